@@ -1,0 +1,335 @@
+"""The rules of the house as functions over a source tree; each returns its violations as lines.
+
+The tree is read with ``ast`` and never imported, so a rule also sees the imports inside functions
+and under ``TYPE_CHECKING``. ``test_architecture.py`` applies the rules to this project, and to
+small trees that break them.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+import tomllib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+SIBLINGS: dict[str, frozenset[str]] = {
+    "go2_wbc": frozenset(),
+    "motions": frozenset({"go2_wbc"}),
+    "viz": frozenset({"go2_wbc"}),
+    "controller": frozenset({"go2_wbc", "motions", "viz"}),
+}
+"""What each package may import of ours, besides itself."""
+
+LAYERS: tuple[frozenset[str], ...] = (
+    frozenset({"errors"}),
+    frozenset({"legs", "geometry"}),
+    frozenset({"curves", "contacts", "robot", "recording"}),
+    frozenset({"reference"}),
+    frozenset({"planning", "wbc", "plant"}),
+    frozenset({"config"}),
+    frozenset({"__init__"}),
+)
+"""Rooms of the engine, lowest first; a room imports lower layers and itself."""
+
+FENCES: dict[str, tuple[str, ...]] = {
+    "mujoco": (
+        "go2_wbc/plant/mujoco_*.py",
+        "go2_wbc/plant/agreement.py",
+        "go2_wbc/plant/viewer.py",
+    ),
+    "meshcat": ("viz/*",),
+    "placo": ("go2_wbc/wbc/placo_backend.py", "go2_wbc/robot/inverse_kinematics.py"),
+    "rclpy": ("controller/bridges/*",),
+    "cyclonedds": ("controller/bridges/*",),
+}
+"""The only files that may import each of these libraries."""
+
+DISTRIBUTIONS = {"pinocchio": "pin", "PIL": "pillow", "collada": "pycollada"}
+"""What to install for an import name, where the two differ."""
+
+OPTIONAL = frozenset({"rclpy", "cyclonedds", "pytest"})
+"""Libraries that are imported only by those who have them; their fences keep them apart."""
+
+PRINTERS = (
+    "controller/cli/*",
+    "controller/demo*",
+    "controller/bench/*",
+    "controller/examples/*",
+)
+"""Files that talk to a person and may print."""
+
+MAX_FILE_LINES = 400
+MAX_BODY_LINES = 70
+MAX_BODY_LINES_P90 = 30
+
+_FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+
+
+@dataclass(frozen=True, slots=True)
+class Module:
+    """One source file: its path relative to the root, dotted name, text and syntax tree."""
+
+    path: str
+    name: str
+    text: str
+    tree: ast.Module
+
+    @property
+    def package(self) -> str:
+        """The top-level folder."""
+        return self.name.split(".")[0]
+
+    @property
+    def room(self) -> str:
+        """The part of the package that the file belongs to, ``__init__`` for the package's own."""
+        parts = self.name.split(".")
+        return parts[1] if len(parts) > 1 else "__init__"
+
+
+def read_tree(root: Path, packages: Iterable[str] = SIBLINGS) -> list[Module]:
+    """Every module of ``packages`` under ``root``."""
+    files = (file for package in packages for file in sorted((root / package).rglob("*.py")))
+    return [_read(root, file) for file in files]
+
+
+def _read(root: Path, file: Path) -> Module:
+    relative = file.relative_to(root)
+    parts = relative.with_suffix("").parts
+    name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+    text = file.read_text(encoding="utf-8")
+    return Module(relative.as_posix(), name, text, ast.parse(text, str(file)))
+
+
+def imports(module: Module, known: frozenset[str]) -> Iterator[tuple[int, str]]:
+    """Line and dotted target of each import; a name taken from a package resolves to its module.
+
+    Args:
+        module: the importing module.
+        known: the dotted names of all our modules.
+    """
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = _absolute(module, node)
+            for alias in node.names:
+                full = f"{base}.{alias.name}"
+                yield node.lineno, full if full in known else base
+
+
+def _absolute(module: Module, node: ast.ImportFrom) -> str:
+    if not node.level:
+        return node.module or ""
+    parts = module.name.split(".")
+    is_package = module.path.endswith("/__init__.py")
+    kept = parts[: len(parts) - node.level + is_package]
+    return ".".join([*kept, node.module] if node.module else kept)
+
+
+def _names(modules: Iterable[Module]) -> frozenset[str]:
+    return frozenset(module.name for module in modules)
+
+
+def sibling_violations(modules: list[Module]) -> list[str]:
+    """Imports between the packages that the house does not allow; tests are nobody's import."""
+    known = _names(modules)
+    return [
+        f"{module.path}:{line}: {module.package} must not import {target}"
+        for module in modules
+        for line, target in imports(module, known)
+        if (top := target.split(".")[0]) in SIBLINGS.keys() | {"tests"}
+        and top != module.package
+        and top not in SIBLINGS[module.package]
+    ]
+
+
+def layer_violations(modules: list[Module]) -> list[str]:
+    """Imports of the engine that go up, or across to another room of the same layer."""
+    level = {room: height for height, layer in enumerate(LAYERS) for room in layer}
+    known = _names(modules)
+    found = []
+    for module in (module for module in modules if module.package == "go2_wbc"):
+        if module.room not in level:
+            found.append(f"{module.path}: room {module.room!r} has no layer")
+            continue
+        for line, target in imports(module, known):
+            parts = target.split(".")
+            room = parts[1] if len(parts) > 1 else "__init__"
+            if parts[0] != "go2_wbc" or room == module.room or room not in level:
+                continue
+            if level[room] >= level[module.room]:
+                found.append(f"{module.path}:{line}: {module.room} must not import {room}")
+    return found
+
+
+def cycles(modules: list[Module]) -> list[str]:
+    """Circles among the modules' own imports, each as ``a -> b -> a``."""
+    known = _names(modules)
+    graph = {m.name: sorted({t for _, t in imports(m, known) if t in known}) for m in modules}
+    found: list[str] = []
+    done: set[str] = set()
+
+    def visit(name: str, trail: list[str]) -> None:
+        if name in trail:
+            found.append(" -> ".join([*trail[trail.index(name) :], name]))
+        elif name not in done:
+            for target in graph[name]:
+                visit(target, [*trail, name])
+            done.add(name)
+
+    for name in graph:
+        visit(name, [])
+    return found
+
+
+def fence_violations(modules: list[Module]) -> list[str]:
+    """Third-party libraries imported outside the files that own them."""
+    known = _names(modules)
+    return [
+        f"{module.path}:{line}: {top} belongs in {', '.join(FENCES[top])}"
+        for module in modules
+        for line, target in imports(module, known)
+        if (top := target.split(".")[0]) in FENCES and not _matches(module.path, FENCES[top])
+    ]
+
+
+def undeclared_libraries(
+    modules: list[Module], pyproject: str, stdlib: frozenset[str]
+) -> list[str]:
+    """Third-party imports that ``pyproject`` does not list as a dependency."""
+    rows = tomllib.loads(pyproject)["project"]["dependencies"]
+    declared = {re.split(r"[^A-Za-z0-9._-]", row.strip())[0] for row in rows}
+    known = _names(modules)
+    allowed = stdlib | OPTIONAL | SIBLINGS.keys()
+    return [
+        f"{module.path}:{line}: {top} is not a dependency in pyproject.toml"
+        for module in modules
+        for line, target in imports(module, known)
+        if (top := target.split(".")[0]) not in allowed
+        and DISTRIBUTIONS.get(top, top) not in declared
+    ]
+
+
+def missing_inits(root: Path, packages: Iterable[str] = SIBLINGS) -> list[str]:
+    """Folders with modules but without ``__init__.py``: pip would leave them out of a wheel."""
+    folders = {file.parent for package in packages for file in (root / package).rglob("*.py")}
+    return [
+        f"{folder.relative_to(root).as_posix()}: no __init__.py"
+        for folder in sorted(folders)
+        if not (folder / "__init__.py").is_file()
+    ]
+
+
+def unpackaged_files(root: Path, pyproject: str, packages: Iterable[str] = SIBLINGS) -> list[str]:
+    """Data files beside the modules that no ``package-data`` pattern puts into the wheel."""
+    patterns = tomllib.loads(pyproject)["tool"]["setuptools"]["package-data"]["*"]
+    suffixes = {".py", ".pyc", *(Path(pattern).suffix for pattern in patterns)}
+    files = (file for package in packages for file in sorted((root / package).rglob("*")))
+    return [
+        f"{file.relative_to(root).as_posix()}: not covered by package-data in pyproject.toml"
+        for file in files
+        if file.is_file() and file.suffix not in suffixes
+    ]
+
+
+def long_files(modules: Iterable[Module]) -> list[str]:
+    """Files of more than ``MAX_FILE_LINES`` lines."""
+    return [
+        f"{module.path}: {count} lines, at most {MAX_FILE_LINES}"
+        for module in modules
+        if (count := len(module.text.splitlines())) > MAX_FILE_LINES
+    ]
+
+
+def body_sizes(modules: Iterable[Module]) -> dict[str, int]:
+    """Lines of each function's body, without its docstring."""
+    return {
+        f"{module.path}:{node.lineno}: {node.name}": _body_lines(node)
+        for module in modules
+        for node in ast.walk(module.tree)
+        if isinstance(node, _FUNCTIONS)
+    }
+
+
+def _body_lines(node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    body = node.body[1:] if ast.get_docstring(node) is not None else node.body
+    if not body:
+        return 0
+    return (body[-1].end_lineno or body[-1].lineno) - body[0].lineno + 1
+
+
+def long_functions(modules: Iterable[Module]) -> list[str]:
+    """Function bodies over the hard limit, and the largest tenth if the 90th percentile is over."""
+    sizes = body_sizes(modules)
+    ranked = sorted(sizes.values())
+    found = [
+        f"{where}: body of {count} lines, at most {MAX_BODY_LINES}"
+        for where, count in sizes.items()
+        if count > MAX_BODY_LINES
+    ]
+    percentile = ranked[math.ceil(0.9 * len(ranked)) - 1] if ranked else 0
+    if percentile > MAX_BODY_LINES_P90:
+        found.append(f"90th percentile of the bodies: {percentile}, at most {MAX_BODY_LINES_P90}")
+        found += [f"{where}: {count}" for where, count in sizes.items() if count >= percentile]
+    return found
+
+
+def missing_docstrings(modules: Iterable[Module]) -> list[str]:
+    """Public modules, classes and functions without a docstring; a file without code needs none."""
+    found = []
+    for module in modules:
+        if module.tree.body and ast.get_docstring(module.tree) is None:
+            found.append(f"{module.path}: no module docstring")
+        found += [
+            f"{module.path}:{node.lineno}: {node.name} has no docstring"
+            for node in _public_definitions(module.tree)
+            if ast.get_docstring(node) is None
+        ]
+    return found
+
+
+def _public_definitions(
+    scope: ast.Module | ast.ClassDef,
+) -> Iterator[ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef]:
+    for node in scope.body:
+        if isinstance(node, (ast.ClassDef, *_FUNCTIONS)) and not node.name.startswith("_"):
+            if not _is_described_elsewhere(node):
+                yield node
+            if isinstance(node, ast.ClassDef):
+                yield from _public_definitions(node)
+
+
+def _is_described_elsewhere(node: ast.AST) -> bool:
+    decorators = {ast.unparse(item) for item in getattr(node, "decorator_list", [])}
+    return any(name.split(".")[-1] in {"override", "overload", "setter"} for name in decorators)
+
+
+def prints(modules: Iterable[Module]) -> list[str]:
+    """Calls of ``print`` in library code."""
+    return [
+        f"{module.path}:{node.lineno}: library code logs, it does not print"
+        for module in modules
+        if not _matches(module.path, PRINTERS)
+        for node in ast.walk(module.tree)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id == "print"
+    ]
+
+
+def asserts(modules: Iterable[Module]) -> list[str]:
+    """``assert`` statements: they vanish under ``python -O``, so they belong in tests only."""
+    return [
+        f"{module.path}:{node.lineno}: assert outside the tests"
+        for module in modules
+        for node in ast.walk(module.tree)
+        if isinstance(node, ast.Assert)
+    ]
+
+
+def _matches(path: str, patterns: Iterable[str]) -> bool:
+    return any(fnmatchcase(path, pattern) for pattern in patterns)

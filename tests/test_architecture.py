@@ -1,0 +1,255 @@
+"""The house stays as it is drawn: who imports whom, how long things are, what is documented.
+
+Each rule is tested twice: this project keeps it, and a small tree that breaks it is caught.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests import architecture_rules as rules
+
+ROOT = Path(__file__).resolve().parent.parent
+STDLIB = frozenset(sys.stdlib_module_names)
+PYPROJECT = '[project]\ndependencies = ["numpy>=2,<3", "pin", "pillow[webp]==11"]\n'
+
+
+@pytest.fixture(scope="module")
+def project() -> list[rules.Module]:
+    return rules.read_tree(ROOT)
+
+
+def synthetic(tmp_path: Path, files: dict[str, str]) -> list[rules.Module]:
+    for name, text in files.items():
+        file = tmp_path / name
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+    return rules.read_tree(tmp_path)
+
+
+def function_of(lines: int, name: str = "f") -> str:
+    body = "    x = 1\n" * lines
+    return f'def {name}():\n    """Say.\n\n    More.\n    """\n{body}\n'
+
+
+# --- this project keeps the rules ---------------------------------------------------------------
+
+
+def test_the_checker_sees_all_four_packages(project: list[rules.Module]) -> None:
+    assert {module.package for module in project} == set(rules.SIBLINGS)
+    assert "go2_wbc.errors" in {module.name for module in project}
+
+
+def test_packages_import_only_the_siblings_they_may(project: list[rules.Module]) -> None:
+    assert rules.sibling_violations(project) == []
+
+
+def test_the_engine_imports_only_downwards(project: list[rules.Module]) -> None:
+    assert rules.layer_violations(project) == []
+
+
+def test_no_modules_import_each_other_in_a_circle(project: list[rules.Module]) -> None:
+    assert rules.cycles(project) == []
+
+
+def test_third_party_libraries_stay_behind_their_fences(project: list[rules.Module]) -> None:
+    assert rules.fence_violations(project) == []
+
+
+def test_every_imported_library_is_a_declared_dependency(project: list[rules.Module]) -> None:
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert rules.undeclared_libraries(project, text, STDLIB) == []
+
+
+def test_every_folder_with_modules_is_a_package() -> None:
+    assert rules.missing_inits(ROOT, [*rules.SIBLINGS, "tests"]) == []
+
+
+def test_every_data_file_is_packaged() -> None:
+    text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert rules.unpackaged_files(ROOT, text) == []
+
+
+def test_no_file_is_too_long(project: list[rules.Module]) -> None:
+    assert rules.long_files([*project, *rules.read_tree(ROOT, ["tests"])]) == []
+
+
+def test_functions_stay_small(project: list[rules.Module]) -> None:
+    assert rules.long_functions(project) == []
+
+
+def test_everything_public_has_a_docstring(project: list[rules.Module]) -> None:
+    assert rules.missing_docstrings(project) == []
+
+
+def test_library_code_does_not_print(project: list[rules.Module]) -> None:
+    assert rules.prints(project) == []
+
+
+def test_assert_is_used_in_tests_only(project: list[rules.Module]) -> None:
+    assert rules.asserts(project) == []
+
+
+# --- each rule catches a tree that breaks it ----------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("path", "statement"),
+    [
+        ("go2_wbc/legs.py", "import motions"),
+        ("go2_wbc/legs.py", "from controller.cli import main"),
+        ("motions/bow.py", "import viz.scene"),
+        ("viz/scene.py", "from motions import Timeline"),
+        ("motions/bow.py", "def f():\n    from controller import GO2Controller"),
+        ("controller/loop.py", "from tests import conftest"),
+    ],
+)
+def test_a_forbidden_sibling_is_caught(tmp_path: Path, path: str, statement: str) -> None:
+    found = rules.sibling_violations(synthetic(tmp_path, {path: statement}))
+    assert len(found) == 1
+    assert found[0].startswith(f"{path}:")
+
+
+def test_an_allowed_sibling_is_not_reported(tmp_path: Path) -> None:
+    files = {
+        "motions/bow.py": "from go2_wbc.legs import Leg",
+        "controller/loop.py": "import viz\nimport motions.bow\nfrom controller import modes",
+    }
+    assert rules.sibling_violations(synthetic(tmp_path, files)) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "statement"),
+    [
+        ("go2_wbc/errors.py", "import go2_wbc.legs"),
+        ("go2_wbc/legs.py", "from go2_wbc import config"),
+        ("go2_wbc/robot/model.py", "from go2_wbc.contacts import Gait"),
+        ("go2_wbc/planning/mpc.py", "from ..wbc import tasks"),
+        ("go2_wbc/wbc/qp.py", "def f():\n    from go2_wbc.plant.base import Plant"),
+        ("go2_wbc/curves.py", "from go2_wbc import Everything"),
+        ("go2_wbc/recording.py", "from go2_wbc.robot.state import RobotState"),
+    ],
+)
+def test_an_import_upwards_or_sideways_is_caught(tmp_path: Path, path: str, statement: str) -> None:
+    rooms = {f"go2_wbc/{room}.py": "" for room in ("errors", "legs", "contacts", "config")}
+    rooms["go2_wbc/wbc/tasks.py"] = ""
+    found = rules.layer_violations(synthetic(tmp_path, {**rooms, path: statement}))
+    assert len(found) == 1
+    assert found[0].startswith(f"{path}:")
+
+
+def test_a_room_without_a_layer_is_caught(tmp_path: Path) -> None:
+    found = rules.layer_violations(synthetic(tmp_path, {"go2_wbc/attic/junk.py": ""}))
+    assert found == ["go2_wbc/attic/junk.py: room 'attic' has no layer"]
+
+
+def test_imports_downwards_and_inside_a_room_are_free(tmp_path: Path) -> None:
+    files = {
+        "go2_wbc/config.py": "from go2_wbc import legs\nfrom go2_wbc.wbc.qp import solve",
+        "go2_wbc/legs.py": "",
+        "go2_wbc/wbc/qp.py": "from .tasks import Task\nfrom go2_wbc.robot.state import RobotState",
+        "go2_wbc/wbc/tasks.py": "",
+    }
+    assert rules.layer_violations(synthetic(tmp_path, files)) == []
+
+
+def test_a_circle_inside_a_room_is_caught_even_through_a_function(tmp_path: Path) -> None:
+    files = {
+        "go2_wbc/wbc/a.py": "from go2_wbc.wbc.b import x",
+        "go2_wbc/wbc/b.py": "from . import c",
+        "go2_wbc/wbc/c.py": "def f():\n    import go2_wbc.wbc.a",
+        "go2_wbc/wbc/__init__.py": "from go2_wbc.wbc.a import x",
+    }
+    found = rules.cycles(synthetic(tmp_path, files))
+    assert found == ["go2_wbc.wbc.a -> go2_wbc.wbc.b -> go2_wbc.wbc.c -> go2_wbc.wbc.a"]
+
+
+@pytest.mark.parametrize(
+    ("path", "statement"),
+    [
+        ("go2_wbc/plant/sensors.py", "import mujoco"),
+        ("controller/loop.py", "import mujoco.viewer as v"),
+        ("go2_wbc/wbc/qp.py", "import placo"),
+        ("motions/compile.py", "from placo import KinematicsSolver"),
+        ("controller/cli/preview.py", "def f():\n    import meshcat"),
+        ("controller/loop.py", "import rclpy"),
+    ],
+)
+def test_a_library_outside_its_fence_is_caught(tmp_path: Path, path: str, statement: str) -> None:
+    assert len(rules.fence_violations(synthetic(tmp_path, {path: statement}))) == 1
+
+
+def test_a_library_inside_its_fence_is_not_reported(tmp_path: Path) -> None:
+    files = {
+        "go2_wbc/plant/mujoco_plant.py": "import mujoco",
+        "go2_wbc/plant/viewer.py": "import mujoco.viewer",
+        "viz/scene/meshes.py": "import meshcat",
+        "controller/bridges/ros2.py": "import rclpy",
+    }
+    assert rules.fence_violations(synthetic(tmp_path, files)) == []
+
+
+def test_an_undeclared_library_is_caught(tmp_path: Path) -> None:
+    files = {"viz/plots.py": "import ast\nimport numpy\nimport PIL\nimport pinocchio\nimport scipy"}
+    found = rules.undeclared_libraries(synthetic(tmp_path, files), PYPROJECT, STDLIB)
+    assert found == ["viz/plots.py:5: scipy is not a dependency in pyproject.toml"]
+
+
+def test_a_folder_without_init_is_caught(tmp_path: Path) -> None:
+    synthetic(tmp_path, {"viz/__init__.py": "", "viz/overlays/arrows.py": ""})
+    assert rules.missing_inits(tmp_path) == ["viz/overlays: no __init__.py"]
+
+
+def test_a_data_file_that_no_pattern_covers_is_caught(tmp_path: Path) -> None:
+    synthetic(tmp_path, {"viz/assets/page.html": "", "viz/assets/font.woff": "", "viz/a.py": ""})
+    text = '[tool.setuptools.package-data]\n"*" = ["**/*.html"]\n'
+    assert rules.unpackaged_files(tmp_path, text) == [
+        "viz/assets/font.woff: not covered by package-data in pyproject.toml"
+    ]
+
+
+def test_a_file_one_line_too_long_is_caught(tmp_path: Path) -> None:
+    files = {"viz/a.py": "x = 1\n" * 400, "viz/b.py": "x = 1\n" * 401}
+    assert rules.long_files(synthetic(tmp_path, files)) == ["viz/b.py: 401 lines, at most 400"]
+
+
+def test_a_body_one_line_too_long_is_caught_and_its_docstring_is_free(tmp_path: Path) -> None:
+    small = "".join(function_of(1, f"g{index}") for index in range(30))
+    files = {"viz/a.py": function_of(70) + small, "viz/b.py": function_of(71) + small}
+    assert rules.long_functions(synthetic(tmp_path, files)) == [
+        "viz/b.py:1: f: body of 71 lines, at most 70"
+    ]
+
+
+def test_many_long_bodies_are_caught_by_the_percentile(tmp_path: Path) -> None:
+    nine_small = "".join(function_of(1, f"g{index}") for index in range(9))
+    just_kept = synthetic(tmp_path / "kept", {"viz/a.py": nine_small + function_of(31)})
+    broken = synthetic(tmp_path / "broken", {"viz/a.py": nine_small + function_of(31) * 2})
+    assert rules.long_functions(just_kept) == []
+    assert rules.long_functions(broken)[0].startswith("90th percentile of the bodies: 31")
+
+
+def test_missing_docstrings_are_caught(tmp_path: Path) -> None:
+    text = "class A:\n    def f(self): ...\n    def _g(self): ...\n\ndef h(): ...\ndef _k(): ...\n"
+    modules = synthetic(tmp_path, {"viz/a.py": text, "viz/__init__.py": ""})
+    assert rules.missing_docstrings(modules) == [
+        "viz/a.py: no module docstring",
+        "viz/a.py:1: A has no docstring",
+        "viz/a.py:2: f has no docstring",
+        "viz/a.py:5: h has no docstring",
+    ]
+
+
+def test_print_is_caught_in_the_library_and_free_in_the_command_line(tmp_path: Path) -> None:
+    files = {"viz/a.py": "print(1)", "controller/cli/list.py": "print(1)"}
+    assert rules.prints(synthetic(tmp_path, files)) == [
+        "viz/a.py:1: library code logs, it does not print"
+    ]
+
+
+def test_assert_is_caught(tmp_path: Path) -> None:
+    found = rules.asserts(synthetic(tmp_path, {"viz/a.py": "def f(x):\n    assert x\n"}))
+    assert found == ["viz/a.py:2: assert outside the tests"]

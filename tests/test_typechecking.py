@@ -1,0 +1,43 @@
+"""The run-time checks of array shapes are really on under pytest, in the workers of xdist too."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from jaxtyping import TypeCheckError
+
+from go2_wbc.errors import unknown_name
+from go2_wbc.robot.state import JointCommand
+from tests import conftest
+
+checking = pytest.mark.skipif(
+    not conftest.IS_CHECKING, reason="GO2_WBC_TYPECHECK=0 switches the checks off"
+)
+
+
+@checking
+def test_an_array_of_the_wrong_shape_is_refused() -> None:
+    assert JointCommand.torque(np.zeros(12)).tau.shape == (12,)
+    with pytest.raises(TypeCheckError, match="tau"):
+        JointCommand.torque(np.zeros(11))
+
+
+@checking
+def test_an_argument_of_the_wrong_type_is_refused() -> None:
+    with pytest.raises(TypeCheckError):
+        unknown_name("side", 3, ("left", "right"))  # pyright: ignore[reportArgumentType]
+
+
+@checking
+def test_every_module_that_is_loaded_went_through_the_hook() -> None:
+    """A module imported before ``conftest.py``, say by a pytest plugin, would go unchecked."""
+    loaded = [name for name in conftest.checked_modules() if name in sys.modules]
+    loaders = {name: type(sys.modules[name].__loader__).__module__ for name in loaded}
+    assert "go2_wbc.robot.state" in loaded
+    assert {name: found for name, found in loaders.items() if "jaxtyping" not in found} == {}
+
+
+def test_every_exempted_module_exists() -> None:
+    assert set(conftest.our_modules()) >= conftest.UNCHECKED
