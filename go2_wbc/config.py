@@ -1,0 +1,103 @@
+"""All numbers of the engine in one value, with overrides from TOML.
+
+Each part is a frozen dataclass beside its consumer, where units and provenance are written. A file
+overrides what it names and nothing else:
+
+    [locomotion]
+    height = 0.27
+
+    [wbc]
+    solver = "proxqp"
+    swing_foot = { kp = [400, 400, 400], kd = [35, 35, 35] }
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from go2_wbc.errors import ConfigError, unknown_name
+from go2_wbc.planning.command import VelocityEnvelope
+from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.robot.safety import SafetyConfig
+from go2_wbc.wbc.config import WbcConfig
+
+_Part = TypeVar("_Part")
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """The engine's numbers.
+
+    Attributes:
+        wbc: whole-body controller.
+        locomotion: locomotion planner.
+        envelope: velocity commands that are followed.
+        safety: when to give up.
+        backend: whole-body back end: condensed, full or placo.
+    """
+
+    wbc: WbcConfig = field(default_factory=WbcConfig)
+    locomotion: LocomotionConfig = field(default_factory=LocomotionConfig)
+    envelope: VelocityEnvelope = field(default_factory=VelocityEnvelope)
+    safety: SafetyConfig = field(default_factory=SafetyConfig)
+    backend: str = "condensed"
+
+
+def load_config(path: Path | str) -> Config:
+    """The default configuration with the overrides of a TOML file.
+
+    Raises:
+        ConfigError: if the file cannot be read, names an unknown key, or has a wrong value.
+    """
+    try:
+        overrides = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"cannot read the configuration {path}: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path} is not valid TOML: {error}") from error
+    return override(Config(), overrides, where=str(path))
+
+
+def override(part: _Part, values: Mapping[str, Any], where: str) -> _Part:
+    """A copy of the dataclass ``part`` with ``values`` put in, nested tables included.
+
+    Args:
+        part: a frozen dataclass.
+        values: new values by field name; a mapping overrides a nested dataclass.
+        where: what to call this place in an error.
+
+    Raises:
+        ConfigError: for an unknown key, or a value of another type than the field's.
+    """
+    fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(part)}  # type: ignore[arg-type]
+    changes = {}
+    for key, value in values.items():
+        if key not in fields:
+            raise ConfigError(f"{where}: {unknown_name('key', key, fields)}")
+        changes[key] = _convert(fields[key], value, f"{where}: {key}")
+    return dataclasses.replace(part, **changes)  # type: ignore[type-var]
+
+
+def _convert(current: object, value: object, where: str) -> object:
+    if dataclasses.is_dataclass(current):
+        if not isinstance(value, Mapping):
+            raise ConfigError(f"{where} must be a table, got {value!r}")
+        return override(current, value, where)
+    if isinstance(current, tuple):
+        if not isinstance(value, list) or len(value) != len(current):
+            raise ConfigError(f"{where} must be a list of {len(current)} numbers, got {value!r}")
+        return tuple(_convert(c, v, where) for c, v in zip(current, value, strict=True))
+    if isinstance(current, float):
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise ConfigError(f"{where} must be a finite number, got {value!r}")
+        return float(value)
+    if type(value) is not type(current):
+        expected = type(current).__name__
+        raise ConfigError(f"{where} must be of type {expected}, got {value!r}")
+    return value

@@ -1,0 +1,153 @@
+"""Who touches the ground when: contact schedules as data.
+
+A schedule is a list of events (a time, and the feet in stance from then on). Intervals are
+half-open: at the exact time of an event the new mode is in force; times within ``TIE`` of an event
+count as the event. A periodic schedule (a gait) repeats; any other holds its first and last mode.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from go2_wbc.errors import CommandError, unknown_name
+from go2_wbc.legs import LEGS
+
+TIE = 1e-9
+"""Times this close [s] to an event count as the event: absorbs rounding of summed time steps."""
+
+
+@dataclass(frozen=True, slots=True)
+class ContactPhase:
+    """The contacts at one instant.
+
+    Attributes:
+        stance: feet in stance.
+        elapsed: seconds since each foot's last change (inf if it never changed).
+        remaining: seconds until each foot's next change (inf if it never changes).
+    """
+
+    stance: Bool[np.ndarray, "4"]
+    elapsed: Float[np.ndarray, "4"]
+    remaining: Float[np.ndarray, "4"]
+
+    @property
+    def progress(self) -> Float[np.ndarray, "4"]:
+        """Elapsed share of each foot's present interval, in [0, 1); 0 where it has no end."""
+        total = self.elapsed + self.remaining
+        finite = np.isfinite(total) & (total > 0)
+        return np.where(finite, self.elapsed / np.where(finite, total, 1.0), 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class ContactSchedule:
+    """Events in increasing order: from ``times[i]`` on, the feet ``modes[i]`` are in stance.
+
+    Attributes:
+        times: event times [s]; ``times[0]`` is the start (0 for a periodic schedule).
+        modes: (n, 4) feet in stance from each event on.
+        period: seconds after which a gait repeats, or None.
+    """
+
+    times: tuple[float, ...]
+    modes: Bool[np.ndarray, "n 4"]
+    period: float | None = None
+    _changes: tuple[Float[np.ndarray, " k"], ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the order of the events and find each foot's changes."""
+        rising = all(b > a for a, b in zip(self.times[:-1], self.times[1:], strict=True))
+        if not self.times or not rising or len(self.modes) != len(self.times):
+            raise CommandError(f"contact events need increasing times, got {self.times}")
+        changes = tuple(self._changes_of(leg) for leg in LEGS)
+        object.__setattr__(self, "_changes", changes)
+
+    def _changes_of(self, leg: int) -> Float[np.ndarray, " k"]:
+        column = self.modes[:, leg]
+        previous = np.roll(column, 1)
+        if self.period is None:
+            previous[0] = column[0]
+        return np.asarray(self.times, float)[column != previous]
+
+    def at(self, t: float) -> ContactPhase:
+        """The contacts at ``t`` seconds after the schedule's start."""
+        if self.period is not None:
+            t = (t + TIE) % self.period
+            t = max(t - TIE, 0.0)
+        index = max(int(np.searchsorted(self.times, t + TIE, side="right")) - 1, 0)
+        elapsed = np.full(4, np.inf)
+        remaining = np.full(4, np.inf)
+        for leg in LEGS:
+            elapsed[leg], remaining[leg] = self._around(self._changes[leg], t)
+        return ContactPhase(self.modes[index].copy(), elapsed, remaining)
+
+    def _around(self, changes: Float[np.ndarray, " k"], t: float) -> tuple[float, float]:
+        if len(changes) == 0:
+            return np.inf, np.inf
+        after = int(np.searchsorted(changes, t + TIE, side="right"))
+        last = changes[after - 1] if after > 0 else -np.inf
+        upcoming = changes[after] if after < len(changes) else np.inf
+        if self.period is not None:
+            last = changes[-1] - self.period if after == 0 else last
+            upcoming = changes[0] + self.period if after == len(changes) else upcoming
+        return max(t - last, 0.0), upcoming - t
+
+
+@dataclass(frozen=True, slots=True)
+class Gait:
+    """A periodic pattern of steps.
+
+    Attributes:
+        name: what users call it.
+        period: stride period [s].
+        duty: share of the period that a foot is in stance, in (0, 1).
+        offsets: phase in [0, 1) at which each foot (FL, FR, RL, RR) touches down.
+    """
+
+    name: str
+    period: float
+    duty: float
+    offsets: tuple[float, float, float, float]
+
+    @property
+    def stance_time(self) -> float:
+        """Seconds that a foot stands in each stride."""
+        return self.duty * self.period
+
+    @property
+    def swing_time(self) -> float:
+        """Seconds that a foot swings in each stride."""
+        return (1.0 - self.duty) * self.period
+
+    def schedule(self) -> ContactSchedule:
+        """This gait as a periodic schedule that starts at phase 0."""
+        touchdowns = [o % 1.0 for o in self.offsets]
+        liftoffs = [(o + self.duty) % 1.0 for o in self.offsets]
+        phases = np.unique(np.round([0.0, *touchdowns, *liftoffs], 12))
+        phase_of = (phases[:, None] - np.asarray(touchdowns)[None, :] + TIE) % 1.0
+        return ContactSchedule(
+            tuple(float(p) * self.period for p in phases), phase_of < self.duty, self.period
+        )
+
+
+def standing() -> ContactSchedule:
+    """All four feet in stance, for ever."""
+    return ContactSchedule((0.0,), np.ones((1, 4), dtype=bool))
+
+
+GAITS: dict[str, Gait] = {
+    "trot": Gait("trot", period=0.36, duty=0.5, offsets=(0.5, 0.0, 0.0, 0.5)),
+}
+
+
+def find_gait(name: str) -> Gait:
+    """The gait of that name.
+
+    Raises:
+        CommandError: for an unknown name; lists the valid ones.
+    """
+    if name not in GAITS:
+        raise CommandError(unknown_name("gait", name, GAITS))
+    return GAITS[name]

@@ -1,0 +1,134 @@
+"""Every exception of the project, in one tree.
+
+    Go2WbcError
+    ├── ConfigError             a configuration file or value is wrong
+    ├── DescriptionError        robot files are missing, broken or do not match
+    ├── ModelMismatch           a user's MJCF lacks something the controller needs
+    ├── MissingDependency       an optional package is not installed; names the install line
+    ├── CommandError            a command is not finite or not valid
+    ├── ModeError               a call that the present mode does not allow
+    ├── ClosedError             a call after close()
+    ├── QpError
+    │   ├── QpInfeasible        no solution satisfies the constraints; carries residuals
+    │   └── SolverUnavailable   unknown or uninstalled QP solver; lists the valid ones
+    ├── IkError                 an inverse-kinematics target was not reached
+    ├── PlantError
+    │   └── PlantTimeout        the plant stopped answering
+    └── MotionError
+        ├── MotionInfeasible    the motion breaks a limit; carries the findings
+        └── StanceMismatch      the motion starts from another stance
+
+A third-party exception is converted where the library is called (``raise ... from``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+
+class Go2WbcError(Exception):
+    """Base of every error that this project raises on purpose."""
+
+
+class ConfigError(Go2WbcError):
+    """A configuration file or value is wrong."""
+
+
+class DescriptionError(Go2WbcError):
+    """The robot's files are missing, broken, or do not describe a Go2."""
+
+
+class ModelMismatch(Go2WbcError):
+    """A user's MJCF lacks something that the controller needs."""
+
+
+class MissingDependency(Go2WbcError):
+    """An optional package is not installed; the message names the install line."""
+
+
+class CommandError(Go2WbcError, ValueError):
+    """A command is not finite or outside what is valid."""
+
+
+class ModeError(Go2WbcError):
+    """The present mode does not allow this call."""
+
+
+class ClosedError(Go2WbcError):
+    """The object was used after ``close()``."""
+
+
+class QpError(Go2WbcError):
+    """The whole-body QP could not be solved."""
+
+
+@dataclass(frozen=True, slots=True)
+class ResidualRow:
+    """One line of a residual table: what was asked, how far the best answer is from it."""
+
+    name: str
+    norm: float
+    unit: str
+
+
+class QpInfeasible(QpError):
+    """No solution satisfies the constraints of the QP.
+
+    Attributes:
+        solver: name of the solver that gave up.
+        residuals: one row per task and constraint at the solver's last iterate.
+    """
+
+    def __init__(self, solver: str, status: str, residuals: Sequence[ResidualRow] = ()) -> None:
+        self.solver = solver
+        self.status = status
+        self.residuals = tuple(residuals)
+        lines = [f"{solver} found no solution of the whole-body QP ({status})"]
+        lines += [f"  {row.name:<24} {row.norm:12.4g} {row.unit}" for row in self.residuals]
+        super().__init__("\n".join(lines))
+
+
+class SolverUnavailable(QpError):
+    """The QP solver asked for is unknown or not installed."""
+
+
+class IkError(Go2WbcError):
+    """An inverse-kinematics target was not reached.
+
+    Attributes:
+        residuals: how far each target is missed.
+    """
+
+    def __init__(self, message: str, residuals: Sequence[ResidualRow] = ()) -> None:
+        self.residuals = tuple(residuals)
+        super().__init__(message)
+
+
+class PlantError(Go2WbcError):
+    """The robot or simulator failed."""
+
+
+class PlantTimeout(PlantError):
+    """The plant stopped answering."""
+
+
+class MotionError(Go2WbcError):
+    """A motion cannot be played."""
+
+
+class MotionInfeasible(MotionError):
+    """The motion breaks a limit; ``findings`` says which, where and when."""
+
+    def __init__(self, name: str, findings: Sequence[object]) -> None:
+        self.findings = tuple(findings)
+        super().__init__("\n  ".join([f"motion {name!r} is infeasible:", *map(str, findings)]))
+
+
+class StanceMismatch(MotionError):
+    """The motion starts from another stance than the robot is in."""
+
+
+def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
+    """Message for a name that does not exist, with the names that do."""
+    return f"unknown {kind} {name!r}; valid: {', '.join(sorted(valid))}"

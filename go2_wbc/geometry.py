@@ -1,0 +1,62 @@
+"""Plane geometry of the support polygon: convex hull and the signed distance of a point to it."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+
+def convex_hull(points: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "h 2"]:
+    """Corners of the convex hull, counter-clockwise; points on an edge are left out.
+
+    Source: monotone chain (Andrew 1979, "Another efficient algorithm for convex hulls in two
+    dimensions"). Fewer than three corners come back if all points lie on a line.
+    """
+    ordered = np.unique(points, axis=0)
+    if len(ordered) <= 2:
+        return ordered
+    return np.array(_chain(ordered)[:-1] + _chain(ordered[::-1])[:-1])
+
+
+def support_margin(points: Float[np.ndarray, "k 2"], p: Float[np.ndarray, "2"]) -> float:
+    """Distance [m] from ``p`` to the border of the convex hull of ``points``.
+
+    Positive inside, negative outside. On a hull without area (one point, or all on a line)
+    nothing is inside, and the result is minus the distance to it.
+
+    Args:
+        points: contact points on the ground [m], at least one.
+        p: the point, usually the CoM projected to the ground [m].
+
+    Raises:
+        ValueError: if there is no point.
+    """
+    if len(points) == 0:
+        raise ValueError("a support polygon needs at least one point")
+    hull = convex_hull(points)
+    starts, edges = hull, np.roll(hull, -1, axis=0) - hull
+    squares = np.maximum((edges**2).sum(axis=1), _TINY)
+    along = ((p - starts) * edges).sum(axis=1) / squares
+    nearest = starts + np.clip(along, 0.0, 1.0)[:, None] * edges
+    distance = float(np.linalg.norm(p - nearest, axis=1).min())
+    is_inside = len(hull) >= 3 and bool((_cross(edges, p - starts) >= 0.0).all())
+    return distance if is_inside else -distance
+
+
+_TINY = 1e-300
+"""[m^2] Keeps the division by the square of an edge defined for a hull of one point."""
+
+
+def _chain(ordered: Float[np.ndarray, "k 2"]) -> list[Float[np.ndarray, "2"]]:
+    chain: list[Float[np.ndarray, "2"]] = []
+    for point in ordered:
+        while len(chain) >= 2 and _cross(chain[-1] - chain[-2], point - chain[-2]) <= 0.0:
+            chain.pop()
+        chain.append(point)
+    return chain
+
+
+def _cross(
+    a: Float[np.ndarray, "*k 2"], b: Float[np.ndarray, "*k 2"]
+) -> Float[np.ndarray, "*k"] | np.floating:
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

@@ -1,0 +1,180 @@
+"""What to track now: the hub type between everything that plans and the controller.
+
+Gaits, motions, teleoperation and remote commands all end in a ``Reference``; the whole-body
+controller starts from one. ``JointReference`` is its little sister for the phases in which the trunk
+lies on the ground and no contact model holds.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, replace
+from enum import Enum, IntEnum
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from go2_wbc.robot.rotations import yaw_rotation
+
+
+class Stance(Enum):
+    """Resting postures between which motions lead."""
+
+    LIE = "lie"
+    SIT = "sit"
+    STAND = "stand"
+
+
+class LegTask(IntEnum):
+    """What a leg is asked to do."""
+
+    STANCE = 0
+    SWING = 1
+    JOINTS = 2
+
+
+class TrackedPoint(Enum):
+    """Which point of the trunk ``BodyTarget.p_world`` speaks of."""
+
+    COM = "com"
+    BASE = "base"
+
+
+@dataclass(frozen=True, slots=True)
+class BodyTarget:
+    """Desired motion of the trunk, everything in the world frame.
+
+    Attributes:
+        point: whether position means the CoM or the origin of the base.
+        p_world: position [m].
+        v_world: linear velocity [m/s].
+        a_world: linear acceleration [m/s^2].
+        R_world_base: orientation.
+        w_world: angular velocity [rad/s].
+        dw_world: angular acceleration [rad/s^2].
+    """
+
+    point: TrackedPoint
+    p_world: Float[np.ndarray, "3"]
+    v_world: Float[np.ndarray, "3"]
+    a_world: Float[np.ndarray, "3"]
+    R_world_base: Float[np.ndarray, "3 3"]
+    w_world: Float[np.ndarray, "3"]
+    dw_world: Float[np.ndarray, "3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """Everything that the whole-body controller is asked for at one instant.
+
+    Attributes:
+        body: desired motion of the trunk.
+        legs: what each leg does.
+        normal_force_min: least normal force [N] of each stance foot.
+        normal_force_max: greatest normal force [N] of each stance foot (ramped at changes).
+        p_world_feet: desired foot positions [m], used for legs in SWING.
+        v_world_feet: their velocities [m/s].
+        a_world_feet: their accelerations [m/s^2].
+        q_joints: desired joint angles [rad], used for legs in JOINTS.
+        v_joints: their velocities [rad/s].
+        a_joints: their accelerations [rad/s^2].
+    """
+
+    body: BodyTarget
+    legs: tuple[LegTask, LegTask, LegTask, LegTask]
+    normal_force_min: Float[np.ndarray, "4"]
+    normal_force_max: Float[np.ndarray, "4"]
+    p_world_feet: Float[np.ndarray, "4 3"]
+    v_world_feet: Float[np.ndarray, "4 3"]
+    a_world_feet: Float[np.ndarray, "4 3"]
+    q_joints: Float[np.ndarray, "12"]
+    v_joints: Float[np.ndarray, "12"]
+    a_joints: Float[np.ndarray, "12"]
+
+    @property
+    def stance(self) -> Bool[np.ndarray, "4"]:
+        """Feet in stance."""
+        return np.array([task is LegTask.STANCE for task in self.legs])
+
+    def placed(self, anchor: Anchor) -> Reference:
+        """This reference, given in the frame of a motion, in the world."""
+        R = yaw_rotation(anchor.yaw)
+        body = self.body
+        return replace(
+            self,
+            body=BodyTarget(
+                point=body.point,
+                p_world=anchor.p_world + R @ body.p_world,
+                v_world=R @ body.v_world,
+                a_world=R @ body.a_world,
+                R_world_base=R @ body.R_world_base,
+                w_world=R @ body.w_world,
+                dw_world=R @ body.dw_world,
+            ),
+            p_world_feet=anchor.p_world + self.p_world_feet @ R.T,
+            v_world_feet=self.v_world_feet @ R.T,
+            a_world_feet=self.a_world_feet @ R.T,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Anchor:
+    """Where a motion takes place: its frame has z up, x ahead, and its origin on the ground.
+
+    Attributes:
+        p_world: the origin: the middle of the feet on the ground [m].
+        yaw: heading of the feet [rad].
+    """
+
+    p_world: Float[np.ndarray, "3"]
+    yaw: float
+
+    @staticmethod
+    def of_feet(p_world_feet: Float[np.ndarray, "4 3"], foot_radius: float) -> Anchor:
+        """The anchor below four standing feet, given their centres [m] and radius [m]."""
+        middle = p_world_feet.mean(axis=0)
+        middle[2] -= foot_radius
+        ahead = p_world_feet[:2].mean(axis=0) - p_world_feet[2:].mean(axis=0)
+        return Anchor(middle, float(np.arctan2(ahead[1], ahead[0])))
+
+
+class MotionPlan(ABC):
+    """A motion, ready to be played: a reference for every instant, in the motion's own frame.
+
+    Attributes:
+        name: what users call it.
+        entry: stance in which it starts.
+        exit: stance in which it ends.
+        duration: [s].
+    """
+
+    name: str
+    entry: Stance
+    exit: Stance
+    duration: float
+
+    @abstractmethod
+    def at(self, t: float) -> Reference:
+        """The reference ``t`` seconds after the start; the ends are held outside [0, duration]."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointReference:
+    """Joint targets for a servo: no contact model, no balance.
+
+    Attributes:
+        q_joints: desired joint angles [rad].
+        v_joints: desired joint velocities [rad/s].
+        kp: stiffness [N m/rad].
+        kd: damping [N m s/rad].
+    """
+
+    q_joints: Float[np.ndarray, "12"]
+    v_joints: Float[np.ndarray, "12"]
+    kp: float
+    kd: float
+
+    @property
+    def stance(self) -> Bool[np.ndarray, "4"]:
+        """No foot is planned to carry the robot."""
+        return np.zeros(4, dtype=bool)

@@ -1,0 +1,156 @@
+"""Finds the Go2's real URDF, SRDF and meshes, and checks that they describe a Go2.
+
+Every model of the project (Pinocchio, MuJoCo, PlaCo, meshcat) is built from the files named here,
+so that any two of them can be compared number by number.
+"""
+
+from __future__ import annotations
+
+import sys
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from pathlib import Path
+
+from go2_wbc.errors import DescriptionError
+from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
+
+BASE_LINK = "base"
+INSTALL_LINE = "pip install example-robot-data"
+_SHARE = Path("cmeel.prefix") / "share"
+_ROBOT = Path("example-robot-data") / "robots" / "go2_description"
+_PACKAGE_PREFIX = "package://"
+
+
+@dataclass(frozen=True, slots=True)
+class RobotDescription:
+    """Where the robot's files are, and the few facts that every model of it needs.
+
+    Attributes:
+        urdf_path: the URDF.
+        srdf_path: the SRDF, or ``None`` if there is none.
+        package_dirs: folders against which ``package://`` mesh names resolve, first match wins.
+        disabled_pairs: pairs of links that the SRDF excludes from collision.
+        efforts: torque limit of each joint [N m], in the order of ``JOINT_NAMES``.
+        speeds: speed limit of each joint [rad/s], in the order of ``JOINT_NAMES``.
+    """
+
+    urdf_path: Path
+    srdf_path: Path | None
+    package_dirs: tuple[Path, ...]
+    disabled_pairs: tuple[tuple[str, str], ...]
+    efforts: tuple[float, ...]
+    speeds: tuple[float, ...]
+
+    def mesh_path(self, filename: str) -> Path:
+        """The file that a mesh name of the URDF means.
+
+        Args:
+            filename: a ``package://`` name, or a path absolute or relative to the URDF.
+
+        Raises:
+            DescriptionError: if no such file exists.
+        """
+        if filename.startswith(_PACKAGE_PREFIX):
+            relative = filename.removeprefix(_PACKAGE_PREFIX)
+            candidates = [folder / relative for folder in self.package_dirs]
+        else:
+            candidates = [self.urdf_path.parent / filename.removeprefix("file://")]
+        for path in candidates:
+            if path.is_file():
+                return path
+        tried = ", ".join(map(str, candidates))
+        raise DescriptionError(f"{self.urdf_path}: mesh {filename!r} not found; tried {tried}")
+
+
+def find_description(urdf: Path | None = None) -> RobotDescription:
+    """The description of the Go2: the installed one, or a user's own URDF.
+
+    A user's URDF uses the SRDF beside it (``<name>.srdf`` or ``../srdf/<name>.srdf``), else the
+    installed SRDF, if any.
+
+    Args:
+        urdf: a user's URDF; ``None`` takes the one of the ``example-robot-data`` wheel.
+
+    Raises:
+        DescriptionError: if files are missing, unreadable, or lack a joint or foot of the Go2.
+    """
+    share = _find_share()
+    if urdf is None:
+        if share is None:
+            raise DescriptionError(f"no Go2 description in this environment; {INSTALL_LINE}")
+        urdf = share / _ROBOT / "urdf" / "go2.urdf"
+    urdf = Path(urdf).resolve()
+    own = () if share is not None and urdf.is_relative_to(share) else tuple(urdf.parents)
+    root = _parse(urdf, "URDF")
+    _check_names(urdf, root)
+    srdf = _find_srdf(urdf, share)
+    return RobotDescription(
+        urdf_path=urdf,
+        srdf_path=srdf,
+        package_dirs=own if share is None else (share, *own),
+        disabled_pairs=() if srdf is None else parse_disabled_pairs(srdf),
+        efforts=_limits(urdf, root, "effort"),
+        speeds=_limits(urdf, root, "velocity"),
+    )
+
+
+def parse_disabled_pairs(srdf: Path) -> tuple[tuple[str, str], ...]:
+    """The pairs of links between which an SRDF disables collision.
+
+    Raises:
+        DescriptionError: if the file is missing or broken.
+    """
+    rows = _parse(srdf, "SRDF").iter("disable_collisions")
+    return tuple((row.get("link1", ""), row.get("link2", "")) for row in rows)
+
+
+def _find_share() -> Path | None:
+    for entry in sys.path:
+        share = Path(entry) / _SHARE
+        if (share / _ROBOT / "urdf" / "go2.urdf").is_file():
+            return share.resolve()
+    return None
+
+
+def _find_srdf(urdf: Path, share: Path | None) -> Path | None:
+    name = f"{urdf.stem}.srdf"
+    candidates = [urdf.parent / name, urdf.parent.parent / "srdf" / name]
+    if share is not None:
+        candidates.append(share / _ROBOT / "srdf" / "go2.srdf")
+    return next((path for path in candidates if path.is_file()), None)
+
+
+def _parse(path: Path, kind: str) -> ET.Element:
+    try:
+        root = ET.parse(path).getroot()
+    except OSError as error:
+        reason = error.strerror or error
+        raise DescriptionError(f"cannot read the {kind} {path}: {reason}") from error
+    except ET.ParseError as error:
+        raise DescriptionError(f"{path} is not a valid {kind}: {error}") from error
+    if root.tag != "robot":
+        raise DescriptionError(f"{path} is not a {kind}: its root is <{root.tag}>, not <robot>")
+    return root
+
+
+def _check_names(urdf: Path, root: ET.Element) -> None:
+    joints = {joint.get("name") for joint in root.findall("joint")}
+    links = {link.get("name") for link in root.findall("link")}
+    lacking = [f"joint {name}" for name in JOINT_NAMES if name not in joints]
+    lacking += [f"link {name}" for name in (BASE_LINK, *FOOT_NAMES) if name not in links]
+    if lacking:
+        raise DescriptionError(f"{urdf} does not describe a Go2; it lacks: {', '.join(lacking)}")
+
+
+def _limits(urdf: Path, root: ET.Element, attribute: str) -> tuple[float, ...]:
+    joints = {joint.get("name"): joint for joint in root.findall("joint")}
+    values: list[float] = []
+    for name in JOINT_NAMES:
+        limit = joints[name].find("limit")
+        text = None if limit is None else limit.get(attribute)
+        try:
+            values.append(float(text or ""))
+        except ValueError as error:
+            message = f"{urdf}: joint {name} has no valid {attribute} limit ({text!r})"
+            raise DescriptionError(message) from error
+    return tuple(values)

@@ -1,0 +1,310 @@
+"""Whole-body inverse kinematics for authored poses, by PlaCo's ``KinematicsSolver``.
+
+``solve_pose`` runs Gauss-Newton steps, each a QP with the joint limits and the CoM polygon as hard
+constraints: first with every target soft, so that a far start cannot make it infeasible, then with
+the positions of the feet (and the trunk, if asked) as equalities. It then measures the result with
+Pinocchio, not with PlaCo: unreachable targets would otherwise end in a silent near miss.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+import placo
+from jaxtyping import Float
+
+from go2_wbc.errors import DescriptionError, IkError, ResidualRow
+from go2_wbc.geometry import convex_hull, support_margin
+from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS, Leg
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
+
+_BASE = "base"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PoseTargets:
+    """What a pose must be, in the world frame.
+
+    Attributes:
+        p_world_feet: foot centres [m]; the row of a raised leg is not used.
+        rpy: roll, pitch, yaw [rad] of the trunk.
+        height: height [m] of the base's origin.
+        raised: leg in the air, if any.
+        p_world_paw: foot centre [m] of the raised leg.
+        q_raised: joint angles [rad] of the raised leg, instead of ``p_world_paw``.
+        support: feet that span the polygon for the CoM; by default all that stand.
+        com_margin: least distance [m] of the CoM to the edges of that polygon.
+        joint_margin: least distance [rad] of every joint to its limits.
+        is_body_hard: whether orientation and height hold exactly, or give way to the rest.
+    """
+
+    p_world_feet: Float[np.ndarray, "4 3"]
+    rpy: tuple[float, float, float]
+    height: float
+    raised: Leg | None = None
+    p_world_paw: tuple[float, float, float] | None = None
+    q_raised: tuple[float, float, float] | None = None
+    support: tuple[Leg, ...] | None = None
+    com_margin: float = 0.0
+    joint_margin: float = 0.05
+    is_body_hard: bool = True
+
+    @property
+    def stance(self) -> tuple[Leg, ...]:
+        """Legs on the ground."""
+        return tuple(leg for leg in LEGS if leg is not self.raised)
+
+    @property
+    def polygon(self) -> Float[np.ndarray, "k 2"]:
+        """Points on the ground [m] that span the polygon for the CoM."""
+        return self.p_world_feet[list(self.support or self.stance), :2]
+
+
+@dataclass(frozen=True, slots=True)
+class PoseSolution:
+    """A pose that meets its targets.
+
+    Attributes:
+        q: (19,) base position [m], quaternion x y z w, 12 joint angles [rad].
+        p_world_com: CoM [m].
+        com_margin: distance [m] of the CoM to the edges of the targets' polygon, + inside.
+        residuals: how far each target is missed.
+        iterations: Gauss-Newton steps taken.
+    """
+
+    q: Float[np.ndarray, "19"]
+    p_world_com: Float[np.ndarray, "3"]
+    com_margin: float
+    residuals: tuple[ResidualRow, ...]
+    iterations: int
+
+
+@dataclass(frozen=True, slots=True)
+class IkConfig:
+    """Numbers of the inverse kinematics. Own choice unless said otherwise.
+
+    Attributes:
+        foot_weight: of the soft foot and paw positions, against 1 rad^2 of trunk orientation.
+        body_weight: of the soft trunk height and orientation.
+        posture_weight: pulls the standing legs towards ``q_start``; chooses among equal poses.
+        damping: of each step, keeps the QP definite at singularities.
+        max_step: longest change [rad or m] of a coordinate in one step.
+        converged_step: step [rad or m] below which the iteration has converged.
+        max_iterations: of each of the two phases.
+        position_tolerance: largest error [m] of a foot or of the hard height.
+        angle_tolerance: largest error [rad] of the hard orientation and of joint targets.
+        constraint_tolerance: largest violation [m, rad] of CoM margin and joint limits.
+    """
+
+    foot_weight: float = 1e4
+    body_weight: float = 1.0
+    posture_weight: float = 1e-4
+    damping: float = 1e-6
+    max_step: float = 0.3
+    converged_step: float = 1e-7
+    max_iterations: int = 200
+    position_tolerance: float = 1e-4
+    angle_tolerance: float = 1e-3
+    constraint_tolerance: float = 1e-5
+
+
+def load_placo_robot(model: RobotModel) -> placo.RobotWrapper:
+    """The robot of ``model`` in PlaCo: same URDF, joint limits and armature, no geometry.
+
+    Each foot has an extra frame ``<leg>_contact``, at the foot frame until it is moved.
+
+    Raises:
+        DescriptionError: if PlaCo orders the joints differently.
+    """
+    root = ET.parse(model.description.urdf_path).getroot()
+    for link in root.findall("link"):
+        for geometry in [*link.findall("visual"), *link.findall("collision")]:
+            link.remove(geometry)
+    for leg in LEGS:
+        name = f"{leg.name}_contact"
+        ET.SubElement(root, "link", name=name)
+        joint = ET.SubElement(root, "joint", name=f"{name}_joint", type="fixed")
+        ET.SubElement(joint, "parent", link=leg.foot)
+        ET.SubElement(joint, "child", link=name)
+    text = ET.tostring(root, encoding="unicode")
+    path = str(model.description.urdf_path)
+    robot = placo.RobotWrapper(path, placo.Flags.ignore_collisions, text)
+    names = list(robot.joint_names())
+    if names != list(JOINT_NAMES):
+        raise DescriptionError(f"PlaCo has joints {names}; expected {list(JOINT_NAMES)}")
+    robot.model.armature = model.pin_model.armature
+    _limit_joints(robot, model, 0.0)
+    return robot
+
+
+def solve_pose(
+    model: RobotModel,
+    targets: PoseTargets,
+    q_start: Float[np.ndarray, "19"],
+    config: IkConfig | None = None,
+) -> PoseSolution:
+    """The pose that meets ``targets``, found from ``q_start`` and as near to it as they allow.
+
+    Raises:
+        IkError: if a target is missed by more than its tolerance; the message gives the table.
+        ValueError: if the targets contradict themselves (a raised leg without its target).
+    """
+    config = config or IkConfig()
+    _check(targets)
+    robot = load_placo_robot(model)
+    _limit_joints(robot, model, targets.joint_margin)
+    robot.state.q = q_start
+    robot.update_kinematics()
+    solver, exact_tasks = _formulate(robot, targets, q_start, config)
+    iterations, failure = _iterate(solver, robot, config)
+    if not failure:
+        soft_q = np.array(robot.state.q)
+        for task in exact_tasks:
+            task.configure(task.name, "hard", 1.0)
+        more, failure = _iterate(solver, robot, config)
+        iterations += more
+        if failure:
+            robot.state.q = soft_q
+    return _verified(model, targets, np.array(robot.state.q), (iterations, failure), config)
+
+
+def _check(targets: PoseTargets) -> None:
+    given = (targets.p_world_paw is not None) + (targets.q_raised is not None)
+    if given != (targets.raised is not None):
+        raise ValueError(
+            "a raised leg needs one of p_world_paw and q_raised; other poses need neither"
+        )
+
+
+def _limit_joints(robot: placo.RobotWrapper, model: RobotModel, margin: float) -> None:
+    for name, lower, upper in zip(JOINT_NAMES, model.q_lower, model.q_upper, strict=True):
+        robot.set_joint_limits(name, float(lower + margin), float(upper - margin))
+
+
+def _formulate(
+    robot: placo.RobotWrapper,
+    targets: PoseTargets,
+    q_start: Float[np.ndarray, "19"],
+    config: IkConfig,
+) -> tuple[placo.KinematicsSolver, list[placo.Task]]:
+    """PlaCo's solver with every target soft, and the tasks to be made exact afterwards."""
+    solver = placo.KinematicsSolver(robot)
+    solver.enable_joint_limits(True)
+    exact = []
+    for leg in targets.stance:
+        exact.append(solver.add_position_task(leg.foot, targets.p_world_feet[leg]))
+        exact[-1].configure(leg.foot, "soft", config.foot_weight)
+    if targets.raised is not None:
+        exact.append(_raised_task(solver, targets, targets.raised))
+        exact[-1].configure("raised leg", "soft", config.foot_weight)
+    orientation = solver.add_orientation_task(_BASE, rotation_from_rpy(*targets.rpy))
+    orientation.configure("orientation", "soft", config.body_weight)
+    height = solver.add_position_task(_BASE, np.array([0.0, 0.0, targets.height]))
+    height.mask.set_axises("z")
+    height.configure("height", "soft", config.body_weight)
+    if targets.is_body_hard:
+        exact += [orientation, height]
+    posture = solver.add_joints_task()
+    for leg in targets.stance:
+        posture.set_joints(dict(zip(JOINT_NAMES[leg.joints], q_start[7:][leg.joints], strict=True)))
+    posture.configure("posture", "soft", config.posture_weight)
+    solver.add_regularization_task(config.damping)
+    clockwise = list(convex_hull(targets.polygon)[::-1])
+    polygon = solver.add_com_polygon_constraint(clockwise, targets.com_margin)
+    polygon.configure("CoM polygon", "hard", 1.0)
+    return solver, exact
+
+
+def _raised_task(
+    solver: placo.KinematicsSolver, targets: PoseTargets, leg: Leg
+) -> placo.PositionTask | placo.JointsTask:
+    if targets.q_raised is None:
+        return solver.add_position_task(leg.foot, np.array(targets.p_world_paw))
+    task = solver.add_joints_task()
+    task.set_joints(dict(zip(JOINT_NAMES[leg.joints], targets.q_raised, strict=True)))
+    return task
+
+
+def _iterate(
+    solver: placo.KinematicsSolver, robot: placo.RobotWrapper, config: IkConfig
+) -> tuple[int, str]:
+    """Steps until converged; returns their number and why the QP failed, or an empty text."""
+    for iteration in range(config.max_iterations):
+        try:
+            step = solver.solve(False)
+        except RuntimeError as error:
+            return iteration, str(error)
+        largest = float(np.abs(step).max())
+        step = step * min(1.0, config.max_step / max(largest, config.converged_step))
+        robot.state.q = pin.integrate(robot.model, robot.state.q, step)
+        robot.update_kinematics()
+        if largest < config.converged_step:
+            return iteration + 1, ""
+    return config.max_iterations, ""
+
+
+def _verified(
+    model: RobotModel,
+    targets: PoseTargets,
+    q: Float[np.ndarray, "19"],
+    outcome: tuple[int, str],
+    config: IkConfig,
+) -> PoseSolution:
+    com, feet = model.forward_kinematics(q)
+    margin = support_margin(targets.polygon, com[:2])
+    rows = [*_position_rows(targets, q, feet, config), *_angle_rows(targets, q, config)]
+    short = max(targets.com_margin - margin, 0.0)
+    rows.append((ResidualRow("CoM margin short by", short, "m"), config.constraint_tolerance))
+    beyond = _beyond_limits(model, targets, q)
+    rows.append((ResidualRow("joint limits beyond", beyond, "rad"), config.constraint_tolerance))
+    missed = [(row, limit) for row, limit in rows if not row.norm <= limit]
+    iterations, failure = outcome
+    if missed:
+        table = [f"  {r.name:<20} {r.norm:10.3g} {r.unit} (limit {at:g})" for r, at in missed]
+        why = f" ({failure})" if failure else ""
+        head = f"no pose meets the targets after {iterations} steps{why}"
+        raise IkError("\n".join([head, *table]), [row for row, _ in rows])
+    return PoseSolution(q, com, margin, tuple(row for row, _ in rows), iterations)
+
+
+_Checked = list[tuple[ResidualRow, float]]
+
+
+def _position_rows(
+    targets: PoseTargets,
+    q: Float[np.ndarray, "19"],
+    feet: Float[np.ndarray, "4 3"],
+    config: IkConfig,
+) -> _Checked:
+    at = config.position_tolerance
+    wanted = np.array(targets.p_world_feet)
+    legs = targets.stance
+    if targets.raised is not None and targets.p_world_paw is not None:
+        wanted[targets.raised] = targets.p_world_paw
+        legs = LEGS
+    errors = np.linalg.norm(feet - wanted, axis=1)
+    rows = [(ResidualRow(FOOT_NAMES[leg], float(errors[leg]), "m"), at) for leg in legs]
+    height_error = abs(float(q[2]) - targets.height)
+    limit = at if targets.is_body_hard else np.inf
+    return [*rows, (ResidualRow("height", height_error, "m"), limit)]
+
+
+def _angle_rows(targets: PoseTargets, q: Float[np.ndarray, "19"], config: IkConfig) -> _Checked:
+    R_world_base = pin.Quaternion(q[3:7]).matrix()
+    error = log_rotation(R_world_base.T @ rotation_from_rpy(*targets.rpy))
+    limit = config.angle_tolerance if targets.is_body_hard else np.inf
+    rows = [(ResidualRow("orientation", float(np.linalg.norm(error)), "rad"), limit)]
+    if targets.raised is not None and targets.q_raised is not None:
+        difference = q[7:][targets.raised.joints] - np.array(targets.q_raised)
+        row = ResidualRow("raised joints", float(np.abs(difference).max()), "rad")
+        rows.append((row, config.angle_tolerance))
+    return rows
+
+
+def _beyond_limits(model: RobotModel, targets: PoseTargets, q: Float[np.ndarray, "19"]) -> float:
+    lower, upper = model.q_lower + targets.joint_margin, model.q_upper - targets.joint_margin
+    return float(max((lower - q[7:]).max(), (q[7:] - upper).max(), 0.0))

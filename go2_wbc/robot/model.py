@@ -1,0 +1,136 @@
+"""The Go2 as Pinocchio sees it: limits, geometry, and the per-tick snapshot.
+
+One ``RobotModel`` owns one Pinocchio model and data. ``snapshot(state)`` computes every dynamic
+quantity of the tick with two Pinocchio algorithms (CRBA in the world convention and the nonlinear
+effects); the CoM terms are read off the first rows of the mass matrix, which are the robot's linear
+momentum (Wieber, Tedrake & Kuindersma 2016, eq. 48.16).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from go2_wbc.errors import DescriptionError
+from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
+from go2_wbc.robot.description import RobotDescription, find_description
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import RobotState
+
+FOOT_RADIUS = 0.022
+"""Radius [m] of the spherical foot: the foot mesh's, see the robot description."""
+ROTOR_ARMATURE = np.tile([0.0045, 0.0045, 0.0164], 4)
+"""Reflected rotor inertia [kg m^2] per joint; same provenance as the plant's ``JointDynamics``."""
+HIP_LIMIT = 0.838
+"""Published hip abduction limit [rad]; the URDF's 1.0472 is wider."""
+
+
+class RobotModel:
+    """Constants and dynamics of the robot.
+
+    Attributes:
+        mass: total mass [kg].
+        gravity: 9.81 [m/s^2].
+        torque_limits: (12,) [N m].
+        speed_limits: (12,) [rad/s].
+        q_lower, q_upper: (12,) joint limits [rad], the tighter of URDF and published ones.
+        p_base_hips: (4, 3) hip abduction axes' origins in the base frame [m].
+        hip_width: lateral distance [m] from the abduction axis to the leg plane.
+    """
+
+    def __init__(
+        self,
+        description: RobotDescription | None = None,
+        *,
+        armature: Float[np.ndarray, "12"] = ROTOR_ARMATURE,
+        foot_radius: float = FOOT_RADIUS,
+    ) -> None:
+        """Load the robot.
+
+        Args:
+            description: the robot's files; by default those of the installed package.
+            armature: reflected rotor inertias [kg m^2].
+            foot_radius: radius [m] of the spherical feet; 0 puts contacts at the foot frames.
+
+        Raises:
+            DescriptionError: if the files are missing, broken, or not a Go2's.
+        """
+        self.description = description or find_description()
+        self.foot_radius = foot_radius
+        self.pin_model = _load(self.description.urdf_path)
+        self.pin_model.armature = np.concatenate([np.zeros(6), armature])
+        self._data = self.pin_model.createData()
+        self._foot_frames = [self.pin_model.getFrameId(name) for name in FOOT_NAMES]
+        self._zero_acceleration = np.zeros(18)
+        self._read_constants()
+
+    def _read_constants(self) -> None:
+        model = self.pin_model
+        self.gravity = float(-model.gravity.linear[2])
+        self.mass = float(pin.computeTotalMass(model))
+        self.torque_limits = np.array(model.effortLimit[6:])
+        self.speed_limits = np.array(model.velocityLimit[6:])
+        self.q_lower = np.array(model.lowerPositionLimit[7:])
+        self.q_upper = np.array(model.upperPositionLimit[7:])
+        self.q_lower[0::3] = np.maximum(self.q_lower[0::3], -HIP_LIMIT)
+        self.q_upper[0::3] = np.minimum(self.q_upper[0::3], HIP_LIMIT)
+        hips = [model.jointPlacements[model.getJointId(JOINT_NAMES[3 * leg])] for leg in LEGS]
+        self.p_base_hips = np.array([T.translation for T in hips])
+        thigh = model.jointPlacements[model.getJointId(JOINT_NAMES[1])]
+        self.hip_width = float(abs(thigh.translation[1]))
+        self.p_base_feet_nominal = self.p_base_hips.copy()
+        self.p_base_feet_nominal[:, 1] += self.hip_width * np.array([leg.side for leg in LEGS])
+
+    def snapshot(self, state: RobotState) -> Snapshot:
+        """Every dynamic quantity of ``state``, computed once."""
+        model, data = self.pin_model, self._data
+        q, v = state.q, state.v
+        M = pin.crba(model, data, q, pin.Convention.WORLD)
+        M = np.where(_UPPER, M, M.T)  # CRBA fills the upper triangle only
+        h = np.array(pin.nonLinearEffects(model, data, q, v))
+        pin.forwardKinematics(model, data, q, v, self._zero_acceleration)
+        J_feet = np.empty((4, 6, 18))
+        drift_feet = np.empty((4, 6))
+        p_feet = np.empty((4, 3))
+        for leg, frame in enumerate(self._foot_frames):
+            p_feet[leg] = pin.updateFramePlacement(model, data, frame).translation
+            J_feet[leg] = pin.getFrameJacobian(model, data, frame, _ALIGNED)
+            drift_feet[leg] = pin.getFrameClassicalAcceleration(model, data, frame, _ALIGNED).vector
+        return Snapshot.build(state, M, h, p_feet, J_feet, drift_feet, self._constants)
+
+    @property
+    def _constants(self) -> tuple[float, float, float]:
+        return self.mass, self.gravity, self.foot_radius
+
+    def forward_kinematics(
+        self, q: Float[np.ndarray, "19"]
+    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4 3"]]:
+        """CoM (3,) and foot centres (4, 3) in the world [m] at configuration ``q``."""
+        com = np.array(pin.centerOfMass(self.pin_model, self._data, q))
+        pin.updateFramePlacements(self.pin_model, self._data)
+        feet = np.array([self._data.oMf[f].translation for f in self._foot_frames])
+        return com, feet
+
+    def inverse_dynamics(
+        self, q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"], a: Float[np.ndarray, "18"]
+    ) -> Float[np.ndarray, "18"]:
+        """Generalised force M(q) a + h(q, v) [N, N m]."""
+        return np.array(pin.rnea(self.pin_model, self._data, q, v, a))
+
+
+_UPPER = np.triu(np.ones((18, 18), dtype=bool))
+_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+def _load(urdf: Path) -> pin.Model:
+    try:
+        model = pin.buildModelFromUrdf(str(urdf), pin.JointModelFreeFlyer())
+    except ValueError as error:
+        raise DescriptionError(f"Pinocchio cannot read the URDF {urdf}: {error}") from error
+    names = list(model.names)[2:]
+    if names != list(JOINT_NAMES):
+        raise DescriptionError(f"{urdf} has joints {names}; expected {list(JOINT_NAMES)}")
+    return model

@@ -1,0 +1,96 @@
+"""Every quantity of one control tick, computed once: holding a Snapshot proves that it is fresh.
+
+Contact points: a foot is a sphere that rolls. The material point at the contact is r below the
+centre, so its velocity is v_c + w x (-r n), and a rolling foot obeys a_c = r (dw x n) (differentiate
+v_c = r w x n). ``J_contacts`` is therefore J_c - r (J_w x n), and ``drift_contacts`` the matching
+velocity-dependent part, without the centripetal term that belongs to the material point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.robot.state import RobotState
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """State and dynamics of one tick. Accelerations use Pinocchio's spatial base acceleration.
+
+    Attributes:
+        state: the measured state that everything here belongs to.
+        R_world_base: base orientation.
+        mass_matrix: M(q) with rotor inertia.
+        bias: h(q, v): Coriolis, centrifugal and gravity terms [N, N m].
+        p_world_com, v_world_com: CoM position [m] and velocity [m/s].
+        J_com: CoM Jacobian (world); drift_com: CoM acceleration [m/s^2] at zero joint acceleration.
+        p_world_feet, v_world_feet: foot centres [m], [m/s].
+        J_feet, drift_feet: Jacobians and drifts of the foot centres (world).
+        J_contacts, drift_contacts: the same for the rolling contact points.
+        v_world_contacts: velocity of the material contact points [m/s].
+    """
+
+    state: RobotState
+    R_world_base: Float[np.ndarray, "3 3"]
+    mass_matrix: Float[np.ndarray, "18 18"]
+    bias: Float[np.ndarray, "18"]
+    p_world_com: Float[np.ndarray, "3"]
+    v_world_com: Float[np.ndarray, "3"]
+    J_com: Float[np.ndarray, "3 18"]
+    drift_com: Float[np.ndarray, "3"]
+    p_world_feet: Float[np.ndarray, "4 3"]
+    v_world_feet: Float[np.ndarray, "4 3"]
+    J_feet: Float[np.ndarray, "4 3 18"]
+    drift_feet: Float[np.ndarray, "4 3"]
+    J_contacts: Float[np.ndarray, "4 3 18"]
+    drift_contacts: Float[np.ndarray, "4 3"]
+    v_world_contacts: Float[np.ndarray, "4 3"]
+
+    @staticmethod
+    def build(
+        state: RobotState,
+        M: Float[np.ndarray, "18 18"],
+        h: Float[np.ndarray, "18"],
+        p_feet: Float[np.ndarray, "4 3"],
+        J_feet: Float[np.ndarray, "4 6 18"],
+        drift_feet: Float[np.ndarray, "4 6"],
+        constants: tuple[float, float, float],
+    ) -> Snapshot:
+        """Derive the CoM and contact terms from what Pinocchio computed.
+
+        ``constants`` are mass [kg], gravity [m/s^2] and foot radius [m].
+        """
+        mass, gravity, radius = constants
+        R = state.R_world_base
+        J_com = R @ M[:3] / mass
+        drift_com = R @ h[:3] / mass
+        drift_com[2] -= gravity
+        com_cross = M[:3, 3:6] / -mass
+        p_base_com = np.array([com_cross[2, 1], com_cross[0, 2], com_cross[1, 0]])
+        J_linear, J_angular = J_feet[:, :3], J_feet[:, 3:]
+        J_contacts = J_linear.copy()
+        J_contacts[:, 0] -= radius * J_angular[:, 1]
+        J_contacts[:, 1] += radius * J_angular[:, 0]
+        drift_contacts = drift_feet[:, :3].copy()
+        drift_contacts[:, 0] -= radius * drift_feet[:, 4]
+        drift_contacts[:, 1] += radius * drift_feet[:, 3]
+        return Snapshot(
+            state=state,
+            R_world_base=R,
+            mass_matrix=M,
+            bias=h,
+            p_world_com=state.q[:3] + R @ p_base_com,
+            v_world_com=J_com @ state.v,
+            J_com=J_com,
+            drift_com=drift_com,
+            p_world_feet=p_feet,
+            v_world_feet=J_linear @ state.v,
+            J_feet=J_linear,
+            drift_feet=drift_feet[:, :3],
+            J_contacts=J_contacts,
+            drift_contacts=drift_contacts,
+            v_world_contacts=J_contacts @ state.v,
+        )

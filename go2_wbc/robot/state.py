@@ -1,0 +1,113 @@
+"""What a plant measures and what it is told: the two values that cross the plant's border."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+
+@dataclass(frozen=True, slots=True)
+class RobotState:
+    """The measured state of the robot at one instant.
+
+    Attributes:
+        time: plant time [s].
+        q: base position [m] in the world, quaternion x y z w, 12 joint angles [rad].
+        v: base linear [m/s] then angular [rad/s] velocity, both in the base frame, 12 joint
+            velocities [rad/s].
+        tau: joint torques that acted over the last step [N m].
+        foot_forces: normal force that each foot's contact sensor reads [N].
+        feet_in_contact: whether each foot's sensor reads a contact.
+    """
+
+    time: float
+    q: Float[np.ndarray, "19"]
+    v: Float[np.ndarray, "18"]
+    tau: Float[np.ndarray, "12"]
+    foot_forces: Float[np.ndarray, "4"]
+    feet_in_contact: Bool[np.ndarray, "4"]
+
+    @property
+    def p_world_base(self) -> Float[np.ndarray, "3"]:
+        """Position of the base in the world [m]."""
+        return self.q[:3]
+
+    @property
+    def R_world_base(self) -> Float[np.ndarray, "3 3"]:  # noqa: N802 - frame naming
+        """Rotation from the base frame to the world."""
+        x, y, z, w = self.q[3:7]
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+    @property
+    def rpy(self) -> Float[np.ndarray, "3"]:
+        """Roll, pitch, yaw [rad] of the base (R = Rz(yaw) Ry(pitch) Rx(roll))."""
+        R = self.R_world_base
+        pitch = np.arcsin(np.clip(-R[2, 0], -1.0, 1.0))
+        return np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
+
+    @property
+    def tilt(self) -> float:
+        """Angle [rad] between the base's z axis and the vertical, 0 to pi."""
+        x, y = self.q[3], self.q[4]
+        return float(np.arccos(np.clip(1 - 2 * (x * x + y * y), -1.0, 1.0)))
+
+    @property
+    def joint_positions(self) -> Float[np.ndarray, "12"]:
+        """Joint angles [rad]."""
+        return self.q[7:]
+
+    @property
+    def joint_velocities(self) -> Float[np.ndarray, "12"]:
+        """Joint velocities [rad/s]."""
+        return self.v[6:]
+
+
+@dataclass(frozen=True, slots=True)
+class JointCommand:
+    """What the motors are told: tau + kp (q_des - q) + kd (v_des - v), clipped to the limits.
+
+    This is the motor law of the Go2's own joint boards, so a simulator and the robot take the
+    same command. A plant evaluates it with its newest encoder values.
+
+    Attributes:
+        tau: feed-forward torque [N m].
+        q_des: desired joint angles [rad].
+        v_des: desired joint velocities [rad/s].
+        kp: stiffness [N m/rad].
+        kd: damping [N m s/rad].
+    """
+
+    tau: Float[np.ndarray, "12"]
+    q_des: Float[np.ndarray, "12"]
+    v_des: Float[np.ndarray, "12"]
+    kp: Float[np.ndarray, "12"]
+    kd: Float[np.ndarray, "12"]
+
+    @staticmethod
+    def torque(tau: Float[np.ndarray, "12"]) -> JointCommand:
+        """Pure torque: no stiffness, no damping."""
+        return JointCommand(tau, _ZEROS, _ZEROS, _ZEROS, _ZEROS)
+
+    @staticmethod
+    def damping(kd: float) -> JointCommand:
+        """Limp and damped: the safe command."""
+        return JointCommand(_ZEROS, _ZEROS, _ZEROS, _ZEROS, np.full(12, kd))
+
+    @staticmethod
+    def servo(
+        q_des: Float[np.ndarray, "12"], v_des: Float[np.ndarray, "12"], kp: float, kd: float
+    ) -> JointCommand:
+        """A joint servo around a moving target."""
+        return JointCommand(_ZEROS, q_des, v_des, np.full(12, kp), np.full(12, kd))
+
+
+_ZEROS = np.zeros(12)
+_ZEROS.flags.writeable = False

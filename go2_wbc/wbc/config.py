@@ -1,0 +1,50 @@
+"""Numbers of the whole-body controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from go2_wbc.wbc.tasks import Gains
+
+
+@dataclass(frozen=True, slots=True)
+class WbcConfig:
+    """Numbers of the whole-body controller.
+
+    Gains are accelerations per unit of error [1/s^2] and [1/s]; they and the weights come from a
+    search on this robot in simulation. Every field can be overridden in a TOML file.
+
+    Attributes:
+        solver: QP solver: daqp, proxqp or quadprog.
+        body_position: CoM or base, world axes.
+        body_orientation: base, base axes.
+        swing_foot: Cartesian swing.
+        leg_posture: joint-space legs.
+        position_weight, orientation_weight, swing_weight, posture_weight: task weights.
+        force_weight: of the force regularisation; at least 1e-6, or accuracy is lost.
+        friction: mu of the friction pyramid.
+        torque_share: share of the URDF's torque limit that may be used.
+        speed_share: share of the URDF's joint speed limit that may be used.
+        stance_damping: [1/s] on the velocity of stance contact points.
+        braking: joint deceleration [rad/s^2] that the limits count on.
+        limit_horizon: time [s] in which a joint-limit bound must be met.
+        joint_margin: distance [rad] that the joints keep from their position limits.
+    """
+
+    solver: str = "daqp"
+    body_position: Gains = Gains((60.0, 60.0, 100.0), (15.0, 15.0, 20.0))
+    body_orientation: Gains = Gains((200.0, 200.0, 80.0), (25.0, 25.0, 18.0))
+    swing_foot: Gains = Gains.uniform(500.0, 40.0)
+    leg_posture: Gains = Gains.uniform(150.0, 20.0)
+    position_weight: float = 1.0
+    orientation_weight: float = 10.0
+    swing_weight: float = 1.0
+    posture_weight: float = 1.0
+    force_weight: float = 1e-4
+    friction: float = 0.6
+    torque_share: float = 1.0
+    speed_share: float = 1.0
+    stance_damping: float = 20.0
+    braking: float = 200.0
+    limit_horizon: float = 0.02
+    joint_margin: float = 0.0

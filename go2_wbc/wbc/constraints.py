@@ -1,0 +1,174 @@
+"""Constraints: what the QP must not break.
+
+Equalities: the six base rows of M a + h = S' tau + J' f (no actuator there), and stance feet that
+roll without sliding. Inequalities: friction pyramid and normal force of each stance foot, torque
+limits, and joint position and speed limits as bounds on the acceleration.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.reference import Reference
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.wbc.problem import FORCES, SIZE, Bounds, Rows
+
+
+_JOINT_SELECTION = np.zeros((12, SIZE))
+_JOINT_SELECTION[:, 6:18] = np.eye(12)
+
+
+class Equality(ABC):
+    """A hard goal."""
+
+    name: str
+    unit: str
+
+    @abstractmethod
+    def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
+        """Rows E z = e of this constraint now."""
+
+
+class Inequality(ABC):
+    """A hard limit."""
+
+    name: str
+    unit: str
+
+    @abstractmethod
+    def bounds(self, snapshot: Snapshot, reference: Reference) -> Bounds:
+        """Rows lower <= C z <= upper of this constraint now."""
+
+
+@dataclass(frozen=True, slots=True)
+class FloatingBaseDynamics(Equality):
+    """The base has no motor: the first six rows of M a + h - J' f are zero."""
+
+    name: str = "base dynamics"
+    unit: str = "N, N m"
+
+    def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
+        """Six rows: force and moment balance of the whole robot in the base frame."""
+        A = np.empty((6, SIZE))
+        A[:, :18] = snapshot.mass_matrix[:6]
+        A[:, FORCES] = -snapshot.J_contacts[:, :, :6].reshape(12, 6).T
+        return Rows(A, -snapshot.bias[:6])
+
+
+@dataclass(frozen=True, slots=True)
+class StanceFeetStill(Equality):
+    """Stance feet roll without sliding: their contact points do not accelerate.
+
+    Attributes:
+        damping: rate [1/s] at which a remaining velocity of the contact point is taken out.
+    """
+
+    damping: float
+    name: str = "stance feet"
+    unit: str = "m/s^2"
+
+    def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
+        """Three rows per stance foot."""
+        stance = np.flatnonzero(reference.stance)
+        A = np.zeros((3 * len(stance), SIZE))
+        A[:, :18] = snapshot.J_contacts[stance].reshape(-1, 18)
+        b = -snapshot.drift_contacts[stance] - self.damping * snapshot.v_world_contacts[stance]
+        return Rows(A, b.ravel())
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionPyramid(Inequality):
+    """|f_x| <= mu f_z and |f_y| <= mu f_z for every stance foot, and bounds on f_z.
+
+    Attributes:
+        friction: mu of the square pyramid; 0.6 leaves room on a floor of 0.8.
+    """
+
+    friction: float
+    name: str = "contact forces"
+    unit: str = "N"
+
+    def bounds(self, snapshot: Snapshot, reference: Reference) -> Bounds:
+        """Five rows per stance foot."""
+        stance = np.flatnonzero(reference.stance)
+        count = len(stance)
+        C = np.zeros((5 * count, SIZE))
+        lower = np.full(5 * count, -np.inf)
+        upper = np.zeros(5 * count)
+        pattern = _pyramid(self.friction)
+        for i, leg in enumerate(stance):
+            start = FORCES.start + 3 * leg
+            C[5 * i : 5 * i + 5, start : start + 3] = pattern
+            lower[5 * i + 4] = reference.normal_force_min[leg]
+            upper[5 * i + 4] = reference.normal_force_max[leg]
+        return Bounds(C, lower, upper)
+
+
+@dataclass(frozen=True, slots=True)
+class TorqueLimits(Inequality):
+    """|tau| within the limits, tau being the joint rows of M a + h - J' f."""
+
+    limits: Float[np.ndarray, "12"]
+    name: str = "torque limits"
+    unit: str = "N m"
+
+    def bounds(self, snapshot: Snapshot, reference: Reference) -> Bounds:
+        """Twelve rows, one per joint."""
+        A, offset = torque_map(snapshot)
+        return Bounds(A, -self.limits - offset, self.limits - offset)
+
+
+@dataclass(frozen=True, slots=True)
+class JointLimits(Inequality):
+    """Joint position and speed limits as acceleration bounds (Del Prete 2018, sec. III).
+
+    The joint may move towards a limit no faster than it can brake before it:
+    v <= sqrt(2 a_brake (q_max - q)), reached within ``horizon``. Beyond a limit the joint may not
+    move further out. No bound asks for more than ``braking``, so the QP stays feasible.
+
+    Attributes:
+        q_lower, q_upper: position limits [rad].
+        speed: speed limits [rad/s].
+        braking: deceleration [rad/s^2] that is always available.
+        horizon: time [s] in which a bound on the velocity must be met.
+    """
+
+    q_lower: Float[np.ndarray, "12"]
+    q_upper: Float[np.ndarray, "12"]
+    speed: Float[np.ndarray, "12"]
+    braking: float
+    horizon: float
+    name: str = "joint limits"
+    unit: str = "rad/s^2"
+
+    def bounds(self, snapshot: Snapshot, reference: Reference) -> Bounds:
+        """Twelve rows, one per joint."""
+        q, v = snapshot.state.joint_positions, snapshot.state.joint_velocities
+        fastest = np.minimum(self.speed, self._braking_speed(self.q_upper - q))
+        slowest = -np.minimum(self.speed, self._braking_speed(q - self.q_lower))
+        upper = np.maximum((fastest - v) / self.horizon, -self.braking)
+        lower = np.minimum((slowest - v) / self.horizon, self.braking)
+        return Bounds(_JOINT_SELECTION, lower, upper)
+
+    def _braking_speed(self, distance: Float[np.ndarray, "12"]) -> Float[np.ndarray, "12"]:
+        return np.sqrt(2 * self.braking * np.maximum(distance, 0.0))
+
+
+def torque_map(
+    snapshot: Snapshot,
+) -> tuple[Float[np.ndarray, "12 30"], Float[np.ndarray, "12"]]:
+    """(A, offset) such that the joint torques are A z + offset [N m]."""
+    A = np.empty((12, SIZE))
+    A[:, :18] = snapshot.mass_matrix[6:]
+    A[:, FORCES] = -snapshot.J_contacts[:, :, 6:].reshape(12, 12).T
+    return A, snapshot.bias[6:]
+
+
+def _pyramid(mu: float) -> Float[np.ndarray, "5 3"]:
+    return np.array(
+        [[1.0, 0.0, -mu], [-1.0, 0.0, -mu], [0.0, 1.0, -mu], [0.0, -1.0, -mu], [0.0, 0.0, 1.0]]
+    )

@@ -1,0 +1,139 @@
+"""The whole-body controller: (snapshot, reference) -> torques, by one quadratic program a tick."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from go2_wbc.errors import ConfigError, unknown_name
+from go2_wbc.reference import Reference
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.wbc.backends import CondensedBackend, FullBackend, QpBackend
+from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.constraints import (
+    Equality,
+    FloatingBaseDynamics,
+    FrictionPyramid,
+    Inequality,
+    JointLimits,
+    StanceFeetStill,
+    TorqueLimits,
+)
+from go2_wbc.wbc.problem import Bounds, Problem, Rows
+from go2_wbc.wbc.solution import WbcSolution
+from go2_wbc.wbc.solvers import check_solver
+from go2_wbc.wbc.tasks import (
+    BodyOrientation,
+    BodyPosition,
+    ForceRegularisation,
+    LegPosture,
+    SwingFoot,
+    Task,
+)
+
+
+class WholeBodyController:
+    """Torques that follow a reference as well as physics and the limits allow.
+
+    Tasks (weighted least squares) and constraints are described in ``tasks`` and ``constraints``;
+    ``backend`` is "condensed" (default), "full" (the same QP without elimination), or "placo".
+    """
+
+    def __init__(
+        self, model: RobotModel, backend: str = "condensed", config: WbcConfig | None = None
+    ) -> None:
+        """Prepare the tasks and constraints for ``model``.
+
+        Raises:
+            ConfigError: for an unknown back end.
+            SolverUnavailable: for an unknown or uninstalled solver.
+        """
+        self.model = model
+        self.config = config or WbcConfig()
+        self.tasks = _tasks(model, self.config)
+        self.equalities: tuple[Equality, ...] = (
+            FloatingBaseDynamics(),
+            StanceFeetStill(self.config.stance_damping),
+        )
+        self.inequalities = _inequalities(model, self.config)
+        self._task_weights = np.array([task.weight for task in self.tasks])
+        self.backend_name = backend
+        self._backend = self._make_backend(backend)
+
+    def _make_backend(self, name: str) -> QpBackend:
+        solver = check_solver(self.config.solver)
+        if name == "condensed":
+            return CondensedBackend(solver)
+        if name == "full":
+            return FullBackend(solver)
+        if name == "placo":
+            from go2_wbc.wbc.placo_backend import PlacoBackend
+
+            return PlacoBackend(self.model, self.config)
+        raise ConfigError(unknown_name("WBC back end", name, ("condensed", "full", "placo")))
+
+    def formulate(self, snapshot: Snapshot, reference: Reference) -> Problem:
+        """The QP of this tick."""
+        task_rows = [task.rows(snapshot, reference) for task in self.tasks]
+        equality_rows = [item.rows(snapshot, reference) for item in self.equalities]
+        bounds = [item.bounds(snapshot, reference) for item in self.inequalities]
+        task_counts = [len(rows.b) for rows in task_rows]
+        return Problem(
+            snapshot=snapshot,
+            reference=reference,
+            tasks=_stack(task_rows),
+            weights=np.repeat(self._task_weights, task_counts),
+            equalities=_stack(equality_rows),
+            bounds=Bounds(*(np.concatenate(parts) for parts in zip(*bounds, strict=True))),
+            sources=(*self.tasks, *self.equalities, *self.inequalities),
+            counts=(
+                *task_counts,
+                *(len(rows.b) for rows in equality_rows),
+                *(len(rows.lower) for rows in bounds),
+            ),
+        )
+
+    def solve(self, snapshot: Snapshot, reference: Reference) -> WbcSolution:
+        """Solve one tick.
+
+        Raises:
+            QpInfeasible: if no torque meets the constraints; carries the residual table.
+        """
+        start = time.thread_time()
+        problem = self.formulate(snapshot, reference)
+        z = self._backend.solve(problem)
+        return WbcSolution.from_decision(
+            z, problem, time.thread_time() - start, self.backend_name
+        )
+
+
+def _tasks(model: RobotModel, config: WbcConfig) -> tuple[Task, ...]:
+    return (
+        BodyPosition(*config.body_position.arrays, config.position_weight),
+        BodyOrientation(*config.body_orientation.arrays, config.orientation_weight),
+        SwingFoot(*config.swing_foot.arrays, config.swing_weight),
+        LegPosture(*config.leg_posture.arrays, config.posture_weight),
+        ForceRegularisation(model.mass * model.gravity, config.force_weight),
+    )
+
+
+def _inequalities(model: RobotModel, config: WbcConfig) -> tuple[Inequality, ...]:
+    return (
+        FrictionPyramid(config.friction),
+        TorqueLimits(model.torque_limits * config.torque_share),
+        JointLimits(
+            model.q_lower + config.joint_margin,
+            model.q_upper - config.joint_margin,
+            model.speed_limits * config.speed_share,
+            config.braking,
+            config.limit_horizon,
+        ),
+    )
+
+
+def _stack(rows: Sequence[Rows]) -> Rows:
+    return Rows(np.concatenate([r.A for r in rows]), np.concatenate([r.b for r in rows]))
+

@@ -1,0 +1,102 @@
+"""The whole-body QP: its decision vector, and the rows that tasks and constraints contribute.
+
+    minimise    sum_i w_i |A_i z - b_i|^2            (tasks)
+    subject to  E z = e                              (dynamics of the base, stance feet still)
+                lower <= C z <= upper                (friction, normal force, torque, joint limits)
+
+The decision vector z (30,) holds the generalised acceleration (18,: Pinocchio's spatial base
+acceleration in the base frame, then the joints) and the contact force of each foot in the world
+frame (4 x 3). The force of a foot in swing is no unknown: back ends leave its columns out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from go2_wbc.errors import ResidualRow
+from go2_wbc.reference import Reference
+from go2_wbc.robot.snapshot import Snapshot
+
+ACCELERATION = slice(0, 18)
+FORCES = slice(18, 30)
+SIZE = 30
+
+
+class Rows(NamedTuple):
+    """Linear rows A z = b, (k, 30) and (k,)."""
+
+    A: Float[np.ndarray, "k 30"]
+    b: Float[np.ndarray, " k"]
+
+
+class Bounds(NamedTuple):
+    """Linear rows lower <= C z <= upper, (k, 30) and (k,) each; infinite where one-sided."""
+
+    C: Float[np.ndarray, "k 30"]
+    lower: Float[np.ndarray, " k"]
+    upper: Float[np.ndarray, " k"]
+
+
+@runtime_checkable
+class Source(Protocol):
+    """A task or a constraint, as a residual table names it."""
+
+    @property
+    def name(self) -> str:
+        """What it is called."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Unit of its rows."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One assembled QP.
+
+    Attributes:
+        snapshot, reference: what the rows were made from.
+        tasks: stacked task rows, not weighted.
+        weights: (rows,) weight of each task row.
+        equalities: stacked equality rows.
+        bounds: stacked inequality rows.
+        sources: who contributed rows, tasks first, then equalities, then bounds.
+        counts: how many rows each of them contributed.
+    """
+
+    snapshot: Snapshot
+    reference: Reference
+    tasks: Rows
+    weights: Float[np.ndarray, " rows"]
+    equalities: Rows
+    bounds: Bounds
+    sources: tuple[Source, ...]
+    counts: tuple[int, ...]
+
+    @property
+    def stance(self) -> Bool[np.ndarray, "4"]:
+        """Feet whose force is an unknown."""
+        return self.reference.stance
+
+    def residuals(self, z: Float[np.ndarray, "30"]) -> tuple[ResidualRow, ...]:
+        """How far ``z`` is from every task, and by how much it breaks every constraint."""
+        value = self.bounds.C @ z
+        excess = np.maximum(np.maximum(self.bounds.lower - value, value - self.bounds.upper), 0.0)
+        errors = np.concatenate(
+            [
+                self.tasks.A @ z - self.tasks.b,
+                self.equalities.A @ z - self.equalities.b,
+                excess,
+            ]
+        )
+        pieces = np.split(np.abs(errors), np.cumsum(self.counts)[:-1])
+        return tuple(
+            ResidualRow(source.name, float(piece.max(initial=0.0)), source.unit)
+            for source, piece in zip(self.sources, pieces, strict=True)
+        )

@@ -1,0 +1,58 @@
+"""What the whole-body controller decided, with everything needed to audit it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.errors import ResidualRow
+from go2_wbc.robot.state import JointCommand
+from go2_wbc.wbc.problem import ACCELERATION, FORCES, Problem
+
+
+@dataclass(frozen=True, slots=True)
+class WbcSolution:
+    """One solution of the whole-body QP.
+
+    Attributes:
+        tau: joint torques [N m].
+        qdd: generalised acceleration (Pinocchio's spatial base acceleration in the base frame
+            [m/s^2, rad/s^2], then the joints [rad/s^2]).
+        forces: contact force [N] of each foot in the world frame; zero for legs in the air.
+        solve_time: CPU seconds of assembly and solution.
+        backend: which back end solved it.
+    """
+
+    tau: Float[np.ndarray, "12"]
+    qdd: Float[np.ndarray, "18"]
+    forces: Float[np.ndarray, "4 3"]
+    solve_time: float
+    backend: str
+    _problem: Problem
+    _z: Float[np.ndarray, "30"]
+
+    @staticmethod
+    def from_decision(
+        z: Float[np.ndarray, "30"],
+        problem: Problem,
+        solve_time: float,
+        backend: str,
+    ) -> WbcSolution:
+        """Torques from the joint rows of M a + h = tau + J' f."""
+        snapshot = problem.snapshot
+        qdd, forces = z[ACCELERATION], z[FORCES]
+        J_joints = snapshot.J_contacts[:, :, 6:].reshape(12, 12)
+        tau = snapshot.mass_matrix[6:] @ qdd + snapshot.bias[6:] - J_joints.T @ forces
+        return WbcSolution(tau, qdd, forces.reshape(4, 3), solve_time, backend, problem, z)
+
+    @property
+    def residuals(self) -> tuple[ResidualRow, ...]:
+        """Error of every task and violation of every constraint, in its own unit."""
+        return self._problem.residuals(self._z)
+
+    @property
+    def command(self) -> JointCommand:
+        """The torques as a joint command."""
+        return JointCommand.torque(self.tau)

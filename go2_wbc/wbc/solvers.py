@@ -1,0 +1,131 @@
+"""Dense QP solvers by name, through qpsolvers, all started fresh.
+
+ProxQP is never warm-started: its warm start reports feasible problems as infeasible when the
+contacts change. Tolerances are set so that torques agree to 1e-6 N m across solvers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import qpsolvers
+from jaxtyping import Float
+
+from go2_wbc.errors import QpInfeasible, SolverUnavailable, unknown_name
+
+
+@dataclass(frozen=True, slots=True)
+class DenseQp:
+    """Minimise x'Hx/2 + g'x subject to E x = e and lower <= C x <= upper."""
+
+    H: Float[np.ndarray, "n n"]
+    g: Float[np.ndarray, " n"]
+    C: Float[np.ndarray, "m n"]
+    lower: Float[np.ndarray, " m"]
+    upper: Float[np.ndarray, " m"]
+    E: Float[np.ndarray, "k n"] | None = None
+    e: Float[np.ndarray, " k"] | None = None
+
+    def one_sided(self) -> tuple[Float[np.ndarray, "r n"], Float[np.ndarray, " r"]]:
+        """The inequality rows as G x <= h, infinite sides left out."""
+        up, low = np.isfinite(self.upper), np.isfinite(self.lower)
+        G = np.concatenate([self.C[up], -self.C[low]])
+        h = np.concatenate([self.upper[up], -self.lower[low]])
+        return G, h
+
+
+@dataclass(frozen=True, slots=True)
+class QpSolution:
+    """Minimiser and multipliers of a ``DenseQp``.
+
+    Attributes:
+        x: the minimiser.
+        inequality_multipliers: >= 0, one per row of ``one_sided()``.
+        equality_multipliers: one per equality row.
+    """
+
+    x: Float[np.ndarray, " n"]
+    inequality_multipliers: Float[np.ndarray, " r"]
+    equality_multipliers: Float[np.ndarray, " k"]
+
+
+QPSOLVERS_OPTIONS: dict[str, dict[str, float]] = {
+    "daqp": {"primal_tol": 1e-9, "dual_tol": 1e-12},
+    "quadprog": {},
+}
+"""Solvers reached through qpsolvers, with the tolerances that make their torques agree."""
+
+SOLVERS: tuple[str, ...] = ("daqp", "proxqp", "quadprog")
+"""Valid solver names."""
+
+PROXQP_EPS = 1e-9
+PROXQP_EPS_INFEASIBLE = 1e-12
+PROXQP_INFINITY = 1e20
+PROXQP_MAX_ITERATIONS = 1000
+
+
+def check_solver(name: str) -> str:
+    """``name`` if it is a valid, installed solver.
+
+    Raises:
+        SolverUnavailable: otherwise; lists the names that would work.
+    """
+    installed = [s for s in SOLVERS if s in qpsolvers.available_solvers]
+    if name not in SOLVERS:
+        raise SolverUnavailable(unknown_name("QP solver", name, installed))
+    if name not in installed:
+        raise SolverUnavailable(
+            f"QP solver {name!r} is not installed: pip install "
+            f"{'proxsuite' if name == 'proxqp' else name}; installed: {', '.join(installed)}"
+        )
+    return name
+
+
+def solve_dense_qp(qp: DenseQp, solver: str) -> QpSolution:
+    """Solve ``qp`` with the solver of that name.
+
+    Raises:
+        QpInfeasible: if the solver finds no solution, or returns one that is not finite.
+    """
+    try:
+        solution = _solve_proxqp(qp) if solver == "proxqp" else _solve_by_qpsolvers(qp, solver)
+    except (qpsolvers.exceptions.QPError, ValueError, RuntimeError) as error:
+        raise QpInfeasible(solver, str(error)) from error
+    if solution is None or not np.isfinite(solution.x).all():
+        raise QpInfeasible(solver, "no feasible point found")
+    return solution
+
+
+def _solve_by_qpsolvers(qp: DenseQp, solver: str) -> QpSolution | None:
+    G, h = qp.one_sided()
+    problem = qpsolvers.Problem(qp.H, qp.g, G, h, qp.E, qp.e)
+    solution = qpsolvers.solve_problem(problem, solver, **QPSOLVERS_OPTIONS[solver])
+    if not solution.found or solution.x is None:
+        return None
+    equality = solution.y if solution.y is not None else np.zeros(0)
+    return QpSolution(np.asarray(solution.x), np.asarray(solution.z), np.asarray(equality))
+
+
+def _solve_proxqp(qp: DenseQp) -> QpSolution | None:
+    import proxsuite
+
+    equalities = 0 if qp.e is None else len(qp.e)
+    solver = proxsuite.proxqp.dense.QP(len(qp.g), equalities, len(qp.lower))
+    settings = solver.settings
+    settings.eps_abs, settings.eps_rel = PROXQP_EPS, 0.0
+    settings.eps_primal_inf = settings.eps_dual_inf = PROXQP_EPS_INFEASIBLE
+    settings.max_iter = PROXQP_MAX_ITERATIONS
+    settings.initial_guess = proxsuite.proxqp.InitialGuess.EQUALITY_CONSTRAINED_INITIAL_GUESS
+    lower = np.maximum(qp.lower, -PROXQP_INFINITY)
+    upper = np.minimum(qp.upper, PROXQP_INFINITY)
+    solver.init(
+        qp.H, qp.g, qp.E, qp.e, qp.C, lower, upper, compute_preconditioner=False
+    )
+    solver.solve()
+    if solver.results.info.status != proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED:
+        return None
+    z = np.asarray(solver.results.z)
+    up, low = np.isfinite(qp.upper), np.isfinite(qp.lower)
+    multipliers = np.concatenate([np.maximum(z, 0.0)[up], np.maximum(-z, 0.0)[low]])
+    return QpSolution(np.array(solver.results.x), multipliers, np.array(solver.results.y))

@@ -1,0 +1,108 @@
+"""Convex hull and signed distance to it."""
+
+from __future__ import annotations
+
+from random import Random
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+
+from go2_wbc.geometry import convex_hull, support_margin
+
+ROUNDING = 1e-9  # coordinates are at most 1 m
+SQUARE = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
+RIGHT_TRIANGLE = np.array([[0.0, 0.0], [4.0, 0.0], [0.0, 3.0]])
+
+coordinates = st.floats(-1.0, 1.0).map(lambda x: round(x, 6))
+clouds = npst.arrays(np.float64, st.tuples(st.integers(3, 9), st.just(2)), elements=coordinates)
+places = npst.arrays(np.float64, 2, elements=coordinates)
+angles = st.floats(-np.pi, np.pi)
+
+
+def area(hull: np.ndarray) -> float:
+    x, y = hull.T
+    return 0.5 * float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)))
+
+
+@pytest.mark.parametrize(
+    ("p", "margin"),
+    [
+        ((0.0, 0.0), 1.0),
+        ((0.9, 0.0), 0.1),
+        ((1.0, 0.5), 0.0),
+        ((1.5, 0.0), -0.5),
+        ((4.0, 5.0), -5.0),
+    ],
+    ids=["centre", "near an edge", "on an edge", "beside an edge", "beyond a corner"],
+)
+def test_the_margin_of_a_square_is_the_distance_to_its_border(
+    p: tuple[float, float], margin: float
+) -> None:
+    assert support_margin(SQUARE, np.array(p)) == pytest.approx(margin, abs=ROUNDING)
+
+
+def test_the_incentre_of_the_3_4_5_triangle_is_1_from_every_edge() -> None:
+    assert support_margin(RIGHT_TRIANGLE, np.array([1.0, 1.0])) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("points", [[[2.0, 0.0]], [[-1.0, 0.0], [1.0, 0.0], [0.0, 0.0]]])
+def test_nothing_is_inside_a_hull_without_area(points: list[list[float]]) -> None:
+    assert support_margin(np.array(points), np.array([1.0, 0.0])) <= 0.0
+    assert support_margin(np.array(points), np.array([2.0, 3.0])) < -2.9
+
+
+def test_no_point_at_all_is_refused() -> None:
+    with pytest.raises(ValueError, match="at least one point"):
+        support_margin(np.zeros((0, 2)), np.zeros(2))
+
+
+def test_points_inside_and_on_edges_are_no_corners() -> None:
+    points = np.concatenate([SQUARE, [[0.0, 0.0], [1.0, 0.0], [0.3, -0.2]], SQUARE])
+    hull = convex_hull(points)
+    assert {tuple(corner) for corner in hull} == {tuple(corner) for corner in SQUARE}
+    assert area(hull) == pytest.approx(4.0)
+
+
+@given(clouds)
+def test_a_hull_runs_counter_clockwise_around_every_point(points: np.ndarray) -> None:
+    hull = convex_hull(points)
+    assume(area(hull) > 1e-6)
+    assert all(support_margin(points, p) >= -ROUNDING for p in points)
+
+
+@given(clouds, places, st.randoms(use_true_random=False))
+def test_the_order_of_the_points_does_not_matter(
+    points: np.ndarray, p: np.ndarray, random: Random
+) -> None:
+    shuffled = points[random.sample(range(len(points)), len(points))]
+    assert support_margin(shuffled, p) == pytest.approx(support_margin(points, p), abs=ROUNDING)
+
+
+@given(clouds, places, angles, places)
+def test_moving_and_turning_everything_keeps_the_margin(
+    points: np.ndarray, p: np.ndarray, angle: float, shift: np.ndarray
+) -> None:
+    assume(area(convex_hull(points)) > 1e-3)
+    c, s = np.cos(angle), np.sin(angle)
+    R = np.array([[c, -s], [s, c]])
+    moved = support_margin(points @ R.T + shift, R @ p + shift)
+    assert moved == pytest.approx(support_margin(points, p), abs=1e-7)
+
+
+@given(clouds, places, places)
+def test_the_margin_never_changes_faster_than_the_point_moves(
+    points: np.ndarray, p: np.ndarray, q: np.ndarray
+) -> None:
+    change = abs(support_margin(points, p) - support_margin(points, q))
+    assert change <= np.linalg.norm(p - q) + ROUNDING
+
+
+@given(clouds, places, places)
+def test_another_foot_never_makes_the_margin_smaller(
+    points: np.ndarray, extra: np.ndarray, p: np.ndarray
+) -> None:
+    more = np.concatenate([points, extra[None]])
+    assert support_margin(more, p) >= support_margin(points, p) - ROUNDING
