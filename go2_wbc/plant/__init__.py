@@ -1,0 +1,8 @@
+"""Plants: what a robot or simulator must do, and MuJoCo doing it."""
+
+from __future__ import annotations
+
+from go2_wbc.plant.base import Plant
+from go2_wbc.plant.mujoco_plant import MujocoPlant
+
+__all__ = ["MujocoPlant", "Plant"]

@@ -1,0 +1,40 @@
+"""What a robot, or a simulator of one, must do to be driven by this project."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from go2_wbc.robot.state import JointCommand, RobotState
+
+
+class Plant(ABC):
+    """A Go2 that can be read and commanded; its clock is the only clock of the controller.
+
+    One control tick is ``read()``, then ``write(command)``, which lets one control period pass.
+    """
+
+    @property
+    @abstractmethod
+    def control_period(self) -> float:
+        """Seconds that pass in one ``write``."""
+
+    @abstractmethod
+    def read(self) -> RobotState:
+        """The newest measured state.
+
+        Raises:
+            PlantTimeout: if the plant stopped answering.
+        """
+
+    @abstractmethod
+    def write(self, command: JointCommand) -> None:
+        """Apply ``command`` for one control period.
+
+        Raises:
+            CommandError: if the command has a value that is not finite; nothing is applied.
+            PlantTimeout: if the plant stopped answering.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release everything; idempotent."""
