@@ -1,0 +1,245 @@
+"""Velocity command -> Reference: footholds, swing feet and the body's path of a gait.
+
+Footholds follow Raibert (1986, ch. 2) with half the stance travel ahead of the hip and a correction
+for the velocity error. The body follows a reference integrated from the command, which takes out the
+steady error that a pure velocity loop keeps; it is held within reach of the robot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from go2_wbc.contacts import ContactPhase, Gait, standing
+from go2_wbc.legs import LEGS
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.correction import SteadyStateCorrection
+from go2_wbc.planning.swing import SwingConfig, swing_foot
+from go2_wbc.reference import BodyTarget, LegTask, Reference, TrackedPoint
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from go2_wbc.robot.snapshot import Snapshot
+
+
+@dataclass(frozen=True, slots=True)
+class LocomotionConfig:
+    """Numbers of the locomotion planner, from a search on this robot in simulation.
+
+    Attributes:
+        height: CoM height [m] above the feet's contact points.
+        linear_acceleration: greatest change of the commanded velocity [m/s^2].
+        angular_acceleration: greatest change of the commanded turning rate [rad/s^2].
+        velocity_feedback: foothold offset [s] per velocity error.
+        position_leash: distance [m] that the reference may run ahead of the robot.
+        yaw_leash: angle [rad] that the heading reference may run ahead.
+        foothold_reach: greatest horizontal distance [m] of a foothold from below its hip.
+        normal_force_min: least normal force [N] asked of a stance foot.
+        normal_force_max: greatest normal force [N] allowed on a stance foot.
+        settle_speed: speed [m/s] below which a robot without command may stop stepping.
+        capture_margin: distance [m] of the capture point from the middle of the feet beyond
+            which a standing robot starts to step.
+        square_tolerance: distance [m] of a foot from below its hip at which the robot stands
+            squarely enough to stop stepping.
+        swing: shape of the swing.
+    """
+
+    height: float = 0.29
+    linear_acceleration: float = 1.5
+    angular_acceleration: float = 4.0
+    velocity_feedback: float = 0.12
+    position_leash: float = 0.08
+    yaw_leash: float = 0.3
+    foothold_reach: float = 0.22
+    normal_force_min: float = 0.0
+    normal_force_max: float = 400.0
+    settle_speed: float = 0.05
+    capture_margin: float = 0.09
+    square_tolerance: float = 0.02
+    swing: SwingConfig = field(default_factory=SwingConfig)
+
+
+class LocomotionPlanner:
+    """Turns a velocity command into references, one tick after the other."""
+
+    def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
+        """Prepare a planner; ``start`` sets it on its way."""
+        self._model = model
+        self._gait = gait
+        self._config = config
+        self._gait_schedule = gait.schedule()
+
+    def start(self, snapshot: Snapshot) -> None:
+        """Begin from the measured state, standing."""
+        self._yaw = float(snapshot.state.rpy[2])
+        self._position = snapshot.p_world_com[:2].copy()
+        self._velocity = np.zeros(3)
+        self._is_stepping = False
+        self._phase_time = 0.0
+        self._last_time = snapshot.state.time
+        self._ground = float(np.mean(snapshot.p_world_feet[:, 2])) - self._model.foot_radius
+        self._liftoff = snapshot.p_world_feet.copy()
+        self._was_stance = np.ones(4, dtype=bool)
+        self._correction = SteadyStateCorrection()
+        self._height_offset = 0.0
+
+    @property
+    def is_stepping(self) -> bool:
+        """Whether the gait is running."""
+        return self._is_stepping
+
+    @property
+    def heading(self) -> float:
+        """Yaw [rad] of the reference."""
+        return self._yaw
+
+    def square_up(self, snapshot: Snapshot) -> bool:
+        """Start stepping unless every foot is below its hip; returns whether they all are."""
+        self._is_stepping = not self._is_square(snapshot)
+        self._phase_time = 0.0
+        return not self._is_stepping
+
+    def update(self, snapshot: Snapshot, command: VelocityCommand) -> Reference:
+        """The reference of this tick for the wanted ``command`` (already inside the envelope)."""
+        dt = snapshot.state.time - self._last_time
+        self._last_time = snapshot.state.time
+        self._advance_phase(snapshot, command, dt)
+        self._integrate(snapshot, command, dt)
+        self._correct_height(snapshot, dt)
+        phase = (self._gait_schedule if self._is_stepping else standing()).at(self._phase_time)
+        self._note_liftoffs(snapshot, phase.stance)
+        p, v, a = self._feet(snapshot, phase)
+        legs = tuple(LegTask.STANCE if s else LegTask.SWING for s in phase.stance)
+        q = snapshot.state.joint_positions
+        config = self._config
+        return Reference(
+            body=self._body(),
+            legs=legs,
+            normal_force_min=np.full(4, config.normal_force_min),
+            normal_force_max=np.full(4, config.normal_force_max),
+            p_world_feet=p,
+            v_world_feet=v,
+            a_world_feet=a,
+            q_joints=q,
+            v_joints=np.zeros(12),
+            a_joints=np.zeros(12),
+        )
+
+    def _advance_phase(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> None:
+        if self._is_stepping:
+            half = self._gait.period / 2
+            before = int(self._phase_time / half)
+            self._phase_time += dt
+            at_touchdown = int(self._phase_time / half) > before
+            if at_touchdown and command.is_zero and self._may_stop(snapshot):
+                self._is_stepping = False
+        elif not command.is_zero or self._must_step(snapshot):
+            self._is_stepping = True
+            self._phase_time = 0.0
+
+    def _may_stop(self, snapshot: Snapshot) -> bool:
+        slow = np.linalg.norm(snapshot.v_world_com[:2]) < self._config.settle_speed
+        return bool(slow and self._is_settled() and self._is_square(snapshot))
+
+    def _is_square(self, snapshot: Snapshot) -> bool:
+        offsets = snapshot.p_world_feet[:, :2] - self._nominal_feet(snapshot)
+        offsets -= offsets.mean(axis=0)
+        return bool(np.linalg.norm(offsets, axis=1).max() < self._config.square_tolerance)
+
+    def _is_settled(self) -> bool:
+        return bool(np.abs(self._velocity).max() < 1e-3)
+
+    def _must_step(self, snapshot: Snapshot) -> bool:
+        omega = np.sqrt(self._model.gravity / self._config.height)
+        capture = snapshot.p_world_com[:2] + snapshot.v_world_com[:2] / omega
+        middle = snapshot.p_world_feet[:, :2].mean(axis=0)
+        return bool(np.linalg.norm(capture - middle) > self._config.capture_margin)
+
+    def _integrate(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> None:
+        config = self._config
+        wanted = np.array([command.linear_x, command.linear_y, command.angular_z])
+        rate = np.array([config.linear_acceleration] * 2 + [config.angular_acceleration])
+        self._velocity += np.clip(wanted - self._velocity, -rate * dt, rate * dt)
+        self._yaw += self._velocity[2] * dt
+        lead = wrap_angle(self._yaw - float(snapshot.state.rpy[2]))
+        self._yaw += np.clip(lead, -config.yaw_leash, config.yaw_leash) - lead
+        self._position = self._position + self._world_velocity()[:2] * dt
+        offset = self._position - snapshot.p_world_com[:2]
+        distance = float(np.linalg.norm(offset))
+        if distance > config.position_leash:
+            self._position = snapshot.p_world_com[:2] + offset * (config.position_leash / distance)
+
+    def _correct_height(self, snapshot: Snapshot, dt: float) -> None:
+        sag = self._ground + self._config.height - snapshot.p_world_com[2]
+        self._height_offset = float(self._correction.update(np.array([0.0, 0.0, sag]), dt)[2])
+
+    def _world_velocity(self) -> Float[np.ndarray, "3"]:
+        return yaw_rotation(self._yaw) @ np.array([self._velocity[0], self._velocity[1], 0.0])
+
+    def _body(self) -> BodyTarget:
+        height = self._ground + self._config.height + self._height_offset
+        return BodyTarget(
+            point=TrackedPoint.COM,
+            p_world=np.array([*self._position, height]),
+            v_world=self._world_velocity(),
+            a_world=np.zeros(3),
+            R_world_base=yaw_rotation(self._yaw),
+            w_world=np.array([0.0, 0.0, self._velocity[2]]),
+            dw_world=np.zeros(3),
+        )
+
+    def _note_liftoffs(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"]) -> None:
+        lifted = self._was_stance & ~stance
+        self._liftoff[lifted] = snapshot.p_world_feet[lifted]
+        landed = ~self._was_stance & stance
+        if landed.any():
+            height = float(np.mean(snapshot.p_world_feet[landed, 2])) - self._model.foot_radius
+            self._ground += 0.3 * (height - self._ground)
+        self._was_stance = stance.copy()
+
+    def _nominal_feet(self, snapshot: Snapshot) -> Float[np.ndarray, "4 2"]:
+        R = yaw_rotation(float(snapshot.state.rpy[2]))
+        feet = self._model.p_base_feet_nominal @ R.T
+        return snapshot.state.p_world_base[:2] + feet[:, :2]
+
+    def _footholds(
+        self, snapshot: Snapshot, remaining: Float[np.ndarray, "4"]
+    ) -> Float[np.ndarray, "4 2"]:
+        """Touchdown points [m]: below the hip at touchdown, plus half the stance travel."""
+        config = self._config
+        v = snapshot.v_world_com[:2]
+        v_ref = self._world_velocity()[:2]
+        hips = self._nominal_feet(snapshot)
+        arms = hips - snapshot.state.p_world_base[:2]
+        spin = self._velocity[2] * np.column_stack([-arms[:, 1], arms[:, 0]])
+        velocity = v + spin
+        step = velocity * self._gait.stance_time / 2 + config.velocity_feedback * (v - v_ref)
+        step += velocity * remaining[:, None]
+        travel = step - velocity * remaining[:, None]
+        length = np.linalg.norm(travel, axis=1, keepdims=True)
+        reach = config.foothold_reach
+        travel *= np.minimum(1.0, reach / np.maximum(length, 1e-9))
+        return hips + travel + velocity * remaining[:, None]
+
+    def _feet(
+        self, snapshot: Snapshot, phase: ContactPhase
+    ) -> tuple[Float[np.ndarray, "4 3"], Float[np.ndarray, "4 3"], Float[np.ndarray, "4 3"]]:
+        p, v, a = snapshot.p_world_feet.copy(), np.zeros((4, 3)), np.zeros((4, 3))
+        swinging = ~phase.stance
+        if not swinging.any():
+            return p, v, a
+        remaining = np.where(swinging, phase.remaining, 0.0)
+        goals = self._footholds(snapshot, remaining)
+        touchdown_height = self._ground + self._model.foot_radius
+        for leg in LEGS:
+            if swinging[leg]:
+                goal = np.array([*goals[leg], touchdown_height])
+                p[leg], v[leg], a[leg] = swing_foot(
+                    self._liftoff[leg],
+                    goal,
+                    float(phase.progress[leg]),
+                    self._gait.swing_time,
+                    self._config.swing,
+                )
+        return p, v, a
