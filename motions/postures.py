@@ -1,0 +1,63 @@
+"""Resting postures and the ways between them, all on four feet that stay where they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.contacts import standing
+from go2_wbc.curves import Curve, keyframes
+from go2_wbc.reference import Stance, TrackedPoint
+from motions.plan import KeyframePlan
+
+STAND_HEIGHT = 0.29
+"""Height [m] of the CoM above the ground when standing."""
+STAND_POSE = np.array([0.0, 0.0, STAND_HEIGHT, 0.0, 0.0, 0.0])
+"""CoM position [m] in the motion's frame, then roll, pitch, yaw [rad]."""
+SIT_POSE = np.array([0.0, 0.0, 0.235, 0.0, np.radians(-38.0), 0.0])
+"""Base position [m] and roll, pitch, yaw [rad] of the dog-like sit: rump down, front legs up.
+
+The lowest rump at this pitch that keeps the rear feet 5 cm below their hips' axes: further down the
+rear legs cross a singularity and rattle, unless the feet happen to be splayed (own simulation).
+"""
+LIE_POSE = np.array([0.0, 0.0, 0.085, 0.0, 0.0, 0.0])
+"""Base position [m] and angles [rad] just above the ground, from which the robot goes limp."""
+TUCKED_JOINTS = np.tile([0.0, 1.30, -2.66], 4)
+"""Joint angles [rad] with the feet under the hips and the belly on the ground."""
+
+def rise(start: Float[np.ndarray, "6"], entry: Stance, duration: float = 1.2) -> KeyframePlan:
+    """From a CoM pose (6,) to standing."""
+    return _posture_plan("rise", entry, Stance.STAND, TrackedPoint.COM, (start, STAND_POSE), duration)
+
+
+def sit_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> KeyframePlan:
+    """From a standing base pose (6,) to the dog-like sit."""
+    poses = (start, SIT_POSE)
+    return _posture_plan("sit", Stance.STAND, Stance.SIT, TrackedPoint.BASE, poses, duration)
+
+
+def lie_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> KeyframePlan:
+    """From a standing base pose (6,) down to the ground."""
+    poses = (start, LIE_POSE)
+    return _posture_plan("lie down", Stance.STAND, Stance.LIE, TrackedPoint.BASE, poses, duration)
+
+
+def _posture_plan(
+    name: str,
+    entry: Stance,
+    exit_stance: Stance,
+    point: TrackedPoint,
+    poses: Sequence[Float[np.ndarray, "6"]],
+    duration: float,
+) -> KeyframePlan:
+    times = np.linspace(0.0, duration, len(poses)).tolist()
+    return KeyframePlan(
+        name, entry, exit_stance, point, keyframes(times, poses), _no_joints(), standing()
+    )
+
+
+def _no_joints() -> Curve:
+    zeros = np.zeros(12)
+    return keyframes((0.0, 1.0), (zeros, zeros))
