@@ -1,0 +1,88 @@
+"""Reads an exported page back: the packed data, the scene, and its own forward kinematics."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+from typing import Any
+
+import numpy as np
+
+_TYPES = {
+    "Float32Array": np.float32,
+    "Uint32Array": np.uint32,
+    "Uint16Array": np.uint16,
+    "Int8Array": np.int8,
+    "Uint8Array": np.uint8,
+}
+
+
+def packed_parts(page: str) -> dict[str, bytes]:
+    """The unpacked contents of the page's data blocks, by id."""
+    blocks = re.findall(r'<script type="text/plain" id="([\w-]+)">([^<]*)</script>', page)
+    return {name: gzip.decompress(base64.b64decode(text)) for name, text in blocks}
+
+
+def read_data(page: str) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Header and arrays of the replay, quantised arrays in their unit."""
+    content = packed_parts(page)["replay-data"]
+    length = int.from_bytes(content[:4], "little")
+    header = json.loads(content[4 : 4 + length])
+    start = -(-(4 + length) // 8) * 8
+    arrays = {}
+    for name, entry in header["arrays"].items():
+        count = int(np.prod(entry["shape"]))
+        raw = np.frombuffer(content, _TYPES[entry["type"]], count, start + entry["offset"])
+        array = raw.reshape(entry["shape"])
+        if "low" in entry:
+            array = np.array(entry["low"]) + np.array(entry["scale"]) * array
+        arrays[name] = array
+    return header, arrays
+
+
+def transforms(header: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Fixed transform of each node that a recorded command sets, by path."""
+    return {
+        command["path"].removeprefix("/meshcat/"): np.reshape(command["matrix"], (4, 4)).T
+        for command in header["commands"]
+        if command["type"] == "set_transform"
+    }
+
+
+def placement(header: dict[str, Any], path: str, q: np.ndarray) -> np.ndarray:
+    """World transform of a node in configuration q, as the page's scene tree makes it."""
+    fixed = transforms(header)
+    turning = {
+        joint["path"]: (joint["axis"], angle)
+        for joint, angle in zip(header["joints"], q[7:], strict=True)
+    }
+    result, node = np.eye(4), ""
+    for name in path.split("/"):
+        node = f"{node}/{name}".lstrip("/")
+        if node == header["base"]:
+            result = result @ _pose(q)
+        elif node in turning:
+            result = result @ _turn(*turning[node])
+        elif node in fixed:
+            result = result @ fixed[node]
+    return result
+
+
+def _pose(q: np.ndarray) -> np.ndarray:
+    x, y, z, w = q[3:7]
+    angle = 2 * np.arctan2(np.linalg.norm([x, y, z]), w)
+    axis = np.array([x, y, z]) / max(np.linalg.norm([x, y, z]), 1e-12)
+    result = _turn(axis, angle)
+    result[:3, 3] = q[:3]
+    return result
+
+
+def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Rodrigues' formula."""
+    x, y, z = axis
+    K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    result = np.eye(4)
+    result[:3, :3] += np.sin(angle) * K + (1 - np.cos(angle)) * K @ K
+    return result

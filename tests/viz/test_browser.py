@@ -1,0 +1,146 @@
+"""The replay page in a real Chromium, from a file, offline."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import viz
+from go2_wbc.recording import Recording
+from tests.viz.chromium import Chromium, find_chromium
+
+pytestmark = pytest.mark.browser
+
+_SIZE = (1280, 720)
+_STAGE = (20, 60, 955, 440)  # [px] the 3D view without its buttons
+_FRAME_TRAVEL = 0.006  # [m] the robot moves this far in half a frame
+_DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+
+
+@pytest.fixture(scope="module")
+def browser(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
+    folder = tmp_path_factory.mktemp("browser")
+    page = viz.export_html(recording, folder / "demo.html", title="A walk")
+    executable = find_chromium()
+    assert executable is not None
+    with Chromium(executable, folder / "profile", _SIZE) as opened:
+        opened.open(page.as_uri())
+        opened.wait_for("window.replay")
+        opened.evaluate("replay.play(false)")
+        yield opened
+
+
+def _stage(browser: Chromium) -> np.ndarray:
+    browser.evaluate(_DRAWN)
+    with Image.open(io.BytesIO(browser.screenshot())) as image:
+        return np.asarray(image.convert("RGB").crop(_STAGE), dtype=float)
+
+
+def test_it_opens_without_a_request_or_an_error(browser: Chromium) -> None:
+    requests = browser.seen("Network.requestWillBeSent")
+    urls = [event["request"]["url"] for event in requests]
+    assert [url for url in urls if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert len(urls) == 1
+    assert browser.seen("Runtime.exceptionThrown") == []
+    assert browser.seen("Log.entryAdded", lambda p: p["entry"]["level"] == "error") == []
+    assert browser.seen("Runtime.consoleAPICalled", lambda p: p["type"] == "error") == []
+
+
+def test_the_robot_is_drawn(browser: Chromium) -> None:
+    browser.evaluate("replay.seek(0.2)")
+    stage = _stage(browser)
+    dark = (stage.max(axis=2) < 90).mean()
+    assert 0.002 < dark < 0.2
+    assert stage.std() > 10
+
+
+def test_scrubbing_changes_the_picture_and_comes_back_to_the_same(browser: Chromium) -> None:
+    pictures = []
+    for time in (0.2, 2.0, 0.2):
+        browser.evaluate(f"replay.scrub({time}); replay.scene.setView('side')")
+        pictures.append(_stage(browser))
+    assert np.abs(pictures[1] - pictures[0]).mean() > 2.0
+    assert np.abs(pictures[2] - pictures[0]).mean() < 0.5
+
+
+def test_a_click_on_the_timeline_goes_to_that_time(browser: Chromium) -> None:
+    box = browser.evaluate(
+        "(({left, right, top}) => [left, right, top])"
+        "(document.getElementById('timeline').getBoundingClientRect())"
+    )
+    browser.click(0.5 * (box[0] + 34 + box[1] - 6), box[2] + 60)
+    half = browser.evaluate("replay.data.duration / 2")
+    assert browser.evaluate("replay.time") == pytest.approx(half, abs=0.05)
+
+
+def test_space_plays_and_pauses_and_arrows_step_by_one_frame(browser: Chromium) -> None:
+    browser.evaluate("replay.scrub(0.5)")
+    frame = browser.evaluate("replay.data.frameAt(replay.time)")
+    browser.key("ArrowRight", "ArrowRight")
+    assert browser.evaluate("replay.data.frameAt(replay.time)") == frame + 1
+    browser.key("ArrowLeft", "ArrowLeft")
+    assert browser.evaluate("replay.data.frameAt(replay.time)") == frame
+    browser.key(" ", "Space", text=" ")
+    browser.wait_for("replay.time > 0.7")
+    browser.key(" ", "Space", text=" ")
+    stopped = browser.evaluate("replay.time")
+    browser.evaluate(_DRAWN)
+    assert browser.evaluate("replay.time") == stopped
+    assert browser.evaluate("replay.isPlaying") is False
+
+
+def test_the_readouts_follow_the_time(browser: Chromium) -> None:
+    browser.evaluate("replay.scrub(2.0)")
+    text = "document.getElementById('{}').textContent"
+    assert browser.evaluate(text.format("behaviour")) == "High five"
+    assert browser.evaluate(text.format("now")) == "2.00"
+    shown = browser.evaluate("document.querySelector('[data-curve=height] output').textContent")
+    height = browser.evaluate("replay.data.q[19 * replay.data.frameAt(2.0) + 2]")
+    assert float(shown.split()[0]) == pytest.approx(100 * height, abs=0.06)
+
+
+def test_hiding_the_forces_changes_the_picture(browser: Chromium) -> None:
+    browser.evaluate("replay.scrub(0.1); replay.scene.setView('side')")
+    shown = _stage(browser)
+    browser.evaluate("document.querySelector('[data-toggle=forces]').click()")
+    hidden = _stage(browser)
+    browser.evaluate("document.querySelector('[data-toggle=forces]').click()")
+    orange = (shown[:, :, 0] > 220) & (shown[:, :, 1] < 170) & (shown[:, :, 2] < 90)
+    assert orange.sum() > 100
+    assert np.abs(shown - hidden)[orange].mean() > 30
+
+
+def test_the_camera_follows_the_robot(browser: Chromium) -> None:
+    ask = (
+        "[replay.scene.viewer.controls.target.x, replay.data.target[2 * replay.data.frameAt({t})]]"
+    )
+    browser.evaluate("replay.scrub(0); replay.scene.setView('corner')")
+    before = browser.evaluate(ask.format(t=0))
+    browser.evaluate("replay.scrub(1.4)")
+    after = browser.evaluate(ask.format(t=1.4))
+    assert after[0] - before[0] == pytest.approx(after[1] - before[1], abs=_FRAME_TRAVEL)
+    assert after[0] - before[0] > 0.1
+
+
+def test_the_page_fits_a_narrow_window(browser: Chromium) -> None:
+    browser.command(
+        "Emulation.setDeviceMetricsOverride",
+        width=640,
+        height=860,
+        deviceScaleFactor=1,
+        mobile=False,
+    )
+    browser.evaluate(_DRAWN)
+    app = "document.getElementById('app')"
+    overflow = f"{app}.scrollWidth > innerWidth || {app}.scrollHeight > innerHeight"
+    assert browser.evaluate(overflow) is False
+    pane = browser.evaluate(
+        "(({width, height}) => [width, height])"
+        "(document.querySelector('#pane canvas').getBoundingClientRect())"
+    )
+    assert pane[0] == pytest.approx(626, abs=6)
+    assert pane[1] > 250

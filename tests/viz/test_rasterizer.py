@@ -1,0 +1,98 @@
+"""The rasteriser against brute force and against geometry known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from viz.camera import Camera
+from viz.rasterizer import rasterize
+
+_EDGE = 1e-5  # [px] a sample this close to an edge may fall on either side
+
+
+def _camera(size: tuple[int, int] = (120, 90)) -> Camera:
+    return Camera(np.zeros(3), np.deg2rad(35.0), np.deg2rad(25.0), 3.0, size)
+
+
+def _signed_distances(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Distances [px] of points to the edges of a clockwise (y down) polygon, positive inside."""
+    edges = np.roll(corners, -1, axis=0) - corners
+    lengths = np.hypot(*edges.T)
+    across = edges[:, 0, None] * (y - corners[:, 1, None])
+    along = edges[:, 1, None] * (x - corners[:, 0, None])
+    return (across - along) / lengths[:, None]
+
+
+def test_the_silhouette_of_a_cube_is_the_hull_of_its_projected_corners() -> None:
+    camera = _camera()
+    cube = trimesh.creation.box((0.6, 0.6, 0.6))
+    projected = camera.project(cube.vertices)
+    seen = rasterize(projected, cube.faces, camera.size)
+    covered = np.zeros(camera.size[0] * camera.size[1], dtype=bool)
+    covered[seen.pixel] = True
+    row, column = np.divmod(np.arange(len(covered)), camera.size[0])
+    hull = trimesh.convex.hull_points(projected[:, :2])
+    centre = hull.mean(axis=0)
+    around = hull[np.argsort(np.arctan2(*(hull - centre).T[::-1]))]
+    depth = _signed_distances(around, column + 0.5, row + 0.5).min(axis=0)
+    clear = np.abs(depth) > _EDGE
+    assert covered.sum() > 500
+    np.testing.assert_array_equal(covered[clear], depth[clear] > 0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_every_sample_shows_the_nearest_of_the_triangles_that_cover_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    width, height = 37, 23
+    points = rng.uniform((-10, -10, 0.2), (width + 10, height + 10, 1.0), (60, 3))
+    triangles = rng.permutation(60).reshape(20, 3)
+    seen = rasterize(points, triangles, (width, height), cull_back=False)
+    found = np.full(width * height, -1)
+    found[seen.pixel] = seen.triangle
+    for pixel in range(width * height):
+        row, column = divmod(pixel, width)
+        nearness = [_nearness(points[triangle], column + 0.5, row + 0.5) for triangle in triangles]
+        best = max(nearness)
+        if found[pixel] < 0:
+            assert best == 0
+        else:
+            assert nearness[found[pixel]] == pytest.approx(best, abs=1e-5)
+
+
+def _nearness(corners: np.ndarray, x: float, y: float) -> float:
+    """Third coordinate of a triangle at a point, 0 outside, by solving for its weights."""
+    system = np.vstack([corners[:, :2].T, np.ones(3)])
+    weights = np.linalg.solve(system, np.array([x, y, 1.0]))
+    return float(weights @ corners[:, 2]) if np.all(weights >= 0) else 0.0
+
+
+def test_a_triangle_seen_from_behind_is_dropped_unless_asked_for() -> None:
+    points = np.array([[2.0, 2.0, 1.0], [2.0, 12.0, 1.0], [12.0, 2.0, 1.0]])
+    front, back = np.array([[0, 1, 2]]), np.array([[0, 2, 1]])
+    assert len(rasterize(points, front, (16, 16)).pixel) > 40
+    assert len(rasterize(points, back, (16, 16)).pixel) == 0
+    assert len(rasterize(points, back, (16, 16), cull_back=False).pixel) > 40
+
+
+def test_neighbouring_triangles_leave_no_crack_between_them() -> None:
+    rng = np.random.default_rng(3)
+    grid = np.stack(np.meshgrid(np.arange(9.0), np.arange(9.0)), axis=-1) * 5
+    grid[1:-1, 1:-1] += rng.uniform(-1.5, 1.5, (7, 7, 2))
+    points = np.column_stack([grid.reshape(-1, 2), np.ones(81)])
+    rows = np.arange(81).reshape(9, 9)
+    a, b, c, d = (
+        part.ravel() for part in (rows[:-1, :-1], rows[:-1, 1:], rows[1:, :-1], rows[1:, 1:])
+    )
+    triangles = np.vstack([np.column_stack([a, c, b]), np.column_stack([b, c, d])])
+    assert len(rasterize(points, triangles, (40, 40)).pixel) == 40 * 40
+
+
+def test_the_floor_under_a_pixel_projects_back_onto_it() -> None:
+    camera = Camera(np.array([0.4, -0.2, 0.3]), 0.7, 0.4, 2.0, (64, 48))
+    for column, row in ((3.0, 40.0), (50.5, 30.25)):
+        x, y, scale = camera.H_floor_picture @ [column, row, 1.0]
+        assert scale > 0
+        back = camera.project(np.array([[x / scale, y / scale, 0.0]]))[0]
+        np.testing.assert_allclose(back[:2], [column, row], atol=1e-9)

@@ -1,0 +1,110 @@
+"""What a rendered picture must show: feet on the floor, a shadow under the robot, a sky."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from go2_wbc.legs import LEGS
+from go2_wbc.robot.model import FOOT_RADIUS
+from viz.camera import Camera
+from viz.floor import FloorStyle, paint_floor
+from viz.posed_robot import PosedRobot, WorldTriangles
+from viz.rasterizer import rasterize
+from viz.renderer import Lighting, RenderStyle, render
+from viz.robot_meshes import load_robot_visuals
+
+_TOUCH = 2.5  # [px] sole in the picture against the projected contact point
+
+
+def _standing() -> tuple[PosedRobot, np.ndarray]:
+    robot = PosedRobot(load_robot_visuals().simplified(0.008))
+    q = np.concatenate([[0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], np.tile([0.0, 0.8, -1.5], 4)])
+    q[2] += FOOT_RADIUS - robot.feet(q)[:, 2].min()
+    return robot, q
+
+
+def _camera(size: tuple[int, int] = (480, 300)) -> Camera:
+    return Camera(np.array([0.0, 0.0, 0.2]), np.deg2rad(-52), np.deg2rad(17), 1.7, size)
+
+
+@pytest.mark.parametrize("leg", LEGS)
+def test_each_foot_meets_the_floor_where_its_contact_point_is(leg: int) -> None:
+    robot, q = _standing()
+    camera = _camera((960, 600))
+    contact = robot.feet(q)[leg] - [0.0, 0.0, FOOT_RADIUS]
+    surface = robot.at(q)
+    near = np.linalg.norm(surface.points - contact, axis=1) < 2 * FOOT_RADIUS
+    faces = surface.triangles[near[surface.triangles].all(axis=1)]
+    seen = rasterize(camera.project(surface.points), faces, camera.size)
+    lowest = seen.pixel.max() // camera.size[0]
+    foot = camera.project(np.array([contact]))[0]
+    sphere = camera.project(contact[None] + np.array([0.0, 0.0, FOOT_RADIUS]))[0]
+    radius = FOOT_RADIUS * camera.focal_length * sphere[2]
+    assert foot[1] - _TOUCH < lowest + 0.5 < sphere[1] + radius + _TOUCH
+
+
+def test_the_floor_is_darker_under_the_robot_than_beside_it() -> None:
+    robot, q = _standing()
+    style, light = FloorStyle(tile=100.0), Lighting().towards_key
+    camera = _camera()
+    with_shadow = paint_floor(camera, robot.at(q), light, style)
+    nothing = WorldTriangles(
+        robot.at(q).points, robot.at(q).normals, np.zeros((0, 3), dtype=int), np.zeros((0, 3))
+    )
+    without = paint_floor(camera, nothing, light, style)
+    column, row = (round(value) for value in camera.project(np.array([[0.0, 0.05, 0.0]]))[0, :2])
+    assert with_shadow[row, column].max() < 0.7 * without[row, column].max()
+    np.testing.assert_allclose(with_shadow[0], without[0], atol=1e-6)
+
+
+def test_the_shadow_falls_away_from_the_light() -> None:
+    tower = WorldTriangles(
+        np.array([[-0.02, 0.0, 0.3], [0.02, 0.0, 0.3], [0.0, 0.03, 0.3]]),
+        np.tile([0.0, 0.0, 1.0], (3, 1)),
+        np.array([[0, 1, 2]]),
+        np.ones((1, 3)),
+    )
+    light = np.array([0.6, 0.0, 0.8])
+    camera = _camera()
+    style = FloorStyle(tile=100.0)
+    picture = paint_floor(camera, tower, light, style)
+    bare = paint_floor(
+        camera,
+        WorldTriangles(tower.points, tower.normals, tower.triangles[:0], tower.colors[:0]),
+        light,
+        style,
+    )
+    row, column = np.unravel_index(np.argmin((picture / bare)[:, :, 0]), picture.shape[:2])
+    darkest = camera.H_floor_picture @ [column + 0.5, row + 0.5, 1.0]
+    np.testing.assert_allclose(darkest[:2] / darkest[2], [-0.3 * 0.75, 0.01], atol=0.02)
+
+
+def test_the_robot_covers_a_good_part_of_the_picture_with_its_own_colours() -> None:
+    robot, q = _standing()
+    camera = _camera()
+    surface = robot.at(q)
+    picture = render(camera, surface, RenderStyle())
+    empty = render(camera, _raised(robot, q, 50.0), RenderStyle())
+    changed = np.any(picture != empty, axis=2).mean()
+    assert picture.shape == (300, 480, 3)
+    assert 0.12 < changed < 0.6
+    assert picture.min() < 60
+    assert np.abs(picture[0].astype(int) - empty[0]).max() == 0
+
+
+def _raised(robot: PosedRobot, q: np.ndarray, height: float) -> WorldTriangles:
+    """The robot far behind the camera's back: out of the picture."""
+    away = robot.at(q)
+    return WorldTriangles(
+        away.points - [0.0, 0.0, height], away.normals, away.triangles, away.colors
+    )
+
+
+def test_more_samples_only_smooth_the_edges() -> None:
+    robot, q = _standing()
+    surface = robot.at(q)
+    coarse = render(_camera(), surface, RenderStyle(samples=1)).astype(float)
+    fine = render(_camera(), surface, RenderStyle(samples=3)).astype(float)
+    assert np.abs(coarse - fine).mean() < 3.0
+    assert np.abs(coarse - fine).max() > 20.0

@@ -1,0 +1,102 @@
+"""The robot's looks against Pinocchio's own loader and against its mirror image."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from go2_wbc.errors import DescriptionError
+from go2_wbc.legs import LEGS
+from go2_wbc.robot.description import find_description
+from go2_wbc.robot.model import FOOT_RADIUS
+from viz.posed_robot import PosedRobot, arrow
+from viz.robot_meshes import load_mesh_file, load_robot_visuals
+
+_MESH_ERROR = 0.002  # [m] the foot's mesh is not exactly the sphere of the contact model
+_STAND = np.concatenate([[0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], np.tile([0.0, 0.8, -1.5], 4)])
+
+
+def _points_of(link: str) -> np.ndarray:
+    visuals = load_robot_visuals()
+    data = visuals.model.createData()
+    pin.forwardKinematics(visuals.model, data, _STAND)
+    visual = next(visual for visual in visuals.visuals if visual.name == link)
+    T = data.oMi[visual.joint].homogeneous @ visual.T_joint_visual
+    local = np.vstack([part.surface.points for part in visuals.meshes[visual.mesh]])
+    return local @ T[:3, :3].T + T[:3, 3]
+
+
+def test_each_mesh_is_loaded_once_and_shared_by_the_legs() -> None:
+    visuals = load_robot_visuals()
+    assert len(visuals.visuals) == 17
+    assert len(visuals.meshes) == 7
+    assert sum(visual.mesh == "hip" for visual in visuals.visuals) == 4
+
+
+def test_every_mesh_lies_as_in_pinocchios_own_loader() -> None:
+    visuals = load_robot_visuals()
+    description = find_description()
+    geometry = pin.GeometryModel()
+    folders = [str(folder) for folder in description.package_dirs]
+    pin.buildGeomFromUrdf(
+        visuals.model, str(description.urdf_path), pin.GeometryType.VISUAL, geometry, folders
+    )
+    for item, visual in zip(geometry.geometryObjects, visuals.visuals, strict=True):
+        item.geometry.computeLocalAABB()
+        box = item.geometry.aabb_local
+        points = np.vstack([part.surface.points for part in visuals.meshes[visual.mesh]])
+        np.testing.assert_allclose(points.min(axis=0), box.min_.ravel(), atol=2e-5)
+        np.testing.assert_allclose(points.max(axis=0), box.max_.ravel(), atol=2e-5)
+
+
+@pytest.mark.parametrize("part", ["hip", "thigh", "calf", "foot"])
+@pytest.mark.parametrize("end", ["F", "R"])
+def test_the_right_legs_look_like_the_left_ones_in_a_mirror(part: str, end: str) -> None:
+    left, right = _points_of(f"{end}L_{part}"), _points_of(f"{end}R_{part}") * [1.0, -1.0, 1.0]
+    np.testing.assert_allclose(left.min(axis=0), right.min(axis=0), atol=_MESH_ERROR)
+    np.testing.assert_allclose(left.max(axis=0), right.max(axis=0), atol=_MESH_ERROR)
+
+
+def test_the_sole_of_each_foot_is_where_the_contact_model_puts_it() -> None:
+    feet = PosedRobot(load_robot_visuals()).feet(_STAND)
+    for leg in LEGS:
+        sole = _points_of(leg.foot)[:, 2].min()
+        assert sole == pytest.approx(feet[leg, 2] - FOOT_RADIUS, abs=_MESH_ERROR)
+
+
+def test_normals_are_unit_and_point_out_of_the_faces() -> None:
+    for parts in load_robot_visuals().meshes.values():
+        for surface in (part.surface for part in parts):
+            np.testing.assert_allclose(np.linalg.norm(surface.normals, axis=1), 1.0)
+            corners = surface.points[surface.triangles]
+            faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            agree = np.sum(faces * surface.normals[surface.triangles].mean(axis=1), axis=1)
+            assert np.mean(agree > 0) > 0.999
+
+
+def test_the_simplified_robot_has_the_same_size() -> None:
+    full = PosedRobot(load_robot_visuals()).at(_STAND)
+    coarse = PosedRobot(load_robot_visuals().simplified(0.008)).at(_STAND)
+    assert len(coarse.triangles) < 0.5 * len(full.triangles)
+    np.testing.assert_allclose(coarse.points.min(axis=0), full.points.min(axis=0), atol=0.008)
+    np.testing.assert_allclose(coarse.points.max(axis=0), full.points.max(axis=0), atol=0.008)
+
+
+def test_an_arrow_is_as_long_as_asked_and_faces_outward() -> None:
+    start = np.array([0.1, 0.2, 0.3])
+    made = arrow(start, 0.15, 0.006, (1.0, 0.5, 0.0))
+    assert made.points[:, 2].min() == pytest.approx(0.3)
+    assert made.points[:, 2].max() == pytest.approx(0.45)
+    corners = made.points[made.triangles]
+    faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    solid = np.linalg.norm(faces, axis=1) > 1e-12
+    volume = np.einsum("ij,ij->i", faces, corners.mean(axis=1) - start).sum() / 6
+    assert volume > 0
+    agree = np.sum(faces * made.normals[made.triangles].mean(axis=1), axis=1)
+    assert np.all(agree[solid] > 0)
+
+
+def test_a_missing_mesh_file_is_named(tmp_path) -> None:  # noqa: ANN001 - pytest's own
+    with pytest.raises(DescriptionError, match=r"nowhere\.dae"):
+        load_mesh_file(tmp_path / "nowhere.dae")

@@ -1,0 +1,159 @@
+"use strict";
+// The player: one clock that moves the scene and the charts, buttons and keys.
+
+const END_PAUSE = 1.2; // s that the last picture stays before the replay starts over
+const LONG_STEP = 1.0; // s, shift with an arrow key
+
+class Player {
+  constructor(data, scene, charts) {
+    Object.assign(this, { data, scene, charts, time: 0, speed: 1, isPlaying: false, rest: 0 });
+    this.button = document.getElementById("play");
+    this.now = document.getElementById("now");
+    this.behaviour = document.getElementById("behaviour");
+    document.getElementById("total").textContent = ` / ${data.duration.toFixed(2)} s`;
+    charts.forEach((chart) => chart.onScrub((t) => this.scrub(t)));
+    this.seek(0);
+    this.last = performance.now();
+    requestAnimationFrame((now) => this.tick(now));
+  }
+
+  tick(now) {
+    const passed = Math.min((now - this.last) / 1000, 0.1);
+    this.last = now;
+    if (this.isPlaying) this.advance(passed);
+    if (this.scene.shown.orbit) this.scene.orbit(passed);
+    requestAnimationFrame((later) => this.tick(later));
+  }
+
+  advance(passed) {
+    if (this.time < this.data.duration) {
+      this.seek(this.time + passed * this.speed);
+      return;
+    }
+    this.rest += passed;
+    if (this.rest > END_PAUSE) this.seek(0);
+  }
+
+  seek(t) {
+    this.rest = 0;
+    this.time = this.data.clampTime(t);
+    this.scene.show(this.time);
+    this.charts.forEach((chart) => chart.show(this.time));
+    this.now.textContent = this.time.toFixed(2);
+    this.behaviour.textContent = readable(this.data.labelAt(this.time));
+    const slider = document.getElementById("timeline");
+    slider.setAttribute("aria-valuenow", this.time.toFixed(2));
+    slider.setAttribute("aria-valuemax", this.data.duration.toFixed(2));
+  }
+
+  scrub(t) {
+    this.play(false);
+    this.seek(t);
+  }
+
+  step(frames) {
+    this.play(false);
+    this.seek((this.data.frameAt(this.time) + frames) / this.data.rate);
+  }
+
+  play(isPlaying) {
+    if (isPlaying && this.time >= this.data.duration) this.seek(0);
+    this.isPlaying = isPlaying;
+    this.button.classList.toggle("playing", isPlaying);
+  }
+
+  setSpeed(speed) {
+    this.speed = speed;
+    for (const button of document.querySelectorAll("[data-speed]")) {
+      button.classList.toggle("on", Number(button.dataset.speed) === speed);
+    }
+  }
+
+  toggle(name) {
+    const { shown } = this.scene;
+    shown[name] = !shown[name];
+    document.querySelector(`[data-toggle=${name}]`).classList.toggle("on", shown[name]);
+    this.scene.show(this.time);
+  }
+}
+
+function bindControls(player) {
+  const each = (name, act) => {
+    for (const button of document.querySelectorAll(`[data-${name}]`)) {
+      button.addEventListener("click", () => {
+        act(button.dataset[name]);
+        button.blur();
+      });
+    }
+  };
+  each("toggle", (name) => player.toggle(name));
+  each("view", (name) => player.scene.setView(name));
+  each("speed", (speed) => player.setSpeed(Number(speed)));
+  each("step", (frames) => player.step(Number(frames)));
+  player.button.addEventListener("click", () => {
+    player.play(!player.isPlaying);
+    player.button.blur();
+  });
+  const views = { 1: "corner", 2: "side", 3: "front", 4: "top" };
+  const toggles = { c: "follow", o: "orbit", f: "forces", s: "support", p: "paths" };
+  window.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const key = event.key.toLowerCase();
+    const sign = { arrowleft: -1, arrowright: 1 }[key];
+    if (key === " ") player.play(!player.isPlaying);
+    else if (sign && event.shiftKey) player.scrub(player.time + sign * LONG_STEP);
+    else if (sign) player.step(sign);
+    else if (key === "home") player.scrub(0);
+    else if (key === "end") player.scrub(player.data.duration);
+    else if (views[key]) player.scene.setView(views[key]);
+    else if (toggles[key]) player.toggle(toggles[key]);
+    else return;
+    event.preventDefault();
+  });
+}
+
+function makeCharts(data) {
+  const card = (name) => document.querySelector(`[data-curve=${name}]`);
+  const heights = Float32Array.from({ length: data.frames }, (_, i) => data.q[19 * i + 2]);
+  return [
+    new Timeline(document.getElementById("timeline"), data),
+    new Curve(card("margin"), data, {
+      values: data.margin, scale: 100, unit: "cm", digits: 1, limit: 0, least: 0.5, isBad: (v) => v < 0,
+    }),
+    new Curve(card("torque"), data, {
+      values: data.torque, scale: 100, unit: "%", digits: 0, limit: 1, least: 1, isBad: (v) => v > 1,
+    }),
+    new Curve(card("height"), data, {
+      values: heights, scale: 100, unit: "cm", digits: 1, least: 0.5, isBad: () => false,
+    }),
+  ];
+}
+
+async function start() {
+  const notice = (text) => {
+    const box = document.getElementById("notice");
+    box.textContent = text;
+    box.hidden = false;
+  };
+  if (typeof DecompressionStream === "undefined") {
+    notice("This browser is too old for this page. Any browser from 2023 or later opens it.");
+    return;
+  }
+  const bundle = document.createElement("script");
+  bundle.textContent = new TextDecoder().decode(await unpackText("meshcat-bundle"));
+  document.head.append(bundle);
+  const data = new ReplayData(await unpackText("replay-data"));
+  let scene;
+  try {
+    scene = new RobotScene(document.getElementById("pane"), data);
+  } catch (error) {
+    notice("This browser shows no 3D graphics (WebGL). Turn on hardware acceleration, or try another browser.");
+    throw error;
+  }
+  const player = new Player(data, scene, makeCharts(data));
+  bindControls(player);
+  player.play(!window.matchMedia("(prefers-reduced-motion: reduce)").matches);
+  window.replay = player; // for scripts and tests
+}
+
+start();

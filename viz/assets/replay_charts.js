@@ -1,0 +1,269 @@
+"use strict";
+// Flat drawings over time: the label strip, the contact strip and the curves.
+
+const INK = "#1f2937", MUTED = "#6b7280", LINE = "#e3e8f0", ACCENT = "#2563eb", BAD = "#dc2626";
+const FONT = "Inter, system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
+const LABEL_COLORS = ["#dbe6ff", "#fde9cf", "#d5f2e3", "#fbdcea", "#e6e0fb", "#d7eff5"];
+
+// A canvas with a picture that is drawn once per size, and a cursor drawn over it.
+class TimeCanvas {
+  constructor(canvas, data, left, right) {
+    Object.assign(this, { canvas, data, left, right, time: 0 });
+    this.picture = document.createElement("canvas");
+    new ResizeObserver(() => this.resize()).observe(canvas);
+  }
+
+  resize() {
+    const ratio = window.devicePixelRatio || 1;
+    this.width = this.canvas.clientWidth;
+    this.height = this.canvas.clientHeight;
+    for (const canvas of [this.canvas, this.picture]) {
+      canvas.width = Math.round(this.width * ratio);
+      canvas.height = Math.round(this.height * ratio);
+      canvas.getContext("2d").setTransform(ratio, 0, 0, ratio, 0, 0);
+    }
+    if (this.width > 0 && this.height > 0) this.draw(this.picture.getContext("2d"));
+    this.show(this.time);
+  }
+
+  xAt(t) {
+    return this.left + (this.width - this.left - this.right) * t / this.data.duration;
+  }
+
+  timeAt(x) {
+    const share = (x - this.left) / (this.width - this.left - this.right);
+    return this.data.clampTime(share * this.data.duration);
+  }
+
+  show(t) {
+    this.time = t;
+    if (!(this.width > 0 && this.height > 0)) return;
+    const paint = this.canvas.getContext("2d");
+    paint.clearRect(0, 0, this.width, this.height);
+    paint.drawImage(this.picture, 0, 0, this.width, this.height);
+    this.drawCursor(paint, this.xAt(t));
+  }
+
+  // Calls `scrub(t)` while the pointer is down on the canvas.
+  onScrub(scrub) {
+    const move = (event) => scrub(this.timeAt(event.clientX - this.canvas.getBoundingClientRect().left));
+    this.canvas.addEventListener("pointerdown", (event) => {
+      this.canvas.setPointerCapture(event.pointerId);
+      move(event);
+    });
+    this.canvas.addEventListener("pointermove", (event) => event.buttons & 1 && move(event));
+  }
+}
+
+// Seconds between ticks, so that about `room / 80` fit.
+function tickStep(duration, room) {
+  const wanted = duration / Math.max(room / 80, 1);
+  const base = 10 ** Math.floor(Math.log10(wanted));
+  return [1, 2, 5, 10].map((k) => k * base).find((step) => step >= wanted);
+}
+
+class Timeline extends TimeCanvas {
+  constructor(canvas, data) {
+    super(canvas, data, 34, 6);
+  }
+
+  draw(paint) {
+    paint.clearRect(0, 0, this.width, this.height);
+    const [labels, axis] = [22, 18];
+    const row = (this.height - labels - axis - 6) / 4;
+    this.drawLabels(paint, labels);
+    this.data.header.legs.forEach((leg, k) => {
+      this.drawLeg(paint, leg, k, labels + 6 + k * row, row - 3);
+    });
+    this.drawAxis(paint, this.height - axis);
+  }
+
+  drawLabels(paint, height) {
+    const names = [...new Set(this.data.header.labels.map((span) => span[2]))];
+    paint.font = `600 11px ${FONT}`;
+    paint.textBaseline = "middle";
+    paint.textAlign = "left";
+    for (const [start, end, label] of this.data.header.labels) {
+      const [x, width] = [this.xAt(start), Math.max(this.xAt(end) - this.xAt(start) - 1.5, 1)];
+      paint.fillStyle = LABEL_COLORS[names.indexOf(label) % LABEL_COLORS.length];
+      roundedBox(paint, x, 0, width, height, 5);
+      const text = readable(label);
+      if (paint.measureText(text).width + 10 > width) continue;
+      paint.fillStyle = INK;
+      paint.fillText(text, x + Math.min(7, (width - paint.measureText(text).width) / 2), height / 2 + 0.5);
+    }
+  }
+
+  // Planned stance as a pale block, measured force as a filled curve in it.
+  drawLeg(paint, leg, k, top, height) {
+    const { data } = this;
+    const color = data.header.leg_colors[k];
+    paint.fillStyle = color;
+    paint.font = `700 11px ${FONT}`;
+    paint.textAlign = "left";
+    paint.textBaseline = "middle";
+    paint.fillText(leg, 4, top + height / 2 + 0.5);
+    paint.fillStyle = "#f3f5f9";
+    paint.fillRect(this.left, top, this.width - this.left - this.right, height);
+    const half = 0.5 / data.rate;
+    paint.globalAlpha = 0.22;
+    paint.fillStyle = color;
+    for (let i = 0, start = -1; i <= data.frames; i++) {
+      const planned = i < data.frames && data.stance[4 * i + k];
+      if (planned && start < 0) start = i;
+      if (!planned && start >= 0) {
+        const [from, to] = [this.xAt(Math.max(start / data.rate - half, 0)), this.xAt(Math.min((i - 1) / data.rate + half, data.duration))];
+        paint.fillRect(from, top, to - from, height);
+        start = -1;
+      }
+    }
+    paint.globalAlpha = 0.9;
+    this.drawForce(paint, k, top, height);
+    paint.globalAlpha = 1;
+  }
+
+  drawForce(paint, k, top, height) {
+    const { data } = this;
+    const bottom = top + height;
+    paint.beginPath();
+    paint.moveTo(this.left, bottom);
+    for (let i = 0; i < data.frames; i++) {
+      const share = Math.min(data.forces[4 * i + k] / data.header.force_scale, 1);
+      paint.lineTo(this.xAt(i / data.rate), bottom - share * height);
+    }
+    paint.lineTo(this.xAt(data.duration), bottom);
+    paint.fill();
+  }
+
+  drawAxis(paint, top) {
+    const step = tickStep(this.data.duration, this.width - this.left);
+    const digits = Math.max(0, -Math.floor(Math.log10(step)));
+    paint.fillStyle = MUTED;
+    paint.font = `11px ${FONT}`;
+    paint.textBaseline = "top";
+    for (let k = 0; k * step <= this.data.duration + 1e-9; k++) {
+      const x = this.xAt(k * step);
+      paint.textAlign = k === 0 ? "left" : x > this.width - 24 ? "right" : "center";
+      paint.fillRect(Math.min(x, this.width - 1), top, 1, 3);
+      paint.fillText(`${(k * step).toFixed(digits)} s`, x, top + 5);
+    }
+  }
+
+  drawCursor(paint, x) {
+    paint.fillStyle = ACCENT;
+    paint.fillRect(x - 1, 0, 2, this.height - 17);
+    paint.beginPath();
+    paint.moveTo(x - 6, 0);
+    paint.lineTo(x + 6, 0);
+    paint.lineTo(x, 8);
+    paint.fill();
+  }
+}
+
+class Curve extends TimeCanvas {
+  // `style`: values, scale (display unit per SI unit), unit, digits, limit (SI, drawn as a line),
+  // isBad(value).
+  constructor(card, data, style) {
+    super(card.querySelector("canvas"), data, 30, 2);
+    this.output = card.querySelector("output");
+    this.style = style;
+    const finite = Array.from(style.values).filter(Number.isFinite).map((v) => v * style.scale);
+    if (style.limit !== undefined) finite.push(style.limit * style.scale);
+    const low = finite.reduce((a, b) => Math.min(a, b), Infinity);
+    const high = finite.reduce((a, b) => Math.max(a, b), -Infinity);
+    const room = Math.max((high - low) * 0.08, style.least || 1e-6);
+    this.low = Number.isFinite(low) ? low - room : 0;
+    this.high = Number.isFinite(high) ? high + room : 1;
+  }
+
+  yAt(value) {
+    return 6 + (this.height - 14) * (this.high - value) / (this.high - this.low);
+  }
+
+  draw(paint) {
+    const { style, data } = this;
+    paint.clearRect(0, 0, this.width, this.height);
+    this.drawGrid(paint);
+    if (style.limit !== undefined) {
+      paint.strokeStyle = BAD;
+      paint.setLineDash([4, 3]);
+      this.horizontal(paint, style.limit * style.scale);
+      paint.setLineDash([]);
+    }
+    paint.strokeStyle = ACCENT;
+    paint.lineWidth = 1.5;
+    paint.lineJoin = "round";
+    paint.beginPath();
+    let isDown = false;
+    for (let i = 0; i < data.frames; i++) {
+      const value = style.values[i] * style.scale;
+      if (Number.isFinite(value)) {
+        const [x, y] = [this.xAt(i / data.rate), this.yAt(value)];
+        if (isDown) paint.lineTo(x, y); else paint.moveTo(x, y);
+      }
+      isDown = Number.isFinite(value);
+    }
+    paint.stroke();
+    paint.lineWidth = 1;
+  }
+
+  drawGrid(paint) {
+    const step = tickStep(this.high - this.low, this.height * 2.2);
+    const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+    paint.font = `10px ${FONT}`;
+    paint.textAlign = "right";
+    paint.textBaseline = "middle";
+    for (let k = Math.ceil(this.low / step); k * step <= this.high; k++) {
+      paint.strokeStyle = LINE;
+      this.horizontal(paint, k * step);
+      paint.fillStyle = MUTED;
+      paint.fillText((k * step).toFixed(digits), this.left - 5, this.yAt(k * step));
+    }
+  }
+
+  horizontal(paint, value) {
+    const y = Math.round(this.yAt(value)) + 0.5;
+    paint.beginPath();
+    paint.moveTo(this.left, y);
+    paint.lineTo(this.width - this.right, y);
+    paint.stroke();
+  }
+
+  show(t) {
+    super.show(t);
+    const value = this.style.values[this.data.frameAt(t)];
+    const isKnown = Number.isFinite(value);
+    this.output.textContent = isKnown
+      ? `${(value * this.style.scale).toFixed(this.style.digits)} ${this.style.unit}` : "–";
+    this.output.classList.toggle("bad", isKnown && this.style.isBad(value));
+  }
+
+  drawCursor(paint, x) {
+    paint.fillStyle = INK;
+    paint.globalAlpha = 0.35;
+    paint.fillRect(x - 0.5, 0, 1, this.height);
+    paint.globalAlpha = 1;
+    const value = this.style.values[this.data.frameAt(this.time)] * this.style.scale;
+    if (!Number.isFinite(value)) return;
+    paint.fillStyle = ACCENT;
+    paint.beginPath();
+    paint.arc(x, this.yAt(value), 3.5, 0, 2 * Math.PI);
+    paint.fill();
+  }
+}
+
+function roundedBox(paint, x, y, width, height, radius) {
+  const r = Math.min(radius, width / 2);
+  paint.beginPath();
+  paint.moveTo(x + r, y);
+  paint.arcTo(x + width, y, x + width, y + height, r);
+  paint.arcTo(x + width, y + height, x, y + height, r);
+  paint.arcTo(x, y + height, x, y, r);
+  paint.arcTo(x, y, x + width, y, r);
+  paint.fill();
+}
+
+function readable(label) {
+  const words = label.replaceAll("_", " ").trim();
+  return words.charAt(0).toUpperCase() + words.slice(1);
+}

@@ -1,0 +1,345 @@
+"use strict";
+// The 3D view: meshcat's viewer, moved by the recording. World axes: x forward, y left, z up.
+
+const PATH_SECONDS = 3.0; // how long a foot's path stays visible
+const FORCE_SCALE = 0.002; // metres of arrow per newton
+const LEAST_FORCE = 4; // N, weaker forces draw no arrow
+const FLOOR_TILE = 0.5; // m, edge of the floor texture's repeat: two by two tiles
+const LIFT = { polygon: 0.0015, outline: 0.002, ring: 0.0015, spot: 0.003 }; // m above the floor
+const VIEWS = { // azimuth and elevation in degrees, distance in m
+  corner: [-52, 16, 1.75], side: [-90, 6, 1.65], front: [-8, 10, 1.6], top: [-90, 88, 2.0],
+};
+const ORBIT_RATE = 0.25; // rad/s
+const BACKGROUND = 0xf4f6fa;
+
+class RobotScene {
+  constructor(pane, data) {
+    this.data = data;
+    this.pane = pane;
+    this.viewer = new MeshCat.Viewer(pane);
+    this.viewer.set_3d_pane_size = (w, h) => this.resize(w, h);
+    this.legs = data.header.legs;
+    this.shown = { forces: true, support: true, paths: true, follow: true, orbit: false };
+    this.scratch = new Float32Array(20);
+    this.setUpStage();
+    this.runCommands();
+    this.base = this.node(data.header.base);
+    this.joints = data.header.joints.map((joint) => ({
+      node: this.node(joint.path), axis: new MeshCat.THREE.Vector3(...joint.axis),
+    }));
+    for (const name of ["forces", "contacts", "com"]) this.makeMarker(this.node(name));
+    this.makeSupport();
+    this.makePaths();
+    this.lastTarget = null;
+    this.show(0);
+    this.setView("corner");
+    this.resize();
+    new ResizeObserver(() => this.resize()).observe(pane);
+  }
+
+  // meshcat puts all that Python names below a node of its own.
+  node(path) {
+    return this.viewer.scene_tree.find(["meshcat", ...path.split("/")]).object;
+  }
+
+  resize(width = this.pane.clientWidth, height = this.pane.clientHeight) {
+    const { viewer } = this;
+    if (width !== this.pane.clientWidth) return;
+    viewer.camera.aspect = width / Math.max(height, 1);
+    viewer.camera.updateProjectionMatrix();
+    viewer.renderer.setSize(width, height);
+    viewer.set_dirty();
+  }
+
+  // The commands that meshcat recorded, with references to shared meshes resolved.
+  runCommands() {
+    const meshes = Array.from({ length: this.data.header.meshes }, (_, i) => this.meshData(i));
+    for (const command of this.data.header.commands) {
+      if (command.type === "set_object") {
+        command.object.geometries = command.object.geometries.map((geometry) =>
+          geometry.type === "SharedMesh"
+            ? { uuid: geometry.uuid, type: "BufferGeometry", data: meshes[geometry.index] }
+            : geometry);
+      }
+      this.viewer.handle_command(command);
+    }
+  }
+
+  meshData(index) {
+    const attribute = (array, normalized) =>
+      ({ itemSize: 3, type: array.constructor.name, array, normalized });
+    const triangles = this.data.array(`mesh${index}.triangles`);
+    return {
+      attributes: {
+        position: attribute(this.data.array(`mesh${index}.points`), false),
+        normal: attribute(this.data.array(`mesh${index}.normals`), true),
+      },
+      index: { type: triangles.constructor.name, array: triangles },
+    };
+  }
+
+  setUpStage() {
+    const { viewer } = this;
+    const { THREE } = MeshCat;
+    for (const name of ["Axes", "Grid"]) viewer.set_property([name], "visible", false);
+    const background = new THREE.Color(BACKGROUND);
+    for (const end of ["top_color", "bottom_color"]) {
+      viewer.set_property(["Background"], end, background.toArray());
+    }
+    viewer.scene.fog = new THREE.Fog(BACKGROUND, 3, 11);
+    viewer.camera.fov = 32;
+    viewer.camera.near = 0.05;
+    viewer.camera.far = 60;
+    viewer.controls.maxPolarAngle = Math.PI / 2 - 0.01;
+    viewer.controls.minDistance = 0.5;
+    viewer.controls.maxDistance = 12;
+    this.setUpLights();
+    this.makeFloor();
+  }
+
+  setUpLights() {
+    const { viewer } = this;
+    const { THREE } = MeshCat;
+    for (const name of ["PointLightNegativeX", "PointLightPositiveX", "FillLight", "AmbientLight"]) {
+      viewer.set_property(["Lights", name], "visible", false);
+    }
+    viewer.set_object(["Lights", "Sky"], new THREE.HemisphereLight(0xffffff, 0xaab2c0, 0.66));
+    this.sun = new THREE.DirectionalLight(0xffffff, 0.5);
+    this.sun.castShadow = true;
+    viewer.renderer.shadowMap.type = THREE.PCFShadowMap; // the kind with a radius
+    this.sun.shadow.mapSize.set(1024, 1024);
+    this.sun.shadow.radius = 3.5;
+    this.sun.shadow.bias = -0.001;
+    this.sun.shadow.normalBias = 0.006;
+    Object.assign(this.sun.shadow.camera, {
+      left: -0.9, right: 0.9, top: 0.9, bottom: -0.9, near: 0.5, far: 6,
+    });
+    viewer.set_object(["Lights", "Sun"], this.sun);
+    this.sunTarget = new THREE.Object3D();
+    viewer.set_object(["Lights", "SunTarget"], this.sunTarget);
+    this.sun.target = this.sunTarget;
+    const fill = new THREE.DirectionalLight(0xffffff, 0.16);
+    fill.position.set(-2, -1, 1);
+    viewer.set_object(["Lights", "Back"], fill);
+  }
+
+  makeFloor() {
+    const { THREE } = MeshCat;
+    const canvas = document.createElement("canvas");
+    canvas.width = canvas.height = 256;
+    const paint = canvas.getContext("2d");
+    paint.fillStyle = "#f7f8fb";
+    paint.fillRect(0, 0, 256, 256);
+    paint.fillStyle = "#e6eaf1";
+    paint.fillRect(0, 0, 128, 128);
+    paint.fillRect(128, 128, 128, 128);
+    const texture = new THREE.CanvasTexture(canvas);
+    texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
+    texture.anisotropy = this.viewer.renderer.capabilities.getMaxAnisotropy();
+    const width = 60 * FLOOR_TILE;
+    texture.repeat.set(60, 60);
+    const tiles = new THREE.Mesh(
+      new THREE.PlaneGeometry(width, width), new THREE.MeshBasicMaterial({ map: texture }));
+    const shade = new THREE.Mesh(
+      new THREE.PlaneGeometry(8, 8),
+      new THREE.ShadowMaterial({ opacity: 0.3, depthWrite: false }));
+    shade.receiveShadow = true;
+    shade.position.z = 0.0006;
+    this.floor = new THREE.Group();
+    this.floor.add(tiles, shade);
+    this.viewer.set_object(["floor"], this.floor);
+  }
+
+  // Markers neither throw nor receive shadows; those inside the robot shine through it.
+  makeMarker(root) {
+    root.traverse((item) => {
+      if (!item.material) return;
+      item.castShadow = item.receiveShadow = false;
+      if (root.name === "contacts") return;
+      item.material.depthTest = false;
+      item.material.transparent = true; // drawn after all that is solid
+      item.renderOrder = 1;
+    });
+  }
+
+  makeSupport() {
+    const { THREE } = MeshCat;
+    const geometry = () => {
+      const made = new THREE.BufferGeometry();
+      made.setAttribute("position", new THREE.BufferAttribute(new Float32Array(15), 3));
+      made.setDrawRange(0, 0);
+      return made;
+    };
+    this.polygon = new THREE.Mesh(geometry(), new THREE.MeshBasicMaterial({
+      color: 0x2563eb, opacity: 0.16, transparent: true, depthWrite: false, side: THREE.DoubleSide,
+    }));
+    this.polygon.geometry.setIndex([0, 1, 2, 0, 2, 3]);
+    this.outline = new THREE.Line(geometry(), new THREE.LineBasicMaterial({ color: 0x2563eb }));
+    for (const object of [this.polygon, this.outline]) object.frustumCulled = false;
+    this.viewer.set_object(["meshcat", "support", "polygon"], this.polygon);
+    this.viewer.set_object(["meshcat", "support", "outline"], this.outline);
+  }
+
+  makePaths() {
+    const { THREE } = MeshCat;
+    const { feet, frames } = this.data;
+    this.paths = this.legs.map((leg, k) => {
+      const points = new Float32Array(3 * frames);
+      for (let i = 0; i < frames; i++) points.set(feet.subarray(12 * i + 3 * k, 12 * i + 3 * k + 3), 3 * i);
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
+      const color = this.data.header.leg_colors[k];
+      const line = new THREE.Line(geometry, new THREE.LineBasicMaterial({ color }));
+      line.frustumCulled = false;
+      this.viewer.set_object(["meshcat", "paths", leg], line);
+      return line;
+    });
+  }
+
+  show(t) {
+    this.poseRobot(t);
+    this.poseForces(t);
+    this.poseSupport(t);
+    const frame = this.data.frameAt(t);
+    const from = Math.max(0, frame - Math.round(PATH_SECONDS * this.data.rate));
+    for (const line of this.paths) {
+      line.visible = this.shown.paths;
+      line.geometry.setDrawRange(from, frame - from + 1);
+    }
+    this.follow(t);
+    this.viewer.set_dirty();
+  }
+
+  poseRobot(t) {
+    const { data, scratch } = this;
+    data.interpolate(data.q, 19, 0, 19, t, scratch);
+    this.base.position.set(scratch[0], scratch[1], scratch[2]);
+    this.base.quaternion.set(scratch[3], scratch[4], scratch[5], scratch[6]).normalize();
+    this.joints.forEach(({ node, axis }, k) => {
+      node.quaternion.setFromAxisAngle(axis, scratch[7 + k]);
+    });
+  }
+
+  poseForces(t) {
+    const { data, scratch, shown } = this;
+    const frame = data.frameAt(t);
+    data.interpolate(data.feet, 12, 0, 12, t, scratch);
+    this.legs.forEach((leg, k) => {
+      const [x, y, z] = scratch.subarray(3 * k, 3 * k + 3);
+      const force = data.forces[4 * frame + k];
+      const ground = z - data.header.foot_radius;
+      const arrow = this.node(`forces/${leg}`);
+      arrow.visible = shown.forces && force > LEAST_FORCE;
+      arrow.position.set(x, y, ground);
+      const shaft = Math.max(force * FORCE_SCALE - 0.035, 0.001);
+      this.node(`forces/${leg}/shaft`).scale.set(1, 1, shaft);
+      this.node(`forces/${leg}/head`).position.z = shaft;
+      const ring = this.node(`contacts/${leg}`);
+      ring.visible = shown.forces && force > LEAST_FORCE;
+      ring.position.set(x, y, ground + LIFT.ring);
+    });
+  }
+
+  poseSupport(t) {
+    const { data, shown } = this;
+    const com = data.interpolate(data.com, 3, 0, 3, t, this.scratch);
+    const [x, y, z] = com;
+    for (const name of ["com", "support"]) this.node(name).visible = shown.support;
+    const floor = Math.min(...this.groundHeights(t));
+    this.node("com/ball").position.set(x, y, z);
+    this.node("com/line").position.set(x, y, floor);
+    this.node("com/line").scale.set(1, 1, Math.max(z - floor, 0.001));
+    this.node("com/spot").position.set(x, y, floor + LIFT.spot);
+    const margin = data.margin[data.frameAt(t)];
+    const color = Number.isNaN(margin) ? 0x1f2937 : margin >= 0 ? 0x16a34a : 0xdc2626;
+    this.node("com/spot").traverse((item) => item.material && item.material.color.setHex(color));
+    this.drawPolygon(convexHull(this.stanceFeet(t)));
+  }
+
+  groundHeights(t) {
+    const frame = this.data.frameAt(t);
+    return this.legs.map((_, k) => this.data.feet[12 * frame + 3 * k + 2] - this.data.header.foot_radius);
+  }
+
+  stanceFeet(t) {
+    const { feet, stance } = this.data;
+    const frame = this.data.frameAt(t);
+    return this.legs.map((_, k) => k).filter((k) => stance[4 * frame + k]).map((k) => {
+      const at = 12 * frame + 3 * k;
+      return [feet[at], feet[at + 1], feet[at + 2] - this.data.header.foot_radius];
+    });
+  }
+
+  drawPolygon(corners) {
+    const fill = (object, points, lift) => {
+      const { position } = object.geometry.attributes;
+      points.forEach((p, i) => position.setXYZ(i, p[0], p[1], p[2] + lift));
+      position.needsUpdate = true;
+    };
+    fill(this.polygon, corners, LIFT.polygon);
+    fill(this.outline, corners.length ? [...corners, corners[0]] : [], LIFT.outline);
+    this.polygon.geometry.setDrawRange(0, corners.length < 3 ? 0 : 3 * (corners.length - 2));
+    this.outline.geometry.setDrawRange(0, corners.length < 2 ? 0 : corners.length + 1);
+  }
+
+  // Keeps sun, floor and (if wanted) camera with the robot.
+  follow(t) {
+    const { data, viewer } = this;
+    const [x, y] = data.interpolate(data.target, 2, 0, 2, t, this.scratch);
+    this.sunTarget.position.set(x, y, 0.1);
+    this.sun.position.set(x + 0.7, y - 1.0, 2.2);
+    this.floor.position.set(
+      Math.round(x / FLOOR_TILE) * FLOOR_TILE, Math.round(y / FLOOR_TILE) * FLOOR_TILE, 0);
+    if (this.lastTarget && this.shown.follow) {
+      const [dx, dy] = [x - this.lastTarget[0], y - this.lastTarget[1]];
+      for (const point of [viewer.camera.position, viewer.controls.target]) {
+        point.x += dx; // the viewer's own axes: x, z up becomes y, y becomes -z
+        point.z -= dy;
+      }
+    }
+    this.lastTarget = [x, y];
+  }
+
+  setView(name) {
+    const [azimuth, elevation, distance] = VIEWS[name];
+    const [a, e] = [azimuth * Math.PI / 180 + this.heading(), elevation * Math.PI / 180];
+    const [x, y] = this.lastTarget;
+    const { camera, controls } = this.viewer;
+    const reach = distance * Math.max(1, 1.25 / camera.aspect);
+    controls.target.set(x, 0.22, -y);
+    camera.position.set(
+      x + reach * Math.cos(e) * Math.cos(a), 0.22 + reach * Math.sin(e),
+      -(y + reach * Math.cos(e) * Math.sin(a)));
+    controls.update();
+    this.viewer.set_dirty();
+  }
+
+  heading() {
+    const { x, y, z, w } = this.base.quaternion;
+    return Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
+  }
+
+  orbit(seconds) {
+    const { camera, controls } = this.viewer;
+    const offset = camera.position.clone().sub(controls.target);
+    offset.applyAxisAngle(new MeshCat.THREE.Vector3(0, 1, 0), ORBIT_RATE * seconds);
+    camera.position.copy(controls.target).add(offset);
+    this.viewer.set_dirty();
+  }
+}
+
+// Corners of the convex hull of at most four points, counter-clockwise (Andrew's monotone chain).
+function convexHull(points) {
+  if (points.length < 3) return points;
+  const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  const turn = (a, b, c) => (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+  const half = (list) => {
+    const chain = [];
+    for (const p of list) {
+      while (chain.length > 1 && turn(chain[chain.length - 2], chain[chain.length - 1], p) <= 0) chain.pop();
+      chain.push(p);
+    }
+    return chain.slice(0, -1);
+  };
+  return [...half(sorted), ...half(sorted.reverse())];
+}

@@ -1,0 +1,159 @@
+"""A z-buffer rasteriser in numpy: triangles in, per-pixel winners out. No GPU, no system library.
+
+All triangles of a picture are scan-converted at once: first to rows, then to pixels, each as one
+flat array, so the cost is that of the pixels and not of a Python loop.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+_LEAST_AREA = 1e-9  # [px^2] flatter triangles have no inside
+_COVERAGE_SLACK = 1e-6  # [px] samples this close to an edge count, so that no crack opens
+
+
+@dataclass(frozen=True, slots=True)
+class Fragments:
+    """The visible samples of a picture.
+
+    Attributes:
+        pixel: (k,) flat index, row * width + column, each at most once.
+        triangle: (k,) row of the triangle that is in front there.
+    """
+
+    pixel: Int[np.ndarray, " k"]
+    triangle: Int[np.ndarray, " k"]
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Horizontal runs of samples: run i is row ``y`` from ``first``, ``count`` samples long."""
+
+    triangle: Int[np.ndarray, " r"]
+    y: Int[np.ndarray, " r"]
+    first: Int[np.ndarray, " r"]
+    count: Int[np.ndarray, " r"]
+
+
+def rasterize(
+    points: Float[np.ndarray, "n 3"],
+    triangles: Int[np.ndarray, "m 3"],
+    size: tuple[int, int],
+    *,
+    cull_back: bool = True,
+) -> Fragments:
+    """Find the triangle that is in front at each sample.
+
+    A sample lies at the centre of its pixel. Of two triangles the one with the larger third
+    coordinate is in front; give 1 / distance, which is linear in the picture.
+
+    Args:
+        points: x (right) and y (down) in pixels, and nearness (> 0, larger is closer).
+        triangles: rows of ``points``, counter-clockwise as seen (with y pointing up).
+        size: width and height [px].
+        cull_back: drop triangles that are seen from behind.
+    """
+    width, height = size
+    corners = triangles.T
+    x, y = points[:, 0][corners], points[:, 1][corners]
+    area = doubled_area(x, y)
+    kept = area > _LEAST_AREA if cull_back else np.abs(area) > _LEAST_AREA
+    top = np.ceil(np.minimum(np.minimum(y[0], y[1]), y[2]) - 0.5)
+    bottom = np.floor(np.maximum(np.maximum(y[0], y[1]), y[2]) - 0.5)
+    rows = np.flatnonzero(kept & (top <= bottom) & (bottom >= 0) & (top < height))
+    x, y, area = x[:, rows], y[:, rows], area[rows]
+    runs = _scan(x, y, area, (width, height))
+    step_x, step_y, start = plane_coefficients(x, y, area, points[:, 2][corners[:, rows]])
+    at_row = start[runs.triangle] + step_y[runs.triangle] * (runs.y + 0.5)
+    run = np.repeat(np.arange(len(runs.y)), runs.count)
+    column = _expand(runs.first, runs.count)
+    nearness = at_row.astype(np.float32)[run] + step_x[runs.triangle].astype(np.float32)[run] * (
+        column.astype(np.float32) + np.float32(0.5)
+    )
+    pixel = (runs.y * width)[run] + column
+    return _resolve(pixel, nearness, rows[runs.triangle].astype(np.int32)[run], width * height)
+
+
+def doubled_area(
+    x: Float[np.ndarray, "3 m"], y: Float[np.ndarray, "3 m"]
+) -> Float[np.ndarray, " m"]:
+    """Twice the area of each triangle [px^2], positive if counter-clockwise (with y up)."""
+    return (x[2] - x[0]) * (y[1] - y[0]) - (x[1] - x[0]) * (y[2] - y[0])
+
+
+def plane_coefficients(
+    x: Float[np.ndarray, "3 m"],
+    y: Float[np.ndarray, "3 m"],
+    area: Float[np.ndarray, " m"],
+    value: Float[np.ndarray, "3 m"],
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
+    """Slopes along x and y, and value at the origin, of the plane through three corner values.
+
+    Args:
+        x: columns of the three corners [px].
+        y: rows of the three corners [px].
+        area: ``doubled_area(x, y)``.
+        value: the quantity at the corners.
+    """
+    d1, d2 = value[1] - value[0], value[2] - value[0]
+    slope_x = (d2 * (y[1] - y[0]) - d1 * (y[2] - y[0])) / area
+    slope_y = (d1 * (x[2] - x[0]) - d2 * (x[1] - x[0])) / area
+    return slope_x, slope_y, value[0] - slope_x * x[0] - slope_y * y[0]
+
+
+def _scan(
+    x: Float[np.ndarray, "3 m"],
+    y: Float[np.ndarray, "3 m"],
+    area: Float[np.ndarray, " m"],
+    size: tuple[int, int],
+) -> _Rows:
+    """Cut every triangle into its rows of covered samples, clipped to the picture."""
+    width, height = size
+    top = np.ceil(np.minimum(np.minimum(y[0], y[1]), y[2]) - 0.5)
+    bottom = np.floor(np.maximum(np.maximum(y[0], y[1]), y[2]) - 0.5)
+    top = np.maximum(top, 0).astype(np.int64)
+    counts = np.minimum(bottom, height - 1).astype(np.int64) - top + 1
+    triangle = np.repeat(np.arange(len(counts)), counts)
+    row = _expand(top, counts)
+    centre = row + 0.5
+    low = np.full(len(row), -np.inf)
+    high = np.full(len(row), np.inf)
+    turn = np.sign(area)
+    for a, b in ((0, 1), (1, 2), (2, 0)):
+        rise = y[b] - y[a]
+        slope = (x[b] - x[a]) / np.where(rise == 0, 1.0, rise)
+        start = x[a] - y[a] * slope
+        crossing = start[triangle] + centre * slope[triangle]
+        side = (rise * turn)[triangle]
+        np.maximum(low, crossing, out=low, where=side > 0)
+        np.minimum(high, crossing, out=high, where=side < 0)
+    first = np.clip(np.ceil(low - 0.5 - _COVERAGE_SLACK), 0, width).astype(np.int64)
+    last = np.clip(np.floor(high - 0.5 + _COVERAGE_SLACK), -1, width - 1).astype(np.int64)
+    covered = np.flatnonzero(last >= first)
+    first = first[covered]
+    return _Rows(triangle[covered], row[covered], first, last[covered] - first + 1)
+
+
+def _expand(first: Int[np.ndarray, " r"], count: Int[np.ndarray, " r"]) -> Int[np.ndarray, " k"]:
+    """Concatenate the integer ranges first[i], first[i] + 1, ... of length count[i]."""
+    offset = np.repeat(first - (np.cumsum(count) - count), count)
+    return offset + np.arange(len(offset))
+
+
+def _resolve(
+    pixel: Int[np.ndarray, " k"],
+    nearness: Float[np.ndarray, " k"],
+    triangle: Int[np.ndarray, " k"],
+    samples: int,
+) -> Fragments:
+    """Keep the nearest candidate of each sample; among equals the last triangle."""
+    nearest = np.zeros(samples, dtype=np.float32)
+    np.maximum.at(nearest, pixel, nearness)
+    front = nearness >= nearest[pixel]
+    winner = np.full(samples, -1, dtype=np.int32)
+    winner[pixel[front]] = triangle[front]
+    seen = np.flatnonzero(winner >= 0)
+    return Fragments(seen, winner[seen])
