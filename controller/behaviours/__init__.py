@@ -1,0 +1,1 @@
+"""Behaviours: each turns the snapshot of a tick into what to track now."""

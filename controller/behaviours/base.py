@@ -1,0 +1,32 @@
+"""What a behaviour is."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+from go2_wbc.reference import JointReference, Reference
+from go2_wbc.robot.snapshot import Snapshot
+
+
+class Behaviour(ABC):
+    """Something the robot does: ``start`` once, then ``update`` every tick.
+
+    Attributes:
+        label: what is written in recordings.
+        needs_balance: whether a large tilt means that the robot has fallen.
+    """
+
+    label: str = "?"
+    needs_balance: bool = True
+
+    @abstractmethod
+    def start(self, snapshot: Snapshot) -> None:
+        """Begin from the measured state."""
+
+    @abstractmethod
+    def update(self, snapshot: Snapshot) -> Reference | JointReference:
+        """What to track now."""
+
+    @abstractmethod
+    def is_finished(self, snapshot: Snapshot) -> bool:
+        """Whether it has nothing more to do; it goes on holding its end until replaced."""

@@ -1,0 +1,72 @@
+"""Behaviours that need no contact model: going limp, and moving the joints by a servo."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from controller.behaviours.base import Behaviour
+from go2_wbc.curves import Curve, keyframes
+from go2_wbc.reference import JointReference
+from go2_wbc.robot.snapshot import Snapshot
+
+DAMPING = 3.0
+"""Joint damping [N m s/rad] of the safe state: the robot sinks in about a second."""
+
+
+class Damped(Behaviour):
+    """Limp: no stiffness, only damping."""
+
+    needs_balance = False
+
+    def __init__(self, label: str = "damped", duration: float = 0.0) -> None:
+        """Go limp for ``duration`` seconds before counting as finished."""
+        self.label = label
+        self._duration = duration
+
+    def start(self, snapshot: Snapshot) -> None:
+        """Note the time."""
+        self._start = snapshot.state.time
+        self._joints = snapshot.state.joint_positions.copy()
+
+    def update(self, snapshot: Snapshot) -> JointReference:
+        """Zero stiffness."""
+        return JointReference(self._joints, np.zeros(12), 0.0, DAMPING)
+
+    def is_finished(self, snapshot: Snapshot) -> bool:
+        """Whether the time is over."""
+        return snapshot.state.time - self._start >= self._duration
+
+
+class ServoJoints(Behaviour):
+    """Move the joints through keyframes by a stiff servo; for when the trunk lies on the ground."""
+
+    needs_balance = False
+
+    def __init__(
+        self,
+        label: str,
+        targets: tuple[tuple[float, Float[np.ndarray, "12"]], ...],
+        kp: float = 40.0,
+        kd: float = 2.0,
+    ) -> None:
+        """Args: targets: (duration [s], joint angles (12,) [rad]) of each leg of the way."""
+        self.label = label
+        self._targets = targets
+        self._kp, self._kd = kp, kd
+
+    def start(self, snapshot: Snapshot) -> None:
+        """Plan from the measured joints."""
+        self._start = snapshot.state.time
+        times = np.cumsum([0.0, *(duration for duration, _ in self._targets)]).tolist()
+        values = [snapshot.state.joint_positions.copy(), *(q for _, q in self._targets)]
+        self._curve: Curve = keyframes(times, values)
+
+    def update(self, snapshot: Snapshot) -> JointReference:
+        """The point of the way that belongs to this instant."""
+        point = self._curve.at(snapshot.state.time - self._start)
+        return JointReference(point.value, point.rate, self._kp, self._kd)
+
+    def is_finished(self, snapshot: Snapshot) -> bool:
+        """Whether the way is at its end."""
+        return snapshot.state.time - self._start >= self._curve.duration

@@ -1,0 +1,36 @@
+"""Walking: the locomotion planner under a velocity command that may change at any time."""
+
+from __future__ import annotations
+
+from controller.behaviours.base import Behaviour
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.locomotion import LocomotionPlanner
+from go2_wbc.reference import Reference
+from go2_wbc.robot.snapshot import Snapshot
+
+
+class Walking(Behaviour):
+    """Follow ``command``; stand ready while it is zero."""
+
+    label = "walk"
+
+    def __init__(self, planner: LocomotionPlanner) -> None:
+        """Walk with ``planner``."""
+        self._planner = planner
+        self.command: VelocityCommand = ZERO_COMMAND
+
+    def start(self, snapshot: Snapshot) -> None:
+        """Start from the measured state, standing."""
+        self._planner.start(snapshot)
+
+    def update(self, snapshot: Snapshot) -> Reference:
+        """The planner's reference."""
+        return self._planner.update(snapshot, self.command)
+
+    def square_up(self, snapshot: Snapshot) -> bool:
+        """Step in place unless the feet are below the hips; returns whether they are."""
+        return self._planner.square_up(snapshot)
+
+    def is_finished(self, snapshot: Snapshot) -> bool:
+        """Whether the robot has come to rest."""
+        return self.command.is_zero and not self._planner.is_stepping

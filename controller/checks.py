@@ -1,0 +1,79 @@
+"""What has to be measured before a call may say True."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+from motions.postures import SIT_POSE, STAND_HEIGHT
+
+STILL_SPEED = 0.05
+"""Speed [m/s] of the base below which it counts as still."""
+STILL_JOINTS = 0.5
+"""Joint speed [rad/s] below which a leg counts as still."""
+HEIGHT_TOLERANCE = 0.02
+"""Distance [m] from the asked height that still counts as there."""
+ANGLE_TOLERANCE = 0.1
+"""Angle [rad] from the asked attitude that still counts as there."""
+LYING_HEIGHT = 0.13
+"""Height [m] of the base above the lowest foot below which the robot lies, if only on folded legs."""
+BELLY_HEIGHT = 0.095
+"""Height [m] of the base above the lowest foot below which the belly is down: 0.085 at rest."""
+
+
+def ground_height(snapshot: Snapshot, model: RobotModel) -> float:
+    """Height [m] of the ground below the lowest foot."""
+    return float(snapshot.p_world_feet[:, 2].min()) - model.foot_radius
+
+
+def is_still(snapshot: Snapshot) -> bool:
+    """Whether base and joints are at rest."""
+    v = snapshot.state.v
+    return bool(np.abs(v[:3]).max() < STILL_SPEED and np.abs(v[6:]).max() < STILL_JOINTS)
+
+
+def is_standing(snapshot: Snapshot, model: RobotModel) -> bool:
+    """Whether the robot stands still on four feet, level, at the standing height."""
+    roll, pitch, _ = snapshot.state.rpy
+    height = snapshot.p_world_com[2] - ground_height(snapshot, model)
+    return bool(
+        snapshot.state.feet_in_contact.all()
+        and abs(height - STAND_HEIGHT) < HEIGHT_TOLERANCE
+        and max(abs(roll), abs(pitch)) < ANGLE_TOLERANCE
+        and is_still(snapshot)
+    )
+
+
+def is_sitting(snapshot: Snapshot, model: RobotModel) -> bool:
+    """Whether the robot sits still: rump down, trunk up, four feet on the ground."""
+    roll, pitch, _ = snapshot.state.rpy
+    height = snapshot.state.q[2] - ground_height(snapshot, model)
+    return bool(
+        snapshot.state.feet_in_contact.all()
+        and abs(height - SIT_POSE[2]) < HEIGHT_TOLERANCE
+        and abs(pitch - SIT_POSE[4]) < ANGLE_TOLERANCE
+        and abs(roll) < ANGLE_TOLERANCE
+        and is_still(snapshot)
+    )
+
+
+def is_lying(snapshot: Snapshot, model: RobotModel) -> bool:
+    """Whether the robot lies still on its belly."""
+    height = snapshot.state.q[2] - ground_height(snapshot, model)
+    return bool(height < BELLY_HEIGHT and snapshot.state.tilt < 0.5 and is_still(snapshot))
+
+
+def posture_figures(snapshot: Snapshot, model: RobotModel) -> dict[str, float]:
+    """The measured quantities behind the verdicts above, by name with unit."""
+    roll, pitch, yaw = np.degrees(snapshot.state.rpy)
+    ground = ground_height(snapshot, model)
+    return {
+        "base height [m]": float(snapshot.state.q[2]) - ground,
+        "CoM height [m]": float(snapshot.p_world_com[2]) - ground,
+        "roll [deg]": float(roll),
+        "pitch [deg]": float(pitch),
+        "yaw [deg]": float(yaw),
+        "feet in contact": float(snapshot.state.feet_in_contact.sum()),
+        "base speed [m/s]": float(np.linalg.norm(snapshot.state.v[:3])),
+    }

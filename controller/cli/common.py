@@ -1,0 +1,55 @@
+"""What every subcommand of ``go2-wbc`` shares: exit codes, parsers and JSON output."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from enum import IntEnum
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    Subparsers = argparse._SubParsersAction[argparse.ArgumentParser]
+else:  # argparse's class takes no subscript at run time
+    Subparsers = argparse._SubParsersAction
+"""What a subcommand's ``register`` adds its parser to."""
+
+
+class ExitCode(IntEnum):
+    """What the process tells its caller."""
+
+    OK = 0
+    FAILED = 1
+    USAGE = 2
+    RUNTIME = 3
+    INTERRUPTED = 130
+    BROKEN_PIPE = 141
+
+
+def add_parser(
+    subparsers: Subparsers, name: str, description: str, *, examples: str = ""
+) -> argparse.ArgumentParser:
+    """Add the parser of the subcommand ``name``.
+
+    Args:
+        subparsers: where to add it.
+        name: the subcommand.
+        description: what it does, shown above the options.
+        examples: command lines, one per line, shown below the options.
+    """
+    return subparsers.add_parser(
+        name,
+        description=description,
+        epilog=examples_epilog(examples),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+
+
+def examples_epilog(examples: str) -> str | None:
+    """The ``examples:`` block at the end of a help text; ``None`` without examples."""
+    lines = [line.strip() for line in examples.strip().splitlines()]
+    return "\n".join(["examples:", *(f"  {line}" for line in lines)]) if lines else None
+
+
+def print_json(value: object) -> None:
+    """Print ``value`` for a program to read."""
+    print(json.dumps(value, indent=2))

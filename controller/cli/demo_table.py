@@ -1,0 +1,95 @@
+"""The report of a demo as text, at most 80 columns wide."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator
+
+from controller.demo.report import DemoReport, DemoTotals, Figure, StepResult
+
+WIDTH = 80
+_ROW = "{mark:>4} {label:<21}{time:>7}  {name:<23}{asked:>9}{measured:>9} {unit}"
+_INDENT = " " * 5
+_DECIMALS = {"deg": 1}
+"""Decimals of a unit's numbers; 3 for any other."""
+
+
+def render(report: DemoReport, encoding: str | None = None) -> str:
+    """The table of steps, the totals and the verdict.
+
+    Args:
+        report: what was measured.
+        encoding: of the terminal; ticks and crosses become words where it lacks them.
+    """
+    marks = _marks(encoding)
+    rows = [
+        _ROW.format(
+            mark="",
+            label="step",
+            time="time",
+            name="figure",
+            asked="asked",
+            measured="measured",
+            unit="",
+        ).rstrip(),
+        "-" * WIDTH,
+    ]
+    for step in report.steps:
+        rows += _step_rows(step, marks[step.ok])
+    rows += ["-" * WIDTH, *_total_rows(report.totals), "", _verdict(report)]
+    return "\n".join(rows)
+
+
+def _marks(encoding: str | None) -> dict[bool, str]:
+    try:
+        "✓✗".encode(encoding or "ascii")
+    except (UnicodeEncodeError, LookupError):
+        return {True: "ok", False: "FAIL"}
+    return {True: "✓", False: "✗"}
+
+
+def _step_rows(step: StepResult, mark: str) -> Iterator[str]:
+    heads = [(mark, step.label, f"{step.duration:.1f} s")]
+    cells = [_cells(figure) for figure in step.figures] or [("", "", "", "")]
+    heads += [("", "", "")] * (len(cells) - 1)
+    for (tick, label, time), (name, asked, measured, unit) in zip(heads, cells, strict=True):
+        yield _ROW.format(
+            mark=tick, label=label, time=time, name=name, asked=asked, measured=measured, unit=unit
+        ).rstrip()
+    if not step.ok:
+        yield from textwrap.wrap(
+            step.reason, WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT
+        )
+
+
+def _cells(figure: Figure) -> tuple[str, str, str, str]:
+    decimals = _DECIMALS.get(figure.unit, 3)
+    asked = "" if figure.asked is None else f"{figure.asked:.{decimals}f}"
+    measured = f"{figure.measured:.{decimals}f}" if math.isfinite(figure.measured) else "-"
+    return figure.name, asked, measured, figure.unit
+
+
+def _total_rows(totals: DemoTotals) -> list[str]:
+    lines = (
+        ("peak joint torque", f"{100 * totals.peak_torque_ratio:.0f} % of its limit"),
+        ("peak joint speed", f"{100 * totals.peak_speed_ratio:.0f} % of its limit"),
+        ("on three legs: least support margin", _or_dash(totals.least_support_margin, "m", 3)),
+        ("on three legs: least load of a foot", _or_dash(totals.least_foot_load, "N", 0)),
+        ("control ticks without a QP solution", str(totals.qp_failures)),
+        ("robot time", f"{totals.robot_time:.1f} s"),
+        ("CPU time of control and physics", f"{totals.cpu_time:.1f} s"),
+        ("real-time factor", f"{totals.real_time_factor:.1f}"),
+    )
+    return [f"{_INDENT}{name:<38}{value}" for name, value in lines]
+
+
+def _or_dash(value: float, unit: str, decimals: int) -> str:
+    return f"{value:.{decimals}f} {unit}" if math.isfinite(value) else "-"
+
+
+def _verdict(report: DemoReport) -> str:
+    done = sum(step.ok for step in report.steps)
+    if report.ok:
+        return f"All {done} steps done, each judged by what was measured."
+    return f"{done} of {len(report.steps)} steps done."

@@ -1,0 +1,297 @@
+"""``go2-wbc doctor``: what is installed, what is missing, and the exact line that gets it."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import site
+import sys
+import textwrap
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
+from controller.cli.probes import (
+    PROJECT,
+    ImportProbe,
+    installed_version,
+    probe_imports,
+    requirements_of,
+    satisfies,
+)
+from go2_wbc.errors import DescriptionError
+
+EXAMPLES = """
+go2-wbc doctor
+go2-wbc doctor --json
+"""
+WIDTH = 80
+OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)
+LIBRARIES: Mapping[str, str | None] = {
+    "pin": "pinocchio",
+    "placo": "placo",
+    "mujoco": "mujoco",
+    "numpy": "numpy",
+    "proxsuite": "proxsuite",
+    "qpsolvers": "qpsolvers",
+    "daqp": "daqp",
+    "quadprog": "quadprog",
+    "meshcat": "meshcat",
+    "jaxtyping": "jaxtyping",
+    "pillow": "PIL",
+    "trimesh": "trimesh",
+    "pycollada": "collada",
+    "example-robot-data": None,
+}
+"""Every library that is needed and the module that it brings; ``None`` is data only."""
+NEEDED_SOLVERS = ("daqp", "proxqp", "quadprog")
+
+
+class Status(Enum):
+    """How a finding bears on the installation."""
+
+    OK = "ok"
+    NOTE = "note"
+    PROBLEM = "PROBLEM"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that was looked at.
+
+    Attributes:
+        section: heading that it is printed under.
+        subject: what was looked at.
+        status: ``PROBLEM`` means that the project does not work like this.
+        detail: what was found.
+        remedy: the line to type, if there is something to do.
+    """
+
+    section: str
+    subject: str
+    status: Status
+    detail: str
+    remedy: str = ""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``doctor``."""
+    parser = add_parser(
+        subparsers,
+        "doctor",
+        "Check this installation: versions, robot files, QP solvers, display.\n"
+        "Exit code 0 if all that is needed is here, 1 otherwise.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON for a program to read")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Examine the installation and print the findings."""
+    findings = examine()
+    problems = [finding for finding in findings if finding.status is Status.PROBLEM]
+    if args.json:
+        print_json({"ok": not problems, "findings": [_as_json(item) for item in findings]})
+    else:
+        print(render(findings))
+    return ExitCode.FAILED if problems else ExitCode.OK
+
+
+def examine() -> list[Finding]:
+    """Everything that can be said about this installation."""
+    probes = probe_imports(module for module in LIBRARIES.values() if module is not None)
+    bounds = requirements_of(PROJECT)
+    versions = {name: installed_version(name) for name in LIBRARIES}
+    findings = [judge_python(sys.version_info[:3], platform.platform()), _judge_project()]
+    for name, module in LIBRARIES.items():
+        probe = None if module is None else probes[module]
+        findings.append(judge_library(name, versions[name], bounds.get(name, ""), probe))
+    pairing = requirements_of("placo").get("pin", "")
+    findings += judge_pairing(versions["placo"], versions["pin"], pairing, bounds.get("placo", ""))
+    findings += judge_robot_files(bounds.get("example-robot-data", ""))
+    findings += judge_solvers(probes["qpsolvers"].solvers, bounds)
+    findings.append(judge_display(sys.platform, os.environ))
+    return findings
+
+
+def judge_python(version: tuple[int, ...], system: str) -> Finding:
+    """Whether this Python is one that all libraries have wheels for."""
+    name = ".".join(map(str, version))
+    fits = OLDEST_PYTHON <= version[:2] <= NEWEST_PYTHON
+    remedy = "" if fits else "make clean && make PYTHON=python3.12 demo"
+    status = Status.OK if fits else Status.PROBLEM
+    detail = f"{name} on {system}" if fits else f"{name}: 3.11, 3.12 or 3.13 is needed"
+    return Finding("Python", "python", status, detail, remedy)
+
+
+def _judge_project() -> Finding:
+    version = installed_version(PROJECT)
+    if version is None:
+        remedy = f"{_pip()} -e ."
+        return Finding("Python", PROJECT, Status.PROBLEM, "not installed", remedy)
+    return Finding("Python", PROJECT, Status.OK, version)
+
+
+def judge_library(
+    name: str, version: str | None, bounds: str, probe: ImportProbe | None
+) -> Finding:
+    """Whether a library is there, in a version that fits, and can be imported.
+
+    Args:
+        name: the package as pip knows it.
+        version: its installed version.
+        bounds: what this project asks of it.
+        probe: how its import went; ``None`` if there is nothing to import.
+    """
+    remedy = install_line(name, bounds)
+    error = "" if probe is None else probe.error
+    if version is None:
+        detail = "not installed"
+        if probe is not None and not error:
+            detail = f"not installed by pip here, but found at {probe.file}"
+    elif not satisfies(version, bounds):
+        detail = f"{version} does not fit {bounds}"
+    elif error:
+        detail = f"{version} is installed, but its import fails: {error}"
+        remedy = install_line(name, bounds, again=True)
+    elif probe is not None and _is_foreign(probe.file):
+        detail = f"{version}, but {probe.file} is imported in its place"
+        remedy = "unset PYTHONPATH"
+    else:
+        return Finding("Libraries", name, Status.OK, version)
+    return Finding("Libraries", name, Status.PROBLEM, detail, remedy)
+
+
+def judge_pairing(placo: str | None, pin: str | None, wanted: str, bounds: str) -> list[Finding]:
+    """Whether placo and Pinocchio were built for each other: placo decides Pinocchio's version.
+
+    Args:
+        placo: installed version of placo.
+        pin: installed version of Pinocchio.
+        wanted: the Pinocchio that the installed placo requires.
+        bounds: what this project asks of placo.
+    """
+    if placo is None or pin is None:
+        return []
+    too_new = satisfies(pin, ">=4") and satisfies(placo, "<0.10")
+    if satisfies(pin, wanted) and not too_new:
+        return [Finding("Libraries", "placo + pin", Status.OK, "built for each other")]
+    detail = f"placo {placo} was not built for pin {pin}" + (f" but for {wanted}" if wanted else "")
+    line = install_line("placo", bounds or ">=0.10.2,<0.11")
+    return [Finding("Libraries", "placo + pin", Status.PROBLEM, detail, line)]
+
+
+def judge_robot_files(bounds: str) -> list[Finding]:
+    """Whether the Go2's URDF, SRDF and meshes are found.
+
+    Args:
+        bounds: what this project asks of ``example-robot-data``.
+    """
+    section, remedy = "Robot files", install_line("example-robot-data", bounds, again=True)
+    try:
+        from go2_wbc.robot.description import find_description
+
+        description = find_description()
+        meshes = sorted({item.get("filename", "") for item in _meshes(description.urdf_path)})
+        for mesh in meshes:
+            description.mesh_path(mesh)
+    except (DescriptionError, ImportError) as error:
+        return [Finding(section, "Go2", Status.PROBLEM, str(error), remedy)]
+    srdf = description.srdf_path
+    return [
+        Finding(section, "URDF", Status.OK, str(description.urdf_path)),
+        Finding(section, "SRDF", Status.OK, str(srdf))
+        if srdf is not None
+        else Finding(section, "SRDF", Status.PROBLEM, "not found", remedy),
+        Finding(section, "meshes", Status.OK, f"all {len(meshes)} found"),
+    ]
+
+
+def _meshes(urdf: Path) -> list[ET.Element]:
+    return list(ET.parse(urdf).getroot().iter("mesh"))
+
+
+def judge_solvers(available: tuple[str, ...], bounds: Mapping[str, str]) -> list[Finding]:
+    """Whether ``qpsolvers`` sees every QP solver that the project uses.
+
+    Args:
+        available: the names that ``qpsolvers`` lists.
+        bounds: what this project asks of its dependencies.
+    """
+    packages = {"proxqp": "proxsuite"}
+    found = []
+    for name in NEEDED_SOLVERS:
+        package = packages.get(name, name)
+        if name in available:
+            found.append(Finding("QP solvers", name, Status.OK, "available"))
+        else:
+            line = install_line(package, bounds.get(package, ""), again=True)
+            found.append(Finding("QP solvers", name, Status.PROBLEM, "not available", line))
+    others = ", ".join(sorted(set(available) - set(NEEDED_SOLVERS)))
+    if others:
+        found.append(Finding("QP solvers", "others", Status.NOTE, others))
+    return found
+
+
+def judge_display(system: str, environment: Mapping[str, str]) -> Finding:
+    """Whether ``--viewer`` can open a window; nothing else needs one."""
+    if system in {"darwin", "win32"}:
+        return Finding("Display", "--viewer", Status.OK, "this system has a desktop")
+    for variable in ("WAYLAND_DISPLAY", "DISPLAY"):
+        if environment.get(variable):
+            detail = f"possible, {variable} is {environment[variable]}"
+            return Finding("Display", "--viewer", Status.OK, detail)
+    detail = "no display here; everything else runs without one"
+    return Finding("Display", "--viewer", Status.NOTE, detail)
+
+
+def install_line(name: str, bounds: str, *, again: bool = False) -> str:
+    """The command that installs a package into this very environment."""
+    options = " --force-reinstall --no-deps" if again else ""
+    return f'{_pip()}{options} "{name}{bounds}"'
+
+
+def _pip() -> str:
+    python = f'"{sys.executable}"' if " " in sys.executable else sys.executable
+    return f"{python} -m pip install"
+
+
+def _is_foreign(file: str) -> bool:
+    homes = [sys.prefix, sys.base_prefix, site.getusersitepackages()]
+    return bool(file) and not any(Path(file).is_relative_to(home) for home in homes)
+
+
+def _as_json(finding: Finding) -> dict[str, str]:
+    return {
+        "section": finding.section,
+        "subject": finding.subject,
+        "status": finding.status.value.lower(),
+        "detail": finding.detail,
+        "remedy": finding.remedy,
+    }
+
+
+def render(findings: list[Finding]) -> str:
+    """The findings as text for a person, 80 columns wide but for paths and lines to type."""
+    lines: list[str] = []
+    section = ""
+    for finding in findings:
+        if finding.section != section:
+            section = finding.section
+            lines += [""] * bool(lines) + [section]
+        head = f"  {finding.status.value:<8} {finding.subject:<19} "
+        wrapped = textwrap.wrap(
+            finding.detail, WIDTH - len(head), break_long_words=False, break_on_hyphens=False
+        ) or [""]
+        lines += [(" " * len(head) if number else head) + row for number, row in enumerate(wrapped)]
+        if finding.remedy:
+            lines.append(f"           -> {finding.remedy}")
+    problems = sum(finding.status is Status.PROBLEM for finding in findings)
+    verdict = "Everything that is needed is here."
+    if problems:
+        verdict = f"{problems} problem{'s' * (problems > 1)}; the lines after -> fix them."
+    return "\n".join([*lines, "", verdict])

@@ -1,0 +1,175 @@
+"""``go2-wbc``: finds the subcommand, runs it, and turns errors into messages and exit codes.
+
+A subcommand is a module with ``register(subparsers)`` and ``run(args) -> int``, and a line in
+``COMMANDS``. Only the module that was asked for is imported: help is quick, and a broken library
+cannot keep ``doctor`` from starting.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import importlib.metadata
+import logging
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import ModuleType
+
+from controller.cli.common import ExitCode, Subparsers, examples_epilog
+from go2_wbc.errors import (
+    CommandError,
+    ConfigError,
+    Go2WbcError,
+    IkError,
+    MotionError,
+    QpInfeasible,
+)
+
+PROGRAM = "go2-wbc"
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """A subcommand: its name, the module that runs it, and its line in the list."""
+
+    name: str
+    module: str
+    summary: str
+
+
+COMMANDS: tuple[Command, ...] = (
+    Command("bench", "controller.cli.bench", "measure the behaviour over many seeds"),
+    Command("demo", "controller.cli.demo", "stand, sit, walk, turn, high five; measured, in 3D"),
+    Command("doctor", "controller.cli.doctor", "check this installation, say what is missing"),
+)
+
+EXAMPLES = """
+go2-wbc demo             run the demo headless: table, replay page, pictures
+go2-wbc doctor           what is installed, what is missing, how to get it
+go2-wbc doctor --json    the same for a program to read
+go2-wbc COMMAND --help   the options of a command, with examples
+"""
+
+EXIT_CODES: tuple[tuple[type[Go2WbcError], ExitCode], ...] = (
+    (MotionError, ExitCode.FAILED),
+    (QpInfeasible, ExitCode.FAILED),
+    (IkError, ExitCode.FAILED),
+    (CommandError, ExitCode.USAGE),
+    (ConfigError, ExitCode.USAGE),
+    (Go2WbcError, ExitCode.RUNTIME),
+)
+"""The exit code of an error; the first class that fits counts."""
+
+_OURS = frozenset({"go2_wbc", "controller", "motions", "viz"})
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        argv: arguments without the program's name; by default those of the process.
+
+    Returns:
+        0 fine, 1 infeasible or failed, 2 usage, 3 runtime error, 130 interrupted.
+    """
+    try:
+        code = _run_reporting_errors(list(sys.argv[1:] if argv is None else argv))
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader has gone. Python flushes once more at exit: let that go nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return ExitCode.BROKEN_PIPE
+    return code
+
+
+def build_parser(module: ModuleType | None, requested: str | None) -> argparse.ArgumentParser:
+    """The parser of the whole command line.
+
+    Args:
+        module: the module of the requested subcommand, which registers its own options.
+        requested: that subcommand's name; the others are listed by name and summary only.
+    """
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM,
+        description="Whole-body control of the Unitree Go2.",
+        epilog=examples_epilog(EXAMPLES),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"{PROGRAM} {_version()}")
+    parser.add_argument(
+        "-v", "--verbose", action="store_true", help="log what happens (to standard error)"
+    )
+    subparsers: Subparsers = parser.add_subparsers(
+        title="commands", dest="command", metavar="COMMAND"
+    )
+    for command in COMMANDS:
+        if module is not None and command.name == requested:
+            module.register(subparsers)
+        else:
+            subparsers.add_parser(command.name, help=command.summary)
+    return parser
+
+
+def _run_reporting_errors(argv: list[str]) -> int:
+    try:
+        return _run(argv)
+    except BrokenPipeError:
+        raise
+    except KeyboardInterrupt:
+        return _complain("interrupted", ExitCode.INTERRUPTED)
+    except Go2WbcError as error:
+        code = next(code for kind, code in EXIT_CODES if isinstance(error, kind))
+        return _complain(str(error), code)
+    except Exception as error:
+        return _complain_about_foreign(error)
+
+
+def _run(argv: list[str]) -> int:
+    requested = next((word for word in argv if not word.startswith("-")), None)
+    modules = {command.name: command.module for command in COMMANDS}
+    module = importlib.import_module(modules[requested]) if requested in modules else None
+    parser = build_parser(module, requested)
+    try:
+        args = parser.parse_args(argv)
+    except SystemExit as stop:  # argparse has printed its help, version or complaint
+        return stop.code if isinstance(stop.code, int) else ExitCode.USAGE
+    logging.basicConfig(
+        level=logging.INFO if args.verbose else logging.WARNING,
+        format="%(levelname)s: %(message)s",
+    )
+    if module is None:
+        parser.print_help(sys.stderr)
+        return ExitCode.USAGE
+    return module.run(args)
+
+
+def _complain_about_foreign(error: Exception) -> int:
+    """Report an error that is not of our tree: a missing library, a file, or a bug."""
+    if isinstance(error, ImportError) and (error.name or "").split(".")[0] not in _OURS:
+        return _complain(
+            f"{error}; `{PROGRAM} doctor` says what is missing and how to get it",
+            ExitCode.RUNTIME,
+        )
+    if isinstance(error, OSError) and error.filename is not None:
+        return _complain(f"{error.filename}: {error.strerror}", ExitCode.RUNTIME)
+    traceback.print_exception(error)
+    return _complain("this is a bug in the program; the lines above say where", ExitCode.RUNTIME)
+
+
+def _complain(message: str, code: ExitCode) -> int:
+    print(f"{PROGRAM}: {message}", file=sys.stderr)
+    return code
+
+
+def _version() -> str:
+    try:
+        return importlib.metadata.version(PROGRAM)
+    except importlib.metadata.PackageNotFoundError:
+        return "(not installed)"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,162 @@
+"""The steps of the demo as data: what is done, and what is measured of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from controller.checks import ANGLE_TOLERANCE, HEIGHT_TOLERANCE, STILL_SPEED
+from controller.demo.report import Figure
+from controller.go2_controller import GO2Controller
+from controller.modes import Mode, Outcome
+from controller.navigation import HEADING_TOLERANCE
+from go2_wbc.errors import ModeError
+from go2_wbc.recording import Recording
+from motions.postures import SIT_POSE, STAND_HEIGHT
+
+FORWARD_SPEED = 0.2
+"""Speed [m/s] of the walk."""
+FORWARD_TIME = 2.0
+"""Duration [s] of the walk."""
+SPEED_UP_TIME = 0.5
+"""Time [s] at the start of the walk that does not count for its mean speed; the ramp takes 0.13 s
+and the first stride 0.36 s."""
+SPEED_TOLERANCE = 0.02
+"""Accepted error [m/s] of the mean speed: a tenth of what is asked."""
+STOP_TIME = 1.0
+"""Time [s] that the robot gets to come to rest."""
+TURN_ANGLE = math.pi / 2
+"""Angle [rad] of the turn, to the left."""
+HOLD_TIME = 2.0
+"""Time [s] for which the paw is held up."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepRun:
+    """One step that has just been run, ready to be measured.
+
+    Attributes:
+        outcome: of its last blocking call.
+        recording: what happened in it, at least one sample.
+    """
+
+    outcome: Outcome
+    recording: Recording
+
+
+@dataclass(frozen=True, slots=True)
+class DemoStep:
+    """One step of the demo.
+
+    Attributes:
+        name: identifies the step in reports.
+        label: says what is done, in at most 21 characters.
+        act: does it; False means that it was not done, None that the figures must tell.
+        measure: figures from what was measured, never from what was commanded.
+    """
+
+    name: str
+    label: str
+    act: Callable[[GO2Controller], bool | None]
+    measure: Callable[[StepRun], tuple[Figure, ...]]
+
+
+def yaw_angles(recording: Recording) -> Float[np.ndarray, " n"]:
+    """Heading [rad] of every sample, without jumps of a full turn."""
+    x, y, z, w = recording.q[:, 3:7].T
+    return np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+
+
+def displacement(recording: Recording, start: int = 0) -> Float[np.ndarray, "2"]:
+    """Way [m] of the base ahead and to the left, seen from its pose at the sample ``start``."""
+    yaw = yaw_angles(recording)[start]
+    dx, dy = recording.q[-1, :2] - recording.q[start, :2]
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array([c * dx + s * dy, -s * dx + c * dy])
+
+
+def _standing(run: StepRun) -> tuple[Figure, ...]:
+    height = _of(run, "CoM height [m]")
+    return (Figure("CoM height", height, "m", STAND_HEIGHT, HEIGHT_TOLERANCE),)
+
+
+def _sitting(run: StepRun) -> tuple[Figure, ...]:
+    height, pitch = float(SIT_POSE[2]), math.degrees(SIT_POSE[4])
+    tolerance = math.degrees(ANGLE_TOLERANCE)
+    return (
+        Figure("base height", _of(run, "base height [m]"), "m", height, HEIGHT_TOLERANCE),
+        Figure("trunk pitch", _of(run, "pitch [deg]"), "deg", pitch, tolerance),
+    )
+
+
+def _forward(run: StepRun) -> tuple[Figure, ...]:
+    recording = run.recording
+    since = recording.time - recording.time[0]
+    steady = min(int(np.searchsorted(since, SPEED_UP_TIME)), len(since) - 1)
+    time = float(since[-1] - since[steady])
+    speed = float(displacement(recording, steady)[0]) / time if time > 0.0 else math.nan
+    ahead, aside = displacement(recording)
+    return (
+        Figure("mean speed", speed, "m/s", FORWARD_SPEED, SPEED_TOLERANCE),
+        Figure("way ahead", float(ahead), "m", FORWARD_SPEED * FORWARD_TIME),
+        Figure("way aside", float(aside), "m", 0.0),
+    )
+
+
+def _stopping(run: StepRun) -> tuple[Figure, ...]:
+    speed = float(np.linalg.norm(run.recording.v[-1, :2]))
+    way = float(displacement(run.recording)[0])
+    return (
+        Figure("speed at the end", speed, "m/s", 0.0, STILL_SPEED),
+        Figure("way to rest", way, "m"),
+    )
+
+
+def _turning(run: StepRun) -> tuple[Figure, ...]:
+    yaw = yaw_angles(run.recording)
+    turned, asked = math.degrees(yaw[-1] - yaw[0]), math.degrees(TURN_ANGLE)
+    drift = float(np.linalg.norm(displacement(run.recording)))
+    return (
+        Figure("turned left", turned, "deg", asked, math.degrees(HEADING_TOLERANCE)),
+        Figure("moved from the place", drift, "m", 0.0),
+    )
+
+
+def _raising_paw(run: StepRun) -> tuple[Figure, ...]:
+    return (
+        Figure("paw held, least height", _of(run, "least paw height [m]"), "m"),
+        Figure("paw held, mean height", _of(run, "mean paw height [m]"), "m"),
+    )
+
+
+def _of(run: StepRun, name: str) -> float:
+    return run.outcome.measured.get(name, math.nan)
+
+
+def _walk_forward(go2: GO2Controller) -> None:
+    go2.move(linear_x=FORWARD_SPEED)
+    go2.wait(FORWARD_TIME)
+
+
+def _come_to_rest(go2: GO2Controller) -> None:
+    if go2.mode is not Mode.WALKING:
+        raise ModeError(f"nothing to stop: the robot is {go2.mode.value}, not walking")
+    go2.stop()
+    go2.wait(STOP_TIME)
+
+
+DEMO_STEPS: tuple[DemoStep, ...] = (
+    DemoStep("stand", "stand up", lambda go2: go2.stand(), _standing),
+    DemoStep("sit", "sit", lambda go2: go2.sit(), _sitting),
+    DemoStep("walk", "walking mode", lambda go2: go2.walk(), _standing),
+    DemoStep("forward", "forward 0.2 m/s, 2 s", _walk_forward, _forward),
+    DemoStep("stop", "stop", _come_to_rest, _stopping),
+    DemoStep("turn", "turn left 90 deg", lambda go2: go2.turn_left(TURN_ANGLE), _turning),
+    DemoStep("high_five", "high five", lambda go2: go2.high_five(hold=HOLD_TIME), _raising_paw),
+    DemoStep("sit_again", "sit", lambda go2: go2.sit(), _sitting),
+)
+"""Stand, sit, walk, forward, stop, turn, high five, sit."""

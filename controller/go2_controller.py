@@ -1,0 +1,390 @@
+"""``GO2Controller``: a Go2 behind a handful of methods."""
+
+from __future__ import annotations
+
+import logging
+import math
+import re
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+
+from controller.loop import ControlLoop
+from controller.modes import Mode, Outcome
+from controller.pilot import Aborted, Figures, Pilot
+from controller.runner import Runner
+from controller.telemetry import Telemetry
+from go2_wbc.config import Config, load_config
+from go2_wbc.errors import (
+    ClosedError,
+    CommandError,
+    ConfigError,
+    Go2WbcError,
+    ModeError,
+    PlantError,
+)
+from go2_wbc.legs import front_leg
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.plant import MujocoPlant, Plant
+from go2_wbc.plant.viewer import PlantViewer
+from go2_wbc.recording import Recording
+from go2_wbc.reference import MotionPlan
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.state import RobotState
+from go2_wbc.wbc.controller import WholeBodyController
+from motions import check_plan, high_five_plan, load_motion
+
+_log = logging.getLogger(__name__)
+
+NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+RECORDED_TIME = 240.0
+"""Seconds of robot time that the telemetry keeps."""
+VIEWER_RATE = 50.0
+"""Frames per second of robot time that the viewer shows."""
+
+
+class GO2Controller:
+    """A Unitree Go2 that stands, sits, walks and gives a high five.
+
+    By default it drives its own robot in MuJoCo, headless, as fast as the CPU allows; time passes
+    only inside calls, so runs are deterministic. With ``realtime=True`` the robot lives in a
+    background thread at wall-clock pace.
+
+    A blocking call returns True only when the measured state shows that the thing was done;
+    otherwise False, with the reason in ``last_outcome``.
+
+    Example:
+        >>> with GO2Controller() as go2:
+        ...     go2.stand() and go2.high_five()
+        True
+    """
+
+    def __init__(
+        self,
+        namespace: str = "robot1",
+        *,
+        plant: Plant | None = None,
+        realtime: bool = False,
+        viewer: bool = False,
+        config: Config | Path | str | None = None,
+    ) -> None:
+        """Take over a robot that lies on the ground, damped.
+
+        Args:
+            namespace: name of this robot: letters, digits and underscores, a letter first.
+            plant: what to drive; by default a ``MujocoPlant`` of its own.
+            realtime: let the robot live at wall-clock pace in a background thread.
+            viewer: open MuJoCo's viewer if there is a display.
+            config: numbers of the engine, or a TOML file that overrides some.
+
+        Raises:
+            ConfigError: for a namespace or configuration that is not valid.
+            SolverUnavailable: if the configured QP solver is unknown or not installed.
+            DescriptionError: if the robot's files are missing.
+            PlantError: if the plant does not answer.
+        """
+        if not isinstance(namespace, str) or not NAMESPACE.match(namespace):
+            raise ConfigError(
+                f"namespace must be letters, digits and underscores, a letter first; "
+                f"got {namespace!r}"
+            )
+        self._namespace = namespace
+        self._config = config if isinstance(config, Config) else _load(config)
+        model = RobotModel()
+        wbc = WholeBodyController(model, self._config.backend, self._config.wbc)
+        self._owns_plant = plant is None
+        self._plant = MujocoPlant(visuals=viewer) if plant is None else plant
+        self._closed = False
+        self._busy = threading.Lock()
+        self._busy_with = ""
+        self._last_outcome = Outcome(True, "lying, nothing asked yet", 0.0)
+        capacity = round(RECORDED_TIME / self._plant.control_period)
+        self._telemetry = Telemetry(model, capacity)
+        loop = ControlLoop(self._plant, model, wbc, self._telemetry, self._config.safety)
+        self._viewer = _open_viewer(self._plant) if viewer else None
+        self._shown_at = loop.state.time
+        self._runner = Runner(loop, realtime=realtime, after_tick=lambda: self._show(loop.state))
+        self._pilot = Pilot(self._runner, self._config)
+
+    # --- postures -------------------------------------------------------------------------
+
+    def stand(self) -> bool:
+        """Stand, balancing, from lying, sitting or walking. True once it really stands."""
+        return self._call("stand", self._pilot.stand)
+
+    def sit(self) -> bool:
+        """Sit like a dog: rump down, front legs up. Stands up first if it lies."""
+        return self._call("sit", self._pilot.sit)
+
+    def lie_down(self) -> bool:
+        """Lie down on the belly and go limp."""
+        return self._call("lie_down", self._pilot.lie_down)
+
+    def recover(self) -> bool:
+        """Get up and stand after a fall."""
+        return self._call("recover", self._pilot.recover, allow_fallen=True)
+
+    def damp(self) -> None:
+        """Go limp at once, safely; also ends a call that is running in another thread."""
+        self._check_open()
+        self._pilot.collapse("damped by damp()")
+
+    # --- walking --------------------------------------------------------------------------
+
+    def walk(self, gait: str = "trot") -> bool:
+        """Enter walking mode; the robot stands ready until ``move``. Stands up first if needed.
+
+        Raises:
+            CommandError: for an unknown gait; lists the valid ones.
+        """
+        return self._call("walk", lambda: self._pilot.walk(gait))
+
+    def move(
+        self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0
+    ) -> None:
+        """Walk with this velocity until the next command; takes no time by itself.
+
+        Args:
+            linear_x: forward speed [m/s], negative is backward.
+            angular_z: turning rate [rad/s], positive is left.
+            linear_y: sideways speed [m/s], positive is left.
+
+        Raises:
+            CommandError: if a value is not a finite number.
+            ModeError: outside walking mode.
+        """
+        self._check_open()
+        wanted = VelocityCommand(linear_x, linear_y, angular_z)
+        followed = self._pilot.set_command(wanted)
+        if followed != wanted:
+            _log.warning("velocity command clipped from %s to %s", wanted, followed)
+
+    def stop(self) -> None:
+        """Zero velocity: the robot comes to rest in walking mode.
+
+        Without ``realtime`` the time until it rests passes inside this call.
+        """
+        self._check_open()
+        if self._pilot.mode is not Mode.WALKING:
+            return
+        self._pilot.set_command(VelocityCommand())
+        if not self._runner.is_realtime:
+            self._call("stop", self._pilot.rest)
+
+    def turn_left(self, angle: float) -> bool:
+        """Turn left in place by ``angle`` [rad], measured on the heading; negative turns right.
+
+        Ends at rest in walking mode.
+        """
+        angle = _finite("angle", angle)
+        return self._call("turn_left", lambda: self._pilot.turn(angle))
+
+    def turn_right(self, angle: float) -> bool:
+        """Turn right in place by ``angle`` [rad], measured on the heading."""
+        angle = _finite("angle", angle)
+        return self._call("turn_right", lambda: self._pilot.turn(-angle))
+
+    def move_forward(self, distance: float) -> bool:
+        """Walk ``distance`` [m] straight ahead, measured; negative is backward.
+
+        Ends at rest in walking mode.
+        """
+        distance = _finite("distance", distance)
+        return self._call("move_forward", lambda: self._pilot.drive(distance))
+
+    # --- motions --------------------------------------------------------------------------
+
+    def high_five(self, side: str = "right", hold: float = 2.0) -> bool:
+        """Raise a front paw on three legs, hold it, tap, and come back to standing.
+
+        Args:
+            side: "right" or "left".
+            hold: time [s] for which the paw is held up, 0.5 to 30.
+
+        Raises:
+            CommandError: for another side or time.
+        """
+        leg, hold = front_leg(side), _finite("hold", hold)
+        if not 0.5 <= hold <= 30.0:
+            raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
+        plan = high_five_plan(self._runner.loop.model, leg, hold)
+        return self._call("high_five", lambda: self._pilot.high_five(plan))
+
+    def play(self, motion: str | MotionPlan) -> bool:
+        """Play a motion of the library by name, or a compiled plan.
+
+        Raises:
+            CommandError: for an unknown name; lists the valid ones.
+            StanceMismatch: if the motion starts from another stance.
+            MotionInfeasible: if the plan breaks a limit of the robot.
+        """
+        self._check_open()
+        model = self._runner.loop.model
+        plan = load_motion(motion, model) if isinstance(motion, str) else motion
+        check_plan(plan, model)
+        return self._call("play", lambda: self._pilot.play(plan))
+
+    def wait(self, seconds: float) -> None:
+        """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
+        self._check_open()
+        seconds = _finite("seconds", seconds)
+        if seconds < 0:
+            raise CommandError(f"seconds must not be negative, got {seconds}")
+        self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
+
+    # --- looking --------------------------------------------------------------------------
+
+    @property
+    def state(self) -> RobotState:
+        """The newest measured state."""
+        return self._runner.loop.state
+
+    @property
+    def mode(self) -> Mode:
+        """What the robot is doing."""
+        return Mode.CLOSED if self._closed else self._pilot.mode
+
+    @property
+    def command(self) -> VelocityCommand:
+        """The velocity command that is being followed, after clipping."""
+        return self._pilot.command
+
+    @property
+    def last_outcome(self) -> Outcome:
+        """What came of the last blocking call, and why."""
+        return self._last_outcome
+
+    @property
+    def namespace(self) -> str:
+        """Name of this robot."""
+        return self._namespace
+
+    @property
+    def plant(self) -> Plant:
+        """What is being driven."""
+        return self._plant
+
+    @property
+    def telemetry(self) -> Telemetry:
+        """Peaks and counts of the run so far."""
+        return self._telemetry
+
+    def recording(self, rate: float = 100.0) -> Recording:
+        """The run so far (its last minutes), at about ``rate`` samples a second."""
+        with self._runner.lock:
+            return self._telemetry.recording(rate)
+
+    # --- ending ---------------------------------------------------------------------------
+
+    def close(self) -> None:
+        """Go limp and release everything; idempotent."""
+        if self._closed:
+            return
+        self._closed = True
+        self._runner.close()
+        if self._viewer is not None:
+            self._viewer.close()
+        if self._owns_plant:
+            self._plant.close()
+
+    def destroy_node(self) -> None:
+        """The same as ``close``, under the name that ROS 2 code uses."""
+        self.close()
+
+    def __enter__(self) -> GO2Controller:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    # --- how calls are made ---------------------------------------------------------------
+
+    def _call(
+        self, name: str, procedure: Callable[[], Figures], *, allow_fallen: bool = False
+    ) -> bool:
+        self._check_open()
+        if self._pilot.mode is Mode.FALLEN and not allow_fallen:
+            raise ModeError(f"{name}() needs a robot that has not fallen: call recover() first")
+        with self._occupied(name):
+            self._pilot.begin()
+            start = self.state.time
+            try:
+                figures = procedure()
+                ok, reason = True, "done"
+            except Aborted as aborted:
+                figures, ok, reason = {}, False, str(aborted)
+            except Go2WbcError as error:
+                self._note(False, str(error), start)
+                raise
+            except BaseException as error:
+                reason = _interruption(name, error)
+                self._pilot.collapse(reason)
+                self._note(False, f"{reason}, damped", start)
+                raise
+            self._note(ok, reason, start, figures)
+        return ok
+
+    def _note(
+        self, ok: bool, reason: str, start: float, figures: Figures | None = None
+    ) -> None:
+        duration = self.state.time - start
+        self._last_outcome = Outcome(ok, reason, duration, dict(figures or {}))
+        if not ok:
+            _log.warning("%s", reason)
+
+    @contextmanager
+    def _occupied(self, name: str) -> Iterator[None]:
+        if not self._busy.acquire(blocking=False):
+            raise ModeError(f"{name}() while {self._busy_with}() is still running")
+        self._busy_with = name
+        try:
+            yield
+        finally:
+            self._busy.release()
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ClosedError("this GO2Controller is closed")
+
+    def _show(self, state: RobotState) -> None:
+        if self._viewer is not None and state.time - self._shown_at >= 1.0 / VIEWER_RATE:
+            self._shown_at = state.time
+            self._viewer.sync()
+
+
+def _interruption(name: str, error: BaseException) -> str:
+    if isinstance(error, KeyboardInterrupt):
+        return f"interrupted during {name}()"
+    return f"{type(error).__name__} during {name}(): {error}"
+
+
+def _load(config: Path | str | None) -> Config:
+    return Config() if config is None else load_config(config)
+
+
+def _finite(name: str, value: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        raise CommandError(f"{name} must be a number, got {value!r}")
+    if not math.isfinite(value):
+        raise CommandError(f"{name} must be finite, got {value}")
+    return float(value)
+
+
+def _open_viewer(plant: Plant) -> PlantViewer | None:
+    if not isinstance(plant, MujocoPlant):
+        _log.warning("the viewer shows MuJoCo plants only; going on without")
+        return None
+    try:
+        return PlantViewer(plant)
+    except PlantError as error:
+        _log.warning("no viewer: %s", error)
+        return None

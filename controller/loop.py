@@ -1,0 +1,180 @@
+"""The control loop: one tick is read, check, snapshot, behaviour, whole-body QP, write, record.
+
+Only here a QP failure is caught: the last good torque is held for one tick, then the robot is
+damped while the failure lasts, and for good after ``qp_patience`` ticks; every one is counted.
+A plant that fails, gives no new state, or gives one that is not finite, ends the behaviour too.
+"""
+
+from __future__ import annotations
+
+import logging
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.behaviours.base import Behaviour
+from controller.behaviours.joints import DAMPING, Damped
+from controller.telemetry import Telemetry
+from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
+from go2_wbc.plant.base import Plant
+from go2_wbc.reference import JointReference, Reference
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.safety import SafetyConfig, fall_reason
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import JointCommand, RobotState
+from go2_wbc.wbc.controller import WholeBodyController
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Why the loop took the robot out of its behaviour.
+
+    Attributes:
+        reason: in plain words.
+        is_fall: whether the robot has fallen.
+        may_fall: whether it went limp in the middle of balancing, so that it may yet fall.
+    """
+
+    reason: str
+    is_fall: bool = False
+    may_fall: bool = False
+
+
+class ControlLoop:
+    """Runs one behaviour at a time on a plant.
+
+    Attributes:
+        behaviour: what the robot does now.
+        snapshot: of the last tick.
+        fault: why the last behaviour was ended by the loop, or None.
+    """
+
+    def __init__(
+        self,
+        plant: Plant,
+        model: RobotModel,
+        wbc: WholeBodyController,
+        telemetry: Telemetry,
+        safety: SafetyConfig,
+    ) -> None:
+        """Start damped.
+
+        Raises:
+            PlantError: if the plant does not answer, or its state is not finite.
+        """
+        self.plant, self.model, self.wbc, self.telemetry = plant, model, wbc, telemetry
+        self._safety = safety
+        self.fault: Fault | None = None
+        self.state: RobotState = plant.read()
+        if not _is_finite(self.state):
+            raise PlantError(f"the first state of the plant is not finite: q={self.state.q}")
+        self.snapshot: Snapshot = model.snapshot(self.state)
+        self._last_command = JointCommand.damping(DAMPING)
+        self._unanswered = 0
+        self._qp_failures_in_a_row = 0
+        self.behaviour: Behaviour
+        self.engage(Damped("lying"))
+
+    def engage(self, behaviour: Behaviour) -> None:
+        """Start ``behaviour`` from the present state and clear the fault.
+
+        Raises:
+            PlantTimeout: if the plant does not answer.
+        """
+        self._observe()
+        self.fault = None
+        self._qp_failures_in_a_row = 0
+        behaviour.start(self.snapshot)
+        self.behaviour = behaviour
+
+    def abandon(self, fault: Fault) -> None:
+        """Go limp and note why."""
+        self.fault = fault
+        self.behaviour = Damped("fallen" if fault.is_fall else "damped")
+        self.behaviour.start(self.snapshot)
+        _log.warning("%s", fault.reason)
+
+    def go_limp(self) -> None:
+        """Send the safe command once, even to a plant that fails: the last word before silence."""
+        with suppress(Exception):
+            self.plant.write(JointCommand.damping(DAMPING))
+
+    def tick(self) -> None:
+        """One control period.
+
+        Raises:
+            PlantError: if the plant fails or stops answering. The robot is damped before, as far
+                as the plant still obeys, and the fault is noted; so for any other exception.
+        """
+        try:
+            self._observe()
+            self._guard()
+            target = self.behaviour.update(self.snapshot)
+            command = self._command(target)
+            self._last_command = command
+            self.plant.write(command)
+            self._unanswered += 1
+        except Exception as error:
+            what = "plant failed" if isinstance(error, PlantError) else type(error).__name__
+            self.abandon(Fault(f"{what}: {error}"))
+            self.go_limp()
+            raise
+        self.telemetry.record(self.snapshot, target.stance, self.behaviour.label)
+
+    def _observe(self) -> None:
+        state = self.plant.read()
+        is_finite = _is_finite(state)
+        if is_finite and state.time > self.state.time:
+            self._unanswered = 0
+            self.state = state
+            self.snapshot = self.model.snapshot(state)
+            return
+        silence = self._unanswered * self.plant.control_period
+        if silence > self._safety.stale_limit:
+            lack = "new" if is_finite else "finite"
+            raise PlantTimeout(f"no {lack} state from the plant for {1000 * silence:.0f} ms")
+
+    def _guard(self) -> None:
+        fault = self.fault
+        is_tipping = fault is not None and self.state.tilt > self._safety.tilt_limit
+        if not (self.behaviour.needs_balance or is_tipping):
+            return
+        lowest_foot = float(self.snapshot.p_world_feet[:, 2].min())
+        reason = fall_reason(self.state, lowest_foot, self._safety)
+        if reason is None:
+            return
+        if fault is None:
+            self.abandon(Fault(reason, is_fall=True))
+        elif not fault.is_fall:
+            self.abandon(Fault(f"{reason}, after: {fault.reason}", is_fall=True))
+
+    def _command(self, target: Reference | JointReference) -> JointCommand:
+        if isinstance(target, JointReference):
+            return JointCommand.servo(target.q_joints, target.v_joints, target.kp, target.kd)
+        try:
+            solution = self.wbc.solve(self.snapshot, target)
+        except QpInfeasible as error:
+            return self._without_solution(error)
+        self._qp_failures_in_a_row = 0
+        return solution.command
+
+    def _without_solution(self, error: QpInfeasible) -> JointCommand:
+        self.telemetry.qp_failures += 1
+        self._qp_failures_in_a_row += 1
+        streak = self._qp_failures_in_a_row
+        if streak >= self._safety.qp_patience:
+            summary = str(error).splitlines()[0]
+            reason = f"damped after {streak} QP failures in a row: {summary}"
+            self.abandon(Fault(reason, may_fall=True))
+        elif streak == 1:
+            time = self.state.time
+            _log.warning("QP failure at t=%.3f s, holding the last torque: %s", time, error)
+            return self._last_command
+        return JointCommand.damping(DAMPING)
+
+
+def _is_finite(state: RobotState) -> bool:
+    return bool(np.isfinite(state.q).all() and np.isfinite(state.v).all())

@@ -1,0 +1,46 @@
+"""Modes of the robot, and the outcome of a call."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+
+class Mode(Enum):
+    """What the robot is doing between calls."""
+
+    LYING = "lying"
+    STANDING = "standing"
+    SITTING = "sitting"
+    WALKING = "walking"
+    MOVING = "moving"
+    FALLEN = "fallen"
+    DAMPED = "damped"
+    CLOSED = "closed"
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether the robot is on its feet."""
+        return self in (Mode.STANDING, Mode.SITTING, Mode.WALKING, Mode.MOVING)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What came of a blocking call.
+
+    Attributes:
+        ok: whether the measured state shows that it was done.
+        reason: why, in plain words.
+        duration: robot time [s] that it took.
+        measured: the measured quantities that the verdict rests on, by name with unit.
+    """
+
+    ok: bool
+    reason: str
+    duration: float
+    measured: Mapping[str, float] = field(default_factory=dict)
+
+    def __bool__(self) -> bool:
+        """Truth of the outcome is ``ok``."""
+        return self.ok

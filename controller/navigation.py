@@ -1,0 +1,179 @@
+"""Errands: turning by an angle and walking a distance, closed on the measured pose."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from go2_wbc.errors import CommandError
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.robot.rotations import wrap_angle
+from go2_wbc.robot.state import RobotState
+
+TURN_RATE = 1.0
+"""Greatest turning rate [rad/s] of an errand."""
+WALK_SPEED = 0.4
+"""Greatest speed [m/s] of an errand."""
+APPROACH = 2.0
+"""Speed per remaining way [1/s]: the errand slows down before its goal."""
+HEADING_TOLERANCE = math.radians(1.5)
+DISTANCE_TOLERANCE = 0.02
+GREATEST_TURN = 20 * math.pi
+"""Greatest angle [rad] of one errand: ten turns, a minute's work; more is a mistake in units."""
+GREATEST_DISTANCE = 100.0
+"""Greatest distance [m] of one errand: four minutes' work; more is a mistake in units."""
+
+
+class Errand(ABC):
+    """A walk with a measured goal."""
+
+    name: str
+    time_limit: float
+
+    @abstractmethod
+    def begin(self, state: RobotState) -> None:
+        """Note where it starts."""
+
+    @abstractmethod
+    def command(self, state: RobotState) -> VelocityCommand:
+        """The velocity that leads to the goal."""
+
+    @abstractmethod
+    def is_done(self, state: RobotState) -> bool:
+        """Whether the goal is reached and the robot may stop."""
+
+    @abstractmethod
+    def is_within_tolerance(self, state: RobotState) -> bool:
+        """Whether the resting robot is at the goal."""
+
+    @abstractmethod
+    def figures(self, state: RobotState) -> dict[str, float]:
+        """What was asked and achieved, by name with unit."""
+
+
+class Course:
+    """Where the robot stands, seen from where an errand began, over any number of turns."""
+
+    def __init__(self, state: RobotState) -> None:
+        """Begin at ``state``."""
+        self._p_world_start = state.p_world_base.copy()
+        self._yaw_start = self._yaw_last = float(state.rpy[2])
+        self._turned = 0.0
+
+    def turned(self, state: RobotState) -> float:
+        """Angle [rad] turned to the left since the start, unwrapped."""
+        yaw = float(state.rpy[2])
+        self._turned += wrap_angle(yaw - self._yaw_last)
+        self._yaw_last = yaw
+        return self._turned
+
+    def displacement(self, state: RobotState) -> tuple[float, float]:
+        """Way ahead and to the left [m] in the frame of the start."""
+        dx, dy = (state.p_world_base - self._p_world_start)[:2].tolist()
+        c, s = math.cos(self._yaw_start), math.sin(self._yaw_start)
+        return c * dx + s * dy, -s * dx + c * dy
+
+
+class TurnInPlace(Errand):
+    """Turn left by an angle, staying in place."""
+
+    def __init__(self, angle: float) -> None:
+        """Turn by ``angle`` [rad], negative turns right.
+
+        Raises:
+            CommandError: if it is more than ``GREATEST_TURN``.
+        """
+        if abs(angle) > GREATEST_TURN:
+            raise CommandError(f"angle must be within +-{GREATEST_TURN:.1f} rad, got {angle}")
+        self.name = f"turn by {math.degrees(angle):.1f} deg"
+        self._angle = angle
+        self.time_limit = 3.0 * abs(angle) / TURN_RATE + 8.0
+
+    def begin(self, state: RobotState) -> None:
+        """Note the heading."""
+        self._course = Course(state)
+
+    def command(self, state: RobotState) -> VelocityCommand:
+        """Turn towards the goal, slower as it comes near, and hold the place."""
+        remaining = self._angle - self._course.turned(state)
+        ahead, left = self._course.displacement(state)
+        yaw = self._course.turned(state)
+        c, s = math.cos(yaw), math.sin(yaw)
+        return VelocityCommand(
+            float(np.clip(-0.5 * (c * ahead + s * left), -0.1, 0.1)),
+            float(np.clip(-0.5 * (-s * ahead + c * left), -0.1, 0.1)),
+            float(np.clip(APPROACH * remaining, -TURN_RATE, TURN_RATE)),
+        )
+
+    def is_done(self, state: RobotState) -> bool:
+        """Whether less than a third of a degree is left and the robot hardly turns."""
+        remaining = self._angle - self._course.turned(state)
+        return abs(remaining) < math.radians(0.3) and abs(float(state.v[5])) < 0.15
+
+    def is_within_tolerance(self, state: RobotState) -> bool:
+        """Whether the heading is right to 1.5 deg."""
+        return abs(self._angle - self._course.turned(state)) < HEADING_TOLERANCE
+
+    def figures(self, state: RobotState) -> dict[str, float]:
+        """Angle asked and turned."""
+        return {
+            "asked [deg]": math.degrees(self._angle),
+            "turned [deg]": math.degrees(self._course.turned(state)),
+        }
+
+
+class DriveStraight(Errand):
+    """Walk a distance along the heading of the start."""
+
+    def __init__(self, distance: float) -> None:
+        """Walk ``distance`` [m], negative is backward.
+
+        Raises:
+            CommandError: if it is more than ``GREATEST_DISTANCE``.
+        """
+        if abs(distance) > GREATEST_DISTANCE:
+            limit = f"+-{GREATEST_DISTANCE:.0f} m"
+            raise CommandError(f"distance must be within {limit}, got {distance}")
+        self.name = f"walk {distance:.3f} m"
+        self._distance = distance
+        self.time_limit = 3.0 * abs(distance) / WALK_SPEED + 8.0
+
+    def begin(self, state: RobotState) -> None:
+        """Note the place and heading."""
+        self._course = Course(state)
+
+    def command(self, state: RobotState) -> VelocityCommand:
+        """Walk towards the goal, slower as it comes near, and hold the line and the heading."""
+        ahead, left = self._course.displacement(state)
+        turned = self._course.turned(state)
+        speed = float(np.clip(APPROACH * (self._distance - ahead), -WALK_SPEED, WALK_SPEED))
+        sideways = float(np.clip(-1.0 * left, -0.15, 0.15))
+        c, s = math.cos(turned), math.sin(turned)
+        return VelocityCommand(
+            c * speed + s * sideways,
+            -s * speed + c * sideways,
+            float(np.clip(-APPROACH * turned, -0.5, 0.5)),
+        )
+
+    def is_done(self, state: RobotState) -> bool:
+        """Whether less than 4 mm are left and the robot hardly moves on."""
+        ahead, _ = self._course.displacement(state)
+        return abs(self._distance - ahead) < 0.004 and abs(float(state.v[0])) < 0.06
+
+    def is_within_tolerance(self, state: RobotState) -> bool:
+        """Whether the robot is within 20 mm of the goal and 1.5 deg of the heading."""
+        ahead, left = self._course.displacement(state)
+        miss = math.hypot(self._distance - ahead, left)
+        return miss < DISTANCE_TOLERANCE and abs(self._course.turned(state)) < HEADING_TOLERANCE
+
+    def figures(self, state: RobotState) -> dict[str, float]:
+        """Distance asked and walked, and the heading error."""
+        ahead, left = self._course.displacement(state)
+        return {
+            "asked [m]": self._distance,
+            "walked [m]": ahead,
+            "aside [m]": left,
+            "heading error [deg]": math.degrees(self._course.turned(state)),
+        }

@@ -1,0 +1,82 @@
+"""Telemetry: every tick recorded in a ring, and peaks over the whole run."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from go2_wbc.errors import CommandError
+from go2_wbc.geometry import support_margin
+from go2_wbc.recording import Recording
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+
+
+class Telemetry:
+    """Records ticks; the oldest are dropped when the ring is full.
+
+    Attributes:
+        peak_torque_ratio: greatest |tau| / limit of any joint so far.
+        peak_speed_ratio: greatest |joint velocity| / limit of any joint so far.
+        qp_failures: ticks in which the QP had no solution, over the whole run.
+    """
+
+    def __init__(self, model: RobotModel, capacity: int) -> None:
+        """Args: capacity: number of ticks that the ring holds."""
+        self._model = model
+        self._capacity = capacity
+        self._time = np.empty(capacity)
+        self._q, self._v = np.empty((capacity, 19)), np.empty((capacity, 18))
+        self._tau, self._forces = np.empty((capacity, 12)), np.empty((capacity, 4))
+        self._stance = np.empty((capacity, 4), dtype=bool)
+        self._com, self._feet = np.empty((capacity, 3)), np.empty((capacity, 4, 3))
+        self._labels = np.empty(capacity, dtype=object)
+        self._count = 0
+        self.peak_torque_ratio = 0.0
+        self.peak_speed_ratio = 0.0
+        self.qp_failures = 0
+
+    def record(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"], label: str) -> None:
+        """Add one tick."""
+        i = self._count % self._capacity
+        state = snapshot.state
+        self._time[i], self._q[i], self._v[i] = state.time, state.q, state.v
+        self._tau[i], self._forces[i] = state.tau, state.foot_forces
+        self._stance[i], self._labels[i] = stance, label
+        self._com[i], self._feet[i] = snapshot.p_world_com, snapshot.p_world_feet
+        self._count += 1
+        torque = float(np.max(np.abs(state.tau) / self._model.torque_limits))
+        speed = float(np.max(np.abs(state.v[6:]) / self._model.speed_limits))
+        self.peak_torque_ratio = max(self.peak_torque_ratio, torque)
+        self.peak_speed_ratio = max(self.peak_speed_ratio, speed)
+
+    def recording(self, rate: float = 100.0) -> Recording:
+        """What the ring holds, thinned to about ``rate`` samples a second.
+
+        Raises:
+            CommandError: if ``rate`` is not a positive number.
+        """
+        if not rate > 0.0:
+            raise CommandError(f"rate must be positive, got {rate}")
+        order = np.arange(max(0, self._count - self._capacity), self._count)
+        rows = order % self._capacity
+        if len(rows) > 1:
+            span = float(self._time[rows[-1]] - self._time[rows[0]])
+            rows = rows[:: max(1, round((len(rows) - 1) / max(rate * span, 1.0)))]
+        return Recording(
+            time=self._time[rows].copy(),
+            q=self._q[rows],
+            v=self._v[rows],
+            tau=self._tau[rows],
+            foot_forces=self._forces[rows],
+            stance=self._stance[rows],
+            p_world_com=self._com[rows],
+            support_margin=np.array([self._margin(row) for row in rows.tolist()]),
+            labels=tuple(str(label) for label in self._labels[rows]),
+        )
+
+    def _margin(self, row: int) -> float:
+        feet: Float[np.ndarray, "k 2"] = self._feet[row][self._stance[row]][:, :2]
+        if len(feet) < 3:
+            return float("nan")
+        return support_margin(feet, self._com[row, :2])

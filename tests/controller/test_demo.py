@@ -1,0 +1,195 @@
+"""The demo does its steps in order and judges each by what was measured."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.demo import DEMO_STEPS, DemoProgress, Figure, StepResult, run_demo
+from controller.demo.run import three_leg_minima
+from controller.modes import Mode
+from go2_wbc.errors import IkError, PlantTimeout
+from tests.controller.fake_go2 import FakeGo2
+
+ROOT = Path(__file__).resolve().parents[2]
+HEAVY = {"numpy", "pinocchio", "placo", "mujoco", "meshcat", "jaxtyping"}
+
+
+def step_of(go2: FakeGo2, name: str) -> StepResult:
+    return next(step for step in run_demo(go2).steps if step.name == name)
+
+
+def figure_of(step: StepResult, name: str) -> Figure:
+    return next(figure for figure in step.figures if figure.name == name)
+
+
+def test_the_demo_stands_sits_walks_stops_turns_gives_a_high_five_and_sits() -> None:
+    go2 = FakeGo2()
+    report = run_demo(go2)
+    assert go2.calls == [
+        *("stand", "sit", "walk", "move", "wait", "stop", "wait"),
+        *("turn_left", "high_five", "sit"),
+    ]
+    assert report.ok
+    assert [step.reason for step in report.steps] == ["done"] * len(DEMO_STEPS)
+
+
+def test_the_demo_leaves_the_controller_open_for_its_owner() -> None:
+    go2 = FakeGo2()
+    run_demo(go2)
+    assert "close" not in go2.calls
+
+
+def test_the_walking_speed_is_measured_and_not_the_command() -> None:
+    step = step_of(FakeGo2(speed_share=0.75), "forward")
+    assert figure_of(step, "mean speed").measured == pytest.approx(0.15, rel=1e-6)
+    assert not step.ok
+    assert step.reason == "mean speed 0.15 m/s, asked 0.2 +- 0.02"
+
+
+@pytest.mark.parametrize("yaw", [0.0, 3.0, -2.0])
+def test_way_and_turn_are_seen_from_the_robot_whatever_its_heading(yaw: float) -> None:
+    report = run_demo(FakeGo2(yaw=yaw))
+    steps = {step.name: step for step in report.steps}
+    assert figure_of(steps["forward"], "mean speed").measured == pytest.approx(0.2, rel=1e-6)
+    assert figure_of(steps["forward"], "way aside").measured == pytest.approx(0.0, abs=1e-9)
+    assert figure_of(steps["turn"], "turned left").measured == pytest.approx(90.0, abs=1e-6)
+
+
+def test_a_robot_that_creeps_on_has_not_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FakeGo2, "stop", lambda self: None)
+    step = step_of(FakeGo2(), "stop")
+    assert not step.ok
+    assert "speed at the end 0.2 m/s" in step.reason
+
+
+def test_a_call_that_returns_false_fails_its_step_with_its_reason() -> None:
+    report = run_demo(FakeGo2(refusals={"high_five": "the paw was not held at 0.62 m"}))
+    failed = [step for step in report.steps if not step.ok]
+    assert [step.name for step in failed] == ["high_five"]
+    assert failed[0].reason == "the paw was not held at 0.62 m"
+    assert not report.ok
+
+
+def test_an_error_of_a_step_fails_it_and_the_demo_goes_on() -> None:
+    report = run_demo(FakeGo2(errors={"high_five": IkError("paw 0.1 m off\ntable")}))
+    assert [step.ok for step in report.steps] == [True] * 6 + [False, True]
+    assert report.steps[6].reason == "paw 0.1 m off"
+    assert report.steps[6].figures == ()
+
+
+def test_a_plant_that_fails_ends_the_demo() -> None:
+    with pytest.raises(PlantTimeout, match="silent"):
+        run_demo(FakeGo2(errors={"walk": PlantTimeout("silent")}))
+
+
+def test_after_a_fall_the_other_steps_are_reported_as_not_run() -> None:
+    go2 = FakeGo2(falls_in="walk")
+    report = run_demo(go2)
+    assert [step.ok for step in report.steps] == [True, True] + [False] * 6
+    assert report.steps[2].reason.startswith("fell at t=3.20 s")
+    assert {step.reason for step in report.steps[3:]} == {"not run: the robot has fallen"}
+    assert "move" not in go2.calls
+
+
+def test_a_fall_while_waiting_fails_the_walk() -> None:
+    step = step_of(FakeGo2(falls_in="wait"), "forward")
+    assert not step.ok
+    assert step.reason.startswith("fell at")
+
+
+def test_there_is_nothing_to_stop_unless_the_robot_walks() -> None:
+    stop = next(step for step in DEMO_STEPS if step.name == "stop")
+    report = run_demo(FakeGo2(), steps=[stop])
+    assert (
+        report.steps[0].reason == f"nothing to stop: the robot is {Mode.LYING.value}, not walking"
+    )
+
+
+def test_progress_is_told_when_a_step_begins_and_when_it_ends() -> None:
+    told: list[DemoProgress] = []
+    report = run_demo(FakeGo2(), told.append)
+    assert [progress.index for progress in told] == [i for i in range(8) for _ in range(2)]
+    assert all(progress.result is None for progress in told[::2])
+    assert tuple(progress.result for progress in told[1::2]) == report.steps
+    assert {progress.count for progress in told} == {8}
+
+
+def test_margin_and_load_count_on_three_legs_and_for_supporting_feet_only() -> None:
+    totals = run_demo(FakeGo2()).totals
+    # Elsewhere the margin is 0.15 m; the raised foot itself carries 0 N.
+    assert totals.least_support_margin == 0.06
+    assert totals.least_foot_load == 40.0
+
+
+def test_without_three_legs_there_is_no_margin() -> None:
+    go2 = FakeGo2()
+    assert all(math.isnan(value) for value in three_leg_minima(go2.recording()))
+
+
+def test_qp_failures_before_the_demo_are_not_its_own() -> None:
+    go2 = FakeGo2()
+    go2.telemetry.qp_failures += 1
+    assert run_demo(go2).totals.qp_failures == 0
+
+
+def test_times_add_up() -> None:
+    report = run_demo(FakeGo2())
+    assert report.totals.robot_time == pytest.approx(sum(step.duration for step in report.steps))
+    starts = np.array([step.start for step in report.steps])
+    ends = starts + [step.duration for step in report.steps]
+    np.testing.assert_allclose(starts[1:], ends[:-1])
+
+
+def test_the_real_time_factor_is_robot_time_per_cpu_time() -> None:
+    totals = run_demo(FakeGo2()).totals
+    assert replace(totals, robot_time=24.0, cpu_time=8.0).real_time_factor == 3.0
+    assert math.isnan(replace(totals, cpu_time=0.0).real_time_factor)
+
+
+def test_the_report_is_strict_json_even_with_what_could_not_be_measured() -> None:
+    values = run_demo(FakeGo2(), steps=DEMO_STEPS[:2]).as_dict()
+    again = json.loads(json.dumps(values, allow_nan=False))
+    assert again["totals"]["least_support_margin"] is None
+    assert again["ok"] is True
+    assert [step["name"] for step in again["steps"]] == ["stand", "sit"]
+    assert again["steps"][1]["figures"][1]["unit"] == "deg"
+
+
+@pytest.mark.parametrize(
+    ("measured", "asked", "tolerance", "met"),
+    [
+        (1.0, None, None, True),
+        (5.0, 1.0, None, True),
+        (1.1, 1.0, 0.2, True),
+        (1.3, 1.0, 0.2, False),
+        (math.nan, 1.0, 0.2, False),
+    ],
+)
+def test_a_figure_is_met_within_its_tolerance(
+    measured: float, asked: float | None, tolerance: float | None, met: bool
+) -> None:
+    assert Figure("x", measured, "m", asked, tolerance).is_met is met
+
+
+def test_the_module_of_the_console_script_imports_no_library() -> None:
+    """A broken library must end in a message that names ``doctor``, not in a traceback."""
+    code = "import sys, controller.demo; print(*sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert HEAVY & set(done.stdout.split()) == set()
+
+
+def test_an_unknown_name_of_the_module_is_an_attribute_error() -> None:
+    import controller.demo
+
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = controller.demo.no_such_name

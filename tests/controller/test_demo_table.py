@@ -1,0 +1,103 @@
+"""The table and the progress line of the demo fit their terminal and leave nothing out."""
+
+from __future__ import annotations
+
+import io
+import math
+
+import pytest
+
+from controller.cli import demo_table
+from controller.cli.progress import ProgressLine, progress_bar
+from controller.demo import DemoReport, DemoTotals, Figure, StepResult, run_demo
+from tests.controller.fake_go2 import FakeGo2
+
+COLUMNS = 80
+LONG_REASON = "fell at t=3.2 s: " + "roll 71 deg, " * 12
+TOTALS = DemoTotals(0.44, 0.42, math.nan, math.nan, 0, 24.5, 8.2)
+
+
+# --- the table ----------------------------------------------------------------------------------
+
+
+def report_of(*steps: StepResult) -> DemoReport:
+    return DemoReport(steps, TOTALS)
+
+
+def test_the_table_fits_80_columns_whatever_happens() -> None:
+    figure = Figure("moved from the place", -123.456, "m/s", -12.0, 0.1)
+    bad = StepResult("stand", "forward 0.2 m/s, 2 s", False, LONG_REASON, 0.0, 123.45, (figure,))
+    for report in (report_of(bad), run_demo(FakeGo2())):
+        for encoding in ("utf-8", "ascii"):
+            lines = demo_table.render(report, encoding).splitlines()
+            assert max(map(len, lines)) <= COLUMNS
+
+
+def test_the_table_marks_every_step_and_gives_the_reason_of_a_failure() -> None:
+    report = run_demo(FakeGo2(refusals={"high_five": "the paw was not held at 0.62 m"}))
+    text = demo_table.render(report, "utf-8")
+    assert text.count("✓") == 7
+    assert text.count("✗") == 1
+    assert "\n     the paw was not held at 0.62 m\n" in text
+    assert "7 of 8 steps done." in text
+
+
+def test_asked_and_measured_stand_side_by_side_with_their_unit() -> None:
+    text = demo_table.render(run_demo(FakeGo2(speed_share=0.95)), "utf-8")
+    row = next(line for line in text.splitlines() if "mean speed" in line)
+    assert row.split()[-3:] == ["0.200", "0.190", "m/s"]
+
+
+def test_what_could_not_be_measured_is_a_dash() -> None:
+    text = demo_table.render(report_of(), "utf-8")
+    assert "nan" not in text
+    assert "least support margin   -" in text
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", None, "no-such-encoding"])
+def test_a_terminal_without_ticks_gets_words(encoding: str | None) -> None:
+    good = StepResult("sit", "sit", True, "done", 0.0, 1.0)
+    text = demo_table.render(
+        report_of(good, StepResult("s", "s", False, "why", 0.0, 1.0)), encoding
+    )
+    assert "  ok sit" in text
+    assert "FAIL s" in text
+    assert text.isascii()
+
+
+# --- the progress line --------------------------------------------------------------------------
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_on_a_terminal_progress_is_one_line_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    stream = Terminal()
+    with ProgressLine(stream) as line:
+        line.update(0.5, "x" * 100)
+        line.done("one piece")
+    text = stream.getvalue()
+    assert "\n" not in text
+    assert "one piece" not in text
+    shown = text.split("\x1b[2K")[1].rstrip("\r")
+    assert len(shown) < 40
+    assert text.endswith("\r\x1b[2K")
+
+
+def test_elsewhere_progress_is_one_line_for_each_finished_piece() -> None:
+    stream = io.StringIO()
+    with ProgressLine(stream) as line:
+        line.update(0.5, "going on")
+        line.done("1/2 stand: ok")
+        line.done("2/2 sit: ok")
+    assert stream.getvalue() == "1/2 stand: ok\n2/2 sit: ok\n"
+
+
+@pytest.mark.parametrize(
+    ("share", "filled"), [(-1.0, 0), (0.0, 0), (0.5, 10), (1.0, 20), (2.0, 20)]
+)
+def test_the_bar_is_filled_in_proportion(share: float, filled: int) -> None:
+    assert progress_bar(share).count("#") == filled

@@ -1,0 +1,231 @@
+"""The doctor finds each known illness, names the line that cures it, and likes a healthy body."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import Namespace
+from pathlib import Path
+
+import pytest
+
+from controller.cli import doctor, probes
+from controller.cli.common import ExitCode
+from controller.cli.doctor import Finding, Status
+from controller.cli.probes import ImportProbe
+from go2_wbc.errors import DescriptionError
+
+INSIDE = str(Path(sys.prefix) / "lib" / "placo.so")
+BOUNDS = ">=0.10.2,<0.11"
+HEALTHY = Finding("Python", "python", Status.OK, "3.11.7")
+ILL = Finding("Libraries", "placo", Status.PROBLEM, "not installed", 'pip install "placo"')
+
+
+# --- the real environment -----------------------------------------------------------------------
+
+
+def test_the_environment_of_these_tests_is_healthy() -> None:
+    findings = doctor.examine()
+    # Whether the project itself is installed does not matter for running its tests.
+    problems = [item for item in findings if item.status is Status.PROBLEM]
+    assert [item for item in problems if item.subject != probes.PROJECT] == []
+    subjects = {item.subject for item in findings}
+    assert {"pin", "placo", "mujoco", "placo + pin", "URDF", "SRDF", "daqp"} <= subjects
+
+
+def test_a_module_that_imports_is_found_where_it_lies() -> None:
+    probe = probes.probe_imports(["json"])["json"]
+    assert probe.error == ""
+    assert Path(probe.file).name == "__init__.py"
+
+
+def test_qpsolvers_names_its_solvers() -> None:
+    assert "daqp" in probes.probe_imports(["qpsolvers"])["qpsolvers"].solvers
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("import os\nos.abort()", "crashed (SIGABRT)"),
+        ("raise ImportError('libpinocchio.so.4: no such file')", "libpinocchio.so.4"),
+        ("import sys\nsys.exit(7)", "exit code 7"),
+    ],
+)
+def test_a_broken_import_is_a_finding_and_not_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, expected: str
+) -> None:
+    (tmp_path / "broken_library.py").write_text(text, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    assert expected in probes.probe_imports(["broken_library"])["broken_library"].error
+
+
+def test_an_import_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "hanging_library.py").write_text("while True: pass", encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setattr(probes, "IMPORT_TIME_LIMIT", 0.2)
+    assert "0.2 s" in probes.probe_imports(["hanging_library"])["hanging_library"].error
+
+
+# --- versions -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("version", "bounds", "fits"),
+    [
+        ("0.10.2", ">=0.10.2,<0.11", True),
+        ("0.9.3", ">=0.10.2,<0.11", False),
+        ("0.11.0", ">=0.10.2,<0.11", False),
+        ("3.8.0", "==3.8", True),
+        ("3.8.0", "==3.8.0", True),
+        ("4.1.0", "==3.8.0", False),
+        ("4.1.0", ">=4", True),
+        ("10.0", ">9", True),
+        ("2.0", "!=2.0", False),
+        ("1.2.3rc1", "<=1.2.3", True),
+        ("7", "", True),
+    ],
+)
+def test_version_bounds_are_compared_by_number(version: str, bounds: str, fits: bool) -> None:
+    assert probes.satisfies(version, bounds) is fits
+
+
+def test_requirements_are_read_without_extras() -> None:
+    rows = ["placo<0.11,>=0.10.2", "pin", "x[y]>=1 ; python_version>'3'", "ruff; extra == 'dev'"]
+    assert probes.parse_requirements(rows) == {"placo": "<0.11,>=0.10.2", "pin": "", "x": ">=1"}
+
+
+def test_the_requirements_of_an_absent_package_are_empty() -> None:
+    assert probes.requirements_of("no-such-distribution-anywhere") == {}
+
+
+# --- illnesses ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("version", "status"), [((3, 10, 9), "PROBLEM"), ((3, 14, 0), "PROBLEM")])
+def test_a_python_without_wheels_is_a_problem(version: tuple[int, ...], status: str) -> None:
+    finding = doctor.judge_python(version, "Linux")
+    assert finding.status.value == status
+    assert "make PYTHON=" in finding.remedy
+
+
+@pytest.mark.parametrize("version", [(3, 11, 0), (3, 12, 1), (3, 13, 9)])
+def test_a_supported_python_is_fine(version: tuple[int, ...]) -> None:
+    assert doctor.judge_python(version, "Linux").status is Status.OK
+
+
+@pytest.mark.parametrize(
+    ("version", "probe", "said", "remedy"),
+    [
+        (None, ImportProbe(error="No module named 'placo'"), "not installed", BOUNDS),
+        ("0.9.3", ImportProbe(file=INSIDE), f"does not fit {BOUNDS}", BOUNDS),
+        ("0.10.2", ImportProbe(error="libx.so"), "import fails: libx.so", "--force-reinstall"),
+        ("0.10.2", ImportProbe(file="/opt/ros/placo.so"), "/opt/ros", "unset PYTHONPATH"),
+        (None, ImportProbe(file="/opt/ros/placo.so"), "/opt/ros", BOUNDS),
+    ],
+)
+def test_an_ill_library_is_named_with_its_cure(
+    version: str | None, probe: ImportProbe, said: str, remedy: str
+) -> None:
+    finding = doctor.judge_library("placo", version, BOUNDS, probe)
+    assert finding.status is Status.PROBLEM
+    assert said in finding.detail
+    assert remedy in finding.remedy
+
+
+def test_a_library_that_fits_and_imports_is_fine() -> None:
+    finding = doctor.judge_library("placo", "0.10.2", BOUNDS, ImportProbe(file=INSIDE))
+    assert finding == Finding("Libraries", "placo", Status.OK, "0.10.2")
+
+
+@pytest.mark.parametrize(
+    ("placo", "pin", "wanted", "status"),
+    [
+        ("0.10.2", "3.8.0", "==3.8.0", Status.OK),
+        ("0.10.2", "4.1.0", "==3.8.0", Status.PROBLEM),
+        ("0.9.3", "4.1.0", "", Status.PROBLEM),
+        ("0.9.3", "3.7.0", "", Status.OK),
+    ],
+)
+def test_placo_and_pinocchio_must_be_built_for_each_other(
+    placo: str, pin: str, wanted: str, status: Status
+) -> None:
+    """``pip install pin placo`` can pair pin 4.1.0 with placo 0.9.3, which cannot be imported."""
+    (finding,) = doctor.judge_pairing(placo, pin, wanted, "")
+    assert finding.status is status
+    assert ("placo>=0.10.2,<0.11" in finding.remedy) is (status is Status.PROBLEM)
+
+
+def test_missing_robot_files_are_named_with_their_cure(monkeypatch: pytest.MonkeyPatch) -> None:
+    def find_nothing() -> None:
+        raise DescriptionError("no Go2 description in this environment")
+
+    monkeypatch.setattr("go2_wbc.robot.description.find_description", find_nothing)
+    (finding,) = doctor.judge_robot_files(">=6,<7")
+    assert finding.status is Status.PROBLEM
+    assert '"example-robot-data>=6,<7"' in finding.remedy
+
+
+def test_a_solver_that_qpsolvers_does_not_see_is_a_problem() -> None:
+    findings = doctor.judge_solvers(("daqp", "quadprog", "scs"), {"proxsuite": ">=0.8"})
+    by_name = {finding.subject: finding for finding in findings}
+    assert by_name["daqp"].status is Status.OK
+    assert by_name["proxqp"].status is Status.PROBLEM
+    assert '"proxsuite>=0.8"' in by_name["proxqp"].remedy
+    assert by_name["others"].detail == "scs"
+
+
+@pytest.mark.parametrize(
+    ("system", "environment", "status"),
+    [
+        ("linux", {}, Status.NOTE),
+        ("linux", {"DISPLAY": ""}, Status.NOTE),
+        ("linux", {"DISPLAY": ":0"}, Status.OK),
+        ("linux", {"WAYLAND_DISPLAY": "wayland-0"}, Status.OK),
+        ("darwin", {}, Status.OK),
+    ],
+)
+def test_a_missing_display_is_a_note_and_never_a_problem(
+    system: str, environment: dict[str, str], status: Status
+) -> None:
+    assert doctor.judge_display(system, environment).status is status
+
+
+# --- the report ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("findings", "code", "verdict"),
+    [
+        ([HEALTHY], ExitCode.OK, "Everything that is needed is here."),
+        ([HEALTHY, ILL], ExitCode.FAILED, "1 problem; the lines after -> fix them."),
+        ([ILL, ILL], ExitCode.FAILED, "2 problems; the lines after -> fix them."),
+    ],
+)
+def test_the_verdict_and_the_exit_code_follow_the_problems(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    findings: list[Finding],
+    code: ExitCode,
+    verdict: str,
+) -> None:
+    monkeypatch.setattr(doctor, "examine", lambda: findings)
+    assert doctor.run(Namespace(json=False)) == code
+    assert capsys.readouterr().out.splitlines()[-1] == verdict
+
+
+def test_json_says_the_same(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(doctor, "examine", lambda: [HEALTHY, ILL])
+    assert doctor.run(Namespace(json=True)) == ExitCode.FAILED
+    report = json.loads(capsys.readouterr().out)
+    assert report["ok"] is False
+    assert [item["status"] for item in report["findings"]] == ["ok", "problem"]
+    assert report["findings"][1]["remedy"] == ILL.remedy
+
+
+def test_long_details_wrap_at_80_columns_and_lines_to_type_never() -> None:
+    line = "python -m pip install " + "x" * 90
+    text = doctor.render([Finding("A", "b", Status.PROBLEM, "word " * 40, line)])
+    assert f"-> {line}" in text
+    assert max(len(row) for row in text.splitlines() if "->" not in row) <= 80

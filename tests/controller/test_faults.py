@@ -1,0 +1,419 @@
+"""Every fault ends in a clear error of our own or in a limp robot, and the next call works."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import qpsolvers
+
+from controller import GO2Controller, Mode
+from go2_wbc.config import Config
+from go2_wbc.errors import (
+    ClosedError,
+    ConfigError,
+    DescriptionError,
+    ModeError,
+    ModelMismatch,
+    PlantError,
+    PlantTimeout,
+    SolverUnavailable,
+)
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.description import find_description
+from go2_wbc.robot.state import RobotState
+from go2_wbc.wbc.config import WbcConfig
+from tests.controller.plants import (
+    HANG_GUARD,
+    MID_RISE,
+    PERIOD,
+    WatchedPlant,
+    break_qp,
+    in_thread,
+    is_limp,
+)
+from tests.plant.contract import PlantContract
+
+# A share of the motors' torque with which the legs cannot carry the trunk.
+FEEBLE = 0.05
+# kg; twice the robot's own mass.
+HEAVY = 30.0
+# N for 0.2 s at the trunk: 60 N s, three times what a standing robot withstands.
+SHOVE = np.array([0.0, 300.0, 0.0])
+
+
+@pytest.fixture
+def plant() -> WatchedPlant:
+    return WatchedPlant()
+
+
+def raising(error: BaseException) -> Callable[[], None]:
+    def act() -> None:
+        raise error
+
+    return act
+
+
+class TestWatchedPlantContract(PlantContract):
+    """The plant of these tests is a plant like any other."""
+
+    @pytest.fixture
+    def plant(self) -> WatchedPlant:
+        return WatchedPlant()
+
+
+# --- the QP -----------------------------------------------------------------------------------
+
+
+def test_one_infeasible_qp_in_the_middle_of_standing_up_does_no_harm(
+    plant: WatchedPlant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    break_qp(monkeypatch, lambda n: n == 100)
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        assert go2.telemetry.qp_failures == 1
+        assert sum(map(is_limp, plant.commands)) == 0
+
+
+def test_a_few_infeasible_qps_damp_the_robot_and_it_stands_all_the_same(
+    plant: WatchedPlant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    break_qp(monkeypatch, lambda n: 100 <= n < 106)
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        assert go2.mode is Mode.STANDING
+        assert go2.telemetry.qp_failures == 6
+        assert sum(map(is_limp, plant.commands)) == 5
+
+
+def test_a_qp_that_stays_infeasible_ends_in_a_limp_robot_that_says_why(
+    plant: WatchedPlant, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    with GO2Controller(plant=plant) as go2:
+        with monkeypatch.context() as patch:
+            break_qp(patch, lambda n: n >= 100)
+            assert not go2.stand()
+        assert go2.mode is Mode.DAMPED
+        assert "damped after 10 QP failures in a row" in go2.last_outcome.reason
+        assert "daqp found no solution" in go2.last_outcome.reason
+        assert go2.telemetry.qp_failures == 10
+        assert is_limp(plant.commands[-1])
+        assert "contact forces" in caplog.text
+        with pytest.raises(ModeError, match="not damped"):
+            go2.move(0.1)
+        assert go2.stand()
+
+
+# --- plants -----------------------------------------------------------------------------------
+
+
+def test_a_plant_that_stops_answering_ends_the_call_with_its_error(plant: WatchedPlant) -> None:
+    plant.from_time(MID_RISE, raising(PlantTimeout("the robot does not answer")))
+    go2 = GO2Controller(plant=plant)
+    with pytest.raises(PlantTimeout, match="the robot does not answer"):
+        go2.stand()
+    assert go2.mode is Mode.DAMPED
+    assert not go2.last_outcome
+    assert "the robot does not answer" in go2.last_outcome.reason
+    go2.close()
+
+
+def test_a_plant_that_answers_again_is_used_again(plant: WatchedPlant) -> None:
+    plant.once_at(MID_RISE, raising(PlantTimeout("a loose plug")))
+    with GO2Controller(plant=plant) as go2:
+        with pytest.raises(PlantTimeout):
+            go2.stand()
+        assert is_limp(plant.commands[-1])
+        assert go2.stand()
+
+
+def test_a_clock_that_stands_still_ends_the_call(plant: WatchedPlant) -> None:
+    frozen: list[RobotState] = []
+
+    def freeze(state: RobotState) -> RobotState:
+        if state.time < MID_RISE:
+            return state
+        frozen.append(state)
+        return frozen[0]
+
+    plant.on_read = freeze
+    with GO2Controller(plant=plant) as go2:
+        with pytest.raises(PlantTimeout, match="no new state from the plant for 3[26] ms"):
+            go2.stand()
+        assert go2.mode is Mode.DAMPED
+        assert is_limp(plant.commands[-1])
+
+
+@pytest.mark.parametrize("name", ["q", "v"])
+def test_states_that_are_not_finite_end_the_call(plant: WatchedPlant, name: str) -> None:
+    def corrupt(state: RobotState) -> RobotState:
+        values = getattr(state, name).copy()
+        values[9] = np.nan
+        return state if state.time < MID_RISE else replace(state, **{name: values})
+
+    plant.on_read = corrupt
+    with GO2Controller(plant=plant) as go2:
+        with pytest.raises(PlantTimeout, match="no finite state from the plant"):
+            go2.stand()
+        assert go2.mode is Mode.DAMPED
+        assert is_limp(plant.commands[-1])
+        assert np.isfinite(go2.state.q).all()
+        assert "no finite state" in go2.last_outcome.reason
+
+
+def test_one_state_that_is_not_finite_is_passed_over(plant: WatchedPlant) -> None:
+    def corrupt(state: RobotState) -> RobotState:
+        is_bad = abs(state.time - MID_RISE) < PERIOD / 2
+        return replace(state, v=np.full(18, np.inf)) if is_bad else state
+
+    plant.on_read = corrupt
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+
+
+def test_physics_that_diverges_ends_the_call_with_the_reason(plant: WatchedPlant) -> None:
+    def explode() -> None:
+        plant.inner.data.qvel[:] = 1e12
+
+    plant.once_at(MID_RISE, explode)
+    with GO2Controller(plant=plant) as go2:
+        with pytest.raises(PlantError, match=r"physics failed at t=1\.5"):
+            go2.stand()
+        assert go2.mode is Mode.DAMPED
+
+
+def test_a_bug_in_a_plant_comes_out_as_it_is_and_leaves_the_robot_limp(
+    plant: WatchedPlant,
+) -> None:
+    plant.once_at(MID_RISE, raising(ZeroDivisionError("a bug")))
+    with GO2Controller(plant=plant) as go2:
+        with pytest.raises(ZeroDivisionError):
+            go2.stand()
+        assert go2.mode is Mode.DAMPED
+        assert "ZeroDivisionError during stand(): a bug" in go2.last_outcome.reason
+        assert go2.stand()
+
+
+def test_in_realtime_a_plant_that_fails_ends_the_waiting_call(plant: WatchedPlant) -> None:
+    plant.from_time(0.1, raising(PlantTimeout("the robot does not answer")))
+    with GO2Controller(plant=plant, realtime=True) as go2:
+        with pytest.raises(PlantTimeout):
+            in_thread(go2.stand).result(HANG_GUARD)
+        assert go2.mode is Mode.DAMPED
+        assert "the robot does not answer" in go2.last_outcome.reason
+        with pytest.raises(PlantTimeout):
+            in_thread(lambda: go2.wait(1.0)).result(HANG_GUARD)
+
+
+# --- Ctrl-C -----------------------------------------------------------------------------------
+
+
+def test_ctrl_c_in_the_middle_of_standing_up_damps_and_goes_on_to_the_caller(
+    plant: WatchedPlant,
+) -> None:
+    plant.once_at(MID_RISE, raising(KeyboardInterrupt()))
+    with GO2Controller(plant=plant) as go2:
+        with pytest.raises(KeyboardInterrupt):
+            go2.stand()
+        assert go2.mode is Mode.DAMPED
+        assert go2.last_outcome.reason == "interrupted during stand(), damped"
+        assert not go2.last_outcome
+        assert is_limp(plant.commands[-1])
+        go2.wait(1.0)
+        assert all(is_limp(command) for command in plant.commands[-200:])
+        assert go2.stand()
+        assert go2.last_outcome
+
+
+def test_a_real_interrupt_signal_ends_a_long_wait(plant: WatchedPlant) -> None:
+    plant.once_at(0.1, lambda: signal.raise_signal(signal.SIGINT))
+    with GO2Controller(plant=plant) as go2:
+        with pytest.raises(KeyboardInterrupt):
+            go2.wait(1e6)
+        assert go2.mode is Mode.DAMPED
+
+
+def test_leaving_the_with_block_by_ctrl_c_closes_and_damps(plant: WatchedPlant) -> None:
+    plant.once_at(MID_RISE, raising(KeyboardInterrupt()))
+    with pytest.raises(KeyboardInterrupt), GO2Controller(plant=plant) as go2:
+        go2.stand()
+    assert go2.mode is Mode.CLOSED
+    assert is_limp(plant.commands[-1])
+
+
+# --- other threads ----------------------------------------------------------------------------
+
+
+def test_a_call_while_another_runs_is_refused(plant: WatchedPlant) -> None:
+    refused: list[str] = []
+    go2 = GO2Controller(plant=plant)
+
+    def intrude() -> None:
+        with pytest.raises(ModeError) as caught:
+            go2.sit()
+        refused.append(str(caught.value))
+
+    plant.once_at(MID_RISE, lambda: in_thread(intrude).result(HANG_GUARD))
+    assert go2.stand()
+    assert refused == ["sit() while stand() is still running"]
+    go2.close()
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+def test_damp_from_another_thread_ends_the_call_honestly(
+    plant: WatchedPlant, *, realtime: bool
+) -> None:
+    under_way = threading.Event()
+    plant.once_at(0.1, under_way.set)
+    with GO2Controller(plant=plant, realtime=realtime) as go2:
+        call = in_thread(go2.stand)
+        assert under_way.wait(HANG_GUARD)
+        go2.damp()
+        assert call.result(HANG_GUARD) is False
+        assert go2.mode is Mode.DAMPED
+        assert go2.last_outcome.reason == "damped by damp()"
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+def test_close_from_another_thread_ends_the_call(plant: WatchedPlant, *, realtime: bool) -> None:
+    under_way = threading.Event()
+    plant.once_at(0.1, under_way.set)
+    go2 = GO2Controller(plant=plant, realtime=realtime)
+    call = in_thread(lambda: go2.wait(1e6))
+    assert under_way.wait(HANG_GUARD)
+    go2.close()
+    ticks = len(plant.commands)
+    assert is_limp(plant.commands[-1])
+    with pytest.raises(ClosedError):
+        call.result(HANG_GUARD)
+    assert "closed during a call" in go2.last_outcome.reason
+    assert len(plant.commands) == ticks
+
+
+# --- robots that cannot -----------------------------------------------------------------------
+
+
+def test_a_robot_pushed_over_in_the_middle_of_a_call_says_that_it_fell(
+    plant: WatchedPlant,
+) -> None:
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        plant.inner.push(SHOVE, 0.2)
+        assert go2.sit() is False
+        assert go2.mode is Mode.FALLEN
+        assert go2.last_outcome.reason.startswith("fell at t=")
+        assert " deg" in go2.last_outcome.reason
+        assert is_limp(plant.commands[-1])
+        for call in (go2.stand, go2.sit, go2.walk, go2.lie_down, go2.high_five):
+            with pytest.raises(ModeError, match=r"call recover\(\) first"):
+                call()
+        with pytest.raises(ModeError, match="fallen"):
+            go2.move(0.1)
+        go2.wait(0.1)
+        assert go2.mode is Mode.FALLEN
+
+
+def test_a_fall_while_waiting_is_reported(plant: WatchedPlant) -> None:
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        plant.inner.push(SHOVE, 0.2)
+        go2.wait(1.0)
+        assert not go2.last_outcome
+        assert "fell at t=" in go2.last_outcome.reason
+        assert go2.mode is Mode.FALLEN
+
+
+def test_motors_that_are_too_weak_give_a_limp_robot_and_the_reason() -> None:
+    config = Config(wbc=replace(WbcConfig(), torque_share=FEEBLE))
+    with GO2Controller(plant=MujocoPlant(control_period=PERIOD), config=config) as go2:
+        assert go2.stand() is False
+        assert go2.mode is Mode.DAMPED
+        assert "QP failures in a row" in go2.last_outcome.reason
+        assert go2.stand() is False
+
+
+def test_a_payload_that_is_too_heavy_makes_stand_say_no_and_how_far_it_got() -> None:
+    plant = MujocoPlant(control_period=PERIOD, payload=HEAVY)
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand() is False
+        assert go2.last_outcome.reason.startswith("stand not done within 3.0 s: base height [m] 0.")
+        assert go2.mode is not Mode.STANDING
+        with pytest.raises(ModeError):
+            go2.move(0.1)
+        assert go2.lie_down()
+        assert go2.mode is Mode.LYING
+
+
+# --- files and libraries ----------------------------------------------------------------------
+
+
+def test_without_the_robots_files_the_error_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = [entry for entry in sys.path if "site-packages" not in entry]
+    monkeypatch.setattr(sys, "path", here)
+    with pytest.raises(DescriptionError, match="pip install example-robot-data"):
+        GO2Controller()
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda text: text[: len(text) // 2], "not a valid URDF"),
+        (lambda text: text.replace("FL_hip_joint", "front_left"), "lacks: joint FL_hip_joint"),
+        (lambda text: text.replace("<robot", "<cow").replace("</robot", "</cow"), "root is <cow>"),
+    ],
+)
+def test_a_broken_urdf_is_refused_with_the_reason(
+    tmp_path: Path, edit: Callable[[str], str], message: str
+) -> None:
+    path = tmp_path / "mine.urdf"
+    text = find_description().urdf_path.read_text(encoding="utf-8")
+    path.write_text(edit(text), encoding="utf-8")
+    with pytest.raises(DescriptionError, match=message):
+        GO2Controller(plant=MujocoPlant(urdf=path))
+
+
+def test_a_missing_urdf_or_mjcf_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DescriptionError, match=r"nowhere\.urdf: No such file"):
+        GO2Controller(plant=MujocoPlant(urdf=tmp_path / "nowhere.urdf"))
+    with pytest.raises(ModelMismatch, match=r"nowhere\.xml: no such file"):
+        GO2Controller(plant=MujocoPlant(tmp_path / "nowhere.xml"))
+
+
+def test_an_unknown_solver_is_refused_with_the_valid_ones() -> None:
+    config = Config(wbc=replace(WbcConfig(), solver="gurobi9000"))
+    with pytest.raises(SolverUnavailable, match="unknown QP solver 'gurobi9000'; valid: daqp, "):
+        GO2Controller(config=config)
+
+
+def test_a_solver_that_is_not_installed_is_refused_with_the_line_that_installs_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(qpsolvers, "available_solvers", ["daqp"])
+    config = Config(wbc=replace(WbcConfig(), solver="proxqp"))
+    with pytest.raises(SolverUnavailable, match="pip install proxsuite; installed: daqp"):
+        GO2Controller(config=config)
+
+
+def test_an_unknown_back_end_is_refused_with_the_valid_ones() -> None:
+    with pytest.raises(ConfigError, match="valid: condensed, full, placo"):
+        GO2Controller(config=Config(backend="magic"))
+
+
+def test_a_refused_configuration_leaves_the_plant_untouched(plant: WatchedPlant) -> None:
+    with pytest.raises(ConfigError):
+        GO2Controller(plant=plant, config=Config(backend="magic"))
+    assert not plant.commands
+
+
+def test_a_plant_that_cannot_be_read_is_refused_at_once(plant: WatchedPlant) -> None:
+    plant.close()
+    with pytest.raises(ClosedError, match="plant is closed"):
+        GO2Controller(plant=plant)

@@ -1,0 +1,465 @@
+"""A robot's day, and the promises of every call: honest, repeatable, and over when it is over."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller import GO2Controller, Mode, Outcome
+from go2_wbc.errors import ClosedError, ModeError, MotionInfeasible, StanceMismatch
+from go2_wbc.legs import Leg
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco_model import JointDynamics, build_spec
+from go2_wbc.robot.description import find_description
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.state import RobotState
+from motions import high_five_plan, load_motion
+from tests.controller.plants import (
+    HANG_GUARD,
+    PERIOD,
+    StillPlant,
+    WatchedPlant,
+    in_thread,
+    is_limp,
+)
+from tests.motions.doctored import with_joint_beyond_its_limit
+from tests.plant.contract import same
+
+# What the errands promise.
+DISTANCE_TOLERANCE = 0.02
+ANGLE_TOLERANCE = np.radians(1.5)
+# m; a walked way sags and sways by less than this.
+SIDE_TOLERANCE = 0.05
+
+
+@dataclass(frozen=True)
+class Step:
+    """One call of the day: what it returned, and the truth before and after it."""
+
+    returned: bool | None
+    mode: Mode
+    outcome: Outcome
+    before: RobotState
+    after: RobotState
+
+
+Day = dict[str, Step]
+
+
+def steps(go2: GO2Controller) -> Iterator[tuple[str, Callable[[], bool | None]]]:
+    yield "stand", go2.stand
+    yield "sit", go2.sit
+    yield "stand from sitting", go2.stand
+    yield "turn left", lambda: go2.turn_left(0.6)
+    yield "turn right", lambda: go2.turn_right(0.4)
+    yield "forward", lambda: go2.move_forward(0.3)
+    yield "backward", lambda: go2.move_forward(-0.2)
+    yield "walk", go2.walk
+    yield "move", lambda: go2.move(0.3, 0.2, linear_y=0.1)
+    yield "wait", lambda: go2.wait(1.5)
+    yield "stop", go2.stop
+    yield "sit from walking", go2.sit
+    yield "high five", lambda: go2.stand() and go2.high_five("left", hold=0.5)
+    yield "lie down", go2.lie_down
+    yield "stand from lying", go2.stand
+
+
+@pytest.fixture(scope="module")
+def day() -> Day:
+    """One robot does everything, once."""
+    done: Day = {}
+    with GO2Controller(plant=MujocoPlant(control_period=PERIOD)) as go2:
+        for name, call in steps(go2):
+            before = go2.state
+            returned = call()
+            done[name] = Step(returned, go2.mode, go2.last_outcome, before, go2.state)
+    return done
+
+
+@pytest.fixture
+def go2() -> Iterator[GO2Controller]:
+    with GO2Controller(plant=MujocoPlant(control_period=PERIOD)) as go2:
+        yield go2
+
+
+@pytest.fixture(scope="module")
+def standing() -> Iterator[GO2Controller]:
+    """A standing robot; its tests leave it standing."""
+    with GO2Controller(plant=MujocoPlant(control_period=PERIOD)) as go2:
+        assert go2.stand()
+        yield go2
+
+
+# --- the day ----------------------------------------------------------------------------------
+
+MODES = {
+    "stand": Mode.STANDING,
+    "sit": Mode.SITTING,
+    "stand from sitting": Mode.STANDING,
+    "turn left": Mode.WALKING,
+    "turn right": Mode.WALKING,
+    "forward": Mode.WALKING,
+    "backward": Mode.WALKING,
+    "walk": Mode.WALKING,
+    "sit from walking": Mode.SITTING,
+    "high five": Mode.STANDING,
+    "lie down": Mode.LYING,
+    "stand from lying": Mode.STANDING,
+}
+
+
+@pytest.mark.parametrize("name", MODES)
+def test_a_blocking_call_returns_true_in_its_mode_with_what_was_measured(
+    day: Day, name: str
+) -> None:
+    step = day[name]
+    assert step.returned is True, step.outcome.reason
+    assert step.mode is MODES[name]
+    assert step.outcome.ok
+    assert step.outcome.reason == "done"
+    assert step.outcome.measured
+    assert 0.0 < step.outcome.duration <= step.after.time - step.before.time + 1e-9
+
+
+@pytest.mark.parametrize("name", ["move", "wait", "stop"])
+def test_a_call_that_only_commands_returns_nothing(day: Day, name: str) -> None:
+    assert day[name].returned is None
+    assert day[name].mode is Mode.WALKING
+
+
+def test_waiting_lets_exactly_that_time_pass(day: Day) -> None:
+    step = day["wait"]
+    assert step.after.time - step.before.time == pytest.approx(1.5, abs=PERIOD)
+
+
+def test_moving_takes_no_time_by_itself(day: Day) -> None:
+    assert same(day["move"].before, day["move"].after)
+
+
+def test_a_standing_robot_is_level_on_four_feet(day: Day) -> None:
+    for name in ("stand", "stand from sitting", "stand from lying"):
+        state = day[name].after
+        assert state.tilt < 0.1
+        assert state.feet_in_contact.all()
+        assert state.q[2] == pytest.approx(0.31, abs=0.02)
+
+
+def test_a_sitting_robot_has_its_rump_down_and_its_front_legs_up(day: Day) -> None:
+    # From walking, the rear legs once crossed a singularity, rattled, and never came to rest.
+    for name in ("sit", "sit from walking"):
+        state = day[name].after
+        assert state.rpy[1] < np.radians(-30)
+        assert state.feet_in_contact.all()
+        assert np.abs(state.v).max() < 0.2
+
+
+def test_a_lying_robot_has_its_trunk_on_the_ground(day: Day) -> None:
+    assert day["lie down"].after.q[2] < 0.1
+
+
+@pytest.mark.parametrize(("name", "angle"), [("turn left", 0.6), ("turn right", -0.4)])
+def test_a_turn_ends_on_the_heading_asked_for(day: Day, name: str, angle: float) -> None:
+    step = day[name]
+    turned = step.after.rpy[2] - step.before.rpy[2]
+    assert turned == pytest.approx(angle, abs=ANGLE_TOLERANCE)
+    assert np.linalg.norm((step.after.q - step.before.q)[:2]) < SIDE_TOLERANCE
+
+
+@pytest.mark.parametrize(("name", "distance"), [("forward", 0.3), ("backward", -0.2)])
+def test_a_walk_ends_at_the_distance_asked_for(day: Day, name: str, distance: float) -> None:
+    step = day[name]
+    way = (step.after.q - step.before.q)[:2]
+    yaw = step.before.rpy[2]
+    ahead = float(way @ [np.cos(yaw), np.sin(yaw)])
+    assert ahead == pytest.approx(distance, abs=DISTANCE_TOLERANCE)
+    assert step.outcome.measured["walked [m]"] == pytest.approx(ahead, abs=DISTANCE_TOLERANCE)
+
+
+def test_a_velocity_command_moves_the_robot_that_way(day: Day) -> None:
+    step = day["wait"]
+    way = (step.after.q - step.before.q)[:2]
+    yaw = (step.before.rpy[2] + step.after.rpy[2]) / 2
+    ahead, left = way @ [np.cos(yaw), np.sin(yaw)], way @ [-np.sin(yaw), np.cos(yaw)]
+    assert ahead == pytest.approx(0.3 * 1.5, rel=0.25)
+    assert left == pytest.approx(0.1 * 1.5, rel=0.35)
+    assert step.after.rpy[2] - step.before.rpy[2] == pytest.approx(0.2 * 1.5, rel=0.25)
+
+
+def test_a_stopped_robot_is_at_rest(day: Day) -> None:
+    assert np.abs(day["stop"].after.v[:3]).max() < 0.1
+
+
+def test_a_high_five_reports_how_high_the_paw_was_held(day: Day) -> None:
+    assert day["high five"].outcome.measured["least paw height [m]"] > 0.5
+
+
+# --- the beginning ----------------------------------------------------------------------------
+
+
+def test_a_new_controller_has_a_robot_that_lies_limp_at_time_zero() -> None:
+    with GO2Controller(namespace="rex_2") as go2:
+        assert go2.namespace == "rex_2"
+        assert go2.mode is Mode.LYING
+        assert go2.state.time == 0.0
+        assert go2.state.q[2] < 0.1
+        assert go2.command.is_zero
+        assert go2.last_outcome.ok
+
+
+def test_without_realtime_no_time_passes_between_calls(go2: GO2Controller) -> None:
+    go2.wait(0.1)
+    before = go2.state
+    assert go2.mode is Mode.LYING
+    assert go2.command.is_zero
+    assert go2.recording().duration > 0.0
+    assert same(go2.state, before)
+
+
+def test_waiting_for_no_time_lets_none_pass(go2: GO2Controller) -> None:
+    go2.wait(0.0)
+    assert go2.state.time == 0.0
+    assert go2.last_outcome.ok
+
+
+def test_a_robot_that_already_lies_lies_down_again(go2: GO2Controller) -> None:
+    assert go2.lie_down()
+    assert go2.mode is Mode.LYING
+
+
+def test_the_same_script_twice_gives_the_same_states_bit_by_bit() -> None:
+    def script() -> list[RobotState]:
+        plant = MujocoPlant(control_period=PERIOD, sensors="noisy", seed=3)
+        with GO2Controller(plant=plant) as go2:
+            assert go2.stand()
+            first = go2.state
+            assert go2.walk()
+            go2.move(0.4, 0.5)
+            go2.wait(0.6)
+            return [first, go2.state]
+
+    assert all(same(a, b) for a, b in zip(script(), script(), strict=True))
+
+
+# --- modes and commands -----------------------------------------------------------------------
+
+
+def test_moving_needs_walking_mode(standing: GO2Controller) -> None:
+    with pytest.raises(ModeError, match=r"not standing: call walk\(\) first"):
+        standing.move(0.1)
+    standing.stop()
+    assert standing.mode is Mode.STANDING
+
+
+def test_damping_makes_the_robot_limp_and_it_can_stand_up_again(go2: GO2Controller) -> None:
+    assert go2.stand()
+    go2.damp()
+    assert go2.mode is Mode.DAMPED
+    with pytest.raises(ModeError, match="not damped"):
+        go2.move(0.1)
+    go2.wait(1.0)
+    assert go2.state.q[2] < 0.15
+    assert go2.lie_down()
+    assert go2.mode is Mode.LYING
+    assert go2.stand()
+
+
+def test_a_lying_robot_whose_walk_was_damped_does_not_take_commands(go2: GO2Controller) -> None:
+    # The mode from before the damping once came back when the next behaviour began.
+    assert go2.walk()
+    go2.damp()
+    plant = go2.plant
+    assert isinstance(plant, MujocoPlant)
+    q = go2.state.q.copy()
+    q[2], q[3:7] = 0.15, [1.0, 0.0, 0.0, 0.0]
+    plant.place(q)
+    assert not go2.lie_down()
+    assert go2.mode in (Mode.DAMPED, Mode.FALLEN)
+    with pytest.raises(ModeError):
+        go2.move(0.1)
+
+
+def test_a_command_beyond_the_envelope_is_clipped_and_logged(
+    go2: GO2Controller, caplog: pytest.LogCaptureFixture
+) -> None:
+    assert go2.walk()
+    with caplog.at_level(logging.WARNING):
+        go2.move(0.2, 0.1)
+        assert not caplog.records
+        go2.move(9.0)
+    assert "clipped from VelocityCommand(linear_x=9.0" in caplog.text
+    assert 0.5 < go2.command.linear_x < 3.0
+    go2.move(-9.0, 9.0, linear_y=9.0)
+    assert -3.0 < go2.command.linear_x < 0.0
+    go2.stop()
+    assert go2.command.is_zero
+    assert go2.last_outcome.ok
+
+
+# --- motions ----------------------------------------------------------------------------------
+
+
+def test_a_motion_from_another_stance_is_refused_and_nothing_happens() -> None:
+    with GO2Controller() as go2:
+        with pytest.raises(StanceMismatch, match="starts from stand, the robot is lying"):
+            go2.play("high_five")
+        assert go2.state.time == 0.0
+        assert go2.mode is Mode.LYING
+        assert not go2.last_outcome
+
+
+def test_an_infeasible_plan_is_refused_with_its_findings(standing: GO2Controller) -> None:
+    before = standing.state
+    plan = with_joint_beyond_its_limit(high_five_plan(RobotModel(), Leg.FR))
+    with pytest.raises(MotionInfeasible) as caught:
+        standing.play(plan)
+    assert len(caught.value.findings) >= 1
+    assert "FR_calf_joint" in str(caught.value)
+    assert same(standing.state, before)
+    assert standing.mode is Mode.STANDING
+
+
+@pytest.mark.slow
+def test_a_motion_plays_by_its_name_and_as_a_plan(standing: GO2Controller) -> None:
+    assert standing.play("high_five")
+    assert standing.play(load_motion("high_five_left", RobotModel()))
+    assert standing.mode is Mode.STANDING
+
+
+# --- the end ----------------------------------------------------------------------------------
+
+CALLS: dict[str, Callable[[GO2Controller], object]] = {
+    "stand": lambda go2: go2.stand(),
+    "sit": lambda go2: go2.sit(),
+    "lie_down": lambda go2: go2.lie_down(),
+    "recover": lambda go2: go2.recover(),
+    "damp": lambda go2: go2.damp(),
+    "walk": lambda go2: go2.walk(),
+    "move": lambda go2: go2.move(0.1),
+    "stop": lambda go2: go2.stop(),
+    "turn_left": lambda go2: go2.turn_left(pi),
+    "turn_right": lambda go2: go2.turn_right(pi),
+    "move_forward": lambda go2: go2.move_forward(1.0),
+    "high_five": lambda go2: go2.high_five(),
+    "play": lambda go2: go2.play("high_five"),
+    "wait": lambda go2: go2.wait(1.0),
+}
+
+
+@pytest.fixture(scope="module")
+def closed() -> GO2Controller:
+    go2 = GO2Controller()
+    go2.close()
+    return go2
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_every_call_after_close_is_refused(closed: GO2Controller, name: str) -> None:
+    with pytest.raises(ClosedError, match="closed"):
+        CALLS[name](closed)
+
+
+def test_a_closed_controller_can_still_be_looked_at(closed: GO2Controller) -> None:
+    assert closed.mode is Mode.CLOSED
+    assert closed.state.time == 0.0
+    assert closed.command.is_zero
+    assert closed.namespace == "robot1"
+    assert closed.recording().duration == 0.0
+
+
+def test_closing_and_destroying_the_node_any_number_of_times_is_fine() -> None:
+    go2 = GO2Controller()
+    for _ in range(2):
+        go2.destroy_node()
+        go2.close()
+    assert go2.mode is Mode.CLOSED
+
+
+def test_leaving_the_with_block_closes_the_robot_that_it_made() -> None:
+    with GO2Controller() as go2:
+        pass
+    assert go2.mode is Mode.CLOSED
+    with pytest.raises(ClosedError):
+        go2.plant.read()
+
+
+def test_a_plant_that_was_given_is_left_open_and_limp() -> None:
+    plant = WatchedPlant()
+    with GO2Controller(plant=plant) as go2:
+        go2.wait(2 * PERIOD)
+    assert is_limp(plant.commands[-1])
+    assert plant.read().time > 0.0
+
+
+def test_an_error_in_the_with_block_closes_and_comes_out() -> None:
+    with pytest.raises(ZeroDivisionError), GO2Controller() as go2:
+        _ = 1 / 0
+    assert go2.mode is Mode.CLOSED
+
+
+# --- realtime, other plants -------------------------------------------------------------------
+
+
+def test_in_realtime_the_robot_stands_and_walks_while_the_script_waits() -> None:
+    plant = WatchedPlant(MujocoPlant(control_period=2 * PERIOD))
+    with GO2Controller(plant=plant, realtime=True) as go2:
+
+        def script() -> bool:
+            ok = go2.stand() and go2.walk()
+            go2.move(0.2)
+            go2.wait(0.2)
+            go2.stop()
+            return ok
+
+        assert in_thread(script).result(HANG_GUARD), go2.last_outcome.reason
+        assert go2.mode is Mode.WALKING
+    assert is_limp(plant.commands[-1])
+
+
+def test_in_realtime_stop_does_not_wait() -> None:
+    with GO2Controller(plant=StillPlant(), realtime=True) as go2:
+        go2.stop()
+        assert go2.last_outcome.reason == "lying, nothing asked yet"
+
+
+def test_a_users_mjcf_stands_under_the_same_controller(tmp_path: Path) -> None:
+    spec = build_spec(find_description(), JointDynamics(), friction=0.8)
+    spec.compile()
+    path = tmp_path / "mine.xml"
+    path.write_text(spec.to_xml(), encoding="utf-8")
+    with GO2Controller(plant=MujocoPlant(path, control_period=PERIOD)) as go2:
+        assert go2.stand(), go2.last_outcome.reason
+
+
+def test_with_noisy_sensors_the_robot_stands_and_trots() -> None:
+    plant = MujocoPlant(sensors="noisy", seed=5)
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand(), go2.last_outcome.reason
+        assert go2.walk()
+        start = go2.state.q[0]
+        go2.move(0.4)
+        go2.wait(3.0)
+        assert go2.last_outcome.ok, go2.last_outcome.reason
+        assert go2.mode is Mode.WALKING
+        assert go2.state.q[0] - start == pytest.approx(0.4 * 3.0, rel=0.2)
+
+
+def test_without_a_display_the_robot_goes_on_without_the_viewer(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with GO2Controller(plant=MujocoPlant(), viewer=True) as go2:
+        go2.wait(0.1)
+    assert "no viewer: cannot open the viewer: there is no display" in caplog.text
+
+
+def test_the_viewer_is_not_for_other_plants(caplog: pytest.LogCaptureFixture) -> None:
+    with GO2Controller(plant=StillPlant(), viewer=True):
+        assert "the viewer shows MuJoCo plants only" in caplog.text

@@ -1,0 +1,301 @@
+"""The loop damps a robot whose QP, plant or posture fails, and says why."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.behaviours.base import Behaviour
+from controller.behaviours.joints import Damped, ServoJoints
+from controller.loop import ControlLoop, Fault
+from controller.telemetry import Telemetry
+from go2_wbc.contacts import find_gait
+from go2_wbc.errors import PlantError, PlantTimeout
+from go2_wbc.planning.command import ZERO_COMMAND
+from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
+from go2_wbc.reference import JointReference, Reference
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.safety import SafetyConfig
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import RobotState
+from go2_wbc.wbc.controller import WholeBodyController
+from motions.postures import TUCKED_JOINTS
+from tests.controller.plants import PERIOD, StillPlant, break_qp, is_limp
+
+SAFETY = SafetyConfig()
+# Ticks that a silent plant is borne with.
+BORNE = int(SAFETY.stale_limit / PERIOD)
+STANDING = np.array([0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0, *np.tile([0.0, 0.8, -1.6], 4)])
+
+Corrupt = Callable[[RobotState], RobotState]
+
+
+class Balance(Behaviour):
+    """Stands still by the whole-body controller."""
+
+    label = "balance"
+
+    def __init__(self, model: RobotModel) -> None:
+        self._planner = LocomotionPlanner(model, find_gait("trot"), LocomotionConfig())
+
+    def start(self, snapshot: Snapshot) -> None:
+        self._planner.start(snapshot)
+        self._reference = self._planner.update(snapshot, ZERO_COMMAND)
+
+    def update(self, snapshot: Snapshot) -> Reference | JointReference:
+        return self._reference
+
+    def is_finished(self, snapshot: Snapshot) -> bool:
+        return False
+
+
+@pytest.fixture(scope="module")
+def model() -> RobotModel:
+    return RobotModel()
+
+
+@pytest.fixture
+def plant() -> StillPlant:
+    plant = StillPlant()
+    plant.state = replace(plant.state, q=STANDING.copy())
+    return plant
+
+
+@pytest.fixture
+def loop(plant: StillPlant, model: RobotModel) -> ControlLoop:
+    wbc = WholeBodyController(model)
+    return ControlLoop(plant, model, wbc, Telemetry(model, 1000), SAFETY)
+
+
+def run(loop: ControlLoop, ticks: int) -> None:
+    for _ in range(ticks):
+        loop.tick()
+
+
+def tilt(plant: StillPlant, roll: float) -> None:
+    q = plant.state.q.copy()
+    q[3:7] = [np.sin(roll / 2), 0.0, 0.0, np.cos(roll / 2)]
+    plant.state = replace(plant.state, q=q)
+
+
+# --- QP failures ------------------------------------------------------------------------------
+
+
+def test_one_infeasible_qp_holds_the_last_command_for_that_tick(
+    loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    break_qp(monkeypatch, lambda n: n == 5)
+    loop.engage(Balance(loop.model))
+    run(loop, 8)
+    assert plant.commands[5] is plant.commands[4]
+    assert not is_limp(plant.commands[5])
+    assert plant.commands[6] is not plant.commands[5]
+    assert not is_limp(plant.commands[6])
+    assert loop.telemetry.qp_failures == 1
+    assert loop.fault is None
+
+
+def test_more_infeasible_qps_damp_the_robot_while_they_last(
+    loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    break_qp(monkeypatch, lambda n: 5 <= n < 9)
+    loop.engage(Balance(loop.model))
+    run(loop, 11)
+    limp = [is_limp(command) for command in plant.commands]
+    assert limp == [False] * 6 + [True] * 3 + [False] * 2
+    assert loop.telemetry.qp_failures == 4
+    assert loop.fault is None
+
+
+def test_an_infeasible_qp_is_logged_with_its_residual_table(
+    loop: ControlLoop, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    break_qp(monkeypatch, lambda n: n == 0)
+    loop.engage(Balance(loop.model))
+    with caplog.at_level(logging.WARNING):
+        loop.tick()
+    for row in ("QP failure at t=", "contact forces", "torque limits", "base dynamics"):
+        assert row in caplog.text
+
+
+def test_qp_failures_in_a_row_damp_the_robot_for_good_at_the_limit(
+    loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    break_qp(monkeypatch, lambda n: n < SAFETY.qp_patience)
+    loop.engage(Balance(loop.model))
+    run(loop, SAFETY.qp_patience - 1)
+    assert loop.fault is None
+    run(loop, 20)
+    assert loop.fault is not None
+    assert loop.fault.reason.startswith(f"damped after {SAFETY.qp_patience} QP failures in a row")
+    assert loop.telemetry.qp_failures == SAFETY.qp_patience
+    assert all(is_limp(command) for command in plant.commands[1:])
+
+
+def test_failures_that_are_not_in_a_row_do_not_add_up(
+    loop: ControlLoop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    break_qp(monkeypatch, lambda n: n % SAFETY.qp_patience != 0)
+    loop.engage(Balance(loop.model))
+    run(loop, 5 * SAFETY.qp_patience)
+    assert loop.fault is None
+    assert loop.telemetry.qp_failures == 5 * (SAFETY.qp_patience - 1)
+
+
+def test_a_new_behaviour_has_the_whole_patience_again(
+    loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # The count once went on from the behaviour before: it passed the limit without meeting it,
+    # and a second behaviour was neither held nor ever ended.
+    break_qp(monkeypatch, lambda n: n % (SAFETY.qp_patience + 1) > 0)
+    for _ in range(3):
+        loop.engage(Balance(loop.model))
+        run(loop, SAFETY.qp_patience)
+        assert loop.fault is None
+        assert not is_limp(plant.commands[-SAFETY.qp_patience + 1])
+        loop.tick()
+        assert loop.fault is not None
+
+
+# --- plants that fail -------------------------------------------------------------------------
+
+
+def test_a_plant_whose_clock_stands_still_is_reported_after_the_limit(
+    loop: ControlLoop, plant: StillPlant
+) -> None:
+    # The state that a silent plant returns may be the very same object each time.
+    loop.tick()
+    plant.is_clock_standing = True
+    run(loop, BORNE)
+    with pytest.raises(PlantTimeout, match="no new state from the plant for 32 ms"):
+        run(loop, 2)
+    assert loop.fault == Fault("plant failed: no new state from the plant for 32 ms")
+    assert is_limp(plant.commands[-1])
+
+
+def test_a_slow_control_period_is_not_mistaken_for_silence(model: RobotModel) -> None:
+    plant = StillPlant(period=2 * SAFETY.stale_limit)
+    loop = ControlLoop(plant, model, WholeBodyController(model), Telemetry(model, 10), SAFETY)
+    for _ in range(3):
+        loop.engage(Damped())
+        loop.tick()
+    assert loop.fault is None
+
+
+def test_a_short_silence_is_borne_with(loop: ControlLoop, plant: StillPlant) -> None:
+    for _ in range(3):
+        plant.is_clock_standing = True
+        run(loop, BORNE)
+        plant.is_clock_standing = False
+        run(loop, 2)
+    assert loop.fault is None
+
+
+@pytest.mark.parametrize("name", ["q", "v"])
+def test_a_state_that_is_not_finite_is_passed_over_for_a_while_and_then_reported(
+    loop: ControlLoop, plant: StillPlant, name: str
+) -> None:
+    loop.engage(Balance(loop.model))
+    run(loop, 3)
+    good = loop.state
+    broken = getattr(good, name).copy()
+    broken[4] = np.nan
+    plant.state = replace(plant.state, **{name: broken})
+    run(loop, BORNE - 1)
+    assert loop.state is good
+    with pytest.raises(PlantTimeout, match="no finite state from the plant"):
+        run(loop, 10)
+    assert loop.fault is not None
+    assert np.isfinite(loop.snapshot.state.q).all()
+    assert is_limp(plant.commands[-1])
+
+
+def test_a_plant_without_a_finite_first_state_is_refused(
+    plant: StillPlant, model: RobotModel
+) -> None:
+    plant.state = replace(plant.state, q=np.full(19, np.nan))
+    with pytest.raises(PlantError, match="first state of the plant is not finite"):
+        ControlLoop(plant, model, WholeBodyController(model), Telemetry(model, 10), SAFETY)
+
+
+@pytest.mark.parametrize("error", [PlantTimeout("no answer"), PlantError("leg lost"), OSError("io")])
+def test_whatever_the_plant_raises_comes_out_and_damps_the_robot(
+    loop: ControlLoop, plant: StillPlant, error: Exception
+) -> None:
+    loop.engage(Balance(loop.model))
+    loop.tick()
+
+    def fail_once() -> None:
+        plant.on_write = lambda: None
+        raise error
+
+    plant.on_write = fail_once
+    with pytest.raises(type(error), match=str(error)):
+        loop.tick()
+    assert loop.fault is not None
+    assert str(error) in loop.fault.reason
+    assert is_limp(plant.commands[-1])
+    loop.tick()
+    assert is_limp(plant.commands[-1])
+
+
+# --- falls ------------------------------------------------------------------------------------
+
+
+def test_a_balancing_robot_that_tilts_too_far_has_fallen(
+    loop: ControlLoop, plant: StillPlant
+) -> None:
+    loop.engage(Balance(loop.model))
+    tilt(plant, SAFETY.tilt_limit - 0.05)
+    loop.tick()
+    assert loop.fault is None
+    tilt(plant, SAFETY.tilt_limit + 0.05)
+    loop.tick()
+    assert loop.fault is not None
+    assert loop.fault.is_fall
+    assert loop.fault.reason.startswith("fell at t=0.00 s: roll 63 deg")
+    assert is_limp(plant.commands[-1])
+
+
+def test_a_robot_whose_legs_have_folded_has_fallen(loop: ControlLoop, plant: StillPlant) -> None:
+    loop.engage(Balance(loop.model))
+    q = STANDING.copy()
+    q[7:] = np.tile([0.0, 2.6, -2.7], 4)
+    plant.state = replace(plant.state, q=q, time=1.0)
+    loop.tick()
+    assert loop.fault is not None
+    assert loop.fault.is_fall
+    assert "above the feet" in loop.fault.reason
+
+
+def test_a_robot_that_lies_on_its_side_may_move_its_joints(
+    loop: ControlLoop, plant: StillPlant
+) -> None:
+    tilt(plant, 2.0)
+    loop.engage(ServoJoints("fold", ((0.1, TUCKED_JOINTS),)))
+    run(loop, 5)
+    assert loop.fault is None
+
+
+def test_a_damped_robot_that_tips_over_later_has_fallen_after_all(
+    loop: ControlLoop, plant: StillPlant
+) -> None:
+    loop.abandon(Fault("damped after 10 QP failures in a row", may_fall=True))
+    loop.tick()
+    assert loop.fault is not None
+    assert not loop.fault.is_fall
+    tilt(plant, 1.5)
+    run(loop, 3)
+    assert loop.fault.is_fall
+    assert loop.fault.reason.startswith("fell at t=")
+    assert loop.fault.reason.endswith("after: damped after 10 QP failures in a row")
+
+
+def test_engaging_a_behaviour_clears_the_fault(loop: ControlLoop) -> None:
+    loop.abandon(Fault("a test"))
+    loop.engage(Damped())
+    assert loop.fault is None

@@ -1,0 +1,256 @@
+"""Time passes inside calls or in the background, and no thread can hang a call."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from controller.behaviours.joints import Damped
+from controller.loop import ControlLoop
+from controller.runner import Runner
+from controller.telemetry import Telemetry
+from go2_wbc.errors import ClosedError, PlantTimeout
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.safety import SafetyConfig
+from go2_wbc.wbc.controller import WholeBodyController
+from tests.controller.plants import HANG_GUARD, PERIOD, StillPlant, in_thread, is_limp
+
+# s of robot time; far more than any of these tests lets pass.
+FOREVER = 1e6
+
+MakeRunner = Callable[..., Runner]
+
+
+@pytest.fixture(scope="module")
+def model() -> RobotModel:
+    return RobotModel()
+
+
+@pytest.fixture
+def plant() -> StillPlant:
+    return StillPlant()
+
+
+@pytest.fixture
+def make_runner(plant: StillPlant, model: RobotModel) -> Iterator[MakeRunner]:
+    """Makes a runner; closes it at the end."""
+    made: list[Runner] = []
+
+    def make(*, realtime: bool, after_tick: Callable[[], None] = lambda: None) -> Runner:
+        wbc = WholeBodyController(model)
+        loop = ControlLoop(plant, model, wbc, Telemetry(model, 1000), SafetyConfig())
+        made.append(Runner(loop, realtime=realtime, after_tick=after_tick))
+        return made[-1]
+
+    yield make
+    for runner in made:
+        runner.close()
+
+
+def wait_for(event: threading.Event) -> None:
+    assert event.wait(HANG_GUARD)
+
+
+# --- without realtime -------------------------------------------------------------------------
+
+
+def test_no_time_passes_outside_calls(make_runner: MakeRunner, plant: StillPlant) -> None:
+    runner = make_runner(realtime=False)
+    runner.engage(Damped())
+    assert not plant.commands
+    assert runner.loop.state.time == 0.0
+
+
+def test_a_call_ends_on_the_tick_on_which_it_is_done(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    runner = make_runner(realtime=False)
+    assert runner.advance_until(lambda: len(plant.commands) == 7, FOREVER)
+    assert len(plant.commands) == 7
+
+
+def test_a_call_that_is_never_done_ends_at_its_limit(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    runner = make_runner(realtime=False)
+    assert not runner.advance_until(lambda: False, 10 * PERIOD)
+    assert len(plant.commands) in (10, 11)
+
+
+def test_an_interruption_between_two_calls_damps_at_once(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    runner = make_runner(realtime=False)
+    runner.interrupt("a test")
+    assert runner.loop.fault is not None
+    assert runner.loop.fault.reason == "a test"
+    assert len(plant.commands) == 1
+    assert is_limp(plant.commands[0])
+
+
+def test_an_interruption_from_within_a_tick_ends_the_call(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    runner = make_runner(realtime=False)
+
+    def interrupt_once() -> None:
+        plant.on_write = lambda: None
+        runner.interrupt("a test")
+
+    plant.on_write = interrupt_once
+    assert not runner.advance_until(lambda: False, FOREVER)
+    assert runner.loop.fault is not None
+
+
+def test_an_interruption_from_another_thread_ends_a_long_call(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    # The call holds the lock all the time; the interruption must not wait for it.
+    runner = make_runner(realtime=False)
+    under_way = threading.Event()
+    plant.on_write = under_way.set
+    call = in_thread(lambda: runner.advance_until(lambda: False, FOREVER))
+    wait_for(under_way)
+    runner.interrupt("a test")
+    assert call.result(HANG_GUARD) is False
+    assert runner.loop.fault is not None
+
+
+def test_closing_from_another_thread_ends_a_long_call_and_no_tick_follows(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    runner = make_runner(realtime=False)
+    under_way = threading.Event()
+    plant.on_write = under_way.set
+    call = in_thread(lambda: runner.advance_until(lambda: False, FOREVER))
+    wait_for(under_way)
+    runner.close()
+    with pytest.raises(ClosedError, match="closed during a call"):
+        call.result(HANG_GUARD)
+    assert is_limp(plant.commands[-1])
+    ticks = len(plant.commands)
+    with pytest.raises(ClosedError):
+        runner.advance_until(lambda: False, FOREVER)
+    with pytest.raises(ClosedError):
+        runner.engage(Damped())
+    assert len(plant.commands) == ticks
+
+
+def test_a_fault_between_two_behaviours_of_a_call_is_not_lost(make_runner: MakeRunner) -> None:
+    # damp() once vanished when it came just before the next behaviour of a running call.
+    runner = make_runner(realtime=False)
+    runner.begin()
+    assert runner.engage(Damped("first")) is None
+    runner.interrupt("a test")
+    fault = runner.engage(Damped("second"))
+    assert fault is not None
+    assert fault.reason == "a test"
+    assert runner.loop.behaviour.label == "damped"
+
+
+def test_a_fault_from_before_a_call_does_not_forbid_it(make_runner: MakeRunner) -> None:
+    runner = make_runner(realtime=False)
+    runner.interrupt("a test")
+    runner.begin()
+    assert runner.engage(Damped()) is None
+    assert runner.loop.fault is None
+
+
+def test_the_same_fault_again_counts_as_a_new_one(make_runner: MakeRunner) -> None:
+    runner = make_runner(realtime=False)
+    runner.interrupt("a test")
+    runner.begin()
+    runner.interrupt("a test")
+    assert runner.engage(Damped()) is not None
+
+
+# --- realtime ---------------------------------------------------------------------------------
+
+
+def test_in_realtime_time_passes_by_itself(make_runner: MakeRunner, plant: StillPlant) -> None:
+    tenth = threading.Event()
+    plant.on_write = lambda: tenth.set() if len(plant.commands) == 10 else None
+    make_runner(realtime=True)
+    wait_for(tenth)
+
+
+def test_in_realtime_a_call_waits_for_what_it_wants_to_see(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    runner = make_runner(realtime=True)
+    assert runner.advance_until(lambda: plant.state.time > 0.1, FOREVER)
+    assert not runner.advance_until(lambda: False, 0.02)
+
+
+@pytest.mark.parametrize("error", [PlantTimeout("no answer"), ValueError("a bug")])
+def test_a_failure_in_the_background_ends_a_waiting_call_with_it_and_every_later_one(
+    make_runner: MakeRunner, plant: StillPlant, error: Exception
+) -> None:
+    # Anything but a PlantError once killed the thread and left the call waiting for ever.
+    def fail_later() -> None:
+        if len(plant.commands) >= 5:
+            raise error
+
+    plant.on_write = fail_later
+    runner = make_runner(realtime=True)
+    for _ in range(2):
+        call = in_thread(lambda: runner.advance_until(lambda: False, FOREVER))
+        with pytest.raises(type(error), match=str(error)):
+            call.result(HANG_GUARD)
+    assert runner.loop.fault is not None
+
+
+def test_a_failure_after_the_tick_ends_a_waiting_call_too(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    def fail_later() -> None:
+        if len(plant.commands) >= 5:
+            raise RuntimeError("viewer")
+
+    runner = make_runner(realtime=True, after_tick=fail_later)
+    call = in_thread(lambda: runner.advance_until(lambda: False, FOREVER))
+    with pytest.raises(RuntimeError, match="viewer"):
+        call.result(HANG_GUARD)
+
+
+def test_in_realtime_an_interruption_ends_a_waiting_call(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    runner = make_runner(realtime=True)
+    under_way = threading.Event()
+    call = in_thread(lambda: runner.advance_until(lambda: bool(under_way.set()), FOREVER))
+    wait_for(under_way)
+    runner.interrupt("a test")
+    assert call.result(HANG_GUARD) is False
+    assert runner.loop.fault is not None
+    assert runner.loop.fault.reason == "a test"
+
+
+def test_in_realtime_closing_ends_a_waiting_call_and_the_thread(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    before = threading.active_count()
+    runner = make_runner(realtime=True)
+    under_way = threading.Event()
+    call = in_thread(lambda: runner.advance_until(lambda: bool(under_way.set()), FOREVER))
+    wait_for(under_way)
+    runner.close()
+    with pytest.raises(ClosedError):
+        call.result(HANG_GUARD)
+    assert is_limp(plant.commands[-1])
+    runner.close()
+    assert threading.active_count() <= before + 1  # the thread of the call may still be ending
+
+
+def test_closing_a_runner_whose_plant_has_died_does_not_raise(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    runner = make_runner(realtime=False)
+
+    def fail() -> None:
+        raise PlantTimeout("no answer")
+
+    plant.on_write = fail
+    runner.close()
