@@ -17,7 +17,7 @@ HEIGHT_TOLERANCE = 0.02
 ANGLE_TOLERANCE = 0.1
 """Angle [rad] from the asked attitude that still counts as there."""
 LYING_HEIGHT = 0.13
-"""Height [m] of the base above the lowest foot below which the robot lies, if only on folded legs."""
+"""Height [m] of the base above the lowest foot below which the robot is down."""
 BELLY_HEIGHT = 0.095
 """Height [m] of the base above the lowest foot below which the belly is down: 0.085 at rest."""
 

@@ -93,7 +93,9 @@ class GO2Controller:
                 f"got {namespace!r}"
             )
         self._namespace = namespace
-        self._config = config if isinstance(config, Config) else _load(config)
+        self._config = _load(config)
+        if plant is not None and not isinstance(plant, Plant):
+            raise ConfigError(f"plant must be a Plant, got {plant!r}")
         model = RobotModel()
         wbc = WholeBodyController(model, self._config.backend, self._config.wbc)
         self._owns_plant = plant is None
@@ -141,11 +143,10 @@ class GO2Controller:
         Raises:
             CommandError: for an unknown gait; lists the valid ones.
         """
+        gait = _word("gait", gait)
         return self._call("walk", lambda: self._pilot.walk(gait))
 
-    def move(
-        self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0
-    ) -> None:
+    def move(self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0) -> None:
         """Walk with this velocity until the next command; takes no time by itself.
 
         Args:
@@ -208,7 +209,7 @@ class GO2Controller:
         Raises:
             CommandError: for another side or time.
         """
-        leg, hold = front_leg(side), _finite("hold", hold)
+        leg, hold = front_leg(_word("side", side)), _finite("hold", hold)
         if not 0.5 <= hold <= 30.0:
             raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
         plan = high_five_plan(self._runner.loop.model, leg, hold)
@@ -224,7 +225,10 @@ class GO2Controller:
         """
         self._check_open()
         model = self._runner.loop.model
-        plan = load_motion(motion, model) if isinstance(motion, str) else motion
+        if isinstance(motion, MotionPlan):
+            plan = motion
+        else:
+            plan = load_motion(_word("motion", motion), model)
         check_plan(plan, model)
         return self._call("play", lambda: self._pilot.play(plan))
 
@@ -333,9 +337,7 @@ class GO2Controller:
             self._note(ok, reason, start, figures)
         return ok
 
-    def _note(
-        self, ok: bool, reason: str, start: float, figures: Figures | None = None
-    ) -> None:
+    def _note(self, ok: bool, reason: str, start: float, figures: Figures | None = None) -> None:
         duration = self.state.time - start
         self._last_outcome = Outcome(ok, reason, duration, dict(figures or {}))
         if not ok:
@@ -367,8 +369,20 @@ def _interruption(name: str, error: BaseException) -> str:
     return f"{type(error).__name__} during {name}(): {error}"
 
 
-def _load(config: Path | str | None) -> Config:
-    return Config() if config is None else load_config(config)
+def _load(config: Config | Path | str | None) -> Config:
+    if config is None:
+        return Config()
+    if isinstance(config, Config):
+        return config
+    if not isinstance(config, Path | str):
+        raise ConfigError(f"config must be a Config or the path of a TOML file, got {config!r}")
+    return load_config(config)
+
+
+def _word(name: str, value: str) -> str:
+    if not isinstance(value, str):
+        raise CommandError(f"{name} must be a string, got {value!r}")
+    return value
 
 
 def _finite(name: str, value: float) -> float:

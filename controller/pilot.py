@@ -37,7 +37,7 @@ from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionPlanner
 from go2_wbc.reference import MotionPlan, Stance, TrackedPoint
 from motions.high_five import HighFivePlan
-from motions.postures import TUCKED_JOINTS, lie_down, rise, sit_down
+from motions.postures import SPLAYED_JOINTS, TUCKED_JOINTS, lie_down, rise, sit_down
 
 SETTLE_LIMIT = 3.0
 """Time [s] in which a posture must come to rest after its motion."""
@@ -45,6 +45,8 @@ STOP_LIMIT = 4.0
 """Time [s] in which a walking robot must come to rest after ``stop``."""
 TUCK_TIME = 0.9
 """Time [s] of drawing the feet under the hips while lying."""
+SPLAY_TIME = 0.5
+"""Time [s] of spreading the folded legs until the belly is on the ground."""
 LIMP_TIME = 0.6
 """Time [s] for which the robot is left to sink before it counts as lying."""
 SINK_TIME = 1.0
@@ -157,6 +159,8 @@ class Pilot:
         self._run(ServoJoints("tuck", ((TUCK_TIME, TUCKED_JOINTS),)), TUCK_TIME + 0.5)
 
     def _go_limp(self) -> None:
+        if self._loop.state.tilt < 0.6:  # or it would rest on folded legs, belly in the air
+            self._run(ServoJoints("splay", ((SPLAY_TIME, SPLAYED_JOINTS),)), SPLAY_TIME + 0.5)
         self._run(Damped("lie", LIMP_TIME), LIMP_TIME + 0.5)
         self._settle("lie down", is_lying)
         self._mode = Mode.LYING
@@ -271,7 +275,8 @@ class Pilot:
             self.square_up()
 
     def high_five(self, plan: HighFivePlan) -> Figures:
-        """Give a high five and measure how high the paw was held."""
+        """Give a high five, from any mode but fallen, and measure how high the paw was held."""
+        self._ensure_standing()
         loop, leg = self._loop, plan.leg
         heights: list[float] = []
 

@@ -1,0 +1,1 @@
+"""The engine: whole-body control of the Unitree Go2."""

@@ -75,7 +75,7 @@ def override(part: _Part, values: Mapping[str, Any], where: str) -> _Part:
     Raises:
         ConfigError: for an unknown key, or a value of another type than the field's.
     """
-    fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(part)}  # type: ignore[arg-type]
+    fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(part)}
     changes = {}
     for key, value in values.items():
         if key not in fields:
@@ -94,7 +94,11 @@ def _convert(current: object, value: object, where: str) -> object:
             raise ConfigError(f"{where} must be a list of {len(current)} numbers, got {value!r}")
         return tuple(_convert(c, v, where) for c, v in zip(current, value, strict=True))
     if isinstance(current, float):
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not math.isfinite(value)
+        ):
             raise ConfigError(f"{where} must be a finite number, got {value!r}")
         return float(value)
     if type(value) is not type(current):

@@ -1,8 +1,8 @@
 """What to track now: the hub type between everything that plans and the controller.
 
 Gaits, motions, teleoperation and remote commands all end in a ``Reference``; the whole-body
-controller starts from one. ``JointReference`` is its little sister for the phases in which the trunk
-lies on the ground and no contact model holds.
+controller starts from one. ``JointReference`` is its little sister for the phases in which the
+trunk lies on the ground and no contact model holds.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class Reference:
 
     Attributes:
         body: desired motion of the trunk.
-        legs: what each leg does.
+        legs: what each of the four legs does.
         normal_force_min: least normal force [N] of each stance foot.
         normal_force_max: greatest normal force [N] of each stance foot (ramped at changes).
         p_world_feet: desired foot positions [m], used for legs in SWING.
@@ -81,7 +81,7 @@ class Reference:
     """
 
     body: BodyTarget
-    legs: tuple[LegTask, LegTask, LegTask, LegTask]
+    legs: tuple[LegTask, ...]
     normal_force_min: Float[np.ndarray, "4"]
     normal_force_max: Float[np.ndarray, "4"]
     p_world_feet: Float[np.ndarray, "4 3"]

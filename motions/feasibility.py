@@ -58,7 +58,8 @@ def check_plan(plan: MotionPlan, model: RobotModel) -> None:
             if key not in worst or finding.margin < worst[key].margin:
                 worst[key] = finding
     if worst:
-        raise MotionInfeasible(plan.name, sorted(worst.values(), key=lambda f: f.time))
+        findings = sorted(worst.values(), key=lambda finding: finding.time)
+        raise MotionInfeasible(plan.name, findings)
 
 
 def _broken(reference: Reference, t: float, model: RobotModel) -> list[Finding]:

@@ -1,10 +1,10 @@
 """High five: shift onto three legs, raise a front paw, hold it, tap, and come back to standing.
 
 The poses are found by inverse kinematics with the CoM kept well inside the three supporting feet.
-The raised leg is tracked in joint space, since a Cartesian paw task crosses a singularity of the leg
-at hip height; it goes up knee first. The numbers come from a search over trunk attitude, height and
-paw position for large margins at once: CoM to the edges of the support triangle, load of the lightest
-foot, static torque, distance of every joint to its limits.
+The raised leg is tracked in joint space, since a Cartesian paw task crosses a singularity of the
+leg at hip height; it goes up knee first. The numbers come from a search over trunk attitude, height
+and paw position for large margins at once: CoM to the edges of the support triangle, load of the
+lightest foot, static torque, distance of every joint to its limits.
 """
 
 from __future__ import annotations

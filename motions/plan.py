@@ -91,6 +91,5 @@ def body_target(point: TrackedPoint, body: CurvePoint) -> BodyTarget:
     )
 
 
-def _leg_tasks(phase: ContactPhase) -> tuple[LegTask, LegTask, LegTask, LegTask]:
-    fl, fr, rl, rr = (LegTask.STANCE if s else LegTask.JOINTS for s in phase.stance)
-    return fl, fr, rl, rr
+def _leg_tasks(phase: ContactPhase) -> tuple[LegTask, ...]:
+    return tuple(LegTask.STANCE if s else LegTask.JOINTS for s in phase.stance)

@@ -26,10 +26,15 @@ LIE_POSE = np.array([0.0, 0.0, 0.085, 0.0, 0.0, 0.0])
 """Base position [m] and angles [rad] just above the ground, from which the robot goes limp."""
 TUCKED_JOINTS = np.tile([0.0, 1.30, -2.66], 4)
 """Joint angles [rad] with the feet under the hips and the belly on the ground."""
+SPLAYED_JOINTS = TUCKED_JOINTS + np.tile([0.3, 0.0, 0.0, -0.3, 0.0, 0.0], 2)
+"""Joint angles [rad] with the feet beside the hips, so that the folded legs carry nothing."""
+
 
 def rise(start: Float[np.ndarray, "6"], entry: Stance, duration: float = 1.2) -> KeyframePlan:
     """From a CoM pose (6,) to standing."""
-    return _posture_plan("rise", entry, Stance.STAND, TrackedPoint.COM, (start, STAND_POSE), duration)
+    return _posture_plan(
+        "rise", entry, Stance.STAND, TrackedPoint.COM, (start, STAND_POSE), duration
+    )
 
 
 def sit_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> KeyframePlan:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from controller.behaviours.base import Behaviour
-from go2_wbc.planning.correction import SteadyStateCorrection
+from go2_wbc.planning.correction import SteadyStateCorrection, tracked_position
 from go2_wbc.reference import Anchor, MotionPlan, Reference, TrackedPoint
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
@@ -34,11 +34,9 @@ class PlayPlan(Behaviour):
         """The plan's reference of this instant, in the world."""
         now = snapshot.state.time
         reference = self.plan.at(now - self._start).placed(self._anchor)
-        body = reference.body
-        error = body.p_world - tracked_position(snapshot, body.point)
-        offset = self._correction.update(error, now - self._last)
+        body = self._correction.corrected(reference.body, snapshot, now - self._last)
         self._last = now
-        return replace(reference, body=replace(body, p_world=body.p_world + offset))
+        return replace(reference, body=body)
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the plan is over."""
@@ -70,8 +68,3 @@ class ChangePosture(PlayPlan):
         position = yaw_rotation(anchor.yaw).T @ (p - anchor.p_world)
         pose = np.array([*position, roll, pitch, wrap_angle(float(yaw) - anchor.yaw)])
         self.plan = self._make_plan(pose)
-
-
-def tracked_position(snapshot: Snapshot, point: TrackedPoint) -> Float[np.ndarray, "3"]:
-    """Measured position [m] of ``point`` in the world."""
-    return snapshot.p_world_com if point is TrackedPoint.COM else snapshot.state.p_world_base

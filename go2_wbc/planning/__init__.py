@@ -1,0 +1,1 @@
+"""From a velocity command to a reference."""

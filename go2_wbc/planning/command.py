@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-
-import numpy as np
+from numbers import Real
 
 from go2_wbc.errors import CommandError
+
+
+def _is_finite(value: Real) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond every float
+        return False
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +28,9 @@ class VelocityCommand:
         """Raise CommandError unless every component is a finite number."""
         for name in ("linear_x", "linear_y", "angular_z"):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
+            if isinstance(value, bool) or not isinstance(value, Real):
                 raise CommandError(f"{name} must be a number, got {value!r}")
-            if not math.isfinite(value):
+            if not _is_finite(value):
                 raise CommandError(f"{name} must be finite, got {value}")
 
     @property

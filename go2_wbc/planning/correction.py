@@ -1,4 +1,4 @@
-"""Slow integral action on the body's position reference.
+"""Slow integral action on the body's reference.
 
 A proportional law sags under an unknown payload and stands off by joint friction. The correction
 adds the integral of the error to the reference, bounded, so that the measured body settles where it
@@ -7,10 +7,14 @@ was asked to be.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
+
+from go2_wbc.reference import BodyTarget, TrackedPoint
+from go2_wbc.robot.rotations import exp_rotation, log_rotation
+from go2_wbc.robot.snapshot import Snapshot
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,28 +23,55 @@ class CorrectionConfig:
 
     Attributes:
         rate: share of the remaining error that is added per second [1/s].
-        limit: greatest correction [m] per axis.
-        window: errors [m] beyond this are no steady-state errors and do not count.
+        position_limit: greatest correction [m] per axis.
+        position_window: errors [m] beyond this are no steady-state errors and do not count.
+        angle_limit: greatest correction [rad] per axis.
+        angle_window: errors [rad] beyond this do not count.
     """
 
     rate: float = 2.0
-    limit: float = 0.06
-    window: float = 0.04
+    position_limit: float = 0.06
+    position_window: float = 0.04
+    angle_limit: float = 0.15
+    angle_window: float = 0.1
 
 
 class SteadyStateCorrection:
-    """Integrates the body's position error."""
+    """Integrates the body's pose error."""
 
     def __init__(self, config: CorrectionConfig | None = None) -> None:
         """Start without correction."""
         self._config = config or CorrectionConfig()
-        self._offset = np.zeros(3)
-
-    def update(self, error: Float[np.ndarray, "3"], dt: float) -> Float[np.ndarray, "3"]:
-        """The offset [m] to add to the reference, after ``dt`` seconds of ``error`` [m]."""
+        self._offset = np.zeros(6)
         config = self._config
-        counted = np.where(np.abs(error) < config.window, error, 0.0)
+        self._window = np.repeat([config.position_window, config.angle_window], 3)
+        self._limit = np.repeat([config.position_limit, config.angle_limit], 3)
+
+    def update(self, error: Float[np.ndarray, "6"], dt: float) -> Float[np.ndarray, "6"]:
+        """The offset to add to the reference, after ``dt`` seconds of ``error``.
+
+        Args:
+            error: reference minus measured: position [m], rotation vector [rad], in the world.
+            dt: [s].
+        """
+        counted = np.where(np.abs(error) < self._window, error, 0.0)
         self._offset = np.clip(
-            self._offset + config.rate * dt * counted, -config.limit, config.limit
+            self._offset + self._config.rate * dt * counted, -self._limit, self._limit
         )
         return self._offset
+
+    def corrected(self, target: BodyTarget, snapshot: Snapshot, dt: float) -> BodyTarget:
+        """``target`` with the correction put in, after ``dt`` seconds of its present error."""
+        rotation_error = log_rotation(target.R_world_base @ snapshot.R_world_base.T)
+        position_error = target.p_world - tracked_position(snapshot, target.point)
+        offset = self.update(np.concatenate([position_error, rotation_error]), dt)
+        return replace(
+            target,
+            p_world=target.p_world + offset[:3],
+            R_world_base=exp_rotation(offset[3:]) @ target.R_world_base,
+        )
+
+
+def tracked_position(snapshot: Snapshot, point: TrackedPoint) -> Float[np.ndarray, "3"]:
+    """Measured position [m] of ``point`` in the world."""
+    return snapshot.p_world_com if point is TrackedPoint.COM else snapshot.state.p_world_base

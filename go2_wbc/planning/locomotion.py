@@ -1,8 +1,8 @@
 """Velocity command -> Reference: footholds, swing feet and the body's path of a gait.
 
-Footholds follow Raibert (1986, ch. 2) with half the stance travel ahead of the hip and a correction
-for the velocity error. The body follows a reference integrated from the command, which takes out the
-steady error that a pure velocity loop keeps; it is held within reach of the robot.
+Footholds follow Raibert (1986, ch. 2) with half the stance travel ahead of the hip and a
+correction for the velocity error. The body follows a reference integrated from the command, which
+takes out the steady error that a pure velocity loop keeps; it is held within reach of the robot.
 """
 
 from __future__ import annotations
@@ -172,7 +172,8 @@ class LocomotionPlanner:
 
     def _correct_height(self, snapshot: Snapshot, dt: float) -> None:
         sag = self._ground + self._config.height - snapshot.p_world_com[2]
-        self._height_offset = float(self._correction.update(np.array([0.0, 0.0, sag]), dt)[2])
+        error = np.array([0.0, 0.0, sag, 0.0, 0.0, 0.0])
+        self._height_offset = float(self._correction.update(error, dt)[2])
 
     def _world_velocity(self) -> Float[np.ndarray, "3"]:
         return yaw_rotation(self._yaw) @ np.array([self._velocity[0], self._velocity[1], 0.0])

@@ -1,0 +1,1 @@
+"""The one robot description, its state, and everything computed from it in a tick."""

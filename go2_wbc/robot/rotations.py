@@ -12,6 +12,11 @@ def log_rotation(R: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3"]:
     return pin.log3(R)
 
 
+def exp_rotation(vector: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Rotation by the rotation vector [rad]."""
+    return pin.exp3(vector)
+
+
 def cross(a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     """a x b; ten times faster than numpy's general one."""
     a0, a1, a2 = a

@@ -27,9 +27,7 @@ class SafetyConfig:
     qp_patience: int = 10
 
 
-def fall_reason(
-    state: RobotState, lowest_foot: float, config: SafetyConfig
-) -> str | None:
+def fall_reason(state: RobotState, lowest_foot: float, config: SafetyConfig) -> str | None:
     """Why the state counts as a fall, or None.
 
     Args:

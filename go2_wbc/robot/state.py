@@ -35,7 +35,7 @@ class RobotState:
         return self.q[:3]
 
     @property
-    def R_world_base(self) -> Float[np.ndarray, "3 3"]:  # noqa: N802 - frame naming
+    def R_world_base(self) -> Float[np.ndarray, "3 3"]:
         """Rotation from the base frame to the world."""
         x, y, z, w = self.q[3:7]
         return np.array(

@@ -1,0 +1,1 @@
+"""The whole-body controller: tasks, constraints, the QP and its back ends."""

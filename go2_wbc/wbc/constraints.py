@@ -17,7 +17,6 @@ from go2_wbc.reference import Reference
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.problem import FORCES, SIZE, Bounds, Rows
 
-
 _JOINT_SELECTION = np.zeros((12, SIZE))
 _JOINT_SELECTION[:, 6:18] = np.eye(12)
 

@@ -105,9 +105,7 @@ class WholeBodyController:
         start = time.thread_time()
         problem = self.formulate(snapshot, reference)
         z = self._backend.solve(problem)
-        return WbcSolution.from_decision(
-            z, problem, time.thread_time() - start, self.backend_name
-        )
+        return WbcSolution.from_decision(z, problem, time.thread_time() - start, self.backend_name)
 
 
 def _tasks(model: RobotModel, config: WbcConfig) -> tuple[Task, ...]:
@@ -136,4 +134,3 @@ def _inequalities(model: RobotModel, config: WbcConfig) -> tuple[Inequality, ...
 
 def _stack(rows: Sequence[Rows]) -> Rows:
     return Rows(np.concatenate([r.A for r in rows]), np.concatenate([r.b for r in rows]))
-

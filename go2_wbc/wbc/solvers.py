@@ -7,6 +7,7 @@ contacts change. Tolerances are set so that torques agree to 1e-6 N m across sol
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import qpsolvers
@@ -50,7 +51,7 @@ class QpSolution:
     equality_multipliers: Float[np.ndarray, " k"]
 
 
-QPSOLVERS_OPTIONS: dict[str, dict[str, float]] = {
+QPSOLVERS_OPTIONS: dict[str, dict[str, Any]] = {
     "daqp": {"primal_tol": 1e-9, "dual_tol": 1e-12},
     "quadprog": {},
 }
@@ -119,9 +120,7 @@ def _solve_proxqp(qp: DenseQp) -> QpSolution | None:
     settings.initial_guess = proxsuite.proxqp.InitialGuess.EQUALITY_CONSTRAINED_INITIAL_GUESS
     lower = np.maximum(qp.lower, -PROXQP_INFINITY)
     upper = np.minimum(qp.upper, PROXQP_INFINITY)
-    solver.init(
-        qp.H, qp.g, qp.E, qp.e, qp.C, lower, upper, compute_preconditioner=False
-    )
+    solver.init(qp.H, qp.g, qp.E, qp.e, qp.C, lower, upper, compute_preconditioner=False)
     solver.solve()
     if solver.results.info.status != proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED:
         return None

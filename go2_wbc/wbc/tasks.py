@@ -1,8 +1,9 @@
 """Tasks: what the QP should achieve as well as it can.
 
 A task is an immutable description. ``rows(snapshot, reference)`` is a pure function that gives
-A z = b, where b is the desired acceleration by the usual law a_des + kd (v_des - v) + kp (p_des - p)
-(Del Prete et al. 2015, eq. 5) less the velocity-dependent drift.
+A z = b, where b is the desired acceleration by the usual law
+a_des + kd (v_des - v) + kp (p_des - p) (Del Prete et al. 2015, eq. 5) less the velocity-dependent
+drift.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import cross, log_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.problem import FORCES, SIZE, Rows
-
 
 _EYE = np.eye(3)
 
@@ -142,7 +143,9 @@ class LegPosture(Task):
             A[rows, leg.velocities] = _EYE
             position_error = reference.q_joints[columns] - snapshot.state.q[7:][columns]
             velocity_error = reference.v_joints[columns] - snapshot.state.v[6:][columns]
-            b[rows] = reference.a_joints[columns] + self.kd * velocity_error + self.kp * position_error
+            b[rows] = (
+                reference.a_joints[columns] + self.kd * velocity_error + self.kp * position_error
+            )
         return Rows(A, b)
 
 
@@ -168,4 +171,3 @@ class ForceRegularisation(Task):
             A[3 * i : 3 * i + 3, start : start + 3] = _EYE
             b[3 * i + 2] = self.weight_of_robot / len(stance)
         return Rows(A, b)
-

@@ -1,0 +1,130 @@
+"""Bad input is refused at once, by an error that says what was wrong and what is valid."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from math import inf, nan
+from pathlib import Path
+
+import pytest
+
+from controller import GO2Controller, Mode
+from go2_wbc.errors import CommandError, ConfigError
+from tests.controller.plants import StillPlant
+
+ROOT = Path(__file__).resolve().parents[2]
+
+Call = Callable[[GO2Controller], object]
+
+
+@pytest.fixture(scope="module")
+def lying() -> Iterator[GO2Controller]:
+    """A lying robot; no time may pass in these tests."""
+    with GO2Controller() as go2:
+        yield go2
+        assert go2.state.time == 0.0
+        assert go2.mode is Mode.LYING
+
+
+@pytest.mark.parametrize("bad", [nan, inf, -inf])
+@pytest.mark.parametrize(
+    ("name", "call"),
+    [
+        ("linear_x", lambda go2, bad: go2.move(bad)),
+        ("angular_z", lambda go2, bad: go2.move(0.1, bad)),
+        ("linear_y", lambda go2, bad: go2.move(linear_y=bad)),
+        ("angle", lambda go2, bad: go2.turn_left(bad)),
+        ("angle", lambda go2, bad: go2.turn_right(bad)),
+        ("distance", lambda go2, bad: go2.move_forward(bad)),
+        ("hold", lambda go2, bad: go2.high_five(hold=bad)),
+        ("seconds", lambda go2, bad: go2.wait(bad)),
+    ],
+)
+def test_a_number_that_is_not_finite_is_refused_by_name(
+    lying: GO2Controller, name: str, call: Callable[[GO2Controller, float], object], bad: float
+) -> None:
+    with pytest.raises(CommandError, match=f"{name} must be finite, got {bad}"):
+        call(lying, bad)
+    assert lying.command.is_zero
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda go2: go2.high_five(hold=0.4), "hold must be 0.5 to 30 s, got 0.4"),
+        (lambda go2: go2.high_five(hold=31.0), "hold must be 0.5 to 30 s, got 31.0"),
+        (lambda go2: go2.wait(-0.1), "seconds must not be negative, got -0.1"),
+        (lambda go2: go2.turn_left(90.0), r"angle must be within \+-62.8 rad, got 90.0"),
+        (lambda go2: go2.turn_right(90.0), r"angle must be within \+-62.8 rad, got -90.0"),
+        (lambda go2: go2.move_forward(1e9), r"distance must be within \+-100 m, got 1"),
+        (lambda go2: go2.high_five("up"), "unknown side 'up'; valid: left, right"),
+        (lambda go2: go2.walk("gallop"), "unknown gait 'gallop'; valid: .*trot"),
+        (lambda go2: go2.play("moonwalk"), "unknown motion 'moonwalk'; valid: .*high_five"),
+        (lambda go2: go2.recording(rate=0.0), "rate must be positive, got 0.0"),
+        (lambda go2: go2.recording(rate=nan), "rate must be positive, got nan"),
+    ],
+)
+def test_a_value_out_of_range_or_an_unknown_name_is_refused_with_what_is_valid(
+    lying: GO2Controller, call: Call, message: str
+) -> None:
+    with pytest.raises(CommandError, match=message):
+        call(lying)
+
+
+@pytest.mark.parametrize("name", ["", " ", "2nd", "robot 1", "robot1\n", "a/b", "roböt", "a-b"])
+def test_a_namespace_that_is_not_a_name_is_refused(name: str) -> None:
+    with pytest.raises(ConfigError, match="letters, digits and underscores, a letter first"):
+        GO2Controller(namespace=name, plant=StillPlant())
+
+
+def test_a_refused_call_is_the_last_outcome() -> None:
+    with GO2Controller(plant=StillPlant()) as go2:
+        with pytest.raises(CommandError):
+            go2.walk("gallop")
+        assert not go2.last_outcome
+        assert "gallop" in go2.last_outcome.reason
+
+
+WRONG_TYPES = """
+from controller import GO2Controller
+from go2_wbc.errors import CommandError, ConfigError
+
+go2 = GO2Controller()
+calls = {
+    CommandError: [
+        lambda: go2.move("fast"), lambda: go2.move(True), lambda: go2.move(None),
+        lambda: go2.turn_left("90"), lambda: go2.move_forward(None), lambda: go2.wait(1 + 1j),
+        lambda: go2.high_five(hold="long"), lambda: go2.high_five(3), lambda: go2.high_five(["left"]),
+        lambda: go2.play(42), lambda: go2.play(None), lambda: go2.walk(None), lambda: go2.walk({}),
+    ],
+    ConfigError: [
+        lambda: GO2Controller(7), lambda: GO2Controller(None), lambda: GO2Controller(config=3),
+        lambda: GO2Controller(config={"wbc": {}}), lambda: GO2Controller(plant="robot"),
+    ],
+}
+for kind, refused in calls.items():
+    for number, call in enumerate(refused):
+        try:
+            call()
+        except kind as error:
+            assert "got" in str(error) or "valid" in str(error), error
+        else:
+            raise SystemExit(f"{kind.__name__} {number} was accepted")
+go2.wait(1)
+"""
+
+
+def test_values_of_a_wrong_type_are_refused_by_errors_of_our_own() -> None:
+    # In a process of its own: under pytest the run-time type checks would refuse them first.
+    done = subprocess.run(
+        [sys.executable, "-c", WRONG_TYPES],
+        cwd=ROOT,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr

@@ -1,0 +1,189 @@
+"""Errands point at their goal, slow down before it, and judge the measured pose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos, pi, radians, sin
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from controller.navigation import (
+    DISTANCE_TOLERANCE,
+    GREATEST_DISTANCE,
+    GREATEST_TURN,
+    HEADING_TOLERANCE,
+    TURN_RATE,
+    WALK_SPEED,
+    Course,
+    DriveStraight,
+    Errand,
+    TurnInPlace,
+)
+from go2_wbc.errors import CommandError
+from go2_wbc.robot.state import RobotState
+
+# Rounding of sines and quaternions.
+EXACT = 1e-9
+STEP = 0.05
+
+yaws = st.floats(-pi, pi)
+places = st.floats(-5.0, 5.0)
+
+
+def pose(x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> RobotState:
+    q = np.zeros(19)
+    q[:3] = x, y, 0.3
+    q[5], q[6] = sin(yaw / 2), cos(yaw / 2)
+    return RobotState(0.0, q, np.zeros(18), np.zeros(12), np.zeros(4), np.ones(4, bool))
+
+
+def begun(errand: Errand, state: RobotState) -> Errand:
+    errand.begin(state)
+    return errand
+
+
+def walk(errand: Errand, x: float, y: float, yaw: float) -> RobotState:
+    """Follows the commands exactly, as an ideal robot would, until the errand is done."""
+    state = pose(x, y, yaw)
+    errand.begin(state)
+    for _ in range(round(errand.time_limit / STEP)):
+        if errand.is_done(state):
+            break
+        command = errand.command(state)
+        x += STEP * (command.linear_x * cos(yaw) - command.linear_y * sin(yaw))
+        y += STEP * (command.linear_x * sin(yaw) + command.linear_y * cos(yaw))
+        yaw += STEP * command.angular_z
+        state = pose(x, y, yaw)
+    return state
+
+
+@given(x=places, y=places, yaw=yaws, ahead=places, left=places)
+def test_displacement_is_measured_in_the_frame_of_the_start(
+    x: float, y: float, yaw: float, ahead: float, left: float
+) -> None:
+    course = Course(pose(x, y, yaw))
+    end = pose(x + ahead * cos(yaw) - left * sin(yaw), y + ahead * sin(yaw) + left * cos(yaw))
+    assert course.displacement(end) == pytest.approx((ahead, left), abs=EXACT)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_the_angle_turned_is_counted_over_several_turns(direction: int) -> None:
+    course = Course(pose(yaw=3.0))
+    for step in range(1, 200):
+        turned = course.turned(pose(yaw=3.0 + direction * 0.1 * step))
+        assert turned == pytest.approx(direction * 0.1 * step, abs=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("errand", "sign"),
+    [
+        (lambda: TurnInPlace(1.0), 1),
+        (lambda: TurnInPlace(-1.0), -1),
+        (lambda: DriveStraight(1.0), 1),
+        (lambda: DriveStraight(-1.0), -1),
+    ],
+)
+def test_an_errand_starts_towards_its_goal_at_its_full_speed(
+    errand: Callable[[], Errand], sign: int
+) -> None:
+    made = errand()
+    command = begun(made, pose()).command(pose())
+    turn, speed = command.angular_z, command.linear_x
+    if isinstance(made, TurnInPlace):
+        assert (turn, speed) == (sign * TURN_RATE, 0.0)
+    else:
+        assert (turn, speed) == (0.0, sign * WALK_SPEED)
+
+
+@given(x=places, y=places, yaw=yaws, angle=st.floats(-8.0, 8.0))
+def test_an_ideal_robot_turns_by_the_angle_and_stays_in_place(
+    x: float, y: float, yaw: float, angle: float
+) -> None:
+    errand = TurnInPlace(angle)
+    end = walk(errand, x, y, yaw)
+    assert errand.is_within_tolerance(end)
+    assert errand.figures(end)["turned [deg]"] == pytest.approx(
+        errand.figures(end)["asked [deg]"], abs=0.5
+    )
+    assert end.q[:2] == pytest.approx([x, y], abs=0.01)
+
+
+@given(x=places, y=places, yaw=yaws, distance=st.floats(-3.0, 3.0))
+def test_an_ideal_robot_walks_the_distance_along_its_heading(
+    x: float, y: float, yaw: float, distance: float
+) -> None:
+    errand = DriveStraight(distance)
+    end = walk(errand, x, y, yaw)
+    assert errand.is_within_tolerance(end)
+    goal = [x + distance * cos(yaw), y + distance * sin(yaw)]
+    assert end.q[:2] == pytest.approx(goal, abs=0.01)
+
+
+def test_a_robot_beside_its_line_is_led_back_to_it() -> None:
+    errand = begun(DriveStraight(1.0), pose())
+    assert errand.command(pose(y=0.1)).linear_y < 0.0
+    assert errand.command(pose(y=-0.1)).linear_y > 0.0
+    assert errand.command(pose(yaw=0.1)).angular_z < 0.0
+
+
+def test_a_turning_robot_that_drifts_is_led_back_to_its_place() -> None:
+    errand = begun(TurnInPlace(pi / 2), pose())
+    assert errand.command(pose(x=0.1)).linear_x < 0.0
+    # A quarter turn on, the start lies behind it to its left.
+    turned = errand.command(pose(x=0.1, yaw=pi / 2))
+    assert turned.linear_y > 0.0
+    assert abs(turned.linear_x) < EXACT
+
+
+@pytest.mark.parametrize(
+    ("end", "is_good"),
+    [
+        (pose(x=1.0), True),
+        (pose(x=1.0 - 0.9 * DISTANCE_TOLERANCE), True),
+        (pose(x=1.0 + 1.1 * DISTANCE_TOLERANCE), False),
+        (pose(x=1.0, y=1.1 * DISTANCE_TOLERANCE), False),
+        (pose(x=1.0, yaw=1.1 * HEADING_TOLERANCE), False),
+        (pose(), False),
+    ],
+)
+def test_a_walk_is_judged_by_place_and_heading(end: RobotState, *, is_good: bool) -> None:
+    assert begun(DriveStraight(1.0), pose()).is_within_tolerance(end) is is_good
+
+
+def test_a_turn_is_judged_by_the_heading() -> None:
+    def is_good(yaw: float) -> bool:
+        return begun(TurnInPlace(0.5), pose()).is_within_tolerance(pose(yaw=yaw))
+
+    assert is_good(0.5 + 0.9 * HEADING_TOLERANCE)
+    assert not is_good(0.5 - 1.1 * HEADING_TOLERANCE)
+    assert not is_good(-0.5)
+
+
+def test_a_robot_that_is_still_moving_is_not_done() -> None:
+    drive, turn = begun(DriveStraight(1.0), pose()), begun(TurnInPlace(0.5), pose())
+    moving = pose(x=1.0)
+    moving.v[0] = 0.2
+    assert not drive.is_done(moving)
+    assert drive.is_done(pose(x=1.0))
+    turning = pose(yaw=0.5)
+    turning.v[5] = 0.3
+    assert not turn.is_done(turning)
+    assert turn.is_done(pose(yaw=0.5))
+
+
+def test_the_time_limit_leaves_three_times_the_time_at_full_speed() -> None:
+    assert TurnInPlace(2.0).time_limit >= 3 * 2.0 / TURN_RATE
+    assert DriveStraight(-2.0).time_limit >= 3 * 2.0 / WALK_SPEED
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_errand_beyond_the_limits_is_refused(sign: float) -> None:
+    TurnInPlace(sign * GREATEST_TURN)
+    DriveStraight(sign * GREATEST_DISTANCE)
+    with pytest.raises(CommandError, match=r"angle must be within \+-62\.8 rad"):
+        TurnInPlace(sign * (GREATEST_TURN + radians(1)))
+    with pytest.raises(CommandError, match=r"distance must be within \+-100 m"):
+        DriveStraight(sign * (GREATEST_DISTANCE + 0.1))

@@ -1,0 +1,159 @@
+"""Modes after calls that failed, and calls that may only say yes to what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from controller import GO2Controller, Mode
+from controller.checks import is_lying, is_sitting, is_standing
+from controller.navigation import DriveStraight, TurnInPlace
+from go2_wbc.legs import Leg
+from go2_wbc.planning.command import ZERO_COMMAND
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+from motions import high_five_plan
+from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant
+
+Check = Callable[[Snapshot, RobotModel], bool]
+UPRIGHT = np.array([0.0, 0.0, 0.31, 0.0, 0.0, 0.0, 1.0, *np.tile([0.0, 0.8, -1.6], 4)])
+
+
+@pytest.fixture
+def plant() -> WatchedPlant:
+    return WatchedPlant()
+
+
+@pytest.fixture
+def go2(plant: WatchedPlant) -> Iterator[GO2Controller]:
+    with GO2Controller(plant=plant) as go2:
+        yield go2
+
+
+# --- only what was measured -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("call", ["stand", "sit", "walk"])
+def test_a_robot_that_does_not_move_never_gets_a_yes(call: str) -> None:
+    # This plant lies still for ever, whatever it is told.
+    with GO2Controller(plant=StillPlant()) as go2:
+        assert getattr(go2, call)() is False
+        assert go2.last_outcome.reason.startswith("stand not done within 3.0 s: base height [m]")
+        assert go2.mode is Mode.MOVING
+        assert go2.last_outcome.measured == {}
+
+
+def test_a_robot_that_is_lifted_is_not_standing(go2: GO2Controller, plant: WatchedPlant) -> None:
+    def lift() -> None:
+        q = go2.state.q.copy()
+        q[2] += 0.5
+        plant.inner.place(q)
+
+    plant.from_time(2.0, lift)
+    assert go2.stand() is False
+    assert go2.mode is not Mode.STANDING
+
+
+def test_a_turn_that_does_not_come_about_says_how_far_it_got(
+    go2: GO2Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert go2.walk()
+    monkeypatch.setattr(TurnInPlace, "command", lambda _self, _state: ZERO_COMMAND)
+    assert go2.turn_left(0.3) is False
+    assert go2.last_outcome.reason.startswith("turn by 17.2 deg not done within 8.9 s: ")
+    assert go2.mode is Mode.WALKING
+
+
+def test_a_walk_that_ends_beside_its_goal_is_not_done(
+    go2: GO2Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert go2.walk()
+    monkeypatch.setattr(DriveStraight, "is_done", lambda _self, _state: True)
+    assert go2.move_forward(0.5) is False
+    assert go2.last_outcome.reason.startswith("walk 0.500 m missed: asked [m] 0.5, walked [m] 0")
+
+
+@pytest.mark.parametrize("check", [is_standing, is_sitting, is_lying])
+def test_a_robot_in_motion_is_in_no_posture(check: Check) -> None:
+    model = RobotModel()
+    with GO2Controller(plant=StillPlant()) as go2:
+        state = go2.state
+    state.v[0] = 0.3
+    assert not check(model.snapshot(state), model)
+
+
+# --- modes after failures ---------------------------------------------------------------------
+
+
+def test_after_a_stand_that_timed_out_the_robot_can_try_again(
+    go2: GO2Controller, plant: WatchedPlant
+) -> None:
+    force = np.array([0.0, 0.0, -250.0])
+    plant.once_at(MID_RISE, lambda: plant.inner.push(force, 4.0))
+    assert go2.stand() is False
+    assert go2.last_outcome.reason.startswith("stand not done")
+    assert go2.mode is Mode.MOVING
+    go2.wait(1.0)
+    assert go2.stand(), go2.last_outcome.reason
+    assert go2.mode is Mode.STANDING
+
+
+def test_a_call_that_is_damped_from_within_a_tick_ends_and_the_next_one_works(
+    go2: GO2Controller, plant: WatchedPlant
+) -> None:
+    plant.once_at(MID_RISE, go2.damp)
+    assert go2.walk() is False
+    assert go2.last_outcome.reason == "damped by damp()"
+    assert go2.mode is Mode.DAMPED
+    assert go2.walk()
+    assert go2.mode is Mode.WALKING
+
+
+def test_while_getting_up_after_a_damped_walk_no_command_is_taken(
+    go2: GO2Controller, plant: WatchedPlant
+) -> None:
+    # The mode fell back to walking as soon as the first behaviour after the damping began.
+    assert go2.walk()
+    go2.damp()
+    go2.wait(1.0)
+    seen: set[Mode] = set()
+    plant.on_write = lambda: seen.add(go2.mode)
+    assert go2.stand()
+    assert seen == {Mode.MOVING}
+
+
+def test_a_high_five_whose_robot_does_not_come_to_rest_is_not_standing_in_the_end() -> None:
+    plan = high_five_plan(RobotModel(), Leg.FR, 0.5)
+    plant = WatchedPlant(MujocoPlant(control_period=2 * PERIOD))
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+
+        def shake() -> None:
+            side = 1.0 if round(plant.inner.time * 10) % 2 else -1.0
+            plant.inner.push(np.array([0.0, 60.0 * side, 0.0]), 2 * PERIOD)
+
+        plant.from_time(go2.state.time + plan.duration + 0.5, shake)
+        assert go2.play(plan) is False
+        assert go2.mode is not Mode.STANDING
+
+
+def test_a_robot_on_its_back_does_not_try_to_stand(
+    go2: GO2Controller, plant: WatchedPlant
+) -> None:
+    q = go2.state.q.copy()
+    q[2], q[3:7] = 0.12, [1.0, 0.0, 0.0, 0.0]
+    plant.inner.place(q)
+    go2.wait(0.5)
+    assert go2.stand() is False
+    assert "cannot stand up from roll" in go2.last_outcome.reason
+    assert "call recover()" in go2.last_outcome.reason
+    assert go2.mode is not Mode.STANDING
+
+
+def test_figures_are_measured_only_when_it_was_done(go2: GO2Controller) -> None:
+    assert go2.stand()
+    assert go2.last_outcome.measured["feet in contact"] == 4.0
+    assert bool(go2.last_outcome) is True

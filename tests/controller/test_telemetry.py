@@ -1,0 +1,100 @@
+"""Telemetry keeps the newest ticks, thins them evenly, and remembers the peaks of the whole run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.telemetry import Telemetry
+from go2_wbc.errors import CommandError
+from go2_wbc.robot.model import RobotModel
+from tests.controller.plants import lying_state
+
+CAPACITY = 50
+PERIOD = 0.002
+ALL = np.ones(4, dtype=bool)
+
+
+@pytest.fixture(scope="module")
+def model() -> RobotModel:
+    return RobotModel()
+
+
+def recorded(model: RobotModel, ticks: int, first: int = 0) -> Telemetry:
+    telemetry = Telemetry(model, CAPACITY)
+    for tick in range(first, first + ticks):
+        snapshot = model.snapshot(lying_state(tick * PERIOD))
+        telemetry.record(snapshot, ALL, f"tick {tick}")
+    return telemetry
+
+
+def test_without_a_tick_the_recording_is_empty(model: RobotModel) -> None:
+    recording = Telemetry(model, CAPACITY).recording()
+    assert len(recording.time) == 0
+    assert recording.duration == 0.0
+
+
+@pytest.mark.parametrize("ticks", [1, 2, CAPACITY - 1, CAPACITY, CAPACITY + 1, 3 * CAPACITY + 7])
+def test_the_newest_ticks_are_kept_in_order(model: RobotModel, ticks: int) -> None:
+    recording = recorded(model, ticks).recording(rate=1 / PERIOD)
+    kept = range(max(0, ticks - CAPACITY), ticks)
+    assert recording.time == pytest.approx(PERIOD * np.array(kept))
+    assert recording.labels == tuple(f"tick {tick}" for tick in kept)
+
+
+@pytest.mark.parametrize(("rate", "count"), [(500.0, 50), (250.0, 25), (100.0, 10), (1e6, 50)])
+def test_a_recording_is_thinned_evenly_to_about_the_rate(
+    model: RobotModel, rate: float, count: int
+) -> None:
+    time = recorded(model, CAPACITY).recording(rate).time
+    assert len(time) == count
+    assert np.ptp(np.diff(time)) < 1e-9
+
+
+def test_a_plant_that_was_silent_for_some_ticks_can_be_recorded(model: RobotModel) -> None:
+    telemetry = Telemetry(model, CAPACITY)
+    snapshot = model.snapshot(lying_state(1.0))
+    for _ in range(5):
+        telemetry.record(snapshot, ALL, "silent")
+    assert set(telemetry.recording().time) == {1.0}
+
+
+def test_a_recording_does_not_change_later(model: RobotModel) -> None:
+    telemetry = recorded(model, CAPACITY)
+    recording = telemetry.recording()
+    before = recording.time.copy(), recording.q.copy()
+    state = lying_state(9.0)
+    for _ in range(CAPACITY):
+        telemetry.record(model.snapshot(replace(state, q=state.q + 0.1)), ALL, "later")
+    assert np.array_equal(recording.time, before[0])
+    assert np.array_equal(recording.q, before[1])
+
+
+def test_the_peaks_are_those_of_the_whole_run_as_shares_of_the_limits(model: RobotModel) -> None:
+    telemetry = Telemetry(model, CAPACITY)
+    tau, v = np.zeros(12), np.zeros(18)
+    tau[4] = -0.8 * model.torque_limits[4]
+    v[6 + 2] = 0.6 * model.speed_limits[2]
+    telemetry.record(model.snapshot(replace(lying_state(0.0), tau=tau, v=v)), ALL, "peak")
+    for tick in range(1, 2 * CAPACITY):
+        telemetry.record(model.snapshot(lying_state(tick * PERIOD)), ALL, "calm")
+    assert telemetry.peak_torque_ratio == pytest.approx(0.8)
+    assert telemetry.peak_speed_ratio == pytest.approx(0.6)
+
+
+def test_the_support_margin_is_that_of_the_planned_stance_feet(model: RobotModel) -> None:
+    telemetry = Telemetry(model, CAPACITY)
+    stances = ALL, np.array([True, False, True, True]), np.array([True, False, False, True])
+    for tick, stance in enumerate(stances):
+        telemetry.record(model.snapshot(lying_state(tick * PERIOD)), stance, "stance")
+    four, three, two = telemetry.recording(rate=1e6).support_margin
+    assert four > three
+    assert np.isnan(two)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan")])
+def test_a_rate_that_is_not_positive_is_refused(model: RobotModel, rate: float) -> None:
+    with pytest.raises(CommandError, match="rate must be positive"):
+        recorded(model, 3).recording(rate)

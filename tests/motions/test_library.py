@@ -1,0 +1,100 @@
+"""The library is found by name, and every motion in it is feasible and well formed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from go2_wbc.errors import CommandError
+from go2_wbc.legs import Leg
+from go2_wbc.reference import Stance
+from go2_wbc.robot.model import RobotModel
+from motions import check_plan, high_five_plan, load_motion, motion_names
+
+# Between a difference quotient over 2 ms and the derivative; the curves are smooth.
+DIFFERENCE_TOLERANCE = 2e-2
+STEP = 1e-3
+
+
+@pytest.fixture(scope="module")
+def model() -> RobotModel:
+    return RobotModel()
+
+
+def test_the_names_are_sorted_and_contain_the_high_fives() -> None:
+    names = motion_names()
+    assert list(names) == sorted(set(names))
+    assert {"high_five", "high_five_left"} <= set(names)
+
+
+@pytest.mark.parametrize("name", ["", "High_Five", "moonwalk"])
+def test_an_unknown_name_is_refused_with_the_valid_ones(model: RobotModel, name: str) -> None:
+    with pytest.raises(CommandError, match=f"unknown motion '{name}'; valid: ") as caught:
+        load_motion(name, model)
+    assert all(valid in str(caught.value) for valid in motion_names())
+
+
+@pytest.mark.parametrize("name", motion_names())
+def test_every_motion_of_the_library_is_feasible_and_holds_its_ends(
+    model: RobotModel, name: str
+) -> None:
+    plan = load_motion(name, model)
+    check_plan(plan, model)
+    assert plan.duration > 0.0
+    for inside, outside in ((0.0, -5.0), (plan.duration, plan.duration + 5.0)):
+        here, there = plan.at(inside), plan.at(outside)
+        assert np.allclose(here.body.p_world, there.body.p_world)
+        assert np.allclose(here.q_joints, there.q_joints)
+        assert not there.body.v_world.any()
+        assert not there.v_joints.any()
+        assert there.stance.all()
+
+
+@pytest.mark.parametrize("name", motion_names())
+def test_velocities_are_the_derivatives_of_positions(model: RobotModel, name: str) -> None:
+    plan = load_motion(name, model)
+    rng = np.random.default_rng(1)
+    for t in rng.uniform(0.0, plan.duration, 60):
+        before, now, after = (plan.at(float(t) + shift) for shift in (-STEP, 0.0, STEP))
+        p_rate = (after.body.p_world - before.body.p_world) / (2 * STEP)
+        q_rate = (after.q_joints - before.q_joints) / (2 * STEP)
+        assert now.body.v_world == pytest.approx(p_rate, abs=DIFFERENCE_TOLERANCE)
+        assert now.v_joints == pytest.approx(q_rate, abs=DIFFERENCE_TOLERANCE)
+        spin = after.body.R_world_base @ before.body.R_world_base.T
+        w_rate = np.array([spin[2, 1], spin[0, 2], spin[1, 0]]) / (2 * STEP)
+        assert now.body.w_world == pytest.approx(w_rate, abs=DIFFERENCE_TOLERANCE)
+
+
+@pytest.mark.parametrize("name", motion_names())
+def test_a_foot_is_unloaded_before_it_lifts_and_loaded_only_after_it_lands(
+    model: RobotModel, name: str
+) -> None:
+    plan = load_motion(name, model)
+    times = np.arange(0.0, plan.duration, 0.005)
+    loads = np.array([plan.at(float(t)).normal_force_max for t in times])
+    stances = np.array([plan.at(float(t)).stance for t in times])
+    assert not loads[~stances].any()
+    change = np.abs(np.diff(loads, axis=0)).max()
+    assert change < 0.05 * loads.max()
+
+
+def test_a_left_high_five_is_the_mirror_image_of_a_right_one(model: RobotModel) -> None:
+    left, right = (high_five_plan(model, leg, 1.0) for leg in (Leg.FL, Leg.FR))
+    assert left.duration == right.duration
+    mirror = np.array([1.0, -1.0, 1.0])
+    for t in np.linspace(0.0, left.duration, 25):
+        a, b = left.at(float(t)), right.at(float(t))
+        assert a.body.p_world == pytest.approx(mirror * b.body.p_world, abs=2e-3)
+        paw_a, paw_b = a.q_joints[Leg.FL.joints], b.q_joints[Leg.FR.joints]
+        assert paw_a == pytest.approx([-paw_b[0], *paw_b[1:]], abs=2e-2)
+        assert a.stance.tolist() == b.stance[[1, 0, 3, 2]].tolist()
+
+
+@pytest.mark.parametrize("hold", [0.5, 2.0, 7.0])
+def test_the_paw_is_held_for_the_time_asked_for(model: RobotModel, hold: float) -> None:
+    plan = high_five_plan(model, Leg.FR, hold)
+    assert plan.hold_end - plan.hold_start == pytest.approx(hold)
+    times = np.linspace(plan.hold_start, plan.hold_end, 9)
+    joints = [plan.at(float(t)).q_joints for t in times]
+    assert np.ptp(joints, axis=0).max() < 1e-9
+    assert (plan.entry, plan.exit) == (Stance.STAND, Stance.STAND)

@@ -1,0 +1,49 @@
+"""The ways between postures start where the robot is and end where they say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from go2_wbc.reference import MotionPlan, Stance
+from motions.postures import LIE_POSE, SIT_POSE, STAND_POSE, lie_down, rise, sit_down
+
+START = np.array([0.02, -0.01, 0.25, 0.05, -0.1, 0.2])
+WAYS: list[tuple[Callable[[np.ndarray], MotionPlan], np.ndarray, Stance]] = [
+    (lambda pose: rise(pose, Stance.LIE), STAND_POSE, Stance.STAND),
+    (sit_down, SIT_POSE, Stance.SIT),
+    (lie_down, LIE_POSE, Stance.LIE),
+]
+
+
+@pytest.mark.parametrize(("make", "goal", "stance"), WAYS)
+def test_a_way_leads_from_the_measured_pose_to_its_posture_at_rest_on_four_feet(
+    make: Callable[[np.ndarray], MotionPlan], goal: np.ndarray, stance: Stance
+) -> None:
+    plan = make(START)
+    first, last = plan.at(0.0), plan.at(plan.duration)
+    assert first.body.p_world == pytest.approx(START[:3])
+    assert last.body.p_world == pytest.approx(goal[:3])
+    assert not np.concatenate([first.body.v_world, last.body.v_world]).any()
+    assert plan.exit is stance
+    assert all(plan.at(float(t)).stance.all() for t in np.linspace(0.0, plan.duration, 20))
+
+
+@pytest.mark.parametrize(("make", "goal", "stance"), WAYS)
+def test_a_way_does_not_overshoot(
+    make: Callable[[np.ndarray], MotionPlan], goal: np.ndarray, stance: Stance
+) -> None:
+    plan = make(START)
+    assert plan.exit is stance
+    heights = [plan.at(float(t)).body.p_world[2] for t in np.linspace(0.0, plan.duration, 50)]
+    assert min(heights) >= min(START[2], goal[2]) - 1e-9
+    assert max(heights) <= max(START[2], goal[2]) + 1e-9
+    rises = np.diff(heights) * np.sign(goal[2] - START[2])
+    assert rises.min() > -1e-9
+
+
+def test_the_stance_in_which_a_rise_starts_is_the_one_that_was_given() -> None:
+    for stance in Stance:
+        assert rise(START, stance).entry is stance

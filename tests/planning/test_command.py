@@ -1,0 +1,118 @@
+"""Velocity commands: what is refused, and how the envelope clips."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from go2_wbc.errors import CommandError
+from go2_wbc.planning import command as command_module
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
+
+ROUNDING = 1e-12  # of a ratio of numbers of order one
+HUGE = pytest.param(10**400, id="an integer beyond every float")
+NAMES = ("linear_x", "linear_y", "angular_z")
+speeds = st.floats(-1e6, 1e6)
+commands = st.builds(VelocityCommand, speeds, speeds, speeds)
+bounds = st.floats(0.1, 5.0)
+envelopes = st.builds(VelocityEnvelope, bounds, bounds, bounds, bounds)
+
+
+def components(command: VelocityCommand) -> np.ndarray:
+    return np.array([command.linear_x, command.linear_y, command.angular_z])
+
+
+def load(envelope: VelocityEnvelope, command: VelocityCommand) -> float:
+    x = command.linear_x / (envelope.forward if command.linear_x >= 0 else envelope.backward)
+    return math.hypot(x, command.linear_y / envelope.lateral, command.angular_z / envelope.turning)
+
+
+@pytest.fixture(scope="module")
+def unchecked() -> ModuleType:
+    """The module as users have it: under pytest, the checks of annotations come before its own."""
+    name, path = command_module.__name__, command_module.__file__
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, np.float32("nan"), HUGE])
+def test_what_is_not_finite_is_refused_by_name(
+    unchecked: ModuleType, name: str, value: float
+) -> None:
+    with pytest.raises(CommandError, match=f"{name} must be finite"):
+        unchecked.VelocityCommand(**{name: value})
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("value", [True, "0.5", None, [0.1], 1j, np.bool_(True), np.complex128(1)])
+def test_what_is_no_real_number_is_refused_by_name(
+    unchecked: ModuleType,
+    name: str,
+    value: Any,  # noqa: ANN401
+) -> None:
+    with pytest.raises(CommandError, match=f"{name} must be a number, got"):
+        unchecked.VelocityCommand(**{name: value})
+
+
+@pytest.mark.parametrize("value", [1, np.float32(0.5), np.int64(-1), 0.25], ids=repr)
+def test_every_kind_of_real_number_is_accepted(unchecked: ModuleType, value: float) -> None:
+    assert unchecked.VelocityCommand(linear_x=value).linear_x == value
+
+
+@given(commands)
+def test_only_the_command_of_three_zeros_asks_the_robot_to_stay(command: VelocityCommand) -> None:
+    assert command.is_zero == (not components(command).any())
+
+
+def test_the_zero_command_is_zero() -> None:
+    assert ZERO_COMMAND.is_zero
+
+
+@given(envelopes, commands)
+def test_a_clipped_command_lies_inside(
+    envelope: VelocityEnvelope, command: VelocityCommand
+) -> None:
+    clipped = envelope.clip(command)
+    assert load(envelope, clipped) <= 1.0 + ROUNDING
+    assert -envelope.backward - ROUNDING <= clipped.linear_x <= envelope.forward + ROUNDING
+    assert abs(clipped.linear_y) <= envelope.lateral + ROUNDING
+    assert abs(clipped.angular_z) <= envelope.turning + ROUNDING
+
+
+@given(envelopes, commands)
+def test_clipping_keeps_the_direction_and_uses_the_whole_envelope(
+    envelope: VelocityEnvelope, command: VelocityCommand
+) -> None:
+    asked, clipped = components(command), components(envelope.clip(command))
+    if load(envelope, command) <= 1.0:
+        np.testing.assert_array_equal(clipped, asked)
+        return
+    assert load(envelope, envelope.clip(command)) == pytest.approx(1.0)
+    unit = asked / np.linalg.norm(asked)
+    np.testing.assert_allclose(clipped / np.linalg.norm(clipped), unit, atol=ROUNDING)
+
+
+@given(envelopes, commands)
+def test_clipping_twice_is_clipping_once(
+    envelope: VelocityEnvelope, command: VelocityCommand
+) -> None:
+    once = envelope.clip(command)
+    np.testing.assert_allclose(components(envelope.clip(once)), components(once), rtol=ROUNDING)
+
+
+def test_backwards_has_its_own_bound() -> None:
+    envelope = VelocityEnvelope(forward=2.0, backward=0.5)
+    assert envelope.clip(VelocityCommand(9.0)).linear_x == pytest.approx(2.0)
+    assert envelope.clip(VelocityCommand(-9.0)).linear_x == pytest.approx(-0.5)

@@ -1,0 +1,84 @@
+"""Swing feet: where they start, how high they go, where they land, and their derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from go2_wbc.planning.swing import SwingConfig, swing_foot
+
+EXACT = 1e-12  # rounding of numbers of order one
+STEP = 1e-5  # [s] of the central differences
+SLOPE_TOLERANCE = 1e-6  # [m/s] their error: step^2 times the third derivative; measured 4e-9
+CURVATURE_TOLERANCE = 1e-4  # [m/s^2] rounding, 1e-16 / step^2; measured 3e-6
+DURATION = 0.18
+CONFIG = SwingConfig(apex=0.06, touchdown_depth=0.008)
+LAST = 1.0 - 1e-12
+
+coordinates = st.floats(-0.5, 0.5)
+points = st.tuples(coordinates, coordinates, st.floats(-0.1, 0.1)).map(np.array)
+
+
+def swing(start: np.ndarray, goal: np.ndarray, progress: float) -> tuple[np.ndarray, ...]:
+    return swing_foot(start, goal, progress, DURATION, CONFIG)
+
+
+@given(points, points)
+def test_a_swing_starts_at_rest_where_the_foot_left_the_ground(
+    start: np.ndarray, goal: np.ndarray
+) -> None:
+    p, v, _ = swing(start, goal, 0.0)
+    np.testing.assert_allclose(p, start, atol=EXACT)
+    np.testing.assert_allclose(v, 0.0, atol=EXACT)
+
+
+@given(points, points)
+def test_it_ends_at_rest_at_the_goal_the_touchdown_depth_below_the_ground(
+    start: np.ndarray, goal: np.ndarray
+) -> None:
+    p, v, _ = swing(start, goal, LAST)
+    np.testing.assert_allclose(p, goal - [0.0, 0.0, CONFIG.touchdown_depth], atol=1e-9)
+    np.testing.assert_allclose(v, 0.0, atol=1e-9)
+
+
+@given(points, points)
+def test_it_passes_its_apex_half_way(start: np.ndarray, goal: np.ndarray) -> None:
+    apex = max(start[2], goal[2]) + CONFIG.apex
+    p, v, _ = swing(start, goal, 0.5)
+    assert p[2] == pytest.approx(apex, abs=EXACT)
+    assert v[2] == pytest.approx(0.0, abs=EXACT)
+    np.testing.assert_allclose(p[:2], (start[:2] + goal[:2]) / 2, atol=EXACT)
+    heights = [swing(start, goal, s)[0][2] for s in np.linspace(0.0, LAST, 41)]
+    assert max(heights) <= apex + EXACT
+    assert (np.diff(heights[:21]) > 0).all()
+    assert (np.diff(heights[20:]) < 0).all()
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_velocity_and_acceleration_are_the_derivatives_for_a_fixed_goal(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    start, goal = rng.uniform(-0.2, 0.2, size=(2, 3))
+    for progress in (*rng.uniform(0.01, 0.49, size=5), *rng.uniform(0.51, 0.99, size=5)):
+        before, now, after = (
+            swing(start, goal, progress + d / DURATION) for d in (-STEP, 0.0, STEP)
+        )
+        slope = (after[0] - before[0]) / (2 * STEP)
+        curvature = (after[0] - 2 * now[0] + before[0]) / STEP**2
+        np.testing.assert_allclose(now[1], slope, atol=SLOPE_TOLERANCE)
+        np.testing.assert_allclose(now[2], curvature, atol=CURVATURE_TOLERANCE)
+
+
+def test_position_and_velocity_are_continuous_at_the_apex() -> None:
+    start, goal = np.random.default_rng(2).uniform(-0.2, 0.2, size=(2, 3))
+    before, after = swing(start, goal, 0.5 - 1e-12), swing(start, goal, 0.5)
+    np.testing.assert_allclose(before[0], after[0], atol=1e-9)
+    np.testing.assert_allclose(before[1], after[1], atol=1e-9)
+
+
+def test_a_goal_that_moves_late_is_still_reached() -> None:
+    start, goal, late = np.zeros(3), np.array([0.1, 0.0, 0.0]), np.array([0.14, 0.03, 0.01])
+    assert not np.allclose(swing(start, goal, 0.9)[0], swing(start, late, 0.9)[0])
+    p, _, _ = swing(start, late, LAST)
+    np.testing.assert_allclose(p[:2], late[:2], atol=1e-9)

@@ -1,0 +1,94 @@
+"""Rotations against Pinocchio, and their derivatives against finite differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from go2_wbc.robot.rotations import (
+    angular_velocity_from_rpy,
+    cross,
+    exp_rotation,
+    log_rotation,
+    rotation_from_rpy,
+    wrap_angle,
+    yaw_rotation,
+)
+
+EXACT = 1e-12  # rounding of numbers of order one
+STEP = 1e-5  # [s] of the central differences
+DIFFERENCE = 1e-6  # their error: step^2 times third derivatives, and rounding / step
+SEEDS = range(20)
+
+
+def axis_rotation(axis: int, angle: float) -> np.ndarray:
+    return pin.AngleAxis(angle, np.eye(3)[axis]).matrix()
+
+
+def random_angles(rng: np.random.Generator) -> np.ndarray:
+    return rng.uniform([-3.0, -1.4, -3.0], [3.0, 1.4, 3.0])
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_rpy_are_turns_about_x_then_y_then_z_of_the_world(seed: int) -> None:
+    roll, pitch, yaw = random_angles(np.random.default_rng(seed))
+    product = axis_rotation(2, yaw) @ axis_rotation(1, pitch) @ axis_rotation(0, roll)
+    np.testing.assert_allclose(rotation_from_rpy(roll, pitch, yaw), product, atol=EXACT)
+    np.testing.assert_allclose(yaw_rotation(yaw), axis_rotation(2, yaw), atol=EXACT)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_logarithm_is_axis_times_angle_and_undone_by_exp(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    angle = rng.uniform(0.0, 3.1)
+    R = pin.AngleAxis(angle, axis).matrix()
+    np.testing.assert_allclose(log_rotation(R), angle * axis, atol=1e-10)
+    np.testing.assert_allclose(exp_rotation(angle * axis), R, atol=EXACT)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_near_the_target_the_error_shrinks_at_the_relative_angular_velocity(seed: int) -> None:
+    """d log(R' R_des) / dt = w_des - w in base axes at R = R_des: the law of the orientation task."""
+    rng = np.random.default_rng(seed)
+    R = rotation_from_rpy(*random_angles(rng))
+    w, w_des = rng.normal(size=(2, 3))  # both in base axes
+
+    def error(t: float) -> np.ndarray:
+        return log_rotation((R @ pin.exp3(w * t)).T @ (R @ pin.exp3(w_des * t)))
+
+    rate = (error(STEP) - error(-STEP)) / (2 * STEP)
+    np.testing.assert_allclose(rate, w_des - w, atol=DIFFERENCE)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_angular_velocity_and_acceleration_are_the_derivatives_of_the_rotation(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rpy, rate, acceleration = random_angles(rng), rng.normal(size=3), rng.normal(size=3)
+
+    def at(t: float) -> tuple[np.ndarray, np.ndarray]:
+        return rpy + rate * t + acceleration * t * t / 2, rate + acceleration * t
+
+    w, dw = angular_velocity_from_rpy(rpy, rate, acceleration)
+    before, after = (rotation_from_rpy(*at(t)[0]) for t in (-STEP, STEP))
+    np.testing.assert_allclose(w, log_rotation(after @ before.T) / (2 * STEP), atol=DIFFERENCE)
+    w_before, w_after = (angular_velocity_from_rpy(*at(t), acceleration)[0] for t in (-STEP, STEP))
+    np.testing.assert_allclose(dw, (w_after - w_before) / (2 * STEP), atol=DIFFERENCE)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_fast_cross_product_is_numpys(seed: int) -> None:
+    a, b = np.random.default_rng(seed).normal(size=(2, 3))
+    np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
+
+
+@given(st.floats(-100.0, 100.0))
+def test_a_wrapped_angle_is_the_same_direction_within_half_a_turn(angle: float) -> None:
+    wrapped = wrap_angle(angle)
+    assert -np.pi <= wrapped <= np.pi
+    assert np.cos(wrapped) == pytest.approx(np.cos(angle), abs=1e-9)
+    assert np.sin(wrapped) == pytest.approx(np.sin(angle), abs=1e-9)

@@ -1,0 +1,217 @@
+"""The snapshot's quantities against finite differences of Pinocchio's configurations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from go2_wbc.legs import FOOT_NAMES, LEGS
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import RobotState
+from tests.engine_helpers import moved, random_state, state_of
+
+STEP = 1e-5  # [s] of the central differences
+DIFFERENCE = 1e-6  # error of a first difference; measured 3e-9
+SECOND_STEP = 1e-4  # [s] larger: rounding enters a second difference as 1e-16 / step^2
+SECOND_DIFFERENCE = 1e-4  # [m/s^2] of second differences; measured 1e-6
+EXACT = 1e-10  # the same quantity by another algorithm, numbers up to 100
+SEEDS = range(15)
+
+MODEL = RobotModel()
+
+
+def scene(seed: int) -> tuple[RobotState, np.ndarray, Snapshot]:
+    """A brisk random state, an acceleration, and the state's snapshot."""
+    rng = np.random.default_rng(seed)
+    state = random_state(rng, tilt=0.3)
+    return state, rng.normal(scale=3.0, size=18), MODEL.snapshot(state)
+
+
+def difference(
+    quantity: Callable[[Snapshot], np.ndarray], state: RobotState, a: np.ndarray
+) -> np.ndarray:
+    """Rate of a quantity along the motion with acceleration ``a``."""
+    before, after = (quantity(MODEL.snapshot(moved(MODEL, state, a, dt))) for dt in (-STEP, STEP))
+    return (after - before) / (2 * STEP)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_mass_matrix_is_symmetric_positive_definite_and_pinocchios(seed: int) -> None:
+    state, a, snapshot = scene(seed)
+    M, robot = snapshot.mass_matrix, MODEL.pin_model
+    np.testing.assert_array_equal(M, M.T)
+    assert np.linalg.eigvalsh(M)[0] > 0.0
+    data = robot.createData()
+    np.testing.assert_allclose(
+        M @ a + snapshot.bias, pin.rnea(robot, data, state.q, state.v, a), atol=EXACT
+    )
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_bias_is_the_inverse_dynamics_without_acceleration(seed: int) -> None:
+    state, _, snapshot = scene(seed)
+    data = MODEL.pin_model.createData()
+    bias = pin.rnea(MODEL.pin_model, data, state.q, state.v, np.zeros(18))
+    np.testing.assert_allclose(snapshot.bias, bias, atol=EXACT)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_energy_grows_at_the_power_of_the_generalised_force(seed: int) -> None:
+    """d/dt (v' M v / 2 + m g z) = v' (M a + h) ties M, h and the CoM together."""
+    state, a, snapshot = scene(seed)
+
+    def energy(s: Snapshot) -> np.ndarray:
+        v = s.state.v
+        return v @ s.mass_matrix @ v / 2 + MODEL.mass * MODEL.gravity * s.p_world_com[2]
+
+    power = state.v @ (snapshot.mass_matrix @ a + snapshot.bias)
+    np.testing.assert_allclose(difference(energy, state, a), power, rtol=1e-6, atol=1e-4)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_com_is_pinocchios_and_its_velocity_the_rate_of_its_position(seed: int) -> None:
+    state, a, snapshot = scene(seed)
+    data = MODEL.pin_model.createData()
+    com = pin.centerOfMass(MODEL.pin_model, data, state.q, state.v)
+    np.testing.assert_allclose(snapshot.p_world_com, com, atol=EXACT)
+    np.testing.assert_allclose(snapshot.v_world_com, data.vcom[0], atol=EXACT)
+    rate = difference(lambda s: s.p_world_com, state, a)
+    np.testing.assert_allclose(snapshot.v_world_com, rate, atol=DIFFERENCE)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_com_jacobian_and_drift_give_the_rate_of_its_velocity(seed: int) -> None:
+    state, a, snapshot = scene(seed)
+    data = MODEL.pin_model.createData()
+    J = pin.jacobianCenterOfMass(MODEL.pin_model, data, state.q)
+    np.testing.assert_allclose(snapshot.J_com, J, atol=EXACT)
+    rate = difference(lambda s: s.v_world_com, state, a)
+    np.testing.assert_allclose(snapshot.J_com @ a + snapshot.drift_com, rate, atol=DIFFERENCE)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_foot_velocities_are_the_rates_of_the_foot_positions(seed: int) -> None:
+    state, a, snapshot = scene(seed)
+    rate = difference(lambda s: s.p_world_feet, state, a)
+    np.testing.assert_allclose(snapshot.v_world_feet, rate, atol=DIFFERENCE)
+    np.testing.assert_allclose(snapshot.J_feet @ state.v, snapshot.v_world_feet, atol=EXACT)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_foot_jacobians_and_drifts_give_the_rate_of_the_foot_velocities(seed: int) -> None:
+    state, a, snapshot = scene(seed)
+    rate = difference(lambda s: s.v_world_feet, state, a)
+    np.testing.assert_allclose(snapshot.J_feet @ a + snapshot.drift_feet, rate, atol=DIFFERENCE)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_contact_jacobians_and_drifts_give_the_rate_of_the_contact_velocities(seed: int) -> None:
+    """The contact point moves over the foot: its velocity is that of ever new material."""
+    state, a, snapshot = scene(seed)
+    rate = difference(lambda s: s.v_world_contacts, state, a)
+    expected = snapshot.J_contacts @ a + snapshot.drift_contacts
+    np.testing.assert_allclose(expected, rate, atol=DIFFERENCE)
+
+
+def material_points(state: RobotState, p_foot_points: np.ndarray) -> np.ndarray:
+    """Where points fixed to the feet, given in foot axes (4, 3), are in the world."""
+    robot = MODEL.pin_model
+    data = robot.createData()
+    pin.framesForwardKinematics(robot, data, state.q)
+    poses = [data.oMf[robot.getFrameId(name)] for name in FOOT_NAMES]
+    return np.array([T.act(p) for T, p in zip(poses, p_foot_points, strict=True)])
+
+
+def lowest_points(state: RobotState) -> np.ndarray:
+    """The sphere's lowest material point of each foot, in foot axes (4, 3)."""
+    robot = MODEL.pin_model
+    data = robot.createData()
+    pin.framesForwardKinematics(robot, data, state.q)
+    down = np.array([0.0, 0.0, -MODEL.foot_radius])
+    return np.array([data.oMf[robot.getFrameId(name)].rotation.T @ down for name in FOOT_NAMES])
+
+
+def foot_spins(state: RobotState) -> np.ndarray:
+    """Angular velocity of each foot in the world (4, 3)."""
+    robot = MODEL.pin_model
+    data = robot.createData()
+    pin.forwardKinematics(robot, data, state.q, state.v)
+    pin.updateFramePlacements(robot, data)
+    aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    frames = [robot.getFrameId(name) for name in FOOT_NAMES]
+    return np.array([pin.getFrameVelocity(robot, data, f, aligned).angular for f in frames])
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_contact_velocity_is_that_of_the_spheres_lowest_material_point(seed: int) -> None:
+    state, a, snapshot = scene(seed)
+    marks = lowest_points(state)
+    before, after = (
+        material_points(moved(MODEL, state, a, dt), marks) for dt in (-STEP, STEP)
+    )
+    rate = (after - before) / (2 * STEP)
+    np.testing.assert_allclose(snapshot.v_world_contacts, rate, atol=DIFFERENCE)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_material_point_has_the_contact_acceleration_and_a_centripetal_one(seed: int) -> None:
+    state, a, snapshot = scene(seed)
+    marks = lowest_points(state)
+    before, now, after = (
+        material_points(moved(MODEL, state, a, dt), marks)
+        for dt in (-SECOND_STEP, 0.0, SECOND_STEP)
+    )
+    acceleration = (after - 2 * now + before) / SECOND_STEP**2
+    w = foot_spins(state)
+    centripetal = np.cross(w, np.cross(w, [0.0, 0.0, -MODEL.foot_radius]))
+    expected = snapshot.J_contacts @ a + snapshot.drift_contacts + centripetal
+    np.testing.assert_allclose(acceleration, expected, atol=SECOND_DIFFERENCE)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_foot_without_contact_velocity_rolls_like_a_sphere_on_a_plane(seed: int) -> None:
+    """Its centre moves at r w x n, so the path of the centre is r times the angle turned."""
+    state, _, snapshot = scene(seed)
+    J = snapshot.J_contacts.reshape(12, 18)
+    rolling = state.v - np.linalg.pinv(J) @ (J @ state.v)
+    rolled = MODEL.snapshot(state_of(state.q, rolling))
+    np.testing.assert_allclose(rolled.v_world_contacts, 0.0, atol=EXACT)
+    w = foot_spins(rolled.state)
+    normal = np.array([0.0, 0.0, 1.0])
+    expected = MODEL.foot_radius * np.cross(w, normal)
+    np.testing.assert_allclose(rolled.v_world_feet, expected, atol=EXACT)
+    assert np.abs(rolled.v_world_feet).max() > 1e-3
+
+
+def test_with_point_feet_the_contact_is_the_foot_frame() -> None:
+    snapshot = RobotModel(foot_radius=0.0).snapshot(random_state(np.random.default_rng(1)))
+    np.testing.assert_array_equal(snapshot.J_contacts, snapshot.J_feet)
+    np.testing.assert_array_equal(snapshot.drift_contacts, snapshot.drift_feet)
+    np.testing.assert_array_equal(snapshot.v_world_contacts, snapshot.v_world_feet)
+
+
+def test_a_foot_moves_with_the_base_and_its_own_leg_only() -> None:
+    _, _, snapshot = scene(0)
+    for leg in LEGS:
+        for J in (snapshot.J_feet[leg], snapshot.J_contacts[leg]):
+            others = np.ones(18, dtype=bool)
+            others[:6] = False
+            others[leg.velocities] = False
+            assert not J[:, others].any()
+            assert np.linalg.matrix_rank(J[:, leg.velocities]) == 3
+
+
+def test_a_snapshot_does_not_change_with_the_next_one() -> None:
+    """Pinocchio reuses its memory; a snapshot that shared it would change behind its holder."""
+    state, _, held = scene(3)
+    fields = [name for name in held.__dataclass_fields__ if name != "state"]
+    before = {name: np.array(getattr(held, name)) for name in fields}
+    MODEL.snapshot(random_state(np.random.default_rng(4)))
+    MODEL.forward_kinematics(random_state(np.random.default_rng(5)).q)
+    for name in fields:
+        np.testing.assert_array_equal(getattr(held, name), before[name], err_msg=name)
+    assert held.state is state

@@ -1,0 +1,119 @@
+"""A TOML file overrides what it names, and everything that is wrong in it is named."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from controller import GO2Controller
+from go2_wbc.config import Config, load_config, override
+from go2_wbc.errors import ConfigError
+from tests.controller.plants import StillPlant
+
+
+def written(tmp_path: Path, text: str) -> Path:
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_an_empty_file_changes_nothing(tmp_path: Path) -> None:
+    assert load_config(written(tmp_path, "")) == Config()
+
+
+def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path: Path) -> None:
+    text = """
+    backend = "full"
+    [locomotion]
+    height = 0.27
+    [wbc]
+    solver = "proxqp"
+    swing_foot = { kp = [400, 401, 402.5], kd = [35, 35, 35] }
+    [safety]
+    qp_patience = 3
+    """
+    config, default = load_config(written(tmp_path, text)), Config()
+    assert config.backend == "full"
+    assert config.locomotion.height == 0.27
+    assert config.wbc.solver == "proxqp"
+    assert config.wbc.swing_foot.kp == (400.0, 401.0, 402.5)
+    assert all(type(gain) is float for gain in config.wbc.swing_foot.kp)
+    assert config.safety.qp_patience == 3
+    assert config.envelope == default.envelope
+    assert config.wbc.body_position == default.wbc.body_position
+    assert config.locomotion.swing == default.locomotion.swing
+
+
+def test_one_half_of_a_nested_table_may_be_left_out(tmp_path: Path) -> None:
+    config = load_config(written(tmp_path, "[wbc.swing_foot]\nkp = [1, 2, 3]"))
+    assert config.wbc.swing_foot.kp == (1.0, 2.0, 3.0)
+    assert config.wbc.swing_foot.kd == Config().wbc.swing_foot.kd
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("speed = 1", r"unknown key 'speed'; valid: backend, envelope, locomotion, safety, wbc"),
+        ("[wbc]\nsolvr = 'daqp'", r"mine\.toml: wbc: unknown key 'solvr'; valid: .*solver"),
+        ("[wbc.swing_foot]\nki = [1, 1, 1]", r"wbc: swing_foot: unknown key 'ki'; valid: kd, kp"),
+        ("wbc = 3", r"wbc must be a table, got 3"),
+        ("[locomotion]\nheight = 'tall'", r"locomotion: height must be a finite number, got 'tall'"),
+        ("[locomotion]\nheight = true", r"height must be a finite number, got True"),
+        ("[locomotion]\nheight = nan", r"height must be a finite number, got nan"),
+        ("[locomotion]\nheight = inf", r"height must be a finite number, got inf"),
+        ("[safety]\nqp_patience = 2.5", r"qp_patience must be of type int, got 2\.5"),
+        ("[safety]\nqp_patience = true", r"qp_patience must be of type int, got True"),
+        ("backend = 1", r"backend must be of type str, got 1"),
+        ("[wbc.swing_foot]\nkp = [1, 2]", r"kp must be a list of 3 numbers, got \[1, 2\]"),
+        ("[wbc.swing_foot]\nkp = 400", r"kp must be a list of 3 numbers, got 400"),
+        ("[wbc.swing_foot]\nkp = [1, 'a', 3]", r"kp must be a finite number, got 'a'"),
+    ],
+)
+def test_a_wrong_key_or_value_is_refused_by_its_place(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    with pytest.raises(ConfigError, match=message):
+        load_config(written(tmp_path, text))
+
+
+def test_a_file_that_is_not_toml_is_refused_with_the_place(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"mine\.toml is not valid TOML: .*line 1"):
+        load_config(written(tmp_path, "height = = 3"))
+
+
+def test_a_file_that_is_not_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match=r"mine\.toml is not valid TOML"):
+        load_config(path)
+
+
+def test_a_file_that_cannot_be_read_is_named_with_the_reason(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"cannot read .*gone\.toml: No such file"):
+        load_config(tmp_path / "gone.toml")
+    with pytest.raises(ConfigError, match=r"cannot read .*: Is a directory"):
+        load_config(tmp_path)
+
+
+def test_an_override_leaves_the_original_alone() -> None:
+    original = Config()
+    changed = override(original, {"safety": {"tilt_limit": 0.5}}, where="a test")
+    assert changed.safety.tilt_limit == 0.5
+    assert original == Config()
+
+
+def test_every_part_is_a_table_that_can_be_overridden() -> None:
+    for part in fields(Config):
+        value = getattr(Config(), part.name)
+        if not isinstance(value, str):
+            assert override(Config(), {part.name: {}}, where="a test") == Config()
+
+
+def test_a_controller_takes_a_file_a_path_or_a_config(tmp_path: Path) -> None:
+    path = written(tmp_path, "[envelope]\nforward = 0.5")
+    for config in (path, str(path), load_config(path)):
+        GO2Controller(plant=StillPlant(), config=config).close()
+    with pytest.raises(ConfigError, match=r"gone\.toml"):
+        GO2Controller(plant=StillPlant(), config=tmp_path / "gone.toml")

@@ -1,0 +1,200 @@
+"""Contact schedules: phases cover the cycle, intervals are half-open, and times add up."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from go2_wbc.contacts import GAITS, TIE, ContactSchedule, Gait, find_gait, standing
+from go2_wbc.errors import CommandError
+from go2_wbc.legs import LEGS
+
+ROUNDING = 1e-9  # [s] times of order 10 s in sums of a few terms
+BESIDE = 1e-6  # [s] clearly not the event, and far shorter than any interval here
+TICK = 0.002  # [s] control period of the robot
+
+GRID = 40
+"""Phases on a grid, so that two events either coincide or are far apart."""
+shares = st.integers(1, GRID - 1).map(lambda n: n / GRID)
+offsets = st.tuples(*[st.integers(0, GRID - 1).map(lambda n: n / GRID)] * 4)
+gaits = st.builds(Gait, st.just("some"), st.floats(0.2, 1.0), shares, offsets)
+
+
+def change_times(schedule: ContactSchedule, until: float) -> list[float]:
+    period = schedule.period or np.inf
+    cycles = range(int(until / period) + 2) if np.isfinite(period) else range(1)
+    times = [t + (0.0 if cycle == 0 else cycle * period) for cycle in cycles for t in schedule.times]
+    return [t for t in times if t < until]
+
+
+@given(gaits)
+def test_the_events_of_a_gait_cover_its_cycle(gait: Gait) -> None:
+    schedule = gait.schedule()
+    assert schedule.times[0] == 0.0
+    assert all(a < b for a, b in itertools.pairwise(schedule.times))
+    assert schedule.times[-1] < gait.period
+    assert schedule.period == gait.period
+
+
+@given(gaits)
+def test_each_foot_stands_for_its_duty_share_of_the_period(gait: Gait) -> None:
+    schedule = gait.schedule()
+    lengths = np.diff([*schedule.times, gait.period])
+    np.testing.assert_allclose(lengths @ schedule.modes, gait.stance_time, atol=ROUNDING)
+    assert gait.stance_time + gait.swing_time == pytest.approx(gait.period)
+
+
+@given(gaits)
+def test_each_foot_touches_down_at_its_offset_and_lifts_after_the_duty(gait: Gait) -> None:
+    schedule = gait.schedule()
+    for leg in LEGS:
+        touchdown = gait.offsets[leg] * gait.period
+        assert not schedule.at(touchdown + gait.period - BESIDE).stance[leg]
+        assert schedule.at(touchdown).stance[leg]
+        assert schedule.at(touchdown + gait.stance_time - BESIDE).stance[leg]
+        assert not schedule.at(touchdown + gait.stance_time).stance[leg]
+
+
+@given(gaits, st.floats(0.0, 5.0), st.integers(1, 5))
+def test_a_gait_repeats_after_its_period(gait: Gait, t: float, cycles: int) -> None:
+    schedule = gait.schedule()
+    assume(all(abs(t - change) > BESIDE for change in change_times(schedule, t + 1.0)))
+    now, later = schedule.at(t), schedule.at(t + cycles * gait.period)
+    np.testing.assert_array_equal(now.stance, later.stance)
+    np.testing.assert_allclose(now.elapsed, later.elapsed, atol=ROUNDING)
+    np.testing.assert_allclose(now.remaining, later.remaining, atol=ROUNDING)
+
+
+@given(gaits, st.floats(0.0, 5.0))
+def test_elapsed_and_remaining_span_the_present_interval(gait: Gait, t: float) -> None:
+    phase = gait.schedule().at(t)
+    span = np.where(phase.stance, gait.stance_time, gait.swing_time)
+    np.testing.assert_allclose(phase.elapsed + phase.remaining, span, atol=2 * TIE)
+    assert (phase.elapsed >= 0.0).all()
+    assert (phase.remaining > 0.0).all()
+    np.testing.assert_allclose(phase.progress, phase.elapsed / span, atol=ROUNDING / span.min())
+    assert (phase.progress < 1.0).all()
+
+
+@given(gaits, st.floats(0.0, 3.0))
+def test_a_foot_changes_exactly_when_its_remaining_time_is_over(gait: Gait, t: float) -> None:
+    schedule = gait.schedule()
+    phase = schedule.at(t)
+    for leg in LEGS:
+        at_change = t + float(phase.remaining[leg])
+        assert schedule.at(at_change).stance[leg] != phase.stance[leg]
+        assert schedule.at(at_change - BESIDE).stance[leg] == phase.stance[leg] or (
+            phase.remaining[leg] < BESIDE
+        )
+
+
+@given(gaits, st.integers(0, 3))
+def test_the_new_mode_holds_from_the_event_on_and_the_old_one_until_it(
+    gait: Gait, cycle: int
+) -> None:
+    schedule = gait.schedule()
+    for index, time in enumerate(schedule.times):
+        event = time + cycle * gait.period
+        np.testing.assert_array_equal(schedule.at(event).stance, schedule.modes[index])
+        before = schedule.at(event + gait.period - BESIDE).stance
+        np.testing.assert_array_equal(before, schedule.modes[index - 1])
+
+
+@pytest.mark.parametrize("early", [0.0, TIE / 4, TIE / 2])
+def test_a_time_that_falls_short_of_an_event_by_rounding_counts_as_the_event(early: float) -> None:
+    schedule = GAITS["trot"].schedule()
+    for event in (0.18, 0.36, 0.54, 3.6):
+        phase, exact = schedule.at(event - early), schedule.at(event)
+        np.testing.assert_array_equal(phase.stance, exact.stance)
+        np.testing.assert_allclose(phase.elapsed, 0.0, atol=TIE)
+        np.testing.assert_allclose(phase.remaining, 0.18, atol=2 * TIE)
+
+
+def test_a_time_clearly_before_an_event_does_not() -> None:
+    schedule = GAITS["trot"].schedule()
+    for event in (0.18, 0.36, 3.6):
+        old = schedule.at(event - 3 * TIE).stance
+        np.testing.assert_array_equal(old, ~schedule.at(event).stance)
+
+
+def test_summed_control_periods_meet_every_event_of_a_minute_on_the_tick() -> None:
+    gait = GAITS["trot"]
+    schedule, ticks = gait.schedule(), round(gait.period / 2 / TICK)
+    time = 0.0
+    for tick in range(round(60.0 / TICK)):
+        half_cycles = tick // ticks
+        expected = schedule.modes[half_cycles % 2]
+        np.testing.assert_array_equal(schedule.at(time).stance, expected, err_msg=f"{tick=}")
+        time += TICK
+
+
+def test_the_trot_stands_on_diagonals_in_turn() -> None:
+    schedule = find_gait("trot").schedule()
+    np.testing.assert_array_equal(
+        schedule.modes, [[False, True, True, False], [True, False, False, True]]
+    )
+
+
+def test_standing_never_changes() -> None:
+    for t in (-1.0, 0.0, 1e6):
+        phase = standing().at(t)
+        assert phase.stance.all()
+        assert np.isinf(phase.elapsed).all()
+        assert np.isinf(phase.remaining).all()
+        assert not phase.progress.any()
+
+
+@pytest.fixture
+def lift_of_fr() -> ContactSchedule:
+    modes = np.ones((3, 4), dtype=bool)
+    modes[1, 1] = False
+    return ContactSchedule((0.0, 1.0, 3.0), modes)
+
+
+def test_a_schedule_without_period_holds_its_first_and_last_mode(
+    lift_of_fr: ContactSchedule,
+) -> None:
+    for t, up in ((-5.0, False), (0.0, False), (0.999, False), (1.0, True), (2.999, True)):
+        assert lift_of_fr.at(t).stance[1] != up
+    for t in (3.0, 100.0):
+        assert lift_of_fr.at(t).stance.all()
+    assert all(lift_of_fr.at(t).stance[[0, 2, 3]].all() for t in (0.0, 2.0, 4.0))
+
+
+def test_without_period_the_time_before_the_first_and_after_the_last_change_is_endless(
+    lift_of_fr: ContactSchedule,
+) -> None:
+    before, during, after = (lift_of_fr.at(t) for t in (0.25, 1.5, 4.0))
+    assert (before.elapsed[1], before.remaining[1]) == (np.inf, 0.75)
+    assert (during.elapsed[1], during.remaining[1]) == (0.5, 1.5)
+    assert (after.elapsed[1], after.remaining[1]) == (1.0, np.inf)
+    assert during.progress[1] == 0.25
+    assert not before.progress.any()
+    for phase in (before, during, after):
+        assert np.isinf(phase.elapsed[[0, 2, 3]]).all()
+        assert np.isinf(phase.remaining[[0, 2, 3]]).all()
+
+
+def test_a_phase_that_was_handed_out_cannot_change_the_schedule() -> None:
+    schedule = standing()
+    schedule.at(0.0).stance[:] = False
+    assert schedule.at(0.0).stance.all()
+
+
+@pytest.mark.parametrize(
+    ("times", "rows"),
+    [((), 0), ((0.0, 0.0), 2), ((1.0, 0.5), 2), ((0.0, 1.0), 3), ((0.0, float("nan")), 2)],
+    ids=["none", "equal", "falling", "more modes", "nan"],
+)
+def test_events_out_of_order_are_refused(times: tuple[float, ...], rows: int) -> None:
+    with pytest.raises(CommandError, match="increasing times"):
+        ContactSchedule(times, np.ones((rows, 4), dtype=bool))
+
+
+def test_an_unknown_gait_is_answered_with_the_known_names() -> None:
+    with pytest.raises(CommandError, match=r"unknown gait 'gallop'; valid: .*trot"):
+        find_gait("gallop")

@@ -1,0 +1,89 @@
+"""The exceptions form the tree that their module draws, and their messages say what they must."""
+
+from __future__ import annotations
+
+import inspect
+import re
+
+from go2_wbc import errors
+from go2_wbc.errors import (
+    CommandError,
+    Go2WbcError,
+    IkError,
+    MotionInfeasible,
+    QpInfeasible,
+    ResidualRow,
+    unknown_name,
+)
+
+ROWS = (ResidualRow("torque limits", 3.25, "N m"), ResidualRow("stance feet", 0.5, "m/s^2"))
+
+
+def exceptions() -> dict[str, type[Exception]]:
+    return {
+        name: value
+        for name, value in vars(errors).items()
+        if inspect.isclass(value)
+        and issubclass(value, Exception)
+        and value.__module__ == errors.__name__
+    }
+
+
+def drawn_tree() -> dict[str, str]:
+    """Parent of each exception by the drawing in the module's docstring."""
+    parents: dict[str, str] = {}
+    path = [("Go2WbcError", -1)]
+    for line in (errors.__doc__ or "").splitlines():
+        found = re.match(r"^\s*([│ ]*[├└]── )(\w+)", line)
+        if found:
+            depth = len(line) - len(line.lstrip(" │├└─"))
+            while path[-1][1] >= depth:
+                path.pop()
+            parents[found[2]] = path[-1][0]
+            path.append((found[2], depth))
+    return parents
+
+
+def test_the_drawn_tree_is_the_real_tree() -> None:
+    real = {
+        name: value.__mro__[1].__name__
+        for name, value in exceptions().items()
+        if value is not Go2WbcError
+    }
+    assert drawn_tree() == real
+
+
+def test_every_error_is_caught_by_the_base_class() -> None:
+    assert all(issubclass(value, Go2WbcError) for value in exceptions().values())
+
+
+def test_a_wrong_command_is_also_a_value_error() -> None:
+    assert issubclass(CommandError, ValueError)
+
+
+def test_an_infeasible_qp_prints_its_residual_table() -> None:
+    error = QpInfeasible("daqp", "status -1", ROWS)
+    head, *table = str(error).splitlines()
+    assert head == "daqp found no solution of the whole-body QP (status -1)"
+    assert [line.split()[-2:] for line in table] == [["N", "m"], ["0.5", "m/s^2"]]
+    assert "torque limits" in table[0]
+    assert "3.25" in table[0]
+    assert (error.solver, error.status, error.residuals) == ("daqp", "status -1", ROWS)
+
+
+def test_an_ik_error_keeps_its_residuals() -> None:
+    assert IkError("missed", list(ROWS)).residuals == ROWS
+
+
+def test_an_infeasible_motion_lists_every_finding() -> None:
+    error = MotionInfeasible("bow", ["calf beyond its limit", "margin -2 cm"])
+    assert str(error).splitlines() == [
+        "motion 'bow' is infeasible:",
+        "  calf beyond its limit",
+        "  margin -2 cm",
+    ]
+    assert error.findings == ("calf beyond its limit", "margin -2 cm")
+
+
+def test_an_unknown_name_is_answered_with_the_sorted_valid_ones() -> None:
+    assert unknown_name("gait", "run", ("walk", "trot")) == "unknown gait 'run'; valid: trot, walk"

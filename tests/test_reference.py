@@ -1,0 +1,112 @@
+"""References: placing a motion in the world is a rigid motion, and anchors undo it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from go2_wbc.reference import Anchor, LegTask, MotionPlan, Reference
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from tests.engine_helpers import JO, ST, SW, random_reference, random_state, state_of
+
+EXACT = 1e-12  # rounding of numbers of order one
+METRES = st.floats(-10.0, 10.0)
+anchors = st.builds(
+    lambda x, y, z, yaw: Anchor(np.array([x, y, z]), yaw),
+    METRES,
+    METRES,
+    st.floats(-0.5, 0.5),
+    st.floats(-np.pi, np.pi),
+)
+MODEL = RobotModel()
+RNG = np.random.default_rng(3)
+REFERENCE = random_reference(MODEL.snapshot(random_state(RNG)), (ST, SW, JO, ST), 2.0, RNG)
+
+
+def vectors(reference: Reference) -> np.ndarray:
+    """Everything that turns but does not shift."""
+    body = reference.body
+    rows = [body.v_world, body.a_world, body.w_world, body.dw_world, *body.R_world_base.T]
+    return np.array([*rows, *reference.v_world_feet, *reference.a_world_feet])
+
+
+def points(reference: Reference) -> np.ndarray:
+    return np.array([reference.body.p_world, *reference.p_world_feet])
+
+
+@given(anchors)
+def test_placing_turns_every_vector_and_moves_every_point(anchor: Anchor) -> None:
+    placed, R = REFERENCE.placed(anchor), yaw_rotation(anchor.yaw)
+    np.testing.assert_allclose(vectors(placed), vectors(REFERENCE) @ R.T, atol=EXACT)
+    expected = points(REFERENCE) @ R.T + anchor.p_world
+    np.testing.assert_allclose(points(placed), expected, atol=10 * EXACT)
+
+
+@given(anchors)
+def test_placing_keeps_distances_and_orientations_rigid(anchor: Anchor) -> None:
+    placed = REFERENCE.placed(anchor)
+    moved, given_points = points(placed), points(REFERENCE)
+    np.testing.assert_allclose(
+        np.linalg.norm(moved - moved[0], axis=1),
+        np.linalg.norm(given_points - given_points[0], axis=1),
+        atol=10 * EXACT,
+    )
+    R = placed.body.R_world_base
+    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=EXACT)
+    assert np.linalg.det(R) == pytest.approx(1.0)
+
+
+@given(anchors, anchors)
+def test_placing_twice_is_placing_once_at_the_composed_anchor(a: Anchor, b: Anchor) -> None:
+    composed = Anchor(b.p_world + yaw_rotation(b.yaw) @ a.p_world, a.yaw + b.yaw)
+    twice, once = REFERENCE.placed(a).placed(b), REFERENCE.placed(composed)
+    np.testing.assert_allclose(points(twice), points(once), atol=100 * EXACT)
+    np.testing.assert_allclose(vectors(twice), vectors(once), atol=10 * EXACT)
+
+
+def test_placing_leaves_legs_joints_and_force_bounds_alone() -> None:
+    placed = REFERENCE.placed(Anchor(np.array([1.0, 2.0, 3.0]), 0.7))
+    assert placed.legs == REFERENCE.legs
+    assert placed.body.point is REFERENCE.body.point
+    for name in ("q_joints", "v_joints", "a_joints", "normal_force_min", "normal_force_max"):
+        np.testing.assert_array_equal(getattr(placed, name), getattr(REFERENCE, name))
+
+
+def test_the_velocity_of_a_placed_point_is_the_rate_of_its_position() -> None:
+    """Were one of the two left in the frame of the motion, they would disagree."""
+    anchor, dt = Anchor(np.array([1.0, -2.0, 0.1]), 2.1), 1e-6
+    start = REFERENCE.placed(anchor)
+    feet = REFERENCE.p_world_feet + dt * REFERENCE.v_world_feet
+    moved = anchor.p_world + feet @ yaw_rotation(anchor.yaw).T
+    rate = (moved - start.p_world_feet) / dt
+    np.testing.assert_allclose(start.v_world_feet, rate, atol=1e-8)
+
+
+def test_stance_names_the_legs_that_stand() -> None:
+    np.testing.assert_array_equal(REFERENCE.stance, [True, False, False, True])
+    assert REFERENCE.legs[1] is LegTask.SWING
+
+
+@given(anchors)
+def test_the_anchor_of_placed_feet_is_the_anchor(anchor: Anchor) -> None:
+    radius = 0.022
+    feet = np.array([[0.2, 0.14, radius], [0.2, -0.14, radius]])
+    feet = np.concatenate([feet, feet * [-1.0, 1.0, 1.0]])
+    found = Anchor.of_feet(anchor.p_world + feet @ yaw_rotation(anchor.yaw).T, radius)
+    np.testing.assert_allclose(found.p_world, anchor.p_world, atol=100 * EXACT)
+    assert wrap_angle(found.yaw - anchor.yaw) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_anchor_does_not_change_the_feet_it_was_given() -> None:
+    feet = MODEL.snapshot(state_of(random_state(RNG).q)).p_world_feet
+    before = feet.copy()
+    Anchor.of_feet(feet, 0.022)
+    np.testing.assert_array_equal(feet, before)
+
+
+def test_a_motion_plan_without_a_reference_cannot_be_made() -> None:
+    with pytest.raises(TypeError, match="at"):
+        MotionPlan()  # pyright: ignore[reportAbstractUsage]
