@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 import logging
-import math
-import re
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
-import numpy as np
-
+from controller import arguments
 from controller.loop import ControlLoop
 from controller.modes import Mode, Outcome
 from controller.pilot import Aborted, Figures, Pilot
 from controller.runner import Runner
 from controller.telemetry import Telemetry
-from go2_wbc.config import Config, load_config
+from go2_wbc.config import Config
 from go2_wbc.errors import (
     ClosedError,
     CommandError,
-    ConfigError,
     Go2WbcError,
     ModeError,
     PlantError,
@@ -40,7 +36,6 @@ from motions import check_plan, high_five_plan, load_motion
 
 _log = logging.getLogger(__name__)
 
-NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 RECORDED_TIME = 240.0
 """Seconds of robot time that the telemetry keeps."""
 VIEWER_RATE = 50.0
@@ -87,15 +82,9 @@ class GO2Controller:
             DescriptionError: if the robot's files are missing.
             PlantError: if the plant does not answer.
         """
-        if not isinstance(namespace, str) or not NAMESPACE.match(namespace):
-            raise ConfigError(
-                f"namespace must be letters, digits and underscores, a letter first; "
-                f"got {namespace!r}"
-            )
-        self._namespace = namespace
-        self._config = _load(config)
-        if plant is not None and not isinstance(plant, Plant):
-            raise ConfigError(f"plant must be a Plant, got {plant!r}")
+        self._namespace = arguments.namespace(namespace)
+        self._config = arguments.config(config)
+        plant = arguments.plant_or_none(plant)
         model = RobotModel()
         wbc = WholeBodyController(model, self._config.backend, self._config.wbc)
         self._owns_plant = plant is None
@@ -143,7 +132,7 @@ class GO2Controller:
         Raises:
             CommandError: for an unknown gait; lists the valid ones.
         """
-        gait = _word("gait", gait)
+        gait = arguments.word("gait", gait)
         return self._call("walk", lambda: self._pilot.walk(gait))
 
     def move(self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0) -> None:
@@ -181,12 +170,12 @@ class GO2Controller:
 
         Ends at rest in walking mode.
         """
-        angle = _finite("angle", angle)
+        angle = arguments.finite("angle", angle)
         return self._call("turn_left", lambda: self._pilot.turn(angle))
 
     def turn_right(self, angle: float) -> bool:
         """Turn right in place by ``angle`` [rad], measured on the heading."""
-        angle = _finite("angle", angle)
+        angle = arguments.finite("angle", angle)
         return self._call("turn_right", lambda: self._pilot.turn(-angle))
 
     def move_forward(self, distance: float) -> bool:
@@ -194,7 +183,7 @@ class GO2Controller:
 
         Ends at rest in walking mode.
         """
-        distance = _finite("distance", distance)
+        distance = arguments.finite("distance", distance)
         return self._call("move_forward", lambda: self._pilot.drive(distance))
 
     # --- motions --------------------------------------------------------------------------
@@ -209,7 +198,7 @@ class GO2Controller:
         Raises:
             CommandError: for another side or time.
         """
-        leg, hold = front_leg(_word("side", side)), _finite("hold", hold)
+        leg, hold = front_leg(arguments.word("side", side)), arguments.finite("hold", hold)
         if not 0.5 <= hold <= 30.0:
             raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
         plan = high_five_plan(self._runner.loop.model, leg, hold)
@@ -228,14 +217,14 @@ class GO2Controller:
         if isinstance(motion, MotionPlan):
             plan = motion
         else:
-            plan = load_motion(_word("motion", motion), model)
+            plan = load_motion(arguments.word("motion", motion), model)
         check_plan(plan, model)
         return self._call("play", lambda: self._pilot.play(plan))
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
         self._check_open()
-        seconds = _finite("seconds", seconds)
+        seconds = arguments.finite("seconds", seconds)
         if seconds < 0:
             raise CommandError(f"seconds must not be negative, got {seconds}")
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
@@ -280,7 +269,8 @@ class GO2Controller:
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""
         with self._runner.lock:
-            return self._telemetry.recording(rate)
+            samples = self._telemetry.samples(rate)
+        return samples.recording()
 
     # --- ending ---------------------------------------------------------------------------
 
@@ -367,30 +357,6 @@ def _interruption(name: str, error: BaseException) -> str:
     if isinstance(error, KeyboardInterrupt):
         return f"interrupted during {name}()"
     return f"{type(error).__name__} during {name}(): {error}"
-
-
-def _load(config: Config | Path | str | None) -> Config:
-    if config is None:
-        return Config()
-    if isinstance(config, Config):
-        return config
-    if not isinstance(config, Path | str):
-        raise ConfigError(f"config must be a Config or the path of a TOML file, got {config!r}")
-    return load_config(config)
-
-
-def _word(name: str, value: str) -> str:
-    if not isinstance(value, str):
-        raise CommandError(f"{name} must be a string, got {value!r}")
-    return value
-
-
-def _finite(name: str, value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-        raise CommandError(f"{name} must be a number, got {value!r}")
-    if not math.isfinite(value):
-        raise CommandError(f"{name} must be finite, got {value}")
-    return float(value)
 
 
 def _open_viewer(plant: Plant) -> PlantViewer | None:

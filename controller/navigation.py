@@ -59,12 +59,12 @@ class Course:
     def __init__(self, state: RobotState) -> None:
         """Begin at ``state``."""
         self._p_world_start = state.p_world_base.copy()
-        self._yaw_start = self._yaw_last = float(state.rpy[2])
+        self._yaw_start = self._yaw_last = state.yaw
         self._turned = 0.0
 
     def turned(self, state: RobotState) -> float:
         """Angle [rad] turned to the left since the start, unwrapped."""
-        yaw = float(state.rpy[2])
+        yaw = state.yaw
         self._turned += wrap_angle(yaw - self._yaw_last)
         self._yaw_last = yaw
         return self._turned

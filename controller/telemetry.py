@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from jaxtyping import Bool, Float
 
@@ -50,7 +52,7 @@ class Telemetry:
         self.peak_torque_ratio = max(self.peak_torque_ratio, torque)
         self.peak_speed_ratio = max(self.peak_speed_ratio, speed)
 
-    def recording(self, rate: float = 100.0) -> Recording:
+    def samples(self, rate: float = 100.0) -> Samples:
         """What the ring holds, thinned to about ``rate`` samples a second.
 
         Raises:
@@ -63,7 +65,8 @@ class Telemetry:
         if len(rows) > 1:
             span = float(self._time[rows[-1]] - self._time[rows[0]])
             rows = rows[:: max(1, round((len(rows) - 1) / max(rate * span, 1.0)))]
-        return Recording(
+        labels = tuple(str(label) for label in self._labels[rows])
+        recording = Recording(
             time=self._time[rows].copy(),
             q=self._q[rows],
             v=self._v[rows],
@@ -71,12 +74,31 @@ class Telemetry:
             foot_forces=self._forces[rows],
             stance=self._stance[rows],
             p_world_com=self._com[rows],
-            support_margin=np.array([self._margin(row) for row in rows.tolist()]),
-            labels=tuple(str(label) for label in self._labels[rows]),
+            support_margin=np.full(len(rows), np.nan),
+            labels=labels,
         )
+        return Samples(recording, self._feet[rows])
+
+
+@dataclass(frozen=True, slots=True)
+class Samples:
+    """Copied ticks whose support margins are still to be computed, away from the control loop.
+
+    Attributes:
+        unfinished: the recording, its support margins nan.
+        p_world_feet: (n, 4, 3) foot centres [m].
+    """
+
+    unfinished: Recording
+    p_world_feet: Float[np.ndarray, "n 4 3"]
+
+    def recording(self) -> Recording:
+        """The finished recording."""
+        margins = [self._margin(row) for row in range(len(self.unfinished.time))]
+        return replace(self.unfinished, support_margin=np.array(margins))
 
     def _margin(self, row: int) -> float:
-        feet: Float[np.ndarray, "k 2"] = self._feet[row][self._stance[row]][:, :2]
+        feet = self.p_world_feet[row][self.unfinished.stance[row], :2]
         if len(feet) < 3:
             return float("nan")
-        return support_margin(feet, self._com[row, :2])
+        return support_margin(feet, self.unfinished.p_world_com[row, :2])

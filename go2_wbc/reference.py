@@ -8,7 +8,7 @@ trunk lies on the ground and no contact model holds.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
 
 import numpy as np
@@ -78,6 +78,7 @@ class Reference:
         q_joints: desired joint angles [rad], used for legs in JOINTS.
         v_joints: their velocities [rad/s].
         a_joints: their accelerations [rad/s^2].
+        stance: feet in stance, from ``legs``.
     """
 
     body: BodyTarget
@@ -90,11 +91,12 @@ class Reference:
     q_joints: Float[np.ndarray, "12"]
     v_joints: Float[np.ndarray, "12"]
     a_joints: Float[np.ndarray, "12"]
+    stance: Bool[np.ndarray, "4"] = field(init=False)
 
-    @property
-    def stance(self) -> Bool[np.ndarray, "4"]:
-        """Feet in stance."""
-        return np.array([task is LegTask.STANCE for task in self.legs])
+    def __post_init__(self) -> None:
+        """Find the feet in stance."""
+        stance = np.array([task is LegTask.STANCE for task in self.legs])
+        object.__setattr__(self, "stance", stance)
 
     def placed(self, anchor: Anchor) -> Reference:
         """This reference, given in the frame of a motion, in the world."""

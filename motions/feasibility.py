@@ -69,7 +69,7 @@ def _broken(reference: Reference, t: float, model: RobotModel) -> list[Finding]:
     if reference.body.point is TrackedPoint.COM and stance.sum() >= 3:
         feet = model.p_base_feet_nominal[stance, :2]
         margin = support_margin(feet, reference.body.p_world[:2])
-        if margin < LEAST_SUPPORT:
+        if not margin >= LEAST_SUPPORT:
             short = margin - LEAST_SUPPORT
             found.append(Finding("support", t, "CoM", margin, LEAST_SUPPORT, short, "m"))
     return found

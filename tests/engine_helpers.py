@@ -29,7 +29,12 @@ THREE_FEET: tuple[Legs, ...] = (
     (ST, ST, JO, ST),
     (ST, ST, ST, JO),
 )
-TWO_FEET: tuple[Legs, ...] = ((ST, SW, SW, ST), (SW, ST, ST, SW), (JO, ST, ST, SW), (ST, SW, ST, SW))
+TWO_FEET: tuple[Legs, ...] = (
+    (ST, SW, SW, ST),
+    (SW, ST, ST, SW),
+    (JO, ST, ST, SW),
+    (ST, SW, ST, SW),
+)
 MODES: tuple[Legs, ...] = (FOUR_FEET, *THREE_FEET, *TWO_FEET, (SW, SW, ST, SW), (SW, SW, SW, SW))
 EFFORTS = (0.0, 2.0, 15.0)
 """Scale [m/s^2] of the accelerations asked for: at rest, lively, too much."""

@@ -59,7 +59,7 @@ def test_one_half_of_a_nested_table_may_be_left_out(tmp_path: Path) -> None:
         ("[wbc]\nsolvr = 'daqp'", r"mine\.toml: wbc: unknown key 'solvr'; valid: .*solver"),
         ("[wbc.swing_foot]\nki = [1, 1, 1]", r"wbc: swing_foot: unknown key 'ki'; valid: kd, kp"),
         ("wbc = 3", r"wbc must be a table, got 3"),
-        ("[locomotion]\nheight = 'tall'", r"locomotion: height must be a finite number, got 'tall'"),
+        ("[locomotion]\nheight = 'low'", r"locomotion: height must be a finite number, got 'low'"),
         ("[locomotion]\nheight = true", r"height must be a finite number, got True"),
         ("[locomotion]\nheight = nan", r"height must be a finite number, got nan"),
         ("[locomotion]\nheight = inf", r"height must be a finite number, got inf"),

@@ -27,7 +27,9 @@ gaits = st.builds(Gait, st.just("some"), st.floats(0.2, 1.0), shares, offsets)
 def change_times(schedule: ContactSchedule, until: float) -> list[float]:
     period = schedule.period or np.inf
     cycles = range(int(until / period) + 2) if np.isfinite(period) else range(1)
-    times = [t + (0.0 if cycle == 0 else cycle * period) for cycle in cycles for t in schedule.times]
+    times = [
+        t + (0.0 if cycle == 0 else cycle * period) for cycle in cycles for t in schedule.times
+    ]
     return [t for t in times if t < until]
 
 

@@ -6,6 +6,7 @@ pytest switches on in the parent, are off in the children. An interrupt ends the
 
 from __future__ import annotations
 
+import gc
 import logging
 import multiprocessing
 import signal
@@ -72,6 +73,8 @@ def run_trial(measure: Callable[[Trial], Measurement], seed: int) -> Measurement
     except Go2WbcError as error:
         reason = f"{type(error).__name__}: {str(error).splitlines()[0]}"
         return Measurement({}, reason=reason)
+    finally:
+        gc.collect()  # robots hold tens of megabytes of records, in cycles
 
 
 _Task = tuple[Family, int]

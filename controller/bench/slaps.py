@@ -140,6 +140,8 @@ def _slap_all(trial: Trial, side: str, slap: Slap) -> _Slapped:
 class Slapper:
     """Slaps the paw in the given directions, one after the other, once it is raised.
 
+    A robot that has fallen, or whose paw is down, after a slap ends the call with ``Failed``.
+
     Attributes:
         distances: how far [mm] the paw was off its place afterwards, by direction.
     """
@@ -175,6 +177,9 @@ class Slapper:
         self._robot.push(self._slap.force * direction, self._slap.duration, self._leg.foot)
 
     def _look(self) -> None:
+        fall = self._robot.witness.fall()
+        if fall is not None or self._paw[2] < RAISED:
+            raise Failed(fall or f"the paw is at {self._paw[2]:.2f} m two seconds later")
         distance = 1000.0 * float(np.linalg.norm(self._paw - self._place))
         self.distances[self._waiting.popleft()] = distance
 

@@ -9,11 +9,11 @@ from numbers import Real
 from go2_wbc.errors import CommandError
 
 
-def _is_finite(value: Real) -> bool:
+def _as_float(value: Real) -> float:
     try:
-        return math.isfinite(value)
+        return float(value)
     except OverflowError:  # an integer beyond every float
-        return False
+        return math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,13 +25,15 @@ class VelocityCommand:
     angular_z: float = 0.0
 
     def __post_init__(self) -> None:
-        """Raise CommandError unless every component is a finite number."""
+        """Make every component a float; raise CommandError unless it is a finite number."""
         for name in ("linear_x", "linear_y", "angular_z"):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, Real):
                 raise CommandError(f"{name} must be a number, got {value!r}")
-            if not _is_finite(value):
+            number = _as_float(value)
+            if not math.isfinite(number):
                 raise CommandError(f"{name} must be finite, got {value}")
+            object.__setattr__(self, name, number)
 
     @property
     def is_zero(self) -> bool:

@@ -72,7 +72,7 @@ class LocomotionPlanner:
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state, standing."""
-        self._yaw = float(snapshot.state.rpy[2])
+        self._yaw = snapshot.state.yaw
         self._position = snapshot.p_world_com[:2].copy()
         self._velocity = np.zeros(3)
         self._is_stepping = False
@@ -162,7 +162,7 @@ class LocomotionPlanner:
         rate = np.array([config.linear_acceleration] * 2 + [config.angular_acceleration])
         self._velocity += np.clip(wanted - self._velocity, -rate * dt, rate * dt)
         self._yaw += self._velocity[2] * dt
-        lead = wrap_angle(self._yaw - float(snapshot.state.rpy[2]))
+        lead = wrap_angle(self._yaw - snapshot.state.yaw)
         self._yaw += np.clip(lead, -config.yaw_leash, config.yaw_leash) - lead
         self._position = self._position + self._world_velocity()[:2] * dt
         offset = self._position - snapshot.p_world_com[:2]
@@ -200,7 +200,7 @@ class LocomotionPlanner:
         self._was_stance = stance.copy()
 
     def _nominal_feet(self, snapshot: Snapshot) -> Float[np.ndarray, "4 2"]:
-        R = yaw_rotation(float(snapshot.state.rpy[2]))
+        R = yaw_rotation(snapshot.state.yaw)
         feet = self._model.p_base_feet_nominal @ R.T
         return snapshot.state.p_world_base[:2] + feet[:, :2]
 
@@ -232,6 +232,7 @@ class LocomotionPlanner:
             return p, v, a
         remaining = np.where(swinging, phase.remaining, 0.0)
         goals = self._footholds(snapshot, remaining)
+        progress = phase.progress
         touchdown_height = self._ground + self._model.foot_radius
         for leg in LEGS:
             if swinging[leg]:
@@ -239,7 +240,7 @@ class LocomotionPlanner:
                 p[leg], v[leg], a[leg] = swing_foot(
                     self._liftoff[leg],
                     goal,
-                    float(phase.progress[leg]),
+                    float(progress[leg]),
                     self._gait.swing_time,
                     self._config.swing,
                 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
@@ -31,7 +33,7 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Float[np.ndarray
 
 def yaw_rotation(yaw: float) -> Float[np.ndarray, "3 3"]:
     """R = Rz(yaw), angle in rad."""
-    c, s = np.cos(yaw), np.sin(yaw)
+    c, s = math.cos(yaw), math.sin(yaw)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
@@ -60,4 +62,4 @@ def angular_velocity_from_rpy(
 
 def wrap_angle(angle: float) -> float:
     """``angle`` in (-pi, pi]."""
-    return float(np.arctan2(np.sin(angle), np.cos(angle)))
+    return math.atan2(math.sin(angle), math.cos(angle))

@@ -3,7 +3,8 @@
 Contact points: a foot is a sphere that rolls. The material point at the contact is r below the
 centre, so its velocity is v_c + w x (-r n), and a rolling foot obeys a_c = r (dw x n)
 (differentiate v_c = r w x n). ``J_contacts`` is therefore J_c - r (J_w x n), and
-``drift_contacts`` the matching velocity-dependent part, without the centripetal term that belongs to the material point.
+``drift_contacts`` the matching velocity-dependent part, without the centripetal term that belongs
+to the material point.
 """
 
 from __future__ import annotations

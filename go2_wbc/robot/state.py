@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,7 +38,7 @@ class RobotState:
     @property
     def R_world_base(self) -> Float[np.ndarray, "3 3"]:
         """Rotation from the base frame to the world."""
-        x, y, z, w = self.q[3:7]
+        x, y, z, w = self.q[3:7].tolist()
         return np.array(
             [
                 [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
@@ -49,9 +50,16 @@ class RobotState:
     @property
     def rpy(self) -> Float[np.ndarray, "3"]:
         """Roll, pitch, yaw [rad] of the base (R = Rz(yaw) Ry(pitch) Rx(roll))."""
-        R = self.R_world_base
-        pitch = np.arcsin(np.clip(-R[2, 0], -1.0, 1.0))
-        return np.array([np.arctan2(R[2, 1], R[2, 2]), pitch, np.arctan2(R[1, 0], R[0, 0])])
+        x, y, z, w = self.q[3:7].tolist()
+        roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+        pitch = math.asin(min(1.0, max(-1.0, 2 * (w * y - z * x))))
+        return np.array([roll, pitch, self.yaw])
+
+    @property
+    def yaw(self) -> float:
+        """Heading [rad] of the base, in (-pi, pi]."""
+        x, y, z, w = self.q[3:7].tolist()
+        return math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
     @property
     def tilt(self) -> float:

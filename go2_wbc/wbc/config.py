@@ -35,7 +35,7 @@ class WbcConfig:
     body_position: Gains = Gains((60.0, 60.0, 100.0), (15.0, 15.0, 20.0))
     body_orientation: Gains = Gains((200.0, 200.0, 80.0), (25.0, 25.0, 18.0))
     swing_foot: Gains = Gains.uniform(500.0, 40.0)
-    leg_posture: Gains = Gains.uniform(150.0, 20.0)
+    leg_posture: Gains = Gains.uniform(400.0, 36.0)
     position_weight: float = 1.0
     orientation_weight: float = 10.0
     swing_weight: float = 1.0

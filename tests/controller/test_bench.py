@@ -17,18 +17,21 @@ from controller.bench.pushes import CLIMB, RUNG, highest_rung
 from controller.bench.report import WIDTH, bar_text, render, summarise, summarise_row
 from controller.bench.rows import Direction, Family, Measurement, Row
 from controller.bench.runner import run_families
-from controller.bench.sequence import FAULTS
+from controller.bench.sequence import FAULTS, Judge
 from controller.bench.trials import (
     FRICTION_RANGE,
     MASS_RANGE,
     NOMINAL_FRICTION,
     YAW_RANGE,
     Failed,
+    Subject,
     Trial,
 )
 from controller.bench.witness import Track
 from controller.cli import main as cli
 from controller.cli.common import ExitCode
+from controller.demo.report import StepResult
+from controller.demo.run import DemoProgress
 from controller.demo.steps import DEMO_STEPS
 from go2_wbc.errors import CommandError, PlantError
 from go2_wbc.legs import LEGS, Leg
@@ -361,6 +364,23 @@ def test_a_track_gives_the_velocity_in_the_frame_of_the_heading() -> None:
 
 def test_every_step_of_the_demo_has_a_criterion_of_the_bench() -> None:
     assert {step.name for step in DEMO_STEPS} <= set(FAULTS)
+
+
+def test_a_true_that_the_simulator_does_not_bear_out_is_found_for_every_step() -> None:
+    with Subject(Trial(0)) as robot:
+        judge = Judge(robot)
+        for name in FAULTS:
+            judge(DemoProgress(0, 1, name))
+            robot.go2.wait(0.01)
+            judge(
+                DemoProgress(
+                    0,
+                    1,
+                    name,
+                    StepResult(name, name, ok=True, reason="done", start=0.0, duration=0.0),
+                )
+            )
+        assert [line.split(":")[0] for line in judge.untrue] == list(FAULTS)
 
 
 def empty_track(n: int, v_contacts: np.ndarray) -> Track:

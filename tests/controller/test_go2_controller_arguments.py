@@ -97,7 +97,7 @@ calls = {
     CommandError: [
         lambda: go2.move("fast"), lambda: go2.move(True), lambda: go2.move(None),
         lambda: go2.turn_left("90"), lambda: go2.move_forward(None), lambda: go2.wait(1 + 1j),
-        lambda: go2.high_five(hold="long"), lambda: go2.high_five(3), lambda: go2.high_five(["left"]),
+        lambda: go2.high_five(hold="long"), lambda: go2.high_five(3), lambda: go2.high_five([]),
         lambda: go2.play(42), lambda: go2.play(None), lambda: go2.walk(None), lambda: go2.walk({}),
     ],
     ConfigError: [

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from controller.behaviours.joints import Damped
+from controller.behaviours.joints import Damped, ServoJoints
 from controller.loop import ControlLoop
 from controller.runner import Runner
 from controller.telemetry import Telemetry
@@ -15,6 +15,7 @@ from go2_wbc.errors import ClosedError, PlantTimeout
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.wbc.controller import WholeBodyController
+from motions.postures import TUCKED_JOINTS
 from tests.controller.plants import HANG_GUARD, PERIOD, StillPlant, in_thread, is_limp
 
 # s of robot time; far more than any of these tests lets pass.
@@ -46,7 +47,12 @@ def make_runner(plant: StillPlant, model: RobotModel) -> Iterator[MakeRunner]:
 
     yield make
     for runner in made:
-        runner.close()
+        close(runner)
+
+
+def close(runner: Runner) -> None:
+    """Closes from another thread, so that a runner that cannot be closed fails the test."""
+    in_thread(runner.close).result(HANG_GUARD)
 
 
 def wait_for(event: threading.Event) -> None:
@@ -126,7 +132,7 @@ def test_closing_from_another_thread_ends_a_long_call_and_no_tick_follows(
     plant.on_write = under_way.set
     call = in_thread(lambda: runner.advance_until(lambda: False, FOREVER))
     wait_for(under_way)
-    runner.close()
+    close(runner)
     with pytest.raises(ClosedError, match="closed during a call"):
         call.result(HANG_GUARD)
     assert is_limp(plant.commands[-1])
@@ -164,6 +170,17 @@ def test_the_same_fault_again_counts_as_a_new_one(make_runner: MakeRunner) -> No
     runner.begin()
     runner.interrupt("a test")
     assert runner.engage(Damped()) is not None
+
+
+def test_the_last_word_to_the_plant_is_to_go_limp(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    runner = make_runner(realtime=False)
+    runner.engage(ServoJoints("hold", ((1.0, TUCKED_JOINTS),)))
+    runner.advance_until(lambda: False, 5 * PERIOD)
+    assert not is_limp(plant.commands[-1])
+    close(runner)
+    assert is_limp(plant.commands[-1])
 
 
 # --- realtime ---------------------------------------------------------------------------------
@@ -236,11 +253,11 @@ def test_in_realtime_closing_ends_a_waiting_call_and_the_thread(
     under_way = threading.Event()
     call = in_thread(lambda: runner.advance_until(lambda: bool(under_way.set()), FOREVER))
     wait_for(under_way)
-    runner.close()
+    close(runner)
     with pytest.raises(ClosedError):
         call.result(HANG_GUARD)
     assert is_limp(plant.commands[-1])
-    runner.close()
+    close(runner)
     assert threading.active_count() <= before + 1  # the thread of the call may still be ending
 
 
@@ -253,4 +270,4 @@ def test_closing_a_runner_whose_plant_has_died_does_not_raise(
         raise PlantTimeout("no answer")
 
     plant.on_write = fail
-    runner.close()
+    close(runner)

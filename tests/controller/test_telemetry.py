@@ -31,14 +31,14 @@ def recorded(model: RobotModel, ticks: int, first: int = 0) -> Telemetry:
 
 
 def test_without_a_tick_the_recording_is_empty(model: RobotModel) -> None:
-    recording = Telemetry(model, CAPACITY).recording()
+    recording = Telemetry(model, CAPACITY).samples().recording()
     assert len(recording.time) == 0
     assert recording.duration == 0.0
 
 
 @pytest.mark.parametrize("ticks", [1, 2, CAPACITY - 1, CAPACITY, CAPACITY + 1, 3 * CAPACITY + 7])
 def test_the_newest_ticks_are_kept_in_order(model: RobotModel, ticks: int) -> None:
-    recording = recorded(model, ticks).recording(rate=1 / PERIOD)
+    recording = recorded(model, ticks).samples(rate=1 / PERIOD).recording()
     kept = range(max(0, ticks - CAPACITY), ticks)
     assert recording.time == pytest.approx(PERIOD * np.array(kept))
     assert recording.labels == tuple(f"tick {tick}" for tick in kept)
@@ -48,7 +48,7 @@ def test_the_newest_ticks_are_kept_in_order(model: RobotModel, ticks: int) -> No
 def test_a_recording_is_thinned_evenly_to_about_the_rate(
     model: RobotModel, rate: float, count: int
 ) -> None:
-    time = recorded(model, CAPACITY).recording(rate).time
+    time = recorded(model, CAPACITY).samples(rate).recording().time
     assert len(time) == count
     assert np.ptp(np.diff(time)) < 1e-9
 
@@ -58,12 +58,12 @@ def test_a_plant_that_was_silent_for_some_ticks_can_be_recorded(model: RobotMode
     snapshot = model.snapshot(lying_state(1.0))
     for _ in range(5):
         telemetry.record(snapshot, ALL, "silent")
-    assert set(telemetry.recording().time) == {1.0}
+    assert set(telemetry.samples().recording().time) == {1.0}
 
 
 def test_a_recording_does_not_change_later(model: RobotModel) -> None:
     telemetry = recorded(model, CAPACITY)
-    recording = telemetry.recording()
+    recording = telemetry.samples().recording()
     before = recording.time.copy(), recording.q.copy()
     state = lying_state(9.0)
     for _ in range(CAPACITY):
@@ -89,7 +89,7 @@ def test_the_support_margin_is_that_of_the_planned_stance_feet(model: RobotModel
     stances = ALL, np.array([True, False, True, True]), np.array([True, False, False, True])
     for tick, stance in enumerate(stances):
         telemetry.record(model.snapshot(lying_state(tick * PERIOD)), stance, "stance")
-    four, three, two = telemetry.recording(rate=1e6).support_margin
+    four, three, two = telemetry.samples(rate=1e6).recording().support_margin
     assert four > three
     assert np.isnan(two)
 
@@ -97,4 +97,4 @@ def test_the_support_margin_is_that_of_the_planned_stance_feet(model: RobotModel
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan")])
 def test_a_rate_that_is_not_positive_is_refused(model: RobotModel, rate: float) -> None:
     with pytest.raises(CommandError, match="rate must be positive"):
-        recorded(model, 3).recording(rate)
+        recorded(model, 3).samples(rate).recording()

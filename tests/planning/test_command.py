@@ -67,8 +67,11 @@ def test_what_is_no_real_number_is_refused_by_name(
 
 
 @pytest.mark.parametrize("value", [1, np.float32(0.5), np.int64(-1), 0.25], ids=repr)
-def test_every_kind_of_real_number_is_accepted(unchecked: ModuleType, value: float) -> None:
-    assert unchecked.VelocityCommand(linear_x=value).linear_x == value
+def test_every_kind_of_real_number_becomes_a_float(unchecked: ModuleType, value: float) -> None:
+    command = unchecked.VelocityCommand(linear_x=value)
+    assert type(command.linear_x) is float
+    assert command.linear_x == value
+    assert command.is_zero is False  # a numpy number made this a numpy bool once
 
 
 @given(commands)

@@ -150,9 +150,7 @@ def foot_spins(state: RobotState) -> np.ndarray:
 def test_the_contact_velocity_is_that_of_the_spheres_lowest_material_point(seed: int) -> None:
     state, a, snapshot = scene(seed)
     marks = lowest_points(state)
-    before, after = (
-        material_points(moved(MODEL, state, a, dt), marks) for dt in (-STEP, STEP)
-    )
+    before, after = (material_points(moved(MODEL, state, a, dt), marks) for dt in (-STEP, STEP))
     rate = (after - before) / (2 * STEP)
     np.testing.assert_allclose(snapshot.v_world_contacts, rate, atol=DIFFERENCE)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from go2_wbc.recording import Recording
-from tests.viz.chromium import BROWSER_VARIABLE, find_chromium
+from tests.viz.chromium import find_chromium
 from tests.viz.synthetic import synthetic_recording
 
 _SHORT_SCRIPT = (("stand", 0.4), ("walk", 1.0), ("high_five", 1.2), ("sit", 0.8))
@@ -23,15 +23,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if without:
         config.hook.pytest_deselected(items=without)
         items[:] = [item for item in items if not item.get_closest_marker("browser")]
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    if find_chromium() is None:
-        terminalreporter.write_line(
-            "browser tests NOT RUN: no Chromium on this machine "
-            f"(apt-get install chromium, or set {BROWSER_VARIABLE})",
-            yellow=True,
-        )
 
 
 @pytest.fixture(scope="session")

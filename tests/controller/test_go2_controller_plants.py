@@ -1,0 +1,154 @@
+"""The controller drives other plants, in realtime too, and leaves every one of them limp."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import pi
+from pathlib import Path
+
+import pytest
+
+from controller import GO2Controller, Mode
+from go2_wbc.errors import ClosedError
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco_model import JointDynamics, build_spec
+from go2_wbc.robot.description import find_description
+from tests.controller.plants import (
+    HANG_GUARD,
+    PERIOD,
+    StillPlant,
+    WatchedPlant,
+    in_thread,
+    is_limp,
+)
+
+
+def test_in_realtime_the_robot_stands_and_walks_while_the_script_waits() -> None:
+    plant = WatchedPlant(MujocoPlant(control_period=2 * PERIOD))
+    with GO2Controller(plant=plant, realtime=True) as go2:
+
+        def script() -> bool:
+            ok = go2.stand() and go2.walk()
+            go2.move(0.2)
+            go2.wait(0.2)
+            go2.stop()
+            return ok
+
+        assert in_thread(script).result(HANG_GUARD), go2.last_outcome.reason
+        assert go2.mode is Mode.WALKING
+    assert is_limp(plant.commands[-1])
+
+
+def test_in_realtime_stop_does_not_wait() -> None:
+    with GO2Controller(plant=StillPlant(), realtime=True) as go2:
+        go2.stop()
+        assert go2.last_outcome.reason == "lying, nothing asked yet"
+
+
+def test_a_users_mjcf_stands_under_the_same_controller(tmp_path: Path) -> None:
+    spec = build_spec(find_description(), JointDynamics(), friction=0.8)
+    spec.compile()
+    path = tmp_path / "mine.xml"
+    path.write_text(spec.to_xml(), encoding="utf-8")
+    with GO2Controller(plant=MujocoPlant(path, control_period=PERIOD)) as go2:
+        assert go2.stand(), go2.last_outcome.reason
+
+
+def test_with_noisy_sensors_the_robot_stands_and_trots() -> None:
+    plant = MujocoPlant(sensors="noisy", seed=5)
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand(), go2.last_outcome.reason
+        assert go2.walk()
+        start = go2.state.q[0]
+        go2.move(0.4)
+        go2.wait(3.0)
+        assert go2.last_outcome.ok, go2.last_outcome.reason
+        assert go2.mode is Mode.WALKING
+        assert go2.state.q[0] - start == pytest.approx(0.4 * 3.0, rel=0.2)
+
+
+def test_without_a_display_the_robot_goes_on_without_the_viewer(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    with GO2Controller(plant=MujocoPlant(), viewer=True) as go2:
+        go2.wait(0.1)
+    assert "no viewer: cannot open the viewer: there is no display" in caplog.text
+
+
+def test_the_viewer_is_not_for_other_plants(caplog: pytest.LogCaptureFixture) -> None:
+    with GO2Controller(plant=StillPlant(), viewer=True):
+        assert "the viewer shows MuJoCo plants only" in caplog.text
+
+
+# --- the end ----------------------------------------------------------------------------------
+
+CALLS: dict[str, Callable[[GO2Controller], object]] = {
+    "stand": lambda go2: go2.stand(),
+    "sit": lambda go2: go2.sit(),
+    "lie_down": lambda go2: go2.lie_down(),
+    "recover": lambda go2: go2.recover(),
+    "damp": lambda go2: go2.damp(),
+    "walk": lambda go2: go2.walk(),
+    "move": lambda go2: go2.move(0.1),
+    "stop": lambda go2: go2.stop(),
+    "turn_left": lambda go2: go2.turn_left(pi),
+    "turn_right": lambda go2: go2.turn_right(pi),
+    "move_forward": lambda go2: go2.move_forward(1.0),
+    "high_five": lambda go2: go2.high_five(),
+    "play": lambda go2: go2.play("high_five"),
+    "wait": lambda go2: go2.wait(1.0),
+}
+
+
+@pytest.fixture(scope="module")
+def closed() -> GO2Controller:
+    go2 = GO2Controller()
+    go2.close()
+    return go2
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_every_call_after_close_is_refused(closed: GO2Controller, name: str) -> None:
+    with pytest.raises(ClosedError, match="closed"):
+        CALLS[name](closed)
+
+
+def test_a_closed_controller_can_still_be_looked_at(closed: GO2Controller) -> None:
+    assert closed.mode is Mode.CLOSED
+    assert closed.state.time == 0.0
+    assert closed.command.is_zero
+    assert closed.namespace == "robot1"
+    assert closed.recording().duration == 0.0
+
+
+def test_closing_and_destroying_the_node_any_number_of_times_is_fine() -> None:
+    go2 = GO2Controller()
+    for _ in range(2):
+        go2.destroy_node()
+        go2.close()
+    assert go2.mode is Mode.CLOSED
+
+
+def test_leaving_the_with_block_closes_the_robot_that_it_made() -> None:
+    with GO2Controller() as go2:
+        pass
+    assert go2.mode is Mode.CLOSED
+    with pytest.raises(ClosedError):
+        go2.plant.read()
+
+
+def test_a_plant_that_was_given_is_left_open_and_limp() -> None:
+    plant = WatchedPlant()
+    with GO2Controller(plant=plant) as go2:
+        go2.wait(2 * PERIOD)
+    assert is_limp(plant.commands[-1])
+    assert plant.read().time > 0.0
+
+
+def test_an_error_in_the_with_block_closes_and_comes_out() -> None:
+    with pytest.raises(ZeroDivisionError), GO2Controller() as go2:
+        _ = 1 / 0
+    assert go2.mode is Mode.CLOSED

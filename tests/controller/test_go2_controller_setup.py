@@ -1,0 +1,96 @@
+"""What a controller is made of may be missing, broken or unknown: the error says what and why."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import qpsolvers
+
+from controller import GO2Controller
+from go2_wbc.config import Config
+from go2_wbc.errors import (
+    ClosedError,
+    ConfigError,
+    DescriptionError,
+    ModelMismatch,
+    SolverUnavailable,
+)
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.description import find_description
+from go2_wbc.wbc.config import WbcConfig
+from tests.controller.plants import WatchedPlant
+
+
+@pytest.fixture
+def plant() -> WatchedPlant:
+    return WatchedPlant()
+
+
+def test_without_the_robots_files_the_error_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = [entry for entry in sys.path if "site-packages" not in entry]
+    monkeypatch.setattr(sys, "path", here)
+    with pytest.raises(DescriptionError, match="pip install example-robot-data"):
+        GO2Controller()
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda text: text[: len(text) // 2], "not a valid URDF"),
+        (lambda text: text.replace("FL_hip_joint", "front_left"), "lacks: joint FL_hip_joint"),
+        (lambda text: text.replace("<robot", "<cow").replace("</robot", "</cow"), "root is <cow>"),
+    ],
+)
+def test_a_broken_urdf_is_refused_with_the_reason(
+    tmp_path: Path, edit: Callable[[str], str], message: str
+) -> None:
+    path = tmp_path / "mine.urdf"
+    text = find_description().urdf_path.read_text(encoding="utf-8")
+    path.write_text(edit(text), encoding="utf-8")
+    with pytest.raises(DescriptionError, match=message):
+        GO2Controller(plant=MujocoPlant(urdf=path))
+
+
+def test_a_missing_urdf_or_mjcf_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DescriptionError, match=r"nowhere\.urdf: No such file"):
+        GO2Controller(plant=MujocoPlant(urdf=tmp_path / "nowhere.urdf"))
+    with pytest.raises(ModelMismatch, match=r"nowhere\.xml: no such file"):
+        GO2Controller(plant=MujocoPlant(tmp_path / "nowhere.xml"))
+
+
+def test_an_unknown_solver_is_refused_with_the_valid_ones() -> None:
+    config = Config(wbc=replace(WbcConfig(), solver="gurobi9000"))
+    with pytest.raises(SolverUnavailable, match="unknown QP solver 'gurobi9000'; valid: daqp, "):
+        GO2Controller(config=config)
+
+
+def test_a_solver_that_is_not_installed_is_refused_with_the_line_that_installs_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(qpsolvers, "available_solvers", ["daqp"])
+    config = Config(wbc=replace(WbcConfig(), solver="proxqp"))
+    with pytest.raises(SolverUnavailable, match="pip install proxsuite; installed: daqp"):
+        GO2Controller(config=config)
+
+
+def test_an_unknown_back_end_is_refused_with_the_valid_ones() -> None:
+    with pytest.raises(ConfigError, match="valid: condensed, full, placo"):
+        GO2Controller(config=Config(backend="magic"))
+
+
+def test_a_refused_configuration_leaves_the_plant_untouched(plant: WatchedPlant) -> None:
+    with pytest.raises(ConfigError):
+        GO2Controller(plant=plant, config=Config(backend="magic"))
+    assert not plant.commands
+
+
+def test_a_plant_that_cannot_be_read_is_refused_at_once(plant: WatchedPlant) -> None:
+    plant.close()
+    with pytest.raises(ClosedError, match="plant is closed"):
+        GO2Controller(plant=plant)

@@ -1,0 +1,331 @@
+"""The locomotion planner on synthetic snapshots: when it steps, where to, and what it asks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from go2_wbc.contacts import GAITS, Gait
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
+from go2_wbc.reference import LegTask, Reference, TrackedPoint
+from go2_wbc.robot.rotations import rotation_from_rpy, yaw_rotation
+from go2_wbc.robot.snapshot import Snapshot
+from tests import engine_helpers as helpers
+
+MODEL = helpers.symmetric_model()
+CONFIG = LocomotionConfig()
+TROT = GAITS["trot"]
+TICK = 0.002
+EXACT = 1e-9  # rounding in sums of a few hundred ticks
+SWING_END = TROT.swing_time - TICK
+LAST_TICK = 5e-4  # [m] the swing curve's way in the last tick, with margin
+
+
+def resting(time: float = 0.0, yaw: float = 0.0) -> Snapshot:
+    """Standing squarely at rest: every foot below its hip, the CoM amid them at its height."""
+    q = helpers.standing_q()
+    q[3:7] = pin.Quaternion(rotation_from_rpy(0.0, 0.0, yaw)).coeffs()
+    snapshot = MODEL.snapshot(helpers.state_of(q, time=time))
+    feet = MODEL.p_base_feet_nominal @ yaw_rotation(yaw).T
+    feet[:, 2] = MODEL.foot_radius
+    com = np.array([*feet[:, :2].mean(axis=0), CONFIG.height])
+    return replace(snapshot, p_world_feet=feet, p_world_com=com)
+
+
+def at(snapshot: Snapshot, time: float) -> Snapshot:
+    return replace(snapshot, state=replace(snapshot.state, time=time))
+
+
+def moving(snapshot: Snapshot, v_world: np.ndarray) -> Snapshot:
+    return replace(snapshot, v_world_com=v_world)
+
+
+def started(snapshot: Snapshot, gait: Gait = TROT) -> LocomotionPlanner:
+    planner = LocomotionPlanner(MODEL, gait, CONFIG)
+    planner.start(snapshot)
+    return planner
+
+
+def hold(
+    planner: LocomotionPlanner, snapshot: Snapshot, command: VelocityCommand, seconds: float
+) -> Reference:
+    """The last reference of a robot that stays where it is whatever it is asked."""
+    start = snapshot.state.time
+    reference = planner.update(snapshot, command)
+    for tick in range(1, round(seconds / TICK) + 1):
+        reference = planner.update(at(snapshot, start + tick * TICK), command)
+    return reference
+
+
+class IdealRobot:
+    """Does at once what the reference says; its stance feet stay where they are."""
+
+    def __init__(self) -> None:
+        self.snapshot = resting()
+        self.offset = self.snapshot.p_world_com - self.snapshot.state.p_world_base
+
+    def follow(self, reference: Reference) -> None:
+        body, state = reference.body, self.snapshot.state
+        q, v = state.q.copy(), state.v.copy()
+        q[:3] = body.p_world - self.offset
+        q[3:7] = pin.Quaternion(body.R_world_base).coeffs()
+        v[:3] = body.R_world_base.T @ body.v_world
+        self.snapshot = replace(
+            self.snapshot,
+            state=replace(state, time=state.time + TICK, q=q, v=v),
+            R_world_base=body.R_world_base,
+            p_world_com=body.p_world,
+            v_world_com=body.v_world,
+            p_world_feet=np.maximum(reference.p_world_feet, [-np.inf, -np.inf, MODEL.foot_radius]),
+        )
+
+
+# --- standing and starting ------------------------------------------------------------------------
+
+
+def test_without_a_command_it_stands_and_holds_its_place() -> None:
+    start = resting(yaw=0.4)
+    planner = started(start)
+    reference = hold(planner, start, ZERO_COMMAND, 1.0)
+    assert not planner.is_stepping
+    assert reference.legs == helpers.FOUR_FEET
+    assert reference.body.point is TrackedPoint.COM
+    np.testing.assert_allclose(reference.body.p_world, start.p_world_com, atol=EXACT)
+    np.testing.assert_allclose(reference.body.R_world_base, yaw_rotation(0.4), atol=EXACT)
+    np.testing.assert_array_equal(reference.body.v_world, 0.0)
+    np.testing.assert_array_equal(reference.p_world_feet, start.p_world_feet)
+
+
+@pytest.mark.parametrize(
+    "command", [VelocityCommand(0.3), VelocityCommand(0.0, -0.2), VelocityCommand(angular_z=0.5)]
+)
+def test_a_command_starts_the_gait_at_its_first_phase(command: VelocityCommand) -> None:
+    planner = started(resting())
+    planner.update(resting(), ZERO_COMMAND)
+    reference = planner.update(resting(TICK), command)
+    assert planner.is_stepping
+    np.testing.assert_array_equal(reference.stance, TROT.schedule().modes[0])
+    assert LegTask.SWING in reference.legs
+
+
+def test_a_push_beyond_the_capture_margin_starts_the_gait_and_a_smaller_one_does_not() -> None:
+    omega = np.sqrt(MODEL.gravity / CONFIG.height)
+    edge = CONFIG.capture_margin * omega
+    for direction in np.random.default_rng(1).normal(size=(8, 2)):
+        v = np.array([*direction / np.linalg.norm(direction), 0.0])
+        for share, steps in ((0.98, False), (1.02, True)):
+            planner = started(resting())
+            planner.update(moving(resting(TICK), share * edge * v), ZERO_COMMAND)
+            assert planner.is_stepping is steps
+
+
+def test_a_com_displaced_beyond_the_capture_margin_starts_the_gait() -> None:
+    start = resting()
+    for share, steps in ((0.98, False), (1.02, True)):
+        planner = started(start)
+        shifted = start.p_world_com + [0.0, share * CONFIG.capture_margin, 0.0]
+        planner.update(replace(start, p_world_com=shifted), ZERO_COMMAND)
+        assert planner.is_stepping is steps
+
+
+def test_squaring_up_steps_unless_the_feet_are_below_the_hips() -> None:
+    start = resting()
+    planner = started(start)
+    assert planner.square_up(start)
+    assert not planner.is_stepping
+    feet = start.p_world_feet.copy()
+    feet[2, 0] += 3 * CONFIG.square_tolerance
+    assert not planner.square_up(replace(start, p_world_feet=feet))
+    assert planner.is_stepping
+
+
+# --- the body's path ------------------------------------------------------------------------------
+
+
+def test_the_reference_velocity_ramps_to_the_command_at_the_allowed_rate() -> None:
+    planner, command = started(resting()), VelocityCommand(0.6, -0.3, 1.0)
+    rate = np.array([CONFIG.linear_acceleration] * 2 + [CONFIG.angular_acceleration])
+    wanted, previous = np.array([0.6, -0.3, 1.0]), np.zeros(3)
+    for tick in range(1, 301):
+        body = planner.update(resting(tick * TICK), command).body
+        v_body = body.R_world_base.T @ body.v_world
+        velocity = np.array([*v_body[:2], body.w_world[2]])
+        assert (np.abs(velocity - previous) <= rate * TICK + EXACT).all()
+        previous = velocity
+    np.testing.assert_allclose(previous, wanted, atol=EXACT)
+
+
+@pytest.mark.parametrize(
+    "command", [VelocityCommand(1.0, 0.4, 0.0), VelocityCommand(angular_z=2.0)]
+)
+def test_of_a_robot_that_is_held_back_the_reference_stays_on_the_leash(
+    command: VelocityCommand,
+) -> None:
+    start = resting(yaw=3.0)
+    planner = started(start)
+    body = hold(planner, start, command, 1.5).body
+    lead = np.linalg.norm(body.p_world[:2] - start.p_world_com[:2])
+    turn = np.arctan2(*(yaw_rotation(3.0).T @ body.R_world_base)[[1, 0], [0, 0]])
+    if command.angular_z:
+        assert turn == pytest.approx(CONFIG.yaw_leash, abs=EXACT)
+        assert lead < EXACT
+    else:
+        assert lead == pytest.approx(CONFIG.position_leash, abs=EXACT)
+        assert turn == pytest.approx(0.0, abs=EXACT)
+
+
+def test_the_reference_of_an_ideal_robot_is_the_integral_of_the_command() -> None:
+    robot, command = IdealRobot(), VelocityCommand(0.5, 0.1, 0.0)
+    planner, start = started(robot.snapshot), robot.snapshot.p_world_com
+    ramp = 0.5 / CONFIG.linear_acceleration, 0.1 / CONFIG.linear_acceleration
+    for _ in range(500):
+        robot.follow(planner.update(robot.snapshot, command))
+    way = robot.snapshot.p_world_com - start
+    time = robot.snapshot.state.time
+    expected = [0.5 * (time - ramp[0] / 2), 0.1 * (time - ramp[1] / 2), 0.0]
+    np.testing.assert_allclose(way, expected, atol=0.5 * TICK)
+
+
+def test_a_robot_that_hangs_low_is_asked_for_more_height() -> None:
+    start = resting()
+    low = replace(start, p_world_com=start.p_world_com - [0.0, 0.0, 0.02])
+    reference = hold(started(start), low, ZERO_COMMAND, 0.5)
+    assert reference.body.p_world[2] > CONFIG.height + 0.01
+
+
+# --- footholds ------------------------------------------------------------------------------------
+
+
+def landing(snapshot: Snapshot, command: VelocityCommand) -> Reference:
+    """The last reference of the first swing, when the feet have all but arrived."""
+    return hold(started(snapshot), snapshot, command, SWING_END)
+
+
+def test_a_robot_that_steps_in_place_puts_its_feet_below_its_hips() -> None:
+    start = resting(yaw=0.8)
+    feet = start.p_world_feet + np.random.default_rng(3).normal(scale=0.03, size=(4, 3))
+    scattered = replace(start, p_world_feet=np.array([*feet.T[:2], start.p_world_feet.T[2]]).T)
+    planner = started(scattered)
+    planner.square_up(scattered)
+    reference = hold(planner, scattered, ZERO_COMMAND, SWING_END)
+    swing = ~reference.stance
+    assert swing.sum() == 2
+    nominal = start.p_world_feet[swing, :2]
+    np.testing.assert_allclose(reference.p_world_feet[swing, :2], nominal, atol=LAST_TICK)
+
+
+def test_the_foothold_is_half_the_stance_travel_ahead_corrected_by_the_velocity_error() -> None:
+    """Raibert 1986: hip + v T/2 + k (v - v_ref), the hip being where it will be at touchdown."""
+    start, v = resting(), np.array([0.6, -0.2, 0.0])
+    reference = landing(moving(start, v), VelocityCommand(0.2))
+    v_ref = reference.body.v_world
+    remaining = TROT.swing_time - SWING_END
+    expected = v * TROT.stance_time / 2 + CONFIG.velocity_feedback * (v - v_ref) + v * remaining
+    swing = ~reference.stance
+    found = reference.p_world_feet[swing] - start.p_world_feet[swing]
+    np.testing.assert_allclose(found[:, :2], np.tile(expected[:2], (2, 1)), atol=LAST_TICK)
+    depth = CONFIG.swing.touchdown_depth
+    np.testing.assert_allclose(found[:, 2], -depth, atol=LAST_TICK)
+
+
+def test_a_turning_robot_steps_along_the_circle_about_its_middle() -> None:
+    start = resting()
+    reference = landing(start, VelocityCommand(0.0, 0.0, 0.6))
+    for leg in np.flatnonzero(~reference.stance):
+        x, y = start.p_world_feet[leg, :2]
+        step = (reference.p_world_feet[leg] - start.p_world_feet[leg])[:2]
+        tangent = np.array([-y, x])
+        share = TROT.stance_time / 2 + TROT.swing_time - SWING_END
+        np.testing.assert_allclose(step, 0.6 * tangent * share, atol=LAST_TICK)
+
+
+def test_a_foothold_stays_within_reach_of_the_hip() -> None:
+    start, v = resting(), np.array([4.0, 3.0, 0.0])
+    reference = landing(moving(start, v), ZERO_COMMAND)
+    swing = ~reference.stance
+    hips = start.p_world_feet[swing] + v * (TROT.swing_time - SWING_END)
+    distance = np.linalg.norm((reference.p_world_feet[swing] - hips)[:, :2], axis=1)
+    np.testing.assert_allclose(distance, CONFIG.foothold_reach, atol=5 * LAST_TICK)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_mirrored_robot_is_asked_for_the_mirror_image(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    state = helpers.random_state(rng)
+    x, y, turn = rng.uniform(-0.5, 0.5, size=3)
+    mirrored_trot = replace(TROT, offsets=(0.0, 0.5, 0.5, 0.0))
+    left, right = state, helpers.mirrored_state(state)
+    planners = [started(MODEL.snapshot(s), g) for s, g in ((left, TROT), (right, mirrored_trot))]
+    commands = VelocityCommand(x, y, turn), VelocityCommand(x, -y, -turn)
+    for tick in range(120):
+        here, there = (
+            planner.update(MODEL.snapshot(replace(s, time=tick * TICK)), command)
+            for planner, s, command in zip(planners, (left, right), commands, strict=True)
+        )
+        image = helpers.mirrored_reference(here)
+        assert image.legs == there.legs
+        for name in ("p_world_feet", "v_world_feet", "a_world_feet"):
+            np.testing.assert_allclose(getattr(image, name), getattr(there, name), atol=EXACT)
+        for name in ("p_world", "v_world", "R_world_base", "w_world"):
+            np.testing.assert_allclose(
+                getattr(image.body, name), getattr(there.body, name), atol=EXACT
+            )
+
+
+# --- walking and stopping -------------------------------------------------------------------------
+
+
+def test_diagonals_take_turns_and_swing_feet_are_lifted() -> None:
+    robot, command = IdealRobot(), VelocityCommand(0.4)
+    planner = started(robot.snapshot)
+    half, highest = round(TROT.period / 2 / TICK), 0.0
+    for tick in range(6 * half):
+        reference = planner.update(robot.snapshot, command)
+        expected = TROT.schedule().modes[(tick // half) % 2]
+        np.testing.assert_array_equal(reference.stance, expected, err_msg=f"{tick=}")
+        highest = max(highest, float(reference.p_world_feet[:, 2].max()))
+        robot.follow(reference)
+    assert highest == pytest.approx(MODEL.foot_radius + CONFIG.swing.apex, abs=1e-3)
+
+
+def test_it_stops_stepping_at_a_touchdown_once_it_stands_squarely_at_rest() -> None:
+    robot = IdealRobot()
+    planner = started(robot.snapshot)
+    for _ in range(500):
+        robot.follow(planner.update(robot.snapshot, VelocityCommand(0.5, 0.1, 0.3)))
+    for _ in range(1000):
+        reference = planner.update(robot.snapshot, ZERO_COMMAND)
+        if not planner.is_stepping:
+            break
+        robot.follow(reference)
+    assert not planner.is_stepping
+    assert reference.legs == helpers.FOUR_FEET
+    np.testing.assert_allclose(reference.body.v_world, 0.0, atol=EXACT)
+    assert planner.square_up(robot.snapshot)
+    assert planner.heading == pytest.approx(float(robot.snapshot.state.rpy[2]), abs=0.05)
+
+
+def test_it_goes_on_stepping_while_the_robot_still_drifts() -> None:
+    start = resting()
+    planner = started(start)
+    hold(planner, start, VelocityCommand(0.2), 0.4)
+    drifting = moving(at(start, 0.4), np.array([2 * CONFIG.settle_speed, 0.0, 0.0]))
+    hold(planner, drifting, ZERO_COMMAND, 2.0)
+    assert planner.is_stepping
+    hold(planner, at(start, 2.4), ZERO_COMMAND, 0.5)
+    assert not planner.is_stepping
+
+
+def test_a_foot_that_lands_higher_raises_the_reference() -> None:
+    """A step up: the body's height and the touchdown height follow the feet."""
+    start = resting()
+    raised = replace(start, p_world_feet=start.p_world_feet + [0.0, 0.0, 0.05])
+    planner = started(start)
+    before = planner.update(start, VelocityCommand(0.2))
+    after = hold(planner, at(raised, TICK), VelocityCommand(0.2), 2.0)
+    rise = after.body.p_world[2] - before.body.p_world[2]
+    assert rise > 0.04

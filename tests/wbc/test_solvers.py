@@ -1,0 +1,173 @@
+"""Dense QP solvers: each meets the optimality conditions on its own, and they agree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import qpsolvers
+
+from go2_wbc.errors import QpInfeasible, SolverUnavailable
+from go2_wbc.wbc import solvers
+from go2_wbc.wbc.solvers import SOLVERS, DenseQp, QpSolution, check_solver, solve_dense_qp
+
+FEASIBLE = 1e-8  # of rows of order one; ProxQP's tolerance is 1e-9, the others reach 1e-13
+STATIONARY = 1e-10  # gradient over the largest multiplier; measured 1e-14
+COMPLEMENTARY = 1e-8  # slack times multiplier, over the largest; measured 1e-9 (ProxQP)
+AGREEMENT = 1e-7  # of minimisers of order one; measured 2e-9
+SEEDS = range(20)
+
+
+def random_qp(seed: int, equalities: int) -> DenseQp:
+    """A feasible, strictly convex QP with active bounds, and some rows with one open side."""
+    rng = np.random.default_rng(seed)
+    n, m = 12, 24
+    root = rng.normal(size=(n + 4, n))
+    C, inside = rng.normal(size=(m, n)), rng.normal(size=n)
+    lower, upper = C @ inside - rng.uniform(0.05, 1.0, m), C @ inside + rng.uniform(0.05, 1.0, m)
+    lower[:6], upper[6:10] = -np.inf, np.inf
+    E = rng.normal(size=(equalities, n))
+    qp = DenseQp(root.T @ root, 5.0 * rng.normal(size=n), C, lower, upper)
+    return replace(qp, E=E, e=E @ inside) if equalities else qp
+
+
+def check_optimality(qp: DenseQp, solution: QpSolution) -> int:
+    """Assert the four conditions of Karush, Kuhn and Tucker; returns how many bounds are active."""
+    x, multipliers = solution.x, solution.inequality_multipliers
+    G, h = qp.one_sided()
+    gradient = qp.H @ x + qp.g + G.T @ multipliers
+    if qp.E is not None and qp.e is not None:
+        gradient = gradient + qp.E.T @ solution.equality_multipliers
+        np.testing.assert_allclose(qp.E @ x, qp.e, atol=FEASIBLE)
+    scale = max(1.0, float(np.abs(multipliers).max()))
+    np.testing.assert_allclose(gradient / scale, 0.0, atol=STATIONARY)
+    slack = h - G @ x
+    assert (slack >= -FEASIBLE).all()
+    assert (multipliers >= -FEASIBLE * scale).all()
+    np.testing.assert_allclose(slack * multipliers / scale, 0.0, atol=COMPLEMENTARY)
+    return int((multipliers > 1e-3).sum())
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("equalities", [0, 5])
+def test_every_solver_meets_the_optimality_conditions(solver: str, equalities: int) -> None:
+    active = 0
+    for seed in SEEDS:
+        qp = random_qp(seed, equalities)
+        active += check_optimality(qp, solve_dense_qp(qp, solver))
+    assert active > len(SEEDS)
+
+
+@pytest.mark.parametrize("equalities", [0, 5])
+def test_the_solvers_find_the_same_minimum_and_multipliers(equalities: int) -> None:
+    for seed in SEEDS:
+        qp = random_qp(seed, equalities)
+        first, *others = [solve_dense_qp(qp, solver) for solver in SOLVERS]
+        for other in others:
+            np.testing.assert_allclose(other.x, first.x, atol=AGREEMENT)
+            np.testing.assert_allclose(
+                other.inequality_multipliers, first.inequality_multipliers, rtol=1e-4, atol=1e-4
+            )
+
+
+def test_the_optimality_check_notices_a_wrong_answer() -> None:
+    qp = random_qp(0, 0)
+    right = solve_dense_qp(qp, "daqp")
+    for wrong in (
+        replace(right, x=right.x + 1e-3),
+        replace(right, inequality_multipliers=-right.inequality_multipliers),
+        replace(right, inequality_multipliers=np.zeros_like(right.inequality_multipliers)),
+    ):
+        with pytest.raises(AssertionError):
+            check_optimality(qp, wrong)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_solver_keeps_no_memory_of_the_last_problem(solver: str) -> None:
+    first, second = random_qp(1, 0), random_qp(2, 0)
+    alone = solve_dense_qp(first, solver).x
+    solve_dense_qp(second, solver)
+    np.testing.assert_array_equal(solve_dense_qp(first, solver).x, alone)
+
+
+def test_open_sides_are_left_out_of_the_one_sided_form() -> None:
+    qp = DenseQp(
+        np.eye(2),
+        np.zeros(2),
+        np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]]),
+        np.array([-np.inf, -1.0, -2.0]),
+        np.array([7.0, np.inf, 8.0]),
+    )
+    G, h = qp.one_sided()
+    np.testing.assert_array_equal(G, [[1.0, 2.0], [5.0, 6.0], [-3.0, -4.0], [-5.0, -6.0]])
+    np.testing.assert_array_equal(h, [7.0, 8.0, 1.0, 2.0])
+
+
+# --- problems without solution --------------------------------------------------------------------
+
+
+def contradiction() -> DenseQp:
+    C = np.array([[1.0, 0.0], [1.0, 0.0]])
+    return DenseQp(np.eye(2), np.zeros(2), C, np.array([1.0, -np.inf]), np.array([np.inf, -1.0]))
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_contradicting_bounds_are_infeasible_and_name_the_solver(solver: str) -> None:
+    with pytest.raises(QpInfeasible, match=f"{solver} found no solution") as caught:
+        solve_dense_qp(contradiction(), solver)
+    assert caught.value.solver == solver
+    assert caught.value.status
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("part", ["g", "lower", "upper"])
+def test_a_nan_is_refused_at_once(solver: str, part: str) -> None:
+    """ProxQP took seconds to give up, and a nan bound was taken for an open side."""
+    qp = random_qp(3, 0)
+    values = getattr(qp, part).copy()
+    values[11] = np.nan
+    with pytest.raises(QpInfeasible, match="holds a nan"):
+        solve_dense_qp(replace(qp, **{part: values}), solver)
+
+
+def test_an_answer_that_is_not_finite_counts_as_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    nan = SimpleNamespace(found=True, x=np.full(12, np.nan), z=np.zeros(38), y=None)
+    monkeypatch.setattr(qpsolvers, "solve_problem", lambda *_, **__: nan)
+    with pytest.raises(QpInfeasible, match="no feasible point"):
+        solve_dense_qp(random_qp(1, 0), "daqp")
+
+
+# --- names ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_every_valid_solver_is_installed(solver: str) -> None:
+    assert check_solver(solver) == solver
+
+
+def test_an_unknown_solver_is_answered_with_the_valid_names() -> None:
+    with pytest.raises(SolverUnavailable, match=r"QP solver 'gurobi'; valid: daqp, proxqp, quad"):
+        check_solver("gurobi")
+
+
+@pytest.mark.parametrize(
+    ("solver", "package"), [("daqp", "daqp"), ("proxqp", "proxsuite"), ("quadprog", "quadprog")]
+)
+def test_an_uninstalled_solver_is_answered_with_the_install_line(
+    monkeypatch: pytest.MonkeyPatch, solver: str, package: str
+) -> None:
+    others = [name for name in SOLVERS if name != solver]
+    monkeypatch.setattr(qpsolvers, "available_solvers", others)
+    expected = f"'{solver}' is not installed: pip install {package}; installed: {', '.join(others)}"
+    with pytest.raises(SolverUnavailable, match=expected):
+        check_solver(solver)
+
+
+def test_a_solver_that_qpsolvers_has_but_we_do_not_tune_is_refused(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(qpsolvers, "available_solvers", [*solvers.SOLVERS, "osqp"])
+    with pytest.raises(SolverUnavailable, match="unknown QP solver 'osqp'"):
+        check_solver("osqp")

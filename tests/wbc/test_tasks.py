@@ -1,0 +1,165 @@
+"""Tasks: A z - b is the acceleration of what they track, minus the one their law asks for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from go2_wbc.legs import LEGS
+from go2_wbc.reference import Reference, TrackedPoint
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import exp_rotation, log_rotation
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.wbc.tasks import (
+    BodyOrientation,
+    BodyPosition,
+    ForceRegularisation,
+    Gains,
+    LegPosture,
+    SwingFoot,
+    Task,
+)
+from tests.engine_helpers import (
+    JO,
+    MODES,
+    ST,
+    SW,
+    moved,
+    random_reference,
+    random_state,
+)
+
+MODEL = RobotModel()
+SEEDS = range(12)
+STEP = 1e-5  # [s] of the central differences
+DIFFERENCE = 1e-5  # [m/s^2, rad/s^2] error of a first difference of a velocity; measured 1e-8
+EXACT = 1e-10  # rounding of numbers up to 100
+GAINS = Gains((60.0, 50.0, 40.0), (15.0, 14.0, 13.0))
+KP, KD = GAINS.arrays
+LEGS_OF_ALL_KINDS = (ST, SW, JO, SW)
+
+
+def scene(seed: int) -> tuple[Snapshot, Reference, np.ndarray]:
+    """A snapshot, a reference with every kind of leg, and a decision vector."""
+    rng = np.random.default_rng(seed)
+    snapshot = MODEL.snapshot(random_state(rng))
+    reference = random_reference(snapshot, LEGS_OF_ALL_KINDS, 2.0, rng)
+    return snapshot, reference, rng.normal(scale=3.0, size=30)
+
+
+def residual(task: Task, snapshot: Snapshot, reference: Reference, z: np.ndarray) -> np.ndarray:
+    rows = task.rows(snapshot, reference)
+    return rows.A @ z - rows.b
+
+
+def neighbours(snapshot: Snapshot, z: np.ndarray) -> tuple[Snapshot, Snapshot]:
+    """Just before and just after, along the motion with the accelerations of ``z``."""
+    before, after = (moved(MODEL, snapshot.state, z[:18], dt) for dt in (-STEP, STEP))
+    return MODEL.snapshot(before), MODEL.snapshot(after)
+
+
+@pytest.mark.parametrize("point", list(TrackedPoint))
+@pytest.mark.parametrize("seed", SEEDS)
+def test_body_position_compares_the_points_acceleration_with_the_law(
+    seed: int, point: TrackedPoint
+) -> None:
+    snapshot, reference, z = scene(seed)
+    target = replace(reference.body, point=point)
+    reference = replace(reference, body=target)
+    before, after = neighbours(snapshot, z)
+    if point is TrackedPoint.COM:
+        p, v = snapshot.p_world_com, snapshot.v_world_com
+        rate = (after.v_world_com - before.v_world_com) / (2 * STEP)
+    else:
+        p, v = snapshot.state.p_world_base, snapshot.R_world_base @ snapshot.state.v[:3]
+        ends = [s.R_world_base @ s.state.v[:3] for s in (before, after)]
+        rate = (ends[1] - ends[0]) / (2 * STEP)
+    wanted = target.a_world + KD * (target.v_world - v) + KP * (target.p_world - p)
+    found = residual(BodyPosition(KP, KD), snapshot, reference, z)
+    np.testing.assert_allclose(found, rate - wanted, atol=DIFFERENCE)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_body_orientation_compares_the_angular_acceleration_in_base_axes(seed: int) -> None:
+    snapshot, reference, z = scene(seed)
+    target, R = reference.body, snapshot.R_world_base
+    before, after = neighbours(snapshot, z)
+    w_world = [s.R_world_base @ s.state.v[3:6] for s in (before, after)]
+    rate = R.T @ (w_world[1] - w_world[0]) / (2 * STEP)
+    error = log_rotation(R.T @ target.R_world_base)
+    w = R @ snapshot.state.v[3:6]
+    wanted = R.T @ target.dw_world + KD * (R.T @ (target.w_world - w)) + KP * error
+    found = residual(BodyOrientation(KP, KD), snapshot, reference, z)
+    np.testing.assert_allclose(found, rate - wanted, atol=DIFFERENCE)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_a_trunk_turned_away_is_turned_back(axis: int) -> None:
+    snapshot, reference, _ = scene(1)
+    turn = 0.1 * np.eye(3)[axis]
+    away = replace(
+        reference.body,
+        R_world_base=snapshot.R_world_base @ exp_rotation(-turn),
+        w_world=snapshot.R_world_base @ snapshot.state.v[3:6],
+        dw_world=np.zeros(3),
+    )
+    rows = BodyOrientation(KP, KD).rows(snapshot, replace(reference, body=away))
+    np.testing.assert_allclose(rows.b, -KP * turn, atol=EXACT)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_swing_feet_compare_the_foot_centres_acceleration_with_the_law(seed: int) -> None:
+    snapshot, reference, z = scene(seed)
+    before, after = neighbours(snapshot, z)
+    rate = (after.v_world_feet - before.v_world_feet) / (2 * STEP)
+    wanted = (
+        reference.a_world_feet
+        + KD * (reference.v_world_feet - snapshot.v_world_feet)
+        + KP * (reference.p_world_feet - snapshot.p_world_feet)
+    )
+    found = residual(SwingFoot(KP, KD), snapshot, reference, z).reshape(-1, 3)
+    np.testing.assert_allclose(found, (rate - wanted)[[1, 3]], atol=DIFFERENCE)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_leg_posture_compares_joint_accelerations_with_the_law(seed: int) -> None:
+    snapshot, reference, z = scene(seed)
+    state = snapshot.state
+    wanted = (
+        reference.a_joints
+        + np.tile(KD, 4) * (reference.v_joints - state.joint_velocities)
+        + np.tile(KP, 4) * (reference.q_joints - state.joint_positions)
+    )
+    found = residual(LegPosture(KP, KD), snapshot, reference, z)
+    np.testing.assert_allclose(found, (z[6:18] - wanted)[6:9], atol=EXACT)
+
+
+@pytest.mark.parametrize("legs", MODES)
+def test_the_forces_are_regularised_around_an_even_share_of_the_weight(legs: tuple) -> None:
+    snapshot, reference, z = scene(0)
+    stance = np.array([task is ST for task in legs])
+    found = residual(ForceRegularisation(160.0), snapshot, replace(reference, legs=legs), z)
+    share = np.array([0.0, 0.0, 160.0 / max(stance.sum(), 1)])
+    np.testing.assert_allclose(found, (z[18:].reshape(4, 3) - share)[stance].ravel(), atol=EXACT)
+
+
+@pytest.mark.parametrize("legs", MODES)
+def test_each_leg_has_rows_in_the_task_it_is_given_and_in_no_other(legs: tuple) -> None:
+    snapshot, reference, _ = scene(0)
+    reference = replace(reference, legs=legs)
+    tasks = {SW: SwingFoot(KP, KD), JO: LegPosture(KP, KD), ST: ForceRegularisation(160.0)}
+    for kind, task in tasks.items():
+        rows = task.rows(snapshot, reference)
+        assert rows.A.shape == (3 * legs.count(kind), 30)
+        used = np.abs(rows.A).sum(axis=0)
+        for leg in LEGS:
+            columns = used[18:].reshape(4, 3)[leg] if kind is ST else used[leg.velocities]
+            assert columns.any() == (legs[leg] is kind)
+
+
+def test_uniform_gains_are_the_same_on_each_axis() -> None:
+    kp, kd = Gains.uniform(500.0, 40.0).arrays
+    np.testing.assert_array_equal(kp, [500.0] * 3)
+    np.testing.assert_array_equal(kd, [40.0] * 3)
