@@ -75,7 +75,8 @@ def override(part: _Part, values: Mapping[str, Any], where: str) -> _Part:
     Raises:
         ConfigError: for an unknown key, or a value of another type than the field's.
     """
-    fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(part)}
+    names = [f.name for f in dataclasses.fields(part)]  # type: ignore[arg-type]
+    fields = {name: getattr(part, name) for name in names}
     changes = {}
     for key, value in values.items():
         if key not in fields:

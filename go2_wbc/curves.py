@@ -114,13 +114,18 @@ def keyframes(
     values: Sequence[Float[np.ndarray, " n"]],
     ease: Ease = Ease.MINIMUM_JERK,
 ) -> Curve:
-    """A curve that passes through each value (n,) at its time [s], at rest at every key.
+    """A curve that passes through each value (n,) at its time [s] after the first key's.
+
+    It comes to rest at every key, unless the ease is linear.
 
     Raises:
         CommandError: if there are fewer than two keys, or the times do not increase.
     """
     if len(times) < 2 or len(times) != len(values):
-        raise CommandError(f"keyframes need two or more times and as many values, got {len(times)}")
+        raise CommandError(
+            "keyframes need two or more times and as many values, "
+            f"got {len(times)} times and {len(values)} values"
+        )
     segments = tuple(
         Segment(np.asarray(a, float), np.asarray(b, float), t1 - t0, ease)
         for a, b, t0, t1 in zip(values[:-1], values[1:], times[:-1], times[1:], strict=True)

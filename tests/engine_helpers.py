@@ -16,7 +16,7 @@ from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.solution import WbcSolution
 
-Legs = tuple[LegTask, LegTask, LegTask, LegTask]
+Legs = tuple[LegTask, ...]
 ST, SW, JO = LegTask.STANCE, LegTask.SWING, LegTask.JOINTS
 FOUR_FEET: Legs = (ST, ST, ST, ST)
 THREE_FEET: tuple[Legs, ...] = (

@@ -215,9 +215,7 @@ class LocomotionPlanner:
         arms = hips - snapshot.state.p_world_base[:2]
         spin = self._velocity[2] * np.column_stack([-arms[:, 1], arms[:, 0]])
         velocity = v + spin
-        step = velocity * self._gait.stance_time / 2 + config.velocity_feedback * (v - v_ref)
-        step += velocity * remaining[:, None]
-        travel = step - velocity * remaining[:, None]
+        travel = velocity * self._gait.stance_time / 2 + config.velocity_feedback * (v - v_ref)
         length = np.linalg.norm(travel, axis=1, keepdims=True)
         reach = config.foothold_reach
         travel *= np.minimum(1.0, reach / np.maximum(length, 1e-9))

@@ -32,6 +32,9 @@ class RobotModel:
     """Constants and dynamics of the robot.
 
     Attributes:
+        description: the files that the robot was loaded from.
+        pin_model: Pinocchio's model, with rotor inertia.
+        foot_radius: radius [m] of the spherical feet.
         mass: total mass [kg].
         gravity: 9.81 [m/s^2].
         torque_limits: (12,) [N m].
@@ -39,6 +42,8 @@ class RobotModel:
         q_lower, q_upper: (12,) joint limits [rad], the tighter of URDF and published ones.
         p_base_hips: (4, 3) hip abduction axes' origins in the base frame [m].
         hip_width: lateral distance [m] from the abduction axis to the leg plane.
+        p_base_feet_nominal: (4, 3) points of the leg planes beside the hips in the base frame [m];
+            below them the feet stand squarely.
     """
 
     def __init__(

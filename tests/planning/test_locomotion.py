@@ -127,7 +127,7 @@ def test_a_com_displaced_beyond_the_capture_margin_starts_the_gait() -> None:
     start = resting()
     for share, steps in ((0.98, False), (1.02, True)):
         planner = started(start)
-        shifted = start.p_world_com + [0.0, share * CONFIG.capture_margin, 0.0]
+        shifted = start.p_world_com + np.array([0.0, share * CONFIG.capture_margin, 0.0])
         planner.update(replace(start, p_world_com=shifted), ZERO_COMMAND)
         assert planner.is_stepping is steps
 
@@ -297,11 +297,12 @@ def test_it_stops_stepping_at_a_touchdown_once_it_stands_squarely_at_rest() -> N
     planner = started(robot.snapshot)
     for _ in range(500):
         robot.follow(planner.update(robot.snapshot, VelocityCommand(0.5, 0.1, 0.3)))
+    reference = planner.update(robot.snapshot, ZERO_COMMAND)
     for _ in range(1000):
-        reference = planner.update(robot.snapshot, ZERO_COMMAND)
         if not planner.is_stepping:
             break
         robot.follow(reference)
+        reference = planner.update(robot.snapshot, ZERO_COMMAND)
     assert not planner.is_stepping
     assert reference.legs == helpers.FOUR_FEET
     np.testing.assert_allclose(reference.body.v_world, 0.0, atol=EXACT)
@@ -323,7 +324,7 @@ def test_it_goes_on_stepping_while_the_robot_still_drifts() -> None:
 def test_a_foot_that_lands_higher_raises_the_reference() -> None:
     """A step up: the body's height and the touchdown height follow the feet."""
     start = resting()
-    raised = replace(start, p_world_feet=start.p_world_feet + [0.0, 0.0, 0.05])
+    raised = replace(start, p_world_feet=start.p_world_feet + np.array([0.0, 0.0, 0.05]))
     planner = started(start)
     before = planner.update(start, VelocityCommand(0.2))
     after = hold(planner, at(raised, TICK), VelocityCommand(0.2), 2.0)

@@ -53,7 +53,7 @@ def test_the_logarithm_is_axis_times_angle_and_undone_by_exp(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_near_the_target_the_error_shrinks_at_the_relative_angular_velocity(seed: int) -> None:
-    """d log(R' R_des) / dt = w_des - w in base axes at R = R_des: the law of the orientation task."""
+    """d log(R' R_des) / dt = w_des - w in base axes at R_des: what the orientation task assumes."""
     rng = np.random.default_rng(seed)
     R = rotation_from_rpy(*random_angles(rng))
     w, w_des = rng.normal(size=(2, 3))  # both in base axes

@@ -99,13 +99,13 @@ def test_the_torques_of_a_static_stand_are_its_static_equilibrium(
 
 @pytest.mark.parametrize("raised", LEGS)
 def test_three_feet_carry_the_weight_too(model: RobotModel, raised: int) -> None:
-    """The CoM lies near the edge of their triangle, so it also moves: Newton's law holds for both."""
+    """The CoM lies near the edge of their triangle, so it moves too: m (a - g) is carried."""
     snapshot = model.snapshot(state_of(standing_q()))
     legs = tuple(JO if leg == raised else ST for leg in LEGS)
     solution = WholeBodyController(model).solve(snapshot, holding_reference(snapshot, legs))
     assert not solution.forces[raised].any()
     a_com = snapshot.J_com @ solution.qdd + snapshot.drift_com
-    expected = model.mass * (a_com + [0.0, 0.0, model.gravity])
+    expected = model.mass * (a_com + np.array([0.0, 0.0, model.gravity]))
     np.testing.assert_allclose(solution.forces.sum(axis=0), expected, atol=EXACT)
 
 
