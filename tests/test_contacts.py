@@ -181,6 +181,15 @@ def test_without_period_the_time_before_the_first_and_after_the_last_change_is_e
         assert np.isinf(phase.remaining[[0, 2, 3]]).all()
 
 
+def test_the_mode_at_the_end_is_no_change_at_the_start() -> None:
+    """Only a gait comes back to its start; a schedule without period does not."""
+    modes = np.ones((2, 4), dtype=bool)
+    modes[1, 1] = False
+    phase = ContactSchedule((0.0, 1.0), modes).at(0.25)
+    assert np.isinf(phase.elapsed).all()
+    assert phase.remaining[1] == 0.75
+
+
 def test_a_phase_that_was_handed_out_cannot_change_the_schedule() -> None:
     schedule = standing()
     schedule.at(0.0).stance[:] = False

@@ -21,7 +21,7 @@ RETURN_TIME = 2.0
 """Time [s] after a slap within which the paw must be back in its place."""
 PAUSE = 0.3
 """Time [s] from there to the next slap."""
-PLACE_TOLERANCE = 50.0
+PLACE_TOLERANCE = 30.0
 """mm; a paw this near to its place is back in the pose. Dry friction in the joints keeps a part."""
 
 DIRECTIONS: dict[str, tuple[float, float, float]] = {

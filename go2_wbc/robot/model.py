@@ -93,8 +93,7 @@ class RobotModel:
         """Every dynamic quantity of ``state``, computed once."""
         model, data = self.pin_model, self._data
         q, v = state.q, state.v
-        M = pin.crba(model, data, q, pin.Convention.WORLD)
-        M = np.where(_UPPER, M, M.T)  # CRBA fills the upper triangle only
+        M = pin.crba(model, data, q, pin.Convention.WORLD)  # a copy, both triangles filled
         h = np.array(pin.nonLinearEffects(model, data, q, v))
         pin.forwardKinematics(model, data, q, v, self._zero_acceleration)
         J_feet = np.empty((4, 6, 18))
@@ -126,7 +125,6 @@ class RobotModel:
         return np.array(pin.rnea(self.pin_model, self._data, q, v, a))
 
 
-_UPPER = np.triu(np.ones((18, 18), dtype=bool))
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 

@@ -64,8 +64,10 @@ PROXQP_EPS = 1e-9
 PROXQP_EPS_INFEASIBLE = 1e-12
 PROXQP_INFINITY = 1e20
 PROXQP_MAX_ITERATIONS = 50
-"""Outer, and inner per outer: solvable problems need 18 and 38 in all. An infeasible one is given
-up after 0.1 s; with 1000 and 1500, it took up to 11 s (own measurement)."""
+"""Outer, and inner per outer. 3 000 solvable problems needed at most 12 outer and 38 inner in all,
+solved again and again, except twice, not repeatable: 322 inner, and no solution after 1903.
+Infeasible ones are given up after 0.12 s at most; with 1000 and 1500, after 11 s (own measurement).
+"""
 
 
 def check_solver(name: str) -> str:

@@ -266,7 +266,7 @@ def test_damp_from_another_thread_ends_the_call_honestly(
     with GO2Controller(plant=plant, realtime=realtime) as go2:
         call = in_thread(go2.stand)
         assert under_way.wait(HANG_GUARD)
-        go2.damp()
+        in_thread(go2.damp).result(HANG_GUARD)
         assert call.result(HANG_GUARD) is False
         assert go2.mode is Mode.DAMPED
         assert go2.last_outcome.reason == "damped by damp()"
@@ -279,7 +279,7 @@ def test_close_from_another_thread_ends_the_call(plant: WatchedPlant, *, realtim
     go2 = GO2Controller(plant=plant, realtime=realtime)
     call = in_thread(lambda: go2.wait(1e6))
     assert under_way.wait(HANG_GUARD)
-    go2.close()
+    in_thread(go2.close).result(HANG_GUARD)
     ticks = len(plant.commands)
     assert is_limp(plant.commands[-1])
     with pytest.raises(ClosedError):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from controller import GO2Controller, Mode, Outcome
+from controller.checks import is_lying, is_sitting, is_standing
 from go2_wbc.errors import ModeError, MotionInfeasible, StanceMismatch
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
@@ -185,6 +186,30 @@ def test_a_velocity_command_moves_the_robot_that_way(day: Day) -> None:
 
 def test_a_stopped_robot_is_at_rest(day: Day) -> None:
     assert np.abs(day["stop"].after.v[:3]).max() < 0.1
+
+
+POSTURES = {"stand": is_standing, "sit": is_sitting, "lie down": is_lying}
+
+
+@pytest.mark.parametrize("name", POSTURES)
+def test_a_posture_is_told_from_the_others_and_from_a_robot_in_motion(day: Day, name: str) -> None:
+    model = RobotModel()
+    state = day[name].after
+    assert [other for other, check in POSTURES.items() if check(model.snapshot(state), model)] == [
+        name
+    ]
+    for moving in (0, 8):  # base, a joint
+        v = state.v.copy()
+        v[moving] = 1.0
+        assert not POSTURES[name](model.snapshot(replace(state, v=v)), model)
+
+
+@pytest.mark.parametrize("name", ["stand", "sit"])
+def test_a_robot_with_a_foot_in_the_air_neither_stands_nor_sits(day: Day, name: str) -> None:
+    model = RobotModel()
+    contacts = np.array([True, True, False, True])
+    state = replace(day[name].after, feet_in_contact=contacts)
+    assert not POSTURES[name](model.snapshot(state), model)
 
 
 # --- the beginning ----------------------------------------------------------------------------

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 from controller import GO2Controller, Mode
-from controller.checks import is_lying, is_sitting, is_standing
 from controller.navigation import DriveStraight, TurnInPlace
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
 from motions import high_five_plan
 from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant
-
-Check = Callable[[Snapshot, RobotModel], bool]
-UPRIGHT = np.array([0.0, 0.0, 0.31, 0.0, 0.0, 0.0, 1.0, *np.tile([0.0, 0.8, -1.6], 4)])
 
 
 @pytest.fixture
@@ -74,15 +69,6 @@ def test_a_walk_that_ends_beside_its_goal_is_not_done(
     monkeypatch.setattr(DriveStraight, "is_done", lambda _self, _state: True)
     assert go2.move_forward(0.5) is False
     assert go2.last_outcome.reason.startswith("walk 0.500 m missed: asked [m] 0.5, walked [m] ")
-
-
-@pytest.mark.parametrize("check", [is_standing, is_sitting, is_lying])
-def test_a_robot_in_motion_is_in_no_posture(check: Check) -> None:
-    model = RobotModel()
-    with GO2Controller(plant=StillPlant()) as go2:
-        state = go2.state
-    state.v[0] = 0.3
-    assert not check(model.snapshot(state), model)
 
 
 # --- modes after failures ---------------------------------------------------------------------

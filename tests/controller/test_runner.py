@@ -119,7 +119,7 @@ def test_an_interruption_from_another_thread_ends_a_long_call(
     plant.on_write = under_way.set
     call = in_thread(lambda: runner.advance_until(lambda: False, FOREVER))
     wait_for(under_way)
-    runner.interrupt("a test")
+    in_thread(lambda: runner.interrupt("a test")).result(HANG_GUARD)
     assert call.result(HANG_GUARD) is False
     assert runner.loop.fault is not None
 
@@ -239,7 +239,7 @@ def test_in_realtime_an_interruption_ends_a_waiting_call(
     under_way = threading.Event()
     call = in_thread(lambda: runner.advance_until(lambda: bool(under_way.set()), FOREVER))
     wait_for(under_way)
-    runner.interrupt("a test")
+    in_thread(lambda: runner.interrupt("a test")).result(HANG_GUARD)
     assert call.result(HANG_GUARD) is False
     assert runner.loop.fault is not None
     assert runner.loop.fault.reason == "a test"
