@@ -12,7 +12,8 @@ import multiprocessing
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -80,23 +81,45 @@ def run_trial(measure: Callable[[Trial], Measurement], seed: int) -> Measurement
 _Task = tuple[Family, int]
 
 
-def _in_turn(tasks: Sequence[_Task]) -> Iterator[tuple[Family, int, Measurement]]:
+_Done = tuple[Family, int, Measurement]
+
+
+def _in_turn(tasks: Sequence[_Task]) -> Iterator[_Done]:
     for family, seed in tasks:
         yield family, seed, run_trial(family.measure, seed)
 
 
-def _in_processes(tasks: Sequence[_Task], jobs: int) -> Iterator[tuple[Family, int, Measurement]]:
+def _in_processes(tasks: Sequence[_Task], jobs: int) -> Iterator[_Done]:
+    """Trials as they end. A process that dies costs no other trial its result."""
+    left = list(tasks)
+    while left:
+        try:
+            for family, seed, measurement in _in_one_pool(left, jobs):
+                left.remove((family, seed))
+                yield family, seed, measurement
+        except BrokenProcessPool:
+            suspects, left = left[:jobs], left[jobs:]  # trials are started in their order
+            for task in suspects:
+                yield from _alone(task)
+
+
+def _alone(task: _Task) -> Iterator[_Done]:
+    """One trial again, in a process of its own; if that dies as well, the trial has failed."""
+    try:
+        yield from _in_one_pool([task], 1)
+    except BrokenProcessPool:
+        yield *task, Measurement({}, reason="its process died twice")
+
+
+def _in_one_pool(tasks: Sequence[_Task], jobs: int) -> Iterator[_Done]:
     strangers = set(multiprocessing.active_children())
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(jobs, context, initializer=_keep_quiet)
     try:
         with _interrupts_ignored():  # inherited by the children: only the parent is interrupted
             futures = {pool.submit(run_trial, f.measure, seed): (f, seed) for f, seed in tasks}
-        pending: set[Future[Measurement]] = set(futures)
-        while pending:
-            finished, pending = wait(pending, return_when=FIRST_COMPLETED)
-            for future in finished:
-                yield *futures[future], future.result()
+        for future in as_completed(futures):
+            yield *futures[future], future.result()
     except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)
         for child in set(multiprocessing.active_children()) - strangers:

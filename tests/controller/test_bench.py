@@ -1,40 +1,24 @@
-"""The bench counts honestly: means, worst seeds, falls, exit codes; and draws what it says."""
+"""The bench counts honestly: means, worst seeds, falls, exit codes."""
 
 from __future__ import annotations
 
 import json
 import math
+import os
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from controller.bench import families as registry
 from controller.bench.families import FAMILIES, find_families
-from controller.bench.high_fives import highest_window, largest_slip, longest_run
-from controller.bench.pushes import CLIMB, RUNG, highest_rung
 from controller.bench.report import WIDTH, bar_text, render, summarise, summarise_row
 from controller.bench.rows import Direction, Family, Measurement, Row
 from controller.bench.runner import run_families
-from controller.bench.sequence import FAULTS, Judge
-from controller.bench.trials import (
-    FRICTION_RANGE,
-    MASS_RANGE,
-    NOMINAL_FRICTION,
-    YAW_RANGE,
-    Failed,
-    Subject,
-    Trial,
-)
-from controller.bench.witness import Track
+from controller.bench.trials import Trial
 from controller.cli import main as cli
 from controller.cli.common import ExitCode
-from controller.demo.report import StepResult
-from controller.demo.run import DemoProgress
-from controller.demo.steps import DEMO_STEPS
 from go2_wbc.errors import CommandError, PlantError
-from go2_wbc.legs import LEGS, Leg
 
 SPEED = Row("fake.speed", "fake item", "speed", "m/s", 1.0, Direction.AT_LEAST)
 ERROR = Row("fake.error", "fake item", "error", "%", 2.0)
@@ -66,6 +50,12 @@ def break_the_plant(trial: Trial) -> Measurement:
 
 def have_a_bug(trial: Trial) -> Measurement:
     raise ZeroDivisionError("a bug")
+
+
+def die_on_seed_1(trial: Trial) -> Measurement:
+    if trial.seed == 1:
+        os._exit(9)
+    return measure_well(trial)
 
 
 def fake(measure: Callable[[Trial], Measurement] = measure_well, factor: int = 1) -> Family:
@@ -194,6 +184,14 @@ def test_processes_give_the_same_as_one_after_the_other() -> None:
     assert run_families([fake()], seeds=3, jobs=2) == in_turn
 
 
+def test_a_process_that_dies_fails_its_own_trial_only() -> None:
+    results = run_families([fake(die_on_seed_1)], seeds=4, jobs=2)["fake"]
+    assert {seed: trial.reason for seed, trial in results.items()} == {
+        **dict.fromkeys((0, 2, 3), ""),
+        1: "its process died twice",
+    }
+
+
 # --- command line -------------------------------------------------------------------------------
 
 
@@ -277,124 +275,3 @@ def test_an_unknown_row_is_a_usage_error_that_lists_the_valid_ones() -> None:
     with pytest.raises(CommandError, match=r"unknown row 'gallop'.*high-five.*trot"):
         find_families(["gallop"])
     assert cli.main(["bench", "behaviour", "--rows", "gallop"]) == ExitCode.USAGE
-
-
-# --- trials -------------------------------------------------------------------------------------
-
-
-def test_trials_draw_inside_their_ranges_and_fill_them() -> None:
-    trials = [Trial(seed) for seed in range(200)]
-    for values, (low, high) in (
-        ([t.friction for t in trials], FRICTION_RANGE),
-        ([t.mass_scale for t in trials], MASS_RANGE),
-        ([t.yaw for t in trials], YAW_RANGE),
-    ):
-        assert low <= min(values) < low + 0.05 * (high - low)
-        assert high - 0.05 * (high - low) < max(values) <= high
-
-
-def test_a_trial_is_decided_by_its_seed() -> None:
-    a, b, other = Trial(5), Trial(5), Trial(6)
-    assert (a.friction, a.mass_scale, a.yaw) == (b.friction, b.mass_scale, b.yaw)
-    assert a.mass_scale != other.mass_scale
-
-
-def test_nominal_friction_changes_nothing_else() -> None:
-    drawn, nominal = Trial(3), Trial(3, has_nominal_friction=True)
-    assert nominal.friction == NOMINAL_FRICTION
-    assert (nominal.mass_scale, nominal.yaw) == (drawn.mass_scale, drawn.yaw)
-
-
-def test_the_plant_of_a_trial_is_what_the_trial_says() -> None:
-    nominal_mass = 16.085
-    trial = Trial(4)
-    plant = trial.plant()
-    assert plant.total_mass == pytest.approx(nominal_mass * trial.mass_scale, rel=1e-3)
-    assert plant.read().rpy[2] == pytest.approx(trial.yaw, abs=0.1)
-    plant.close()
-
-
-# --- measures -----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("greatest", "first", "found"),
-    [
-        (14.0, 14.0, 14.0),
-        (15.0, 14.0, 14.0),
-        (100.0, 14.0, 14.0 + CLIMB * RUNG),
-        (13.0, 14.0, 12.0),
-        (0.0, 14.0, 0.0),
-        (1.0, 3.0, 1.0),
-    ],
-)
-def test_the_ladder_ends_below_the_first_impulse_that_is_not_survived(
-    greatest: float, first: float, found: float
-) -> None:
-    assert highest_rung(lambda impulse: impulse <= greatest, first) == found
-
-
-def test_the_longest_run_is_found() -> None:
-    flags = np.array([1, 0, 1, 1, 0, 1, 1, 1], dtype=bool)
-    assert longest_run(flags) == slice(5, 8)
-    assert longest_run(np.zeros(3, dtype=bool)) == slice(0, 0)
-
-
-def test_the_held_height_is_the_best_that_was_kept_for_the_whole_time() -> None:
-    heights = np.array([0.0, 0.9, 0.59, 0.61, 0.62, 0.6, 0.0])
-    assert highest_window(heights, 3) == slice(3, 6)
-    with pytest.raises(Failed):
-        highest_window(heights, 8)
-
-
-def test_slip_is_the_largest_excursion_and_not_the_final_one() -> None:
-    v = np.zeros((201, 4, 3))
-    v[1:101, Leg.RL, 0], v[101:, Leg.RL, 0] = 0.02, -0.02  # 4 mm there and back
-    track = empty_track(201, v)
-    assert largest_slip(track, list(LEGS)) == pytest.approx(0.004)
-    assert largest_slip(track, [Leg.FL]) == 0.0
-
-
-def test_a_track_gives_the_velocity_in_the_frame_of_the_heading() -> None:
-    track = empty_track(11, np.zeros((11, 4, 3)))
-    track.rpy[:, 2] = math.pi / 2
-    track.p_world_com[:, 1] = 0.5 * track.time  # along world y is ahead
-    assert track.com_velocity == pytest.approx(np.tile([0.5, 0.0, 0.0], (10, 1)))
-
-
-def test_every_step_of_the_demo_has_a_criterion_of_the_bench() -> None:
-    assert {step.name for step in DEMO_STEPS} <= set(FAULTS)
-
-
-def test_a_true_that_the_simulator_does_not_bear_out_is_found_for_every_step() -> None:
-    with Subject(Trial(0)) as robot:
-        judge = Judge(robot)
-        for name in FAULTS:
-            judge(DemoProgress(0, 1, name))
-            robot.go2.wait(0.01)
-            judge(
-                DemoProgress(
-                    0,
-                    1,
-                    name,
-                    StepResult(name, name, ok=True, reason="done", start=0.0, duration=0.0),
-                )
-            )
-        assert [line.split(":")[0] for line in judge.untrue] == list(FAULTS)
-
-
-def empty_track(n: int, v_contacts: np.ndarray) -> Track:
-    three, twelve = np.zeros((n, 3)), np.zeros((n, 12))
-    return Track(
-        time=0.002 * np.arange(n),
-        q=np.zeros((n, 19)),
-        v=np.zeros((n, 18)),
-        rpy=three.copy(),
-        tau=twelve,
-        foot_forces=np.zeros((n, 4)),
-        p_world_com=three.copy(),
-        p_world_feet=np.zeros((n, 4, 3)),
-        p_world_contacts=np.zeros((n, 4, 3)),
-        v_world_contacts=v_contacts,
-        trunk_force=np.zeros(n),
-    )
