@@ -1,7 +1,8 @@
 """Runs many trials in parallel processes, each started fresh.
 
 Started by spawning, so that a child holds no state of the parent; run-time checks of types, which
-pytest switches on in the parent, are off in the children. An interrupt ends the children at once.
+pytest switches on in the parent, are off in the children. An interrupt ends the children at once,
+and so does the end of the parent, however it came.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import gc
 import logging
 import multiprocessing
+import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -114,7 +116,7 @@ def _alone(task: _Task) -> Iterator[_Done]:
 def _in_one_pool(tasks: Sequence[_Task], jobs: int) -> Iterator[_Done]:
     strangers = set(multiprocessing.active_children())
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(jobs, context, initializer=_keep_quiet)
+    pool = ProcessPoolExecutor(jobs, context, initializer=_settle_in)
     try:
         with _interrupts_ignored():  # inherited by the children: only the parent is interrupted
             futures = {pool.submit(run_trial, f.measure, seed): (f, seed) for f, seed in tasks}
@@ -129,9 +131,17 @@ def _in_one_pool(tasks: Sequence[_Task], jobs: int) -> Iterator[_Done]:
         pool.shutdown()
 
 
-def _keep_quiet() -> None:
-    """Keeps the warnings about falls, which end up in the report, out of the child's stderr."""
+def _settle_in() -> None:
+    """Keeps warnings about falls, which the report tells, quiet, and ends with the parent."""
     logging.getLogger().addHandler(logging.NullHandler())
+    threading.Thread(target=_end_with_parent, name="bench-parent", daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 @contextmanager

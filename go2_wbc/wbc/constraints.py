@@ -125,9 +125,11 @@ class TorqueLimits(Inequality):
 class JointLimits(Inequality):
     """Joint position and speed limits as acceleration bounds (Del Prete 2018, sec. III).
 
-    The joint may move towards a limit no faster than it can brake before it:
-    v <= sqrt(2 a_brake (q_max - q)), reached within ``horizon``. Beyond a limit the joint may not
-    move further out. No bound asks for more than ``braking``, so the QP stays feasible.
+    A state is viable if braking still stops the joint at its limit. With the speed going evenly
+    from v to v' within ``horizon`` h, that is v'^2 <= 2 b (q_max - q - h (v + v') / 2), b being
+    ``braking``; so the acceleration is bounded by that of the greatest such v'. Beyond a limit
+    the joint has to come back. No bound asks for more than ``braking``; whether the legs can brake
+    that hard, at the torque limits and with their feet on the ground, is for the QP to tell.
 
     Attributes:
         q_lower, q_upper: position limits [rad].
@@ -147,14 +149,19 @@ class JointLimits(Inequality):
     def bounds(self, snapshot: Snapshot, reference: Reference) -> Bounds:
         """Twelve rows, one per joint."""
         q, v = snapshot.state.joint_positions, snapshot.state.joint_velocities
-        fastest = np.minimum(self.speed, self._braking_speed(self.q_upper - q))
-        slowest = -np.minimum(self.speed, self._braking_speed(q - self.q_lower))
+        fastest = np.minimum(self.speed, self._viable_speed(self.q_upper - q, v))
+        slowest = -np.minimum(self.speed, self._viable_speed(q - self.q_lower, -v))
         upper = np.maximum((fastest - v) / self.horizon, -self.braking)
         lower = np.minimum((slowest - v) / self.horizon, self.braking)
         return Bounds(_JOINT_SELECTION, lower, upper)
 
-    def _braking_speed(self, distance: Float[np.ndarray, "12"]) -> Float[np.ndarray, "12"]:
-        return np.sqrt(2 * self.braking * np.maximum(distance, 0.0))
+    def _viable_speed(
+        self, distance: Float[np.ndarray, "12"], speed: Float[np.ndarray, "12"]
+    ) -> Float[np.ndarray, "12"]:
+        """v': the greatest speed after the horizon that is viable, ``distance`` from the limit."""
+        half = self.braking * self.horizon / 2
+        radicand = half * half - 2 * half * speed + 2 * self.braking * distance
+        return np.sqrt(np.maximum(radicand, 0.0)) - half
 
 
 def torque_map(

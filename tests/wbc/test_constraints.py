@@ -38,8 +38,7 @@ EXACT = 1e-9  # rounding of sums of numbers up to 1000
 MU = 0.6
 BRAKING, HORIZON = 200.0, 0.02
 TICK = 0.002  # [s] the control period
-OVERSHOOT = 0.45  # [rad] at full speed, see the test of the stop; measured 0.40
-STOP_TOLERANCE = 5e-3  # [rad] what the exact viability bound of Del Prete 2018 leaves: 4.4e-3
+STOP_TOLERANCE = 5e-3  # [rad] of a bound that is renewed every tick; measured 4.4e-3
 AT_REST = 0.01  # [rad/s] after 4 s
 NEARBY = 0.05  # [rad]
 
@@ -164,12 +163,14 @@ def test_the_bounds_never_contradict_each_other_nor_ask_for_more_than_the_brakin
 
 
 @given(joint_values)
-def test_beyond_a_limit_a_joint_may_not_move_further_out(speed: np.ndarray) -> None:
-    v = speed * MODEL.speed_limits
-    lower, upper = joint_bounds(MODEL.q_upper + 0.01, v)
-    assert (upper <= np.maximum(-v / HORIZON, -BRAKING) + EXACT).all()
-    lower, upper = joint_bounds(MODEL.q_lower - 0.01, v)
-    assert (lower >= np.minimum(-v / HORIZON, BRAKING) - EXACT).all()
+def test_beyond_a_limit_a_joint_that_rests_or_moves_out_has_to_come_back(
+    speed: np.ndarray,
+) -> None:
+    out = np.abs(speed) * MODEL.speed_limits
+    lower, upper = joint_bounds(MODEL.q_upper + 0.01, out)
+    assert (upper < np.maximum(-out / HORIZON, -BRAKING + EXACT)).all()
+    lower, upper = joint_bounds(MODEL.q_lower - 0.01, -out)
+    assert (lower > np.minimum(out / HORIZON, BRAKING - EXACT)).all()
 
 
 def test_a_resting_joint_far_from_its_limits_is_free() -> None:
@@ -179,11 +180,12 @@ def test_a_resting_joint_far_from_its_limits_is_free() -> None:
 
 
 def test_a_joint_beyond_its_speed_limit_is_slowed_down() -> None:
-    far = np.arange(12) % 3 != 0  # the hips' range is so short that its ends bind before the speed
+    endless = replace(LIMITS, q_lower=MODEL.q_lower - 100.0, q_upper=MODEL.q_upper + 100.0)
     for sign in (1.0, -1.0):
-        lower, upper = joint_bounds(MIDDLE, sign * (MODEL.speed_limits + 1.0))
-        slowing = upper if sign > 0 else -lower
-        np.testing.assert_allclose(slowing[far], -1.0 / HORIZON, atol=EXACT)
+        fast = joint_snapshot(MIDDLE, sign * (MODEL.speed_limits + 1.0))
+        bounds = endless.bounds(fast, holding_reference(SNAPSHOT))
+        slowing = bounds.upper if sign > 0 else -bounds.lower
+        np.testing.assert_allclose(slowing, -1.0 / HORIZON, atol=EXACT)
 
 
 def test_the_two_sides_of_the_limits_mirror_each_other() -> None:
@@ -212,23 +214,11 @@ def driven(direction: float, drive: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-@pytest.mark.parametrize("drive", [1.0, 400.0])
-def test_a_joint_that_is_driven_at_its_limit_comes_to_rest(direction: float, drive: float) -> None:
+@pytest.mark.parametrize("drive", [1.0, 20.0, 400.0])
+def test_a_joint_that_is_driven_at_its_limit_stops_there(direction: float, drive: float) -> None:
     beyond, v = driven(direction, drive)
     assert (np.abs(v) < AT_REST).all()
     assert (beyond > -NEARBY).all()  # the whole range is used
-    assert (beyond < OVERSHOOT).all()
-
-
-@pytest.mark.xfail(
-    strict=True,
-    reason="the bound does not count the way that the joint makes within the horizon: driven "
-    "hard, a joint passes its limit by 0.40 rad, gently by 0.04 rad",
-)
-@pytest.mark.parametrize("direction", [1.0, -1.0])
-@pytest.mark.parametrize("drive", [1.0, 20.0, 400.0])
-def test_a_driven_joint_stops_at_its_limit(direction: float, drive: float) -> None:
-    beyond, _ = driven(direction, drive)
     assert (beyond < STOP_TOLERANCE).all()
 
 
