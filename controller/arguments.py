@@ -70,6 +70,17 @@ def config(value: Config | Path | str | None) -> Config:
     return load_config(value)
 
 
+def path_or_none(name: str, value: Path | str | None) -> Path | None:
+    """``value`` as a path.
+
+    Raises:
+        ConfigError: if it is none.
+    """
+    if value is not None and not isinstance(value, Path | str):
+        raise ConfigError(f"{name} must be a path, got {value!r}")
+    return None if value is None else Path(value)
+
+
 def plant_or_none(value: Plant | None) -> Plant | None:
     """``value``.
 

@@ -10,12 +10,14 @@ from pathlib import Path
 from types import TracebackType
 
 from controller import arguments
+from controller.executor import Aborted, Figures
 from controller.loop import ControlLoop
 from controller.modes import Mode, Outcome
-from controller.pilot import Aborted, Figures, Pilot
+from controller.pilot import Pilot
 from controller.runner import Runner
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
+from go2_wbc.contacts import Gait
 from go2_wbc.errors import (
     ClosedError,
     CommandError,
@@ -29,6 +31,7 @@ from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.plant.viewer import PlantViewer
 from go2_wbc.recording import Recording
 from go2_wbc.reference import MotionPlan
+from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.controller import WholeBodyController
@@ -66,6 +69,7 @@ class GO2Controller:
         realtime: bool = False,
         viewer: bool = False,
         config: Config | Path | str | None = None,
+        urdf: Path | str | None = None,
     ) -> None:
         """Take over a robot that lies on the ground, damped.
 
@@ -75,20 +79,26 @@ class GO2Controller:
             realtime: let the robot live at wall-clock pace in a background thread.
             viewer: open MuJoCo's viewer if there is a display.
             config: numbers of the engine, or a TOML file that overrides some.
+            urdf: another URDF of the Go2 instead of the installed one: what the controller takes
+                the robot for. Without ``plant`` the simulated robot is built from it, too.
 
         Raises:
             ConfigError: for a namespace or configuration that is not valid.
             SolverUnavailable: if the configured QP solver is unknown or not installed.
-            DescriptionError: if the robot's files are missing.
+            DescriptionError: if the robot's files are missing, broken, or not a Go2's.
             PlantError: if the plant does not answer.
         """
         self._namespace = arguments.namespace(namespace)
         self._config = arguments.config(config)
         plant = arguments.plant_or_none(plant)
-        model = RobotModel()
+        model = RobotModel(find_description(arguments.path_or_none("urdf", urdf)))
         wbc = WholeBodyController(model, self._config.backend, self._config.wbc)
         self._owns_plant = plant is None
-        self._plant = MujocoPlant(visuals=viewer) if plant is None else plant
+        self._plant = (
+            MujocoPlant(urdf=model.description.urdf_path, visuals=viewer)
+            if plant is None
+            else plant
+        )
         self._closed = False
         self._busy = threading.Lock()
         self._busy_with = ""
@@ -126,13 +136,16 @@ class GO2Controller:
 
     # --- walking --------------------------------------------------------------------------
 
-    def walk(self, gait: str = "trot") -> bool:
+    def walk(self, gait: str | Gait = "trot") -> bool:
         """Enter walking mode; the robot stands ready until ``move``. Stands up first if needed.
+
+        Args:
+            gait: name of a gait, or a gait of your own.
 
         Raises:
             CommandError: for an unknown gait; lists the valid ones.
         """
-        gait = arguments.word("gait", gait)
+        gait = gait if isinstance(gait, Gait) else arguments.word("gait", gait)
         return self._call("walk", lambda: self._pilot.walk(gait))
 
     def move(self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0) -> None:
@@ -145,7 +158,7 @@ class GO2Controller:
 
         Raises:
             CommandError: if a value is not a finite number.
-            ModeError: outside walking mode.
+            ModeError: outside walking mode, or while another thread turns or moves forward.
         """
         self._check_open()
         wanted = VelocityCommand(linear_x, linear_y, angular_z)
@@ -156,13 +169,14 @@ class GO2Controller:
     def stop(self) -> None:
         """Zero velocity: the robot comes to rest in walking mode.
 
-        Without ``realtime`` the time until it rests passes inside this call.
+        Without ``realtime`` the time until it rests passes inside this call. From another thread it
+        also ends ``turn_left``, ``turn_right`` and ``move_forward``, which then return False.
         """
         self._check_open()
         if self._pilot.mode is not Mode.WALKING:
             return
-        self._pilot.set_command(VelocityCommand())
-        if not self._runner.is_realtime:
+        ends_errand = self._pilot.halt()
+        if not (ends_errand or self._runner.is_realtime):
             self._call("stop", self._pilot.rest)
 
     def turn_left(self, angle: float) -> bool:
@@ -315,7 +329,7 @@ class GO2Controller:
                 figures = procedure()
                 ok, reason = True, "done"
             except Aborted as aborted:
-                figures, ok, reason = {}, False, str(aborted)
+                figures, ok, reason = aborted.figures, False, str(aborted)
             except Go2WbcError as error:
                 self._note(False, str(error), start)
                 raise

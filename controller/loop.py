@@ -170,8 +170,10 @@ class ControlLoop:
             reason = f"damped after {streak} QP failures in a row: {summary}"
             self.abandon(Fault(reason, may_fall=True))
         elif streak == 1:
+            is_first = self.telemetry.qp_failures == 1
+            what = str(error) if is_first else str(error).splitlines()[0]  # one table is enough
             time = self.state.time
-            _log.warning("QP failure at t=%.3f s, holding the last torque: %s", time, error)
+            _log.warning("QP failure at t=%.3f s, holding the last torque: %s", time, what)
             return self._last_command
         return JointCommand.damping(DAMPING)
 

@@ -8,12 +8,11 @@ the face that turns procedures into calls.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from statistics import fmean
 
 import numpy as np
 
-from controller.behaviours.base import Behaviour
 from controller.behaviours.joints import Damped, ServoJoints
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.walking import Walking
@@ -23,15 +22,15 @@ from controller.checks import (
     is_lying,
     is_sitting,
     is_standing,
-    posture_figures,
 )
+from controller.executor import Aborted, Executor, Figures, listed
 from controller.loop import Fault
 from controller.modes import Mode
 from controller.navigation import DriveStraight, Errand, TurnInPlace
 from controller.recovery import roll_over
 from controller.runner import Runner
 from go2_wbc.config import Config
-from go2_wbc.contacts import find_gait
+from go2_wbc.contacts import Gait, find_gait
 from go2_wbc.errors import ModeError, StanceMismatch
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionPlanner
@@ -39,8 +38,8 @@ from go2_wbc.reference import MotionPlan, Stance, TrackedPoint
 from motions.high_five import HighFivePlan
 from motions.postures import SPLAYED_JOINTS, TUCKED_JOINTS, lie_down, rise, sit_down
 
-SETTLE_LIMIT = 3.0
-"""Time [s] in which a posture must come to rest after its motion."""
+READY_TIME = 0.2
+"""Time [s] that a robot is given to stand ready in walking mode."""
 STOP_LIMIT = 4.0
 """Time [s] in which a walking robot must come to rest after ``stop``."""
 TUCK_TIME = 0.9
@@ -49,17 +48,8 @@ SPLAY_TIME = 0.5
 """Time [s] of spreading the folded legs until the belly is on the ground."""
 LIMP_TIME = 0.6
 """Time [s] for which the robot is left to sink before it counts as lying."""
-SINK_TIME = 1.0
-"""Time [s] for which a robot that went limp on its feet is watched: it sinks, or it falls."""
-
 PAW_TOLERANCE = 0.03
 """Distance [m] that the paw, on the average of the hold, may be below its planned height."""
-
-Figures = Mapping[str, float]
-
-
-class Aborted(Exception):
-    """A procedure did not reach its end; the message says why."""
 
 
 class Pilot:
@@ -75,7 +65,9 @@ class Pilot:
         self._loop = runner.loop
         self._model = runner.loop.model
         self._config = config
+        self._executor = Executor(runner)
         self._walking: Walking | None = None
+        self._errand: Errand | None = None
         self._mode = Mode.LYING
 
     @property
@@ -110,40 +102,40 @@ class Pilot:
         entry = {Mode.SITTING: Stance.SIT, Mode.LYING: Stance.LIE}.get(mode, Stance.STAND)
         duration = 0.4 if mode in (Mode.STANDING, Mode.WALKING) else 1.2
         self._take_posture("stand", lambda pose: rise(pose, entry, duration), TrackedPoint.COM)
-        self._settle("stand", is_standing)
+        self._executor.settle("stand", is_standing)
         self._mode = Mode.STANDING
-        return self._figures()
+        return self._executor.figures()
 
     def sit(self) -> Figures:
         """Sit like a dog, from any mode but fallen."""
         if self.mode is Mode.SITTING:
-            self._settle("sit", is_sitting)
-            return self._figures()
+            self._executor.settle("sit", is_sitting)
+            return self._executor.figures()
         self._ensure_standing()
         self._take_posture("sit", sit_down, TrackedPoint.BASE)
-        self._settle("sit", is_sitting)
+        self._executor.settle("sit", is_sitting)
         self._mode = Mode.SITTING
-        return self._figures()
+        return self._executor.figures()
 
     def lie_down(self) -> Figures:
         """Lie down and go limp."""
         if self.mode in (Mode.LYING, Mode.DAMPED) or self.is_on_the_ground:
             self._go_limp()
-            return self._figures()
+            return self._executor.figures()
         if self.mode is not Mode.MOVING:  # a stand that failed need not succeed to lie down
             self._ensure_standing()
         self._take_posture("lie down", lie_down, TrackedPoint.BASE)
         self._go_limp()
-        return self._figures()
+        return self._executor.figures()
 
     def recover(self) -> Figures:
         """Get up after a fall onto the belly, a side or the back."""
         if self.mode.is_upright:
             return self.stand()
         self._mode = Mode.DAMPED
-        self._run(Damped("recover", LIMP_TIME), LIMP_TIME + 1.0)
+        self._executor.run(Damped("recover", LIMP_TIME), LIMP_TIME + 1.0)
         for step in roll_over(self._loop):
-            self._run(step, 4.0)
+            self._executor.run(step, 4.0)
         if self._loop.state.tilt > 0.6:
             reason = f"could not roll onto the belly: {self._attitude()}"
             with self._runner.lock:
@@ -156,13 +148,15 @@ class Pilot:
         if self._loop.state.tilt > 0.6:
             raise Aborted(f"cannot stand up from {self._attitude()}; call recover()")
         self._mode = Mode.MOVING
-        self._run(ServoJoints("tuck", ((TUCK_TIME, TUCKED_JOINTS),)), TUCK_TIME + 0.5)
+        self._executor.run(ServoJoints("tuck", ((TUCK_TIME, TUCKED_JOINTS),)), TUCK_TIME + 0.5)
 
     def _go_limp(self) -> None:
         if self._loop.state.tilt < 0.6:  # or it would rest on folded legs, belly in the air
-            self._run(ServoJoints("splay", ((SPLAY_TIME, SPLAYED_JOINTS),)), SPLAY_TIME + 0.5)
-        self._run(Damped("lie", LIMP_TIME), LIMP_TIME + 0.5)
-        self._settle("lie down", is_lying)
+            self._executor.run(
+                ServoJoints("splay", ((SPLAY_TIME, SPLAYED_JOINTS),)), SPLAY_TIME + 0.5
+            )
+        self._executor.run(Damped("lie", LIMP_TIME), LIMP_TIME + 0.5)
+        self._executor.settle("lie down", is_lying)
         self._mode = Mode.LYING
 
     def _ensure_standing(self) -> None:
@@ -171,22 +165,24 @@ class Pilot:
 
     # --- walking --------------------------------------------------------------------------
 
-    def walk(self, gait: str) -> Figures:
+    def walk(self, gait: str | Gait) -> Figures:
         """Enter walking mode, ready for commands."""
         find_gait(gait)
         if self.mode is not Mode.WALKING:
             self._ensure_standing()
         self._start_walking(gait)
-        self._pass(0.2)
+        self.wait(READY_TIME)
         self._mode = Mode.WALKING
-        return self._figures()
+        return self._executor.figures()
 
     def set_command(self, command: VelocityCommand) -> VelocityCommand:
         """Follow ``command``, clipped to the envelope; returns what is followed.
 
         Raises:
-            ModeError: outside walking mode.
+            ModeError: outside walking mode, or during an errand.
         """
+        if self._errand is not None:
+            raise ModeError(f"move() during an errand ({self._errand.name}): end it by stop()")
         if self.mode is not Mode.WALKING or self._walking is None:
             raise ModeError(f"move() needs walking mode, not {self.mode.value}: call walk() first")
         self._walking.command = self._config.envelope.clip(command)
@@ -198,30 +194,50 @@ class Pilot:
         if self.mode is Mode.WALKING and walking is not None:
             walking.command = ZERO_COMMAND
             loop = self._loop
-            self._until(lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "come to rest")
-        return self._figures()
+            self._executor.until(
+                lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "come to rest"
+            )
+        return self._executor.figures()
 
     def run_errand(self, errand: Errand) -> Figures:
         """Walk an errand to its measured end and come to rest."""
-        if self.mode is not Mode.WALKING:
-            self.walk("trot")
-        self.rest()
-        walking, loop = self._walking or self._start_walking("trot"), self._loop
-
-        def arrived() -> bool:
-            walking.command = self._config.envelope.clip(errand.command(loop.state))
-            return errand.is_done(loop.state)
-
-        errand.begin(loop.state)
+        self._errand, loop = errand, self._loop
         try:
-            self._until(arrived, errand.time_limit, errand.name)
+            if self.mode is not Mode.WALKING:
+                self.walk("trot")
+            self.rest()
+            walking = self._walking or self._start_walking("trot")
+
+            def is_over() -> bool:
+                if self._errand is None:
+                    return True
+                walking.command = self._config.envelope.clip(errand.command(loop.state))
+                return errand.is_done(loop.state)
+
+            errand.begin(loop.state)
+            self._executor.until(is_over, errand.time_limit, errand.name)
+            self.rest()
+            was_halted = self._errand is None
         finally:
-            walking.command = ZERO_COMMAND
-        self.rest()
+            self._errand = None
+            if self._walking is not None:
+                self._walking.command = ZERO_COMMAND
         figures = errand.figures(loop.state)
+        if was_halted:
+            raise Aborted(f"{errand.name} ended by stop()", figures)
         if not errand.is_within_tolerance(loop.state):
-            raise Aborted(f"{errand.name} missed: {_listed(figures)}")
+            raise Aborted(f"{errand.name} missed: {listed(figures)}", figures)
         return figures
+
+    def halt(self) -> bool:
+        """Zero the command, from any thread; returns whether that ends an errand.
+
+        The errand's own call then brings the robot to rest.
+        """
+        had_errand, self._errand = self._errand is not None, None
+        if self._walking is not None:
+            self._walking.command = ZERO_COMMAND
+        return had_errand
 
     def turn(self, angle: float) -> Figures:
         """Turn left by ``angle`` [rad]."""
@@ -231,10 +247,10 @@ class Pilot:
         """Walk ``distance`` [m] straight ahead; negative is backward."""
         return self.run_errand(DriveStraight(distance))
 
-    def _start_walking(self, gait: str) -> Walking:
+    def _start_walking(self, gait: str | Gait) -> Walking:
         planner = LocomotionPlanner(self._model, find_gait(gait), self._config.locomotion)
         walking = Walking(planner)
-        self._engage(walking)
+        self._executor.engage(walking)
         self._walking = walking
         return walking
 
@@ -249,7 +265,7 @@ class Pilot:
         self._meet_entry(plan)
         self._mode = Mode.MOVING
         behaviour = PlayPlan(plan, self._model.foot_radius)
-        self._engage(behaviour)
+        self._executor.engage(behaviour)
         start = self._loop.state.time
 
         def finished() -> bool:
@@ -257,10 +273,10 @@ class Pilot:
                 watch(self._loop.state.time - start)
             return behaviour.is_finished(self._loop.snapshot)
 
-        self._until(finished, plan.duration + 1.0, plan.name)
-        self._settle(plan.name, _CHECK_OF_STANCE[plan.exit])
+        self._executor.until(finished, plan.duration + 1.0, plan.name)
+        self._executor.settle(plan.name, _CHECK_OF_STANCE[plan.exit])
         self._mode = _MODE_OF_STANCE[plan.exit]
-        return self._figures()
+        return self._executor.figures()
 
     def _meet_entry(self, plan: MotionPlan) -> None:
         mode = self.mode
@@ -286,10 +302,15 @@ class Pilot:
                 heights.append(float(loop.snapshot.p_world_feet[leg, 2]) - ground)
 
         figures = self.play(plan, watch)
-        held = {"least paw height [m]": min(heights), "mean paw height [m]": fmean(heights)}
+        figures = {
+            **figures,
+            "planned paw height [m]": plan.paw_height,
+            "least paw height [m]": min(heights),
+            "mean paw height [m]": fmean(heights),
+        }
         if fmean(heights) < plan.paw_height - PAW_TOLERANCE:
-            raise Aborted(f"the paw was not held at {plan.paw_height:.2f} m: {_listed(held)}")
-        return {**figures, **held}
+            raise Aborted(f"the paw was not held at its height: {listed(figures)}", figures)
+        return figures
 
     def square_up(self) -> None:
         """Stand with the feet below the hips, stepping in place if need be."""
@@ -299,7 +320,9 @@ class Pilot:
         if not walking.square_up(self._loop.snapshot):
             loop = self._loop
             self._mode = Mode.WALKING
-            self._until(lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "square the feet")
+            self._executor.until(
+                lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "square the feet"
+            )
             self._mode = Mode.STANDING
         self.stand()
 
@@ -312,16 +335,11 @@ class Pilot:
     def wait(self, seconds: float) -> Figures:
         """Let time pass, whatever happens in it; a fault ends up in ``mode``."""
         known_fault = self._loop.fault
-        self._let_pass(seconds)
+        self._executor.let_pass(seconds)
         fault = self._loop.fault
         if fault is not None and fault is not known_fault:
-            raise Aborted(fault.reason)
-        return self._figures()
-
-    def _let_pass(self, seconds: float) -> None:
-        end = self._loop.state.time + seconds - 1e-9
-        while self._loop.state.time < end:
-            self._runner.advance_until(lambda: False, end - self._loop.state.time)
+            raise Aborted(fault.reason, self._executor.figures())
+        return self._executor.figures()
 
     def _take_posture(
         self,
@@ -331,48 +349,7 @@ class Pilot:
     ) -> None:
         behaviour = ChangePosture(label, make_plan, point, self._model.foot_radius)
         self._mode = Mode.MOVING
-        self._run(behaviour, 5.0)
-
-    def _run(self, behaviour: Behaviour, limit: float) -> None:
-        self._engage(behaviour)
-        loop = self._loop
-        self._until(lambda: behaviour.is_finished(loop.snapshot), limit, behaviour.label)
-
-    def _engage(self, behaviour: Behaviour) -> None:
-        fault = self._runner.engage(behaviour)
-        if fault is not None:
-            raise Aborted(fault.reason)
-
-    def _settle(self, what: str, check: Callable[..., bool]) -> None:
-        loop, model = self._loop, self._model
-        calm_since: list[float] = []
-
-        def calm() -> bool:
-            if not check(loop.snapshot, model):
-                calm_since.clear()
-                return False
-            calm_since.append(loop.state.time)
-            return loop.state.time - calm_since[0] >= 0.1
-
-        self._until(calm, SETTLE_LIMIT, what)
-
-    def _pass(self, seconds: float) -> None:
-        end = self._loop.state.time + seconds - 1e-9
-        self._until(lambda: self._loop.state.time >= end, seconds + 0.1, "wait")
-
-    def _until(self, is_done: Callable[[], bool], limit: float, what: str) -> None:
-        if self._runner.advance_until(is_done, limit):
-            return
-        fault = self._loop.fault
-        if fault is not None and fault.may_fall:
-            self._let_pass(SINK_TIME)
-            fault = self._loop.fault or fault
-        if fault is not None:
-            raise Aborted(fault.reason)
-        raise Aborted(f"{what} not done within {limit:.1f} s: {_listed(self._figures())}")
-
-    def _figures(self) -> Figures:
-        return posture_figures(self._loop.snapshot, self._model)
+        self._executor.run(behaviour, 5.0)
 
     def _attitude(self) -> str:
         roll, pitch, _ = np.degrees(self._loop.state.rpy)
@@ -392,7 +369,3 @@ _MODE_OF_STANCE = {
     Stance.STAND: Mode.STANDING,
 }
 _CHECK_OF_STANCE = {Stance.LIE: is_lying, Stance.SIT: is_sitting, Stance.STAND: is_standing}
-
-
-def _listed(figures: Figures) -> str:
-    return ", ".join(f"{name} {value:.3g}" for name, value in figures.items())

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from controller.behaviours.base import Behaviour
 from controller.loop import ControlLoop, Fault
-from go2_wbc.errors import ClosedError
+from go2_wbc.errors import ClosedError, PlantError
 
 _log = logging.getLogger(__name__)
 
@@ -56,7 +56,16 @@ class Runner:
         return self._thread is not None
 
     def begin(self) -> None:
-        """Begin a call: a fault from before it may be cleared, one during it ends it."""
+        """Begin a call: a fault from before it may be cleared, one during it ends it.
+
+        Raises:
+            PlantError: if the background thread has ended, since nothing would move any more.
+        """
+        if self._failure is not None:
+            raise PlantError(
+                f"the loop in the background has ended ({self._failure}); "
+                "close this controller and make a new one"
+            )
         with self.lock:
             self._known_fault = self.loop.fault
 

@@ -12,8 +12,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.errors import CommandError, unknown_name
+from go2_wbc.errors import CommandError, ConfigError, unknown_name
 from go2_wbc.legs import LEGS
+from go2_wbc.validation import require_positive, require_share
 
 TIE = 1e-9
 """Times this close [s] to an event count as the event: absorbs rounding of summed time steps."""
@@ -40,6 +41,15 @@ class ContactPhase:
         finite = np.isfinite(total) & (total > 0)
         return np.where(finite, self.elapsed / np.where(finite, total, 1.0), 0.0)
 
+    def load_share(self, ramp: float) -> Float[np.ndarray, "4"]:
+        """Share of its load that each foot may bear: 1 in stance, 0 in the air.
+
+        It rises over ``ramp`` seconds after a touchdown and falls over as long before a lift-off,
+        so that contact forces change without a jump.
+        """
+        nearest_change = np.minimum(self.elapsed, self.remaining)
+        return np.where(self.stance, np.clip(nearest_change / ramp, 0.0, 1.0), 0.0)
+
 
 @dataclass(frozen=True, slots=True)
 class ContactSchedule:
@@ -61,6 +71,11 @@ class ContactSchedule:
         rising = all(b > a for a, b in zip(self.times[:-1], self.times[1:], strict=True))
         if not self.times or not rising or len(self.modes) != len(self.times):
             raise CommandError(f"contact events need increasing times, got {self.times}")
+        if self.period is not None and (self.times[0] != 0.0 or self.times[-1] >= self.period):
+            raise CommandError(
+                f"periodic contact events must start at 0 and end before the period of "
+                f"{self.period} s, got {self.times}"
+            )
         changes = tuple(self._changes_of(leg) for leg in LEGS)
         object.__setattr__(self, "_changes", changes)
 
@@ -102,7 +117,7 @@ class Gait:
     Attributes:
         name: what users call it.
         period: stride period [s].
-        duty: share of the period that a foot is in stance, in (0, 1).
+        duty: share of the period that a foot is in stance, in (0, 1].
         offsets: phase in [0, 1) at which each foot (FL, FR, RL, RR) touches down.
     """
 
@@ -110,6 +125,13 @@ class Gait:
     period: float
     duty: float
     offsets: tuple[float, float, float, float]
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a period, duty or offset that is out of range."""
+        require_positive(self, "period")
+        require_share(self, "duty")
+        if len(self.offsets) != 4 or not all(0.0 <= offset < 1.0 for offset in self.offsets):
+            raise ConfigError(f"Gait.offsets must be four phases in [0, 1), got {self.offsets}")
 
     @property
     def stance_time(self) -> float:
@@ -142,12 +164,14 @@ GAITS: dict[str, Gait] = {
 }
 
 
-def find_gait(name: str) -> Gait:
-    """The gait of that name.
+def find_gait(name: str | Gait) -> Gait:
+    """The gait of that name; a gait is itself.
 
     Raises:
         CommandError: for an unknown name; lists the valid ones.
     """
+    if isinstance(name, Gait):
+        return name
     if name not in GAITS:
         raise CommandError(unknown_name("gait", name, GAITS))
     return GAITS[name]

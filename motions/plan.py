@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.contacts import ContactPhase, ContactSchedule
 from go2_wbc.curves import Curve, CurvePoint
@@ -56,7 +55,7 @@ class KeyframePlan(MotionPlan):
         """The reference at ``t``; see ``MotionPlan.at``."""
         phase = self.contacts.at(t)
         joints = self.joints.at(t)
-        share = self._load_share(phase)
+        share = phase.load_share(self.ramp)
         zeros = np.zeros((4, 3))
         return Reference(
             body=body_target(self.point, self.body.at(t)),
@@ -70,10 +69,6 @@ class KeyframePlan(MotionPlan):
             v_joints=joints.rate,
             a_joints=joints.acceleration,
         )
-
-    def _load_share(self, phase: ContactPhase) -> Float[np.ndarray, "4"]:
-        nearest_change = np.minimum(phase.elapsed, phase.remaining)
-        return np.where(phase.stance, np.clip(nearest_change / self.ramp, 0.0, 1.0), 0.0)
 
 
 def body_target(point: TrackedPoint, body: CurvePoint) -> BodyTarget:

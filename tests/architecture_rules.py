@@ -26,7 +26,7 @@ SIBLINGS: dict[str, frozenset[str]] = {
 
 LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"errors"}),
-    frozenset({"legs", "geometry"}),
+    frozenset({"legs", "geometry", "validation"}),
     frozenset({"curves", "contacts", "robot", "recording"}),
     frozenset({"reference"}),
     frozenset({"planning", "wbc", "plant"}),

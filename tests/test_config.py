@@ -117,3 +117,27 @@ def test_a_controller_takes_a_file_a_path_or_a_config(tmp_path: Path) -> None:
         GO2Controller(plant=StillPlant(), config=config).close()
     with pytest.raises(ConfigError, match=r"gone\.toml"):
         GO2Controller(plant=StillPlant(), config=tmp_path / "gone.toml")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[envelope]\nforward = 0", "VelocityEnvelope.forward must be positive, got 0.0"),
+        ("[wbc]\nfriction = -0.6", "WbcConfig.friction must be positive, got -0.6"),
+        ("[wbc]\ntorque_share = 1.5", "WbcConfig.torque_share must be above 0 and at most 1"),
+        ("[wbc]\nswing_weight = -1", "WbcConfig.swing_weight must be at least 0, got -1.0"),
+        ("[wbc.swing_foot]\nkp = [1, -1, 1]", r"Gains.kp must be at least 0, got \(1.0, -1.0"),
+        ("[locomotion]\nheight = 0", "LocomotionConfig.height must be positive"),
+        ("[locomotion]\nnormal_force_max = 1\nnormal_force_min = 2", "must be below"),
+        ("[locomotion.swing]\napex = 0", "SwingConfig.apex must be positive"),
+        ("[safety]\nqp_patience = 0", "SafetyConfig.qp_patience must be positive, got 0"),
+    ],
+)
+def test_a_number_out_of_range_is_refused_by_name(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        load_config(written(tmp_path, text))
+
+
+def test_a_margin_that_leaves_the_joints_no_range_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="joint_margin leaves no range"):
+        GO2Controller(plant=StillPlant(), config=written(tmp_path, "[wbc]\njoint_margin = 1.0"))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from go2_wbc.contacts import GAITS, TIE, ContactSchedule, Gait, find_gait, standing
-from go2_wbc.errors import CommandError
+from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.legs import LEGS
 
 ROUNDING = 1e-9  # [s] times of order 10 s in sums of a few terms
@@ -209,3 +211,41 @@ def test_events_out_of_order_are_refused(times: tuple[float, ...], rows: int) ->
 def test_an_unknown_gait_is_answered_with_the_known_names() -> None:
     with pytest.raises(CommandError, match=r"unknown gait 'gallop'; valid: .*trot"):
         find_gait("gallop")
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"period": 0.0}, "Gait.period must be positive"),
+        ({"duty": 1.2}, "Gait.duty must be above 0 and at most 1"),
+        ({"offsets": (0.0, 0.5, 1.0, 0.0)}, "Gait.offsets must be four phases"),
+    ],
+)
+def test_a_gait_out_of_range_is_refused(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        replace(GAITS["trot"], **changes)
+
+
+def test_a_periodic_schedule_that_outlasts_its_period_is_refused() -> None:
+    with pytest.raises(CommandError, match="before the period"):
+        ContactSchedule((0.0, 0.5), np.ones((2, 4), dtype=bool), period=0.4)
+
+
+@given(gaits, st.floats(0.0, 10.0), st.floats(0.01, 0.3))
+def test_a_foot_takes_up_its_load_after_touchdown_and_gives_it_up_before_lift_off(
+    gait: Gait, t: float, ramp: float
+) -> None:
+    phase = gait.schedule().at(t)
+    share = phase.load_share(ramp)
+    assert (share[~phase.stance] == 0.0).all()
+    assert ((share >= 0.0) & (share <= 1.0)).all()
+    np.testing.assert_allclose(
+        share[phase.stance],
+        np.clip(np.minimum(phase.elapsed, phase.remaining) / ramp, 0, 1)[phase.stance],
+    )
+
+
+def test_a_gait_is_found_by_its_name_or_is_itself() -> None:
+    mine = replace(GAITS["trot"], name="mine")
+    assert find_gait("trot") is GAITS["trot"]
+    assert find_gait(mine) is mine

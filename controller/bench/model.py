@@ -7,8 +7,9 @@ from jaxtyping import Float
 
 from controller.bench.rows import Family, Measurement, Row
 from controller.bench.trials import Trial
+from controller.executor import Aborted
 from controller.loop import ControlLoop
-from controller.pilot import Aborted, Pilot
+from controller.pilot import Pilot
 from controller.runner import Runner
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config

@@ -7,6 +7,10 @@ from dataclasses import dataclass
 from numbers import Real
 
 from go2_wbc.errors import CommandError
+from go2_wbc.validation import require_positive
+
+ROUNDING = 1e-12
+"""Share of the envelope by which a command on its surface may seem to lie outside."""
 
 
 def _as_float(value: Real) -> float:
@@ -49,6 +53,10 @@ class VelocityEnvelope:
     """Commands that the trot follows inside the torque and joint-speed limits.
 
     The bounds are combined as an ellipsoid: a command on its surface uses the whole envelope.
+
+    Attributes:
+        forward, backward, lateral: speeds [m/s].
+        turning: turning rate [rad/s].
     """
 
     forward: float = 1.5
@@ -56,16 +64,17 @@ class VelocityEnvelope:
     lateral: float = 0.6
     turning: float = 2.0
 
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a bound that is not positive."""
+        require_positive(self, "forward", "backward", "lateral", "turning")
+
     def clip(self, command: VelocityCommand) -> VelocityCommand:
         """``command``, scaled down if it lies outside."""
-        forward = self.forward if command.linear_x >= 0.0 else self.backward
-        load = math.hypot(
-            command.linear_x / forward,
-            command.linear_y / self.lateral,
-            command.angular_z / self.turning,
-        )
-        if load <= 1.0:
+        parts = (command.linear_x, command.linear_y, command.angular_z)
+        scale = max(1.0, *map(abs, parts))  # so that no quotient overflows
+        x, y, turn = (part / scale for part in parts)
+        forward = self.forward if x >= 0.0 else self.backward
+        load = math.hypot(x / forward, y / self.lateral, turn / self.turning)
+        if load * scale <= 1.0 + ROUNDING:
             return command
-        return VelocityCommand(
-            command.linear_x / load, command.linear_y / load, command.angular_z / load
-        )
+        return VelocityCommand(x / load, y / load, turn / load)

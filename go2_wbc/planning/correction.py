@@ -7,7 +7,7 @@ was asked to be.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +15,7 @@ from jaxtyping import Float
 from go2_wbc.reference import BodyTarget, TrackedPoint
 from go2_wbc.robot.rotations import exp_rotation, log_rotation
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.validation import require_not_negative
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,10 @@ class CorrectionConfig:
     position_window: float = 0.04
     angle_limit: float = 0.15
     angle_window: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a negative number."""
+        require_not_negative(self, *(f.name for f in fields(self)))
 
 
 class SteadyStateCorrection:

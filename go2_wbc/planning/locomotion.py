@@ -7,12 +7,13 @@ takes out the steady error that a pure velocity loop keeps; it is held within re
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.contacts import ContactPhase, Gait, standing
+from go2_wbc.errors import ConfigError
 from go2_wbc.legs import LEGS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.correction import SteadyStateCorrection
@@ -21,6 +22,12 @@ from go2_wbc.reference import BodyTarget, LegTask, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.validation import require_not_negative, require_positive
+
+SETTLED_COMMAND = 1e-3
+"""Ramped velocity command [m/s, rad/s] below which it counts as arrived at zero."""
+GROUND_SHARE = 0.3
+"""Share of a landing foot's height that goes into the estimate of the ground's height."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +44,8 @@ class LocomotionConfig:
         foothold_reach: greatest horizontal distance [m] of a foothold from below its hip.
         normal_force_min: least normal force [N] asked of a stance foot.
         normal_force_max: greatest normal force [N] allowed on a stance foot.
+        load_ramp: time [s] over which a foot takes up that force after touchdown and gives it up
+            before lift-off.
         settle_speed: speed [m/s] below which a robot without command may stop stepping.
         capture_margin: distance [m] of the capture point from the middle of the feet beyond
             which a standing robot starts to step.
@@ -54,10 +63,23 @@ class LocomotionConfig:
     foothold_reach: float = 0.22
     normal_force_min: float = 0.0
     normal_force_max: float = 400.0
+    load_ramp: float = 0.03
     settle_speed: float = 0.05
     capture_margin: float = 0.09
     square_tolerance: float = 0.02
     swing: SwingConfig = field(default_factory=SwingConfig)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a number that is out of range."""
+        zero_is_valid = {"velocity_feedback", "normal_force_min"}
+        positive = {f.name for f in fields(self)} - zero_is_valid - {"swing"}
+        require_positive(self, *sorted(positive))
+        require_not_negative(self, *sorted(zero_is_valid))
+        if self.normal_force_min >= self.normal_force_max:
+            raise ConfigError(
+                f"normal_force_min must be below normal_force_max, got {self.normal_force_min} "
+                f"and {self.normal_force_max} N"
+            )
 
 
 class LocomotionPlanner:
@@ -112,12 +134,12 @@ class LocomotionPlanner:
         p, v, a = self._feet(snapshot, phase)
         legs = tuple(LegTask.STANCE if s else LegTask.SWING for s in phase.stance)
         q = snapshot.state.joint_positions
-        config = self._config
+        load = phase.load_share(self._config.load_ramp)
         return Reference(
             body=self._body(),
             legs=legs,
-            normal_force_min=np.full(4, config.normal_force_min),
-            normal_force_max=np.full(4, config.normal_force_max),
+            normal_force_min=self._config.normal_force_min * load,
+            normal_force_max=self._config.normal_force_max * load,
             p_world_feet=p,
             v_world_feet=v,
             a_world_feet=a,
@@ -128,15 +150,18 @@ class LocomotionPlanner:
 
     def _advance_phase(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> None:
         if self._is_stepping:
-            half = self._gait.period / 2
-            before = int(self._phase_time / half)
             self._phase_time += dt
-            at_touchdown = int(self._phase_time / half) > before
-            if at_touchdown and command.is_zero and self._may_stop(snapshot):
+            if command.is_zero and self._is_landing() and self._may_stop(snapshot):
                 self._is_stepping = False
         elif not command.is_zero or self._must_step(snapshot):
             self._is_stepping = True
             self._phase_time = 0.0
+
+    def _is_landing(self) -> bool:
+        """Whether feet touch down at this tick and no other one is in the air."""
+        stance = self._gait_schedule.at(self._phase_time).stance
+        has_landed = (stance & ~self._was_stance).any()
+        return bool(has_landed and (stance | self._was_stance).all())
 
     def _may_stop(self, snapshot: Snapshot) -> bool:
         slow = np.linalg.norm(snapshot.v_world_com[:2]) < self._config.settle_speed
@@ -148,7 +173,7 @@ class LocomotionPlanner:
         return bool(np.linalg.norm(offsets, axis=1).max() < self._config.square_tolerance)
 
     def _is_settled(self) -> bool:
-        return bool(np.abs(self._velocity).max() < 1e-3)
+        return bool(np.abs(self._velocity).max() < SETTLED_COMMAND)
 
     def _must_step(self, snapshot: Snapshot) -> bool:
         omega = np.sqrt(self._model.gravity / self._config.height)
@@ -196,7 +221,7 @@ class LocomotionPlanner:
         landed = ~self._was_stance & stance
         if landed.any():
             height = float(np.mean(snapshot.p_world_feet[landed, 2])) - self._model.foot_radius
-            self._ground += 0.3 * (height - self._ground)
+            self._ground += GROUND_SHARE * (height - self._ground)
         self._was_stance = stance.copy()
 
     def _nominal_feet(self, snapshot: Snapshot) -> Float[np.ndarray, "4 2"]:

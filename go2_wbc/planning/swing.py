@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.curves import Ease
+from go2_wbc.validation import require_not_negative, require_positive
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +23,11 @@ class SwingConfig:
 
     apex: float = 0.06
     touchdown_depth: float = 0.008
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a length that is out of range."""
+        require_positive(self, "apex")
+        require_not_negative(self, "touchdown_depth")
 
 
 def swing_foot(

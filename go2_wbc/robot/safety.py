@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from go2_wbc.robot.state import RobotState
+from go2_wbc.validation import require_positive
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +27,10 @@ class SafetyConfig:
     stale_limit: float = 0.03
     qp_patience: int = 10
 
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a limit that is not positive."""
+        require_positive(self, "tilt_limit", "height_limit", "stale_limit", "qp_patience")
+
 
 def fall_reason(state: RobotState, lowest_foot: float, config: SafetyConfig) -> str | None:
     """Why the state counts as a fall, or None.
@@ -37,9 +42,9 @@ def fall_reason(state: RobotState, lowest_foot: float, config: SafetyConfig) -> 
     """
     if not (np.isfinite(state.q).all() and np.isfinite(state.v).all()):
         return f"state is not finite at t={state.time:.2f} s"
-    roll, pitch, _ = np.degrees(state.rpy)
+    roll, pitch, _ = (round(angle) for angle in np.degrees(state.rpy).tolist())
     if state.tilt > config.tilt_limit:
-        return f"fell at t={state.time:.2f} s: roll {roll:.0f} deg, pitch {pitch:.0f} deg"
+        return f"fell at t={state.time:.2f} s: roll {roll} deg, pitch {pitch} deg"
     height = float(state.q[2]) - lowest_foot
     if height < config.height_limit:
         return f"fell at t={state.time:.2f} s: base {100 * height:.0f} cm above the feet"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from go2_wbc.validation import require_not_negative, require_positive, require_share
 from go2_wbc.wbc.tasks import Gains
 
 
@@ -48,3 +49,10 @@ class WbcConfig:
     braking: float = 200.0
     limit_horizon: float = 0.02
     joint_margin: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a number that is out of range."""
+        require_positive(self, "force_weight", "friction", "braking", "limit_horizon")
+        require_share(self, "torque_share", "speed_share")
+        weights = ("position_weight", "orientation_weight", "swing_weight", "posture_weight")
+        require_not_negative(self, *weights, "stance_damping", "joint_margin")

@@ -43,17 +43,28 @@ class WholeBodyController:
     """
 
     def __init__(
-        self, model: RobotModel, backend: str = "condensed", config: WbcConfig | None = None
+        self,
+        model: RobotModel,
+        backend: str = "condensed",
+        config: WbcConfig | None = None,
+        *,
+        extra_tasks: Sequence[Task] = (),
     ) -> None:
         """Prepare the tasks and constraints for ``model``.
 
+        Args:
+            model: the robot.
+            backend: name of the back end.
+            config: gains, weights and limits.
+            extra_tasks: tasks of your own, beside the built-in ones.
+
         Raises:
-            ConfigError: for an unknown back end.
+            ConfigError: for an unknown back end, or extra tasks with one that cannot take them.
             SolverUnavailable: for an unknown or uninstalled solver.
         """
         self.model = model
         self.config = config or WbcConfig()
-        self.tasks = _tasks(model, self.config)
+        self.tasks = (*_tasks(model, self.config), *extra_tasks)
         self.equalities: tuple[Equality, ...] = (
             FloatingBaseDynamics(),
             StanceFeetStill(self.config.stance_damping),
@@ -62,6 +73,8 @@ class WholeBodyController:
         self._task_weights = np.array([task.weight for task in self.tasks])
         self.backend_name = backend
         self._backend = self._make_backend(backend)
+        if extra_tasks and backend == "placo":
+            raise ConfigError("the placo back end has tasks of its own and takes no extra ones")
 
     def _make_backend(self, name: str) -> QpBackend:
         solver = check_solver(self.config.solver)
@@ -119,6 +132,8 @@ def _tasks(model: RobotModel, config: WbcConfig) -> tuple[Task, ...]:
 
 
 def _inequalities(model: RobotModel, config: WbcConfig) -> tuple[Inequality, ...]:
+    if (model.q_upper - model.q_lower <= 2 * config.joint_margin).any():
+        raise ConfigError(f"WbcConfig.joint_margin leaves no range: {config.joint_margin} rad")
     return (
         FrictionPyramid(config.friction),
         TorqueLimits(model.torque_limits * config.torque_share),

@@ -1,7 +1,7 @@
 """Dense QP solvers by name, through qpsolvers, all started fresh.
 
 ProxQP is never warm-started: its warm start reports feasible problems as infeasible when the
-contacts change. Tolerances are set so that torques agree to 1e-6 N m across solvers.
+contacts change. Tolerances are set so that torques agree to 1e-5 N m across solvers.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import cross, log_rotation
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.validation import require_not_negative
 from go2_wbc.wbc.problem import FORCES, SIZE, Rows
 
 _EYE = np.eye(3)
@@ -29,6 +30,10 @@ class Gains:
 
     kp: tuple[float, float, float]
     kd: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a negative gain."""
+        require_not_negative(self, "kp", "kd")
 
     @staticmethod
     def uniform(kp: float, kd: float) -> Gains:

@@ -10,6 +10,7 @@ import numpy as np
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode, Outcome
 from controller.telemetry import Telemetry
+from go2_wbc.contacts import Gait
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
@@ -59,7 +60,7 @@ class FakeGo2(GO2Controller):
     def sit(self) -> bool:
         return self._do("sit", Mode.SITTING, SIT)
 
-    def walk(self, gait: str = "trot") -> bool:
+    def walk(self, gait: str | Gait = "trot") -> bool:
         return self._do("walk", Mode.WALKING, STAND)
 
     def move(self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0) -> None:

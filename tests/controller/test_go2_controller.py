@@ -11,6 +11,7 @@ import pytest
 
 from controller import GO2Controller, Mode, Outcome
 from controller.checks import is_lying, is_sitting, is_standing
+from go2_wbc.contacts import Gait
 from go2_wbc.errors import ModeError, MotionInfeasible, StanceMismatch
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
@@ -19,6 +20,7 @@ from go2_wbc.robot.state import RobotState
 from motions import high_five_plan
 from tests.controller.plants import (
     PERIOD,
+    WatchedPlant,
 )
 from tests.motions.doctored import with_joint_beyond_its_limit
 from tests.plant.contract import same
@@ -345,3 +347,38 @@ def test_a_high_five_plays_by_its_name_and_measures_how_high_the_paw_was_held(
     assert standing.high_five("left", hold=0.5), standing.last_outcome.reason
     assert standing.last_outcome.measured["least paw height [m]"] > 0.5
     assert standing.mode is Mode.STANDING
+
+
+# --- errands and other threads ----------------------------------------------------------------
+
+
+def test_during_an_errand_move_is_refused_and_stop_ends_it() -> None:
+    plant = WatchedPlant()
+    refused: list[str] = []
+
+    def interfere() -> None:
+        with pytest.raises(ModeError) as caught:
+            go2.move(0.5)
+        refused.append(str(caught.value))
+        go2.stop()
+
+    with GO2Controller(plant=plant) as go2:
+        assert go2.walk()
+        plant.once_at(go2.state.time + 2.0, interfere)
+        assert go2.move_forward(2.0) is False
+        assert go2.last_outcome.reason == "walk 2.000 m ended by stop()"
+        assert 0.1 < go2.last_outcome.measured["walked [m]"] < 1.0
+        assert refused == ["move() during an errand (walk 2.000 m): end it by stop()"]
+        assert go2.mode is Mode.WALKING
+        go2.move(0.2)
+        assert go2.command.linear_x == 0.2
+
+
+def test_a_gait_of_ones_own_walks(go2: GO2Controller) -> None:
+    gait = Gait("slow trot", period=0.5, duty=0.6, offsets=(0.5, 0.0, 0.0, 0.5))
+    assert go2.walk(gait)
+    go2.move(0.3)
+    go2.wait(4.0)
+    assert go2.state.q[0] > 0.8
+    go2.stop()
+    assert go2.last_outcome.ok

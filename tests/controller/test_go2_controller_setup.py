@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import qpsolvers
@@ -21,7 +22,9 @@ from go2_wbc.errors import (
 )
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.description import find_description
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
+from motions.postures import STAND_HEIGHT
 from tests.controller.plants import WatchedPlant
 
 
@@ -94,3 +97,30 @@ def test_a_plant_that_cannot_be_read_is_refused_at_once(plant: WatchedPlant) -> 
     plant.close()
     with pytest.raises(ClosedError, match="plant is closed"):
         GO2Controller(plant=plant)
+
+
+def test_a_urdf_of_ones_own_makes_the_model_and_the_robot(tmp_path: Path) -> None:
+    path = tmp_path / "heavier.urdf"
+    text = find_description().urdf_path.read_text(encoding="utf-8")
+    rotor, heavier = '<mass value="0.089"/>', '<mass value="0.589"/>'
+    path.write_text(text.replace(rotor, heavier), encoding="utf-8")
+    with GO2Controller(urdf=path) as go2:
+        plant = go2.plant
+        assert isinstance(plant, MujocoPlant)
+        model = RobotModel(find_description(path))
+        assert model.mass == pytest.approx(RobotModel().mass + 0.5 * text.count(rotor))
+        assert plant.total_mass == pytest.approx(model.mass)
+        assert go2.stand()
+        height = go2.last_outcome.measured["CoM height [m]"]
+        assert height == pytest.approx(STAND_HEIGHT, abs=0.005)
+
+
+@pytest.mark.parametrize("urdf", [3, b"go2.urdf"])
+def test_a_urdf_that_is_no_path_is_refused(urdf: Any) -> None:  # noqa: ANN401
+    with pytest.raises(ConfigError, match="urdf must be a path"):
+        GO2Controller(urdf=urdf)
+
+
+def test_a_urdf_that_does_not_exist_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DescriptionError, match=r"nowhere\.urdf"):
+        GO2Controller(urdf=tmp_path / "nowhere.urdf")

@@ -122,6 +122,17 @@ def test_an_infeasible_qp_is_logged_with_its_residual_table(
         assert row in caplog.text
 
 
+def test_the_residual_table_is_logged_once_and_not_at_every_failure_of_a_tumble(
+    loop: ControlLoop, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    break_qp(monkeypatch, lambda n: n % 2 == 0)
+    loop.engage(Balance(loop.model))
+    with caplog.at_level(logging.WARNING):
+        run(loop, 6)
+    assert caplog.text.count("QP failure at t=") == 3
+    assert caplog.text.count("contact forces") == 1
+
+
 def test_qp_failures_in_a_row_damp_the_robot_for_good_at_the_limit(
     loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import sys
 from types import ModuleType
 from typing import Any
 
@@ -119,3 +120,10 @@ def test_backwards_has_its_own_bound() -> None:
     envelope = VelocityEnvelope(forward=2.0, backward=0.5)
     assert envelope.clip(VelocityCommand(9.0)).linear_x == pytest.approx(2.0)
     assert envelope.clip(VelocityCommand(-9.0)).linear_x == pytest.approx(-0.5)
+
+
+def test_clipping_keeps_the_direction_of_the_greatest_numbers_there_are() -> None:
+    greatest = sys.float_info.max
+    clipped = VelocityEnvelope().clip(VelocityCommand(greatest, -greatest, greatest))
+    np.testing.assert_allclose(components(clipped), components(clipped)[0] * np.array([1, -1, 1]))
+    assert load(VelocityEnvelope(), clipped) == pytest.approx(1.0)

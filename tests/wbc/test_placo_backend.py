@@ -213,7 +213,7 @@ WHIRL = 3.0 * np.random.default_rng(1).normal(size=12)
     [
         (50.0, 20.0, 1.0, np.zeros(12)),
         (600.0, 700.0, 1.0, np.zeros(12)),
-        (0.0, 250.0, 0.0, WHIRL),
+        (0.0, 250.0, 1e-9, WHIRL),
     ],
     ids=["least above greatest force", "forces beyond the torques", "no torque to hold feet"],
 )
