@@ -287,7 +287,14 @@ def test_a_file_in_the_way_of_the_folder_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_real_demo_does_every_step_inside_the_limits(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "options",
+    [[], ["--backend", "placo"], ["--backend", "full", "--solver", "proxqp"]],
+    ids=["default", "placo", "full proxqp"],
+)
+def test_the_real_demo_does_every_step_inside_the_limits(
+    tmp_path: Path, options: list[str]
+) -> None:
     environment = {name: v for name, v in os.environ.items() if name not in NO_DISPLAY}
     done = subprocess.run(
         [
@@ -299,6 +306,7 @@ def test_the_real_demo_does_every_step_inside_the_limits(tmp_path: Path) -> None
             "--viewer",
             "--out",
             ".",
+            *options,
         ],
         cwd=tmp_path,
         env={**environment, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"},
