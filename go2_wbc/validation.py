@@ -10,25 +10,24 @@ from go2_wbc.errors import ConfigError
 
 def require_positive(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is finite and above 0."""
-    _require(config, names, lambda value: value > 0.0, "positive")
+    for name in names:
+        _require(config, name, lambda value: value > 0.0, "positive")
 
 
 def require_not_negative(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is finite and at least 0."""
-    _require(config, names, lambda value: value >= 0.0, "at least 0")
+    for name in names:
+        _require(config, name, lambda value: value >= 0.0, "at least 0")
 
 
 def require_share(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is in (0, 1]."""
-    _require(config, names, lambda value: 0.0 < value <= 1.0, "above 0 and at most 1")
-
-
-def _require(
-    config: object, names: tuple[str, ...], holds: Callable[[float], bool], what: str
-) -> None:
     for name in names:
-        field = getattr(config, name)
-        for value in field if isinstance(field, tuple) else (field,):
-            if not (math.isfinite(value) and holds(value)):
-                where = f"{type(config).__name__}.{name}"
-                raise ConfigError(f"{where} must be {what}, got {field!r}")
+        _require(config, name, lambda value: 0.0 < value <= 1.0, "above 0 and at most 1")
+
+
+def _require(config: object, name: str, holds: Callable[[float], bool], what: str) -> None:
+    field = getattr(config, name)
+    for value in field if isinstance(field, tuple) else (field,):
+        if not (math.isfinite(value) and holds(value)):
+            raise ConfigError(f"{type(config).__name__}.{name} must be {what}, got {field!r}")

@@ -103,6 +103,7 @@ calls = {
     ConfigError: [
         lambda: GO2Controller(7), lambda: GO2Controller(None), lambda: GO2Controller(config=3),
         lambda: GO2Controller(config={"wbc": {}}), lambda: GO2Controller(plant="robot"),
+        lambda: GO2Controller(urdf=3), lambda: GO2Controller(urdf=b"go2.urdf"),
     ],
 }
 for kind, refused in calls.items():

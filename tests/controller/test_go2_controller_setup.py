@@ -6,7 +6,6 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 import qpsolvers
@@ -113,12 +112,6 @@ def test_a_urdf_of_ones_own_makes_the_model_and_the_robot(tmp_path: Path) -> Non
         assert go2.stand()
         height = go2.last_outcome.measured["CoM height [m]"]
         assert height == pytest.approx(STAND_HEIGHT, abs=0.005)
-
-
-@pytest.mark.parametrize("urdf", [3, b"go2.urdf"])
-def test_a_urdf_that_is_no_path_is_refused(urdf: Any) -> None:  # noqa: ANN401
-    with pytest.raises(ConfigError, match="urdf must be a path"):
-        GO2Controller(urdf=urdf)
 
 
 def test_a_urdf_that_does_not_exist_is_named(tmp_path: Path) -> None:
