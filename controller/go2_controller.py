@@ -35,7 +35,8 @@ from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.controller import WholeBodyController
-from motions import check_plan, high_five_plan, load_motion
+from motions import FeasibilityChecker, Motion, Timeline, compile_timeline, load_motion
+from motions.library.high_five import HEIGHT as HIGH_FIVE_HEIGHT
 
 _log = logging.getLogger(__name__)
 
@@ -102,6 +103,7 @@ class GO2Controller:
         self._closed = False
         self._busy = threading.Lock()
         self._busy_with = ""
+        self._checker: FeasibilityChecker | None = None
         self._last_outcome = Outcome(True, "lying, nothing asked yet", 0.0)
         capacity = round(RECORDED_TIME / self._plant.control_period)
         self._telemetry = Telemetry(model, capacity)
@@ -215,25 +217,34 @@ class GO2Controller:
         leg, hold = front_leg(arguments.word("side", side)), arguments.finite("hold", hold)
         if not 0.5 <= hold <= 30.0:
             raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
-        plan = high_five_plan(self._runner.loop.model, leg, hold)
-        return self._call("high_five", lambda: self._pilot.high_five(plan))
+        timeline = load_motion("high_five", side=side, hold=hold, height=HIGH_FIVE_HEIGHT)
+        plan = compile_timeline(timeline, self._runner.loop.model)
+        return self._call("high_five", lambda: self._pilot.high_five(plan, leg, HIGH_FIVE_HEIGHT))
 
-    def play(self, motion: str | MotionPlan) -> bool:
-        """Play a motion of the library by name, or a compiled plan.
+    def play(self, motion: str | Motion | Timeline | MotionPlan) -> bool:
+        """Play a motion: a name of the library, a timeline, or a compiled plan.
 
         Raises:
             CommandError: for an unknown name; lists the valid ones.
+            TimelineError: for an empty timeline.
             StanceMismatch: if the motion starts from another stance.
-            MotionInfeasible: if the plan breaks a limit of the robot.
+            MotionInfeasible: if the motion breaks a limit of the robot; carries the findings.
         """
         self._check_open()
-        model = self._runner.loop.model
-        if isinstance(motion, MotionPlan):
-            plan = motion
-        else:
-            plan = load_motion(arguments.word("motion", motion), model)
-        check_plan(plan, model)
+        plan = self._plan(motion)
+        if self._checker is None:
+            self._checker = FeasibilityChecker(self._runner.loop.model)
+        self._checker.check(plan).raise_if_infeasible()
         return self._call("play", lambda: self._pilot.play(plan))
+
+    def _plan(self, motion: str | Motion | Timeline | MotionPlan) -> MotionPlan:
+        if isinstance(motion, MotionPlan):
+            return motion
+        if isinstance(motion, Motion):
+            motion = motion()
+        if not isinstance(motion, Timeline):
+            motion = load_motion(arguments.word("motion", motion))
+        return compile_timeline(motion, self._runner.loop.model)
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""

@@ -32,10 +32,11 @@ from controller.runner import Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait, find_gait
 from go2_wbc.errors import ModeError, StanceMismatch
+from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionPlanner
 from go2_wbc.reference import MotionPlan, Stance, TrackedPoint
-from motions.high_five import HighFivePlan
+from motions.compiler import CompiledPlan
 from motions.postures import SPLAYED_JOINTS, TUCKED_JOINTS, lie_down, rise, sit_down
 
 READY_TIME = 0.2
@@ -290,25 +291,31 @@ class Pilot:
         if plan.entry is Stance.STAND:
             self.square_up()
 
-    def high_five(self, plan: HighFivePlan) -> Figures:
-        """Give a high five, from any mode but fallen, and measure how high the paw was held."""
+    def high_five(self, plan: CompiledPlan, leg: Leg, height: float) -> Figures:
+        """Give a high five, from any mode but fallen, and measure how high the paw was held.
+
+        Args:
+            plan: with a span named "held".
+            leg: the one that is raised.
+            height: planned for the paw's centre [m].
+        """
         self._ensure_standing()
-        loop, leg = self._loop, plan.leg
+        loop, (hold_start, hold_end) = self._loop, plan.spans["held"]
         heights: list[float] = []
 
         def watch(t: float) -> None:
-            if plan.hold_start <= t <= plan.hold_end:
+            if hold_start <= t <= hold_end:
                 ground = ground_height(loop.snapshot, self._model)
                 heights.append(float(loop.snapshot.p_world_feet[leg, 2]) - ground)
 
         figures = self.play(plan, watch)
         figures = {
             **figures,
-            "planned paw height [m]": plan.paw_height,
+            "planned paw height [m]": height,
             "least paw height [m]": min(heights),
             "mean paw height [m]": fmean(heights),
         }
-        if fmean(heights) < plan.paw_height - PAW_TOLERANCE:
+        if fmean(heights) < height - PAW_TOLERANCE:
             raise Aborted(f"the paw was not held at its height: {listed(figures)}", figures)
         return figures
 

@@ -15,6 +15,7 @@
     ├── PlantError
     │   └── PlantTimeout        the plant stopped answering
     └── MotionError
+        ├── TimelineError       an authored motion is written wrongly
         ├── MotionInfeasible    the motion breaks a limit; carries the findings
         └── StanceMismatch      the motion starts from another stance
 
@@ -115,6 +116,10 @@ class PlantTimeout(PlantError):
 
 class MotionError(Go2WbcError):
     """A motion cannot be played."""
+
+
+class TimelineError(MotionError, ValueError):
+    """An authored motion is written wrongly; the message says what and how to write it."""
 
 
 class MotionInfeasible(MotionError):

@@ -23,7 +23,8 @@ from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.solution import WbcSolution
-from motions import high_five_plan
+from motions import compile_timeline, load_motion
+from motions.library.high_five import HEIGHT
 
 STATES = 200
 """Random states of a trial on which the two models are compared."""
@@ -151,7 +152,8 @@ def _exercise(pilot: Pilot, plant: MujocoPlant) -> None:
     pilot.wait(2.0)
     pilot.rest()
     pilot.stand()
-    pilot.high_five(high_five_plan(RobotModel(), Leg.FR, 1.0))
+    plan = compile_timeline(load_motion("high_five", hold=1.0), RobotModel())
+    pilot.high_five(plan, Leg.FR, HEIGHT)
     pilot.sit()
 
 

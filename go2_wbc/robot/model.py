@@ -109,6 +109,10 @@ class RobotModel:
     def _constants(self) -> tuple[float, float, float]:
         return self.mass, self.gravity, self.foot_radius
 
+    def center_of_mass(self, q: Float[np.ndarray, "19"]) -> Float[np.ndarray, "3"]:
+        """CoM in the world [m] at configuration ``q``."""
+        return np.array(pin.centerOfMass(self.pin_model, self._data, q))
+
     def forward_kinematics(
         self, q: Float[np.ndarray, "19"]
     ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4 3"]]:

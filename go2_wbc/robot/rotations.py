@@ -31,6 +31,16 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Float[np.ndarray
     return pin.rpy.rpyToMatrix(roll, pitch, yaw)
 
 
+def rpy_from_rotation(R: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3"]:
+    """Roll, pitch, yaw [rad] of ``R``."""
+    return pin.rpy.matrixToRpy(R)
+
+
+def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Float[np.ndarray, "4"]:
+    """Quaternion x y z w of Rz(yaw) Ry(pitch) Rx(roll), angles in rad."""
+    return pin.Quaternion(rotation_from_rpy(roll, pitch, yaw)).coeffs()
+
+
 def yaw_rotation(yaw: float) -> Float[np.ndarray, "3 3"]:
     """R = Rz(yaw), angle in rad."""
     c, s = math.cos(yaw), math.sin(yaw)

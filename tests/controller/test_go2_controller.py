@@ -13,11 +13,10 @@ from controller import GO2Controller, Mode, Outcome
 from controller.checks import is_lying, is_sitting, is_standing
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ModeError, MotionInfeasible, StanceMismatch
-from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
-from motions import high_five_plan
+from motions import compile_timeline, load_motion
 from tests.controller.plants import (
     PERIOD,
     WatchedPlant,
@@ -330,11 +329,11 @@ def test_a_motion_from_another_stance_is_refused_and_nothing_happens() -> None:
 
 def test_an_infeasible_plan_is_refused_with_its_findings(standing: GO2Controller) -> None:
     before = standing.state
-    plan = with_joint_beyond_its_limit(high_five_plan(RobotModel(), Leg.FR))
+    plan = with_joint_beyond_its_limit(compile_timeline(load_motion("high_five"), RobotModel()))
     with pytest.raises(MotionInfeasible) as caught:
         standing.play(plan)
     assert len(caught.value.findings) >= 1
-    assert "FR_calf_joint" in str(caught.value)
+    assert "FR_calf" in str(caught.value)
     assert same(standing.state, before)
     assert standing.mode is Mode.STANDING
 

@@ -9,11 +9,10 @@ import pytest
 
 from controller import GO2Controller, Mode
 from controller.navigation import DriveStraight, TurnInPlace
-from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
-from motions import high_five_plan
+from motions import compile_timeline, load_motion
 from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant
 
 
@@ -112,7 +111,7 @@ def test_while_getting_up_after_a_damped_walk_no_command_is_taken(
 
 
 def test_a_high_five_whose_robot_does_not_come_to_rest_is_not_standing_in_the_end() -> None:
-    plan = high_five_plan(RobotModel(), Leg.FR, 0.5)
+    plan = compile_timeline(load_motion("high_five", hold=0.5), RobotModel())
     plant = WatchedPlant(MujocoPlant(control_period=2 * PERIOD))
     with GO2Controller(plant=plant) as go2:
         assert go2.stand()

@@ -2,40 +2,72 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from go2_wbc.curves import keyframes
 from go2_wbc.legs import Leg
-from motions import HighFivePlan
+from go2_wbc.reference import MotionPlan, Reference, Stance
+from motions import CompiledPlan
 
 # rad; beyond the upper limit of a calf, -0.838.
 STRETCHED = -0.5
+# s; half the time in which a joint leaves its way and comes back.
+BUMP = 0.3
 
 
-def with_joint_beyond_its_limit(plan: HighFivePlan) -> HighFivePlan:
+@dataclass(frozen=True, slots=True)
+class DoctoredPlan(MotionPlan):
+    """A plan whose joints and body are bent by ``joints(t)`` (12,) and ``body(t)`` (3,)."""
+
+    inner: CompiledPlan
+    joint: int = 0
+    angle: float = 0.0
+    centre: float = 0.0
+    width: float = BUMP
+    aside: float = 0.0
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        return self.inner.name
+
+    @property
+    def entry(self) -> Stance:  # type: ignore[override]
+        return self.inner.entry
+
+    @property
+    def exit(self) -> Stance:  # type: ignore[override]
+        return self.inner.exit
+
+    @property
+    def duration(self) -> float:  # type: ignore[override]
+        return self.inner.duration
+
+    def at(self, t: float) -> Reference:
+        good = self.inner.at(t)
+        joints = good.q_joints.copy()
+        joints[self.joint] += self.angle * max(0.0, 1.0 - abs(t - self.centre) / self.width)
+        body = replace(good.body, p_world=good.body.p_world + np.array([0.0, self.aside, 0.0]))
+        return replace(good, q_joints=joints, body=body)
+
+
+def middle(plan: CompiledPlan) -> float:
+    """The middle [s] of the time for which the paw is held."""
+    return float(np.mean(plan.spans["held"]))
+
+
+def with_joint_beyond_its_limit(plan: CompiledPlan) -> DoctoredPlan:
     """``plan`` with the raised calf stretched beyond its limit while the paw is held."""
-    middle = 0.5 * (plan.hold_start + plan.hold_end)
-    stretched = plan.joints.at(middle).value.copy()
-    stretched[Leg(plan.leg).joints.stop - 1] = STRETCHED
-    ends = plan.joints.at(0.0).value
-    times = (0.0, middle, plan.duration)
-    return replace(plan, joints=keyframes(times, (ends, stretched, ends)))
+    calf = Leg.FR.joints.stop - 1
+    bend = STRETCHED - float(plan.at(middle(plan)).q_joints[calf])
+    return DoctoredPlan(plan, calf, bend, middle(plan))
 
 
-def with_joint_too_fast(plan: HighFivePlan) -> HighFivePlan:
+def with_joint_too_fast(plan: CompiledPlan) -> DoctoredPlan:
     """``plan`` with the raised thigh swung by 1 rad within 20 ms."""
-    middle = 0.5 * (plan.hold_start + plan.hold_end)
-    before = plan.joints.at(middle).value
-    after = before.copy()
-    after[plan.leg.joints.start + 1] += 1.0
-    values = (before, before, after, after)
-    times = (0.0, middle, middle + 0.02, plan.duration)
-    return replace(plan, joints=keyframes(times, values))
+    return DoctoredPlan(plan, Leg.FR.joints.start + 1, 1.0, middle(plan), width=0.02)
 
 
-def with_body_aside(plan: HighFivePlan, aside: float) -> HighFivePlan:
+def with_body_aside(plan: CompiledPlan, aside: float) -> DoctoredPlan:
     """``plan`` with the CoM ``aside`` metres to the left for the whole time."""
-    pose = plan.body.at(0.0).value + np.array([0.0, aside, 0.0, 0.0, 0.0, 0.0])
-    return replace(plan, body=keyframes((0.0, plan.duration), (pose, pose)))
+    return DoctoredPlan(plan, aside=aside)

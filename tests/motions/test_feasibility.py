@@ -7,14 +7,24 @@ import pytest
 
 from go2_wbc.errors import MotionInfeasible
 from go2_wbc.legs import Leg
+from go2_wbc.reference import Stance
 from go2_wbc.robot.model import RobotModel
-from motions import Finding, HighFivePlan, check_plan, high_five_plan
+from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg, load_motion
+from motions.feasibility import FeasibilityReport
+from motions.feasibility.dynamic import forces_of
+from motions.postures import STAND_HEIGHT
+from motions.trajectory import trajectory_of
 from tests.motions.doctored import (
     STRETCHED,
+    DoctoredPlan,
+    middle,
     with_body_aside,
     with_joint_beyond_its_limit,
     with_joint_too_fast,
 )
+
+# m, N, N m; of quantities that two ways of calculating give, one of them by a spline.
+EXACT = 1e-6
 
 
 @pytest.fixture(scope="module")
@@ -23,71 +33,186 @@ def model() -> RobotModel:
 
 
 @pytest.fixture(scope="module")
-def good(model: RobotModel) -> HighFivePlan:
-    return high_five_plan(model, Leg.FR, 1.0)
+def checker(model: RobotModel) -> FeasibilityChecker:
+    return FeasibilityChecker(model)
 
 
-def findings(plan: HighFivePlan, model: RobotModel) -> list[Finding]:
-    with pytest.raises(MotionInfeasible, match="'high five' is infeasible") as caught:
-        check_plan(plan, model)
-    found = [finding for finding in caught.value.findings if isinstance(finding, Finding)]
-    assert len(found) == len(caught.value.findings)
-    assert all(str(finding) in str(caught.value) for finding in found)
-    return found
+@pytest.fixture(scope="module")
+def good(model: RobotModel) -> CompiledPlan:
+    return compile_timeline(load_motion("high_five", hold=1.0), model)
 
 
-def test_a_good_plan_passes(good: HighFivePlan, model: RobotModel) -> None:
-    check_plan(good, model)
+def failed(report: FeasibilityReport) -> set[str]:
+    return {finding.check for finding in report.failures}
+
+
+# --- plans broken on purpose ----------------------------------------------------------------------
+
+
+def test_a_good_plan_passes(good: CompiledPlan, checker: FeasibilityChecker) -> None:
+    report = checker.check(good)
+    assert report.ok, report.table()
+    report.raise_if_infeasible()
+    assert all(finding.margin >= 0.0 for finding in report.margins.values())
 
 
 def test_a_joint_beyond_its_limit_is_found_at_its_worst_instant(
-    good: HighFivePlan, model: RobotModel
+    good: CompiledPlan, checker: FeasibilityChecker, model: RobotModel
 ) -> None:
-    found = findings(with_joint_beyond_its_limit(good), model)
-    (finding,) = [f for f in found if f.check == "joint position"]
+    report = checker.check(with_joint_beyond_its_limit(good))
+    (finding,) = [f for f in report.failures if f.check == "joint position"]
     limit = model.q_upper[Leg.FR.joints.stop - 1]
-    assert finding.subject == "FR_calf_joint"
+    assert finding.subject == "FR_calf"
     assert finding.unit == "rad"
     assert finding.limit == pytest.approx(limit)
-    assert finding.value == pytest.approx(STRETCHED, abs=0.01)
-    assert finding.margin == pytest.approx(limit - STRETCHED, abs=0.01)
-    assert finding.time == pytest.approx(0.5 * (good.hold_start + good.hold_end), abs=0.02)
+    assert finding.value == pytest.approx(STRETCHED, abs=0.03)
+    assert finding.margin == pytest.approx(limit - STRETCHED, abs=0.03)
+    assert finding.time == pytest.approx(middle(good), abs=0.02)
+    with pytest.raises(MotionInfeasible, match="'high_five' is infeasible") as caught:
+        report.raise_if_infeasible()
+    assert str(finding) in str(caught.value)
+    assert caught.value.findings == report.failures
 
 
-def test_a_joint_that_is_too_fast_is_found(good: HighFivePlan, model: RobotModel) -> None:
-    found = findings(with_joint_too_fast(good), model)
-    (finding,) = [f for f in found if f.check == "joint speed"]
-    assert finding.subject == "FR_thigh_joint"
+def test_a_joint_that_is_too_fast_is_found(good: CompiledPlan, checker: FeasibilityChecker) -> None:
+    report = checker.check(with_joint_too_fast(good))
+    (finding,) = [f for f in report.failures if f.check == "joint speed"]
+    assert finding.subject == "FR_thigh"
     assert finding.unit == "rad/s"
-    assert finding.margin < 0.0
-    assert abs(finding.value) > finding.limit == pytest.approx(30.1)
+    assert finding.value > finding.limit == pytest.approx(30.1)
+    assert "continuity" in failed(report)
 
 
 @pytest.mark.parametrize("aside", [0.3, -0.3])
 def test_a_com_outside_the_support_is_found(
-    good: HighFivePlan, model: RobotModel, aside: float
+    good: CompiledPlan, checker: FeasibilityChecker, aside: float
 ) -> None:
-    (finding,) = [f for f in findings(with_body_aside(good, aside), model) if f.check == "support"]
+    report = checker.check(with_body_aside(good, aside))
+    (finding,) = [f for f in report.failures if f.check == "support"]
     assert finding.subject == "CoM"
     assert finding.margin < -0.05
     assert finding.value < finding.limit
 
 
-def test_a_com_between_the_feet_but_off_the_triangle_is_found_only_while_a_paw_is_up(
-    good: HighFivePlan, model: RobotModel
+def test_a_com_off_the_triangle_is_found_only_while_a_paw_is_up(
+    good: CompiledPlan, checker: FeasibilityChecker
 ) -> None:
-    (finding,) = findings(with_body_aside(good, -0.08), model)
-    assert finding.check == "support"
+    report = checker.check(with_body_aside(good, -0.085))
+    (finding,) = [f for f in report.failures if f.check == "support"]
     assert not good.at(finding.time).stance.all()
+    assert "foot load" in failed(report) or "contact wrench" in failed(report)
 
 
-def test_findings_come_in_the_order_of_their_time(good: HighFivePlan, model: RobotModel) -> None:
-    times = [f.time for f in findings(with_body_aside(with_joint_too_fast(good), 0.3), model)]
+def test_findings_come_in_the_order_of_their_time(
+    good: CompiledPlan, checker: FeasibilityChecker
+) -> None:
+    times = [f.time for f in checker.check(with_body_aside(good, 0.3)).failures]
     assert len(times) >= 2
     assert times == sorted(times)
 
 
-def test_a_plan_that_is_not_a_number_is_infeasible(good: HighFivePlan, model: RobotModel) -> None:
-    nans = findings(with_body_aside(good, float("nan")), model)
-    assert [f.check for f in nans] == ["support"]
-    assert np.isnan(nans[0].value)
+def test_a_plan_that_is_not_a_number_is_infeasible(
+    good: CompiledPlan, checker: FeasibilityChecker
+) -> None:
+    report = checker.check(DoctoredPlan(good, aside=float("nan")))
+    assert not report.ok
+
+
+# --- timelines that the robot cannot do -----------------------------------------------------------
+
+AWAY = {
+    "reach": Timeline().body(z=0.18, over=1.0).home(over=1.0),
+    "joint position": Timeline().body(z=-0.24, over=1.0).home(over=1.0),
+    "continuity": Timeline().body(pitch=deg(18), over=0.05).home(over=0.05),
+    "friction": Timeline().body(y=0.06, over=0.2).body(y=-0.06, over=0.2).home(over=0.2),
+    "support": Timeline(balance=False).foot("FR", z=0.1, over=0.8).home(over=0.8),
+    "landing speed": Timeline().foot("FR", z=0.15, over=0.6).foot("FR", over=0.1, ease="linear"),
+    "clearance": Timeline().body(pitch=deg(35), z=-0.2, over=1.0).home(over=1.0),
+    "entry and exit": Timeline().body(z=-0.08, over=1.0),
+    "balance": Timeline().foot("FR", z=0.1, over=0.8).foot("RL", z=0.1, over=0.8),
+}
+
+
+@pytest.mark.parametrize("check", AWAY)
+def test_what_the_robot_cannot_do_is_found_under_its_name(
+    checker: FeasibilityChecker, check: str
+) -> None:
+    report = checker.check(AWAY[check])
+    assert check in failed(report), report.table()
+
+
+def test_legs_that_cross_are_found(checker: FeasibilityChecker) -> None:
+    crossing = (
+        Timeline().foot("FR", z=0.10, over=0.8).foot("FR", y=0.26, z=0.04, over=0.8).home(over=1.0)
+    )
+    (finding,) = [f for f in checker.check(crossing).failures if f.check == "self-collision"]
+    assert "FL" in finding.subject
+    assert "FR" in finding.subject
+
+
+def test_a_motion_that_starts_lying_or_ends_elsewhere_is_refused(
+    checker: FeasibilityChecker,
+) -> None:
+    for line in (
+        Timeline(entry=Stance.LIE).body(z=0.0, roll=0.01, over=1.0),
+        Timeline(exit=Stance.SIT).body(z=-0.05, over=1.0).home(over=1.0),
+    ):
+        assert "entry and exit" in failed(checker.check(line))
+
+
+# --- what the numbers mean ------------------------------------------------------------------------
+
+
+def test_the_feet_of_a_resting_robot_carry_its_weight_with_the_torques_of_statics(
+    model: RobotModel,
+) -> None:
+    plan = compile_timeline(Timeline().body(z=-0.001, over=5.0).home(over=5.0), model)
+    path = trajectory_of(plan, model)
+    forces = forces_of(path, model)
+    weight = model.mass * model.gravity
+    assert forces.contact[0, :, 2].sum() == pytest.approx(weight, abs=1e-2)
+    assert forces.missing.max() < 1e-2
+    assert forces.zmp[0] == pytest.approx(path.p_com[0, :2], abs=1e-4)
+    assert path.p_com[0, 2] == pytest.approx(STAND_HEIGHT, abs=EXACT)
+
+
+def test_the_trajectory_puts_the_com_and_the_feet_where_the_plan_wants_them(
+    good: CompiledPlan, model: RobotModel
+) -> None:
+    path = trajectory_of(good, model)
+    for row in range(0, len(path.times), 25):
+        reference = good.at(float(path.times[row]))
+        com, feet = model.forward_kinematics(path.q[row])
+        assert com == pytest.approx(reference.body.p_world, abs=EXACT)
+        stands = reference.stance
+        assert feet[stands] == pytest.approx(path.p_feet[stands], abs=EXACT)
+        raised = ~np.repeat(stands, 3)
+        assert path.q[row, 7:][raised] == pytest.approx(reference.q_joints[raised], abs=EXACT)
+
+
+def test_equations_of_motion_hold_along_a_trajectory(good: CompiledPlan, model: RobotModel) -> None:
+    path = trajectory_of(good, model)
+    forces = forces_of(path, model)
+    for row in range(0, len(path.times), 40):
+        generalised = model.inverse_dynamics(path.q[row], path.v[row], path.a[row])
+        snapshot = model.snapshot(_state_at(path, row))
+        applied = snapshot.J_contacts.reshape(12, 18).T @ forces.contact[row].ravel()
+        residual = generalised - applied
+        assert np.abs(residual[:6]).max() < 0.01  # N; the evenness of the load takes its share
+        assert residual[6:] == pytest.approx(forces.tau[row], abs=EXACT)
+
+
+def test_a_table_fits_80_columns_and_names_every_check(
+    good: CompiledPlan, checker: FeasibilityChecker
+) -> None:
+    report = checker.check(good)
+    lines = report.table().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert all(any(line.startswith(check) for line in lines) for check in report.margins)
+    assert "can do it" in lines[-1]
+
+
+def _state_at(path, row: int):  # noqa: ANN001, ANN202
+    from motions.feasibility.dynamic import _state
+
+    return _state(path, row)

@@ -5,11 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from go2_wbc.errors import CommandError
+from go2_wbc.errors import CommandError, TimelineError
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Stance
 from go2_wbc.robot.model import RobotModel
-from motions import check_plan, high_five_plan, load_motion, motion_names
+from motions import (
+    FeasibilityChecker,
+    compile_timeline,
+    find_motion,
+    load_motion,
+    motion_names,
+)
+from motions.authoring import Choice
 
 # Between a difference quotient over 2 ms and the derivative; the curves are smooth.
 DIFFERENCE_TOLERANCE = 2e-2
@@ -21,26 +28,49 @@ def model() -> RobotModel:
     return RobotModel()
 
 
-def test_the_names_are_sorted_and_contain_the_high_fives() -> None:
+@pytest.fixture(scope="module")
+def checker(model: RobotModel) -> FeasibilityChecker:
+    return FeasibilityChecker(model)
+
+
+def test_there_are_motions_enough_and_each_says_what_it_is() -> None:
     names = motion_names()
     assert list(names) == sorted(set(names))
-    assert {"high_five", "high_five_left"} <= set(names)
+    assert len(names) >= 14
+    for name in names:
+        found = find_motion(name)
+        assert found.name == name
+        assert len(found.summary) > 10
+        assert f"motions/library/{name}.py:" in found.source
 
 
 @pytest.mark.parametrize("name", ["", "High_Five", "moonwalk"])
-def test_an_unknown_name_is_refused_with_the_valid_ones(model: RobotModel, name: str) -> None:
+def test_an_unknown_name_is_refused_with_the_valid_ones(name: str) -> None:
     with pytest.raises(CommandError, match=f"unknown motion '{name}'; valid: ") as caught:
-        load_motion(name, model)
+        load_motion(name)
     assert all(valid in str(caught.value) for valid in motion_names())
 
 
 @pytest.mark.parametrize("name", motion_names())
-def test_every_motion_of_the_library_is_feasible_and_holds_its_ends(
-    model: RobotModel, name: str
+def test_every_motion_of_the_library_is_feasible_on_both_sides(
+    checker: FeasibilityChecker, name: str
 ) -> None:
-    plan = load_motion(name, model)
-    check_plan(plan, model)
+    sides = [
+        parameter.valid.words
+        for parameter in find_motion(name).parameters
+        if isinstance(parameter.valid, Choice)
+    ]
+    for side in sides[0] if sides else (None,):
+        line = load_motion(name) if side is None else load_motion(name, side=side)
+        report = checker.check(line)
+        assert report.ok, report.table()
+
+
+@pytest.mark.parametrize("name", motion_names())
+def test_every_motion_holds_its_ends(model: RobotModel, name: str) -> None:
+    plan = compile_timeline(load_motion(name), model)
     assert plan.duration > 0.0
+    assert plan.problems == ()
     for inside, outside in ((0.0, -5.0), (plan.duration, plan.duration + 5.0)):
         here, there = plan.at(inside), plan.at(outside)
         assert np.allclose(here.body.p_world, there.body.p_world)
@@ -52,14 +82,16 @@ def test_every_motion_of_the_library_is_feasible_and_holds_its_ends(
 
 @pytest.mark.parametrize("name", motion_names())
 def test_velocities_are_the_derivatives_of_positions(model: RobotModel, name: str) -> None:
-    plan = load_motion(name, model)
+    plan = compile_timeline(load_motion(name), model)
     rng = np.random.default_rng(1)
-    for t in rng.uniform(0.0, plan.duration, 60):
+    for t in rng.uniform(STEP, plan.duration - STEP, 40):
         before, now, after = (plan.at(float(t) + shift) for shift in (-STEP, 0.0, STEP))
         p_rate = (after.body.p_world - before.body.p_world) / (2 * STEP)
         q_rate = (after.q_joints - before.q_joints) / (2 * STEP)
         assert now.body.v_world == pytest.approx(p_rate, abs=DIFFERENCE_TOLERANCE)
         assert now.v_joints == pytest.approx(q_rate, abs=DIFFERENCE_TOLERANCE)
+        a_rate = (after.v_joints - before.v_joints) / (2 * STEP)
+        assert now.a_joints == pytest.approx(a_rate, abs=10 * DIFFERENCE_TOLERANCE)
         spin = after.body.R_world_base @ before.body.R_world_base.T
         w_rate = np.array([spin[2, 1], spin[0, 2], spin[1, 0]]) / (2 * STEP)
         assert now.body.w_world == pytest.approx(w_rate, abs=DIFFERENCE_TOLERANCE)
@@ -69,7 +101,7 @@ def test_velocities_are_the_derivatives_of_positions(model: RobotModel, name: st
 def test_a_foot_is_unloaded_before_it_lifts_and_loaded_only_after_it_lands(
     model: RobotModel, name: str
 ) -> None:
-    plan = load_motion(name, model)
+    plan = compile_timeline(load_motion(name), model)
     times = np.arange(0.0, plan.duration, 0.005)
     loads = np.array([plan.at(float(t)).normal_force_max for t in times])
     stances = np.array([plan.at(float(t)).stance for t in times])
@@ -79,7 +111,10 @@ def test_a_foot_is_unloaded_before_it_lifts_and_loaded_only_after_it_lands(
 
 
 def test_a_left_high_five_is_the_mirror_image_of_a_right_one(model: RobotModel) -> None:
-    left, right = (high_five_plan(model, leg, 1.0) for leg in (Leg.FL, Leg.FR))
+    left, right = (
+        compile_timeline(load_motion("high_five", side=side, hold=1.0), model)
+        for side in ("left", "right")
+    )
     assert left.duration == right.duration
     mirror = np.array([1.0, -1.0, 1.0])
     for t in np.linspace(0.0, left.duration, 25):
@@ -92,9 +127,25 @@ def test_a_left_high_five_is_the_mirror_image_of_a_right_one(model: RobotModel) 
 
 @pytest.mark.parametrize("hold", [0.5, 2.0, 7.0])
 def test_the_paw_is_held_for_the_time_asked_for(model: RobotModel, hold: float) -> None:
-    plan = high_five_plan(model, Leg.FR, hold)
-    assert plan.hold_end - plan.hold_start == pytest.approx(hold)
-    times = np.linspace(plan.hold_start, plan.hold_end, 9)
-    joints = [plan.at(float(t)).q_joints for t in times]
-    assert np.ptp(joints, axis=0).max() < 1e-9
+    plan = compile_timeline(load_motion("high_five", hold=hold), model)
+    start, end = plan.spans["held"]
+    assert end - start == pytest.approx(hold)
+    joints = [plan.at(float(t)).q_joints for t in np.linspace(start, end, 9)]
+    assert np.ptp(joints, axis=0).max() < 1e-3  # rad; the spline swings a little about a hold
     assert (plan.entry, plan.exit) == (Stance.STAND, Stance.STAND)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"height": 0.9}, "height must be 0.45 to 0.66 m, got 0.9"),
+        ({"side": "top"}, "unknown side 'top'; valid: left, right"),
+        ({"speed": 1.0}, "high_five: unknown parameter 'speed'; valid: height, hold, side"),
+        ({"hold": float("nan")}, "hold must be 0.5 to 30 s, got nan"),
+    ],
+)
+def test_a_parameter_out_of_range_is_refused_by_name(
+    values: dict[str, float | str], message: str
+) -> None:
+    with pytest.raises(TimelineError, match=message):
+        load_motion("high_five", **values)

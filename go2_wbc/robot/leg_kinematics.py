@@ -1,0 +1,86 @@
+"""Closed-form inverse kinematics of the four legs, for whole trajectories at once.
+
+A leg is a hip that turns about x, and a thigh and a calf that turn about y, at a distance from the
+plane of the hip's axis; see Spong, Hutchinson & Vidyasagar (2006, sec. 3.3.3) for the same arm
+upside down. Two branches exist for the side on which the foot lies: below the hip's axis, as in
+standing, or above it, as for a raised paw. The knee always points backwards, as the limits demand.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.legs import JOINT_NAMES, Leg
+from go2_wbc.robot.model import RobotModel
+
+
+@dataclass(frozen=True, slots=True)
+class LegGeometry:
+    """Lengths of a leg.
+
+    Attributes:
+        p_base_hip: origin of the hip's axis in the base frame [m].
+        width: distance [m] from the hip's axis to the plane of the leg, positive to the left.
+        thigh: from the thigh's axis to the knee [m].
+        calf: from the knee to the foot's centre [m].
+    """
+
+    p_base_hip: Float[np.ndarray, "3"]
+    width: float
+    thigh: float
+    calf: float
+
+    @staticmethod
+    def of(model: RobotModel, leg: Leg) -> LegGeometry:
+        """The lengths of ``leg``, read from the robot's description."""
+        pin_model = model.pin_model
+        joints = [pin_model.getJointId(name) for name in JOINT_NAMES[leg.joints]]
+        hip, thigh, calf = (pin_model.jointPlacements[joint].translation for joint in joints)
+        foot = pin_model.frames[pin_model.getFrameId(leg.foot)].placement.translation
+        return LegGeometry(np.array(hip), float(thigh[1]), float(-calf[2]), float(-foot[2]))
+
+
+@dataclass(frozen=True, slots=True)
+class LegAngles:
+    """Joint angles that bring a foot to its places, as near as the leg reaches.
+
+    Attributes:
+        q: (n, 3) hip, thigh and calf angle [rad].
+        miss: (n,) distance [m] by which each place is out of the leg's reach; 0 within it.
+    """
+
+    q: Float[np.ndarray, "n 3"]
+    miss: Float[np.ndarray, " n"]
+
+
+def leg_angles(geometry: LegGeometry, p_base_foot: Float[np.ndarray, "n 3"]) -> LegAngles:
+    """Joint angles for foot centres (n, 3) in the base frame [m]."""
+    x, y, z = (p_base_foot - geometry.p_base_hip).T
+    width, thigh, calf = geometry.width, geometry.thigh, geometry.calf
+    across = y * y + z * z - width * width
+    down = np.where(z > 0.0, -1.0, 1.0) * np.sqrt(np.maximum(across, 0.0))
+    hip = _wrapped(np.arctan2(z, y) + np.arctan2(down, width))
+    reach = np.hypot(x, down)
+    cosine = (reach**2 - thigh**2 - calf**2) / (2.0 * thigh * calf)
+    knee = -np.arccos(np.clip(cosine, -1.0, 1.0))
+    swing = np.arctan2(-x, down) - np.arctan2(calf * np.sin(knee), thigh + calf * np.cos(knee))
+    too_near = np.sqrt(np.maximum(-across, 0.0))
+    too_far = np.maximum(np.maximum(reach - thigh - calf, abs(thigh - calf) - reach), 0.0)
+    return LegAngles(np.column_stack([hip, _wrapped(swing), knee]), np.hypot(too_near, too_far))
+
+
+def _wrapped(angle: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    return np.arctan2(np.sin(angle), np.cos(angle))
+
+
+def foot_places(geometry: LegGeometry, q: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    """Foot centres (n, 3) in the base frame [m] at joint angles (n, 3)."""
+    hip, thigh, calf = q.T
+    x = -geometry.thigh * np.sin(thigh) - geometry.calf * np.sin(thigh + calf)
+    down = geometry.thigh * np.cos(thigh) + geometry.calf * np.cos(thigh + calf)
+    y = geometry.width * np.cos(hip) + down * np.sin(hip)
+    z = geometry.width * np.sin(hip) - down * np.cos(hip)
+    return geometry.p_base_hip + np.column_stack([x, y, z])

@@ -1,0 +1,152 @@
+"""``@motion``: turns a function that returns a ``Timeline`` into a motion with checked parameters.
+
+    @motion
+    def nod(times: Annotated[int, Range(1, 5)] = 2) -> Timeline:
+        \"\"\"Nod: the trunk says yes.\"\"\"
+
+A parameter's annotation says which values are valid, its default what is taken otherwise.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from numbers import Real
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+from go2_wbc.errors import TimelineError, unknown_name
+from motions.timeline import Timeline
+
+Value = float | int | str | bool
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Numbers from ``low`` to ``high``, in ``unit``."""
+
+    low: float
+    high: float
+    unit: str = ""
+
+    def __str__(self) -> str:
+        """For a person."""
+        return f"{self.low:g} to {self.high:g} {self.unit}".strip()
+
+
+@dataclass(frozen=True, slots=True, init=False)
+class Choice:
+    """One of some words."""
+
+    words: tuple[str, ...]
+
+    def __init__(self, *words: str) -> None:
+        """The valid ``words``."""
+        object.__setattr__(self, "words", words)
+
+    def __str__(self) -> str:
+        """For a person."""
+        return " or ".join(self.words)
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A parameter of a motion: its name, what is valid, and what is taken by default."""
+
+    name: str
+    valid: Range | Choice
+    default: Value
+
+    def check(self, value: Value) -> Value:
+        """``value``, as a number of the kind of the default.
+
+        Raises:
+            TimelineError: if it is not valid.
+        """
+        if isinstance(self.valid, Choice):
+            if value not in self.valid.words:
+                raise TimelineError(unknown_name(self.name, str(value), self.valid.words))
+            return value
+        is_number = isinstance(value, Real) and not isinstance(value, bool)
+        if not (is_number and math.isfinite(float(value)) and self._is_inside(float(value))):
+            raise TimelineError(f"{self.name} must be {self.valid}, got {value!r}")
+        if not isinstance(self.default, int):
+            return float(value)
+        if float(value) != round(float(value)):
+            raise TimelineError(f"{self.name} must be a whole number, got {value!r}")
+        return round(float(value))
+
+    def _is_inside(self, value: float) -> bool:
+        return isinstance(self.valid, Range) and self.valid.low <= value <= self.valid.high
+
+    def __str__(self) -> str:
+        """For a person."""
+        return f"{self.name}={self.default!r} ({self.valid})"
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A motion that can be made with other parameters.
+
+    Attributes:
+        name: what users call it.
+        summary: first line of its docstring.
+        parameters: what can be chosen.
+        source: file and line where it is written.
+    """
+
+    name: str
+    summary: str
+    parameters: tuple[Parameter, ...]
+    source: str
+    _make: Callable[..., Timeline]
+
+    def __call__(self, **values: Value) -> Timeline:
+        """The timeline for these parameters.
+
+        Raises:
+            TimelineError: for an unknown parameter or a value that is not valid.
+        """
+        known = {parameter.name: parameter for parameter in self.parameters}
+        checked: dict[str, Any] = {}
+        for name, value in values.items():
+            if name not in known:
+                raise TimelineError(f"{self.name}: {unknown_name('parameter', name, known)}")
+            checked[name] = known[name].check(value)
+        timeline = self._make(**checked)
+        if not isinstance(timeline, Timeline):
+            raise TimelineError(
+                f"{self.name}() must return a Timeline, it returned {type(timeline).__name__}"
+            )
+        return replace(timeline, name=self.name)
+
+
+def motion(function: Callable[..., Timeline]) -> Motion:
+    """Makes a motion of ``function``, which is named after it.
+
+    Raises:
+        TimelineError: if a parameter lacks its range or its default.
+    """
+    hints = get_type_hints(function, include_extras=True)
+    parameters = tuple(
+        _parameter(function.__name__, item, hints)
+        for item in inspect.signature(function).parameters.values()
+    )
+    summary = (inspect.getdoc(function) or function.__name__).splitlines()[0]
+    code = function.__code__
+    source = f"{code.co_filename}:{code.co_firstlineno}"
+    return Motion(function.__name__, summary, parameters, source, function)
+
+
+def _parameter(name: str, item: inspect.Parameter, hints: Mapping[str, object]) -> Parameter:
+    hint = hints.get(item.name)
+    valid = get_args(hint)[1] if get_origin(hint) is Annotated else None
+    if not isinstance(valid, Range | Choice) or item.default is inspect.Parameter.empty:
+        raise TimelineError(
+            f"{name}: parameter {item.name!r} needs a range and a default, such as "
+            f"{item.name}: Annotated[float, Range(0.0, 1.0)] = 0.5"
+        )
+    parameter = Parameter(item.name, valid, item.default)
+    parameter.check(item.default)
+    return parameter

@@ -1,0 +1,167 @@
+"""Timeline -> plan: the trunk's path, the legs' joints and the contacts, as smooth curves.
+
+The tracks are sampled a hundred times a second, the legs solved in closed form, and cubic splines
+laid through the CoM, the attitude and the joints; so positions, velocities and accelerations of a
+plan are each other's derivatives. What cannot be done as written does not end in a near miss: it is
+kept in ``problems``, which the feasibility check reports.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import CubicSpline
+
+from go2_wbc.contacts import ContactSchedule
+from go2_wbc.curves import CurvePoint
+from go2_wbc.errors import TimelineError
+from go2_wbc.legs import LEGS
+from go2_wbc.reference import LegTask, MotionPlan, Reference, Stance, TrackedPoint
+from go2_wbc.robot.model import RobotModel
+from motions.balance import Balancer, Unbalanced
+from motions.keys import Mark
+from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, body_target
+from motions.timeline import Timeline
+from motions.tracks import LegTracks, body_path, configuration, flights, home_poses
+
+SAMPLE_PERIOD = 0.01
+"""Time [s] between the instants at which a timeline is sampled."""
+REACH_TOLERANCE = 1e-3
+"""Distance [m] by which a place may be out of reach before it counts."""
+UNLOAD_TIME = 0.3
+"""Time [s] over which a foot gives up its load before lift-off, if there is that much."""
+
+
+@dataclass(frozen=True, slots=True)
+class OutOfReach:
+    """A leg is asked for a place that it cannot reach; worst instant."""
+
+    time: float
+    leg: str
+    miss: float
+
+
+@dataclass(frozen=True, slots=True)
+class CompiledPlan(MotionPlan):
+    """A timeline, ready to be played.
+
+    Attributes:
+        name, entry, exit: see ``MotionPlan``.
+        curves: spline of CoM [m], roll, pitch, yaw [rad] and the twelve joints [rad]: (18,).
+        contacts: who stands when.
+        ramp: time [s] over which a foot is unloaded before lift-off and loaded after touchdown.
+        problems: what could not be done as written.
+        spans: start and end [s] of the named holds.
+    """
+
+    name: str
+    entry: Stance
+    exit: Stance
+    curves: CubicSpline
+    contacts: ContactSchedule
+    ramp: float
+    problems: tuple[OutOfReach | Unbalanced, ...]
+    spans: Mapping[str, tuple[float, float]]
+
+    @property
+    def duration(self) -> float:  # type: ignore[override]
+        """Length of the motion [s]."""
+        return float(self.curves.x[-1])
+
+    def at(self, t: float) -> Reference:
+        """The reference at ``t``; see ``MotionPlan.at``."""
+        value, rate, acceleration = self._curves_at(t)
+        phase = self.contacts.at(t)
+        load, zeros = phase.load_share(self.ramp), np.zeros((4, 3))
+        return Reference(
+            body=body_target(TrackedPoint.COM, CurvePoint(value[:6], rate[:6], acceleration[:6])),
+            legs=tuple(LegTask.STANCE if s else LegTask.JOINTS for s in phase.stance),
+            normal_force_min=NORMAL_FORCE_MIN * load,
+            normal_force_max=NORMAL_FORCE_MAX * load,
+            p_world_feet=zeros,
+            v_world_feet=zeros,
+            a_world_feet=zeros,
+            q_joints=value[6:],
+            v_joints=rate[6:],
+            a_joints=acceleration[6:],
+        )
+
+    def _curves_at(self, t: float) -> tuple[Float[np.ndarray, "18"], ...]:
+        inside = min(max(t, 0.0), self.duration)
+        value = self.curves(inside)
+        if inside != t:
+            return value, np.zeros(18), np.zeros(18)
+        return value, self.curves(t, 1), self.curves(t, 2)
+
+
+def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
+    """The plan of ``timeline``.
+
+    Raises:
+        TimelineError: if it is empty.
+    """
+    end = timeline.end
+    if not timeline.keys:
+        raise TimelineError(
+            f"motion {timeline.name!r} is empty: it needs at least one body(), foot() or leg()"
+        )
+    times = np.linspace(0.0, end, max(round(end / SAMPLE_PERIOD), 2) + 1)
+    home = home_poses(model)
+    tracks = LegTracks(model, home[timeline.entry])
+    body = body_path(timeline, home, times)
+    balance = Balancer(timeline, tracks, model, times, body).balance()
+    body[:, :2] += balance.offsets
+    paths = [tracks.path(timeline, leg, times, body) for leg in LEGS]
+    joints = np.hstack([path.q for path in paths])
+    com = np.array(
+        [model.center_of_mass(configuration(*row)) for row in zip(body, joints, strict=True)]
+    )
+    problems: list[OutOfReach | Unbalanced] = list(balance.failures)
+    for leg, path in zip(LEGS, paths, strict=True):
+        worst = int(np.argmax(path.miss))
+        if path.miss[worst] > REACH_TOLERANCE:
+            problems.append(OutOfReach(float(times[worst]), leg.name, float(path.miss[worst])))
+    contacts = contact_schedule(timeline)
+    samples = np.hstack([com, body[:, 3:], joints])
+    return CompiledPlan(
+        name=timeline.name,
+        entry=timeline.entry,
+        exit=timeline.exit,
+        curves=CubicSpline(times, samples, bc_type="clamped"),
+        contacts=contacts,
+        ramp=_ramp(contacts),
+        problems=tuple(problems),
+        spans={mark.name: (mark.start, mark.end) for mark in timeline.in_order(Mark)},
+    )
+
+
+def contact_schedule(timeline: Timeline) -> ContactSchedule:
+    """Who stands when, as events."""
+    spans = {leg: flights(timeline, leg) for leg in LEGS}
+    changes = {t for legs in spans.values() for span in legs for t in span if np.isfinite(t)}
+    times = sorted({0.0, *changes})
+    modes = np.ones((len(times), 4), dtype=bool)
+    for row, t in enumerate(times):
+        for leg, flown in spans.items():
+            modes[row, leg] = not any(start <= t < end for start, end in flown)
+    return ContactSchedule(tuple(times), modes)
+
+
+def _ramp(contacts: ContactSchedule) -> float:
+    """Half of the shortest time on the ground between two flights, at most ``UNLOAD_TIME``."""
+    longest = UNLOAD_TIME
+    for leg in LEGS:
+        column = contacts.modes[:, leg]
+        for index in range(1, len(column) - 1):
+            if column[index] and not column[index - 1]:
+                later = np.flatnonzero(~column[index:])
+                if len(later):
+                    span = contacts.times[index + int(later[0])] - contacts.times[index]
+                    longest = min(longest, span / 2)
+        lifts = np.flatnonzero(~column)
+        if len(lifts) and lifts[0] > 0:
+            longest = min(longest, contacts.times[int(lifts[0])])
+    return longest

@@ -1,0 +1,14 @@
+"""Feasibility: whether the robot can do a motion, told without simulating it."""
+
+from motions.feasibility.check import FeasibilityChecker, check
+from motions.feasibility.limits import FeasibilityLimits
+from motions.feasibility.report import FeasibilityReport, Finding, Series
+
+__all__ = [
+    "FeasibilityChecker",
+    "FeasibilityLimits",
+    "FeasibilityReport",
+    "Finding",
+    "Series",
+    "check",
+]

@@ -1,0 +1,89 @@
+"""``check``: can the robot do this motion? Kinematics first, then forces; nothing is simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from go2_wbc.errors import MotionError
+from go2_wbc.reference import MotionPlan
+from go2_wbc.robot.model import RobotModel
+from motions.authoring import Motion
+from motions.balance import Unbalanced
+from motions.compiler import CompiledPlan, OutOfReach, compile_timeline
+from motions.feasibility import dynamic, kinematic
+from motions.feasibility.collision import SelfCollision, self_distance
+from motions.feasibility.limits import FeasibilityLimits
+from motions.feasibility.report import FeasibilityReport, Series
+from motions.timeline import Timeline
+from motions.trajectory import trajectory_of
+
+
+class FeasibilityChecker:
+    """Checks motions on one robot; loads what it needs once."""
+
+    def __init__(
+        self, model: RobotModel | None = None, limits: FeasibilityLimits | None = None
+    ) -> None:
+        """Prepare for ``model``, by default the installed Go2."""
+        self._model = model or RobotModel()
+        self._limits = limits or FeasibilityLimits()
+        self._collision = SelfCollision(self._model)
+
+    def check(self, motion: Motion | Timeline | MotionPlan) -> FeasibilityReport:
+        """The report on ``motion``.
+
+        Args:
+            motion: a motion with its default parameters, a timeline, or a plan.
+
+        Raises:
+            TimelineError: if the timeline is empty.
+        """
+        if isinstance(motion, Motion):
+            motion = motion()
+        is_plan = isinstance(motion, MotionPlan)
+        plan = motion if is_plan else compile_timeline(motion, self._model)
+        model, limits = self._model, self._limits
+        try:
+            path = trajectory_of(plan, model)
+        except MotionError as error:
+            unknown = _failed("numbers", "plan", 0.0, np.nan, str(error))
+            return FeasibilityReport.of(plan.name, plan.duration, [unknown])
+        forces = dynamic.forces_of(path, model)
+        series = [
+            *_as_written(plan),
+            kinematic.reach(path, limits),
+            kinematic.joint_position(path, model),
+            kinematic.joint_speed(path, model),
+            *dynamic.torque(path, forces, model, limits),
+            *dynamic.support(path, forces, limits),
+            *dynamic.contacts(path, forces, limits),
+            self_distance(path, self._collision, limits),
+            kinematic.clearance(path, model, limits),
+            *kinematic.landing(path, model, limits),
+            kinematic.smoothness(path, limits),
+            kinematic.ends(plan, path, model, limits),
+        ]
+        return FeasibilityReport.of(plan.name, plan.duration, series)
+
+
+def check(motion: Motion | Timeline | MotionPlan) -> FeasibilityReport:
+    """Whether the installed Go2 can do ``motion``; see ``FeasibilityChecker``."""
+    return FeasibilityChecker().check(motion)
+
+
+def _as_written(plan: MotionPlan) -> list[Series]:
+    """What the compiler could not do as it was written."""
+    if not isinstance(plan, CompiledPlan):
+        return []
+    series = []
+    for problem in plan.problems:
+        if isinstance(problem, OutOfReach):
+            series.append(_failed("way of a foot", problem.leg, problem.time, problem.miss, ""))
+        elif isinstance(problem, Unbalanced):
+            series.append(_failed("balance", "trunk", problem.time, np.nan, problem.reason))
+    return series
+
+
+def _failed(what: str, subject: str, time: float, value: float, note: str) -> Series:
+    one = np.ones((1, 1))
+    return Series(what, "m", (subject,), np.array([time]), value * one, 0 * one, -one, note=note)

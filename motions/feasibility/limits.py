@@ -1,0 +1,57 @@
+"""Numbers of the feasibility check."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from go2_wbc.validation import require_positive
+
+
+@dataclass(frozen=True, slots=True)
+class FeasibilityLimits:
+    """What a motion must keep. Own choice, set by comparing verdicts with simulated runs.
+
+    Attributes:
+        reach: distance [m] by which a foot's place may be out of the leg's reach.
+        torque_share: share of the torque limit that a plan may use; the rest is for feedback.
+        knee_speed_share: share of a joint's greatest speed above which its torque falls linearly
+            to nothing at the greatest speed, as in a DC motor at its greatest voltage.
+        friction: friction coefficient that the ground is counted on for.
+        foot_load: least normal force [N] of a foot that stands.
+        support: least distance [m] of the CoM to the edges of the support polygon.
+        zero_moment: the same for the zero-moment point.
+        wrench: greatest part [N] of the force, and a fifth of it [N m] of the moment, that no
+            contact forces can give.
+        self_distance: least distance [m] between links that must not touch.
+        clearance: least height [m] of knees and trunk.
+        swing_depth: how deep [m] the lowest point of a foot in the air may be below the ground.
+        landing: distance [m] by which a foot may land beside its place.
+        landing_speed: greatest speed [m/s] of a foot at touchdown.
+        joint_jump: greatest change [rad/s] of a joint's speed between samples.
+        body_jump: greatest change [m/s, rad/s] of the trunk's speed between samples.
+        stance_position, stance_angle: how far [m, rad] the ends may be from their postures.
+        end_speed: greatest speed [m/s, rad/s] of trunk and joints at the ends.
+    """
+
+    reach: float = 0.002
+    torque_share: float = 0.85
+    knee_speed_share: float = 0.5
+    friction: float = 0.45
+    foot_load: float = 10.0
+    support: float = 0.015
+    zero_moment: float = 0.01
+    wrench: float = 5.0
+    self_distance: float = 0.005
+    clearance: float = 0.02
+    swing_depth: float = 0.005
+    landing: float = 0.01
+    landing_speed: float = 0.6
+    joint_jump: float = 4.0
+    body_jump: float = 0.4
+    stance_position: float = 0.02
+    stance_angle: float = 0.05
+    end_speed: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a limit that is not positive."""
+        require_positive(self, *(f.name for f in fields(self)))

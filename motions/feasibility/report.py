@@ -1,0 +1,173 @@
+"""What a feasibility check found: margins, failures and warnings, as values, tables and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.errors import MotionInfeasible
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """The worst instant of one subject under one check; a negative ``margin`` breaks the limit.
+
+    Attributes:
+        check: which limit.
+        time: when [s] it is worst.
+        subject: joint, foot or body part.
+        value, limit, margin: in ``unit``.
+        unit: of these numbers.
+        note: what else there is to say.
+    """
+
+    check: str
+    time: float
+    subject: str
+    value: float
+    limit: float
+    margin: float
+    unit: str
+    note: str = ""
+
+    def __str__(self) -> str:
+        """One line for a person."""
+        line = (
+            f"{self.check}: {self.subject} at {self.time:.2f} s is {self.value:.3g} {self.unit}, "
+            f"limit {self.limit:.3g}"
+        )
+        return f"{line} ({self.note})" if self.note else line
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """One check over the whole motion.
+
+    Attributes:
+        check: which limit.
+        unit: of values, limits and margins.
+        subjects: what is looked at, one per column.
+        times: (n,) [s].
+        values, limits, margins: (n, k); a margin of nan says that there was nothing to check.
+        least: margin below which the motion is infeasible.
+        tight: margin below which a warning is due.
+        note: what else to say of a finding.
+    """
+
+    check: str
+    unit: str
+    subjects: tuple[str, ...]
+    times: Float[np.ndarray, " n"]
+    values: Float[np.ndarray, "n k"]
+    limits: Float[np.ndarray, "n k"]
+    margins: Float[np.ndarray, "n k"]
+    tight: float = 0.0
+    note: str = ""
+
+    def findings(self) -> list[Finding]:
+        """The worst instant of every subject that was checked."""
+        found = []
+        for column, subject in enumerate(self.subjects):
+            margins = self.margins[:, column]
+            if np.isnan(margins).all():
+                continue
+            row = int(np.nanargmin(margins))
+            found.append(
+                Finding(
+                    self.check,
+                    float(self.times[row]),
+                    subject,
+                    float(self.values[row, column]),
+                    float(self.limits[row, column]),
+                    float(margins[row]),
+                    self.unit,
+                    self.note,
+                )
+            )
+        return found
+
+    def least_margins(self) -> Float[np.ndarray, " n"]:
+        """The smallest margin over the subjects at every instant; nan where nothing is checked."""
+        padded = np.where(np.isnan(self.margins), np.inf, self.margins).min(axis=1)
+        return np.where(np.isinf(padded), np.nan, padded)
+
+
+@dataclass(frozen=True, slots=True)
+class FeasibilityReport:
+    """Whether the robot can do a motion, and by how much.
+
+    Attributes:
+        motion: its name.
+        duration: its length [s].
+        series: every check over the whole motion.
+        failures: broken limits, the earliest first.
+        warnings: limits that are met by little.
+        margins: worst finding of every check.
+    """
+
+    motion: str
+    duration: float
+    series: tuple[Series, ...]
+    failures: tuple[Finding, ...]
+    warnings: tuple[Finding, ...]
+    margins: Mapping[str, Finding]
+
+    @staticmethod
+    def of(motion: str, duration: float, series: Sequence[Series]) -> FeasibilityReport:
+        """Draw the conclusions from ``series``."""
+        failures, warnings, margins = [], [], {}
+        for item in series:
+            found = item.findings()
+            if not found:
+                continue
+            margins[item.check] = min(found, key=lambda finding: finding.margin)
+            failures += [finding for finding in found if not finding.margin >= 0.0]
+            warnings += [finding for finding in found if 0.0 <= finding.margin < item.tight]
+        by_time = sorted(failures, key=lambda finding: finding.time)
+        return FeasibilityReport(
+            motion, duration, tuple(series), tuple(by_time), tuple(warnings), margins
+        )
+
+    @property
+    def ok(self) -> bool:
+        """Whether no limit is broken."""
+        return not self.failures
+
+    def raise_if_infeasible(self) -> None:
+        """Raise MotionInfeasible with the failures, if there are any."""
+        if self.failures:
+            raise MotionInfeasible(self.motion, self.failures)
+
+    def table(self) -> str:
+        """The worst finding of every check, at most 80 columns wide."""
+        head = f"{'check':<16}{'worst':<17}{'at':>8}{'value':>10}{'limit':>9}{'margin':>10}"
+        lines = [head, "-" * 80]
+        for check, finding in self.margins.items():
+            mark = "x" if finding.margin < 0.0 else "!" if finding in self.warnings else "ok"
+            lines.append(
+                f"{check:<16}{finding.subject:<17.16}{finding.time:>6.2f} s{finding.value:>10.3g}"
+                f"{finding.limit:>9.3g}{finding.margin:>10.3g} {mark:<2} {finding.unit}"
+            )
+        verdict = "can do it" if self.ok else f"cannot do it: {_count(len(self.failures), 'limit')}"
+        tight = f", {_count(len(self.warnings), 'tight margin')}" if self.warnings else ""
+        lines += ["-" * 80, f"{self.motion}, {self.duration:.1f} s: the robot {verdict}{tight}."]
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything but the series, for JSON."""
+        return {
+            "motion": self.motion,
+            "duration": self.duration,
+            "ok": self.ok,
+            "failures": [asdict(finding) for finding in self.failures],
+            "warnings": [asdict(finding) for finding in self.warnings],
+            "margins": {check: asdict(finding) for check, finding in self.margins.items()},
+        }
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

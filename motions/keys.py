@@ -1,0 +1,167 @@
+"""What a timeline is made of: keys, each a goal for one track within a span of time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import TypeVar
+
+from go2_wbc.curves import Ease
+from go2_wbc.legs import Leg
+from go2_wbc.reference import Stance
+
+BODY_CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw")
+"""What of the trunk can move: places [m] and angles [rad], as offsets from the posture."""
+_FLIPPED = frozenset({"y", "roll", "yaw"})
+
+_KeyType = TypeVar("_KeyType", bound="Key")
+
+
+class Frame(Enum):
+    """What a leg's goal is given in."""
+
+    GROUND = "ground"
+    BODY = "body"
+    JOINTS = "joints"
+
+
+@dataclass(frozen=True, slots=True)
+class LegTarget:
+    """Where a leg goes.
+
+    Attributes:
+        frame: what ``values`` mean.
+        values: offset x, y, z [m] of the foot from where it stands, fixed to the ground or to the
+            trunk; or hip, thigh and calf angle [rad].
+    """
+
+    frame: Frame
+    values: tuple[float, float, float]
+
+    @staticmethod
+    def on_ground() -> LegTarget:
+        """The foot where it stands."""
+        return LegTarget(Frame.GROUND, (0.0, 0.0, 0.0))
+
+    @property
+    def is_on_ground(self) -> bool:
+        """Whether the foot stands on the ground, where it stood."""
+        return self.frame is Frame.GROUND and self.values == (0.0, 0.0, 0.0)
+
+    @property
+    def mirrored(self) -> LegTarget:
+        """The same goal of the leg across."""
+        first, second, third = self.values
+        if self.frame is Frame.JOINTS:
+            return LegTarget(self.frame, (-first, second, third))
+        return LegTarget(self.frame, (first, -second, third))
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """One move of one track.
+
+    Attributes:
+        start, end: when [s].
+        ease: how it goes from the last goal to this one.
+    """
+
+    start: float
+    end: float
+    ease: Ease
+
+    def later(self: _KeyType, seconds: float) -> _KeyType:
+        """The same key, moved in time."""
+        return replace(self, start=self.start + seconds, end=self.end + seconds)
+
+    @property
+    def track(self) -> str:
+        """What moves, in words."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, slots=True)
+class BodyKey(Key):
+    """The trunk moves along one channel to an offset [m or rad]."""
+
+    channel: str
+    value: float
+
+    @property
+    def track(self) -> str:
+        """The channel."""
+        return f"body {self.channel}"
+
+    @property
+    def mirrored(self) -> BodyKey:
+        """Left and right exchanged."""
+        return replace(self, value=-self.value) if self.channel in _FLIPPED else self
+
+
+@dataclass(frozen=True, slots=True)
+class PostureKey(Key):
+    """The trunk moves to another resting posture, from which offsets count from then on."""
+
+    stance: Stance
+
+    @property
+    def track(self) -> str:
+        """The posture."""
+        return "posture"
+
+    @property
+    def mirrored(self) -> PostureKey:
+        """Left and right exchanged."""
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class LegKey(Key):
+    """A leg moves to a target."""
+
+    leg: Leg
+    target: LegTarget
+
+    @property
+    def track(self) -> str:
+        """The leg."""
+        return f"foot {self.leg.name}"
+
+    @property
+    def mirrored(self) -> LegKey:
+        """Left and right exchanged."""
+        return replace(self, leg=self.leg.mirror, target=self.target.mirrored)
+
+
+@dataclass(frozen=True, slots=True)
+class Mark(Key):
+    """A named span of time: something is worth looking at."""
+
+    name: str
+
+    @property
+    def track(self) -> str:
+        """The name."""
+        return f"span {self.name!r}"
+
+    @property
+    def mirrored(self) -> Mark:
+        """Left and right exchanged."""
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class ShiftKey(Key):
+    """The trunk moves over the feet that stay when ``raised`` legs are in the air."""
+
+    raised: frozenset[Leg]
+
+    @property
+    def track(self) -> str:
+        """The balance."""
+        return "balance"
+
+    @property
+    def mirrored(self) -> ShiftKey:
+        """Left and right exchanged."""
+        return replace(self, raised=frozenset(leg.mirror for leg in self.raised))

@@ -1,0 +1,1 @@
+"""The library: one motion a file, named like the file."""

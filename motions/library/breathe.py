@@ -1,0 +1,17 @@
+"""Breathe."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from motions.authoring import Range, motion
+from motions.timeline import Timeline
+
+
+@motion
+def breathe(breaths: Annotated[int, Range(1, 10)] = 3) -> Timeline:
+    """Breathe: calm, in and out."""
+    line = Timeline()
+    for _ in range(breaths):
+        line = line.body(z=0.015, over=1.1).body(z=-0.015, over=1.3)
+    return line.home(over=0.8)

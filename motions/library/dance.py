@@ -1,0 +1,26 @@
+"""Dance."""
+
+from __future__ import annotations
+
+from motions.authoring import motion
+from motions.library.bow import bow
+from motions.library.hula import hula
+from motions.library.push_ups import push_ups
+from motions.library.tap_dance import tap_dance
+from motions.library.twist import twist
+from motions.library.wave import wave
+from motions.library.wiggle import wiggle
+from motions.timeline import Timeline
+
+
+@motion
+def dance() -> Timeline:
+    """Dance for half a minute: wiggle, twist, tap, hula, wave, and bow to the audience."""
+    return wiggle().then(
+        twist(tempo=100.0),
+        tap_dance(tempo=90.0, bars=1),
+        hula(rounds=1),
+        push_ups(times=2),
+        wave(times=2),
+        bow(),
+    )

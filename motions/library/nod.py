@@ -1,0 +1,17 @@
+"""Nod."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from motions.authoring import Range, motion
+from motions.timeline import Timeline, deg
+
+
+@motion
+def nod(times: Annotated[int, Range(1, 6)] = 3) -> Timeline:
+    """Nod: yes, yes, yes."""
+    line = Timeline()
+    for _ in range(times):
+        line = line.body(pitch=deg(12.0), over=0.3).body(pitch=deg(-4.0), over=0.3)
+    return line.home(over=0.4)

@@ -1,0 +1,17 @@
+"""Shake the head."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from motions.authoring import Range, motion
+from motions.timeline import Timeline, deg
+
+
+@motion
+def shake_head(times: Annotated[int, Range(1, 6)] = 3) -> Timeline:
+    """Shake the head: no, no, no."""
+    line = Timeline()
+    for _ in range(times):
+        line = line.body(yaw=deg(12.0), over=0.35).body(yaw=deg(-12.0), over=0.35)
+    return line.home(over=0.4)

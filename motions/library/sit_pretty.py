@@ -1,0 +1,26 @@
+"""Sit pretty."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from go2_wbc.reference import Stance
+from motions.authoring import Choice, motion
+from motions.timeline import Timeline, deg
+
+
+@motion
+def sit_pretty(side: Annotated[str, Choice("left", "right")] = "right") -> Timeline:
+    """Sit pretty: sit down like a dog, tilt the head to one side and the other, stand up again."""
+    line = (
+        Timeline()
+        .posture(Stance.SIT, over=1.6)
+        .hold(0.4)
+        .body(roll=deg(6.0), over=0.6)
+        .hold(0.6)
+        .body(roll=deg(-6.0), pitch=deg(-4.0), over=0.8)
+        .hold(0.6)
+        .home(over=0.6)
+        .posture(Stance.STAND, over=1.4)
+    )
+    return line if side == "right" else line.mirror()

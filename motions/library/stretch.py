@@ -1,0 +1,19 @@
+"""Stretch."""
+
+from __future__ import annotations
+
+from motions.authoring import motion
+from motions.timeline import Timeline, deg
+
+
+@motion
+def stretch() -> Timeline:
+    """Stretch like after a nap: chest down and forward legs long, then the other way round."""
+    return (
+        Timeline()
+        .body(pitch=deg(22.0), x=-0.05, z=-0.05, over=1.1)
+        .hold(0.7)
+        .body(pitch=deg(-14.0), x=0.05, z=0.0, over=1.4)
+        .hold(0.5)
+        .home(over=1.0)
+    )

@@ -1,0 +1,92 @@
+"""Finds motions: those of the library by name, and those in a user's own file."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import pkgutil
+import sys
+import traceback
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+from go2_wbc.errors import CommandError, TimelineError, unknown_name
+from motions import library
+from motions.authoring import Motion, Value
+from motions.timeline import Timeline
+
+
+@cache
+def motion_names() -> tuple[str, ...]:
+    """Names of the motions in the library: one file each."""
+    return tuple(sorted(module.name for module in pkgutil.iter_modules(library.__path__)))
+
+
+def find_motion(name: str) -> Motion:
+    """The motion of the library with that name.
+
+    Raises:
+        CommandError: for an unknown name; lists the valid ones.
+    """
+    if name not in motion_names():
+        raise CommandError(unknown_name("motion", name, motion_names()))
+    module = importlib.import_module(f"motions.library.{name}")
+    return getattr(module, name)
+
+
+def load_motion(name: str, **values: Value) -> Timeline:
+    """The timeline of a motion of the library, with these parameters.
+
+    Raises:
+        CommandError: for an unknown name; lists the valid ones.
+        TimelineError: for a parameter that is not valid.
+    """
+    return find_motion(name)(**values)
+
+
+def load_file(path: Path | str) -> Mapping[str, Motion]:
+    """The motions that a Python file defines, by name.
+
+    Raises:
+        TimelineError: if the file cannot be read, does not run (says the line), or has no motion.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise TimelineError(f"there is no file {file}")
+    found = {item.name: item for item in vars(_run(file)).values() if isinstance(item, Motion)}
+    own = {
+        name: item for name, item in found.items() if item.source.startswith(str(file.resolve()))
+    }
+    if not own:
+        raise TimelineError(f"{file} defines no motion: write a function with @motion")
+    return own
+
+
+def _run(file: Path) -> ModuleType:
+    name = f"_motion_file_{file.stem}"
+    spec = importlib.util.spec_from_file_location(name, file.resolve())
+    if spec is None or spec.loader is None:
+        raise TimelineError(f"{file} is not a Python file: its name must end in .py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise TimelineError(f"{_place(file, error)}: {type(error).__name__}: {error}") from error
+    finally:
+        del sys.modules[name]
+    return module
+
+
+def _place(file: Path, error: Exception) -> str:
+    """``file`` and the line of it that was running, or that cannot be read."""
+    if isinstance(error, SyntaxError) and error.filename == str(file.resolve()):
+        return f"{file}, line {error.lineno}"
+    lines = [
+        frame.lineno
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename == str(file.resolve())
+    ]
+    return f"{file}, line {lines[-1]}" if lines else str(file)
