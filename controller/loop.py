@@ -28,6 +28,10 @@ from go2_wbc.wbc.controller import WholeBodyController
 _log = logging.getLogger(__name__)
 
 
+UNIT_TOLERANCE = 0.01
+"""How far the norm of a measured quaternion may be from 1."""
+
+
 @dataclass(frozen=True, slots=True)
 class Fault:
     """Why the loop took the robot out of its behaviour.
@@ -78,13 +82,18 @@ class ControlLoop:
         self.behaviour: Behaviour
         self.engage(Damped("lying"))
 
-    def engage(self, behaviour: Behaviour) -> None:
+    def engage(self, behaviour: Behaviour, *, observe: bool = True) -> None:
         """Start ``behaviour`` from the present state and clear the fault.
+
+        Args:
+            behaviour: what to do from the next tick on.
+            observe: read the plant before; needless where ticks have just done so.
 
         Raises:
             PlantTimeout: if the plant does not answer.
         """
-        self._observe()
+        if observe:
+            self._observe()
         self.fault = None
         self._qp_failures_in_a_row = 0
         behaviour.start(self.snapshot)
@@ -143,7 +152,7 @@ class ControlLoop:
         if not (self.behaviour.needs_balance or is_tipping):
             return
         lowest_foot = float(self.snapshot.p_world_feet[:, 2].min())
-        reason = fall_reason(self.state, lowest_foot, self._safety)
+        reason = fall_reason(self.state, lowest_foot, self._safety, may_lie=self.behaviour.may_lie)
         if reason is None:
             return
         if fault is None:
@@ -179,4 +188,7 @@ class ControlLoop:
 
 
 def _is_finite(state: RobotState) -> bool:
-    return bool(np.isfinite(state.q).all() and np.isfinite(state.v).all())
+    measured = (state.q, state.v, state.tau, state.foot_forces)
+    if not all(np.isfinite(values).all() for values in measured):
+        return False
+    return abs(float(np.linalg.norm(state.q[3:7])) - 1.0) < UNIT_TOLERANCE

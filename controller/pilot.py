@@ -61,15 +61,16 @@ class Pilot:
     """
 
     def __init__(self, runner: Runner, config: Config) -> None:
-        """Take over a robot that lies on the ground."""
+        """Take over a robot that lies on the ground, or stands and will sink."""
         self._runner = runner
         self._loop = runner.loop
         self._model = runner.loop.model
         self._config = config
         self._executor = Executor(runner)
         self._walking: Walking | None = None
+        self._gait: Gait | None = None
         self._errand: Errand | None = None
-        self._mode = Mode.LYING
+        self._mode = Mode.LYING if self.is_on_the_ground else Mode.DAMPED
 
     @property
     def mode(self) -> Mode:
@@ -139,7 +140,7 @@ class Pilot:
             self._executor.run(step, 4.0)
         if self._loop.state.tilt > 0.6:
             reason = f"could not roll onto the belly: {self._attitude()}"
-            with self._runner.lock:
+            with self._runner.lock():
                 self._loop.abandon(Fault(reason, is_fall=True))
             raise Aborted(reason)
         self._mode = Mode.LYING
@@ -167,11 +168,14 @@ class Pilot:
     # --- walking --------------------------------------------------------------------------
 
     def walk(self, gait: str | Gait) -> Figures:
-        """Enter walking mode, ready for commands."""
-        find_gait(gait)
+        """Enter walking mode, ready for commands; one that walks with this gait just goes on."""
+        wanted = find_gait(gait)
         if self.mode is not Mode.WALKING:
             self._ensure_standing()
-        self._start_walking(gait)
+            self._start_walking(wanted)
+        elif wanted != self._gait:
+            self.rest()
+            self._start_walking(wanted)
         self.wait(READY_TIME)
         self._mode = Mode.WALKING
         return self._executor.figures()
@@ -249,8 +253,8 @@ class Pilot:
         return self.run_errand(DriveStraight(distance))
 
     def _start_walking(self, gait: str | Gait) -> Walking:
-        planner = LocomotionPlanner(self._model, find_gait(gait), self._config.locomotion)
-        walking = Walking(planner)
+        self._gait = find_gait(gait)
+        walking = Walking(LocomotionPlanner(self._model, self._gait, self._config.locomotion))
         self._executor.engage(walking)
         self._walking = walking
         return walking
@@ -277,7 +281,10 @@ class Pilot:
         self._executor.until(finished, plan.duration + 1.0, plan.name)
         self._executor.settle(plan.name, _CHECK_OF_STANCE[plan.exit])
         self._mode = _MODE_OF_STANCE[plan.exit]
-        return self._executor.figures()
+        figures = {**self._executor.figures(), **behaviour.deviation.figures()}
+        if not behaviour.deviation.is_small:
+            raise Aborted(f"{plan.name} went another way: {listed(figures)}", figures)
+        return figures
 
     def _meet_entry(self, plan: MotionPlan) -> None:
         mode = self.mode

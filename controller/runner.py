@@ -9,11 +9,12 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from controller.behaviours.base import Behaviour
 from controller.loop import ControlLoop, Fault
-from go2_wbc.errors import ClosedError, PlantError
+from go2_wbc.errors import ClosedError, PlantError, PlantTimeout
 
 _log = logging.getLogger(__name__)
 
@@ -23,6 +24,8 @@ BREATH = 1e-4
 """Least pause [s] between two ticks, in which waiting calls get hold of the lock."""
 POLL = 0.05
 """Time [s] after which a waiting thread looks again, should it have missed a notice."""
+HANG_LIMIT = 2.0
+"""Time [s] for which one tick may keep others waiting; a plant that blocks longer hangs."""
 
 
 class Runner:
@@ -30,7 +33,8 @@ class Runner:
 
     Whoever ticks the loop, or reads more of it than one attribute, holds ``lock``. Without
     ``realtime`` a waiting call holds it until it ends, so other threads never wait for the lock to
-    end a call: ``interrupt`` and ``close`` leave a note that is read before every tick.
+    end a call: ``interrupt`` and ``close`` leave a note that is read before every tick. Should the
+    plant block in the background, calls end with ``PlantTimeout`` instead of waiting with it.
     """
 
     def __init__(
@@ -38,9 +42,10 @@ class Runner:
     ) -> None:
         """Start the background thread if ``realtime``; call ``after_tick`` after every tick."""
         self.loop = loop
-        self.lock = threading.RLock()
+        self._lock = threading.RLock()
         self._after_tick = after_tick
-        self._changed = threading.Condition(self.lock)
+        self._changed = threading.Condition()  # with a lock of its own, which no tick holds
+        self._ticks = 0
         self._stopping = False
         self._interruption: str | None = None
         self._known_fault = loop.fault
@@ -55,6 +60,21 @@ class Runner:
         """Whether time passes by itself."""
         return self._thread is not None
 
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Holds the loop between two ticks.
+
+        Raises:
+            PlantTimeout: if a tick does not end.
+        """
+        limit = HANG_LIMIT if self.is_realtime else -1.0  # else: until the call that runs ends
+        if not self._lock.acquire(timeout=limit):
+            raise self._hanging()
+        try:
+            yield
+        finally:
+            self._lock.release()
+
     def begin(self) -> None:
         """Begin a call: a fault from before it may be cleared, one during it ends it.
 
@@ -66,7 +86,7 @@ class Runner:
                 f"the loop in the background has ended ({self._failure}); "
                 "close this controller and make a new one"
             )
-        with self.lock:
+        with self.lock():
             self._known_fault = self.loop.fault
 
     def engage(self, behaviour: Behaviour) -> Fault | None:
@@ -79,25 +99,32 @@ class Runner:
             PlantError: if the plant fails.
             ClosedError: if the controller is closed meanwhile.
         """
-        with self.lock:
+        with self.lock():
             self._heed()
             fault = self.loop.fault
             if fault is not None and fault is not self._known_fault:
                 return fault
-            self.loop.engage(behaviour)
+            self.loop.engage(behaviour, observe=not self.is_realtime)
             return None
 
     def interrupt(self, reason: str) -> None:
-        """Go limp at once, from any thread; returns when the loop has taken notice."""
+        """Go limp at once, from any thread; returns when the loop has taken notice.
+
+        Raises:
+            PlantTimeout: if the loop does not, since a tick does not end.
+        """
         self._interruption = reason
+        deadline = time.monotonic() + HANG_LIMIT
         while self._interruption is not None:
-            if self.lock.acquire(timeout=POLL):
+            if time.monotonic() > deadline:
+                raise self._hanging()
+            if self._lock.acquire(timeout=POLL):
                 try:
                     self._heed_interruption()
                     if not self.is_realtime:
                         self.loop.go_limp()
                 finally:
-                    self.lock.release()
+                    self._lock.release()
 
     def advance_until(self, is_done: Callable[[], bool], limit: float) -> bool:
         """Let time pass until ``is_done()`` holds after a tick, for ``limit`` seconds at most.
@@ -109,29 +136,50 @@ class Runner:
             PlantError: if the plant fails.
             ClosedError: if the controller is closed meanwhile.
         """
-        with self._changed:
-            end = self.loop.state.time + limit
-            behaviour = self.loop.behaviour
-            while self.loop.state.time < end:
-                self._pass_one_tick()
-                if self.loop.fault is not None or self.loop.behaviour is not behaviour:
-                    return False
-                if is_done():
-                    return True
-            return False
+        with self.lock():
+            end, behaviour = self.loop.state.time + limit, self.loop.behaviour
+            if not self.is_realtime:
+                return self._advance(is_done, behaviour, end)
+        return self._watch(is_done, behaviour, end)
 
-    def _pass_one_tick(self) -> None:
-        if self._thread is None:
+    def _advance(self, is_done: Callable[[], bool], behaviour: Behaviour, end: float) -> bool:
+        while self.loop.state.time < end:
             self._heed()
             self.loop.tick()
             self._after_tick()
-            return
-        before = self.loop.state.time
-        while self.loop.state.time == before and self._failure is None:
-            self._heed()
-            self._changed.wait(timeout=POLL)
-        if self._failure is not None:
-            raise self._failure
+            if self._is_ended(behaviour):
+                return False
+            if is_done():
+                return True
+        return False
+
+    def _watch(self, is_done: Callable[[], bool], behaviour: Behaviour, end: float) -> bool:
+        seen = self._ticks
+        while True:
+            with self._changed:
+                news = self._changed.wait_for(lambda seen=seen: self._has_news(seen), HANG_LIMIT)
+            if not news:
+                raise self._hanging()
+            with self.lock():
+                self._heed()
+                if self._failure is not None:
+                    raise self._failure
+                seen = self._ticks
+                if self._is_ended(behaviour):
+                    return False
+                if is_done():
+                    return True
+                if self.loop.state.time >= end:
+                    return False
+
+    def _has_news(self, seen: int) -> bool:
+        return self._ticks != seen or self._failure is not None or self._stopping
+
+    def _is_ended(self, behaviour: Behaviour) -> bool:
+        return self.loop.fault is not None or self.loop.behaviour is not behaviour
+
+    def _hanging(self) -> PlantTimeout:
+        return PlantTimeout(f"the plant has kept the loop waiting for more than {HANG_LIMIT:g} s")
 
     def _heed(self) -> None:
         if self._stopping:
@@ -141,13 +189,15 @@ class Runner:
     def _heed_interruption(self) -> None:
         reason, self._interruption = self._interruption, None
         if reason is not None:
-            self.loop.abandon(Fault(reason))
+            fault = self.loop.fault
+            self.loop.abandon(Fault(reason, is_fall=fault is not None and fault.is_fall))
 
     def _keep_pace(self) -> None:
         due = time.monotonic()
         while True:
-            with self._changed:
+            with self._lock:
                 if self._stopping:
+                    self.loop.go_limp()  # the last word, should ``close`` not have waited for it
                     return
                 try:
                     self._heed_interruption()
@@ -157,7 +207,7 @@ class Runner:
                     self._failure = error
                     return
                 finally:
-                    self._changed.notify_all()
+                    self._announce()
             due += self.loop.plant.control_period
             lag = time.monotonic() - due
             if lag > LATE:
@@ -170,7 +220,15 @@ class Runner:
         self._stopping = True
         with self._changed:
             self._changed.notify_all()
-        if self._thread is not None and self._thread is not threading.current_thread():
-            self._thread.join()
-        with self.lock:
-            self.loop.go_limp()
+        if self._thread is None:
+            with self.lock():
+                self.loop.go_limp()
+        elif self._thread is not threading.current_thread():
+            self._thread.join(HANG_LIMIT)
+            if self._thread.is_alive():
+                _log.warning("%s; left behind", self._hanging())
+
+    def _announce(self) -> None:
+        with self._changed:
+            self._ticks += 1
+            self._changed.notify_all()

@@ -48,7 +48,7 @@ class ContactPhase:
         so that contact forces change without a jump.
         """
         nearest_change = np.minimum(self.elapsed, self.remaining)
-        return np.where(self.stance, np.clip(nearest_change / ramp, 0.0, 1.0), 0.0)
+        return np.where(self.stance, np.clip(nearest_change / max(ramp, TIE), 0.0, 1.0), 0.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,7 +78,7 @@ class QpInfeasible(QpError):
 
     Attributes:
         solver: name of the solver that gave up.
-        residuals: one row per task and constraint at the solver's last iterate.
+        residuals: one row per task and constraint at the best point without the constraints.
     """
 
     def __init__(self, solver: str, status: str, residuals: Sequence[ResidualRow] = ()) -> None:

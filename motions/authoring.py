@@ -11,9 +11,11 @@ from __future__ import annotations
 
 import inspect
 import math
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from numbers import Real
+from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from go2_wbc.errors import TimelineError, unknown_name
@@ -82,7 +84,8 @@ class Parameter:
 
     def __str__(self) -> str:
         """For a person."""
-        return f"{self.name}={self.default!r} ({self.valid})"
+        shown = f"{self.default:g}" if isinstance(self.default, float) else str(self.default)
+        return f"{self.name}={shown} ({self.valid})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +117,23 @@ class Motion:
             if name not in known:
                 raise TimelineError(f"{self.name}: {unknown_name('parameter', name, known)}")
             checked[name] = known[name].check(value)
-        timeline = self._make(**checked)
+        try:
+            timeline = self._make(**checked)
+        except Exception as error:
+            raise TimelineError(self._told(error)) from error
         if not isinstance(timeline, Timeline):
             raise TimelineError(
                 f"{self.name}() must return a Timeline, it returned {type(timeline).__name__}"
             )
         return replace(timeline, name=self.name)
+
+    def _told(self, error: Exception) -> str:
+        """``error`` with the line of the motion's file that caused it."""
+        file, _, first = self.source.rpartition(":")
+        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
+        where = f"{self.name} ({Path(file).name}, line {lines[-1] if lines else first})"
+        what = "" if isinstance(error, TimelineError) else f"{type(error).__name__}: "
+        return f"{where}: {what}{error}"
 
 
 def motion(function: Callable[..., Timeline]) -> Motion:

@@ -14,10 +14,12 @@ class Behaviour(ABC):
     Attributes:
         label: what is written in recordings.
         needs_balance: whether a large tilt means that the robot has fallen.
+        may_lie: whether the belly may be on the ground.
     """
 
     label: str = "?"
     needs_balance: bool = True
+    may_lie: bool = False
 
     @abstractmethod
     def start(self, snapshot: Snapshot) -> None:

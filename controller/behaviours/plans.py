@@ -3,20 +3,75 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from controller.behaviours.base import Behaviour
 from go2_wbc.planning.correction import SteadyStateCorrection, tracked_position
-from go2_wbc.reference import Anchor, MotionPlan, Reference, TrackedPoint
-from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from go2_wbc.reference import Anchor, LegTask, MotionPlan, Reference, Stance, TrackedPoint
+from go2_wbc.robot.rotations import log_rotation, wrap_angle, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
+
+LOW = 0.15
+"""Height [m] of the trunk over the ground below which a posture may begin on the belly."""
+PLACE_TOLERANCE = 0.03
+"""Distance [m] that the tracked point may be off its plan, on the average."""
+ATTITUDE_TOLERANCE = 0.1
+"""Angle [rad] that the trunk may be off its plan, on the average."""
+JOINT_TOLERANCE = 0.2
+"""Angle [rad] that the worst joint of a raised leg may be off its plan, on the average."""
+
+
+@dataclass(slots=True)
+class Deviation:
+    """How far a robot has been off its plan, on the average: place [m], attitude, joints [rad]."""
+
+    place: float = 0.0
+    attitude: float = 0.0
+    joints: float = 0.0
+    _ticks: int = 0
+    _raised_ticks: int = 0
+
+    def note(self, snapshot: Snapshot, reference: Reference) -> None:
+        """Add one tick; ``reference`` is in the world."""
+        body = reference.body
+        place = np.linalg.norm(body.p_world - tracked_position(snapshot, body.point))
+        attitude = np.linalg.norm(log_rotation(body.R_world_base @ snapshot.R_world_base.T))
+        self._ticks += 1
+        self.place += (float(place) - self.place) / self._ticks
+        self.attitude += (float(attitude) - self.attitude) / self._ticks
+        raised = np.repeat([task is LegTask.JOINTS for task in reference.legs], 3)
+        if raised.any():
+            off = np.abs(reference.q_joints - snapshot.state.joint_positions)[raised].max()
+            self._raised_ticks += 1
+            self.joints += (float(off) - self.joints) / self._raised_ticks
+
+    @property
+    def is_small(self) -> bool:
+        """Whether the robot can be said to have done what was planned."""
+        return (
+            self.place < PLACE_TOLERANCE
+            and self.attitude < ATTITUDE_TOLERANCE
+            and self.joints < JOINT_TOLERANCE
+        )
+
+    def figures(self) -> dict[str, float]:
+        """By name with unit."""
+        return {
+            "mean place off plan [m]": self.place,
+            "mean attitude off plan [deg]": float(np.degrees(self.attitude)),
+            "mean joints off plan [deg]": float(np.degrees(self.joints)),
+        }
 
 
 class PlayPlan(Behaviour):
-    """Play a plan where the robot stands."""
+    """Play a plan where the robot stands.
+
+    Attributes:
+        deviation: how far the robot has been off the plan.
+    """
 
     def __init__(self, plan: MotionPlan, foot_radius: float) -> None:
         """Play ``plan``; ``foot_radius`` [m] tells where the ground is."""
@@ -28,12 +83,14 @@ class PlayPlan(Behaviour):
         """Anchor the plan at the feet."""
         self._start = self._last = snapshot.state.time
         self._correction = SteadyStateCorrection()
+        self.deviation = Deviation()
         self._anchor = Anchor.of_feet(snapshot.p_world_feet, self._foot_radius)
 
     def update(self, snapshot: Snapshot) -> Reference:
         """The plan's reference of this instant, in the world."""
         now = snapshot.state.time
         reference = self.plan.at(now - self._start).placed(self._anchor)
+        self.deviation.note(snapshot, reference)
         body = self._correction.corrected(reference.body, snapshot, now - self._last)
         self._last = now
         return replace(reference, body=body)
@@ -68,3 +125,4 @@ class ChangePosture(PlayPlan):
         position = yaw_rotation(anchor.yaw).T @ (p - anchor.p_world)
         pose = np.array([*position, roll, pitch, wrap_angle(float(yaw) - anchor.yaw)])
         self.plan = self._make_plan(pose)
+        self.may_lie = pose[2] < LOW or self.plan.exit is Stance.LIE

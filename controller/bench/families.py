@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from controller.bench import errands, high_fives, model, postures, sequence, slaps, trotting
+from controller.bench import (
+    errands,
+    high_fives,
+    library,
+    model,
+    postures,
+    sequence,
+    slaps,
+    trotting,
+)
 from controller.bench.rows import Family
 from go2_wbc.errors import CommandError, unknown_name
 
@@ -18,6 +27,7 @@ FAMILIES: tuple[Family, ...] = (
     errands.FAMILY,
     high_fives.FAMILY,
     slaps.FAMILY,
+    library.FAMILY,
     sequence.FAMILY,
 )
 

@@ -86,9 +86,9 @@ class Subject:
         witness: what MuJoCo says.
     """
 
-    def __init__(self, trial: Trial) -> None:
-        """Set up a robot under the conditions of ``trial``."""
-        self.plant = trial.plant()
+    def __init__(self, trial: Trial | MujocoPlant) -> None:
+        """Set up a robot under the conditions of ``trial``, or the one given."""
+        self.plant = trial.plant() if isinstance(trial, Trial) else trial
         self.witness = Witness(self.plant)
         self.go2 = GO2Controller(plant=self.witness)
 

@@ -37,17 +37,17 @@ def run_demo_command(args: argparse.Namespace) -> int:
     files = DemoFiles.inside(args.out)  # before the run: its results must not be lost
     report, recording = _perform(args)
     values = {**report.as_dict(), "settings": _settings(args)}
-    written = [save_recording(recording, files.recording), save_report(values, files.report)]
     if args.json:
         print_json(values)
     else:
         print(render(report, sys.stdout.encoding), end="\n\n", flush=True)
-    if not args.no_media:
-        try:
+    try:
+        written = [save_recording(recording, files.recording), save_report(values, files.report)]
+        if not args.no_media:
             written += _picture(recording, report, files)
-        except ConfigError as error:  # the disk or the size: no fault of the caller's usage
-            print(f"go2-wbc: {error}", file=sys.stderr)
-            return ExitCode.RUNTIME
+    except ConfigError as error:  # the disk or the size: no fault of the caller's usage
+        print(f"go2-wbc: {error}", file=sys.stderr)
+        return ExitCode.RUNTIME
     if not args.json:
         _list_files(written)
     return ExitCode.OK if report.ok else ExitCode.FAILED

@@ -42,12 +42,19 @@ class Command:
 
 COMMANDS: tuple[Command, ...] = (
     Command("bench", "controller.cli.bench", "measure the behaviour over many seeds"),
+    Command("check", "controller.cli.motion_check", "can the robot do this motion?"),
     Command("demo", "controller.cli.demo", "stand, sit, walk, turn, high five; measured, in 3D"),
     Command("doctor", "controller.cli.doctor", "check this installation, say what is missing"),
+    Command("export", "controller.cli.motion_export", "a motion's trajectory as NumPy or CSV"),
+    Command("list", "controller.cli.motion_list", "the motions, and what can be set"),
+    Command("new", "controller.cli.motion_new", "write a small motion to start from"),
+    Command("run", "controller.cli.motion_run", "check a motion, then play it in MuJoCo"),
 )
 
 EXAMPLES = """
 go2-wbc demo             run the demo headless: table, replay page, pictures
+go2-wbc check wave       can the robot do this motion?
+go2-wbc run wave         play it in MuJoCo
 go2-wbc doctor           what is installed, what is missing, how to get it
 go2-wbc doctor --json    the same for a program to read
 go2-wbc COMMAND --help   the options of a command, with examples

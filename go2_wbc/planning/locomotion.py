@@ -26,6 +26,8 @@ from go2_wbc.validation import require_not_negative, require_positive
 
 SETTLED_COMMAND = 1e-3
 """Ramped velocity command [m/s, rad/s] below which it counts as arrived at zero."""
+LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34
+"""CoM heights [m] between which the legs can step."""
 GROUND_SHARE = 0.3
 """Share of a landing foot's height that goes into the estimate of the ground's height."""
 
@@ -75,6 +77,11 @@ class LocomotionConfig:
         positive = {f.name for f in fields(self)} - zero_is_valid - {"swing"}
         require_positive(self, *sorted(positive))
         require_not_negative(self, *sorted(zero_is_valid))
+        if not LEAST_HEIGHT <= self.height <= GREATEST_HEIGHT:
+            raise ConfigError(
+                f"LocomotionConfig.height must be {LEAST_HEIGHT} to {GREATEST_HEIGHT} m, "
+                f"got {self.height!r}"
+            )
         if self.normal_force_min >= self.normal_force_max:
             raise ConfigError(
                 f"normal_force_min must be below normal_force_max, got {self.normal_force_min} "

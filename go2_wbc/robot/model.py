@@ -1,9 +1,9 @@
 """The Go2 as Pinocchio sees it: limits, geometry, and the per-tick snapshot.
 
 One ``RobotModel`` owns one Pinocchio model and data. ``snapshot(state)`` computes every dynamic
-quantity of the tick with two Pinocchio algorithms (CRBA in the world convention and the nonlinear
-effects); the CoM terms are read off the first rows of the mass matrix, which are the robot's linear
-momentum (Wieber, Tedrake & Kuindersma 2016, eq. 48.16).
+quantity of the tick: CRBA in the world convention, the nonlinear effects, and the feet's Jacobians
+and drifts; the CoM terms are read off the first rows of the mass matrix, which are the robot's
+linear momentum (Wieber, Tedrake & Kuindersma 2016, eq. 48.16).
 """
 
 from __future__ import annotations

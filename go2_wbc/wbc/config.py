@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from go2_wbc.errors import ConfigError
 from go2_wbc.validation import require_not_negative, require_positive, require_share
 from go2_wbc.wbc.tasks import Gains
+
+LEAST_FORCE_WEIGHT = 1e-6
+"""Below this the torques lose their accuracy although solvers report success."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +56,12 @@ class WbcConfig:
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a number that is out of range."""
-        require_positive(self, "force_weight", "friction", "braking", "limit_horizon")
+        require_positive(self, "friction", "braking", "limit_horizon")
+        if not self.force_weight >= LEAST_FORCE_WEIGHT:
+            raise ConfigError(
+                f"WbcConfig.force_weight must be at least {LEAST_FORCE_WEIGHT:g}, "
+                f"got {self.force_weight!r}"
+            )
         require_share(self, "torque_share", "speed_share")
         weights = ("position_weight", "orientation_weight", "swing_weight", "posture_weight")
         require_not_negative(self, *weights, "stance_damping", "joint_margin")

@@ -84,7 +84,7 @@ class FrictionPyramid(Inequality):
     """|f_x| <= mu f_z and |f_y| <= mu f_z for every stance foot, and bounds on f_z.
 
     Attributes:
-        friction: mu of the square pyramid; 0.6 leaves room on a floor of 0.8.
+        friction: mu of the square pyramid, per axis; on the diagonal it allows 1.4 times as much.
     """
 
     friction: float

@@ -19,15 +19,19 @@ from motions.trajectory import trajectory_of
 
 
 class FeasibilityChecker:
-    """Checks motions on one robot; loads what it needs once."""
+    """Checks motions on one robot; loads what it needs once.
+
+    Attributes:
+        model: the robot.
+    """
 
     def __init__(
         self, model: RobotModel | None = None, limits: FeasibilityLimits | None = None
     ) -> None:
         """Prepare for ``model``, by default the installed Go2."""
-        self._model = model or RobotModel()
+        self.model = model or RobotModel()
         self._limits = limits or FeasibilityLimits()
-        self._collision = SelfCollision(self._model)
+        self._collision = SelfCollision(self.model)
 
     def check(self, motion: Motion | Timeline | MotionPlan) -> FeasibilityReport:
         """The report on ``motion``.
@@ -41,8 +45,8 @@ class FeasibilityChecker:
         if isinstance(motion, Motion):
             motion = motion()
         is_plan = isinstance(motion, MotionPlan)
-        plan = motion if is_plan else compile_timeline(motion, self._model)
-        model, limits = self._model, self._limits
+        plan = motion if is_plan else compile_timeline(motion, self.model)
+        model, limits = self.model, self._limits
         try:
             path = trajectory_of(plan, model)
         except MotionError as error:

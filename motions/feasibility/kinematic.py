@@ -14,8 +14,8 @@ from motions.feasibility.report import Series
 from motions.tracks import home_poses, rotations
 from motions.trajectory import Trajectory
 
-BELLY = np.array([[x, y, -0.057] for x in (0.19, -0.19) for y in (0.05, -0.05)])
-"""Corners [m] of the trunk's underside in the base frame: half the box of the URDF's base."""
+BELLY = np.array([[x, y, -0.085] for x in (0.15, -0.15) for y in (0.05, -0.05)])
+"""Corners [m] of the trunk's underside in the base frame; lying, the base rests 0.085 m high."""
 JOINTS = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 END_PARTS = ("place", "attitude", "speed")
 FEET = tuple(leg.name for leg in LEGS)
@@ -90,14 +90,14 @@ def landing(
 
 
 def smoothness(motion: Trajectory, limits: FeasibilityLimits) -> Series:
-    """Jumps of velocity between samples."""
+    """Jumps of velocity between samples: m/s of the trunk, rad/s of its attitude and the joints."""
     jumps = np.vstack([np.zeros(18), np.abs(np.diff(motion.v, axis=0))])
     values = np.column_stack(
         [jumps[:, :3].max(axis=1), jumps[:, 3:6].max(axis=1), jumps[:, 6:].max(axis=1)]
     )
     bounds = np.tile([limits.body_jump, limits.body_jump, limits.joint_jump], (len(values), 1))
     subjects = ("trunk", "trunk turning", "joints")
-    return Series("continuity", "m/s", subjects, motion.times, values, bounds, bounds - values)
+    return Series("continuity", "/s", subjects, motion.times, values, bounds, bounds - values)
 
 
 def ends(

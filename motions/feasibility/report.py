@@ -53,7 +53,6 @@ class Series:
         subjects: what is looked at, one per column.
         times: (n,) [s].
         values, limits, margins: (n, k); a margin of nan says that there was nothing to check.
-        least: margin below which the motion is infeasible.
         tight: margin below which a warning is due.
         note: what else to say of a finding.
     """
@@ -157,6 +156,16 @@ class FeasibilityReport:
         lines += ["-" * 80, f"{self.motion}, {self.duration:.1f} s: the robot {verdict}{tight}."]
         return "\n".join(lines)
 
+    def summary(self) -> str:
+        """One line: the verdict, and what is closest to its limit."""
+        if not self.ok:
+            return f"no   {self.motion:<16}{_count(len(self.failures), 'limit')} broken"
+        tight = min(self.margins.values(), key=_share_left)
+        return (
+            f"ok   {self.motion:<16}{self.duration:>5.1f} s   closest: {tight.check}, "
+            f"{tight.subject} at {tight.time:.1f} s"
+        )
+
     def as_dict(self) -> dict[str, Any]:
         """Everything but the series, for JSON."""
         return {
@@ -167,6 +176,10 @@ class FeasibilityReport:
             "warnings": [asdict(finding) for finding in self.warnings],
             "margins": {check: asdict(finding) for check, finding in self.margins.items()},
         }
+
+
+def _share_left(finding: Finding) -> float:
+    return finding.margin / max(abs(finding.limit), 1e-9)
 
 
 def _count(number: int, what: str) -> str:

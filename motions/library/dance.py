@@ -17,8 +17,8 @@ from motions.timeline import Timeline
 def dance() -> Timeline:
     """Dance for half a minute: wiggle, twist, tap, hula, wave, and bow to the audience."""
     return wiggle().then(
-        twist(tempo=100.0),
-        tap_dance(tempo=90.0, bars=1),
+        twist(tempo=70.0),
+        tap_dance(tempo=80.0, bars=1),
         hula(rounds=1),
         push_ups(times=2),
         wave(times=2),

@@ -14,13 +14,13 @@ def sit_pretty(side: Annotated[str, Choice("left", "right")] = "right") -> Timel
     """Sit pretty: sit down like a dog, tilt the head to one side and the other, stand up again."""
     line = (
         Timeline()
-        .posture(Stance.SIT, over=1.6)
+        .posture(Stance.SIT, over=1.8)
         .hold(0.4)
-        .body(roll=deg(6.0), over=0.6)
+        .body(roll=deg(6.0), over=0.9)
         .hold(0.6)
-        .body(roll=deg(-6.0), pitch=deg(-4.0), over=0.8)
+        .body(roll=deg(-6.0), pitch=deg(-4.0), over=1.2)
         .hold(0.6)
-        .home(over=0.6)
-        .posture(Stance.STAND, over=1.4)
+        .home(over=0.9)
+        .posture(Stance.STAND, over=1.6)
     )
     return line if side == "right" else line.mirror()

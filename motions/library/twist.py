@@ -9,9 +9,9 @@ from motions.timeline import Timeline, deg
 
 
 @motion
-def twist(tempo: Annotated[float, Range(40.0, 120.0, "beats/min")] = 90.0) -> Timeline:
+def twist(tempo: Annotated[float, Range(40.0, 120.0, "beats/min")] = 75.0) -> Timeline:
     """Twist: turn against the feet to the beat, going down and coming up again."""
-    line, swing = Timeline().bpm(tempo), deg(13.0)
+    line, swing = Timeline().bpm(tempo), deg(11.0)
     for height in (-0.03, -0.07, -0.10, -0.07, -0.03, 0.0):
         line = line.body(yaw=swing, z=height, over=1.0)
         swing = -swing

@@ -25,6 +25,7 @@ SEEDS = {
     "high-five": 2,
     "slaps": 1,
     "sequence": 2,
+    "library": 1,
 }
 """How many seeds of each family fit into a few minutes."""
 NOT_JUDGED = frozenset({"demo.pace"})

@@ -1,0 +1,89 @@
+"""``go2-wbc export``: a motion's trajectory as NumPy or CSV, for other tools."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+from pathlib import Path
+
+import numpy as np
+
+from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.motion_args import add_motion, timelines
+from go2_wbc.errors import CommandError
+from go2_wbc.legs import JOINT_NAMES, LEGS
+
+EXAMPLES = """
+go2-wbc export wave --out wave.csv
+go2-wbc export wave --out wave.npz
+"""
+COLUMNS = """
+columns, 100 rows a second, in the frame between the feet (x ahead, z up):
+  time [s]; x y z [m] and roll pitch yaw [rad] of the base; angles [rad] and
+  speeds [rad/s] of the 12 joints; com_x com_y com_z [m]; stance of each foot.
+npz: the same as arrays time, q (position, quaternion x y z w, joints), v, a (in
+the base frame), rpy, p_com, stance.
+"""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``export``."""
+    parser = add_parser(
+        subparsers,
+        "export",
+        "Write a motion's trajectory of the whole robot to a file.\n" + COLUMNS,
+        examples=EXAMPLES,
+    )
+    add_motion(parser)
+    parser.add_argument(
+        "--out", metavar="FILE", type=Path, required=True, help="ends in .csv or .npz"
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compile, sample, write."""
+    from go2_wbc.robot.model import RobotModel
+    from motions import compile_timeline
+    from motions.trajectory import Trajectory, trajectory_of
+    from viz.files import checked_output, write_atomically
+
+    target = checked_output(args.out, [".csv", ".npz"])
+    lines = timelines([args.motion], args.values)
+    if len(lines) > 1:
+        raise CommandError(f"{args.motion} has more than one motion: choose FILE.py:NAME")
+    model = RobotModel()
+    path: Trajectory = trajectory_of(compile_timeline(lines[0], model), model)
+    if target.suffix == ".npz":
+        stream = io.BytesIO()
+        np.savez_compressed(
+            stream,
+            time=path.times,
+            q=path.q,
+            v=path.v,
+            a=path.a,
+            rpy=path.rpy,
+            p_com=path.p_com,
+            stance=path.stance,
+        )
+        content = stream.getvalue()
+    else:
+        content = _csv(path.times, path.q, path.v, path.rpy, path.p_com, path.stance).encode()
+    write_atomically(target, content)
+    print(f"wrote {args.out}: {len(path.times)} rows of {lines[0].name}")
+    return ExitCode.OK
+
+
+def _csv(*parts: np.ndarray) -> str:
+    times, q, v, rpy, com, stance = parts
+    joints = [name.removesuffix("_joint") for name in JOINT_NAMES]
+    header = ["time", "x", "y", "z", "roll", "pitch", "yaw", *joints]
+    header += [f"{joint}_speed" for joint in joints]
+    header += ["com_x", "com_y", "com_z", *(f"{leg.name}_stance" for leg in LEGS)]
+    table = np.column_stack([times, q[:, :3], rpy, q[:, 7:], v[:, 6:], com])
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(header)
+    for row, feet in zip(table, stance.astype(int), strict=True):
+        writer.writerow([*(f"{value:.6f}" for value in row), *feet])
+    return stream.getvalue()

@@ -1,0 +1,84 @@
+"""``go2-wbc run``: play a motion in MuJoCo; what was asked, what was achieved."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
+from controller.cli.motion_args import add_motion, timelines
+from go2_wbc.errors import CommandError, StanceMismatch
+
+if TYPE_CHECKING:
+    from controller.bench.motion_runs import MotionRun
+
+EXAMPLES = """
+go2-wbc run high_five
+go2-wbc run wave --set side=left --html wave.html
+go2-wbc run my_motion.py --friction 0.5
+go2-wbc run my_motion.py --force    although the check says no
+"""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``run``."""
+    parser = add_parser(
+        subparsers,
+        "run",
+        "Check a motion, then play it in MuJoCo under the whole-body controller, and\n"
+        "print what came of it. Exit code 0 if it was done, 1 if it is infeasible or\n"
+        "was not done.",
+        examples=EXAMPLES,
+    )
+    add_motion(parser)
+    parser.add_argument("--force", action="store_true", help="play it even if it is infeasible")
+    parser.add_argument("--friction", metavar="MU", type=float, help="of the feet, default 0.8")
+    parser.add_argument("--html", metavar="FILE", type=Path, help="write a 3D replay page")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check, play, measure, print."""
+    from controller.bench.motion_runs import run_motion
+    from controller.bench.trials import Subject
+    from go2_wbc.plant import MujocoPlant
+    from go2_wbc.reference import Stance
+    from motions import FeasibilityChecker, compile_timeline
+    from viz import export_html
+    from viz.files import checked_output
+
+    lines = timelines([args.motion], args.values)
+    if len(lines) > 1:
+        names = ", ".join(line.name for line in lines)
+        raise CommandError(f"{args.motion} has several motions, choose FILE.py:NAME: {names}")
+    target = None if args.html is None else checked_output(args.html, [".html"])
+    checker = FeasibilityChecker()
+    plan = compile_timeline(lines[0], checker.model)
+    report = checker.check(plan)
+    if not args.force:
+        report.raise_if_infeasible()
+    with Subject(MujocoPlant(friction=args.friction)) as robot:
+        starts = {Stance.STAND: robot.go2.stand, Stance.SIT: robot.go2.sit}
+        if plan.entry not in starts:
+            raise StanceMismatch(f"{plan.name} starts from {plan.entry.value}: cannot be run")
+        robot.require(starts[plan.entry]())
+        result = run_motion(robot, plan, checker.model)
+        recording = robot.go2.recording()
+    if args.json:
+        print_json({"motion": plan.name, "feasible": report.ok, **result.as_dict()})
+    else:
+        _print(plan.name, plan.duration, result)
+    if target is not None:
+        export_html(recording, target, title=plan.name)
+        print(f"3D replay, offline: {args.html}")
+    return ExitCode.OK if result.ok else ExitCode.FAILED
+
+
+def _print(name: str, duration: float, result: MotionRun) -> None:
+    print(f"{name}, {duration:.1f} s in MuJoCo")
+    print("-" * 80)
+    for label, value, unit in result.figures():
+        print(f"  {label:<38}{value:>10} {unit}")
+    print("-" * 80)
+    print("done" if result.ok else f"NOT done: {result.fall or result.reason}")

@@ -1,0 +1,132 @@
+"""The commands about motions: list, check, new, export and run."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.cli.common import ExitCode
+from controller.cli.main import main
+from motions import motion_names
+
+CLUMSY = '''
+from motions import Timeline, motion
+
+@motion
+def fall_over() -> Timeline:
+    """Fall over: lean over a foot, then take it away."""
+    line = Timeline(balance=False).body(x=0.06, y=-0.05, over=0.8)
+    return line.foot("FR", z=0.1, over=0.5).hold(1.0).home(over=0.5)
+
+@motion
+def second() -> Timeline:
+    """Second."""
+    return Timeline().body(z=-0.02, over=0.5).home(over=0.5)
+'''
+
+
+@pytest.fixture
+def clumsy(tmp_path: Path) -> Path:
+    path = tmp_path / "clumsy.py"
+    path.write_text(CLUMSY, encoding="utf-8")
+    return path
+
+
+def test_the_list_names_every_motion_with_its_parameters(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["list"]) == ExitCode.OK
+    text = capsys.readouterr().out
+    assert all(name in text for name in motion_names())
+    assert "--set hold=2 (0.5 to 30 s)" in text
+    assert max(map(len, text.splitlines())) <= 80
+    assert main(["list", "--json"]) == ExitCode.OK
+    listed = json.loads(capsys.readouterr().out)
+    assert [item["name"] for item in listed] == list(motion_names())
+
+
+def test_check_prints_a_table_for_one_motion_and_a_line_each_for_more(
+    capsys: pytest.CaptureFixture[str], clumsy: Path
+) -> None:
+    assert main(["check", "bow"]) == ExitCode.OK
+    assert "bow, 2.4 s: the robot can do it." in capsys.readouterr().out
+    assert main(["check", "bow", "nod"]) == ExitCode.OK
+    assert len(capsys.readouterr().out.splitlines()) == 2
+    assert main(["check", f"{clumsy}:fall_over"]) == ExitCode.FAILED
+    assert "x support: CoM at" in capsys.readouterr().out
+    assert main(["check", str(clumsy)]) == ExitCode.FAILED
+    assert "no   fall_over" in capsys.readouterr().out
+
+
+def test_check_gives_json_with_every_margin(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "high_five", "--set", "side=left", "--json"]) == ExitCode.OK
+    (report,) = json.loads(capsys.readouterr().out)
+    assert report["ok"]
+    assert {"support", "torque", "foot load", "friction"} <= set(report["margins"])
+    assert report["margins"]["support"]["margin"] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["check", "moonwalk"], ExitCode.USAGE, "unknown motion 'moonwalk'; valid: bow"),
+        (["check", "nowhere.py"], ExitCode.FAILED, "there is no file nowhere.py"),
+        (["check", "wave", "--set", "times=99"], ExitCode.FAILED, "times must be 1 to 8, got 99"),
+        (["check", "wave", "--set", "times"], ExitCode.USAGE, "--set needs NAME=VALUE"),
+        (["check", "wave", "--set", "x=1"], ExitCode.FAILED, "unknown parameter 'x'"),
+        (["new", "two words"], ExitCode.USAGE, "must be a Python name"),
+        (["export", "wave", "--out", "wave.txt"], ExitCode.USAGE, "valid: .csv, .npz"),
+    ],
+)
+def test_what_is_wrong_is_said_with_what_is_valid(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], code: ExitCode, message: str
+) -> None:
+    assert main(arguments) == code
+    assert message in capsys.readouterr().err
+
+
+def test_a_new_motion_is_feasible_and_is_not_written_twice(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["new", "greet", "--out", str(tmp_path)]) == ExitCode.OK
+    path = tmp_path / "greet.py"
+    assert main(["check", str(path)]) == ExitCode.OK
+    before = path.read_bytes()
+    assert main(["new", "greet", "--out", str(tmp_path)]) == ExitCode.USAGE
+    assert "exists already" in capsys.readouterr().err
+    assert path.read_bytes() == before
+
+
+def test_export_writes_the_same_trajectory_as_csv_and_npz(tmp_path: Path) -> None:
+    for name in ("wave.csv", "wave.npz"):
+        assert main(["export", "wave", "--out", str(tmp_path / name)]) == ExitCode.OK
+    with (tmp_path / "wave.csv").open(encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    arrays = np.load(tmp_path / "wave.npz")
+    assert len(rows) == len(arrays["time"])
+    assert float(rows[100]["FR_thigh"]) == pytest.approx(arrays["q"][100, 7 + 4], abs=1e-6)
+    assert float(rows[100]["z"]) == pytest.approx(arrays["q"][100, 2], abs=1e-6)
+    assert {row["FR_stance"] for row in rows} == {"0", "1"}
+
+
+@pytest.mark.slow
+def test_run_plays_a_motion_and_measures_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], clumsy: Path
+) -> None:
+    page = tmp_path / "bow.html"
+    assert main(["run", "bow", "--html", str(page)]) == ExitCode.OK
+    text = capsys.readouterr().out
+    assert "\ndone\n" in text
+    assert page.stat().st_size > 100_000
+    assert main(["run", f"{clumsy}:fall_over"]) == ExitCode.FAILED
+    assert "infeasible" in capsys.readouterr().err
+    assert main(["run", str(clumsy)]) == ExitCode.USAGE
+    assert "choose FILE.py:NAME: fall_over, second" in capsys.readouterr().err
+    assert main(["run", f"{clumsy}:fall_over", "--force", "--json"]) == ExitCode.FAILED
+    result = json.loads(capsys.readouterr().out)
+    assert not result["ok"]
+    assert not result["feasible"]
