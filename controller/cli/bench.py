@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from controller.bench.runner import BenchProgress
 
 EXAMPLES = """
-go2-wbc bench behaviour            everything; an hour and a half on two cores
+go2-wbc bench behaviour            everything; an hour on two cores
 go2-wbc bench behaviour --quick    three seeds
 go2-wbc bench behaviour --list     the rows and their bars
 go2-wbc bench behaviour --rows stand trot --jobs 4

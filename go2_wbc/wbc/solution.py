@@ -21,7 +21,7 @@ class WbcSolution:
         qdd: generalised acceleration (Pinocchio's spatial base acceleration in the base frame
             [m/s^2, rad/s^2], then the joints [rad/s^2]).
         forces: contact force [N] of each foot in the world frame; zero for legs in the air.
-        solve_time: CPU seconds of assembly and solution.
+        solve_time: seconds of assembly and solution.
         backend: which back end solved it.
     """
 
