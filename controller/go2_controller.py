@@ -90,6 +90,7 @@ class GO2Controller:
             PlantError: if the plant does not answer.
         """
         self._namespace = arguments.namespace(namespace)
+        realtime, viewer = arguments.flag("realtime", realtime), arguments.flag("viewer", viewer)
         self._config = arguments.config(config)
         plant = arguments.plant_or_none(plant)
         model = RobotModel(find_description(arguments.path_or_none("urdf", urdf)))
@@ -245,7 +246,7 @@ class GO2Controller:
         if isinstance(motion, Motion):
             motion = motion()
         if not isinstance(motion, Timeline):
-            motion = load_motion(arguments.word("motion", motion))
+            motion = load_motion(arguments.motion_name(motion))
         return compile_timeline(motion, self._runner.loop.model)
 
     def wait(self, seconds: float) -> None:
@@ -357,7 +358,9 @@ class GO2Controller:
     def _note(self, ok: bool, reason: str, start: float, figures: Figures | None = None) -> None:
         duration = self.state.time - start
         self._last_outcome = Outcome(ok, reason, duration, dict(figures or {}))
-        if not ok:
+        fault = self._runner.loop.fault
+        is_known = fault is not None and fault.reason in reason  # the loop has logged it
+        if not (ok or is_known):
             _log.warning("%s", reason)
 
     @contextmanager

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from numbers import Real
 
 from go2_wbc.errors import ConfigError
 
@@ -20,6 +21,12 @@ def require_not_negative(config: object, *names: str) -> None:
         _require(config, name, lambda value: value >= 0.0, "at least 0")
 
 
+def require_finite(config: object, *names: str) -> None:
+    """Raise ConfigError unless each named field of ``config`` is a finite number."""
+    for name in names:
+        _require(config, name, lambda _: True, "finite")
+
+
 def require_share(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is in (0, 1]."""
     for name in names:
@@ -29,5 +36,6 @@ def require_share(config: object, *names: str) -> None:
 def _require(config: object, name: str, holds: Callable[[float], bool], what: str) -> None:
     field = getattr(config, name)
     for value in field if isinstance(field, tuple) else (field,):
-        if not (math.isfinite(value) and holds(value)):
+        is_number = isinstance(value, Real) and not isinstance(value, bool)
+        if not (is_number and math.isfinite(value) and holds(float(value))):
             raise ConfigError(f"{type(config).__name__}.{name} must be {what}, got {field!r}")

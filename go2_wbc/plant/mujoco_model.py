@@ -18,6 +18,7 @@ from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.mujoco_visuals import add_visuals
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.description import BASE_LINK, RobotDescription
+from go2_wbc.validation import require_not_negative
 
 FOOT_RADIUS = 0.022  # m; radius of the foot in the URDF's foot mesh and in every published MJCF
 FLOOR = "go2_wbc_floor"
@@ -57,6 +58,10 @@ class JointDynamics:
     armature: tuple[float, float, float] = (0.0045, 0.0045, 0.0164)
     damping: tuple[float, float, float] = (0.1, 0.1, 0.1)
     friction_loss: tuple[float, float, float] = (0.2, 0.2, 0.2)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a negative number."""
+        require_not_negative(self, "armature", "damping", "friction_loss")
 
     @staticmethod
     def none() -> JointDynamics:

@@ -98,14 +98,14 @@ class MujocoPlant(Plant):
         initial_yaw: float = 0.0,
         initial_joint_noise: float = 0.0,
         joint_dynamics: JointDynamics | None = None,
-        urdf: Path | None = None,
+        urdf: Path | str | None = None,
         visuals: bool = False,
     ) -> None:
         if sensors not in (_IDEAL, _NOISY):
             raise ConfigError(unknown_name("sensors", sensors, (_IDEAL, _NOISY)))
         setup = PlantSetup(
-            mjcf=None if mjcf is None else Path(mjcf),
-            urdf=urdf,
+            mjcf=Path(mjcf) if isinstance(mjcf, str) else mjcf,
+            urdf=Path(urdf) if isinstance(urdf, str) else urdf,
             timestep=timestep,
             control_period=control_period,
             friction=friction,
@@ -116,6 +116,7 @@ class MujocoPlant(Plant):
             initial_joint_noise=initial_joint_noise,
             joint_dynamics=joint_dynamics,
             visuals=visuals,
+            seed=seed,
         )
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
         mujoco.set_mju_user_warning(_log_warning)

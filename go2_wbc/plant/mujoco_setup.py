@@ -16,6 +16,7 @@ from go2_wbc.plant.mujoco_model import JointDynamics, add_payload, build_spec, f
 from go2_wbc.plant.mujoco_user_model import load_user_model
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.description import BASE_LINK, RobotDescription, find_description
+from go2_wbc.validation import require_finite, require_not_negative, require_positive
 
 # Dry rubber on a hard floor; Unitree publishes none. The prototype's runs used it.
 DEFAULT_FRICTION = 0.8
@@ -56,24 +57,21 @@ class PlantSetup:
     initial_joint_noise: float
     joint_dynamics: JointDynamics | None
     visuals: bool
+    seed: int
     lying_damping: float = 3.0
 
     def __post_init__(self) -> None:
-        positive = {
-            "timestep": self.timestep,
-            "control_period": self.control_period,
-            "mass_scale": self.mass_scale,
-            "friction": DEFAULT_FRICTION if self.friction is None else self.friction,
-        }
-        for name, value in positive.items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise ConfigError(f"{name} must be positive and finite, got {value!r}")
-        least_zero = {"payload": self.payload, "initial_joint_noise": self.initial_joint_noise}
-        for name, value in least_zero.items():
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ConfigError(f"{name} must be finite and at least 0, got {value!r}")
-        if not math.isfinite(self.initial_yaw):
-            raise ConfigError(f"initial_yaw must be finite [rad], got {self.initial_yaw!r}")
+        for name in ("mjcf", "urdf"):
+            path = getattr(self, name)
+            if path is not None and not isinstance(path, Path):
+                raise ConfigError(f"{name} must be a path, got {path!r}")
+        if self.terrain is not None and not isinstance(self.terrain, Boxes):
+            raise ConfigError(f"terrain must be Boxes(...) or None, got {self.terrain!r}")
+        require_positive(self, "timestep", "control_period", "mass_scale")
+        if self.friction is not None:
+            require_positive(self, "friction")
+        require_not_negative(self, "payload", "initial_joint_noise", "seed")
+        require_finite(self, "initial_yaw")
         ratio = self.control_period / self.timestep
         if round(ratio) < 1 or abs(ratio - round(ratio)) > _MULTIPLE_TOLERANCE * ratio:
             raise ConfigError(

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.robot.state import RobotState
+from go2_wbc.validation import require_not_negative
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,10 @@ class SensorNoise:
     joint_position: float = 0.002
     joint_velocity: float = 0.05
     foot_force: float = 2.0
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a negative deviation."""
+        require_not_negative(self, *(f.name for f in fields(self)))
 
     def corrupt_state(self, state: RobotState, rng: np.random.Generator) -> RobotState:
         """``state`` with noise added; time and torque are known exactly."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.validation import require_not_negative, require_positive
+
 
 @dataclass(frozen=True, slots=True)
 class Boxes:
@@ -29,6 +31,11 @@ class Boxes:
     extent: float = 4.0
     clear_radius: float = 0.55
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a number that is out of range."""
+        require_positive(self, "height", "size", "extent")
+        require_not_negative(self, "count", "clear_radius", "seed")
 
     def layout(self) -> Float[np.ndarray, "n 4"]:
         """One row per box: x, y of its centre [m], yaw [rad], height [m].

@@ -6,6 +6,7 @@ so that any two of them can be compared number by number.
 
 from __future__ import annotations
 
+import math
 import sys
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
@@ -83,6 +84,7 @@ def find_description(urdf: Path | None = None) -> RobotDescription:
     own = () if share is not None and urdf.is_relative_to(share) else tuple(urdf.parents)
     root = _parse(urdf, "URDF")
     _check_names(urdf, root)
+    _check_joints(urdf, root)
     srdf = _find_srdf(urdf, share)
     return RobotDescription(
         urdf_path=urdf,
@@ -148,9 +150,38 @@ def _limits(urdf: Path, root: ET.Element, attribute: str) -> tuple[float, ...]:
     for name in JOINT_NAMES:
         limit = joints[name].find("limit")
         text = None if limit is None else limit.get(attribute)
-        try:
-            values.append(float(text or ""))
-        except ValueError as error:
+        value = _number(text)
+        if not value > 0.0:
             message = f"{urdf}: joint {name} has no valid {attribute} limit ({text!r})"
-            raise DescriptionError(message) from error
+            raise DescriptionError(message)
+        values.append(value)
     return tuple(values)
+
+
+def _check_joints(urdf: Path, root: ET.Element) -> None:
+    """The twelve joints must turn between two angles, and no link may have a negative mass."""
+    joints = {joint.get("name"): joint for joint in root.findall("joint")}
+    for name in JOINT_NAMES:
+        kind, limit = joints[name].get("type"), joints[name].find("limit")
+        if kind != "revolute":
+            raise DescriptionError(f"{urdf}: joint {name} must be revolute, it is {kind}")
+        lower, upper = (
+            _number(None if limit is None else limit.get(side)) for side in ("lower", "upper")
+        )
+        if not lower < upper:
+            raise DescriptionError(f"{urdf}: joint {name} has no range: {lower:g} to {upper:g} rad")
+    for link in root.findall("link"):
+        mass = link.find("inertial/mass")
+        if mass is not None and not _number(mass.get("value")) >= 0.0:
+            raise DescriptionError(
+                f"{urdf}: link {link.get('name')} has no valid mass ({mass.get('value')!r})"
+            )
+
+
+def _number(text: str | None) -> float:
+    """The finite number that ``text`` means, or nan."""
+    try:
+        value = float(text or "nan")
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan

@@ -98,12 +98,14 @@ calls = {
         lambda: go2.move("fast"), lambda: go2.move(True), lambda: go2.move(None),
         lambda: go2.turn_left("90"), lambda: go2.move_forward(None), lambda: go2.wait(1 + 1j),
         lambda: go2.high_five(hold="long"), lambda: go2.high_five(3), lambda: go2.high_five([]),
-        lambda: go2.play(42), lambda: go2.play(None), lambda: go2.walk(None), lambda: go2.walk({}),
+        lambda: go2.play(42), lambda: go2.play(print), lambda: go2.play(None),
+        lambda: go2.walk(None), lambda: go2.walk({}),
     ],
     ConfigError: [
         lambda: GO2Controller(7), lambda: GO2Controller(None), lambda: GO2Controller(config=3),
         lambda: GO2Controller(config={"wbc": {}}), lambda: GO2Controller(plant="robot"),
-        lambda: GO2Controller(urdf=3), lambda: GO2Controller(urdf=b"go2.urdf"),
+        lambda: GO2Controller(urdf=3), lambda: GO2Controller(realtime="yes"),
+        lambda: GO2Controller(viewer=1), lambda: GO2Controller(urdf=b"go2.urdf"),
     ],
 }
 for kind, refused in calls.items():
