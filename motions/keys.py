@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TypeVar
@@ -58,7 +59,7 @@ class LegTarget:
 
 
 @dataclass(frozen=True, slots=True)
-class Key:
+class Key(ABC):
     """One move of one track.
 
     Attributes:
@@ -75,9 +76,9 @@ class Key:
         return replace(self, start=self.start + seconds, end=self.end + seconds)
 
     @property
+    @abstractmethod
     def track(self) -> str:
         """What moves, in words."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, slots=True)

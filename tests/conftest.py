@@ -12,12 +12,15 @@ from pathlib import Path
 import pytest
 from jaxtyping import install_import_hook
 
+from tests import typechecker
+
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("go2_wbc", "controller", "motions", "viz")
 # Small functions and values that the control loop uses many times in a tick: checking these five
 # modules as well makes a tick half as slow again. Their callers are checked.
 UNCHECKED = frozenset(
     {
+        "controller.pytest_plugin",  # pytest loads it before this file
         "go2_wbc.contacts",
         "go2_wbc.curves",
         "go2_wbc.planning.swing",
@@ -41,7 +44,7 @@ def checked_modules() -> list[str]:
 
 
 if IS_CHECKING:
-    install_import_hook(checked_modules(), "beartype.beartype")
+    install_import_hook(checked_modules(), f"{typechecker.__name__}.checked")
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

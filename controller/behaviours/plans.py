@@ -125,4 +125,4 @@ class ChangePosture(PlayPlan):
         position = yaw_rotation(anchor.yaw).T @ (p - anchor.p_world)
         pose = np.array([*position, roll, pitch, wrap_angle(float(yaw) - anchor.yaw)])
         self.plan = self._make_plan(pose)
-        self.may_lie = pose[2] < LOW or self.plan.exit is Stance.LIE
+        self.may_lie = bool(pose[2] < LOW) or self.plan.exit is Stance.LIE
