@@ -148,7 +148,7 @@ def motion(function: Callable[..., Timeline]) -> Motion:
         for item in inspect.signature(function).parameters.values()
     )
     summary = (inspect.getdoc(function) or function.__name__).splitlines()[0]
-    code = function.__code__
+    code = inspect.unwrap(function).__code__
     source = f"{code.co_filename}:{code.co_firstlineno}"
     return Motion(function.__name__, summary, parameters, source, function)
 
