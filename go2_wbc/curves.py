@@ -42,12 +42,34 @@ def _linear(s: float) -> tuple[float, float, float]:
     return s, 1.0, 0.0
 
 
+def _in(s: float) -> tuple[float, float, float]:
+    return s**3 * (2 - s), s * s * (6 - 4 * s), 12 * s * (1 - s)
+
+
+def _out(s: float) -> tuple[float, float, float]:
+    value, rate, acceleration = _in(1 - s)
+    return 1 - value, rate, -acceleration
+
+
+def _hold(s: float) -> tuple[float, float, float]:
+    return (0.0 if s < 1.0 else 1.0), 0.0, 0.0
+
+
 class Ease(Enum):
-    """How a piece goes from its start to its end: progress over normalised time s in [0, 1]."""
+    """How a piece goes from its start to its end: progress over normalised time s in [0, 1].
+
+    Minimum jerk, cubic and linear are symmetric. ``IN`` starts at rest and ends at twice its mean
+    speed without acceleration, ``OUT`` is the same backwards; so one after the other over the same
+    time and way, or with a linear piece of twice that speed between them, they are smooth. ``HOLD``
+    stays at the start and jumps at its end.
+    """
 
     MINIMUM_JERK = "minimum_jerk"
     CUBIC = "cubic"
     LINEAR = "linear"
+    IN = "in"
+    OUT = "out"
+    HOLD = "hold"
 
     def progress(self, s: float) -> tuple[float, float, float]:
         """Progress in [0, 1] at s in [0, 1], with d/ds and d2/ds2."""
@@ -58,6 +80,9 @@ _PROGRESS: dict[Ease, Callable[[float], tuple[float, float, float]]] = {
     Ease.MINIMUM_JERK: _minimum_jerk,
     Ease.CUBIC: _cubic,
     Ease.LINEAR: _linear,
+    Ease.IN: _in,
+    Ease.OUT: _out,
+    Ease.HOLD: _hold,
 }
 
 
@@ -116,7 +141,7 @@ def keyframes(
 ) -> Curve:
     """A curve that passes through each value (n,) at its time [s] after the first key's.
 
-    It comes to rest at every key, unless the ease is linear.
+    It comes to rest at every key with minimum jerk and cubic easing.
 
     Raises:
         CommandError: if there are fewer than two keys, or the times do not increase.

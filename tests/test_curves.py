@@ -15,6 +15,7 @@ SLOPE_TOLERANCE = 1e-7  # their error is step^2 times the third derivative, some
 CURVATURE_TOLERANCE = 1e-3  # rounding of a second difference, 1e-16 / step^2; measured 2e-5
 EXACT = 1e-12  # rounding of numbers of order one
 SMOOTH = [Ease.MINIMUM_JERK, Ease.CUBIC]
+SYMMETRIC = [*SMOOTH, Ease.LINEAR]
 
 
 def random_curve(seed: int, ease: Ease) -> Curve:
@@ -61,7 +62,7 @@ def test_outside_its_duration_a_curve_rests_at_its_ends(ease: Ease, outside: flo
     for t, value in ((-outside, first), (curve.duration + outside, last)):
         point = curve.at(t)
         np.testing.assert_allclose(point.value, value, atol=EXACT)
-        if outside > 0.0 and ease is not Ease.LINEAR:
+        if outside > 0.0 and ease in {*SMOOTH, Ease.HOLD}:
             np.testing.assert_allclose(point.rate, 0.0, atol=1e-9)
 
 
@@ -89,11 +90,31 @@ def test_minimum_jerk_also_starts_and_ends_without_acceleration() -> None:
 
 
 @given(st.floats(0.0, 1.0), st.sampled_from(list(Ease)))
-def test_progress_is_monotonic_bounded_and_symmetric_about_the_middle(s: float, ease: Ease) -> None:
+def test_progress_is_monotonic_and_bounded(s: float, ease: Ease) -> None:
     value, slope, _ = ease.progress(s)
     assert -EXACT <= value <= 1.0 + EXACT
     assert slope >= -EXACT
+
+
+@given(st.floats(0.0, 1.0), st.sampled_from(SYMMETRIC))
+def test_progress_is_symmetric_about_the_middle(s: float, ease: Ease) -> None:
+    value, _, _ = ease.progress(s)
     assert value + ease.progress(1.0 - s)[0] == pytest.approx(1.0, abs=EXACT)
+
+
+@given(st.floats(0.0, 1.0))
+def test_easing_out_is_easing_in_backwards(s: float) -> None:
+    value, slope, bend = Ease.IN.progress(s)
+    assert Ease.OUT.progress(1.0 - s) == pytest.approx((1.0 - value, slope, -bend), abs=EXACT)
+
+
+def test_easing_in_joins_a_linear_piece_of_twice_its_mean_speed_smoothly() -> None:
+    assert Ease.IN.progress(0.0) == (0.0, 0.0, 0.0)
+    assert Ease.IN.progress(1.0) == pytest.approx((1.0, 2.0, 0.0), abs=EXACT)
+
+
+def test_hold_stays_until_its_end() -> None:
+    assert [Ease.HOLD.progress(s)[0] for s in (0.0, 0.5, 0.999, 1.0)] == [0.0, 0.0, 0.0, 1.0]
 
 
 def test_a_value_that_was_handed_out_at_rest_cannot_move_the_curve() -> None:

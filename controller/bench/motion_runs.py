@@ -10,11 +10,19 @@ from jaxtyping import Float
 from controller.bench.trials import Subject
 from controller.bench.witness import Track
 from go2_wbc.legs import LEGS
-from go2_wbc.reference import Anchor, MotionPlan
+from go2_wbc.reference import Anchor, LegTask, MotionPlan, TrackedPoint
+from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 
 TRACKING_STRIDE = 5
 """Every fifth tick is compared with the plan."""
+HALF_LENGTH = 0.2
+"""Distance [m] from the trunk's middle to its ends: what a wrong attitude moves."""
+FULL = 0.999
+"""Share of a torque limit from which on a motor gives all it has."""
+TOUCH = 1.0
+"""Force [N] on a knee or the trunk that counts as a touch."""
 SETTLED_CONTACT = 0.1
 """Time [s] after a touchdown, and before a lift-off, in which an unloaded foot may skid."""
 
@@ -29,8 +37,12 @@ class MotionRun:
         reason: in its words.
         slip: largest distance [m] that the material of a standing foot slid at its contact point.
         torque, speed: largest share of a joint's torque and speed limit.
+        saturated: time [s] in which some motor gave all it has.
         tracking: largest distance [m] of the CoM from its plan.
+        ends_off: largest distance [m] of the trunk's ends from their plan, seen from its middle.
+        feet_off: largest distance [m] of a raised foot from its plan, seen from the trunk.
         joint_distance: least distance [rad] of a joint to its limit.
+        touched: time [s] in which a knee or the trunk touched the ground, or a link another.
     """
 
     fall: str | None
@@ -39,8 +51,12 @@ class MotionRun:
     slip: float
     torque: float
     speed: float
+    saturated: float
     tracking: float
+    ends_off: float
+    feet_off: float
     joint_distance: float
+    touched: float
 
     @property
     def ok(self) -> bool:
@@ -68,16 +84,23 @@ def run_motion(robot: Subject, plan: MotionPlan, model: RobotModel) -> MotionRun
     said = robot.go2.play(plan, check=False)
     fall = robot.witness.fall()
     track = _of_motion(robot, plan)
-    q = track.q[:, 7:]
+    q, dt = track.q[:, 7:], robot.plant.control_period
+    shares = (np.abs(track.tau) / model.torque_limits).max(axis=1)
+    touched = track.touches_itself | (np.maximum(track.trunk_force, track.limb_force) > TOUCH)
+    off = _off_plan(track, plan, model)
     return MotionRun(
         fall=fall,
         said=said,
         reason=robot.go2.last_outcome.reason,
         slip=_slip(track, plan),
-        torque=float((np.abs(track.tau) / model.torque_limits).max()),
+        torque=float(shares.max()),
         speed=float((np.abs(track.v[:, 6:]) / model.speed_limits).max()),
-        tracking=_tracking(track, plan, model.foot_radius),
+        saturated=dt * float((shares >= FULL).sum()),
+        tracking=off.com,
+        ends_off=HALF_LENGTH * off.attitude,
+        feet_off=off.feet,
         joint_distance=float(np.minimum(q - model.q_lower, model.q_upper - q).min()),
+        touched=dt * float(touched.sum()),
     )
 
 
@@ -119,13 +142,33 @@ def _runs(flags: np.ndarray, margin: int) -> list[slice]:
     return runs
 
 
-def _tracking(track: Track, plan: MotionPlan, foot_radius: float) -> float:
-    anchor = Anchor.of_feet(track.p_world_feet[0].copy(), foot_radius)
-    start, worst = float(track.time[0]), 0.0
+@dataclass(frozen=True, slots=True)
+class _OffPlan:
+    """Largest deviations: CoM [m], attitude [rad], raised feet [m]."""
+
+    com: float
+    attitude: float
+    feet: float
+
+
+def _off_plan(track: Track, plan: MotionPlan, model: RobotModel) -> _OffPlan:
+    anchor = Anchor.of_feet(track.p_world_feet[0].copy(), model.foot_radius)
+    start, worst = float(track.time[0]), np.zeros(3)
+    legs = [LegGeometry.of(model, leg) for leg in LEGS]
     for row in range(0, len(track.time), TRACKING_STRIDE):
-        body = plan.at(float(track.time[row]) - start).placed(anchor).body
-        worst = max(worst, _distance(track.p_world_com[row], body.p_world))
-    return worst
+        reference = plan.at(float(track.time[row]) - start).placed(anchor)
+        body, q = reference.body, track.q[row]
+        R = rotation_from_rpy(*track.rpy[row].tolist())
+        point = track.p_world_com[row] if body.point is TrackedPoint.COM else q[:3]
+        joints = np.vstack([q[7:], reference.q_joints])
+        feet = [
+            _distance(*foot_places(legs[leg], joints[:, leg.joints]))
+            for leg in LEGS
+            if reference.legs[leg] is LegTask.JOINTS
+        ]
+        turned = float(np.linalg.norm(log_rotation(body.R_world_base @ R.T)))
+        worst = np.maximum(worst, [_distance(point, body.p_world), turned, max(feet, default=0.0)])
+    return _OffPlan(*worst.tolist())
 
 
 def _distance(a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"]) -> float:

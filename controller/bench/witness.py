@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import final
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.robot.description import BASE_LINK
@@ -38,6 +38,8 @@ class Track:
         p_world_contacts: contact points of the feet [m], nan in the air.
         v_world_contacts: tangential velocity [m/s] of the feet's material there, 0 in the air.
         trunk_force: normal force [N] between the trunk and the ground.
+        limb_force: the same for the legs without their feet.
+        touches_itself: whether two links touch that must not.
     """
 
     time: Float[np.ndarray, " n"]
@@ -51,6 +53,8 @@ class Track:
     p_world_contacts: Float[np.ndarray, "n 4 3"]
     v_world_contacts: Float[np.ndarray, "n 4 3"]
     trunk_force: Float[np.ndarray, " n"]
+    limb_force: Float[np.ndarray, " n"]
+    touches_itself: Bool[np.ndarray, " n"]
 
     def part(self, rows: slice) -> Track:
         """Some of the ticks."""
@@ -161,5 +165,7 @@ class Witness(Plant):
                 contacts.p_world_contact,
                 contacts.v_world_contact,
                 plant.base_contact_force,
+                plant.limb_contact_force,
+                plant.touches_itself,
             )
         )

@@ -7,25 +7,29 @@ import json
 import sys
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from controller.cli.progress import ProgressLine
-from go2_wbc.errors import ConfigError
 
 if TYPE_CHECKING:
-    from controller.bench.report import BenchReport
     from controller.bench.rows import Family
-    from controller.bench.runner import BenchProgress
+    from controller.bench.runner import BenchProgress, Results
 
-EXAMPLES = """
+BEHAVIOUR_EXAMPLES = """
 go2-wbc bench behaviour            everything; an hour on two cores
 go2-wbc bench behaviour --quick    three seeds
 go2-wbc bench behaviour --list     the rows and their bars
 go2-wbc bench behaviour --rows stand trot --jobs 4
 go2-wbc bench behaviour --json --out behaviour.json
 """
+FEASIBILITY_EXAMPLES = """
+go2-wbc bench feasibility              five minutes on two cores
+go2-wbc bench feasibility --motions 24
+go2-wbc bench feasibility --json --out feasibility.json
+"""
 SEEDS, QUICK_SEEDS = 20, 3
+MOTIONS = 160
 
 
 def register(subparsers: Subparsers) -> None:
@@ -33,17 +37,17 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "bench",
-        "Measure what the robot does, over many seeds, against fixed bars.\n"
-        "Exit code 0 if every row passes, 1 if one does not.",
-        examples=EXAMPLES,
+        "Measure over many seeds, against fixed bars.\n"
+        "Exit code 0 if every bar is met, 1 if one is not.",
+        examples=BEHAVIOUR_EXAMPLES + FEASIBILITY_EXAMPLES,
     )
     benches: Subparsers = parser.add_subparsers(title="benches", dest="bench", required=True)
     behaviour = add_parser(
         benches,
         "behaviour",
-        "Stand, trot, pushes, errands, high five, slaps and the whole demo in MuJoCo,\n"
-        "with friction, mass, heading and joint angles drawn by each seed.",
-        examples=EXAMPLES,
+        "Stand, trot, pushes, errands, high five, slaps, the motions and the whole demo\n"
+        "in MuJoCo, with friction, mass, heading and joint angles drawn by each seed.",
+        examples=BEHAVIOUR_EXAMPLES,
     )
     behaviour.add_argument(
         "--seeds", metavar="N", type=_positive, help=f"default {SEEDS}; the demo takes 5 times N"
@@ -52,36 +56,57 @@ def register(subparsers: Subparsers) -> None:
     behaviour.add_argument(
         "--rows", metavar="NAME", nargs="+", default=[], help="only these; see --list"
     )
-    behaviour.add_argument(
-        "--jobs", metavar="N", type=_positive, default=2, help="processes, default %(default)s"
-    )
-    behaviour.add_argument("--json", action="store_true", help="print JSON instead of the table")
-    behaviour.add_argument("--out", metavar="FILE", type=Path, help="also write the JSON here")
     behaviour.add_argument("--list", action="store_true", help="list the rows and run nothing")
+    feasibility = add_parser(
+        benches,
+        "feasibility",
+        "Does the feasibility check foresee what physics does? Motions made by the\n"
+        "dozen, good ones and broken ones, are checked and played in MuJoCo.",
+        examples=FEASIBILITY_EXAMPLES,
+    )
+    feasibility.add_argument(
+        "--motions", metavar="N", type=_positive, default=MOTIONS, help="default %(default)s"
+    )
+    for bench in (behaviour, feasibility):
+        bench.add_argument(
+            "--jobs", metavar="N", type=_positive, default=2, help="processes, default %(default)s"
+        )
+        bench.add_argument("--json", action="store_true", help="print JSON instead of the table")
+        bench.add_argument("--out", metavar="FILE", type=Path, help="also write the JSON here")
 
 
 def run(args: argparse.Namespace) -> int:
-    """List the rows, or run them, report, and say by the exit code whether all pass."""
+    """Run what was asked for, report, and say by the exit code whether all bars are met."""
+    return _run_behaviour(args) if args.bench == "behaviour" else _run_feasibility(args)
+
+
+def _run_behaviour(args: argparse.Namespace) -> int:
     from controller.bench.families import find_families
+    from controller.bench.report import render, summarise
 
     families = find_families(args.rows)
     if args.list:
         _print_list(families)
         return ExitCode.OK
-    if args.out is not None:
-        _check_folder(args.out)  # before the run: its results must not be lost
-    report = _measure(families, args)
-    if args.out is not None:
-        _write_aside(report, args.out)
-    _print(report, as_json=args.json)
+    seeds = args.seeds or (QUICK_SEEDS if args.quick else SEEDS)
+    target = _checked_target(args)
+    report = summarise(families, _measure(families, seeds, args.jobs))
+    _publish(report.as_dict(), render(report), args, target)
     return ExitCode.OK if report.ok else ExitCode.FAILED
 
 
-def _measure(families: tuple[Family, ...], args: argparse.Namespace) -> BenchReport:
-    from controller.bench.report import summarise
+def _run_feasibility(args: argparse.Namespace) -> int:
+    from controller.bench.feasibility import FAMILY, render, verdicts_of
+
+    target = _checked_target(args)
+    verdicts = verdicts_of(_measure((FAMILY,), args.motions, args.jobs))
+    _publish(verdicts.as_dict(), render(verdicts), args, target)
+    return ExitCode.OK if verdicts.ok else ExitCode.FAILED
+
+
+def _measure(families: tuple[Family, ...], seeds: int, jobs: int) -> Results:
     from controller.bench.runner import run_families
 
-    seeds = args.seeds or (QUICK_SEEDS if args.quick else SEEDS)
     with ProgressLine(sys.stderr) as line:
 
         def show(progress: BenchProgress) -> None:
@@ -93,16 +118,27 @@ def _measure(families: tuple[Family, ...], args: argparse.Namespace) -> BenchRep
             line.update(progress.done / progress.count, place)
 
         line.update(0.0, "starting")
-        return summarise(families, run_families(families, seeds, args.jobs, show))
+        return run_families(families, seeds, jobs, show)
 
 
-def _print(report: BenchReport, *, as_json: bool) -> None:
-    from controller.bench.report import render
+def _checked_target(args: argparse.Namespace) -> Path | None:
+    """Where the JSON goes, known to be writable before the run: its results must not be lost."""
+    from viz.files import checked_output
 
-    if as_json:
-        print_json(report.as_dict())
+    return None if args.out is None else checked_output(args.out, [".json"])
+
+
+def _publish(
+    values: dict[str, Any], table: str, args: argparse.Namespace, target: Path | None
+) -> None:
+    from viz.files import write_atomically
+
+    if target is not None:
+        write_atomically(target, (json.dumps(values, indent=2) + "\n").encode())
+    if args.json:
+        print_json(values)
     else:
-        print(render(report))
+        print(table)
 
 
 def _print_list(families: tuple[Family, ...]) -> None:
@@ -114,20 +150,6 @@ def _print_list(families: tuple[Family, ...]) -> None:
             print(f"  {item}")
             for row in rows:
                 print(f"    {row.quantity:<30}{bar_text(row)}")
-
-
-def _check_folder(path: Path) -> None:
-    if not path.parent.is_dir():
-        raise ConfigError(f"the folder of --out does not exist: {path.parent}")
-    if path.is_dir():
-        raise ConfigError(f"--out is a folder: {path}")
-
-
-def _write_aside(report: BenchReport, path: Path) -> None:
-    """Writes a file beside ``path`` and renames it, so that ``path`` is never half written."""
-    aside = path.with_name(f".{path.name}.part")
-    aside.write_text(json.dumps(report.as_dict(), indent=2) + "\n", encoding="utf-8")
-    aside.replace(path)
 
 
 def _positive(text: str) -> int:

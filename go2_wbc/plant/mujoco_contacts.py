@@ -72,6 +72,15 @@ def foot_contacts(data: mujoco.MjData, layout: MujocoLayout) -> FootContacts:
     return FootContacts(touching, points, velocities)
 
 
+def touches_itself(data: mujoco.MjData, layout: MujocoLayout) -> bool:
+    """Whether two links of the robot touch that its SRDF does not let touch."""
+    if data.ncon == 0:
+        return False
+    contacts = data.contact
+    is_own = _pair_codes(contacts.geom, layout) < FOREIGN
+    return bool((is_own & (contacts.dist <= 0.0)).any())
+
+
 def _pair_codes(geoms: Int[np.ndarray, "n 2"], layout: MujocoLayout) -> Int[np.ndarray, " n"]:
     """Sum of both geoms' codes: ``FOREIGN`` plus a bin if exactly one belongs to the robot."""
     codes = layout.geom_codes[geoms]

@@ -15,7 +15,12 @@ from jaxtyping import Float
 from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, unknown_name
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
-from go2_wbc.plant.mujoco_contacts import FootContacts, foot_contacts, ground_force_bins
+from go2_wbc.plant.mujoco_contacts import (
+    FootContacts,
+    foot_contacts,
+    ground_force_bins,
+    touches_itself,
+)
 from go2_wbc.plant.mujoco_layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN
 from go2_wbc.plant.mujoco_model import (
     ACCELEROMETER,
@@ -292,6 +297,11 @@ class MujocoPlant(Plant):
     def limb_contact_force(self) -> float:
         """Normal force between the legs, feet excepted, and anything that is not the robot [N]."""
         return float(self._forces[LIMB_BIN])
+
+    @property
+    def touches_itself(self) -> bool:
+        """Whether two links touch that must not."""
+        return touches_itself(self._data, self._layout)
 
     def save(self) -> SavedPhysics:
         """Everything that decides what happens next; ``restore`` goes on from there, bit by bit."""

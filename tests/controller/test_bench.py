@@ -254,13 +254,15 @@ def test_an_interrupt_leaves_the_old_results(
     assert file.read_text() == "old"
 
 
-def test_a_missing_folder_is_told_before_anything_runs(
+def test_a_file_that_cannot_be_written_is_told_before_anything_runs(
     only: Callable[[Family], None], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     only(fake(have_a_bug))
-    missing = tmp_path / "none" / "bench.json"
-    assert cli.main(["bench", "behaviour", "--out", str(missing)]) == ExitCode.USAGE
-    assert "does not exist" in capsys.readouterr().err
+    in_the_way = tmp_path / "file"
+    in_the_way.write_text("")
+    for out, reason in ((in_the_way / "bench.json", "choose a folder"), (tmp_path, "no suffix")):
+        assert cli.main(["bench", "behaviour", "--out", str(out)]) == ExitCode.USAGE
+        assert reason in capsys.readouterr().err
 
 
 def test_list_names_every_family_and_bar(capsys: pytest.CaptureFixture[str]) -> None:
