@@ -11,10 +11,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from weakref import WeakValueDictionary
 
 from controller.behaviours.base import Behaviour
 from controller.loop import ControlLoop, Fault
 from go2_wbc.errors import ClosedError, PlantError, PlantTimeout
+from go2_wbc.plant.base import Plant
 
 _log = logging.getLogger(__name__)
 
@@ -26,6 +28,8 @@ POLL = 0.05
 """Time [s] after which a waiting thread looks again, should it have missed a notice."""
 HANG_LIMIT = 2.0
 """Time [s] for which one tick may keep others waiting; a plant that blocks longer hangs."""
+_DRIVEN: WeakValueDictionary[int, Plant] = WeakValueDictionary()
+"""Plants that have a runner, by their ``id``."""
 
 
 class Runner:
@@ -40,8 +44,15 @@ class Runner:
     def __init__(
         self, loop: ControlLoop, *, realtime: bool, after_tick: Callable[[], None]
     ) -> None:
-        """Start the background thread if ``realtime``; call ``after_tick`` after every tick."""
+        """Start the background thread if ``realtime``; call ``after_tick`` after every tick.
+
+        Raises:
+            PlantError: if another runner drives the loop's plant.
+        """
         self.loop = loop
+        if _DRIVEN.get(id(loop.plant)) is loop.plant:
+            raise PlantError("another controller drives this plant: close that one first")
+        _DRIVEN[id(loop.plant)] = loop.plant
         self._lock = threading.RLock()
         self._after_tick = after_tick
         self._changed = threading.Condition()  # with a lock of its own, which no tick holds
@@ -218,6 +229,7 @@ class Runner:
     def close(self) -> None:
         """Go limp and stop: no tick after this, and a call that runs ends; idempotent."""
         self._stopping = True
+        _DRIVEN.pop(id(self.loop.plant), None)
         with self._changed:
             self._changed.notify_all()
         if self._thread is None:

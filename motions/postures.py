@@ -19,8 +19,8 @@ STAND_POSE = np.array([0.0, 0.0, STAND_HEIGHT, 0.0, 0.0, 0.0])
 SIT_POSE = np.array([0.0, 0.0, 0.235, 0.0, np.radians(-38.0), 0.0])
 """Base position [m] and roll, pitch, yaw [rad] of the dog-like sit: rump down, front legs up.
 
-The lowest rump at this pitch that keeps the rear feet 5 cm below their hips' axes: further down the
-rear legs cross a singularity and rattle, unless the feet happen to be splayed (own simulation).
+The rear feet stay 9 cm below their hips' axes: much further down the rear legs cross a singularity
+and rattle, unless the feet happen to be splayed (own simulation).
 """
 LIE_POSE = np.array([0.0, 0.0, 0.085, 0.0, 0.0, 0.0])
 """Base position [m] and angles [rad] just above the ground, from which the robot goes limp."""

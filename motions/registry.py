@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import importlib.util
 import pkgutil
@@ -50,7 +51,8 @@ def load_file(path: Path | str) -> Mapping[str, Motion]:
     """The motions that a Python file defines, by name.
 
     Raises:
-        TimelineError: if the file cannot be read, does not run (says the line), or has no motion.
+        TimelineError: if the file cannot be read, does not run (says the line), has no motion, or
+            two of one name.
     """
     file = Path(path)
     if not file.is_file():
@@ -61,7 +63,19 @@ def load_file(path: Path | str) -> Mapping[str, Motion]:
     }
     if not own:
         raise TimelineError(f"{file} defines no motion: write a function with @motion")
+    _require_own_names(file, set(own))
     return own
+
+
+def _require_own_names(file: Path, names: set[str]) -> None:
+    """The second of two functions of one name would silently take the place of the first."""
+    first_lines: dict[str, int] = {}
+    for node in ast.parse(file.read_bytes()).body:
+        if isinstance(node, ast.FunctionDef) and node.name in names:
+            if node.name in first_lines:
+                lines = f"lines {first_lines[node.name]} and {node.lineno}"
+                raise TimelineError(f"{file} has two motions named {node.name!r}, {lines}")
+            first_lines[node.name] = node.lineno
 
 
 def _run(file: Path) -> ModuleType:

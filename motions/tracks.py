@@ -74,15 +74,6 @@ def eased(start: float, end: float, ease: Ease, times: Times) -> Float[np.ndarra
     return np.array([ease.progress(float(value))[0] for value in s])
 
 
-def contact_path(timeline: Timeline, times: Times) -> Bool[np.ndarray, "n 4"]:
-    """Which feet stand at ``times``; a foot is in the air from its first key to its landing."""
-    stance = np.ones((len(times), 4), dtype=bool)
-    for leg in LEGS:
-        for start, end in flights(timeline, leg):
-            stance[(times >= start) & (times < end), leg] = False
-    return stance
-
-
 def flights(timeline: Timeline, leg: Leg) -> list[tuple[float, float]]:
     """Spans [s] in which a foot is off the ground; the last one may be endless."""
     spans: list[tuple[float, float]] = []

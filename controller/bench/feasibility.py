@@ -12,7 +12,7 @@ from typing import Any
 from controller.bench.motion_runs import MotionRun, run_motion
 from controller.bench.rows import Family, Measurement, Row
 from controller.bench.runner import Results
-from controller.bench.specimens import specimen
+from controller.bench.specimens import Specimen, near_specimen, specimen
 from controller.bench.trials import Subject, Trial
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import MotionPlan
@@ -38,8 +38,18 @@ _FAILED = Row("feasibility.failed", "physics", "went wrong in MuJoCo", "", None)
 
 
 def measure(trial: Trial) -> Measurement:
-    """Check and play one motion; the reasons of both are kept as the rows' failures."""
-    made, model = specimen(trial.seed), RobotModel()
+    """Check and play one clear motion, good or broken."""
+    return _judged(specimen(trial.seed), trial)
+
+
+def measure_near(trial: Trial) -> Measurement:
+    """Check and play one motion that may be close to a limit."""
+    return _judged(near_specimen(trial.seed), trial)
+
+
+def _judged(made: Specimen, trial: Trial) -> Measurement:
+    """The reasons of the check and of physics are kept as the rows' failures."""
+    model = RobotModel()
     plan = made.plan(model)
     report = FeasibilityChecker(model).check(plan)
     plant = MujocoPlant(
@@ -54,6 +64,7 @@ def measure(trial: Trial) -> Measurement:
 
 
 FAMILY = Family("feasibility", (_REFUSED, _FAILED), measure)
+NEAR_FAMILY = Family("near limits", (_REFUSED, _FAILED), measure_near)
 
 
 def harms(run: MotionRun, plan: MotionPlan) -> list[str]:
@@ -65,7 +76,7 @@ def harms(run: MotionRun, plan: MotionPlan) -> list[str]:
         "fell": run.fall is not None,
         f"slipped {1000 * run.slip:.0f} mm": run.slip > SLIP,
         f"saturated for {1000 * run.saturated:.0f} ms": run.saturated > SATURATED,
-        f"a joint {-run.joint_distance:.2f} rad beyond its limit": run.joint_distance < 0.0,
+        f"a joint {-run.joint_distance:.3f} rad beyond its limit": run.joint_distance < 0.0,
         f"a joint at {100 * run.speed:.0f} % of its speed": run.speed > 1.0,
         f"{100 * off:.0f} cm off what was written": off > OFF_PLAN,
         f"touched itself or the ground for {1000 * run.touched:.0f} ms": run.touched > TOUCHED,
@@ -156,17 +167,18 @@ class Verdicts:
         }
 
 
-def verdicts_of(results: Results) -> Verdicts:
-    """The matrix of what ``run_families`` measured."""
+def verdicts_of(results: Results, family: Family = FAMILY) -> Verdicts:
+    """The matrix of what ``run_families`` measured of a family."""
+    make = near_specimen if family.name == NEAR_FAMILY.name else specimen
     cases, lost = [], {}
-    for seed, measured in sorted(results[FAMILY.name].items()):
+    for seed, measured in sorted(results[family.name].items()):
         if not measured.values:
             lost[seed] = measured.reason
             continue
         cases.append(
             Case(
                 seed,
-                specimen(seed).kind,
+                make(seed).kind,
                 bool(measured.values[_REFUSED.name]),
                 bool(measured.values[_FAILED.name]),
                 measured.failures.get(_REFUSED.name, ""),
@@ -176,8 +188,21 @@ def verdicts_of(results: Results) -> Verdicts:
     return Verdicts(tuple(cases), lost)
 
 
-def render(verdicts: Verdicts) -> str:
+def render(verdicts: Verdicts, near: Verdicts) -> str:
     """Matrix, what came of each kind, and the misses; at most 80 columns wide."""
+    lines = ["Clear motions, good and broken", *_tables(verdicts), ""]
+    if near.cases:
+        lines += ["Motions from easy to impossible, many close to a limit", *_tables(near), ""]
+        shares = f"precision {near.precision:.3f}, recall {near.recall:.3f}"
+        lines.append(f"{len(near.cases)} motions close to a limit: {shares}; no bar.")
+    lines.append(
+        f"{len(verdicts.cases)} clear motions: precision {verdicts.precision:.3f}, recall "
+        f"{verdicts.recall:.3f}; the bar is {BAR} for both: {'ok' if verdicts.ok else 'NO'}."
+    )
+    return "\n".join(lines)
+
+
+def _tables(verdicts: Verdicts) -> list[str]:
     lines = [f"{'':<26}{'went wrong':>14}{'was done':>12}", "-" * 80]
     for what, refused in (("the check refuses it", True), ("the check lets it pass", False)):
         counts = [verdicts.count(is_refused=refused, has_failed=failed) for failed in (True, False)]
@@ -190,11 +215,7 @@ def render(verdicts: Verdicts) -> str:
         said = f"refused ({case.refusal})" if case.is_refused else "let pass"
         lines += [f"seed {case.seed}, {case.kind}: {said}; {case.harm or 'was done'}"[:80]]
     lines += [f"seed {seed}: no result, {reason}"[:80] for seed, reason in verdicts.lost.items()]
-    lines.append(
-        f"{len(verdicts.cases)} motions: precision {verdicts.precision:.3f}, recall "
-        f"{verdicts.recall:.3f}; the bar is {BAR} for both: {'ok' if verdicts.ok else 'NO'}."
-    )
-    return "\n".join(lines)
+    return lines
 
 
 def _kind_line(kind: str, verdicts: Verdicts) -> str:

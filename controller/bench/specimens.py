@@ -1,8 +1,9 @@
 """Motions made by the dozen from a seed: some that the Go2 can do, some that it cannot.
 
 Every maker draws its numbers from a range. Those of ``GOOD`` stay well inside of what the robot can
-do; each of ``BROKEN`` goes wrong in the way that it is named after. Nothing here knows what the
-feasibility check says.
+do; each of ``BROKEN`` goes wrong in the way that it is named after; those of ``NEAR`` range from
+easy to impossible, so that many come out close to a limit. Nothing here knows what the feasibility
+check says.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from go2_wbc.curves import Ease
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import MotionPlan, Reference, Stance
 from go2_wbc.robot.model import RobotModel
@@ -26,13 +28,13 @@ class Specimen:
 
     Attributes:
         kind: the maker's name.
-        is_broken: whether it is meant to be impossible.
+        is_broken: whether it is meant to be impossible; None if that is left to chance.
         line: as it is written.
         start: time [s] at which the plan is entered; above 0 for a wrong entry.
     """
 
     kind: str
-    is_broken: bool
+    is_broken: bool | None
     line: Timeline
     start: float = 0.0
 
@@ -74,6 +76,12 @@ class LateStart(MotionPlan):
         return self.inner.at(max(t, 0.0) + self.start)
 
 
+def _move(
+    line: Timeline, way: Mapping[str, float], over: float, ease: Ease = Ease.MINIMUM_JERK
+) -> Timeline:
+    return line.body(**way, over=over, ease=ease)
+
+
 def _leg(rng: np.random.Generator) -> Leg:
     return LEGS[int(rng.integers(4))]
 
@@ -100,14 +108,14 @@ def _sway(rng: np.random.Generator) -> Timeline:
     aside, over = float(rng.uniform(0.02, 0.06)), float(rng.uniform(0.7, 1.2))
     way = {"x": aside} if rng.random() < 0.5 else {"y": aside}
     back = {name: -value for name, value in way.items()}
-    return Timeline().body(**way, over=over).body(**back, over=over).home(over=over)
+    return _move(_move(Timeline(), way, over), back, over).home(over=over)
 
 
 def _tilt(rng: np.random.Generator) -> Timeline:
     line, over = Timeline(), float(rng.uniform(0.7, 1.2))
     for _ in range(int(rng.integers(1, 4))):
         channel = str(rng.choice(["roll", "pitch", "yaw"]))
-        line = line.body(**{channel: _sign(rng) * float(rng.uniform(0.08, 0.22))}, over=over)
+        line = _move(line, {channel: _sign(rng) * float(rng.uniform(0.08, 0.22))}, over)
     return line.home(over=over)
 
 
@@ -189,7 +197,7 @@ def _too_far(rng: np.random.Generator) -> Timeline:
     if rng.random() < 0.5:
         aside = _sign(rng) * float(rng.uniform(0.28, 0.4))
         way = {"x": aside} if rng.random() < 0.5 else {"y": aside}
-        return Timeline().body(**way, over=1.5).hold(0.3).home(over=1.5)
+        return _move(Timeline(), way, 1.5).hold(0.3).home(over=1.5)
     leg = _front(rng)
     line = Timeline().foot(leg, z=0.08, over=0.8)
     return line.foot(leg, x=float(rng.uniform(0.45, 0.7)), z=0.1, over=1.2).hold(0.3).home(over=1.5)
@@ -227,7 +235,7 @@ def _feet_unloaded(rng: np.random.Generator) -> Timeline:
 def _colliding(rng: np.random.Generator) -> Timeline:
     leg = _front(rng)
     inward = -1.0 if leg is Leg.FL else 1.0
-    y, z = inward * float(rng.uniform(0.25, 0.31)), float(rng.uniform(0.03, 0.06))
+    y, z = inward * float(rng.uniform(0.28, 0.34)), float(rng.uniform(0.03, 0.06))
     line = Timeline().foot(leg, z=0.10, over=0.8).foot(leg, y=y, z=z, over=0.9)
     return line.hold(0.4).home(over=1.2)
 
@@ -237,14 +245,14 @@ def _slipping(rng: np.random.Generator) -> Timeline:
     name = "x" if rng.random() < 0.5 else "y"
     line = Timeline()
     for _ in range(3):
-        line = line.body(**{name: aside}, over=over).body(**{name: -aside}, over=over)
+        line = _move(_move(line, {name: aside}, over), {name: -aside}, over)
     return line.home(over=0.4)
 
 
 def _discontinuous(rng: np.random.Generator) -> Timeline:
     name, size = (("z", -0.13), ("y", 0.10), ("pitch", 0.4))[int(rng.integers(3))]
     jump = size * float(rng.uniform(0.9, 1.2))
-    return Timeline().body(**{name: jump}, over=0.6, ease="hold").hold(0.5).home(over=1.0)
+    return _move(Timeline(), {name: jump}, 0.6, Ease.HOLD).hold(0.5).home(over=1.0)
 
 
 def _torque_hungry(rng: np.random.Generator) -> Timeline:
@@ -272,6 +280,68 @@ BROKEN: Mapping[str, Maker] = {
     "wrong entry": _wrong_entry,
     "torque-hungry": _torque_hungry,
 }
+# --- from easy to impossible ------------------------------------------------------------------
+
+
+def _up(rng: np.random.Generator) -> Timeline:
+    return Timeline().body(z=float(rng.uniform(0.02, 0.16)), over=1.0).hold(0.3).home(over=1.0)
+
+
+def _aside(rng: np.random.Generator) -> Timeline:
+    aside = _sign(rng) * float(rng.uniform(0.04, 0.26))
+    way = {"x": aside} if rng.random() < 0.5 else {"y": aside}
+    return _move(Timeline(), way, 1.2).hold(0.3).home(over=1.2)
+
+
+def _faster_sway(rng: np.random.Generator) -> Timeline:
+    aside, over, line = float(rng.uniform(0.03, 0.06)), float(rng.uniform(0.16, 0.5)), Timeline()
+    for _ in range(3):
+        line = line.body(y=aside, over=over).body(y=-aside, over=over)
+    return line.home(over=0.5)
+
+
+def _higher_paw(rng: np.random.Generator) -> Timeline:
+    line = Timeline().foot(_front(rng), x=0.05, z=float(rng.uniform(0.1, 0.8)), over=1.2)
+    return line.hold(0.3).home(over=1.2)
+
+
+def _farther_paw(rng: np.random.Generator) -> Timeline:
+    leg = _front(rng)
+    line = Timeline().foot(leg, z=0.1, over=0.8)
+    return line.foot(leg, x=float(rng.uniform(0.05, 0.5)), z=0.1, over=1.0).home(over=1.2)
+
+
+def _closer_legs(rng: np.random.Generator) -> Timeline:
+    leg = _front(rng)
+    inward = (-1.0 if leg is Leg.FL else 1.0) * float(rng.uniform(0.12, 0.30))
+    line = Timeline().foot(leg, z=0.08, over=0.8).foot(leg, y=inward, z=0.05, over=0.9)
+    return line.hold(0.3).home(over=1.2)
+
+
+def _leaning(rng: np.random.Generator) -> Timeline:
+    leg = _leg(rng)
+    inward = -1.0 if leg in (Leg.FL, Leg.RL) else 1.0
+    line = Timeline(balance=False).body(y=inward * float(rng.uniform(0.0, 0.08)), over=0.8)
+    return line.foot(leg, z=0.08, over=0.6).hold(0.8).home(over=0.8)
+
+
+def _harder_push(rng: np.random.Generator) -> Timeline:
+    over, line = float(rng.uniform(0.12, 0.5)), Timeline().body(z=-0.10, over=0.8)
+    for _ in range(2):
+        line = line.body(z=0.02, over=over).body(z=-0.10, over=over)
+    return line.home(over=0.8)
+
+
+NEAR: Mapping[str, Maker] = {
+    "up": _up,
+    "aside": _aside,
+    "faster sway": _faster_sway,
+    "higher paw": _higher_paw,
+    "farther paw": _farther_paw,
+    "closer legs": _closer_legs,
+    "leaning": _leaning,
+    "harder push-up": _harder_push,
+}
 LATE = 1.0
 """When [s] a motion with a wrong entry is entered: it is where its first move has led."""
 
@@ -279,7 +349,15 @@ LATE = 1.0
 def specimen(seed: int) -> Specimen:
     """The motion of a seed: even seeds give good ones, odd ones broken, each kind in turn."""
     is_broken = bool(seed % 2)
-    makers = BROKEN if is_broken else GOOD
-    kind = list(makers)[seed // 2 % len(makers)]
+    return _made(BROKEN if is_broken else GOOD, seed // 2, seed, is_broken=is_broken)
+
+
+def near_specimen(seed: int) -> Specimen:
+    """The motion of a seed among those from easy to impossible, each kind in turn."""
+    return _made(NEAR, seed, seed, is_broken=None)
+
+
+def _made(makers: Mapping[str, Maker], turn: int, seed: int, *, is_broken: bool | None) -> Specimen:
+    kind = list(makers)[turn % len(makers)]
     line = replace(makers[kind](np.random.default_rng([seed, 7])), name=f"{kind} {seed}")
     return Specimen(kind, is_broken, line, LATE if kind == "wrong entry" else 0.0)

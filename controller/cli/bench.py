@@ -24,12 +24,12 @@ go2-wbc bench behaviour --rows stand trot --jobs 4
 go2-wbc bench behaviour --json --out behaviour.json
 """
 FEASIBILITY_EXAMPLES = """
-go2-wbc bench feasibility              five minutes on two cores
-go2-wbc bench feasibility --motions 24
+go2-wbc bench feasibility              eight minutes on two cores
+go2-wbc bench feasibility --motions 40 --near 0
 go2-wbc bench feasibility --json --out feasibility.json
 """
 SEEDS, QUICK_SEEDS = 20, 3
-MOTIONS = 160
+MOTIONS, NEAR = 160, 64
 
 
 def register(subparsers: Subparsers) -> None:
@@ -67,6 +67,13 @@ def register(subparsers: Subparsers) -> None:
     feasibility.add_argument(
         "--motions", metavar="N", type=_positive, default=MOTIONS, help="default %(default)s"
     )
+    feasibility.add_argument(
+        "--near",
+        metavar="N",
+        type=int,
+        default=NEAR,
+        help="motions close to a limit, which have no bar; default %(default)s",
+    )
     for bench in (behaviour, feasibility):
         bench.add_argument(
             "--jobs", metavar="N", type=_positive, default=2, help="processes, default %(default)s"
@@ -96,11 +103,14 @@ def _run_behaviour(args: argparse.Namespace) -> int:
 
 
 def _run_feasibility(args: argparse.Namespace) -> int:
-    from controller.bench.feasibility import FAMILY, render, verdicts_of
+    from controller.bench.feasibility import FAMILY, NEAR_FAMILY, render, verdicts_of
 
     target = _checked_target(args)
-    verdicts = verdicts_of(_measure((FAMILY,), args.motions, args.jobs))
-    _publish(verdicts.as_dict(), render(verdicts), args, target)
+    results = _measure((FAMILY,), args.motions, args.jobs)
+    results |= _measure((NEAR_FAMILY,), args.near, args.jobs)
+    verdicts, near = verdicts_of(results), verdicts_of(results, NEAR_FAMILY)
+    values = {**verdicts.as_dict(), "near_limits": near.as_dict()}
+    _publish(values, render(verdicts, near), args, target)
     return ExitCode.OK if verdicts.ok else ExitCode.FAILED
 
 

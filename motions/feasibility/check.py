@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.errors import MotionError
+from go2_wbc.errors import MotionError, TimelineError
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.authoring import Motion
@@ -14,6 +14,7 @@ from motions.feasibility import dynamic, kinematic
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import FeasibilityReport, Series
+from motions.registry import load_motion
 from motions.timeline import Timeline
 from motions.trajectory import trajectory_of
 
@@ -33,17 +34,23 @@ class FeasibilityChecker:
         self._limits = limits or FeasibilityLimits()
         self._collision = SelfCollision(self.model)
 
-    def check(self, motion: Motion | Timeline | MotionPlan) -> FeasibilityReport:
+    def check(self, motion: str | Motion | Timeline | MotionPlan) -> FeasibilityReport:
         """The report on ``motion``.
 
         Args:
-            motion: a motion with its default parameters, a timeline, or a plan.
+            motion: a name of the library, a motion with its default parameters, a timeline, or a
+                plan.
 
         Raises:
-            TimelineError: if the timeline is empty.
+            CommandError: for an unknown name.
+            TimelineError: if the timeline is empty, or this is no motion.
         """
+        if isinstance(motion, str):
+            motion = load_motion(motion)
         if isinstance(motion, Motion):
             motion = motion()
+        if not isinstance(motion, Timeline | MotionPlan):
+            raise TimelineError(f"a motion is a name, a Timeline or a plan, not {motion!r}")
         is_plan = isinstance(motion, MotionPlan)
         plan = motion if is_plan else compile_timeline(motion, self.model)
         model, limits = self.model, self._limits
@@ -70,7 +77,7 @@ class FeasibilityChecker:
         return FeasibilityReport.of(plan.name, plan.duration, series)
 
 
-def check(motion: Motion | Timeline | MotionPlan) -> FeasibilityReport:
+def check(motion: str | Motion | Timeline | MotionPlan) -> FeasibilityReport:
     """Whether the installed Go2 can do ``motion``; see ``FeasibilityChecker``."""
     return FeasibilityChecker().check(motion)
 

@@ -17,7 +17,6 @@ from motions.trajectory import Trajectory
 BELLY = np.array([[x, y, -0.085] for x in (0.15, -0.15) for y in (0.05, -0.05)])
 """Corners [m] of the trunk's underside in the base frame; lying, the base rests 0.085 m high."""
 JOINTS = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
-END_PARTS = ("place", "attitude", "speed")
 FEET = tuple(leg.name for leg in LEGS)
 
 

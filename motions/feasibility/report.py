@@ -36,10 +36,9 @@ class Finding:
 
     def __str__(self) -> str:
         """One line for a person."""
-        line = (
-            f"{self.check}: {self.subject} at {self.time:.2f} s is {self.value:.3g} {self.unit}, "
-            f"limit {self.limit:.3g}"
-        )
+        line = f"{self.check}: {self.subject} at {self.time:.2f} s"
+        if np.isfinite(self.value):
+            line += f" is {self.value:.3g} {self.unit}, limit {self.limit:.3g}"
         return f"{line} ({self.note})" if self.note else line
 
 
@@ -147,10 +146,12 @@ class FeasibilityReport:
         lines = [head, "-" * 80]
         for check, finding in self.margins.items():
             mark = "x" if finding.margin < 0.0 else "!" if finding in self.warnings else "ok"
-            lines.append(
-                f"{check:<16}{finding.subject:<17.16}{finding.time:>6.2f} s{finding.value:>10.3g}"
-                f"{finding.limit:>9.3g}{finding.margin:>10.3g} {mark:<2} {finding.unit}"
-            )
+            line = f"{check:<16}{finding.subject:<17.16}{finding.time:>6.2f} s"
+            if np.isfinite(finding.value):
+                line += f"{finding.value:>10.3g}{finding.limit:>9.3g}{finding.margin:>10.3g}"
+                lines.append(f"{line} {mark:<2} {finding.unit}")
+            else:
+                lines.append(f"{line}{'-':>10}{'-':>9}{'-':>10} {mark}")
         verdict = "can do it" if self.ok else f"cannot do it: {_count(len(self.failures), 'limit')}"
         tight = f", {_count(len(self.warnings), 'tight margin')}" if self.warnings else ""
         lines += ["-" * 80, f"{self.motion}, {self.duration:.1f} s: the robot {verdict}{tight}."]

@@ -12,7 +12,7 @@ from controller.bench import feasibility
 from controller.bench.feasibility import FAMILY, Verdicts, harms, render, verdicts_of
 from controller.bench.motion_runs import MotionRun
 from controller.bench.rows import Family, Measurement
-from controller.bench.specimens import BROKEN, GOOD, specimen
+from controller.bench.specimens import BROKEN, GOOD, NEAR, near_specimen, specimen
 from controller.bench.trials import Trial
 from controller.cli import main as cli
 from controller.cli.common import ExitCode
@@ -43,7 +43,7 @@ def model() -> RobotModel:
 
 def test_there_are_as_many_good_motions_as_broken_ones_of_every_kind() -> None:
     made = [specimen(seed) for seed in range(COUNT)]
-    assert sum(one.is_broken for one in made) == COUNT / 2
+    assert [one.is_broken for one in made].count(True) == COUNT / 2
     kinds = [one.kind for one in made]
     assert set(kinds) == {*GOOD, *BROKEN}
     assert {kinds.count(kind) for kind in kinds} == {COUNT // (len(GOOD) + len(BROKEN))}
@@ -52,6 +52,10 @@ def test_there_are_as_many_good_motions_as_broken_ones_of_every_kind() -> None:
 def test_a_seed_gives_the_same_motion_every_time_and_another_seed_another_one() -> None:
     assert specimen(7) == specimen(7)
     assert specimen(7).line.keys != specimen(7 + 2 * len(BROKEN)).line.keys
+
+
+def test_near_the_limits_there_are_motions_of_every_kind() -> None:
+    assert {near_specimen(seed).kind for seed in range(len(NEAR))} == set(NEAR)
 
 
 def test_a_wrong_entry_begins_where_the_robot_is_not(model: RobotModel) -> None:
@@ -72,7 +76,7 @@ def test_nothing_is_held_against_a_clean_run(model: RobotModel) -> None:
         (replace(CLEAN, fall="fell at t=3.20 s"), "fell"),
         (replace(CLEAN, slip=0.012), "slipped 12 mm"),
         (replace(CLEAN, saturated=0.02), "saturated for 20 ms"),
-        (replace(CLEAN, joint_distance=-0.05), "0.05 rad beyond"),
+        (replace(CLEAN, joint_distance=-0.05), "0.050 rad beyond"),
         (replace(CLEAN, speed=1.1), "110 % of its speed"),
         (replace(CLEAN, tracking=0.06), "6 cm off"),
         (replace(CLEAN, ends_off=0.07), "7 cm off"),
@@ -98,6 +102,9 @@ def result(refused: float, failed: float) -> Measurement:
     )
 
 
+NONE = Verdicts((), {})
+
+
 def matrix(*pairs: tuple[float, float]) -> Verdicts:
     measured = {seed: result(*pair) for seed, pair in enumerate(pairs)}
     return verdicts_of({FAMILY.name: measured})
@@ -109,15 +116,15 @@ def test_precision_and_recall_are_shares_of_the_refused_and_of_the_failed() -> N
     assert found.recall == pytest.approx(3 / 5)
     assert [case.seed for case in found.misses] == [3, 4, 5]
     assert not found.ok
-    assert "precision 0.750, recall 0.600" in render(found)
-    assert max(map(len, render(found).splitlines())) <= 80
+    assert "precision 0.750, recall 0.600" in render(found, NONE)
+    assert max(map(len, render(found, NONE).splitlines())) <= 80
 
 
 def test_all_right_is_ok_and_a_lost_run_is_not() -> None:
     assert matrix((1, 1), (0, 0)).ok
     lost = verdicts_of({FAMILY.name: {0: result(1, 1), 1: Measurement({}, reason="fell")}})
     assert not lost.ok
-    assert "seed 1: no result, fell" in render(lost)
+    assert "seed 1: no result, fell" in render(lost, NONE)
 
 
 def fake(trial: Trial) -> Measurement:
@@ -127,9 +134,12 @@ def fake(trial: Trial) -> Measurement:
 def test_the_command_reports_and_writes_the_matrix(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(feasibility, "FAMILY", Family(FAMILY.name, FAMILY.rows, fake))
+    for name in ("FAMILY", "NEAR_FAMILY"):
+        family = getattr(feasibility, name)
+        monkeypatch.setattr(feasibility, name, Family(family.name, family.rows, fake))
     file = tmp_path / "matrix.json"
-    arguments = ["bench", "feasibility", "--motions", "6", "--jobs", "1", "--json"]
+    arguments = ["bench", "feasibility", "--motions", "6", "--near", "4", "--jobs", "1"]
+    arguments.append("--json")
     assert cli.main([*arguments, "--out", str(file)]) == ExitCode.OK
     printed = json.loads(capsys.readouterr().out)
     assert printed == json.loads(file.read_text())
@@ -139,11 +149,12 @@ def test_the_command_reports_and_writes_the_matrix(
         "accepted_failed": 0,
         "accepted_done": 3,
     }
+    assert len(printed["near_limits"]["cases"]) == 4
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(0, 2 * len(BROKEN), 3))
 def test_the_check_foresees_what_physics_does(seed: int) -> None:
     measured = feasibility.measure(Trial(seed))
-    assert measured.values["feasibility.failed"] == float(specimen(seed).is_broken)
-    assert measured.values["feasibility.refused"] == float(specimen(seed).is_broken)
+    assert measured.values["feasibility.failed"] == float(specimen(seed).is_broken is True)
+    assert measured.values["feasibility.refused"] == float(specimen(seed).is_broken is True)

@@ -148,4 +148,6 @@ def empty_track(n: int, v_contacts: np.ndarray) -> Track:
         p_world_contacts=np.zeros((n, 4, 3)),
         v_world_contacts=v_contacts,
         trunk_force=np.zeros(n),
+        limb_force=np.zeros(n),
+        touches_itself=np.zeros(n, dtype=bool),
     )

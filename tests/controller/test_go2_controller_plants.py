@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from controller import GO2Controller, Mode
-from go2_wbc.errors import ClosedError
+from go2_wbc.errors import ClosedError, PlantError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco_model import JointDynamics, build_spec
 from go2_wbc.robot.description import find_description
@@ -146,6 +146,17 @@ def test_a_plant_that_was_given_is_left_open_and_limp() -> None:
         go2.wait(2 * PERIOD)
     assert is_limp(plant.commands[-1])
     assert plant.read().time > 0.0
+
+
+def test_a_plant_obeys_one_controller_at_a_time() -> None:
+    plant = MujocoPlant()
+    with (
+        GO2Controller(plant=plant),
+        pytest.raises(PlantError, match="another controller drives this plant"),
+    ):
+        GO2Controller("robot2", plant=plant)
+    with GO2Controller("robot2", plant=plant) as go2:
+        assert go2.stand()
 
 
 def test_an_error_in_the_with_block_closes_and_comes_out() -> None:

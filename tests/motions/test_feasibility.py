@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from go2_wbc.errors import MotionInfeasible
+from go2_wbc.errors import CommandError, MotionInfeasible, TimelineError
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Stance
 from go2_wbc.robot.model import RobotModel
@@ -148,6 +148,22 @@ def test_legs_that_cross_are_found(checker: FeasibilityChecker) -> None:
     (finding,) = [f for f in checker.check(crossing).failures if f.check == "self-collision"]
     assert "FL" in finding.subject
     assert "FR" in finding.subject
+
+
+def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: FeasibilityChecker) -> None:
+    assert checker.check("bow").motion == "bow"
+    with pytest.raises(CommandError, match="unknown motion 'bows'; valid: bow"):
+        checker.check("bows")
+    with pytest.raises(TimelineError, match="a motion is a name, a Timeline or a plan, not 3"):
+        checker.check(3)  # type: ignore[arg-type]
+
+
+def test_a_moment_without_balance_is_told_without_a_number(checker: FeasibilityChecker) -> None:
+    report = checker.check(AWAY["balance"])
+    (finding,) = [f for f in report.failures if f.check == "balance"]
+    assert "nan" not in str(finding)
+    assert "two feet cannot balance the trunk" in str(finding)
+    assert "nan" not in report.table()
 
 
 def test_a_motion_that_starts_lying_or_ends_elsewhere_is_refused(

@@ -1,0 +1,73 @@
+"""Motions of a user's own file: found by name, and every mistake named with its file and line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from go2_wbc.errors import TimelineError
+from motions import load_file
+
+HEAD = "from motions import Timeline, motion\n\n\n"
+NOD = """@motion
+def nod() -> Timeline:
+    return Timeline().body(pitch=0.1, over=1.0)
+"""
+
+
+def written(folder: Path, text: str, name: str = "mine.py") -> Path:
+    file = folder / name
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def test_the_motions_of_a_file_come_by_name(tmp_path: Path) -> None:
+    found = load_file(written(tmp_path, HEAD + NOD + NOD.replace("nod", "shake")))
+    assert list(found) == ["nod", "shake"]
+    assert found["nod"].source.endswith("mine.py:4")
+    assert found["nod"]().end == 1.0
+
+
+def test_motions_that_a_file_imports_are_not_its_own(tmp_path: Path) -> None:
+    text = (
+        HEAD + "from motions.library.bow import bow\n\n\n" + NOD + "\n\nagain = nod\nother = bow\n"
+    )
+    assert list(load_file(written(tmp_path, text))) == ["nod"]
+
+
+def test_two_motions_of_one_name_are_refused_with_both_lines(tmp_path: Path) -> None:
+    file = written(tmp_path, HEAD + NOD + "\n\n" + NOD)
+    with pytest.raises(TimelineError, match=r"two motions named 'nod', lines 5 and 10"):
+        load_file(file)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "defines no motion"),
+        ("def broken(:\n", "mine.py, line 1: SyntaxError"),
+        (HEAD + "import no_such_module\n", "mine.py, line 4: ModuleNotFoundError"),
+        (HEAD + "1 / 0\n", "mine.py, line 4: ZeroDivisionError"),
+        (HEAD + NOD.replace("nod()", "nod(depth: float)"), "line 4: TimelineError: nod: parameter"),
+    ],
+)
+def test_a_file_that_does_not_load_is_named_with_the_line(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    with pytest.raises(TimelineError, match=message):
+        load_file(written(tmp_path, text))
+
+
+def test_a_missing_file_and_another_kind_of_file_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(TimelineError, match="there is no file"):
+        load_file(tmp_path / "none.py")
+    with pytest.raises(TimelineError, match=r"must end in \.py"):
+        load_file(written(tmp_path, "hello", "mine.txt"))
+
+
+def test_a_file_may_be_loaded_again_after_it_was_changed(tmp_path: Path) -> None:
+    file = written(tmp_path, HEAD + NOD)
+    assert load_file(file)["nod"]().end == 1.0
+    written(tmp_path, HEAD + NOD.replace("over=1.0", "over=2.5"))
+    assert load_file(file)["nod"]().end == 2.5
