@@ -26,6 +26,7 @@ from go2_wbc.errors import (
     IkError,
     MotionError,
     QpInfeasible,
+    SolverUnavailable,
 )
 
 PROGRAM = "go2-wbc"
@@ -66,6 +67,7 @@ EXIT_CODES: tuple[tuple[type[Go2WbcError], ExitCode], ...] = (
     (IkError, ExitCode.FAILED),
     (CommandError, ExitCode.USAGE),
     (ConfigError, ExitCode.USAGE),
+    (SolverUnavailable, ExitCode.USAGE),
     (Go2WbcError, ExitCode.RUNTIME),
 )
 """The exit code of an error; the first class that fits counts."""

@@ -136,6 +136,7 @@ def test_the_exit_code_of_a_command_is_passed_on(act: Callable[[Action], None]) 
         (errors.IkError("0.4 m off"), ExitCode.FAILED),
         (errors.CommandError("nan"), ExitCode.USAGE),
         (errors.ConfigError("unknown key"), ExitCode.USAGE),
+        (errors.SolverUnavailable("unknown QP solver"), ExitCode.USAGE),
         (errors.PlantTimeout("silent"), ExitCode.RUNTIME),
         (errors.MissingDependency("pip install x"), ExitCode.RUNTIME),
         (FileNotFoundError(2, "No such file or directory", "bow.py"), ExitCode.RUNTIME),
