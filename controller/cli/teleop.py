@@ -1,0 +1,101 @@
+"""``go2-wbc teleop``: drive the simulated robot with the keyboard."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import select
+import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from controller.cli.common import ExitCode, Subparsers, add_parser
+from go2_wbc.errors import CommandError
+
+if TYPE_CHECKING:
+    from controller.teleop import Teleop
+
+EXAMPLES = """
+go2-wbc teleop              headless: a line tells what the robot does
+go2-wbc teleop --viewer     watch it in MuJoCo's window
+"""
+REFRESH = 0.1
+"""Time [s] between two looks at the keyboard and the robot."""
+_CLEAR_LINE = "\r\x1b[2K"
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``teleop``."""
+    parser = add_parser(
+        subparsers,
+        "teleop",
+        "Drive the robot in MuJoCo with the keyboard, at the pace of the wall clock.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument("--viewer", action="store_true", help="also open MuJoCo's window")
+    parser.add_argument("--mjcf", metavar="FILE", type=Path, help="your own Go2 model or scene")
+    parser.add_argument("--config", metavar="FILE", type=Path, help="TOML with other numbers")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Read keys until the last one, or Ctrl-C; the robot ends limp."""
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise CommandError("teleop reads keys from a terminal; standard input or output is none")
+    from controller.go2_controller import GO2Controller
+    from controller.teleop import Teleop, keys_help
+    from go2_wbc.plant import MujocoPlant
+
+    print(keys_help())
+    with (
+        closing(MujocoPlant(args.mjcf)) as plant,
+        GO2Controller(plant=plant, realtime=True, viewer=args.viewer, config=args.config) as go2,
+    ):
+        teleop = Teleop(go2)
+        try:
+            with _single_keys():
+                _drive(teleop)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            print()
+            teleop.close()
+    return ExitCode.OK
+
+
+def _drive(teleop: Teleop) -> None:
+    goes_on = True
+    while goes_on:
+        width = shutil.get_terminal_size().columns - 1
+        news = "".join(f"{_CLEAR_LINE}{line}\n" for line in teleop.news())
+        sys.stdout.write(news + _CLEAR_LINE + teleop.status()[:width])
+        sys.stdout.flush()
+        for key in _pressed():
+            goes_on = goes_on and teleop.press(key)
+
+
+def _pressed() -> str:
+    """Keys that came within the next moment; the end of the input counts as the last key."""
+    from controller.teleop import QUIT
+
+    ready, _, _ = select.select([sys.stdin], [], [], REFRESH)
+    if not ready:
+        return ""
+    return os.read(sys.stdin.fileno(), 64).decode(errors="ignore") or QUIT
+
+
+@contextmanager
+def _single_keys() -> Iterator[None]:
+    """Keys come at once and unseen; the terminal is left as it was found."""
+    import termios
+    import tty
+
+    handle = sys.stdin.fileno()
+    before = termios.tcgetattr(handle)
+    try:
+        tty.setcbreak(handle)
+        yield
+    finally:
+        termios.tcsetattr(handle, termios.TCSADRAIN, before)

@@ -1,0 +1,138 @@
+"""Drives a robot by keys: short commands at once, long ones in a thread of their own.
+
+Knows nothing of terminals: ``press`` takes a key, ``status`` tells what is going on, ``news`` what
+has come of it.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from queue import SimpleQueue
+from typing import final
+
+from controller.go2_controller import GO2Controller
+from go2_wbc.errors import ClosedError, Go2WbcError
+from go2_wbc.planning.command import VelocityCommand
+
+SPEED_STEP = 0.1
+"""Change of speed [m/s] by one key."""
+TURN_STEP = 0.2
+"""Change of the turning rate [rad/s] by one key."""
+JOIN_TIME = 5.0
+"""Time [s] that a running call gets to end when the robot is let go."""
+
+QUIT, STOP, DAMP = "x", " ", "k"
+STEPS: Mapping[str, tuple[str, VelocityCommand]] = {
+    "w": ("faster", VelocityCommand(SPEED_STEP, 0.0, 0.0)),
+    "s": ("slower", VelocityCommand(-SPEED_STEP, 0.0, 0.0)),
+    "a": ("turn left", VelocityCommand(0.0, 0.0, TURN_STEP)),
+    "d": ("turn right", VelocityCommand(0.0, 0.0, -TURN_STEP)),
+    "q": ("step left", VelocityCommand(0.0, SPEED_STEP, 0.0)),
+    "e": ("step right", VelocityCommand(0.0, -SPEED_STEP, 0.0)),
+}
+ACTIONS: Mapping[str, tuple[str, Callable[[GO2Controller], bool]]] = {
+    "1": ("stand", lambda go2: go2.stand()),
+    "2": ("sit", lambda go2: go2.sit()),
+    "3": ("lie down", lambda go2: go2.lie_down()),
+    "4": ("walk", lambda go2: go2.walk()),
+    "h": ("high five", lambda go2: go2.high_five()),
+    "b": ("bow", lambda go2: go2.play("bow")),
+    "r": ("recover", lambda go2: go2.recover()),
+}
+
+
+def keys_help() -> str:
+    """Every key with what it does, for a person; at most 80 columns wide."""
+    moves = [f"{key} {label}" for key, (label, _) in STEPS.items()]
+    acts = [f"{key} {label}" for key, (label, _) in ACTIONS.items()]
+    return "\n".join(
+        [
+            "   ".join(acts),
+            "   ".join(moves),
+            "space stop   k go limp   x quit",
+        ]
+    )
+
+
+@final
+class Teleop:
+    """Turns keys into calls on a robot whose time passes by itself (``realtime=True``)."""
+
+    def __init__(self, go2: GO2Controller) -> None:
+        """Drive ``go2``."""
+        self._go2 = go2
+        self._worker: threading.Thread | None = None
+        self._doing = ""
+        self._news: SimpleQueue[str] = SimpleQueue()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether a long call is running."""
+        return self._worker is not None and self._worker.is_alive()
+
+    def press(self, key: str) -> bool:
+        """Do what ``key`` means; False if it means to end."""
+        if key == QUIT:
+            return False
+        try:
+            self._obey(key)
+        except Go2WbcError as error:
+            self._news.put(str(error))
+        return True
+
+    def status(self) -> str:
+        """One line of at most 80 columns: what it does, what is asked and what is measured."""
+        state, command = self._go2.state, self._go2.command
+        doing = f"{self._doing} ..." if self.is_busy else self._go2.mode.name.lower()
+        asked = (
+            f"{command.linear_x:+.1f} {command.linear_y:+.1f} m/s {command.angular_z:+.1f} rad/s"
+        )
+        measured = f"ahead {state.v[0]:+.2f} m/s, {state.q[2]:.2f} m high"
+        return f"{doing:<13} asked {asked}; {measured}"
+
+    def news(self) -> list[str]:
+        """What has been said since the last call."""
+        return [self._news.get() for _ in range(self._news.qsize())]
+
+    def close(self) -> None:
+        """Go limp, and wait for a running call to notice."""
+        self._go2.damp()
+        if self._worker is not None:
+            self._worker.join(JOIN_TIME)
+
+    def _obey(self, key: str) -> None:
+        if key in STEPS:
+            self._change(STEPS[key][1])
+        elif key in ACTIONS:
+            self._begin(*ACTIONS[key])
+        elif key == STOP:
+            self._go2.stop()
+        elif key == DAMP:
+            self._go2.damp()
+            self._news.put("limp")
+
+    def _change(self, step: VelocityCommand) -> None:
+        now = self._go2.command
+        self._go2.move(
+            linear_x=round(now.linear_x + step.linear_x, 3),
+            angular_z=round(now.angular_z + step.angular_z, 3),
+            linear_y=round(now.linear_y + step.linear_y, 3),
+        )
+
+    def _begin(self, label: str, act: Callable[[GO2Controller], bool]) -> None:
+        if self.is_busy:
+            self._news.put(f"{self._doing} is still running: k ends it")
+            return
+        self._doing = label
+        self._worker = threading.Thread(target=self._do, args=(label, act), daemon=True)
+        self._worker.start()
+
+    def _do(self, label: str, act: Callable[[GO2Controller], bool]) -> None:
+        try:
+            ok = act(self._go2)
+            self._news.put(f"{label}: {'done' if ok else self._go2.last_outcome.reason}")
+        except ClosedError:
+            pass
+        except Go2WbcError as error:
+            self._news.put(f"{label}: {error}")
