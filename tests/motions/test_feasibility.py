@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 
@@ -155,7 +157,7 @@ def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: Feasibil
     with pytest.raises(CommandError, match="unknown motion 'bows'; valid: bow"):
         checker.check("bows")
     with pytest.raises(TimelineError, match="a motion is a name, a Timeline or a plan, not 3"):
-        checker.check(3)  # type: ignore[arg-type]
+        inspect.unwrap(FeasibilityChecker.check)(checker, 3)  # past the checks of types
 
 
 def test_a_moment_without_balance_is_told_without_a_number(checker: FeasibilityChecker) -> None:
