@@ -66,7 +66,7 @@ class FeasibilityChecker:
         """
         return self._rehearsed(self._plan(motion))
 
-    def _plan(self, motion: str | Motion | Timeline | MotionPlan) -> MotionPlan:
+    def _plan(self, motion: object) -> MotionPlan:
         if isinstance(motion, str):
             motion = load_motion(motion)
         if isinstance(motion, Motion):
