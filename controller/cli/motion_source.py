@@ -39,7 +39,7 @@ class MotionSource:
         else:
             self.path = Path(find_motion(word).source.rpartition(":")[0])
             self._word = f"{self.path}:{word}"
-        self._seen = self._signature()
+        self._seen = self._last = self._signature()
         self.name = self.timeline().name
 
     def timeline(self) -> Timeline:
@@ -52,12 +52,13 @@ class MotionSource:
         return the_motion(self._word, self._settings)
 
     def has_changed(self) -> bool:
-        """Whether the file was saved since the last call; not while it is away.
+        """Whether the file was saved, and has rested since the call before.
 
-        Editors save by writing aside and renaming: for a moment there may be no file.
+        A save takes a moment, in which the file may be empty, cut short or away.
         """
         now = self._signature()
-        if now is None or now == self._seen:
+        has_rested, self._last = now == self._last, now
+        if now is None or now == self._seen or not has_rested:
             return False
         self._seen = now
         return True

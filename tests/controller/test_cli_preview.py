@@ -124,7 +124,7 @@ def test_a_port_in_use_is_named(capsys: Output) -> None:
     assert f"cannot listen on port {port} of 127.0.0.1" in capsys.readouterr().err
 
 
-def test_a_source_sees_saves_and_waits_while_an_editor_renames(rise: Path) -> None:
+def test_a_source_sees_saves_once_they_are_done(rise: Path) -> None:
     source = MotionSource(str(rise), [])
     assert source.name == "rise"
     assert not source.has_changed()
@@ -133,8 +133,11 @@ def test_a_source_sees_saves_and_waits_while_an_editor_renames(rise: Path) -> No
     aside = rise.with_suffix(".tmp")
     aside.write_text(GOOD.replace("over=0.8", "over=1.8"), encoding="utf-8")
     os.replace(aside, rise)  # noqa: PTH105 - as editors do
-    assert source.has_changed()
+    assert [source.has_changed() for _ in range(4)] == [False, True, False, False]
+    rise.write_text("", encoding="utf-8")
     assert not source.has_changed()
+    rise.write_text(GOOD.replace("over=0.8", "over=1.8"), encoding="utf-8")
+    assert [source.has_changed() for _ in range(3)] == [False, True, False]
     assert source.timeline().end == pytest.approx(4.0)
 
 
