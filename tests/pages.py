@@ -1,0 +1,163 @@
+"""Reads the project's Markdown pages and runs what they show.
+
+A comment on the line before a block says how to take it:
+
+    <!-- file: greet.py -->       the block is written to this file of the working folder
+    <!-- exits 1 -->              its last command ends with this code
+    <!-- needs: preview -->       left out while the command line has no such subcommand
+    <!-- numbers within 30 % -->  how near the numbers of this output must be
+
+A ``text`` block right after a ``sh`` or ``python`` block is its output. Words must agree, numbers
+nearly; ``...`` as a line stands for any lines, and at the end of a line for the rest of it.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from controller.cli.main import COMMANDS
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = tuple(f"docs/{name}.md" for name in ("tutorial", "motions", "feasibility", "gallery"))
+PAGES = ("README.md", "CONTRIBUTING.md", *DOCS)
+FENCE = re.compile(r"^(?:<!-- ([^>]*) -->\n)?```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+NOT_RUN = "# not run by the tests"
+# Numbers of a feasibility table repeat to the last digit on one machine; elsewhere the QP and the
+# splines round differently.
+NEAR, NEAR_ZERO = 0.03, 1e-3
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+
+@dataclass(frozen=True)
+class Block:
+    """A fenced block: its language, text, the line of the page on which it starts, and its note."""
+
+    language: str
+    text: str
+    line: int
+    note: str
+
+    @property
+    def file(self) -> str:
+        """The file that it is, or an empty word."""
+        return self.note.removeprefix("file: ") if self.note.startswith("file: ") else ""
+
+    @property
+    def is_runnable(self) -> bool:
+        """Whether its subcommand exists, if it needs one."""
+        name = self.note.removeprefix("needs: ")
+        return name == self.note or name in {command.name for command in COMMANDS}
+
+    @property
+    def exit_code(self) -> int:
+        match = re.search(r"exits (\d)", self.note)
+        return int(match[1]) if match else 0
+
+    @property
+    def tolerance(self) -> float:
+        match = re.search(r"numbers within (\d+) %", self.note)
+        return int(match[1]) / 100 if match else NEAR
+
+
+def page(name: str) -> str:
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+def blocks(name: str, language: str | None = None) -> list[Block]:
+    text = page(name)
+    found = (
+        Block(match[2], match[3], text.count("\n", 0, match.start(2)) + 1, match[1] or "")
+        for match in FENCE.finditer(text)
+    )
+    return [block for block in found if language in (None, block.language)]
+
+
+def name_of(block: Block) -> str:
+    return f"line {block.line}"
+
+
+def words_of(block: Block) -> list[list[str]]:
+    """Words of every shell line of a block, comments dropped."""
+    lines = (shlex.split(line, comments=True) for line in block.text.splitlines())
+    return [words for words in lines if words]
+
+
+def command_lines(name: str) -> list[list[str]]:
+    """Words of every shell line of a page that can be run."""
+    shells = (block for block in blocks(name, "sh") if block.is_runnable)
+    return [words for block in shells for words in words_of(block)]
+
+
+def run_python(text: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a Python block alone, in ``folder``."""
+    return _run(["-W", "error::DeprecationWarning:__main__", "-c", text], folder)
+
+
+def run_command(words: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run ``go2-wbc``, ``pytest`` or ``python`` of this checkout, installed or not."""
+    program = {
+        "go2-wbc": ["-m", "controller.cli.main"],
+        "pytest": ["-m", "pytest", "-p", "controller.pytest_plugin"],
+        "python": [],
+    }[words[0]]
+    return _run([*program, *words[1:]], folder)
+
+
+def _run(arguments: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(ROOT),
+        "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+        "COLUMNS": "80",
+    }
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def difference(shown: str, printed: str, tolerance: float = NEAR) -> str:
+    """The first line of ``shown`` that ``printed`` does not bear out; empty if there is none."""
+    real = [line.split() for line in printed.splitlines() if line.strip()]
+    position, may_skip = 0, False
+    for line in shown.splitlines():
+        words = line.split()
+        if not words:
+            continue
+        if words == ["..."]:
+            may_skip = True
+            continue
+        candidates = range(position, len(real) if may_skip else min(position + 1, len(real)))
+        found = next((k for k in candidates if _agree(words, real[k], tolerance)), None)
+        if found is None:
+            return f"shown: {line}"
+        position, may_skip = found + 1, False
+    left = [] if may_skip else real[position:]
+    return f"not shown: {' '.join(left[0])}" if left else ""
+
+
+def _agree(shown: list[str], real: list[str], tolerance: float) -> bool:
+    if shown[-1] == "...":
+        shown, real = shown[:-1], real[: len(shown) - 1]
+    pairs = zip(shown, real, strict=False)
+    return len(shown) == len(real) and all(_same(a, b, tolerance) for a, b in pairs)
+
+
+def _same(shown: str, real: str, tolerance: float) -> bool:
+    if _NUMBER.sub("#", shown) != _NUMBER.sub("#", real):
+        return False
+    pairs = zip(_NUMBER.findall(shown), _NUMBER.findall(real), strict=True)
+    return all(
+        abs(float(a) - float(b)) <= max(tolerance * abs(float(a)), NEAR_ZERO) for a, b in pairs
+    )
