@@ -31,16 +31,29 @@ def support_margin(points: Float[np.ndarray, "k 2"], p: Float[np.ndarray, "2"]) 
     Raises:
         ValueError: if there is no point.
     """
+    return float(support_margins(points, p[None])[0])
+
+
+def support_margins(
+    points: Float[np.ndarray, "k 2"], p: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, " n"]:
+    """``support_margin`` of many places ``p`` [m] over the same ``points`` [m].
+
+    Raises:
+        ValueError: if there is no point.
+    """
     if len(points) == 0:
         raise ValueError("a support polygon needs at least one point")
     hull = convex_hull(points)
-    starts, edges = hull, np.roll(hull, -1, axis=0) - hull
+    edges = np.roll(hull, -1, axis=0) - hull
     squares = np.maximum((edges**2).sum(axis=1), _TINY)
-    along = ((p - starts) * edges).sum(axis=1) / squares
-    nearest = starts + np.clip(along, 0.0, 1.0)[:, None] * edges
-    distance = float(np.linalg.norm(p - nearest, axis=1).min())
-    is_inside = len(hull) >= 3 and bool((_cross(edges, p - starts) >= 0.0).all())
-    return distance if is_inside else -distance
+    offsets = p[:, None] - hull
+    along = (offsets * edges).sum(axis=2) / squares
+    nearest = hull + np.clip(along, 0.0, 1.0)[:, :, None] * edges
+    distance = np.linalg.norm(p[:, None] - nearest, axis=2).min(axis=1)
+    turns = edges[:, 0] * offsets[:, :, 1] - edges[:, 1] * offsets[:, :, 0]
+    is_inside = (turns >= 0.0).all(axis=1) & (len(hull) >= 3)
+    return np.where(is_inside, distance, -distance)
 
 
 _TINY = 1e-300

@@ -2,7 +2,7 @@
 
 from motions.authoring import Choice, Motion, Range, motion
 from motions.compiler import CompiledPlan, compile_timeline
-from motions.feasibility import FeasibilityChecker, FeasibilityReport, Finding, check
+from motions.feasibility import FeasibilityChecker, FeasibilityReport, Finding, Rehearsal, check
 from motions.registry import find_motion, load_file, load_motion, motion_names
 from motions.timeline import Timeline, deg
 
@@ -14,6 +14,7 @@ __all__ = [
     "Finding",
     "Motion",
     "Range",
+    "Rehearsal",
     "Timeline",
     "check",
     "compile_timeline",

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import ast
 import importlib
-import importlib.util
 import pkgutil
 import sys
 import traceback
 from collections.abc import Mapping
 from functools import cache
+from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import ModuleType
 
@@ -80,13 +80,16 @@ def _require_own_names(file: Path, names: set[str]) -> None:
 
 def _run(file: Path) -> ModuleType:
     name = f"_motion_file_{file.stem}"
-    spec = importlib.util.spec_from_file_location(name, file.resolve())
-    if spec is None or spec.loader is None:
+    if file.suffix != ".py":
         raise TimelineError(f"{file} is not a Python file: its name must end in .py")
-    module = importlib.util.module_from_spec(spec)
+    path = str(file.resolve())
+    loader = SourceFileLoader(name, path)
+    module = ModuleType(name)
+    module.__file__ = path
     sys.modules[name] = module  # dataclasses look their module up
     try:
-        spec.loader.exec_module(module)
+        # Never from cached bytecode: it tells two saves within a second apart by their size only.
+        exec(loader.source_to_code(loader.get_data(path), path), vars(module))
     except Exception as error:
         raise TimelineError(f"{_place(file, error)}: {type(error).__name__}: {error}") from error
     finally:

@@ -71,7 +71,10 @@ def progress(key: BodyKey | PostureKey | LegKey, times: Times) -> Float[np.ndarr
 def eased(start: float, end: float, ease: Ease, times: Times) -> Float[np.ndarray, " n"]:
     """0 before ``start``, 1 after ``end``, eased between them."""
     s = np.clip((times - start) / (end - start), 0.0, 1.0)
-    return np.array([ease.progress(float(value))[0] for value in s])
+    shares = np.where(s < 1.0, 0.0, 1.0)
+    during = (s > 0.0) & (s < 1.0)
+    shares[during] = [ease.progress(float(value))[0] for value in s[during]]
+    return shares
 
 
 def flights(timeline: Timeline, leg: Leg) -> list[tuple[float, float]]:

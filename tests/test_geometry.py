@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from go2_wbc.geometry import convex_hull, support_margin
+from go2_wbc.geometry import convex_hull, support_margin, support_margins
 
 ROUNDING = 1e-9  # coordinates are at most 1 m
 SQUARE = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
@@ -106,3 +106,11 @@ def test_another_foot_never_makes_the_margin_smaller(
 ) -> None:
     more = np.concatenate([points, extra[None]])
     assert support_margin(more, p) >= support_margin(points, p) - ROUNDING
+
+
+def test_many_points_at_once_have_the_margins_that_they_have_alone() -> None:
+    rng = np.random.default_rng(5)
+    feet, points = rng.normal(size=(4, 2)), rng.normal(size=(50, 2))
+    alone = [support_margin(feet, point) for point in points]
+    np.testing.assert_array_equal(support_margins(feet, points), alone)
+    assert min(alone) < 0.0 < max(alone)

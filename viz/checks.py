@@ -6,8 +6,22 @@ import numpy as np
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
+from viz.screening import Screening
 
 _LEAST_SAMPLES = 2
+
+
+def checked_screening(shown: Recording | Screening) -> Screening:
+    """What to show, once it is known that it can be drawn.
+
+    Raises:
+        ConfigError: for a recording that cannot be drawn.
+    """
+    screening = Screening(shown) if isinstance(shown, Recording) else shown
+    check_recording(screening.recording)
+    if screening.ghost is not None:
+        check_recording(screening.ghost)
+    return screening
 
 
 def check_recording(recording: Recording) -> None:

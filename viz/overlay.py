@@ -9,7 +9,7 @@ from jaxtyping import Bool, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
 from go2_wbc.legs import LEGS
-from viz.palette import ACCENT, INK, LEG_COLORS, MUTED, TRACK
+from viz.palette import ACCENT, ALARM, INK, LEG_COLORS, MUTED, TRACK
 
 _SUPERSAMPLING = 3  # Pillow draws shapes without antialiasing: draw larger, then shrink
 
@@ -24,6 +24,7 @@ class Caption:
         progress: share of the recording that has passed, 0..1; ``None`` draws no bar.
         contacts: which feet touch the floor.
         speed: playback speed, shown if not 1.
+        is_alarm: the label says what is wrong, and is red.
     """
 
     label: str
@@ -31,11 +32,13 @@ class Caption:
     progress: float | None
     contacts: Bool[np.ndarray, "4"]
     speed: float | int = 1.0
+    is_alarm: bool = False
 
 
 def readable(label: str) -> str:
     """``high_five`` as ``High five``."""
-    return label.replace("_", " ").strip().capitalize()
+    words = label.replace("_", " ").strip()
+    return words[:1].upper() + words[1:]
 
 
 def draw_caption(
@@ -60,9 +63,10 @@ def _draw_strip(
     middle = height - 28 * unit
     font, small = ImageFont.load_default(15 * unit), ImageFont.load_default(11.5 * unit)
     text = readable(caption.label)
+    back = ALARM if caption.is_alarm else INK
     left, pad, half = 14 * unit, 11 * unit, 13 * unit
     right = left + draw.textlength(text, font) + 2 * pad
-    draw.rounded_rectangle((left, middle - half, right, middle + half), half, fill=INK)
+    draw.rounded_rectangle((left, middle - half, right, middle + half), half, fill=back)
     draw.text((left + pad, middle), text, "white", font, anchor="lm")
     clock = f"{caption.time:.1f} s"
     if caption.speed != 1.0:

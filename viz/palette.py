@@ -6,6 +6,7 @@ INK = "#1f2937"
 MUTED = "#6b7280"
 TRACK = "#d8dee8"
 ACCENT = "#2563eb"
+ALARM = "#dc2626"
 FORCE = "#f97316"
 LEG_COLORS = ("#2563eb", "#f59e0b", "#10b981", "#db2777")
 """One colour per leg, in the order of ``LEGS``."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -10,10 +10,12 @@ from jaxtyping import Bool, Float, Int
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
 from viz.posed_robot import PosedRobot
+from viz.screening import MarginCurve
 from viz.smoothing import smoothed
 
 _FRAME_RATE = 50.0  # [Hz] finer is not seen at 60 Hz screens, swings stay smooth
 _MOST_FRAMES = 6000  # keeps the page of a long recording small; the rate drops instead
+_MOST_MARGINS = 3000  # samples of a margin curve; the least of each step is kept
 _CAMERA_SMOOTHING = 0.7  # [s]
 
 
@@ -95,6 +97,17 @@ def replay_frames(recording: Recording, robot: PosedRobot) -> ReplayFrames:
         support_margin=_extreme(np.fmin, recording.support_margin, rows),
         torque_ratio=_extreme(np.maximum, ratio, rows),
     )
+
+
+def reduced(curve: MarginCurve) -> MarginCurve:
+    """The curve with at most ``_MOST_MARGINS`` samples: the least of each step."""
+    step = -(-len(curve.time) // _MOST_MARGINS)
+    if step <= 1:
+        return curve
+    known = np.where(np.isnan(curve.margin), np.inf, curve.margin)
+    edges = range(0, len(known), step)
+    rows = np.array([start + int(known[start : start + step].argmin()) for start in edges])
+    return replace(curve, time=curve.time[rows], margin=curve.margin[rows], worst=curve.worst[rows])
 
 
 def label_spans(recording: Recording) -> tuple[Span, ...]:

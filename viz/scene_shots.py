@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import final
 
@@ -17,6 +18,9 @@ from viz.palette import FORCE, rgb
 from viz.posed_robot import PosedRobot, WorldTriangles, arrow
 from viz.renderer import RenderStyle, render
 from viz.robot_meshes import load_robot_visuals
+from viz.screening import Remark
+
+_INSTANT = 0.04  # [s] a limit that is broken for an instant is told for this long around it
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +60,18 @@ class ShotStyle:
 class Photographer:
     """Takes pictures of a recording."""
 
-    def __init__(self, recording: Recording, style: ShotStyle) -> None:
-        """Prepare the meshes and the path of the camera."""
+    def __init__(
+        self, recording: Recording, style: ShotStyle, remarks: Sequence[Remark] = ()
+    ) -> None:
+        """Prepare the meshes and the path of the camera.
+
+        Args:
+            recording: what happened.
+            style: how pictures are taken.
+            remarks: broken limits take the label's place in captions while they are broken.
+        """
         self._recording = recording
+        self._broken = [remark for remark in remarks if remark.is_broken]
         self._style = style
         self._robot = PosedRobot(load_robot_visuals().simplified(style.detail))
         self._path = camera_path(recording, self._robot, smoothing=style.smoothing)
@@ -82,13 +95,23 @@ class Photographer:
         k = int(nearest_rows(recording, np.array([time]))[0])
         progress = time / max(recording.duration, 1e-9) if with_progress else None
         touching = recording.foot_forces[k] > self._style.least_force
-        return Caption(recording.labels[k], time, progress, touching, speed)
+        broken = self._broken_at(time)
+        if broken is None:
+            return Caption(recording.labels[k], time, progress, touching, speed)
+        label = f"{broken.limit}: {broken.subject}"
+        return Caption(label, time, progress, touching, speed, is_alarm=True)
 
     def shoot_captioned(
         self, time: float, *, speed: float | int = 1.0
     ) -> UInt8[np.ndarray, "h w 3"]:
         """The picture at ``time`` with its caption."""
         return draw_caption(self.shoot(time), self.caption(time, speed=speed))
+
+    def _broken_at(self, time: float) -> Remark | None:
+        for remark in self._broken:
+            if any(start - _INSTANT <= time <= end + _INSTANT for start, end in remark.spans):
+                return remark
+        return None
 
     def _camera(self, time: float) -> Camera:
         style = self._style

@@ -49,6 +49,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("export", "controller.cli.motion_export", "a motion's trajectory as NumPy or CSV"),
     Command("list", "controller.cli.motion_list", "the motions, and what can be set"),
     Command("new", "controller.cli.motion_new", "write a small motion to start from"),
+    Command("preview", "controller.cli.motion_preview", "watch a motion, live in the browser"),
+    Command("ros2", "controller.cli.ros2", "the simulated robot as a ROS 2 node"),
     Command("run", "controller.cli.motion_run", "check a motion, then play it in MuJoCo"),
     Command("teleop", "controller.cli.teleop", "drive the robot with the keyboard"),
 )
@@ -56,6 +58,7 @@ COMMANDS: tuple[Command, ...] = (
 EXAMPLES = """
 go2-wbc demo             run the demo headless: table, replay page, pictures
 go2-wbc check wave       can the robot do this motion?
+go2-wbc preview wave     watch it in the browser, again after every save
 go2-wbc run wave         play it in MuJoCo
 go2-wbc doctor           what is installed, what is missing, how to get it
 go2-wbc doctor --json    the same for a program to read

@@ -44,6 +44,20 @@ def timelines(words: list[str], settings: list[str]) -> list[Timeline]:
     return [motion(**values) for motion in found]
 
 
+def the_motion(word: str, settings: list[str]) -> Timeline:
+    """The one motion that is meant.
+
+    Raises:
+        CommandError: for an unknown name, a setting that cannot be read, or several motions.
+        TimelineError: for a file that cannot be used or a parameter out of range.
+    """
+    found = timelines([word], settings)
+    if len(found) > 1:
+        names = ", ".join(line.name for line in found)
+        raise CommandError(f"{word} has several motions, choose FILE.py:NAME: {names}")
+    return found[0]
+
+
 def _motions(word: str) -> list[Motion]:
     from motions import find_motion, load_file
 

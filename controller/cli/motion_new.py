@@ -16,8 +16,9 @@ go2-wbc new greet --out motions_of_mine
 
 STARTER = '''"""{title}: a motion for the Go2.
 
-    go2-wbc check {name}.py    can the robot do it?
-    go2-wbc run {name}.py      play it in MuJoCo
+    go2-wbc check {name}.py      can the robot do it?
+    go2-wbc preview {name}.py    watch it; the page follows every save of this file
+    go2-wbc run {name}.py        play it in MuJoCo
 """
 
 from typing import Annotated

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
-from controller.cli.motion_args import add_motion, timelines
-from go2_wbc.errors import CommandError, StanceMismatch
+from controller.cli.motion_args import add_motion, the_motion
+from go2_wbc.errors import StanceMismatch
 
 if TYPE_CHECKING:
     from controller.bench.motion_runs import MotionRun
@@ -34,7 +34,9 @@ def register(subparsers: Subparsers) -> None:
     add_motion(parser)
     parser.add_argument("--force", action="store_true", help="play it even if it is infeasible")
     parser.add_argument("--friction", metavar="MU", type=float, help="of the feet, default 0.8")
-    parser.add_argument("--html", metavar="FILE", type=Path, help="write a 3D replay page")
+    parser.add_argument(
+        "--html", metavar="FILE", type=Path, help="write a 3D replay page, the plan as a ghost"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -42,20 +44,18 @@ def run(args: argparse.Namespace) -> int:
     """Check, play, measure, print."""
     from controller.bench.motion_runs import run_motion
     from controller.bench.trials import Subject
+    from controller.watching import performed
     from go2_wbc.plant import MujocoPlant
     from go2_wbc.reference import Stance
-    from motions import FeasibilityChecker, compile_timeline
-    from viz import export_html
+    from motions import FeasibilityChecker
+    from viz import HTML_SUFFIXES, export_html
     from viz.files import checked_output
 
-    lines = timelines([args.motion], args.values)
-    if len(lines) > 1:
-        names = ", ".join(line.name for line in lines)
-        raise CommandError(f"{args.motion} has several motions, choose FILE.py:NAME: {names}")
-    target = None if args.html is None else checked_output(args.html, [".html"])
+    timeline = the_motion(args.motion, args.values)
+    target = None if args.html is None else checked_output(args.html, HTML_SUFFIXES)
     checker = FeasibilityChecker()
-    plan = compile_timeline(lines[0], checker.model)
-    report = checker.check(plan)
+    rehearsal = checker.rehearse(timeline)
+    plan, report = rehearsal.plan, rehearsal.report
     if not args.force:
         report.raise_if_infeasible()
     with Subject(MujocoPlant(friction=args.friction)) as robot:
@@ -70,8 +70,9 @@ def run(args: argparse.Namespace) -> int:
     else:
         _print(plan.name, plan.duration, result)
     if target is not None:
-        export_html(recording, target, title=plan.name)
-        print(f"3D replay, offline: {args.html}")
+        export_html(performed(rehearsal, recording, checker.model), target, title=plan.name)
+        if not args.json:
+            print(f"3D replay beside the plan, offline: {args.html}")
     return ExitCode.OK if result.ok else ExitCode.FAILED
 
 

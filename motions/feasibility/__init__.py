@@ -2,6 +2,7 @@
 
 from motions.feasibility.check import FeasibilityChecker, check
 from motions.feasibility.limits import FeasibilityLimits
+from motions.feasibility.rehearsal import Rehearsal
 from motions.feasibility.report import FeasibilityReport, Finding, Series
 
 __all__ = [
@@ -9,6 +10,7 @@ __all__ = [
     "FeasibilityLimits",
     "FeasibilityReport",
     "Finding",
+    "Rehearsal",
     "Series",
     "check",
 ]

@@ -13,6 +13,7 @@ from motions.compiler import CompiledPlan, OutOfReach, compile_timeline
 from motions.feasibility import dynamic, kinematic
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.limits import FeasibilityLimits
+from motions.feasibility.rehearsal import Rehearsal
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.registry import load_motion
 from motions.timeline import Timeline
@@ -45,6 +46,27 @@ class FeasibilityChecker:
             CommandError: for an unknown name.
             TimelineError: if the timeline is empty, or this is no motion.
         """
+        plan = self._plan(motion)
+        try:
+            return self._rehearsed(plan).report
+        except MotionError as error:
+            unknown = _failed("numbers", "plan", 0.0, np.nan, str(error))
+            return FeasibilityReport.of(plan.name, plan.duration, [unknown])
+
+    def rehearse(self, motion: str | Motion | Timeline | MotionPlan) -> Rehearsal:
+        """The report on ``motion`` with the movement and the forces that it judges.
+
+        Args:
+            motion: as for ``check``.
+
+        Raises:
+            CommandError: for an unknown name.
+            TimelineError: if the timeline is empty, or this is no motion.
+            MotionError: if the plan is not finite: then there is no movement.
+        """
+        return self._rehearsed(self._plan(motion))
+
+    def _plan(self, motion: object) -> MotionPlan:
         if isinstance(motion, str):
             motion = load_motion(motion)
         if isinstance(motion, Motion):
@@ -52,13 +74,11 @@ class FeasibilityChecker:
         if not isinstance(motion, Timeline | MotionPlan):
             raise TimelineError(f"a motion is a name, a Timeline or a plan, not {motion!r}")
         is_plan = isinstance(motion, MotionPlan)
-        plan = motion if is_plan else compile_timeline(motion, self.model)
+        return motion if is_plan else compile_timeline(motion, self.model)
+
+    def _rehearsed(self, plan: MotionPlan) -> Rehearsal:
         model, limits = self.model, self._limits
-        try:
-            path = trajectory_of(plan, model)
-        except MotionError as error:
-            unknown = _failed("numbers", "plan", 0.0, np.nan, str(error))
-            return FeasibilityReport.of(plan.name, plan.duration, [unknown])
+        path = trajectory_of(plan, model)
         forces = dynamic.forces_of(path, model)
         series = [
             *_as_written(plan),
@@ -74,7 +94,8 @@ class FeasibilityChecker:
             kinematic.smoothness(path, limits),
             kinematic.ends(plan, path, model, limits),
         ]
-        return FeasibilityReport.of(plan.name, plan.duration, series)
+        report = FeasibilityReport.of(plan.name, plan.duration, series)
+        return Rehearsal(plan, report, path, forces)
 
 
 def check(motion: str | Motion | Timeline | MotionPlan) -> FeasibilityReport:

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import QpInfeasible
-from go2_wbc.geometry import support_margin
+from go2_wbc.geometry import support_margins
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -122,11 +122,14 @@ def contacts(
 
 def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tuple[Series, Series]:
     """Distance of the CoM and of the zero-moment point to the edges of the support polygon."""
-    values = np.empty((len(motion.times), 2))
-    for row, stands in enumerate(motion.stance):
+    values = np.full((len(motion.times), 2), -1.0)
+    for stands in np.unique(motion.stance, axis=0):
+        if not stands.any():
+            continue
+        rows = (motion.stance == stands).all(axis=1)
         feet = motion.p_feet[stands, :2]
-        points = (motion.p_com[row, :2], forces.zmp[row])
-        values[row] = [support_margin(feet, p) if len(feet) else -1.0 for p in points]
+        for column, points in enumerate((motion.p_com[:, :2], forces.zmp)):
+            values[rows, column] = support_margins(feet, points[rows])
     series = []
     for column, (check, subject, least) in enumerate(
         (("support", "CoM", limits.support), ("support of ZMP", "ZMP", limits.zero_moment))
@@ -168,7 +171,7 @@ def _share(
         weighted = scale[:, None] * A
         H = weighted.T @ weighted + EVENNESS * np.eye(3 * len(legs))
         g = -weighted.T @ (scale * wrench) - EVENNESS * even.ravel()
-        C = np.kron(np.eye(len(legs)), _PYRAMID_ROWS)
+        C = _PYRAMIDS[len(legs) - 1]
         lower = np.tile([-np.inf] * 4 + [0.0], len(legs))
         upper = np.zeros((len(legs), 5))
         upper[:, 4] = GREATEST_FORCE * shares
@@ -201,3 +204,4 @@ _PYRAMID_ROWS = np.array(
         [0.0, 0.0, 1.0],
     ]
 )
+_PYRAMIDS = tuple(np.kron(np.eye(feet), _PYRAMID_ROWS) for feet in (1, 2, 3, 4))

@@ -160,10 +160,10 @@ class FeasibilityReport:
     def summary(self) -> str:
         """One line: the verdict, and what is closest to its limit."""
         if not self.ok:
-            return f"no   {self.motion:<16}{_count(len(self.failures), 'limit')} broken"
+            return f"no   {self.motion:<15} {_count(len(self.failures), 'limit')} broken"
         tight = min(self.margins.values(), key=_share_left)
         return (
-            f"ok   {self.motion:<16}{self.duration:>5.1f} s   closest: {tight.check}, "
+            f"ok   {self.motion:<15} {self.duration:>5.1f} s   closest: {tight.check}, "
             f"{tight.subject} at {tight.time:.1f} s"
         )
 

@@ -12,6 +12,7 @@ import pytest
 from controller.cli.common import ExitCode
 from controller.cli.main import main
 from motions import motion_names
+from tests.viz.page_reader import read_data
 
 CLUMSY = '''
 from motions import Timeline, motion
@@ -27,6 +28,10 @@ def second() -> Timeline:
     """Second."""
     return Timeline().body(z=-0.02, over=0.5).home(over=0.5)
 '''
+
+
+GHOST_DISTANCE = 0.03
+"""How far [m] the trunk of a run may be from its plan: posture and timing of the tracking."""
 
 
 @pytest.fixture
@@ -121,7 +126,13 @@ def test_run_plays_a_motion_and_measures_it(
     assert main(["run", "bow", "--html", str(page)]) == ExitCode.OK
     text = capsys.readouterr().out
     assert "\ndone\n" in text
-    assert page.stat().st_size > 100_000
+    header, arrays = read_data(page.read_text(encoding="utf-8"))
+    assert not header["is_plan"]
+    assert header["verdict"]["ok"]
+    shared = min(len(arrays["q"]), len(arrays["ghost.q"]))
+    apart = np.abs(arrays["q"][:shared] - arrays["ghost.q"][:shared])
+    assert 0.0 < apart[:, :3].max() < GHOST_DISTANCE
+    assert np.abs(np.ptp(arrays["ghost.q"], axis=0)).max() > 0.1
     assert main(["run", f"{clumsy}:fall_over"]) == ExitCode.FAILED
     assert "infeasible" in capsys.readouterr().err
     assert main(["run", str(clumsy)]) == ExitCode.USAGE

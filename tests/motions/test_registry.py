@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from pathlib import Path
 
 import pytest
@@ -71,3 +73,16 @@ def test_a_file_may_be_loaded_again_after_it_was_changed(tmp_path: Path) -> None
     assert load_file(file)["nod"]().end == 1.0
     written(tmp_path, HEAD + NOD.replace("over=1.0", "over=2.5"))
     assert load_file(file)["nod"]().end == 2.5
+
+
+def test_a_file_that_is_saved_twice_in_a_second_is_read_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    lengths = []
+    for over in ("1.0", "2.0"):
+        file = written(tmp_path, HEAD + NOD.replace("over=1.0", f"over={over}"))
+        os.utime(file, (1_000_000_000, 1_000_000_000))
+        lengths.append(load_file(file)["nod"]().end)
+    assert lengths == [1.0, 2.0]
+    assert not (tmp_path / "__pycache__").exists()

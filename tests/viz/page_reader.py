@@ -26,8 +26,14 @@ def packed_parts(page: str) -> dict[str, bytes]:
 
 
 def read_data(page: str) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """Header and arrays of the replay, quantised arrays in their unit."""
-    content = packed_parts(page)["replay-data"]
+    """Header and arrays of scene and replay together, quantised arrays in their unit."""
+    parts = packed_parts(page)
+    scene, replay = read_pack(parts["replay-scene"]), read_pack(parts["replay-data"])
+    return {**scene[0], **replay[0]}, {**scene[1], **replay[1]}
+
+
+def read_pack(content: bytes) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """Header and arrays of one unpacked block."""
     length = int.from_bytes(content[:4], "little")
     header = json.loads(content[4 : 4 + length])
     start = -(-(4 + length) // 8) * 8

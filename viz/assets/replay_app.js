@@ -10,11 +10,50 @@ class Player {
     this.button = document.getElementById("play");
     this.now = document.getElementById("now");
     this.behaviour = document.getElementById("behaviour");
-    document.getElementById("total").textContent = ` / ${data.duration.toFixed(2)} s`;
     charts.forEach((chart) => chart.onScrub((t) => this.scrub(t)));
+    this.verdict = new VerdictPanel(data, (t) => this.scrub(t));
+    this.describe();
     this.seek(0);
     this.last = performance.now();
     requestAnimationFrame((now) => this.tick(now));
+  }
+
+  // Shows other data at the same time, from the same place.
+  use(data) {
+    this.data = data;
+    this.scene.use(data);
+    this.charts.forEach((chart) => chart.use(data));
+    this.verdict.use(data);
+    this.describe();
+    this.seek(this.time);
+  }
+
+  // What does not change with time.
+  describe() {
+    const { data } = this;
+    const { title, is_plan: isPlan } = data.header;
+    document.title = document.querySelector("h1").textContent = title;
+    document.getElementById("total").textContent = ` / ${data.duration.toFixed(2)} s`;
+    document.getElementById("app").classList.toggle("haunted", data.ghost !== null);
+    document.getElementById("force-key").textContent = isPlan ? "planned force" : "measured force";
+  }
+
+  cycleGhost() {
+    const { ghost } = this.scene;
+    const places = Object.keys(GHOST_PLACES);
+    ghost.place = places[(places.indexOf(ghost.place) + 1) % places.length];
+    const button = document.querySelector("[data-ghost]");
+    button.textContent = `Ghost: ${ghost.place}`;
+    button.classList.toggle("on", ghost.place !== "off");
+    this.scene.show(this.time);
+  }
+
+  // "check" or "curves" in the side panel.
+  openTab(name) {
+    document.getElementById("app").dataset.tab = name;
+    for (const button of document.querySelectorAll("[data-open]")) {
+      button.classList.toggle("on", button.dataset.open === name);
+    }
   }
 
   tick(now) {
@@ -39,6 +78,7 @@ class Player {
     this.time = this.data.clampTime(t);
     this.scene.show(this.time);
     this.charts.forEach((chart) => chart.show(this.time));
+    this.verdict.show(this.time);
     this.now.textContent = this.time.toFixed(2);
     this.behaviour.textContent = readable(this.data.labelAt(this.time));
     const slider = document.getElementById("timeline");
@@ -49,6 +89,12 @@ class Player {
   scrub(t) {
     this.play(false);
     this.seek(t);
+  }
+
+  // To the next broken or tight limit, after the last one to the first.
+  jumpToNext() {
+    const times = this.data.remarks.map((remark) => remark.time).sort((a, b) => a - b);
+    this.scrub(times.find((t) => t > this.time + INSTANT) ?? times[0]);
   }
 
   step(frames) {
@@ -90,6 +136,8 @@ function bindControls(player) {
   each("view", (name) => player.scene.setView(name));
   each("speed", (speed) => player.setSpeed(Number(speed)));
   each("step", (frames) => player.step(Number(frames)));
+  each("ghost", () => player.cycleGhost());
+  each("open", (name) => player.openTab(name));
   player.button.addEventListener("click", () => {
     player.play(!player.isPlaying);
     player.button.blur();
@@ -107,6 +155,8 @@ function bindControls(player) {
     else if (key === "end") player.scrub(player.data.duration);
     else if (views[key]) player.scene.setView(views[key]);
     else if (toggles[key]) player.toggle(toggles[key]);
+    else if (key === "g" && player.data.ghost) player.cycleGhost();
+    else if (key === "n" && player.data.remarks.length) player.jumpToNext();
     else return;
     event.preventDefault();
   });
@@ -114,17 +164,16 @@ function bindControls(player) {
 
 function makeCharts(data) {
   const card = (name) => document.querySelector(`[data-curve=${name}]`);
-  const heights = Float32Array.from({ length: data.frames }, (_, i) => data.q[19 * i + 2]);
   return [
     new Timeline(document.getElementById("timeline"), data),
     new Curve(card("margin"), data, {
-      values: data.margin, scale: 100, unit: "cm", digits: 1, limit: 0, least: 0.5, isBad: (v) => v < 0,
+      name: "margin", scale: 100, unit: "cm", digits: 1, limit: 0, least: 0.5, isBad: (v) => v < 0,
     }),
     new Curve(card("torque"), data, {
-      values: data.torque, scale: 100, unit: "%", digits: 0, limit: 1, least: 1, isBad: (v) => v > 1,
+      name: "torque", scale: 100, unit: "%", digits: 0, limit: 1, least: 1, isBad: (v) => v > 1,
     }),
     new Curve(card("height"), data, {
-      values: heights, scale: 100, unit: "cm", digits: 1, least: 0.5, isBad: () => false,
+      name: "height", scale: 100, unit: "cm", digits: 1, least: 0.5, isBad: () => false,
     }),
   ];
 }
@@ -140,9 +189,10 @@ async function start() {
     return;
   }
   const bundle = document.createElement("script");
-  bundle.textContent = new TextDecoder().decode(await unpackText("meshcat-bundle"));
+  bundle.textContent = new TextDecoder().decode(await unpackElement("meshcat-bundle"));
   document.head.append(bundle);
-  const data = new ReplayData(await unpackText("replay-data"));
+  const stored = new Pack(await unpackElement("replay-scene"));
+  const data = new ReplayData(await unpackElement("replay-data"), stored);
   let scene;
   try {
     scene = new RobotScene(document.getElementById("pane"), data);
@@ -154,6 +204,7 @@ async function start() {
   bindControls(player);
   player.play(!window.matchMedia("(prefers-reduced-motion: reduce)").matches);
   window.replay = player; // for scripts and tests
+  if (typeof listen === "function") listen(player);
 }
 
 start();

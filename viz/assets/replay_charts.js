@@ -3,6 +3,8 @@
 
 const INK = "#1f2937", MUTED = "#6b7280", LINE = "#e3e8f0", ACCENT = "#2563eb", BAD = "#dc2626";
 const FONT = "Inter, system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
+const WARN = "#f59e0b", GHOST = "#7c93d6";
+const LANE = 9; // px, height of the strip that shows when limits are broken
 const LABEL_COLORS = ["#dbe6ff", "#fde9cf", "#d5f2e3", "#fbdcea", "#e6e0fb", "#d7eff5"];
 
 // A canvas with a picture that is drawn once per size, and a cursor drawn over it.
@@ -22,8 +24,7 @@ class TimeCanvas {
       canvas.height = Math.round(this.height * ratio);
       canvas.getContext("2d").setTransform(ratio, 0, 0, ratio, 0, 0);
     }
-    if (this.width > 0 && this.height > 0) this.draw(this.picture.getContext("2d"));
-    this.show(this.time);
+    this.redraw();
   }
 
   xAt(t) {
@@ -42,6 +43,17 @@ class TimeCanvas {
     paint.clearRect(0, 0, this.width, this.height);
     paint.drawImage(this.picture, 0, 0, this.width, this.height);
     this.drawCursor(paint, this.xAt(t));
+  }
+
+  // Shows other data.
+  use(data) {
+    this.data = data;
+    this.redraw();
+  }
+
+  redraw() {
+    if (this.width > 0 && this.height > 0) this.draw(this.picture.getContext("2d"));
+    this.show(this.time);
   }
 
   // Calls `scrub(t)` while the pointer is down on the canvas.
@@ -70,10 +82,12 @@ class Timeline extends TimeCanvas {
   draw(paint) {
     paint.clearRect(0, 0, this.width, this.height);
     const [labels, axis] = [22, 18];
-    const row = (this.height - labels - axis - 6) / 4;
+    const top = labels + 6 + (this.data.remarks.length ? LANE + 5 : 0);
+    const row = (this.height - top - axis) / 4;
     this.drawLabels(paint, labels);
+    this.drawRemarks(paint, labels + 5);
     this.data.header.legs.forEach((leg, k) => {
-      this.drawLeg(paint, leg, k, labels + 6 + k * row, row - 3);
+      this.drawLeg(paint, leg, k, top + k * row, row - 3);
     });
     this.drawAxis(paint, this.height - axis);
   }
@@ -92,6 +106,26 @@ class Timeline extends TimeCanvas {
       paint.fillStyle = INK;
       paint.fillText(text, x + Math.min(7, (width - paint.measureText(text).width) / 2), height / 2 + 0.5);
     }
+  }
+
+  // When limits are nearly broken (amber) and broken (red).
+  drawRemarks(paint, top) {
+    if (!this.data.remarks.length) return;
+    paint.fillStyle = "#f3f5f9";
+    paint.fillRect(this.left, top, this.width - this.left - this.right, LANE);
+    const sorted = [...this.data.remarks].sort((a, b) => a.is_broken - b.is_broken);
+    for (const { is_broken: isBroken, spans } of sorted) {
+      paint.fillStyle = isBroken ? BAD : WARN;
+      for (const [from, to] of spans) {
+        const width = Math.max(this.xAt(to) - this.xAt(from), 3);
+        roundedBox(paint, this.xAt((from + to) / 2) - width / 2, top, width, LANE, 2);
+      }
+    }
+    paint.fillStyle = this.data.header.verdict.ok ? WARN : BAD;
+    paint.font = `700 12px ${FONT}`;
+    paint.textAlign = "left";
+    paint.textBaseline = "middle";
+    paint.fillText("!", 9, top + LANE / 2 + 0.5);
   }
 
   // Planned stance as a pale block, measured force as a filled curve in it.
@@ -118,21 +152,25 @@ class Timeline extends TimeCanvas {
       }
     }
     paint.globalAlpha = 0.9;
-    this.drawForce(paint, k, top, height);
+    paint.beginPath();
+    paint.moveTo(this.left, top + height);
+    this.traceForce(paint, data, k, top, height);
+    paint.lineTo(this.xAt(data.end), top + height);
+    paint.fill();
     paint.globalAlpha = 1;
+    if (!data.ghost) return;
+    paint.strokeStyle = INK;
+    paint.lineWidth = 1;
+    paint.beginPath();
+    this.traceForce(paint, data.ghost, k, top, height);
+    paint.stroke();
   }
 
-  drawForce(paint, k, top, height) {
-    const { data } = this;
-    const bottom = top + height;
-    paint.beginPath();
-    paint.moveTo(this.left, bottom);
-    for (let i = 0; i < data.frames; i++) {
-      const share = Math.min(data.forces[4 * i + k] / data.header.force_scale, 1);
-      paint.lineTo(this.xAt(i / data.rate), bottom - share * height);
+  traceForce(paint, run, k, top, height) {
+    for (let i = 0; i < run.frames; i++) {
+      const share = Math.min(run.forces[4 * i + k] / this.data.header.force_scale, 1);
+      paint.lineTo(this.xAt(i / run.rate), top + height * (1 - share));
     }
-    paint.lineTo(this.xAt(data.duration), bottom);
-    paint.fill();
   }
 
   drawAxis(paint, top) {
@@ -161,19 +199,27 @@ class Timeline extends TimeCanvas {
 }
 
 class Curve extends TimeCanvas {
-  // `style`: values, scale (display unit per SI unit), unit, digits, limit (SI, drawn as a line),
-  // isBad(value).
+  // `style`: name of a run's values, scale (display unit per SI unit), unit, digits, limit (SI,
+  // drawn as a line), least room above and below, isBad(value).
   constructor(card, data, style) {
     super(card.querySelector("canvas"), data, 30, 2);
     this.output = card.querySelector("output");
     this.style = style;
-    const finite = Array.from(style.values).filter(Number.isFinite).map((v) => v * style.scale);
+    this.use(data);
+  }
+
+  use(data) {
+    const { style } = this;
+    const runs = data.ghost ? [data, data.ghost] : [data];
+    const finite = runs.flatMap((run) => Array.from(run[style.name]))
+      .filter(Number.isFinite).map((v) => v * style.scale);
     if (style.limit !== undefined) finite.push(style.limit * style.scale);
     const low = finite.reduce((a, b) => Math.min(a, b), Infinity);
     const high = finite.reduce((a, b) => Math.max(a, b), -Infinity);
     const room = Math.max((high - low) * 0.08, style.least || 1e-6);
     this.low = Number.isFinite(low) ? low - room : 0;
     this.high = Number.isFinite(high) ? high + room : 1;
+    super.use(data);
   }
 
   yAt(value) {
@@ -183,22 +229,32 @@ class Curve extends TimeCanvas {
   draw(paint) {
     const { style, data } = this;
     paint.clearRect(0, 0, this.width, this.height);
-    this.drawGrid(paint);
+    drawGrid(paint, this);
     if (style.limit !== undefined) {
       paint.strokeStyle = BAD;
       paint.setLineDash([4, 3]);
       this.horizontal(paint, style.limit * style.scale);
       paint.setLineDash([]);
     }
-    paint.strokeStyle = ACCENT;
+    if (data.ghost) {
+      paint.setLineDash([5, 3]);
+      this.drawRun(paint, data.ghost, GHOST);
+      paint.setLineDash([]);
+    }
+    this.drawRun(paint, data, ACCENT);
+  }
+
+  drawRun(paint, run, color) {
+    const { name, scale } = this.style;
+    paint.strokeStyle = color;
     paint.lineWidth = 1.5;
     paint.lineJoin = "round";
     paint.beginPath();
     let isDown = false;
-    for (let i = 0; i < data.frames; i++) {
-      const value = style.values[i] * style.scale;
+    for (let i = 0; i < run.frames; i++) {
+      const value = run[name][i] * scale;
       if (Number.isFinite(value)) {
-        const [x, y] = [this.xAt(i / data.rate), this.yAt(value)];
+        const [x, y] = [this.xAt(i / run.rate), this.yAt(value)];
         if (isDown) paint.lineTo(x, y); else paint.moveTo(x, y);
       }
       isDown = Number.isFinite(value);
@@ -207,31 +263,14 @@ class Curve extends TimeCanvas {
     paint.lineWidth = 1;
   }
 
-  drawGrid(paint) {
-    const step = tickStep(this.high - this.low, this.height * 2.2);
-    const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
-    paint.font = `10px ${FONT}`;
-    paint.textAlign = "right";
-    paint.textBaseline = "middle";
-    for (let k = Math.ceil(this.low / step); k * step <= this.high; k++) {
-      paint.strokeStyle = LINE;
-      this.horizontal(paint, k * step);
-      paint.fillStyle = MUTED;
-      paint.fillText((k * step).toFixed(digits), this.left - 5, this.yAt(k * step));
-    }
-  }
-
   horizontal(paint, value) {
     const y = Math.round(this.yAt(value)) + 0.5;
-    paint.beginPath();
-    paint.moveTo(this.left, y);
-    paint.lineTo(this.width - this.right, y);
-    paint.stroke();
+    line(paint, this.left, y, this.width - this.right, y);
   }
 
   show(t) {
     super.show(t);
-    const value = this.style.values[this.data.frameAt(t)];
+    const value = this.data[this.style.name][this.data.frameAt(t)];
     const isKnown = Number.isFinite(value);
     this.output.textContent = isKnown
       ? `${(value * this.style.scale).toFixed(this.style.digits)} ${this.style.unit}` : "–";
@@ -243,13 +282,36 @@ class Curve extends TimeCanvas {
     paint.globalAlpha = 0.35;
     paint.fillRect(x - 0.5, 0, 1, this.height);
     paint.globalAlpha = 1;
-    const value = this.style.values[this.data.frameAt(this.time)] * this.style.scale;
+    const value = this.data[this.style.name][this.data.frameAt(this.time)] * this.style.scale;
     if (!Number.isFinite(value)) return;
     paint.fillStyle = ACCENT;
     paint.beginPath();
     paint.arc(x, this.yAt(value), 3.5, 0, 2 * Math.PI);
     paint.fill();
   }
+}
+
+// Lines and numbers of a canvas with a scale from `low` to `high`.
+function drawGrid(paint, chart) {
+  const step = tickStep(chart.high - chart.low, chart.height * 2.2);
+  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  paint.font = `10px ${FONT}`;
+  paint.textAlign = "right";
+  paint.textBaseline = "middle";
+  for (let k = Math.ceil(chart.low / step); k * step <= chart.high; k++) {
+    const y = Math.round(chart.yAt(k * step)) + 0.5;
+    paint.strokeStyle = LINE;
+    line(paint, chart.left, y, chart.width - chart.right, y);
+    paint.fillStyle = MUTED;
+    paint.fillText((k * step).toFixed(digits), chart.left - 5, y);
+  }
+}
+
+function line(paint, x0, y0, x1, y1) {
+  paint.beginPath();
+  paint.moveTo(x0, y0);
+  paint.lineTo(x1, y1);
+  paint.stroke();
 }
 
 function roundedBox(paint, x, y, width, height, radius) {

@@ -1,29 +1,25 @@
 "use strict";
 // Unpacks the page's data and answers "what was the robot doing at time t".
 
-async function unpackText(id) {
-  const packed = atob(document.getElementById(id).textContent.trim());
-  const bytes = Uint8Array.from(packed, (letter) => letter.charCodeAt(0));
+async function unpack(text) {
+  const bytes = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Response(stream).arrayBuffer();
 }
 
+function unpackElement(id) {
+  return unpack(document.getElementById(id).textContent);
+}
+
 const ARRAY_TYPES = { Float32Array, Uint32Array, Uint16Array, Int8Array, Uint8Array };
 
-class ReplayData {
+// A JSON header and named arrays.
+class Pack {
   constructor(buffer) {
     const length = new DataView(buffer).getUint32(0, true);
     this.header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
     this.buffer = buffer;
     this.start = Math.ceil((4 + length) / 8) * 8;
-    const { rate, frames } = this.header;
-    this.rate = rate;
-    this.frames = frames;
-    this.duration = (frames - 1) / rate;
-    for (const name of ["q", "feet", "com", "target", "forces", "margin", "torque"]) {
-      this[name] = this.array(name);
-    }
-    this.stance = this.array("stance");
   }
 
   // A stored array; quantised ones come back as numbers in their unit.
@@ -39,19 +35,26 @@ class ReplayData {
     }
     return values;
   }
+}
 
-  clampTime(t) {
-    return Math.min(Math.max(t, 0), this.duration);
+// One movement at even steps; outside its time the ends are held.
+class Run {
+  constructor(pack, prefix, { rate, frames }) {
+    Object.assign(this, { rate, frames, end: (frames - 1) / rate });
+    for (const name of ["q", "feet", "com", "target", "forces", "stance", "margin", "torque"]) {
+      this[name] = pack.array(prefix + name);
+    }
+    this.height = Float32Array.from({ length: frames }, (_, i) => this.q[19 * i + 2]);
   }
 
   // Nearest frame.
   frameAt(t) {
-    return Math.min(Math.round(this.clampTime(t) * this.rate), this.frames - 1);
+    return Math.min(Math.max(Math.round(t * this.rate), 0), this.frames - 1);
   }
 
   // Linear interpolation of `count` values starting at `column` of an array with rows of `width`.
   interpolate(values, width, column, count, t, out) {
-    const x = this.clampTime(t) * this.rate;
+    const x = Math.min(Math.max(t, 0), this.end) * this.rate;
     const row = Math.min(Math.floor(x), this.frames - 2);
     const share = x - row;
     for (let k = 0; k < count; k++) {
@@ -61,10 +64,41 @@ class ReplayData {
     }
     return out;
   }
+}
+
+// The movement that is shown, the ghost beside it (or null), and what there is to say.
+class ReplayData extends Run {
+  constructor(buffer, scene) {
+    const pack = new Pack(buffer);
+    super(pack, "", pack.header);
+    this.scene = scene;
+    this.header = { ...scene.header, ...pack.header };
+    this.ghost = pack.header.ghost ? new Run(pack, "ghost.", pack.header.ghost) : null;
+    this.duration = Math.max(this.end, this.ghost ? this.ghost.end : 0);
+    this.remarks = this.header.verdict ? this.header.verdict.remarks : [];
+    this.curves = (this.header.verdict ? this.header.verdict.curves : []).map((curve, k) => ({
+      ...curve,
+      time: pack.array(`curve${k}.time`),
+      margin: pack.array(`curve${k}.margin`),
+      worst: pack.array(`curve${k}.worst`),
+    }));
+  }
+
+  clampTime(t) {
+    return Math.min(Math.max(t, 0), this.duration);
+  }
 
   labelAt(t) {
     const spans = this.header.labels;
     const found = spans.find((span) => t < span[1]);
     return (found || spans[spans.length - 1])[2];
   }
+
+  // Broken limits at time t; an instant is widened so that it can be seen in passing.
+  brokenAt(t) {
+    return this.remarks.filter((remark) => remark.is_broken && remark.spans.some(
+      ([from, to]) => t >= from - INSTANT && t <= to + INSTANT));
+  }
 }
+
+const INSTANT = 0.04; // s

@@ -4,37 +4,47 @@
 const PATH_SECONDS = 3.0; // how long a foot's path stays visible
 const FORCE_SCALE = 0.002; // metres of arrow per newton
 const LEAST_FORCE = 4; // N, weaker forces draw no arrow
-const FLOOR_TILE = 0.5; // m, edge of the floor texture's repeat: two by two tiles
 const LIFT = { polygon: 0.0015, outline: 0.002, ring: 0.0015, spot: 0.003 }; // m above the floor
 const VIEWS = { // azimuth and elevation in degrees, distance in m
   corner: [-52, 16, 1.75], side: [-90, 6, 1.65], front: [-8, 10, 1.6], top: [-90, 88, 2.0],
 };
+const STEEP = 0.8; // sine of the camera's angle above the floor
 const ORBIT_RATE = 0.25; // rad/s
-const BACKGROUND = 0xf4f6fa;
+const GOOD_COLOR = 0x16a34a, BAD_COLOR = 0xdc2626, INK_COLOR = 0x1f2937;
 
 class RobotScene {
   constructor(pane, data) {
-    this.data = data;
     this.pane = pane;
     this.viewer = new MeshCat.Viewer(pane);
     this.viewer.set_3d_pane_size = (w, h) => this.resize(w, h);
-    this.legs = data.header.legs;
+    const { header } = data.scene;
+    this.legs = header.legs;
+    this.footRadius = header.foot_radius;
     this.shown = { forces: true, support: true, paths: true, follow: true, orbit: false };
     this.scratch = new Float32Array(20);
-    this.setUpStage();
-    this.runCommands();
-    this.base = this.node(data.header.base);
-    this.joints = data.header.joints.map((joint) => ({
+    this.stage = new Stage(this.viewer);
+    this.runCommands(data.scene);
+    this.body = new Body(this.node("robot"), this.node(header.base), header.joints.map((joint) => ({
       node: this.node(joint.path), axis: new MeshCat.THREE.Vector3(...joint.axis),
-    }));
+    })));
     for (const name of ["forces", "contacts", "com"]) this.makeMarker(this.node(name));
     this.makeSupport();
-    this.makePaths();
-    this.lastTarget = null;
+    this.ghost = new Ghost(this);
+    this.flags = new Flags(this);
+    this.use(data);
     this.show(0);
     this.setView("corner");
     this.resize();
+    this.viewer.controls.addEventListener("change", () => this.showThrough());
     new ResizeObserver(() => this.resize()).observe(pane);
+  }
+
+  // Takes other data, to be shown by `show`; the camera stays where it is.
+  use(data) {
+    this.data = data;
+    this.makePaths();
+    this.ghost.use(data);
+    this.flags.use(data);
   }
 
   // meshcat puts all that Python names below a node of its own.
@@ -49,12 +59,13 @@ class RobotScene {
     viewer.camera.updateProjectionMatrix();
     viewer.renderer.setSize(width, height);
     viewer.set_dirty();
+    if (this.flags) this.flags.placeNotes();
   }
 
   // The commands that meshcat recorded, with references to shared meshes resolved.
-  runCommands() {
-    const meshes = Array.from({ length: this.data.header.meshes }, (_, i) => this.meshData(i));
-    for (const command of this.data.header.commands) {
+  runCommands(pack) {
+    const meshes = Array.from({ length: pack.header.meshes }, (_, i) => this.meshData(pack, i));
+    for (const command of pack.header.commands) {
       if (command.type === "set_object") {
         command.object.geometries = command.object.geometries.map((geometry) =>
           geometry.type === "SharedMesh"
@@ -65,89 +76,17 @@ class RobotScene {
     }
   }
 
-  meshData(index) {
+  meshData(pack, index) {
     const attribute = (array, normalized) =>
       ({ itemSize: 3, type: array.constructor.name, array, normalized });
-    const triangles = this.data.array(`mesh${index}.triangles`);
+    const triangles = pack.array(`mesh${index}.triangles`);
     return {
       attributes: {
-        position: attribute(this.data.array(`mesh${index}.points`), false),
-        normal: attribute(this.data.array(`mesh${index}.normals`), true),
+        position: attribute(pack.array(`mesh${index}.points`), false),
+        normal: attribute(pack.array(`mesh${index}.normals`), true),
       },
       index: { type: triangles.constructor.name, array: triangles },
     };
-  }
-
-  setUpStage() {
-    const { viewer } = this;
-    const { THREE } = MeshCat;
-    for (const name of ["Axes", "Grid"]) viewer.set_property([name], "visible", false);
-    const background = new THREE.Color(BACKGROUND);
-    for (const end of ["top_color", "bottom_color"]) {
-      viewer.set_property(["Background"], end, background.toArray());
-    }
-    viewer.scene.fog = new THREE.Fog(BACKGROUND, 3, 11);
-    viewer.camera.fov = 32;
-    viewer.camera.near = 0.05;
-    viewer.camera.far = 60;
-    viewer.controls.maxPolarAngle = Math.PI / 2 - 0.01;
-    viewer.controls.minDistance = 0.5;
-    viewer.controls.maxDistance = 12;
-    this.setUpLights();
-    this.makeFloor();
-  }
-
-  setUpLights() {
-    const { viewer } = this;
-    const { THREE } = MeshCat;
-    for (const name of ["PointLightNegativeX", "PointLightPositiveX", "FillLight", "AmbientLight"]) {
-      viewer.set_property(["Lights", name], "visible", false);
-    }
-    viewer.set_object(["Lights", "Sky"], new THREE.HemisphereLight(0xffffff, 0xaab2c0, 0.66));
-    this.sun = new THREE.DirectionalLight(0xffffff, 0.5);
-    this.sun.castShadow = true;
-    viewer.renderer.shadowMap.type = THREE.PCFShadowMap; // the kind with a radius
-    this.sun.shadow.mapSize.set(1024, 1024);
-    this.sun.shadow.radius = 3.5;
-    this.sun.shadow.bias = -0.001;
-    this.sun.shadow.normalBias = 0.006;
-    Object.assign(this.sun.shadow.camera, {
-      left: -0.9, right: 0.9, top: 0.9, bottom: -0.9, near: 0.5, far: 6,
-    });
-    viewer.set_object(["Lights", "Sun"], this.sun);
-    this.sunTarget = new THREE.Object3D();
-    viewer.set_object(["Lights", "SunTarget"], this.sunTarget);
-    this.sun.target = this.sunTarget;
-    const fill = new THREE.DirectionalLight(0xffffff, 0.16);
-    fill.position.set(-2, -1, 1);
-    viewer.set_object(["Lights", "Back"], fill);
-  }
-
-  makeFloor() {
-    const { THREE } = MeshCat;
-    const canvas = document.createElement("canvas");
-    canvas.width = canvas.height = 256;
-    const paint = canvas.getContext("2d");
-    paint.fillStyle = "#f7f8fb";
-    paint.fillRect(0, 0, 256, 256);
-    paint.fillStyle = "#e6eaf1";
-    paint.fillRect(0, 0, 128, 128);
-    paint.fillRect(128, 128, 128, 128);
-    const texture = new THREE.CanvasTexture(canvas);
-    texture.wrapS = texture.wrapT = THREE.RepeatWrapping;
-    texture.anisotropy = this.viewer.renderer.capabilities.getMaxAnisotropy();
-    const width = 60 * FLOOR_TILE;
-    texture.repeat.set(60, 60);
-    const tiles = new THREE.Mesh(
-      new THREE.PlaneGeometry(width, width), new THREE.MeshBasicMaterial({ map: texture }));
-    const shade = new THREE.Mesh(
-      new THREE.PlaneGeometry(8, 8),
-      new THREE.ShadowMaterial({ opacity: 0.3, depthWrite: false }));
-    shade.receiveShadow = true;
-    shade.position.z = 0.0006;
-    this.floor = new THREE.Group();
-    this.floor.add(tiles, shade);
-    this.viewer.set_object(["floor"], this.floor);
   }
 
   // Markers neither throw nor receive shadows; those inside the robot shine through it.
@@ -174,50 +113,49 @@ class RobotScene {
       color: 0x2563eb, opacity: 0.16, transparent: true, depthWrite: false, side: THREE.DoubleSide,
     }));
     this.polygon.geometry.setIndex([0, 1, 2, 0, 2, 3]);
-    this.outline = new THREE.Line(geometry(), new THREE.LineBasicMaterial({ color: 0x2563eb }));
-    for (const object of [this.polygon, this.outline]) object.frustumCulled = false;
+    this.outline = new THREE.Line(geometry(), new THREE.LineBasicMaterial({ color: 0x2563eb, transparent: true }));
+    for (const object of [this.polygon, this.outline]) {
+      object.frustumCulled = false;
+      object.renderOrder = 0.9; // over the ghost
+    }
     this.viewer.set_object(["meshcat", "support", "polygon"], this.polygon);
     this.viewer.set_object(["meshcat", "support", "outline"], this.outline);
   }
 
+  // Each foot's way: the last seconds of it; of a motion also, paler, all of it.
   makePaths() {
     const { THREE } = MeshCat;
-    const { feet, frames } = this.data;
+    const { feet, frames, header } = this.data;
     this.paths = this.legs.map((leg, k) => {
       const points = new Float32Array(3 * frames);
       for (let i = 0; i < frames; i++) points.set(feet.subarray(12 * i + 3 * k, 12 * i + 3 * k + 3), 3 * i);
       const geometry = new THREE.BufferGeometry();
       geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
-      const color = this.data.header.leg_colors[k];
-      const line = new THREE.Line(geometry, new THREE.LineBasicMaterial({ color }));
-      line.frustumCulled = false;
-      this.viewer.set_object(["meshcat", "paths", leg], line);
-      return line;
+      const line = (opacity) => new THREE.Line(geometry.clone(), new THREE.LineBasicMaterial({
+        color: header.leg_colors[k], opacity, transparent: opacity < 1,
+      }));
+      const [late, whole] = [line(1), line(0.3)];
+      whole.visible = header.verdict !== null;
+      for (const item of [late, whole]) item.frustumCulled = false;
+      this.viewer.set_object(["meshcat", "paths", leg, "late"], late);
+      this.viewer.set_object(["meshcat", "paths", leg, "whole"], whole);
+      return late;
     });
   }
 
   show(t) {
-    this.poseRobot(t);
+    const { data } = this;
+    this.body.pose(data, t, this.scratch);
     this.poseForces(t);
     this.poseSupport(t);
-    const frame = this.data.frameAt(t);
-    const from = Math.max(0, frame - Math.round(PATH_SECONDS * this.data.rate));
-    for (const line of this.paths) {
-      line.visible = this.shown.paths;
-      line.geometry.setDrawRange(from, frame - from + 1);
-    }
+    this.ghost.show(t);
+    const frame = data.frameAt(t);
+    const from = Math.max(0, frame - Math.round(PATH_SECONDS * data.rate));
+    this.node("paths").visible = this.shown.paths;
+    for (const line of this.paths) line.geometry.setDrawRange(from, frame - from + 1);
     this.follow(t);
+    this.flags.show(t);
     this.viewer.set_dirty();
-  }
-
-  poseRobot(t) {
-    const { data, scratch } = this;
-    data.interpolate(data.q, 19, 0, 19, t, scratch);
-    this.base.position.set(scratch[0], scratch[1], scratch[2]);
-    this.base.quaternion.set(scratch[3], scratch[4], scratch[5], scratch[6]).normalize();
-    this.joints.forEach(({ node, axis }, k) => {
-      node.quaternion.setFromAxisAngle(axis, scratch[7 + k]);
-    });
   }
 
   poseForces(t) {
@@ -227,7 +165,7 @@ class RobotScene {
     this.legs.forEach((leg, k) => {
       const [x, y, z] = scratch.subarray(3 * k, 3 * k + 3);
       const force = data.forces[4 * frame + k];
-      const ground = z - data.header.foot_radius;
+      const ground = z - this.footRadius;
       const arrow = this.node(`forces/${leg}`);
       arrow.visible = shown.forces && force > LEAST_FORCE;
       arrow.position.set(x, y, ground);
@@ -251,14 +189,23 @@ class RobotScene {
     this.node("com/line").scale.set(1, 1, Math.max(z - floor, 0.001));
     this.node("com/spot").position.set(x, y, floor + LIFT.spot);
     const margin = data.margin[data.frameAt(t)];
-    const color = Number.isNaN(margin) ? 0x1f2937 : margin >= 0 ? 0x16a34a : 0xdc2626;
+    const color = Number.isNaN(margin) ? INK_COLOR : margin >= 0 ? GOOD_COLOR : BAD_COLOR;
     this.node("com/spot").traverse((item) => item.material && item.material.color.setHex(color));
     this.drawPolygon(convexHull(this.stanceFeet(t)));
+    this.showThrough();
+  }
+
+  // Seen from above the robot would cover its support polygon: then the polygon shines through.
+  showThrough() {
+    const { camera, controls } = this.viewer;
+    const offset = camera.position.clone().sub(controls.target);
+    const isSteep = offset.y > STEEP * offset.length();
+    for (const { material } of [this.polygon, this.outline]) material.depthTest = !isSteep;
   }
 
   groundHeights(t) {
     const frame = this.data.frameAt(t);
-    return this.legs.map((_, k) => this.data.feet[12 * frame + 3 * k + 2] - this.data.header.foot_radius);
+    return this.legs.map((_, k) => this.data.feet[12 * frame + 3 * k + 2] - this.footRadius);
   }
 
   stanceFeet(t) {
@@ -266,7 +213,7 @@ class RobotScene {
     const frame = this.data.frameAt(t);
     return this.legs.map((_, k) => k).filter((k) => stance[4 * frame + k]).map((k) => {
       const at = 12 * frame + 3 * k;
-      return [feet[at], feet[at + 1], feet[at + 2] - this.data.header.foot_radius];
+      return [feet[at], feet[at + 1], feet[at + 2] - this.footRadius];
     });
   }
 
@@ -286,10 +233,7 @@ class RobotScene {
   follow(t) {
     const { data, viewer } = this;
     const [x, y] = data.interpolate(data.target, 2, 0, 2, t, this.scratch);
-    this.sunTarget.position.set(x, y, 0.1);
-    this.sun.position.set(x + 0.7, y - 1.0, 2.2);
-    this.floor.position.set(
-      Math.round(x / FLOOR_TILE) * FLOOR_TILE, Math.round(y / FLOOR_TILE) * FLOOR_TILE, 0);
+    this.stage.moveTo(x, y);
     if (this.lastTarget && this.shown.follow) {
       const [dx, dy] = [x - this.lastTarget[0], y - this.lastTarget[1]];
       for (const point of [viewer.camera.position, viewer.controls.target]) {
@@ -303,19 +247,21 @@ class RobotScene {
   setView(name) {
     const [azimuth, elevation, distance] = VIEWS[name];
     const [a, e] = [azimuth * Math.PI / 180 + this.heading(), elevation * Math.PI / 180];
-    const [x, y] = this.lastTarget;
+    const [x, y] = this.lastTarget.map((value, k) => value + this.ghost.shift[k] / 2);
     const { camera, controls } = this.viewer;
-    const reach = distance * Math.max(1, 1.25 / camera.aspect);
+    const room = Math.hypot(...this.ghost.shift) / 2;
+    const reach = (distance + room) * Math.max(1, 1.25 / camera.aspect);
     controls.target.set(x, 0.22, -y);
     camera.position.set(
       x + reach * Math.cos(e) * Math.cos(a), 0.22 + reach * Math.sin(e),
       -(y + reach * Math.cos(e) * Math.sin(a)));
     controls.update();
+    this.showThrough();
     this.viewer.set_dirty();
   }
 
   heading() {
-    const { x, y, z, w } = this.base.quaternion;
+    const { x, y, z, w } = this.body.base.quaternion;
     return Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
   }
 

@@ -1,0 +1,192 @@
+"""``go2-wbc preview``: the files it writes, what it refuses, and the life of the live page."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from controller.cli import motion_preview_run
+from controller.cli.common import ExitCode
+from controller.cli.main import main
+from controller.cli.motion_source import MotionSource
+from go2_wbc.errors import CommandError
+from tests.live_preview import BROKEN, GOOD, TOO_HIGH, LivePreview
+from tests.viz.page_reader import read_data
+from viz.html_page import PAGE_LIMIT
+
+Output = pytest.CaptureFixture[str]
+
+
+@pytest.fixture
+def rise(tmp_path: Path) -> Path:
+    path = tmp_path / "rise.py"
+    path.write_text(GOOD, encoding="utf-8")
+    return path
+
+
+def test_it_writes_page_and_plot_and_says_so(tmp_path: Path, capsys: Output) -> None:
+    page, plot = tmp_path / "bow.html", tmp_path / "bow.svg"
+    assert main(["preview", "bow", "--html", str(page), "--plot", str(plot)]) == ExitCode.OK
+    text = capsys.readouterr().out
+    assert text.startswith("ok   bow ")
+    assert f"{page}: " in text
+    assert f"{plot}: " in text
+    assert page.stat().st_size < PAGE_LIMIT
+    header, _ = read_data(page.read_text(encoding="utf-8"))
+    assert header["is_plan"]
+    assert header["verdict"]["ok"]
+    assert "joint position" in plot.read_text(encoding="utf-8")
+
+
+def test_an_infeasible_motion_is_written_too_with_exit_code_1(
+    rise: Path, tmp_path: Path, capsys: Output
+) -> None:
+    rise.write_text(TOO_HIGH, encoding="utf-8")
+    page = tmp_path / "rise.html"
+    assert main(["preview", str(rise), "--html", str(page), "--json"]) == ExitCode.FAILED
+    report = json.loads(capsys.readouterr().out)
+    assert not report["ok"]
+    assert report["files"] == {"html": str(page)}
+    header, _ = read_data(page.read_text(encoding="utf-8"))
+    remarks = [remark for remark in header["verdict"]["remarks"] if remark["is_broken"]]
+    assert {remark["limit"] for remark in remarks} >= {"reach", "joint position"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", ["webp", "gif"])
+def test_a_video_lasts_as_long_as_the_motion(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"bow.{suffix}"
+    assert main(["preview", "bow", "--video", str(path)]) == ExitCode.OK
+    with Image.open(path) as image:
+        frames = getattr(image, "n_frames", 1)
+        image.seek(1)
+        image.load()
+        assert image.info["duration"] == 80
+    assert frames == round(2.4 * 12.5) + 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["--html", "bow.pdf"], ExitCode.USAGE, "valid: .html, .htm"),
+        (["--video", "bow.mp4"], ExitCode.USAGE, "valid: .webp, .gif"),
+        (["--plot", "bow"], ExitCode.USAGE, "no suffix; valid: .svg, .png"),
+        (["--port", "http"], ExitCode.USAGE, "must be a port from 0 to 65535, got 'http'"),
+        (["--port", "65536"], ExitCode.USAGE, "must be a port from 0 to 65535"),
+        (["--html", "bow.html", "--set", "angle=9"], ExitCode.FAILED, "angle must be 0.1 to 0.45"),
+    ],
+)
+def test_what_is_wrong_is_said_with_what_is_valid(
+    arguments: list[str],
+    code: ExitCode,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: Output,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["preview", "bow", *arguments]) == code
+    assert message in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output
+) -> None:
+    def work(*_: object) -> None:
+        pytest.fail("the check ran first")
+
+    monkeypatch.setattr(motion_preview_run.FeasibilityChecker, "rehearse", work)
+    (tmp_path / "file").write_text("")
+    target = tmp_path / "file" / "bow.html"
+    assert main(["preview", "bow", "--html", str(target)]) == ExitCode.USAGE
+    assert f"cannot write {target}" in capsys.readouterr().err
+
+
+def test_unknown_motions_and_several_motions_are_refused(rise: Path, capsys: Output) -> None:
+    assert main(["preview", "moonwalk", "--no-open"]) == ExitCode.USAGE
+    assert "unknown motion 'moonwalk'; valid: bow" in capsys.readouterr().err
+    rise.write_text(GOOD + GOOD.replace("rise", "second"), encoding="utf-8")
+    assert main(["preview", str(rise), "--no-open"]) == ExitCode.USAGE
+    assert "choose FILE.py:NAME: rise, second" in capsys.readouterr().err
+
+
+def test_a_port_in_use_is_named(capsys: Output) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        arguments = ["preview", "bow", "--no-open", "--port", str(port)]
+        assert main(arguments) == ExitCode.USAGE
+    assert f"cannot listen on port {port} of 127.0.0.1" in capsys.readouterr().err
+
+
+def test_a_source_sees_saves_once_they_are_done(rise: Path) -> None:
+    source = MotionSource(str(rise), [])
+    assert source.name == "rise"
+    assert not source.has_changed()
+    rise.unlink()
+    assert not source.has_changed()
+    aside = rise.with_suffix(".tmp")
+    aside.write_text(GOOD.replace("over=0.8", "over=1.8"), encoding="utf-8")
+    os.replace(aside, rise)  # noqa: PTH105 - as editors do
+    assert [source.has_changed() for _ in range(4)] == [False, True, False, False]
+    rise.write_text("", encoding="utf-8")
+    assert not source.has_changed()
+    rise.write_text(GOOD.replace("over=0.8", "over=1.8"), encoding="utf-8")
+    assert [source.has_changed() for _ in range(3)] == [False, True, False]
+    assert source.timeline().end == pytest.approx(4.0)
+
+
+def test_a_motion_of_the_library_has_its_own_file_and_parameters() -> None:
+    source = MotionSource("wave", ["times=3"])
+    assert source.path.name == "wave.py"
+    assert source.timeline().end > MotionSource("wave", ["times=2"]).timeline().end
+    with pytest.raises(CommandError, match="unknown motion"):
+        MotionSource("waves", [])
+
+
+@pytest.mark.slow
+def test_the_live_page_tells_every_verdict_and_ends_with_the_last(rise: Path) -> None:
+    with LivePreview(str(rise)) as preview:
+        assert preview.url.startswith("http://127.0.0.1:")
+        assert preview.heard()["ok"] is True
+        rise.write_text(BROKEN, encoding="utf-8")
+        assert "rise.py, line 9: SyntaxError" in preview.heard()["error"]
+        rise.write_text(TOO_HIGH, encoding="utf-8")
+        assert preview.heard()["ok"] is False
+        assert preview.interrupt() == ExitCode.FAILED
+    rise.write_text(GOOD, encoding="utf-8")
+    with LivePreview(str(rise)) as preview:
+        assert preview.heard()["ok"] is True
+        assert preview.interrupt() == ExitCode.OK
+
+
+@pytest.mark.parametrize(
+    ("problem", "arguments", "opens"),
+    [(None, [], True), (None, ["--no-open"], False), ("there is no display", [], False)],
+)
+def test_a_browser_is_opened_where_there_is_a_screen(
+    problem: str | None,
+    arguments: list[str],
+    opens: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: Output,
+) -> None:
+    opened: list[str] = []
+
+    def interrupt(_seconds: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(motion_preview_run, "display_problem", lambda: problem)
+    monkeypatch.setattr(motion_preview_run.webbrowser, "open", opened.append)
+    monkeypatch.setattr(motion_preview_run.time, "sleep", interrupt)
+    assert main(["preview", "bow", "--port", "0", *arguments]) == ExitCode.OK
+    first, verdict = capsys.readouterr().out.splitlines()
+    assert first.startswith("bow: http://127.0.0.1:")
+    assert "bow.py; Ctrl-C ends)" in first
+    assert verdict.startswith("ok   bow ")
+    assert opened == ([first.split()[1]] if opens else [])

@@ -1,0 +1,135 @@
+"""From the check's report, and from a run, to what the viewers show."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.watching import parts_of, performed, planned, verdict_of
+from go2_wbc.errors import PlantError
+from go2_wbc.recording import Recording
+from go2_wbc.robot.rotations import yaw_rotation
+from motions import FeasibilityChecker, Rehearsal, Timeline
+
+_YAW, _PLACE = 1.1, np.array([0.7, -0.4, 0.0])
+_ROUNDING = 1e-9
+
+
+@pytest.fixture(scope="module")
+def checker() -> FeasibilityChecker:
+    return FeasibilityChecker()
+
+
+@pytest.fixture(scope="module")
+def nod(checker: FeasibilityChecker) -> Rehearsal:
+    return checker.rehearse(Timeline(name="nod").body(pitch=0.1, over=0.6).home(over=0.6))
+
+
+@pytest.fixture(scope="module")
+def stretched(checker: FeasibilityChecker) -> Rehearsal:
+    line = Timeline(name="up").body(z=0.15, over=1.0).hold(0.5).home(over=1.0)
+    return checker.rehearse(line)
+
+
+def test_a_feasible_plan_has_a_green_verdict(nod: Rehearsal) -> None:
+    screening = planned(nod)
+    assert screening.is_plan
+    assert screening.verdict is not None
+    assert screening.verdict.ok
+    assert screening.verdict.text == "feasible"
+    names = {curve.name for curve in screening.verdict.curves}
+    assert {"support", "torque", "friction", "joint position", "self-collision"} <= names
+    assert not any(curve.is_broken for curve in screening.verdict.curves)
+
+
+def test_what_is_broken_says_where_and_when(stretched: Rehearsal) -> None:
+    verdict = verdict_of(stretched.report)
+    assert not verdict.ok
+    assert verdict.text.startswith(f"{len(stretched.report.failures)} limits broken")
+    (reach,) = [remark for remark in verdict.remarks if remark.limit == "reach"]
+    assert reach.subject == "FL, FR, RL, RR"
+    assert {"FL_foot", "RR_calf"} <= set(reach.parts)
+    start = min(start for start, _ in reach.spans)
+    end = max(end for _, end in reach.spans)
+    assert 0.4 < start < reach.time <= end < 2.1
+    (calves,) = [remark for remark in verdict.remarks if remark.limit == "joint position"]
+    assert calves.subject == "FL, FR, RL, RR calf"
+    assert "-0 rad" not in calves.text
+
+
+def test_the_spans_are_where_the_margin_is_negative(stretched: Rehearsal) -> None:
+    verdict = verdict_of(stretched.report)
+    (reach,) = [remark for remark in verdict.remarks if remark.limit == "reach"]
+    (curve,) = [curve for curve in verdict.curves if curve.name == "reach"]
+    inside = np.zeros(len(curve.time), dtype=bool)
+    for start, end in reach.spans:
+        inside |= (curve.time >= start) & (curve.time <= end)
+    np.testing.assert_array_equal(inside, curve.margin < 0.0)
+
+
+@pytest.mark.parametrize(
+    ("subject", "parts"),
+    [
+        ("FL", ("FL_foot", "FL_calf")),
+        ("RR_thigh", ("RR_thigh",)),
+        ("CoM", ("com",)),
+        ("ZMP", ("com",)),
+        ("FL_calf-base", ("FL_calf", "base")),
+        ("FR knee", ("FR_calf",)),
+        ("FR foot", ("FR_foot",)),
+        ("trunk turning", ("base",)),
+        ("exit place", ("base",)),
+    ],
+)
+def test_a_subject_has_its_parts(subject: str, parts: tuple[str, ...]) -> None:
+    assert parts_of(subject) == parts
+
+
+def test_a_run_is_seen_in_the_frame_and_at_the_time_of_its_motion(
+    nod: Rehearsal, checker: FeasibilityChecker
+) -> None:
+    plan = nod.recording()
+    screening = performed(nod, _elsewhere(plan), checker.model)
+    own = screening.recording
+    assert not screening.is_plan
+    assert screening.ghost is not None
+    rows = slice(0, len(plan.time))
+    np.testing.assert_allclose(own.time[rows], plan.time, atol=_ROUNDING)
+    np.testing.assert_allclose(own.q[rows], plan.q, atol=_ROUNDING)
+    np.testing.assert_allclose(own.p_world_com[rows], plan.p_world_com, atol=_ROUNDING)
+    np.testing.assert_allclose(screening.ghost.q, plan.q)
+    assert own.duration == pytest.approx(plan.duration + 1.0, abs=0.02)
+    assert own.labels[0] == plan.labels[0]
+    assert own.labels[-1] == "afterwards"
+
+
+def test_a_run_without_the_motion_is_refused(nod: Rehearsal, checker: FeasibilityChecker) -> None:
+    run = _elsewhere(nod.recording())
+    with pytest.raises(PlantError, match="no motion 'nod'"):
+        performed(nod, replace(run, labels=("stand",) * len(run.labels)), checker.model)
+
+
+def _elsewhere(plan: Recording) -> Recording:
+    """The plan done exactly, somewhere else, after standing for 1 s and before another 3 s."""
+    before, after = 100, 300
+    rows = np.clip(np.arange(-before, len(plan.time) + after), 0, len(plan.time) - 1)
+    R = yaw_rotation(_YAW)
+    q = plan.q[rows].copy()
+    q[:, :3] = q[:, :3] @ R.T + _PLACE
+    x, y, z, w = q[:, 3:7].T.copy()
+    s, c = np.sin(_YAW / 2), np.cos(_YAW / 2)
+    q[:, 3:7] = np.column_stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z])
+    labels = ("stand",) * before + ("nod",) * len(plan.time) + ("stand",) * after
+    return Recording(
+        time=5.0 + np.arange(len(rows)) * 0.01,
+        q=q,
+        v=plan.v[rows],
+        tau=plan.tau[rows],
+        foot_forces=plan.foot_forces[rows],
+        stance=plan.stance[rows],
+        p_world_com=plan.p_world_com[rows] @ R.T + _PLACE,
+        support_margin=plan.support_margin[rows],
+        labels=labels,
+    )

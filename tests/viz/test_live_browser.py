@@ -1,0 +1,61 @@
+"""``go2-wbc preview`` as a user sees it: save the file, and the open page follows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.live_preview import BROKEN, GOOD, TOO_HIGH, LivePreview
+from tests.viz.browsing import complaints, requested, stage
+from tests.viz.chromium import Chromium, find_chromium
+
+pytestmark = pytest.mark.browser
+
+_BADGE = "document.getElementById('badge').textContent"
+_TROUBLE = "document.getElementById('trouble')"
+
+
+@pytest.mark.slow
+def test_the_page_follows_every_save(tmp_path: Path) -> None:
+    file = tmp_path / "rise.py"
+    file.write_text(GOOD, encoding="utf-8")
+    executable = find_chromium()
+    assert executable is not None
+    with (
+        LivePreview(str(file)) as preview,
+        Chromium(executable, tmp_path / "profile", (1280, 720)) as browser,
+    ):
+        browser.open(preview.url)
+        browser.wait_for("window.replay && replay.version")
+        browser.evaluate("replay.scrub(1.0); replay.scene.setView('side')")
+        assert browser.evaluate(_BADGE) == "feasible"
+        before, camera = stage(browser), _camera(browser)
+
+        file.write_text(TOO_HIGH, encoding="utf-8")
+        browser.wait_for(f"{_BADGE}.includes('broken')")
+        assert browser.evaluate("replay.time") == 1.0
+        assert _camera(browser) == pytest.approx(camera, abs=1e-5)
+        after = stage(browser)
+        assert np.abs(after - before).mean() > 2.0
+        assert browser.evaluate("document.querySelectorAll('.remark.broken').length") > 0
+
+        file.write_text(BROKEN, encoding="utf-8")
+        browser.wait_for(f"!{_TROUBLE}.hidden")
+        assert "rise.py, line 9: SyntaxError" in browser.evaluate(f"{_TROUBLE}.textContent")
+        assert "broken" in browser.evaluate(_BADGE)
+
+        file.write_text(GOOD, encoding="utf-8")
+        browser.wait_for(f"{_TROUBLE}.hidden && {_BADGE} === 'feasible'")
+        assert np.abs(stage(browser) - before).mean() < 0.5
+        assert complaints(browser) == []
+        urls = requested(browser)
+        assert all(url.startswith(preview.url) for url in urls)
+
+        assert preview.interrupt() == 0
+        browser.wait_for(f"{_TROUBLE}.textContent.includes('The preview has ended')")
+
+
+def _camera(browser: Chromium) -> list[float]:
+    return browser.evaluate("replay.scene.viewer.camera.position.toArray()")

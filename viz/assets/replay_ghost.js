@@ -1,0 +1,86 @@
+"use strict";
+// Bodies that can be posed: the robot, and the ghost that shows the plan beside it.
+
+const GHOST_COLOR = 0x6d8ff5, GHOST_OPACITY = 0.38;
+const GHOST_PLACES = { beside: [0, 0.62], overlay: [0, 0], off: [0, 0] }; // m ahead, m left
+
+// A tree of meshes with a base and joints that a configuration moves.
+class Body {
+  constructor(root, base, joints) {
+    Object.assign(this, { root, base, joints });
+  }
+
+  pose(run, t, scratch) {
+    run.interpolate(run.q, 19, 0, 19, t, scratch);
+    this.base.position.set(scratch[0], scratch[1], scratch[2]);
+    this.base.quaternion.set(scratch[3], scratch[4], scratch[5], scratch[6]).normalize();
+    this.joints.forEach(({ node, axis }, k) => {
+      node.quaternion.setFromAxisAngle(axis, scratch[7 + k]);
+    });
+  }
+
+  // The same tree again, its meshes shared.
+  twin() {
+    const root = this.root.clone(true);
+    const twins = new Map();
+    const pair = (a, b) => {
+      twins.set(a, b);
+      a.children.forEach((child, k) => pair(child, b.children[k]));
+    };
+    pair(this.root, root);
+    const joints = this.joints.map(({ node, axis }) => ({ node: twins.get(node), axis }));
+    return new Body(root, twins.get(this.base), joints);
+  }
+}
+
+class Ghost {
+  constructor(scene) {
+    this.scene = scene;
+    this.place = "beside";
+    this.run = null;
+  }
+
+  // Ground distance [m] between the robot and its ghost.
+  get shift() {
+    return this.run ? GHOST_PLACES[this.place] : [0, 0];
+  }
+
+  get isShown() {
+    return this.run !== null && this.place !== "off";
+  }
+
+  use(data) {
+    this.run = data.ghost;
+    if (this.run && !this.body) this.make();
+  }
+
+  make() {
+    this.body = this.scene.body.twin();
+    // First the depth alone, so that only the ghost's outside is seen; solid parts win a tie.
+    const { THREE } = MeshCat;
+    const shared = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
+    const depth = new THREE.MeshBasicMaterial({ ...shared, colorWrite: false });
+    const skin = new THREE.MeshLambertMaterial({
+      ...shared, color: GHOST_COLOR, transparent: true, opacity: GHOST_OPACITY, depthWrite: false,
+    });
+    const meshes = [];
+    this.body.root.traverse((item) => item.isMesh && meshes.push(item));
+    for (const mesh of meshes) {
+      mesh.material = depth;
+      mesh.renderOrder = 0.5;
+      const over = new THREE.Mesh(mesh.geometry, skin);
+      mesh.castShadow = mesh.receiveShadow = over.castShadow = over.receiveShadow = false;
+      over.renderOrder = 0.6;
+      mesh.add(over);
+    }
+    this.scene.viewer.set_object(["meshcat", "ghost"], this.body.root);
+  }
+
+  show(t) {
+    if (!this.body) return;
+    this.body.root.visible = this.isShown;
+    if (!this.isShown) return;
+    this.body.pose(this.run, t, this.scene.scratch);
+    this.body.root.position.set(...this.shift, 0);
+  }
+}

@@ -1,0 +1,115 @@
+"""What a page, a film or a plot shows: a movement, perhaps a ghost beside it, and a verdict on it.
+
+Plain values: whoever checks motions translates its report into a ``Verdict``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from go2_wbc.recording import Recording
+
+CENTRE_OF_MASS = "com"
+"""Stands in ``Remark.parts`` for the centre of mass."""
+
+
+@dataclass(frozen=True, slots=True)
+class MarginCurve:
+    """What is left to one limit over time: the least of all its subjects.
+
+    Attributes:
+        name: of the limit.
+        unit: of the margin.
+        time: (n,) seconds after the start.
+        margin: (n,) negative where the limit is broken, nan where there is nothing to judge.
+        subjects: what is judged.
+        worst: (n,) which subject has the least margin, a row of ``subjects``.
+        tight: a margin below it deserves a warning.
+    """
+
+    name: str
+    unit: str
+    time: Float[np.ndarray, " n"]
+    margin: Float[np.ndarray, " n"]
+    subjects: tuple[str, ...]
+    worst: Int[np.ndarray, " n"]
+    tight: float | int = 0.0
+
+    @property
+    def least(self) -> float:
+        """The least margin; inf if there was nothing to judge."""
+        known = self.margin[~np.isnan(self.margin)]
+        return float(known.min()) if len(known) else np.inf
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether the limit is broken at any time."""
+        return self.least < 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """A limit that one subject breaks, or nearly does.
+
+    Attributes:
+        limit: its name.
+        subject: joint, foot or part of the body.
+        time: when [s] it is worst.
+        text: value and limit in words.
+        is_broken: otherwise the margin is only tight.
+        spans: start and end [s] of each stretch in which it is so.
+        parts: links that are concerned, such as ``FL_calf``, or ``CENTRE_OF_MASS``.
+    """
+
+    limit: str
+    subject: str
+    time: float
+    text: str
+    is_broken: bool
+    spans: tuple[tuple[float, float], ...]
+    parts: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What a check says of a movement.
+
+    Attributes:
+        ok: no limit is broken.
+        text: the verdict in a few words.
+        remarks: the broken limits, then the tight ones.
+        curves: the margin of every limit.
+    """
+
+    ok: bool
+    text: str
+    remarks: tuple[Remark, ...]
+    curves: tuple[MarginCurve, ...]
+
+    def ranked(self) -> tuple[MarginCurve, ...]:
+        """The curves: broken ones first, then the tight ones, then the others as they come."""
+        return tuple(sorted(self.curves, key=_rank))
+
+
+@dataclass(frozen=True, slots=True)
+class Screening:
+    """What to show.
+
+    Attributes:
+        recording: the movement of the solid robot.
+        is_plan: it is a plan; otherwise it was measured.
+        verdict: what to say about the motion.
+        ghost: another movement, shown translucent; its clock starts with the first one's.
+    """
+
+    recording: Recording
+    is_plan: bool = False
+    verdict: Verdict | None = None
+    ghost: Recording | None = None
+
+
+def _rank(curve: MarginCurve) -> int:
+    return 0 if curve.is_broken else 1 if curve.least < curve.tight else 2
