@@ -4,7 +4,6 @@ A comment on the line before a block says how to take it:
 
     <!-- file: greet.py -->       the block is written to this file of the working folder
     <!-- exits 1 -->              its last command ends with this code
-    <!-- needs: preview -->       left out while the command line has no such subcommand
     <!-- numbers within 30 % -->  how near the numbers of this output must be
 
 A ``text`` block right after a ``sh`` or ``python`` block is its output. Words must agree, numbers
@@ -21,8 +20,6 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-from controller.cli.main import COMMANDS
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = tuple(f"docs/{name}.md" for name in ("tutorial", "motions", "feasibility", "gallery"))
@@ -48,12 +45,6 @@ class Block:
     def file(self) -> str:
         """The file that it is, or an empty word."""
         return self.note.removeprefix("file: ") if self.note.startswith("file: ") else ""
-
-    @property
-    def is_runnable(self) -> bool:
-        """Whether its subcommand exists, if it needs one."""
-        name = self.note.removeprefix("needs: ")
-        return name == self.note or name in {command.name for command in COMMANDS}
 
     @property
     def exit_code(self) -> int:
@@ -90,9 +81,8 @@ def words_of(block: Block) -> list[list[str]]:
 
 
 def command_lines(name: str) -> list[list[str]]:
-    """Words of every shell line of a page that can be run."""
-    shells = (block for block in blocks(name, "sh") if block.is_runnable)
-    return [words for block in shells for words in words_of(block)]
+    """Words of every shell line of a page."""
+    return [words for block in blocks(name, "sh") for words in words_of(block)]
 
 
 def run_python(text: str, folder: Path) -> subprocess.CompletedProcess[str]:

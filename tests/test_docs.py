@@ -41,14 +41,14 @@ OWN = [
 @pytest.mark.slow
 def test_every_block_of_the_tutorial_does_and_prints_what_it_says(tmp_path: Path) -> None:
     """One after the other in one folder, as a reader would."""
-    printed: str | None = None
+    printed = ""
     for block in blocks(TUTORIAL):
         where = f"{TUTORIAL}, {name_of(block)}"
         if block.file:
             (tmp_path / block.file).write_text(block.text, encoding="utf-8")
         elif block.language == "sh":
-            printed = _output(block, tmp_path, where) if block.is_runnable else None
-        elif block.language == "text" and printed is not None:
+            printed = _output(block, tmp_path, where)
+        elif block.language == "text":
             wrong = difference(block.text, printed, block.tolerance)
             assert not wrong, f"{where}: {wrong}\nprinted:\n{printed}"
         else:
