@@ -16,19 +16,13 @@ from controller.modes import Mode, Outcome
 from controller.pilot import Pilot
 from controller.runner import Runner
 from controller.telemetry import Telemetry
+from controller.viewing import open_viewer
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
-from go2_wbc.errors import (
-    ClosedError,
-    CommandError,
-    Go2WbcError,
-    ModeError,
-    PlantError,
-)
+from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError
 from go2_wbc.legs import front_leg
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant import MujocoPlant, Plant
-from go2_wbc.plant.viewer import PlantViewer
 from go2_wbc.recording import Recording
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.description import find_description
@@ -109,7 +103,7 @@ class GO2Controller:
         capacity = round(RECORDED_TIME / self._plant.control_period)
         self._telemetry = Telemetry(model, capacity)
         loop = ControlLoop(self._plant, model, wbc, self._telemetry, self._config.safety)
-        self._viewer = _open_viewer(self._plant) if viewer else None
+        self._viewer = open_viewer(self._plant) if viewer else None
         self._shown_at = loop.state.time
         self._runner = Runner(loop, realtime=realtime, after_tick=lambda: self._show(loop.state))
         self._pilot = Pilot(self._runner, self._config)
@@ -239,6 +233,20 @@ class GO2Controller:
             self._checker = self._checker or FeasibilityChecker(self._runner.loop.model)
             self._checker.check(plan).raise_if_infeasible()
         return self._call("play", lambda: self._pilot.play(plan))
+
+    def cancel(self) -> None:
+        """From another thread or the plant: leave the motion that plays, safely, and stand.
+
+        Its call then returns False. A motion on three feet goes the way back, or on, that it knows.
+        """
+        self._check_open()
+        self._pilot.recall()
+
+    @property
+    def progress(self) -> float:
+        """Share of the motion that has been played, 0 to 1; 0 if none is."""
+        playing = self._pilot.playing
+        return 0.0 if playing is None else playing.progress
 
     def _plan(self, motion: str | Motion | Timeline | MotionPlan) -> MotionPlan:
         if isinstance(motion, MotionPlan):
@@ -387,14 +395,3 @@ def _interruption(name: str, error: BaseException) -> str:
     if isinstance(error, KeyboardInterrupt):
         return f"interrupted during {name}()"
     return f"{type(error).__name__} during {name}(): {error}"
-
-
-def _open_viewer(plant: Plant) -> PlantViewer | None:
-    if not isinstance(plant, MujocoPlant):
-        _log.warning("the viewer shows MuJoCo plants only; going on without")
-        return None
-    try:
-        return PlantViewer(plant)
-    except PlantError as error:
-        _log.warning("no viewer: %s", error)
-        return None

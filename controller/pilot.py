@@ -16,13 +16,7 @@ import numpy as np
 from controller.behaviours.joints import Damped, ServoJoints
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.walking import Walking
-from controller.checks import (
-    LYING_HEIGHT,
-    ground_height,
-    is_lying,
-    is_sitting,
-    is_standing,
-)
+from controller.checks import LYING_HEIGHT, ground_height, is_lying, is_sitting, is_standing
 from controller.executor import Aborted, Executor, Figures, listed
 from controller.loop import Fault
 from controller.modes import Mode
@@ -58,6 +52,7 @@ class Pilot:
 
     Attributes:
         mode: what the robot is doing.
+        playing: the behaviour that plays a motion, or None.
     """
 
     def __init__(self, runner: Runner, config: Config) -> None:
@@ -70,6 +65,8 @@ class Pilot:
         self._walking: Walking | None = None
         self._gait: Gait | None = None
         self._errand: Errand | None = None
+        self.playing: PlayPlan | None = None
+        self._is_recalled = False
         self._mode = Mode.LYING if self.is_on_the_ground else Mode.DAMPED
 
     @property
@@ -90,6 +87,7 @@ class Pilot:
     def begin(self) -> None:
         """Begin a procedure: the mode is from now on what the last fault, if any, has made it."""
         self._mode = self.mode
+        self._is_recalled = False
         self._runner.begin()
 
     # --- postures -------------------------------------------------------------------------
@@ -268,23 +266,36 @@ class Pilot:
             StanceMismatch: if the plan starts from another stance.
         """
         self._meet_entry(plan)
+        if self._is_recalled:
+            raise Aborted(f"{plan.name} was cancelled before it began", self._executor.figures())
         self._mode = Mode.MOVING
         behaviour = PlayPlan(plan, self._model.foot_radius)
         self._executor.engage(behaviour)
-        start = self._loop.state.time
+        start, self.playing = self._loop.state.time, behaviour
 
         def finished() -> bool:
             if watch is not None:
                 watch(self._loop.state.time - start)
             return behaviour.is_finished(self._loop.snapshot)
 
-        self._executor.until(finished, plan.duration + 1.0, plan.name)
+        try:
+            self._executor.until(finished, plan.duration + 1.0, plan.name)
+        finally:
+            self.playing = None
+        if self._is_recalled:
+            raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
         self._executor.settle(plan.name, _CHECK_OF_STANCE[plan.exit])
         self._mode = _MODE_OF_STANCE[plan.exit]
         figures = {**self._executor.figures(), **behaviour.deviation.figures()}
         if not behaviour.deviation.is_small:
             raise Aborted(f"{plan.name} went another way: {listed(figures)}", figures)
         return figures
+
+    def recall(self) -> None:
+        """Let the procedure that plays a motion leave it and stand; any thread may call it."""
+        self._is_recalled, playing = True, self.playing
+        if playing is not None:
+            playing.recall()
 
     def _meet_entry(self, plan: MotionPlan) -> None:
         mode = self.mode

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from controller.behaviours.base import Behaviour
+from controller.behaviours.recall import Recall
 from go2_wbc.planning.correction import SteadyStateCorrection, tracked_position
 from go2_wbc.reference import Anchor, LegTask, MotionPlan, Reference, Stance, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, wrap_angle, yaw_rotation
@@ -82,21 +83,41 @@ class PlayPlan(Behaviour):
     def start(self, snapshot: Snapshot) -> None:
         """Anchor the plan at the feet."""
         self._start = self._last = snapshot.state.time
+        self._recall: Recall | None = None
+        self._is_recalled = False
         self._correction = SteadyStateCorrection()
         self.deviation = Deviation()
         self._anchor = Anchor.of_feet(snapshot.p_world_feet, self._foot_radius)
 
+    def recall(self) -> None:
+        """Leave the plan: go to its nearest instant on four loaded feet; any thread may call."""
+        self._is_recalled = True
+
+    @property
+    def progress(self) -> float:
+        """Share of the plan that has been played, 0 to 1."""
+        return min(1.0, (self._last - self._start) / self.plan.duration)
+
     def update(self, snapshot: Snapshot) -> Reference:
         """The plan's reference of this instant, in the world."""
         now = snapshot.state.time
-        reference = self.plan.at(now - self._start).placed(self._anchor)
+        reference = self._planned(now).placed(self._anchor)
         self.deviation.note(snapshot, reference)
         body = self._correction.corrected(reference.body, snapshot, now - self._last)
         self._last = now
         return replace(reference, body=body)
 
+    def _planned(self, now: float) -> Reference:
+        if self._is_recalled and self._recall is None:
+            self._recall = Recall(self.plan, self._last - self._start)
+        if self._recall is not None:
+            return self._recall.advance(now - self._last)
+        return self.plan.at(now - self._start)
+
     def is_finished(self, snapshot: Snapshot) -> bool:
-        """Whether the plan is over."""
+        """Whether the plan is over, or the way back from it."""
+        if self._recall is not None:
+            return self._recall.is_over
         return snapshot.state.time - self._start >= self.plan.duration
 
 
