@@ -8,6 +8,7 @@
     ├── CommandError            a command is not finite or not valid
     ├── ModeError               a call that the present mode does not allow
     ├── ClosedError             a call after close()
+    ├── BridgeError             a door to other middleware cannot be opened
     ├── QpError
     │   ├── QpInfeasible        no solution satisfies the constraints; carries residuals
     │   └── SolverUnavailable   unknown or uninstalled QP solver; lists the valid ones
@@ -58,6 +59,10 @@ class ModeError(Go2WbcError):
 
 class ClosedError(Go2WbcError):
     """The object was used after ``close()``."""
+
+
+class BridgeError(Go2WbcError):
+    """A door to other middleware cannot be opened; says what stands in the way."""
 
 
 class QpError(Go2WbcError):

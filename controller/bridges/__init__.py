@@ -1,0 +1,1 @@
+"""Doors to other middleware: optional, each behind an extra of its own."""

@@ -1,0 +1,111 @@
+"""The action that plays motions: goal, feedback with progress, cancel, result.
+
+Goals are rare, so it has a node and an executor of its own, which sleep while there is none.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from typing import Any
+
+from controller.bridges.ros2 import imports as ros
+from controller.bridges.ros2.behaviors import check_motion_name, motion_job
+from controller.bridges.ros2.desk import Answer, Desk
+from controller.bridges.ros2.names import MOTION_ACTION, MOTION_NODE, Rates, topic
+from go2_wbc.errors import CommandError
+
+_log = logging.getLogger(__name__)
+
+THREADS = 3
+"""One waits for the motion, the others serve cancels and further goals."""
+
+
+class MotionActions:
+    """Offers ``play_motion`` on a desk."""
+
+    def __init__(self, context: Any, namespace: str, desk: Desk, rates: Rates) -> None:
+        """Offer the action of the robot ``namespace`` in ``context``."""
+        self._desk, self._period = desk, 1.0 / rates.feedback
+        self._node = ros.Node(
+            MOTION_NODE, namespace=namespace, context=context, start_parameter_services=False
+        )
+        self._server = ros.ActionServer(
+            self._node,
+            ros.PlayMotion,
+            topic(namespace, MOTION_ACTION),
+            execute_callback=self._execute,
+            callback_group=ros.ReentrantCallbackGroup(),
+            goal_callback=self._judge,
+            cancel_callback=lambda _handle: ros.CancelResponse.ACCEPT,
+        )
+        self._executor = ros.MultiThreadedExecutor(THREADS, context=context)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, name="go2-actions", daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        try:
+            self._executor.spin()
+        except Exception as error:  # the robot goes on without the action
+            _log.error("the action %s has ended: %s", MOTION_ACTION, error)
+
+    def _judge(self, goal: Any) -> Any:
+        refusal = self._desk.refusal()
+        if not refusal:
+            return ros.GoalResponse.ACCEPT
+        _log.warning("motion %r refused: %s", goal.motion, refusal)
+        return ros.GoalResponse.REJECT
+
+    def _execute(self, handle: Any) -> Any:
+        answers: list[Answer] = []
+        answered = threading.Event()
+
+        def reply(answer: Answer) -> None:
+            answers.append(answer)
+            answered.set()
+
+        refusal = self._submit(handle.request, reply)
+        if refusal:
+            reply(Answer(False, refusal))
+        while not answered.wait(self._period):
+            if handle.is_cancel_requested and not self._is_returning():
+                self._desk.cancel(handle.request.motion)
+            handle.publish_feedback(self._feedback())
+        return self._conclude(handle, answers[0])
+
+    def _submit(self, goal: Any, reply: Any) -> str:
+        try:
+            check_motion_name(goal.motion)
+        except CommandError as error:
+            return str(error)
+        return self._desk.submit(motion_job(goal.motion, list(goal.settings), reply))
+
+    def _is_returning(self) -> bool:
+        job = self._desk.job
+        return job is None or job.is_cancelled
+
+    def _feedback(self) -> Any:
+        feedback, job, go2 = ros.PlayMotion.Feedback(), self._desk.job, self._desk.go2
+        if job is not None:
+            feedback.phase, feedback.progress = job.phase, float(go2.progress)
+            feedback.elapsed = float(go2.state.time - job.start)
+        return feedback
+
+    def _conclude(self, handle: Any, answer: Answer) -> Any:
+        if answer.success:
+            handle.succeed()
+        elif answer.cancelled and handle.is_cancel_requested:
+            handle.canceled()
+        else:
+            handle.abort()
+        return ros.PlayMotion.Result(
+            success=answer.success, message=answer.message, duration=float(answer.duration)
+        )
+
+    def close(self) -> None:
+        """Stop spinning and release the node; the desk must have answered before."""
+        self._executor.shutdown(timeout_sec=2.0)
+        self._thread.join(2.0)
+        self._server.destroy()
+        self._node.destroy_node()

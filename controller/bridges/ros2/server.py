@@ -1,0 +1,282 @@
+"""The robot as a ROS 2 node: MuJoCo, the whole-body controller and the topics in one loop.
+
+Everything but the action runs in one thread: after every control period the loop asks for calls
+and commands, publishes what is due, and sleeps if it is to keep the pace of the wall clock. What
+goes wrong in here is logged and counted; it never stops the control of the robot.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass, field
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+from controller import arguments
+from controller.bridges.ros2 import imports as ros
+from controller.bridges.ros2.actions import MotionActions
+from controller.bridges.ros2.behaviors import COMMANDS, order
+from controller.bridges.ros2.desk import Answer, Desk
+from controller.bridges.ros2.hooked_plant import HookedPlant
+from controller.bridges.ros2.names import (
+    BEHAVIOR_SERVICE,
+    CMD_VEL,
+    SERVER_NODE,
+    STATISTICS_SERVICE,
+    Rates,
+    topic,
+)
+from controller.bridges.ros2.neighbours import Neighbours
+from controller.bridges.ros2.pacing import Pacer
+from controller.bridges.ros2.polling import Call, PolledService, PolledSubscription
+from controller.bridges.ros2.states import StatePublisher
+from controller.bridges.ros2.throttle import Throttle
+from controller.bridges.ros2.velocity import VelocityInput
+from controller.go2_controller import VIEWER_RATE, GO2Controller
+from controller.viewing import open_viewer
+from go2_wbc.config import Config
+from go2_wbc.plant import MujocoPlant
+
+_log = logging.getLogger(__name__)
+
+IDLE = 0.01
+"""Robot time [s] that passes at a time while nothing is ordered."""
+SWITCH_INTERVAL = 0.0005
+"""Time [s] for which a thread may keep the interpreter from the control loop."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServerSettings:
+    """How the robot is served.
+
+    Attributes:
+        namespace: of its topics and services.
+        realtime: at the pace of the wall clock; otherwise as fast as the CPU allows, with /clock.
+        viewer: open MuJoCo's window.
+        config: numbers of the engine, or a TOML file.
+        rates: of the topics.
+    """
+
+    namespace: str = "robot1"
+    realtime: bool = False
+    viewer: bool = False
+    config: Config | Path | None = None
+    rates: Rates = field(default_factory=Rates)
+
+
+def serve(
+    settings: ServerSettings,
+    stop: threading.Event | None = None,
+    on_ready: Callable[[str], None] = lambda _text: None,
+) -> None:
+    """Serve a simulated Go2 until ``stop`` is set.
+
+    Args:
+        settings: how.
+        stop: ends it: whoever waits for an answer gets one, and the robot goes limp.
+        on_ready: is told, once, what is offered and what is not.
+
+    Raises:
+        BridgeError: if the namespace is already served.
+        MissingDependency: if ROS 2 is not installed.
+        PlantError: if the simulation fails.
+    """
+    namespace, stop = arguments.namespace(settings.namespace), stop or threading.Event()
+    config = arguments.config(settings.config)
+    switch_interval = sys.getswitchinterval()
+    with ExitStack() as stack:
+        sys.setswitchinterval(SWITCH_INTERVAL)
+        stack.callback(sys.setswitchinterval, switch_interval)
+        context = ros.Context()
+        ros.rclpy.init(args=[], context=context, signal_handler_options=ros.SignalHandlerOptions.NO)
+        stack.callback(ros.rclpy.shutdown, context=context)
+        neighbours = Neighbours(context, namespace)
+        stack.callback(neighbours.close)
+        neighbours.check()
+        has_clock = not (settings.realtime or neighbours.have_clock)
+        plant = HookedPlant(MujocoPlant(visuals=settings.viewer))
+        stack.callback(plant.close)
+        go2 = stack.enter_context(GO2Controller(namespace, plant=plant, config=config))
+        door = Door(context, go2, plant, settings, config, has_clock=has_clock)
+        stack.callback(door.close)
+        stack.callback(plant.silence)
+        plant.after_write = lambda: door.serve(stop)
+        on_ready(door.offer)
+        door.run(stop, neighbours)
+        _log.info("ending: the robot goes limp")
+
+
+class Door:
+    """Everything that one robot offers, and the loop that serves it."""
+
+    def __init__(
+        self,
+        context: Any,
+        go2: GO2Controller,
+        plant: HookedPlant,
+        settings: ServerSettings,
+        config: Config,
+        *,
+        has_clock: bool,
+    ) -> None:
+        """Offer ``go2`` in ``context``."""
+        self._settings, self._go2, namespace = settings, go2, settings.namespace
+        self._node = ros.Node(
+            SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
+        )
+        self._desk = Desk(go2)
+        self._velocity = VelocityInput(go2, config.envelope)
+        self._cmd_vel = PolledSubscription(self._node, ros.Twist, topic(namespace, CMD_VEL))
+        self._command = self._offer_command()
+        self._triggers = cycle(self._offer_triggers())
+        self._states = StatePublisher(
+            self._node,
+            namespace,
+            plant.inner,
+            settings.rates,
+            clock=has_clock,
+            realtime=settings.realtime,
+        )
+        self._actions = (
+            MotionActions(context, namespace, self._desk, settings.rates)
+            if ros.PlayMotion is not None
+            else None
+        )
+        self._viewer = open_viewer(plant.inner) if settings.viewer else None
+        self._shown_at = 0.0
+        self._pacer = Pacer(plant.control_period) if settings.realtime else None
+        self._throttle, self._errors = Throttle(_log), 0
+        self._cpu, self._ticks, self._began = 0.0, 0, time.monotonic()
+
+    def _offer_command(self) -> PolledService | None:
+        if ros.RobotBehaviorCommand is None:
+            return None
+        name = topic(self._settings.namespace, BEHAVIOR_SERVICE)
+        return PolledService(self._node, ros.RobotBehaviorCommand, name)
+
+    def _offer_triggers(self) -> list[tuple[PolledService, Callable[[Call], None]]]:
+        acts: dict[str, Callable[[Call], None]] = {
+            command: lambda call, name=command: self._order(name, call) for command in COMMANDS
+        }
+        acts[STATISTICS_SERVICE] = self._take_statistics
+        namespace = self._settings.namespace
+        return [
+            (PolledService(self._node, ros.Trigger, topic(namespace, name)), act)
+            for name, act in acts.items()
+        ]
+
+    @property
+    def offer(self) -> str:
+        """What is offered, and what is missing with the line that brings it."""
+        namespace = self._settings.namespace
+        lines = [f"serving /{namespace}: " + ("real time" if self._pacer else "free-running")]
+        missing = ros.missing_interfaces()
+        if missing:
+            lines.append(f"without {' and '.join(missing)}; to build and install: {ros.BUILD}")
+        if ros.RobotBehaviorCommand is None:
+            names = ", ".join(f"/{namespace}/{name}" for name in COMMANDS)
+            lines.append(f"std_srvs/Trigger services instead: {names}")
+        return "\n".join(lines)
+
+    # --- the loop -------------------------------------------------------------------------
+
+    def run(self, stop: threading.Event, neighbours: Neighbours) -> None:
+        """Carry out orders, or wait for them, until ``stop`` is set."""
+        while not stop.is_set():
+            if not self._desk.work():
+                self._go2.wait(IDLE)
+            neighbours.look()
+
+    def serve(self, stop: threading.Event) -> None:
+        """One turn after a control period; called by the plant."""
+        began = time.thread_time()
+        self._ticks += 1
+        self._guarded(self._turn)
+        if stop.is_set() and self._desk.job is not None:
+            self._guarded(lambda: self._desk.damp())
+        self._cpu += time.thread_time() - began
+        if self._pacer is not None and not stop.is_set():
+            self._pacer.wait(self._listen)
+        if self._viewer is not None:
+            self._show()
+
+    def _turn(self) -> None:
+        service, act = next(self._triggers)
+        for call in service.take():
+            act(call)
+        self._take_messages()
+        self._velocity.expire()
+        self._states.publish_due()
+
+    def _listen(self) -> None:
+        began = time.thread_time()
+        self._guarded(self._take_messages)
+        self._cpu += time.thread_time() - began
+
+    def _guarded(self, act: Callable[[], object]) -> None:
+        try:
+            act()
+        except Exception as error:  # whatever it is: the robot must not fall for it
+            self._errors += 1
+            self._throttle.warn(type(error).__name__, f"{type(error).__name__}: {error}")
+
+    def _take_messages(self) -> None:
+        if self._command is not None:
+            for call in self._command.take():
+                self._order(call.request.command, call)
+        is_busy = self._desk.job is not None
+        for twist in self._cmd_vel.take():
+            linear, turn = twist.linear, twist.angular.z
+            self._velocity.accept(linear.x, linear.y, turn, is_busy=is_busy)
+
+    def _show(self) -> None:
+        now = self._go2.state.time
+        if self._viewer is not None and now - self._shown_at >= 1.0 / VIEWER_RATE:
+            self._shown_at = now
+            self._viewer.sync()
+
+    # --- services -------------------------------------------------------------------------
+
+    def _order(self, command: str, call: Call) -> None:
+        def reply(answer: Answer) -> None:
+            self._guarded(lambda: call.answer(success=answer.success, message=answer.message))
+
+        order(self._desk, command, reply)
+        if self._desk.job is not None:
+            self._velocity.forget()
+
+    def _take_statistics(self, call: Call) -> None:
+        call.answer(success=True, message=json.dumps(self.statistics()))
+
+    def statistics(self) -> dict[str, Any]:
+        """Counts and times since the start, for benches and the curious."""
+        own = time.thread_time()
+        return {
+            "mode": self._go2.mode.value,
+            "robot_time": self._go2.state.time,
+            "wall_time": time.monotonic() - self._began,
+            "ticks": self._ticks,
+            "paces_given_up": self._pacer.give_ups if self._pacer else 0,
+            "ros_cpu_in_loop": self._cpu,
+            "cpu_of_loop": own,
+            "cpu_of_other_threads": time.process_time() - own,
+            "cmd_vel": asdict(self._velocity.counts),
+            "published": dict(self._states.counts),
+            "errors": self._errors,
+        }
+
+    def close(self) -> None:
+        """Answer whoever waits and release everything."""
+        self._desk.abandon("the server is ending: the robot goes limp")
+        if self._actions is not None:
+            self._actions.close()
+        if self._viewer is not None:
+            self._viewer.close()
+        self._node.destroy_node()
