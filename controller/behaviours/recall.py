@@ -54,13 +54,14 @@ def nearest_safe_instant(plan: MotionPlan, t: float) -> float:
 
     Going back costs the time of turning round. The end of a plan is always safe.
     """
-    ahead = next((s for s in np.arange(t, plan.duration, STEP) if _is_safe(plan, s)), plan.duration)
-    behind = next((s for s in np.arange(t, 0.0, -STEP) if _is_safe(plan, s)), 0.0)
+    later, earlier = np.arange(t, plan.duration, STEP), np.arange(t, 0.0, -STEP)
+    ahead = next((s for s in later.tolist() if _is_safe(plan, s)), plan.duration)
+    behind = next((s for s in earlier.tolist() if _is_safe(plan, s)), 0.0)
     return float(ahead if ahead - t <= t - behind + 2.0 * TURNING else behind)
 
 
 def _is_safe(plan: MotionPlan, t: float) -> bool:
-    reference = plan.at(float(t))
+    reference = plan.at(t)
     loads = reference.normal_force_max
     return bool(reference.stance.all() and loads.min() >= loads.max())
 

@@ -48,6 +48,7 @@ CancelResponse = needed("rclpy.action").CancelResponse
 GoalResponse = needed("rclpy.action").GoalResponse
 Context = needed("rclpy.context").Context
 MultiThreadedExecutor = needed("rclpy.executors").MultiThreadedExecutor
+SingleThreadedExecutor = needed("rclpy.executors").SingleThreadedExecutor
 ReentrantCallbackGroup = needed("rclpy.callback_groups").ReentrantCallbackGroup
 QoSProfile = needed("rclpy.qos").QoSProfile
 SignalHandlerOptions = needed("rclpy.signals").SignalHandlerOptions

@@ -1,0 +1,341 @@
+"""``GO2ControllerNode``: the seeds' controller as an ``rclpy`` node."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from controller import arguments
+from controller.bridges.ros2 import imports as ros
+from controller.bridges.ros2.names import (
+    BEHAVIOR_SERVICE,
+    CMD_VEL,
+    MOTION_ACTION,
+    ODOM,
+    QUEUE,
+    topic,
+)
+from controller.bridges.ros2.odometry import state_of
+from controller.bridges.ros2.repeater import Repeater
+from controller.navigation import DriveStraight, Errand, TurnInPlace
+from go2_wbc.errors import BridgeError, MissingDependency
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.robot.state import RobotState
+
+ANSWER_LIMIT = 30.0
+"""Time [s] in which a behaviour must be answered; the longest one takes four."""
+MOTION_LIMIT = 180.0
+"""Time [s] in which a motion must be over."""
+ODOM_LIMIT = 2.0
+"""Time [s] without odometry after which an errand is given up."""
+SLICE = 0.1
+"""Time [s] between two looks whether the server is still there."""
+REST_SPEED, REST_TIME, REST_LIMIT = 0.02, 0.3, 4.0
+"""A robot rests once it has been slower than this [m/s] for this long [s]; it gets so long [s]."""
+
+
+class GO2ControllerNode(ros.Node):
+    """Commands a Go2 that a ROS 2 server drives, with the methods of ``GO2Controller``.
+
+    A call returns True only if the server says that it has happened, or odometry shows it; the
+    reason is in ``last_message`` and in the log. A call whose server has gone returns False.
+
+    Example:
+        >>> rclpy.init()
+        >>> go2 = GO2ControllerNode("robot1")
+        >>> go2.stand() and go2.high_five()
+        True
+
+    Attributes:
+        last_message: what came of the last call, in plain words.
+        progress: share of the motion that plays, 0 to 1.
+    """
+
+    def __init__(self, namespace: str = "robot1", *, node_name: str = "go2_controller") -> None:
+        """Look for the server of ``namespace``, for five seconds; it may also come later.
+
+        Args:
+            namespace: of the robot's topics and services.
+            node_name: of this node.
+
+        Raises:
+            ConfigError: for a namespace that is not a name.
+            MissingDependency: if the interfaces are not installed; names the line that builds them.
+            BridgeError: if ``rclpy.init()`` has not been called.
+        """
+        self._namespace = arguments.namespace(namespace)
+        if ros.RobotBehaviorCommand is None:
+            raise MissingDependency(f"quadropted_msgs is not here; build it: {ros.BUILD}")
+        if not ros.rclpy.ok():
+            raise BridgeError("call rclpy.init() before making a GO2ControllerNode")
+        super().__init__(node_name)
+        self.last_message, self.progress = "", 0.0
+        self._behavior_client = self.create_client(
+            ros.RobotBehaviorCommand, topic(namespace, BEHAVIOR_SERVICE)
+        )
+        self._cmd_vel_pub = self.create_publisher(ros.Twist, topic(namespace, CMD_VEL), QUEUE)
+        self._motion_client = (
+            ros.ActionClient(self, ros.PlayMotion, topic(namespace, MOTION_ACTION))
+            if ros.PlayMotion is not None
+            else None
+        )
+        self._state: RobotState | None = None
+        self.create_subscription(ros.Odometry, topic(namespace, ODOM), self._take_odometry, 1)
+        self._repeater = Repeater()
+        self._goal: Any = None
+        self._spinner = ros.SingleThreadedExecutor()
+        self._wait_for_service()
+
+    # --- postures -------------------------------------------------------------------------
+
+    def sit(self) -> bool:
+        """Sit like a dog."""
+        return self._behave("sit")
+
+    def stand(self) -> bool:
+        """Stand, not walking."""
+        return self._behave("up")
+
+    def walk(self) -> bool:
+        """Enter walking mode: ``move`` works from now on."""
+        return self._behave("walk")
+
+    def lie_down(self) -> bool:
+        """Lie down and go limp."""
+        return self._behave("lie_down")
+
+    def recover(self) -> bool:
+        """Get up after a fall."""
+        return self._behave("recover")
+
+    def damp(self) -> bool:
+        """Go limp at once, also in the middle of something."""
+        return self._behave("damp")
+
+    # --- walking --------------------------------------------------------------------------
+
+    def move(self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0) -> None:
+        """Walk with this velocity until the next command; needs walking mode.
+
+        It is published at once and then 50 times a second, since a robot that hears nothing stops.
+
+        Args:
+            linear_x: forward speed [m/s], negative is backward.
+            angular_z: turning rate [rad/s], positive is left.
+            linear_y: sideways speed [m/s], positive is left.
+
+        Raises:
+            CommandError: if a value is not a finite number.
+        """
+        message = _twist(VelocityCommand(linear_x, linear_y, angular_z))
+        self._repeater.stop()
+        self._cmd_vel_pub.publish(message)
+        self._repeater.start(lambda: self._cmd_vel_pub.publish(message))
+
+    def stop(self) -> None:
+        """Zero velocity: the robot comes to rest in walking mode."""
+        self._repeater.stop()
+        self._cmd_vel_pub.publish(_twist(VelocityCommand()))
+
+    def turn_left(self, angle: float) -> bool:
+        """Turn left in place by ``angle`` [rad], closed on odometry; negative turns right."""
+        return self._run_errand(TurnInPlace(arguments.finite("angle", angle)))
+
+    def turn_right(self, angle: float) -> bool:
+        """Turn right in place by ``angle`` [rad], closed on odometry."""
+        return self._run_errand(TurnInPlace(-arguments.finite("angle", angle)))
+
+    def move_forward(self, distance: float) -> bool:
+        """Walk ``distance`` [m] straight ahead, closed on odometry; negative is backward."""
+        return self._run_errand(DriveStraight(arguments.finite("distance", distance)))
+
+    def _run_errand(self, errand: Errand) -> bool:
+        if not self.walk():
+            return False
+        state = self._next_state()
+        if state is None:
+            return self._conclude(errand.name, False, "no odometry")
+        errand.begin(state)
+        end = state.time + errand.time_limit
+        while not errand.is_done(state) and state.time < end:
+            self._cmd_vel_pub.publish(_twist(errand.command(state)))
+            newer = self._next_state()
+            if newer is None:
+                self.stop()
+                return self._conclude(errand.name, False, "odometry has ceased")
+            state = newer
+        state = self._come_to_rest(state)
+        figures = ", ".join(f"{name} {value:.3f}" for name, value in errand.figures(state).items())
+        return self._conclude(errand.name, errand.is_within_tolerance(state), figures)
+
+    def _come_to_rest(self, state: RobotState) -> RobotState:
+        end, moved_at = state.time + REST_LIMIT, state.time
+        while state.time < end and state.time - moved_at < REST_TIME:
+            self.stop()
+            newer = self._next_state()
+            if newer is None:
+                break
+            state = newer
+            if max(map(abs, state.v[:2].tolist())) > REST_SPEED:
+                moved_at = state.time
+        return state
+
+    # --- motions --------------------------------------------------------------------------
+
+    def high_five(self, side: str = "right", hold: float = 2.0) -> bool:
+        """Raise a front paw, hold it for ``hold`` seconds, tap, and come back to standing."""
+        return self.play("high_five", {"side": side, "hold": arguments.finite("hold", hold)})
+
+    def play(
+        self,
+        motion: str,
+        settings: Mapping[str, object] | None = None,
+        on_progress: Callable[[float], None] = lambda _share: None,
+    ) -> bool:
+        """Play a motion of the server's library; an interruption cancels it, and it ends standing.
+
+        Args:
+            motion: its name.
+            settings: its parameters.
+            on_progress: is told the share that is done, ten times a second.
+        """
+        self._repeater.stop()
+        if self._motion_client is None:
+            return self._conclude(motion, False, f"PlayMotion is not here; build it: {ros.BUILD}")
+        if not self._motion_client.wait_for_server(5.0):
+            return self._conclude(motion, False, self._absence())
+
+        def note(message: Any) -> None:
+            self.progress = message.feedback.progress
+            on_progress(self.progress)
+
+        rows = [f"{name}={value}" for name, value in (settings or {}).items()]
+        goal = ros.PlayMotion.Goal(motion=motion, settings=rows)
+        sent = self._motion_client.send_goal_async(goal, feedback_callback=note)
+        self._goal = self._result_of(sent, ANSWER_LIMIT)
+        if self._goal is None or not self._goal.accepted:
+            reason = "refused: the robot is busy" if self._goal is not None else self._absence()
+            return self._conclude(motion, False, reason)
+        return self._await_motion(motion)
+
+    def _await_motion(self, motion: str) -> bool:
+        goal = self._goal
+        try:
+            answer = self._result_of(goal.get_result_async(), MOTION_LIMIT)
+        except BaseException:
+            goal.cancel_goal_async()
+            raise
+        finally:
+            self._goal = None
+        if answer is None:
+            return self._conclude(motion, False, self._absence())
+        return self._conclude(motion, bool(answer.result.success), answer.result.message)
+
+    def cancel(self) -> None:
+        """Call off the motion that plays, from its ``on_progress`` or another thread."""
+        goal = self._goal
+        if goal is not None:
+            goal.cancel_goal_async()
+
+    # --- looking --------------------------------------------------------------------------
+
+    @property
+    def namespace(self) -> str:
+        """Namespace of the robot."""
+        return self._namespace
+
+    def state(self) -> RobotState | None:
+        """The next state from odometry: base pose and velocity; None if there is none."""
+        return self._next_state()
+
+    def _take_odometry(self, message: Any) -> None:
+        self._state = state_of(message)
+
+    def _next_state(self) -> RobotState | None:
+        before, end = self._state, time.monotonic() + ODOM_LIMIT
+        while self._state is before:
+            if time.monotonic() > end:
+                return None
+            self._turn_over(SLICE)
+        return self._state
+
+    # --- talking to the server ------------------------------------------------------------
+
+    def _wait_for_service(self, timeout_sec: float = 5.0) -> bool:
+        """Wait until the server is there; returns whether it is."""
+        is_there = self._behavior_client.wait_for_service(timeout_sec)
+        if not is_there:
+            self.get_logger().error(self._absence())
+        return is_there
+
+    def _behave(self, command: str) -> bool:
+        self._repeater.stop()
+        return self._call_behavior(command)
+
+    def _call_behavior(self, command: str) -> bool:
+        """Send a behaviour and wait until it has happened; returns whether it has."""
+        if not (self._behavior_client.service_is_ready() or self._wait_for_service()):
+            return self._conclude(command, False, self._absence())
+        request = ros.RobotBehaviorCommand.Request(command=command)
+        answer = self._result_of(self._behavior_client.call_async(request), ANSWER_LIMIT)
+        if answer is None:
+            return self._conclude(command, False, self._absence())
+        return self._conclude(command, bool(answer.success), answer.message)
+
+    def _result_of(self, future: Any, limit: float) -> Any:
+        """What ``future`` comes to; None if the server goes, or says nothing for ``limit`` s."""
+        end = time.monotonic() + limit
+        while not future.done() and time.monotonic() < end:
+            self._turn_over(SLICE, future)
+            if not future.done() and not self._behavior_client.service_is_ready():
+                break
+        if not future.done():
+            future.cancel()
+            return None
+        return future.result()
+
+    def _turn_over(self, seconds: float, future: Any = None) -> None:
+        """Let messages in, or wait if somebody else spins this node."""
+        other = self.executor
+        if other is not None and other is not self._spinner and self in other.get_nodes():
+            arrived = threading.Event()
+            if future is not None:
+                future.add_done_callback(lambda _future: arrived.set())
+            arrived.wait(seconds)
+            return
+        self._spinner.add_node(self)
+        if future is not None:
+            self._spinner.spin_until_future_complete(future, timeout_sec=seconds)
+        else:
+            self._spinner.spin_once(timeout_sec=seconds)
+
+    def _absence(self) -> str:
+        if self._behavior_client.service_is_ready():
+            return f"the server of /{self._namespace} has not answered in time"
+        return (
+            f"no server of /{self._namespace}: start one with "
+            f"`go2-wbc ros2 --namespace {self._namespace}`, in the same ROS_DOMAIN_ID"
+        )
+
+    def _conclude(self, what: str, done: bool, message: str) -> bool:
+        self.last_message = message
+        if done:
+            self.get_logger().info(f"{what}: {message}")
+        else:
+            self.get_logger().error(f"{what}: not done: {message}")
+        return done
+
+    def destroy_node(self) -> None:
+        """Release everything; the robot stops by itself."""
+        self._repeater.close()
+        self._spinner.shutdown()
+        super().destroy_node()
+
+
+def _twist(command: VelocityCommand) -> Any:
+    message = ros.Twist()
+    message.linear.x, message.linear.y = command.linear_x, command.linear_y
+    message.angular.z = command.angular_z
+    return message
