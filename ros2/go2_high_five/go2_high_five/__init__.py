@@ -1,0 +1,1 @@
+"""A Go2 behind one class."""
