@@ -280,11 +280,11 @@ class Pilot:
 
         try:
             self._executor.until(finished, plan.duration + 1.0, plan.name)
+            if self._is_recalled:
+                raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
+            self._executor.settle(plan.name, _CHECK_OF_STANCE[plan.exit])
         finally:
             self.playing = None
-        if self._is_recalled:
-            raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
-        self._executor.settle(plan.name, _CHECK_OF_STANCE[plan.exit])
         self._mode = _MODE_OF_STANCE[plan.exit]
         figures = {**self._executor.figures(), **behaviour.deviation.figures()}
         if not behaviour.deviation.is_small:

@@ -11,7 +11,7 @@ from typing import Any
 
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.behaviors import check_motion_name, motion_job
-from controller.bridges.ros2.desk import Answer, Desk
+from controller.bridges.ros2.desk import Answer, Desk, Job
 from controller.bridges.ros2.names import MOTION_ACTION, MOTION_NODE, Rates, topic
 from go2_wbc.errors import CommandError
 
@@ -71,7 +71,9 @@ class MotionActions:
         while not answered.wait(self._period):
             if handle.is_cancel_requested and not self._is_returning():
                 self._desk.cancel(handle.request.motion)
-            handle.publish_feedback(self._feedback())
+            job = self._desk.job
+            if job is not None:
+                handle.publish_feedback(self._feedback(job))
         return self._conclude(handle, answers[0])
 
     def _submit(self, goal: Any, reply: Any) -> str:
@@ -85,11 +87,10 @@ class MotionActions:
         job = self._desk.job
         return job is None or job.is_cancelled
 
-    def _feedback(self) -> Any:
-        feedback, job, go2 = ros.PlayMotion.Feedback(), self._desk.job, self._desk.go2
-        if job is not None:
-            feedback.phase, feedback.progress = job.phase, float(go2.progress)
-            feedback.elapsed = float(go2.state.time - job.start)
+    def _feedback(self, job: Job) -> Any:
+        feedback, go2 = ros.PlayMotion.Feedback(), self._desk.go2
+        feedback.phase, feedback.progress = job.phase, float(go2.progress)
+        feedback.elapsed = float(go2.state.time - job.start)
         return feedback
 
     def _conclude(self, handle: Any, answer: Answer) -> Any:

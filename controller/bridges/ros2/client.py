@@ -12,9 +12,9 @@ from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.names import (
     BEHAVIOR_SERVICE,
     CMD_VEL,
+    COMMAND_QUEUE,
     MOTION_ACTION,
     ODOM,
-    QUEUE,
     topic,
 )
 from controller.bridges.ros2.odometry import state_of
@@ -75,7 +75,9 @@ class GO2ControllerNode(ros.Node):
         self._behavior_client = self.create_client(
             ros.RobotBehaviorCommand, topic(namespace, BEHAVIOR_SERVICE)
         )
-        self._cmd_vel_pub = self.create_publisher(ros.Twist, topic(namespace, CMD_VEL), QUEUE)
+        self._cmd_vel_pub = self.create_publisher(
+            ros.Twist, topic(namespace, CMD_VEL), COMMAND_QUEUE
+        )
         self._motion_client = (
             ros.ActionClient(self, ros.PlayMotion, topic(namespace, MOTION_ACTION))
             if ros.PlayMotion is not None

@@ -133,7 +133,7 @@ class Desk:
         return True
 
     def _carry_out(self, job: Job) -> Answer:
-        outcome = self.go2.last_outcome
+        before = self.go2.last_outcome
         try:
             job.check_prepared()
             done = not job.is_cancelled and job.act(self.go2, job)
@@ -143,12 +143,14 @@ class Desk:
         duration = self.go2.state.time - job.start
         if refusal:
             return Answer(False, refusal, duration)
-        if self.go2.last_outcome is not outcome:
-            outcome = self.go2.last_outcome
+        outcome = self.go2.last_outcome
+        is_new = outcome is not before
         if done:
-            figures = listed(outcome.measured)
-            return Answer(True, f"done in {duration:.1f} s" + (f": {figures}" if figures else ""))
-        reason = outcome.reason if not outcome.ok else f"{job.name} was cancelled"
+            figures = listed(outcome.measured) if is_new else ""
+            message = f"done in {duration:.1f} s" + (f": {figures}" if figures else "")
+            return Answer(True, message, duration)
+        is_told = is_new and not outcome.ok
+        reason = outcome.reason if is_told else f"{job.name} was cancelled"
         return Answer(False, reason, duration, cancelled=job.is_cancelled)
 
     def _finish(self, job: Job, answer: Answer) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 from go2_wbc.errors import MissingDependency
 
-INSTALL = 'python -m pip install "go2-wbc[ros2]"'
+INSTALL = 'python -m pip install -e ".[ros2]"'
 BUILD = "ros2/build_interfaces.sh python3 dist && python -m pip install dist/*.whl"
 PROFILE_VARIABLE = "FASTDDS_DEFAULT_PROFILES_FILE"
 

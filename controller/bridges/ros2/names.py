@@ -16,6 +16,8 @@ CMD_VEL_SILENCE = 0.5
 """Robot time [s] without a command after which the robot stops."""
 QUEUE = 10
 """Messages that are kept for a slow reader."""
+COMMAND_QUEUE = 100
+"""Commands that are kept for the loop: two seconds' worth, should the machine be that busy."""
 
 
 @dataclass(frozen=True, slots=True)

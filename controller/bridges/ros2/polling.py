@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from controller.bridges.ros2.names import QUEUE
+from controller.bridges.ros2.names import COMMAND_QUEUE
 
 
 class PolledSubscription:
@@ -20,11 +20,11 @@ class PolledSubscription:
     def __init__(self, node: Any, kind: Any, name: str) -> None:
         """Subscribe ``node`` to the topic ``name``."""
         self._kind = kind
-        self._handle = node.create_subscription(kind, name, _never, QUEUE).handle
+        self._handle = node.create_subscription(kind, name, _never, COMMAND_QUEUE).handle
 
     def take(self) -> Iterator[Any]:
         """The messages that have come since, at most one queue full."""
-        for _ in range(QUEUE):
+        for _ in range(COMMAND_QUEUE):
             with self._handle:
                 taken = self._handle.take_message(self._kind, False)
             if taken is None:
@@ -58,7 +58,7 @@ class PolledService:
     def take(self) -> Iterator[Call]:
         """The calls that have come since, at most one queue full."""
         handle = self._service.handle
-        for _ in range(QUEUE):
+        for _ in range(COMMAND_QUEUE):
             with handle:
                 request, header = handle.service_take_request(self._kind.Request)
             if request is None:

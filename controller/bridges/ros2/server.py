@@ -50,6 +50,8 @@ IDLE = 0.01
 """Robot time [s] that passes at a time while nothing is ordered."""
 SWITCH_INTERVAL = 0.0005
 """Time [s] for which a thread may keep the interpreter from the control loop."""
+LINGER = 0.2
+"""Time [s] in which the last answers reach their callers before the node goes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,7 +252,7 @@ class Door:
 
         order(self._desk, command, reply)
         if self._desk.job is not None:
-            self._velocity.forget()
+            self._velocity.end()
 
     def _take_statistics(self, call: Call) -> None:
         call.answer(success=True, message=json.dumps(self.statistics()))
@@ -279,4 +281,5 @@ class Door:
             self._actions.close()
         if self._viewer is not None:
             self._viewer.close()
+        time.sleep(LINGER)
         self._node.destroy_node()

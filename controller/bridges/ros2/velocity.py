@@ -70,13 +70,13 @@ class VelocityInput:
 
     def expire(self) -> None:
         """Stop a robot whose last command is older than ``CMD_VEL_SILENCE``."""
-        if self._last is None or self._go2.state.time - self._last < CMD_VEL_SILENCE:
-            return
-        self._last = None
-        if self._go2.mode is Mode.WALKING and not self._go2.command.is_zero:
-            self.counts.silences += 1
-            self._go2.move()
+        if self._last is not None and self._go2.state.time - self._last >= CMD_VEL_SILENCE:
+            self.counts.silences += self.end()
 
-    def forget(self) -> None:
-        """A behaviour takes over: no command is pending any more."""
+    def end(self) -> bool:
+        """Stop following the last command; returns whether the robot was walking by it."""
         self._last = None
+        was_walking = self._go2.mode is Mode.WALKING and not self._go2.command.is_zero
+        if was_walking:
+            self._go2.move()
+        return was_walking
