@@ -5,7 +5,6 @@ import sys
 import time
 
 import rclpy
-
 from go2_high_five.controller import GO2Controller
 
 

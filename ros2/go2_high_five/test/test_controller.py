@@ -7,7 +7,6 @@ from unittest.mock import MagicMock, patch
 
 import pytest
 import rclpy
-
 from go2_high_five.controller import GO2Controller
 
 
@@ -31,8 +30,8 @@ def test_a_behaviour_sends_its_command(
     call.assert_called_once_with(command)
 
 
-@patch("go2_high_five.controller.GO2Controller._call_behavior", return_value=False)
-def test_a_failure_is_handed_on(_call: MagicMock, robot: GO2Controller) -> None:
+@patch("go2_high_five.controller.GO2Controller._call_behavior", lambda _self, _command: False)
+def test_a_failure_is_handed_on(robot: GO2Controller) -> None:
     assert robot.stand() is False
 
 

@@ -1,0 +1,101 @@
+"""Without the extra the bridge says what is missing, and everything else goes on."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import controller.bridges.ros2 as bridge
+from controller.behaviours.joints import DAMPING
+from controller.bridges.ros2.hooked_plant import HookedPlant
+from controller.bridges.ros2.pacing import Pacer
+from controller.cli import main as cli
+from controller.cli.common import ExitCode
+from go2_wbc.errors import MissingDependency
+from go2_wbc.robot.state import JointCommand
+from tests.controller.plants import StillPlant, is_limp
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+@pytest.fixture
+def no_ros(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As if rclpy were not installed."""
+    for name in [name for name in sys.modules if name.startswith("controller.bridges.ros2.")]:
+        monkeypatch.delitem(sys.modules, name)
+    for name in [name for name in sys.modules if name.split(".")[0] == "rclpy"]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "rclpy", None)
+
+
+@pytest.mark.usefixtures("no_ros")
+def test_without_the_extra_the_command_names_the_line_that_installs_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert cli.main(["ros2"]) == ExitCode.RUNTIME
+    complaint = capsys.readouterr().err
+    assert 'pip install -e ".[ros2]"' in complaint
+    assert "Traceback" not in complaint
+
+
+@pytest.mark.usefixtures("no_ros")
+def test_without_the_extra_the_client_is_an_error_of_ours() -> None:
+    with pytest.raises(MissingDependency, match="ros2"):
+        _ = bridge.GO2ControllerNode
+
+
+def test_a_name_that_the_bridge_does_not_have_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = bridge.nothing
+
+
+def test_importing_the_bridge_imports_no_ros() -> None:
+    code = "import sys, controller.bridges.ros2; sys.exit('rclpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+
+
+def test_the_hook_follows_every_write_but_not_its_own() -> None:
+    inner = StillPlant()
+    plant, turns = HookedPlant(inner), []
+
+    def turn() -> None:
+        turns.append(inner.read().time)
+        plant.write(JointCommand.damping(DAMPING))
+
+    plant.after_write = turn
+    for _ in range(3):
+        plant.write(JointCommand.damping(DAMPING))
+    assert len(turns) == 3
+    assert len(inner.commands) == 6
+    assert all(map(is_limp, inner.commands))
+    plant.silence()
+    plant.write(JointCommand.damping(DAMPING))
+    assert len(turns) == 3
+
+
+def test_the_pace_is_kept_and_taken_up_anew_after_a_long_lag(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock, naps = [100.0], []
+
+    def sleep(seconds: float) -> None:
+        naps.append(seconds)
+        clock[0] += seconds
+
+    monkeypatch.setattr("controller.bridges.ros2.pacing.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("controller.bridges.ros2.pacing.time.sleep", sleep)
+    pacer = Pacer(0.004)
+    for _ in range(10):
+        pacer.wait(lambda: None)
+    assert clock[0] == pytest.approx(100.04)
+    assert max(naps) <= 0.001
+    clock[0] += 0.1  # a short lag is made up for, without a nap
+    naps.clear()
+    pacer.wait(lambda: None)
+    assert (naps, pacer.give_ups) == ([], 0)
+    clock[0] += 10.0
+    pacer.wait(lambda: None)
+    assert pacer.give_ups == 1

@@ -1,0 +1,196 @@
+"""The desk carries out one order at a time and tells the truth about it. No ROS is needed."""
+
+from __future__ import annotations
+
+import math
+import threading
+
+import pytest
+
+from controller.bridges.ros2 import throttle
+from controller.bridges.ros2.behaviors import COMMANDS, motion_job, order, parse_settings
+from controller.bridges.ros2.desk import Answer, Desk, Job
+from controller.bridges.ros2.names import CMD_VEL_SILENCE
+from controller.bridges.ros2.velocity import VelocityInput
+from controller.go2_controller import GO2Controller
+from controller.modes import Mode
+from go2_wbc.errors import CommandError, ModeError
+from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
+from tests.controller.fake_go2 import FakeGo2
+from tests.controller.plants import PERIOD, WatchedPlant
+
+HANG_GUARD = 30.0
+
+
+def ordered(desk: Desk, command: str) -> list[Answer]:
+    """The answers to an order, after the desk has worked."""
+    answers: list[Answer] = []
+    order(desk, command, answers.append)
+    desk.work()
+    return answers
+
+
+@pytest.mark.parametrize(
+    ("command", "call"), [("up", "stand"), ("stand", "stand"), (" SIT ", "sit"), ("Walk", "walk")]
+)
+def test_an_order_is_answered_after_it_has_happened(command: str, call: str) -> None:
+    go2 = FakeGo2()
+    desk, answers = Desk(go2), []
+    order(desk, command, answers.append)
+    assert answers == []
+    assert desk.work()
+    assert go2.calls == [call]
+    assert [answer.success for answer in answers] == [True]
+    assert "done in" in answers[0].message
+
+
+def test_an_unknown_order_is_refused_with_the_valid_names() -> None:
+    (answer,) = ordered(Desk(FakeGo2()), "moonwalk")
+    assert not answer.success
+    assert "'moonwalk'" in answer.message
+    assert all(name in answer.message for name in COMMANDS)
+
+
+def test_what_did_not_happen_is_answered_with_the_reason() -> None:
+    (answer,) = ordered(Desk(FakeGo2(refusals={"sit": "sit not done within 3.0 s"})), "sit")
+    assert (answer.success, answer.message) == (False, "sit not done within 3.0 s")
+    (answer,) = ordered(Desk(FakeGo2(errors={"walk": ModeError("fallen: recover")})), "walk")
+    assert (answer.success, answer.message) == (False, "fallen: recover")
+
+
+def test_a_second_order_is_refused_at_once_and_the_first_goes_on() -> None:
+    go2 = FakeGo2()
+    desk, first, second = Desk(go2), [], []
+    order(desk, "sit", first.append)
+    order(desk, "up", second.append)
+    assert "busy with 'sit'" in second[0].message
+    desk.work()
+    assert first[0].success
+    assert go2.calls == ["sit"]
+    assert ordered(desk, "up")[0].success
+
+
+def test_whoever_waits_is_told_when_the_server_ends() -> None:
+    desk, answers = Desk(FakeGo2()), []
+    order(desk, "sit", answers.append)
+    desk.abandon("ending")
+    assert answers == [Answer(False, "ending")]
+    desk.abandon("ending")
+    assert len(answers) == 1
+
+
+def test_stop_in_a_motion_leaves_it_and_is_answered_when_the_robot_stands() -> None:
+    plant = WatchedPlant()
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        desk, answers = Desk(go2), {}
+        order(desk, "high_five", lambda answer: answers.setdefault("high_five", answer))
+        stop = lambda: order(desk, "stop", lambda answer: answers.setdefault("stop", answer))  # noqa: E731
+        plant.once_at(go2.state.time + 2.0, stop)
+        desk.work()
+        assert not answers["high_five"].success
+        assert "cancelled" in answers["high_five"].message
+        assert answers["stop"].success
+        assert go2.mode is Mode.STANDING
+
+
+def test_damp_in_a_posture_ends_it() -> None:
+    plant = WatchedPlant()
+    with GO2Controller(plant=plant) as go2:
+        desk, answers = Desk(go2), {}
+        order(desk, "up", lambda answer: answers.setdefault("up", answer))
+        damp = lambda: order(desk, "damp", lambda answer: answers.setdefault("damp", answer))  # noqa: E731
+        plant.once_at(1.2, damp)
+        desk.work()
+        assert not answers["up"].success
+        assert answers["damp"].success
+        assert go2.mode is Mode.DAMPED
+
+
+# --- motions ------------------------------------------------------------------------------------
+
+
+def played(go2: GO2Controller, motion: str, *settings: str) -> Answer:
+    desk, answers, answered = Desk(go2), [], threading.Event()
+    assert desk.submit(motion_job(motion, settings, answers.append)) == ""
+    while not desk.work():
+        answered.wait(0.01)
+    return answers[0]
+
+
+def test_a_motion_is_prepared_beside_the_loop_and_played_from_lying() -> None:
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        answer = played(go2, "nod", "times=1")
+        assert answer.success, answer.message
+        assert go2.mode is Mode.STANDING
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [(["times=99"], "times"), (["times"], "name=value"), (["size=1"], "size")],
+)
+def test_wrong_settings_are_answered_with_the_reason(settings: list[str], complaint: str) -> None:
+    go2 = FakeGo2()
+    answer = played(go2, "nod", *settings)
+    assert not answer.success
+    assert complaint in answer.message
+    assert go2.calls == []
+
+
+def test_a_bug_in_the_slow_work_is_an_answer_and_not_a_silence() -> None:
+    def prepare() -> None:
+        raise RuntimeError("no memory")
+
+    desk, answers = Desk(FakeGo2()), []
+    job = Job("nod", lambda _go2, _job: True, answers.append, prepare)
+    assert desk.submit(job) == ""
+    while not desk.work():
+        pass
+    assert answers[0].message == "RuntimeError: no memory"
+
+
+def test_settings_are_read_as_numbers_or_words() -> None:
+    read = parse_settings(["hold=2.5", "times = 3", "side=left"])
+    assert read == {"hold": 2.5, "times": 3, "side": "left"}
+    with pytest.raises(CommandError, match="'side='"):
+        parse_settings(["side="])
+
+
+# --- velocities ---------------------------------------------------------------------------------
+
+
+def test_a_velocity_lasts_half_a_second() -> None:
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        velocity = VelocityInput(go2, VelocityEnvelope())
+        assert go2.walk()
+        velocity.accept(0.3, 0.1, 0.2, is_busy=False)
+        assert go2.command == VelocityCommand(0.3, 0.1, 0.2)
+        go2.wait(CMD_VEL_SILENCE - 2 * PERIOD)
+        velocity.expire()
+        assert not go2.command.is_zero
+        go2.wait(3 * PERIOD)
+        velocity.expire()
+        assert go2.command.is_zero
+        assert velocity.counts.silences == 1
+
+
+def test_velocities_that_cannot_be_followed_are_counted_and_warned_of_once(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(throttle, "PERIOD", math.inf)
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        velocity = VelocityInput(go2, VelocityEnvelope())
+        for _ in range(5):
+            velocity.accept(0.3, 0.0, 0.0, is_busy=False)
+            velocity.accept(math.nan, 0.0, 0.0, is_busy=False)
+        assert go2.walk()
+        velocity.accept(0.3, 0.0, math.inf, is_busy=False)
+        velocity.accept(0.3, 0.0, 0.0, is_busy=True)
+        assert go2.command.is_zero
+        velocity.accept(9.0, 0.0, 0.0, is_busy=False)
+        assert go2.command.linear_x == pytest.approx(VelocityEnvelope().forward)
+    counts = velocity.counts
+    assert (counts.received, counts.followed) == (13, 1)
+    assert (counts.not_finite, counts.out_of_mode) == (6, 6)
+    warnings = [record.message for record in caplog.records if "cmd_vel" in record.message]
+    assert len(warnings) == 3

@@ -1,0 +1,197 @@
+"""The client with the seeds' face, alone and against a server; and a student's own class."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from typing import Any
+from unittest.mock import patch
+
+import pytest
+
+from go2_wbc.errors import BridgeError, CommandError, ConfigError
+from tests.controller.bridges.ros2_graph import ROOT, Probe, Server, needs_ros2
+
+pytestmark = needs_ros2
+
+CLIENT = "controller.bridges.ros2.client.GO2ControllerNode"
+
+
+@pytest.fixture
+def alone(graph: None) -> Iterator[Any]:
+    """A client that does not look for a server."""
+    from controller.bridges.ros2 import GO2ControllerNode
+
+    with patch(f"{CLIENT}._wait_for_service", return_value=True):
+        node = GO2ControllerNode("nobody")
+    yield node
+    node.destroy_node()
+
+
+@pytest.fixture
+def go2(server: Server) -> Iterator[Any]:
+    from controller.bridges.ros2 import GO2ControllerNode
+
+    node = GO2ControllerNode()
+    yield node
+    node.destroy_node()
+
+
+# --- without a server ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("method", "command"), [("sit", "sit"), ("stand", "up"), ("walk", "walk")])
+@pytest.mark.parametrize("done", [True, False])
+def test_a_behaviour_sends_its_command_and_hands_on_the_answer(
+    alone: Any, method: str, command: str, *, done: bool
+) -> None:
+    with patch(f"{CLIENT}._call_behavior", return_value=done) as call:
+        assert getattr(alone, method)() is done
+    call.assert_called_once_with(command)
+
+
+def test_move_is_published_at_once_and_repeated_until_stop(alone: Any) -> None:
+    with patch.object(alone, "_cmd_vel_pub") as publisher:
+        alone.move(linear_x=0.2, angular_z=-0.5, linear_y=0.1)
+        publisher.publish.assert_called_once()
+        time.sleep(0.3)
+        sent = publisher.publish.call_args.args[0]
+        assert (sent.linear.x, sent.linear.y, sent.angular.z) == (0.2, 0.1, -0.5)
+        assert publisher.publish.call_count >= 3
+        alone.stop()
+        count = publisher.publish.call_count
+        sent = publisher.publish.call_args.args[0]
+        assert (sent.linear.x, sent.linear.y, sent.angular.z) == (0.0, 0.0, 0.0)
+        time.sleep(0.1)
+        assert publisher.publish.call_count == count
+
+
+def test_wrong_arguments_are_errors_of_ours(alone: Any) -> None:
+    from controller.bridges.ros2 import GO2ControllerNode
+
+    for call in (lambda: alone.move(math.nan), lambda: alone.turn_left(math.inf)):
+        with pytest.raises(CommandError, match="finite"):
+            call()
+    with pytest.raises(ConfigError, match="namespace"):
+        GO2ControllerNode("not a name")
+
+
+def test_without_a_server_a_call_ends_in_false_and_says_how_to_start_one(alone: Any) -> None:
+    with patch(f"{CLIENT}._wait_for_service", return_value=False):
+        assert alone.stand() is False
+    assert "go2-wbc ros2 --namespace nobody" in alone.last_message
+
+
+def test_without_init_the_client_says_what_to_call_first() -> None:
+    from controller.bridges.ros2 import GO2ControllerNode
+
+    with (
+        patch("controller.bridges.ros2.client.ros.rclpy.ok", return_value=False),
+        pytest.raises(BridgeError, match=r"rclpy\.init\(\)"),
+    ):
+        GO2ControllerNode()
+
+
+# --- against a server ---------------------------------------------------------------------------
+
+
+def test_every_call_of_the_demo_is_borne_out_by_odometry(go2: Any) -> None:
+    assert go2.stand()
+    assert go2.state().q[2] > 0.29
+    assert go2.sit()
+    assert go2.state().q[2] == pytest.approx(0.235, abs=0.02)
+    assert go2.walk()
+    before = go2.state()
+    go2.move(linear_x=0.2)
+    time.sleep(2.0)
+    go2.stop()
+    time.sleep(1.0)
+    after = go2.state()
+    assert after.q[0] - before.q[0] == pytest.approx(0.4, abs=0.06)
+    assert go2.high_five()
+    assert "paw height" in go2.last_message
+    assert go2.sit()
+
+
+def test_the_demo_runs_over_ros_and_its_figures_come_from_odometry(server: Server) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "controller.cli.main", "demo", "--ros2", "--json"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=180.0,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    report = json.loads(done.stdout[done.stdout.index("{") :])
+    assert report["ok"] is True
+    steps = {step["name"]: step for step in report["steps"]}
+    assert list(steps)[:3] == ["stand", "sit", "walk"]
+    assert steps["forward"]["figures"][0]["measured"] == pytest.approx(0.4, abs=0.06)
+
+
+def test_errands_are_closed_on_odometry(go2: Any) -> None:
+    assert go2.turn_left(math.pi / 2)
+    yaw = go2.state().yaw
+    assert go2.turn_right(math.pi / 2)
+    assert math.remainder(go2.state().yaw - yaw, math.tau) == pytest.approx(-math.pi / 2, abs=0.06)
+    before = go2.state().p_world_base
+    assert go2.move_forward(0.4)
+    assert math.dist(go2.state().p_world_base[:2], before[:2]) == pytest.approx(0.4, abs=0.04)
+
+
+def test_a_motion_tells_its_progress_and_can_be_cancelled(go2: Any) -> None:
+    seen: list[float] = []
+
+    def watch(share: float) -> None:
+        seen.append(share)
+        if share > 0.3:
+            go2.cancel()
+
+    assert go2.play("push_ups", {"times": 3}, watch) is False
+    assert "cancelled" in go2.last_message
+    assert max(seen) < 0.9
+    assert go2.state().q[2] > 0.27
+
+
+def test_a_class_from_the_course_runs_unmodified(server: Server, probe: Probe) -> None:
+    from tests.controller.bridges.student import StudentController
+
+    student = StudentController()
+    try:
+        assert student.stand()
+        assert probe.pose()[2] > 0.29
+        assert student.sit()
+        assert probe.pose()[2] == pytest.approx(0.235, abs=0.02)
+        assert student.walk()
+        before = probe.pose()
+        student.move(linear_x=0.2)
+        time.sleep(2.0)
+        student.stop()
+        time.sleep(1.0)
+        # It publishes once, and a robot that hears nothing stops after half a second.
+        assert math.dist(probe.pose()[:2], before[:2]) == pytest.approx(0.1, abs=0.03)
+        assert student.sit()
+    finally:
+        student.destroy_node()
+
+
+def test_somebody_else_may_spin_the_node(go2: Any) -> None:
+    import threading
+
+    from rclpy.executors import SingleThreadedExecutor
+
+    executor = SingleThreadedExecutor()
+    executor.add_node(go2)
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    try:
+        assert go2.stand()
+        assert go2.state() is not None
+    finally:
+        executor.shutdown()
+        thread.join(5.0)

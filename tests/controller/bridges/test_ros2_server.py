@@ -1,0 +1,263 @@
+"""The server as others see it: plain rclpy in another process than the robot's."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from typing import Any
+
+import pytest
+
+from tests.controller.bridges.ros2_graph import DISCOVERY, Probe, Server, needs_ros2, serving
+
+pytestmark = needs_ros2
+
+SPEED_TOLERANCE = 0.02
+"""Share of the commanded speed, over several strides."""
+RATE_TOLERANCE = 0.05
+"""Share of a rate: a few messages are on their way when the counting begins and ends."""
+
+
+def test_a_behaviour_is_answered_when_odometry_bears_it_out(server: Server, probe: Probe) -> None:
+    low = probe.pose()[2]
+    answer = probe.call("UP")
+    assert answer.success, answer.message
+    assert probe.pose()[2] > 0.29 > low
+    answer = probe.call("Sit")
+    assert answer.success, answer.message
+    assert probe.pose()[2] == pytest.approx(0.235, abs=0.02)
+
+
+def test_an_unknown_behaviour_is_refused_with_the_valid_names(server: Server, probe: Probe) -> None:
+    answer = probe.call("moonwalk")
+    assert not answer.success
+    assert "valid: damp, high_five, lie_down, recover, sit, stand, stop, up, walk" in answer.message
+
+
+def test_a_second_call_during_one_is_refused_at_once(server: Server, probe: Probe) -> None:
+    probe.call("up")
+    first = probe.send("sit")
+    began = time.monotonic()
+    second = probe.result(probe.send("up"))
+    assert not second.success
+    assert "busy with 'sit'" in second.message
+    assert time.monotonic() - began < 1.0
+    assert not first.done()
+    assert probe.result(first).success
+
+
+def test_velocities_are_real_ones_and_end_with_silence(server: Server, probe: Probe) -> None:
+    assert probe.call("walk").success
+    before = probe.statistics()["cmd_vel"]
+    probe.drive(1.0, 0.3)
+    start = probe.place()
+    probe.drive(5.0, 0.3)
+    end = probe.place()
+    assert math.dist(end.xy, start.xy) / (end.time - start.time) == pytest.approx(
+        0.3, rel=SPEED_TOLERANCE
+    )
+    probe.spin(1.5)
+    resting = probe.pose()
+    probe.spin(0.5)
+    assert math.dist(probe.pose()[:2], resting[:2]) < 0.005
+    after = probe.statistics()["cmd_vel"]
+    assert after["silences"] == before["silences"] + 1
+    assert after["followed"] > before["followed"]
+
+
+def test_an_order_ends_the_velocity_that_came_before_it(server: Server, probe: Probe) -> None:
+    # A robot that was told to walk while it walked forgot to stop when the commands ceased.
+    assert probe.call("walk").success
+    probe.drive(1.0, 0.3)
+    assert probe.call("walk").success
+    probe.spin(1.5)
+    resting = probe.pose()
+    probe.spin(0.5)
+    assert math.dist(probe.pose()[:2], resting[:2]) < 0.005
+
+
+def test_sideways_and_turning_velocities_are_followed_too(server: Server, probe: Probe) -> None:
+    assert probe.call("walk").success
+    probe.drive(1.0, 0.0, 0.5)
+    start = probe.place()
+    probe.drive(3.0, 0.0, 0.5)
+    end = probe.place()
+    turned = math.remainder(end.yaw - start.yaw, math.tau)
+    assert turned / (end.time - start.time) == pytest.approx(0.5, rel=0.05)
+    probe.drive(1.0, 0.0, y=0.2)
+    start = probe.place()
+    probe.drive(3.0, 0.0, y=0.2)
+    end = probe.place()
+    dx, dy = end.xy[0] - start.xy[0], end.xy[1] - start.xy[1]
+    aside = -math.sin(start.yaw) * dx + math.cos(start.yaw) * dy
+    assert aside / (end.time - start.time) == pytest.approx(0.2, rel=0.1)
+
+
+def test_a_velocity_that_is_not_finite_or_out_of_mode_moves_nothing(
+    server: Server, probe: Probe
+) -> None:
+    assert probe.call("walk").success
+    assert probe.trigger("stop").success
+    before, counts = probe.pose(), probe.statistics()["cmd_vel"]
+    probe.drive(0.5, math.nan)
+    assert probe.call("up").success
+    probe.drive(0.5, 0.5)
+    after, later = probe.pose(), probe.statistics()["cmd_vel"]
+    assert math.dist(before[:2], after[:2]) < 0.02
+    assert later["not_finite"] > counts["not_finite"]
+    assert later["out_of_mode"] > counts["out_of_mode"]
+    assert later["followed"] == counts["followed"]
+    assert "not finite" in server.said
+
+
+def test_the_triggers_do_the_same_as_the_command(server: Server, probe: Probe) -> None:
+    assert probe.trigger("up").success
+    assert probe.trigger("stop").success
+    assert probe.statistics()["mode"] == "standing"
+
+
+def test_every_topic_comes_at_its_rate(server: Server, probe: Probe) -> None:
+    first = probe.statistics()
+    probe.spin(3.0)
+    second = probe.statistics()
+    time_passed = second["robot_time"] - first["robot_time"]
+    rates = {
+        name: (second["published"][name] - first["published"][name]) / time_passed
+        for name in second["published"]
+    }
+    expected = dict.fromkeys(("joint_states", "odom", "imu", "foot_contact"), 100.0)
+    assert rates.pop("/tf") == pytest.approx(50.0, rel=RATE_TOLERANCE)
+    assert rates.keys() == {f"/robot1/{name}" for name in expected}
+    assert all(rate == pytest.approx(100.0, rel=RATE_TOLERANCE) for rate in rates.values())
+    assert second["errors"] == 0
+
+
+def test_the_messages_say_what_a_standing_robot_measures(server: Server, probe: Probe) -> None:
+    from quadropted_msgs.msg import RobotFootContact
+    from sensor_msgs.msg import Imu, JointState
+    from tf2_msgs.msg import TFMessage
+
+    assert probe.call("up").success
+    heard = listen(
+        probe,
+        {
+            "joint_states": (JointState, "/robot1/joint_states"),
+            "imu": (Imu, "/robot1/imu"),
+            "contacts": (RobotFootContact, "/robot1/foot_contact"),
+            "tf": (TFMessage, "/tf"),
+        },
+    )
+    joints = heard["joint_states"]
+    assert joints.name[:3] == ["FL_hip_joint", "FL_thigh_joint", "FL_calf_joint"]
+    assert len(joints.position) == len(joints.velocity) == len(joints.effort) == 12
+    assert heard["imu"].linear_acceleration.z == pytest.approx(9.81, abs=0.5)
+    assert list(heard["contacts"].contacts) == [True] * 4
+    (transform,) = heard["tf"].transforms
+    assert (transform.header.frame_id, transform.child_frame_id) == (
+        "robot1/odom",
+        "robot1/base_link",
+    )
+    assert transform.transform.translation.z == pytest.approx(probe.pose()[2], abs=0.01)
+
+
+def listen(probe: Probe, topics: dict[str, tuple[Any, str]]) -> dict[str, Any]:
+    heard: dict[str, Any] = {}
+    for key, (kind, name) in topics.items():
+        note = lambda message, key=key: heard.setdefault(key, message)  # noqa: E731
+        probe.node.create_subscription(kind, name, note, 10)
+    end = time.monotonic() + DISCOVERY
+    while len(heard) < len(topics) and time.monotonic() < end:
+        probe.spin(0.1)
+    assert heard.keys() == topics.keys()
+    return heard
+
+
+# --- the action ---------------------------------------------------------------------------------
+
+
+def goal_of(probe: Probe, motion: str, *settings: str) -> tuple[Any, list[Any]]:
+    """The goal's handle and the list that its feedback goes to."""
+    from quadropted_msgs.action import PlayMotion
+    from rclpy.action import ActionClient
+
+    client, feedback = ActionClient(probe.node, PlayMotion, "/robot1/play_motion"), []
+    assert client.wait_for_server(DISCOVERY)
+    goal = PlayMotion.Goal(motion=motion, settings=list(settings))
+    note = lambda message: feedback.append(message.feedback)  # noqa: E731
+    return probe.result(client.send_goal_async(goal, feedback_callback=note)), feedback
+
+
+def test_a_motion_has_feedback_with_progress_and_a_result(server: Server, probe: Probe) -> None:
+    handle, feedback = goal_of(probe, "nod", "times=1")
+    assert handle.accepted
+    answer = probe.result(handle.get_result_async())
+    assert answer.status == 4  # succeeded
+    assert answer.result.success, answer.result.message
+    assert answer.result.duration > 1.0
+    shares = [message.progress for message in feedback]
+    assert shares == sorted(shares)
+    assert shares[-1] > 0.5
+    assert {message.phase for message in feedback} >= {"playing"}
+
+
+def test_a_high_five_that_is_cancelled_ends_standing(server: Server, probe: Probe) -> None:
+    assert probe.call("up").success
+    handle, feedback = goal_of(probe, "high_five", "hold=5.0")
+    while not feedback or feedback[-1].progress < 0.4:
+        probe.spin(0.05)
+    busy, _ = goal_of(probe, "nod")
+    assert not busy.accepted
+    probe.result(handle.cancel_goal_async())
+    answer = probe.result(handle.get_result_async())
+    assert answer.status == 5  # canceled
+    assert not answer.result.success
+    assert probe.statistics()["mode"] == "standing"
+    assert feedback[-1].phase == "returning"
+
+
+def test_a_motion_that_does_not_exist_is_aborted_with_the_names(
+    server: Server, probe: Probe
+) -> None:
+    handle, _ = goal_of(probe, "moonwalk")
+    answer = probe.result(handle.get_result_async())
+    assert answer.status == 6  # aborted
+    assert "unknown motion 'moonwalk'; valid: bow," in answer.result.message
+
+
+# --- other ways to serve ------------------------------------------------------------------------
+
+
+def test_free_running_time_is_the_clock(graph: None) -> None:
+    from rosgraph_msgs.msg import Clock
+
+    with serving(namespace="robot3") as server:
+        probe = Probe("robot3")
+        assert probe.call("up").success
+        first = listen(probe, {"clock": (Clock, "/clock")})["clock"].clock
+        probe.spin(1.0)
+        stamp = probe.pose()[3]
+        assert first.sec + 1e-9 * first.nanosec < stamp
+        assert stamp == pytest.approx(probe.statistics()["robot_time"], abs=1.0)
+        probe.close()
+        assert server.end() == 0
+
+
+def test_without_the_interfaces_the_triggers_remain_and_the_server_says_so(
+    graph: None, tmp_path: Any
+) -> None:
+    for package in ("quadropted_msgs", "tf2_msgs"):
+        (tmp_path / package).mkdir()
+        (tmp_path / package / "__init__.py").write_text("", encoding="utf-8")
+    with serving(namespace="robot4", path=str(tmp_path)) as server:
+        probe = Probe("robot4")
+        assert probe.trigger("up").success
+        assert probe.trigger("sit").success
+        assert "without quadropted_msgs and tf2_msgs" in server.said
+        assert "ros2/build_interfaces.sh" in server.said
+        assert "/robot4/sit" in server.said
+        published = json.loads(probe.trigger("statistics").message)["published"]
+        assert "/robot4/odom" in published
+        assert "/tf" not in published
+        probe.close()
+        assert server.end() == 0
