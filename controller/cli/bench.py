@@ -28,6 +28,10 @@ go2-wbc bench feasibility              eight minutes on two cores
 go2-wbc bench feasibility --motions 40 --near 0
 go2-wbc bench feasibility --json --out feasibility.json
 """
+BRIDGES_EXAMPLES = """
+go2-wbc bench bridges              two minutes; needs the extra [ros2]
+go2-wbc bench bridges --json --out bridges.json
+"""
 SEEDS, QUICK_SEEDS = 20, 3
 MOTIONS, NEAR = 160, 64
 
@@ -39,7 +43,7 @@ def register(subparsers: Subparsers) -> None:
         "bench",
         "Measure over many seeds, against fixed bars.\n"
         "Exit code 0 if every bar is met, 1 if one is not.",
-        examples=BEHAVIOUR_EXAMPLES + FEASIBILITY_EXAMPLES,
+        examples=BEHAVIOUR_EXAMPLES + FEASIBILITY_EXAMPLES + BRIDGES_EXAMPLES,
     )
     benches: Subparsers = parser.add_subparsers(title="benches", dest="bench", required=True)
     behaviour = add_parser(
@@ -74,17 +78,30 @@ def register(subparsers: Subparsers) -> None:
         default=NEAR,
         help="motions close to a limit, which have no bar; default %(default)s",
     )
+    bridges = add_parser(
+        benches,
+        "bridges",
+        "A server in a process of its own, on the loopback: round trips, lost messages,\n"
+        "speed against command, CPU of the middleware, and the demo over it.",
+        examples=BRIDGES_EXAMPLES,
+    )
     for bench in (behaviour, feasibility):
         bench.add_argument(
             "--jobs", metavar="N", type=_positive, default=2, help="processes, default %(default)s"
         )
+    for bench in (behaviour, feasibility, bridges):
         bench.add_argument("--json", action="store_true", help="print JSON instead of the table")
         bench.add_argument("--out", metavar="FILE", type=Path, help="also write the JSON here")
 
 
 def run(args: argparse.Namespace) -> int:
     """Run what was asked for, report, and say by the exit code whether all bars are met."""
-    return _run_behaviour(args) if args.bench == "behaviour" else _run_feasibility(args)
+    runs = {
+        "behaviour": _run_behaviour,
+        "bridges": _run_bridges,
+        "feasibility": _run_feasibility,
+    }
+    return runs[args.bench](args)
 
 
 def _run_behaviour(args: argparse.Namespace) -> int:
@@ -112,6 +129,16 @@ def _run_feasibility(args: argparse.Namespace) -> int:
     values = {**verdicts.as_dict(), "near_limits": near.as_dict()}
     _publish(values, render(verdicts, near), args, target)
     return ExitCode.OK if verdicts.ok else ExitCode.FAILED
+
+
+def _run_bridges(args: argparse.Namespace) -> int:
+    from controller.bench.bridges import measure_bridges, render
+
+    target = _checked_target(args)
+    with ProgressLine(sys.stderr) as line:
+        report = measure_bridges(line.done)
+    _publish(report.as_dict(), render(report), args, target)
+    return ExitCode.OK if report.ok else ExitCode.FAILED
 
 
 def _measure(families: tuple[Family, ...], seeds: int, jobs: int) -> Results:
