@@ -13,6 +13,7 @@ go2-wbc demo --no-media --json       figures only, for a program to read
 go2-wbc demo --viewer --realtime     watch it live in MuJoCo's window
 go2-wbc demo --friction 0.4 --mass-scale 1.2 --seed 3
 go2-wbc demo --backend placo --solver proxqp
+go2-wbc demo --ros2                  on a robot served by `go2-wbc ros2 --realtime`
 """
 DEFAULT_FOLDER = Path("out/demo")
 BACKENDS = ("condensed", "full", "placo")
@@ -37,6 +38,13 @@ def register(subparsers: Subparsers) -> None:
     output.add_argument("--json", action="store_true", help="print JSON instead of the table")
     output.add_argument("--viewer", action="store_true", help="also open MuJoCo's window")
     output.add_argument("--realtime", action="store_true", help="at the pace of the wall clock")
+    ros2 = parser.add_argument_group("over ROS 2")
+    ros2.add_argument(
+        "--ros2", action="store_true", help="on a robot that `go2-wbc ros2` serves elsewhere"
+    )
+    ros2.add_argument(
+        "--namespace", metavar="NAME", default="robot1", help="its name, default %(default)s"
+    )
     robot = parser.add_argument_group("robot and world")
     robot.add_argument(
         "--seed",
@@ -57,6 +65,10 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the demo, print the report, write the files."""
+    if args.ros2:
+        from controller.cli.demo_ros2 import run_ros_demo_command
+
+        return run_ros_demo_command(args)
     from controller.cli.demo_run import run_demo_command
 
     return run_demo_command(args)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from controller.demo.report import DemoReport, DemoTotals, Figure, StepResult
 
@@ -22,6 +22,13 @@ def render(report: DemoReport, encoding: str | None = None) -> str:
         report: what was measured.
         encoding: of the terminal; ticks and crosses become words where it lacks them.
     """
+    rows = [render_steps(report.steps, encoding)]
+    rows += [*_total_rows(report.totals), "", _verdict(report)]
+    return "\n".join(rows)
+
+
+def render_steps(steps: Sequence[StepResult], encoding: str | None = None) -> str:
+    """The table of steps alone, with a line below; see ``render``."""
     marks = _marks(encoding)
     rows = [
         _ROW.format(
@@ -35,10 +42,9 @@ def render(report: DemoReport, encoding: str | None = None) -> str:
         ).rstrip(),
         "-" * WIDTH,
     ]
-    for step in report.steps:
+    for step in steps:
         rows += _step_rows(step, marks[step.ok])
-    rows += ["-" * WIDTH, *_total_rows(report.totals), "", _verdict(report)]
-    return "\n".join(rows)
+    return "\n".join([*rows, "-" * WIDTH])
 
 
 def _marks(encoding: str | None) -> dict[bool, str]:

@@ -48,6 +48,20 @@ LIBRARIES: Mapping[str, str | None] = {
     "example-robot-data": None,
 }
 """Every library that is needed and the module that it brings; ``None`` is data only."""
+ROS2: Mapping[str, str] = {
+    "ros-rclpy": "rclpy",
+    "ros-rmw-fastrtps-cpp": "rclpy",
+    "ros-geometry-msgs": "geometry_msgs.msg",
+    "ros-nav-msgs": "nav_msgs.msg",
+    "ros-rosgraph-msgs": "rosgraph_msgs.msg",
+    "ros-sensor-msgs": "sensor_msgs.msg",
+    "ros-std-srvs": "std_srvs.srv",
+    "quadropted-msgs": "quadropted_msgs.action",
+    "tf2-msgs": "tf2_msgs.msg",
+}
+"""What ``go2-wbc ros2`` uses, and the module that each brings; those of ``BUILT`` are built."""
+BUILT = ("quadropted-msgs", "tf2-msgs")
+BUILD_LINE = "ros2/build_interfaces.sh {python} dist && {pip} dist/*.whl"
 NEEDED_SOLVERS = ("daqp", "proxqp", "quadprog")
 
 
@@ -115,7 +129,40 @@ def examine() -> list[Finding]:
     findings += judge_robot_files(bounds.get("example-robot-data", ""))
     findings += judge_solvers(probes["qpsolvers"].solvers, bounds)
     findings.append(judge_display(sys.platform, os.environ))
-    return findings
+    return findings + _examine_ros2()
+
+
+def _examine_ros2() -> list[Finding]:
+    versions = {name: installed_version(name) for name in ROS2}
+    here = {ROS2[name] for name, version in versions.items() if version is not None}
+    return judge_ros2(versions, probe_imports(sorted(here)))
+
+
+def judge_ros2(
+    versions: Mapping[str, str | None], probes: Mapping[str, ImportProbe]
+) -> list[Finding]:
+    """Whether ``go2-wbc ros2`` can run; it is optional, so that nothing here is a problem.
+
+    Args:
+        versions: installed version of each package of ``ROS2``.
+        probes: how the imports of those that are installed went.
+    """
+    section = "ROS 2 (optional)"
+    if versions["ros-rclpy"] is None:
+        line = f'{_pip()} -e ".[ros2]"'
+        detail = "not installed: go2-wbc ros2 and high_five_demo --ros2 need it"
+        return [Finding(section, "extra [ros2]", Status.NOTE, detail, line)]
+    found = []
+    for name, version in versions.items():
+        build = BUILD_LINE.format(python=_python(), pip=_pip())
+        remedy = build if name in BUILT else f'{_pip()} -e ".[ros2]"'
+        error = "" if version is None else probes[ROS2[name]].error
+        if version is not None and not error:
+            found.append(Finding(section, name, Status.OK, version))
+        else:
+            detail = f"{version} does not import: {error}" if error else "not installed"
+            found.append(Finding(section, name, Status.NOTE, detail, remedy))
+    return found
 
 
 def judge_python(version: tuple[int, ...], system: str) -> Finding:
@@ -256,8 +303,11 @@ def install_line(name: str, bounds: str, *, again: bool = False) -> str:
 
 
 def _pip() -> str:
-    python = f'"{sys.executable}"' if " " in sys.executable else sys.executable
-    return f"{python} -m pip install"
+    return f"{_python()} -m pip install"
+
+
+def _python() -> str:
+    return f'"{sys.executable}"' if " " in sys.executable else sys.executable
 
 
 def _is_foreign(file: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 
@@ -109,12 +110,13 @@ class DemoReport:
     def as_dict(self) -> dict[str, object]:
         """Plain values for JSON; what could not be measured is None."""
         totals = asdict(self.totals) | {"real_time_factor": self.totals.real_time_factor}
-        values = {
-            "ok": self.ok,
-            "steps": [asdict(step) for step in self.steps],
-            "totals": totals,
-        }
-        return {key: _without_nan(value) for key, value in values.items()}
+        values = {"ok": self.ok, "totals": _without_nan(totals)}
+        return values | {"steps": self.steps_as_dicts(self.steps)}
+
+    @staticmethod
+    def steps_as_dicts(steps: Sequence[StepResult]) -> object:
+        """Plain values of ``steps`` for JSON."""
+        return _without_nan([asdict(step) for step in steps])
 
 
 def _without_nan(value: object) -> object:

@@ -229,3 +229,26 @@ def test_long_details_wrap_at_80_columns_and_lines_to_type_never() -> None:
     text = doctor.render([Finding("A", "b", Status.PROBLEM, "word " * 40, line)])
     assert f"-> {line}" in text
     assert max(len(row) for row in text.splitlines() if "->" not in row) <= 80
+
+
+# --- ROS 2, which is optional -------------------------------------------------------------------
+
+
+def test_without_the_extra_one_note_names_the_line_that_installs_it() -> None:
+    (finding,) = doctor.judge_ros2(dict.fromkeys(doctor.ROS2), {})
+    assert finding.status is Status.NOTE
+    assert finding.remedy.endswith('pip install -e ".[ros2]"')
+
+
+def test_interfaces_that_are_missing_are_built_and_ros_that_is_broken_is_installed() -> None:
+    versions = {**dict.fromkeys(doctor.ROS2, "1.0"), "tf2-msgs": None}
+    modules = set(doctor.ROS2.values())
+    probes_ = {name: ImportProbe(file=INSIDE) for name in modules}
+    probes_["nav_msgs.msg"] = ImportProbe(error="no librcl")
+    found = {item.subject: item for item in doctor.judge_ros2(versions, probes_)}
+    assert "ros2/build_interfaces.sh" in found["tf2-msgs"].remedy
+    assert "no librcl" in found["ros-nav-msgs"].detail
+    assert '-e ".[ros2]"' in found["ros-nav-msgs"].remedy
+    others = [item for name, item in found.items() if name not in ("tf2-msgs", "ros-nav-msgs")]
+    assert {item.status for item in others} == {Status.OK}
+    assert not any(item.status is Status.PROBLEM for item in found.values())
