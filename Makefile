@@ -4,7 +4,7 @@
 SHELL := bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test gates format bench doctor clean
+.PHONY: help demo test test-ros2 gates format bench doctor clean
 
 # A shell that has sourced another robot stack would put its own Pinocchio before ours.
 unexport PYTHONPATH
@@ -20,8 +20,8 @@ help: ## show this list
 	@echo "Usage: make TARGET [PYTHON=python3.12] [WORKERS=2] [ARGS='...']"
 	@echo
 	@while IFS= read -r line; do \
-		if [[ $$line =~ ^([a-z]+):.*'## '(.*)$$ ]]; then \
-			printf '  %-8s %s\n' "$${BASH_REMATCH[1]}" "$${BASH_REMATCH[2]}"; \
+		if [[ $$line =~ ^([a-z0-9-]+):.*'## '(.*)$$ ]]; then \
+			printf '  %-10s %s\n' "$${BASH_REMATCH[1]}" "$${BASH_REMATCH[2]}"; \
 		fi; \
 	done < Makefile
 	@echo
@@ -32,6 +32,9 @@ demo: $(VENV)/.stamp-run ## install, then run the demo headless
 
 test: $(VENV)/.stamp-dev ## install with the test tools, then run every test
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
+
+test-ros2: ## build the ROS 2 interfaces, install the extra [ros2], run its tests
+	ros2/test.sh $(ARGS)
 
 gates: $(VENV)/.stamp-dev ## lint, formatting and types
 	$(BIN)/ruff check .
@@ -49,7 +52,7 @@ doctor: $(VENV)/.stamp-run ## say what is installed and what is missing
 	$(BIN)/go2-wbc doctor $(ARGS)
 
 clean: ## remove the environment, builds and caches
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-ros2* build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # --- installation -----------------------------------------------------------------------------

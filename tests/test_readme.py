@@ -92,9 +92,9 @@ def test_every_command_is_one_of_the_command_line_with_options_that_exist(
 
 @pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])
 def test_every_make_target_exists(name: str) -> None:
-    targets = set(re.findall(r"^([a-z]+):", page("Makefile"), re.MULTILINE))
+    targets = set(re.findall(r"^([a-z0-9-]+):", page("Makefile"), re.MULTILINE))
     named = {words[1] for words in command_lines(name) if words[0] == "make"}
-    named |= set(re.findall(r"`make ([a-z]+)", page(name)))
+    named |= set(re.findall(r"`make ([a-z0-9-]+)", page(name)))
     assert named
     assert named <= targets
 
