@@ -13,7 +13,7 @@ go2-wbc demo --no-media --json       figures only, for a program to read
 go2-wbc demo --viewer --realtime     watch it live in MuJoCo's window
 go2-wbc demo --friction 0.4 --mass-scale 1.2 --seed 3
 go2-wbc demo --backend placo --solver proxqp
-go2-wbc demo --ros2                  on a robot served by `go2-wbc ros2 --realtime`
+go2-wbc demo --ros2                  on the robot of `go2-wbc ros2 --realtime`
 """
 DEFAULT_FOLDER = Path("out/demo")
 BACKENDS = ("condensed", "full", "placo")

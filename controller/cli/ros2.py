@@ -12,9 +12,9 @@ from pathlib import Path
 from controller.cli.common import ExitCode, Subparsers, add_parser
 
 EXAMPLES = """
-go2-wbc ros2 --realtime                       at the pace of the wall clock
-go2-wbc ros2                                  as fast as the CPU allows, with /clock
-go2-wbc ros2 --realtime --namespace robot2    a second robot, in a second process
+go2-wbc ros2 --realtime                      at the pace of the wall clock
+go2-wbc ros2                                 as fast as it can, with /clock
+go2-wbc ros2 --realtime --namespace robot2   a second robot
 """
 
 

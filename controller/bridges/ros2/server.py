@@ -259,10 +259,12 @@ class Door:
 
     def statistics(self) -> dict[str, Any]:
         """Counts and times since the start, for benches and the curious."""
-        own = time.thread_time()
+        own, state = time.thread_time(), self._go2.state
         return {
             "mode": self._go2.mode.value,
-            "robot_time": self._go2.state.time,
+            "robot_time": state.time,
+            "position": state.p_world_base.tolist(),
+            "heading": state.yaw,
             "wall_time": time.monotonic() - self._began,
             "ticks": self._ticks,
             "paces_given_up": self._pacer.give_ups if self._pacer else 0,

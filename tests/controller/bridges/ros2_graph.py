@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import json
-import math
 import os
 import signal
 import subprocess
@@ -184,10 +183,15 @@ class Probe:
 
     def place(self) -> Place:
         """Where the robot is, and its own time: on a busy machine less passes than on the wall."""
-        x, y, _, _ = self.pose()
-        at = self.odometry.pose.pose.orientation
-        yaw = math.atan2(2 * (at.w * at.z + at.x * at.y), 1 - 2 * (at.y**2 + at.z**2))
-        return Place((x, y), yaw, self.statistics()["robot_time"])
+        figures = self.statistics()
+        x, y, _ = figures["position"]
+        return Place((x, y), figures["heading"], figures["robot_time"])
+
+    def let_pass(self, seconds: float) -> None:
+        """Let this much of the robot's own time pass."""
+        end = self.place().time + seconds
+        while self.place().time < end:
+            self.spin(0.05)
 
     def close(self) -> None:
         self.node.destroy_node()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 
 import pytest
 
@@ -84,12 +85,14 @@ def test_stop_in_a_motion_leaves_it_and_is_answered_when_the_robot_stands() -> N
     with GO2Controller(plant=plant) as go2:
         assert go2.stand()
         desk, answers = Desk(go2), {}
-        order(desk, "high_five", lambda answer: answers.setdefault("high_five", answer))
+        job = motion_job("nod", [], lambda answer: answers.setdefault("nod", answer))
+        assert desk.submit(job) == ""
         stop = lambda: order(desk, "stop", lambda answer: answers.setdefault("stop", answer))  # noqa: E731
         plant.once_at(go2.state.time + 2.0, stop)
-        desk.work()
-        assert not answers["high_five"].success
-        assert "cancelled" in answers["high_five"].message
+        while not desk.work():
+            time.sleep(0.01)
+        assert not answers["nod"].success
+        assert "cancelled" in answers["nod"].message
         assert answers["stop"].success
         assert go2.mode is Mode.STANDING
 

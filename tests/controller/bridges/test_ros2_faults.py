@@ -69,10 +69,10 @@ def test_a_walking_robot_whose_client_is_killed_stops_and_stands(
         assert math.dist(moving[:2], before[:2]) > 0.2
     finally:
         end(walker)
-    probe.spin(2.5)
-    resting = probe.pose()
-    probe.spin(0.5)
-    assert math.dist(probe.pose()[:2], resting[:2]) < 0.01
+    probe.let_pass(2.0)
+    resting = probe.place()
+    probe.let_pass(0.5)
+    assert math.dist(probe.place().xy, resting.xy) < 0.01
     assert probe.statistics()["mode"] == "walking"
     assert probe.call("sit").success
 
