@@ -1,0 +1,1 @@
+"""Bridges: other people's protocols in front of this controller; optional, imported lazily."""
