@@ -35,6 +35,11 @@ def register(subparsers: Subparsers) -> None:
     parser.add_argument("--payload", metavar="KG", type=float, default=0.0, help="extra mass")
     parser.add_argument("--sensors", choices=("ideal", "noisy"), default="ideal")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="of the noise")
+    parser.add_argument(
+        "--lockstep",
+        action="store_true",
+        help="under low-level control time waits for the next lowcmd (1 s at most)",
+    )
     parser.add_argument("--config", metavar="FILE", type=Path, help="TOML with other numbers")
 
 
@@ -58,6 +63,7 @@ def run(args: argparse.Namespace) -> int:
         sensors=args.sensors,
         seed=args.seed,
         config=args.config,
+        lockstep=args.lockstep,
     )
     with UnitreeSimulator(settings):
         print(f"serving on DDS domain {args.domain}, interface {args.interface}", flush=True)

@@ -22,6 +22,8 @@ SPORT_STATE_TICKS: Final = 10
 """Control periods between two samples of ``rt/sportmodestate``."""
 COMMAND_QUEUE: Final = 64
 """Low-level commands that are looked at in one tick; of more, the oldest are lost."""
+LOCKSTEP_LIMIT: Final = 1.0
+"""Time [s] for which a simulator in lockstep waits for the next low-level command."""
 CATCH_UP: Final = 0.9
 """Share of a control period that passes at least between two ticks under low-level control: a
 simulator that is late must not run ahead of its peer's commands to catch up."""
@@ -53,8 +55,11 @@ class ServedPlant(Plant):
         status: what ``rt/sportmodestate`` says; written by the sport service.
     """
 
-    def __init__(self, inner: MujocoPlant, bus: Bus, gate: CommandGate) -> None:
-        """Serve ``inner`` on ``bus``."""
+    def __init__(
+        self, inner: MujocoPlant, bus: Bus, gate: CommandGate, *, lockstep: bool = False
+    ) -> None:
+        """Serve ``inner`` on ``bus``; with ``lockstep`` time waits for the low-level peer."""
+        self._is_lockstep = lockstep
         self.gate, self.status = gate, SportStatus()
         self._inner = inner
         self._commands = bus.reader("rt/lowcmd", idl.low_cmd(), depth=COMMAND_QUEUE)
@@ -76,7 +81,9 @@ class ServedPlant(Plant):
 
     def write(self, command: JointCommand) -> None:
         """Apply ``command``, or what the low-level peer asks instead, and publish the new state."""
-        if self.gate.is_active:
+        if self.gate.is_active and self._is_lockstep:
+            self._commands.wait(LOCKSTEP_LIMIT)
+        elif self.gate.is_active:
             self._keep_apart()
         self._inner.write(self.gate.choose(self._commands.take(), command))
         state, imu = self._inner.read(), self._inner.imu()

@@ -50,6 +50,7 @@ class SimulatorSettings:
         sensors: "ideal" or "noisy".
         seed: of the noise.
         config: TOML with other numbers.
+        lockstep: under low-level control let time pass only command by command.
     """
 
     domain: int = SIMULATOR_DOMAIN
@@ -60,6 +61,7 @@ class SimulatorSettings:
     sensors: str = "ideal"
     seed: int = 0
     config: Path | None = None
+    lockstep: bool = False
 
 
 @final
@@ -84,7 +86,7 @@ class UnitreeSimulator:
         )
         model = RobotModel()
         self._gate = CommandGate(model.q_lower, model.q_upper)
-        self._plant = ServedPlant(inner, bus, self._gate)
+        self._plant = ServedPlant(inner, bus, self._gate, lockstep=settings.lockstep)
         self._robot = SportRobot(self._plant, config)
         self._is_released = False
         self._sport = SportService(self._robot, self._has_low_level)
