@@ -51,6 +51,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("new", "controller.cli.motion_new", "write a small motion to start from"),
     Command("run", "controller.cli.motion_run", "check a motion, then play it in MuJoCo"),
     Command("teleop", "controller.cli.teleop", "drive the robot with the keyboard"),
+    Command("unitree-drive", "controller.cli.unitree_drive", "drive a Go2 through its low level"),
     Command("unitree-sim", "controller.cli.unitree_sim", "simulate a Go2 for Unitree's SDK"),
 )
 
