@@ -28,6 +28,10 @@ go2-wbc bench feasibility              eight minutes on two cores
 go2-wbc bench feasibility --motions 40 --near 0
 go2-wbc bench feasibility --json --out feasibility.json
 """
+BRIDGES_EXAMPLES = """
+go2-wbc bench bridges              two minutes, wants an idle machine
+go2-wbc bench bridges --json --out bridges.json
+"""
 SEEDS, QUICK_SEEDS = 20, 3
 MOTIONS, NEAR = 160, 64
 
@@ -39,7 +43,7 @@ def register(subparsers: Subparsers) -> None:
         "bench",
         "Measure over many seeds, against fixed bars.\n"
         "Exit code 0 if every bar is met, 1 if one is not.",
-        examples=BEHAVIOUR_EXAMPLES + FEASIBILITY_EXAMPLES,
+        examples=BEHAVIOUR_EXAMPLES + FEASIBILITY_EXAMPLES + BRIDGES_EXAMPLES,
     )
     benches: Subparsers = parser.add_subparsers(title="benches", dest="bench", required=True)
     behaviour = add_parser(
@@ -74,7 +78,15 @@ def register(subparsers: Subparsers) -> None:
         default=NEAR,
         help="motions close to a limit, which have no bar; default %(default)s",
     )
-    for bench in (behaviour, feasibility):
+    bridges = add_parser(
+        benches,
+        "bridges",
+        "Other people's protocols between real processes on the loopback: answers,\n"
+        "losses, latencies, and the robot driven through them. Needs the extras.",
+        examples=BRIDGES_EXAMPLES,
+    )
+    bridges.add_argument("--seeds", metavar="N", type=_positive, default=1, help="repetitions")
+    for bench in (behaviour, feasibility, bridges):
         bench.add_argument(
             "--jobs", metavar="N", type=_positive, default=2, help="processes, default %(default)s"
         )
@@ -84,7 +96,8 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run what was asked for, report, and say by the exit code whether all bars are met."""
-    return _run_behaviour(args) if args.bench == "behaviour" else _run_feasibility(args)
+    benches = {"behaviour": _run_behaviour, "bridges": _run_bridges}
+    return benches.get(args.bench, _run_feasibility)(args)
 
 
 def _run_behaviour(args: argparse.Namespace) -> int:
@@ -112,6 +125,18 @@ def _run_feasibility(args: argparse.Namespace) -> int:
     values = {**verdicts.as_dict(), "near_limits": near.as_dict()}
     _publish(values, render(verdicts, near), args, target)
     return ExitCode.OK if verdicts.ok else ExitCode.FAILED
+
+
+def _run_bridges(args: argparse.Namespace) -> int:
+    from controller.bench.bridges_unitree import FAMILY
+    from controller.bench.report import render, summarise
+    from controller.bridges.unitree.extra import require_dds
+
+    require_dds()
+    target = _checked_target(args)
+    report = summarise((FAMILY,), _measure((FAMILY,), args.seeds, 1))
+    _publish(report.as_dict(), render(report), args, target)
+    return ExitCode.OK if report.ok else ExitCode.FAILED
 
 
 def _measure(families: tuple[Family, ...], seeds: int, jobs: int) -> Results:

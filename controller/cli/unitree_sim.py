@@ -65,8 +65,11 @@ def run(args: argparse.Namespace) -> int:
         config=args.config,
         lockstep=args.lockstep,
     )
-    with UnitreeSimulator(settings):
+    with UnitreeSimulator(settings) as simulator:
         print(f"serving on DDS domain {args.domain}, interface {args.interface}", flush=True)
         while not stop.wait(0.5):
             pass
+        gate = simulator.gate
+    refused = ", ".join(f"{reason} {count}" for reason, count in gate.refused.items())
+    print(f"low-level commands: {gate.accepted} good, refused: {refused or 'none'}", flush=True)
     return ExitCode.OK

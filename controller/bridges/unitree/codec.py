@@ -10,6 +10,7 @@ one by one.
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Final, final
@@ -114,6 +115,10 @@ class Response:
     api_id: int
     code: int = 0
     data: str = ""
+
+
+Reply = Callable[[int, str], None]
+"""Answers a request: code and data. Any thread may call it, once."""
 
 
 def encode_request(request: Request) -> bytes:

@@ -12,6 +12,7 @@ from typing import Final, final
 from controller.bridges.unitree import idl
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import (
+    Reply,
     Request,
     Response,
     decode_request,
@@ -30,9 +31,6 @@ QUEUE: Final = 64
 """Requests that are kept for a server that is busy; of more, the oldest are lost."""
 LEASE_TERM: Final = 1.0
 """Time [s] for which a lease holds without renewal."""
-
-Reply = Callable[[int, str], None]
-"""Answers a request: code and data. Any thread may call it, once."""
 
 
 @final

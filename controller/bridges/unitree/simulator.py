@@ -11,9 +11,9 @@ from types import TracebackType
 from typing import Final, final
 
 from controller.bridges.unitree.bus import Bus
-from controller.bridges.unitree.codec import Request
+from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.low_level import CommandGate
-from controller.bridges.unitree.rpc import LeaseServer, Reply, Server
+from controller.bridges.unitree.rpc import LeaseServer, Server
 from controller.bridges.unitree.served_plant import ServedPlant, SportStatus
 from controller.bridges.unitree.sport_api import (
     SPORT_SERVICE,

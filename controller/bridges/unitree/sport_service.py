@@ -16,8 +16,7 @@ from dataclasses import dataclass
 from typing import Final, final
 
 from controller.bridges.unitree import sport_api
-from controller.bridges.unitree.codec import Request
-from controller.bridges.unitree.rpc import Reply
+from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
 from controller.bridges.unitree.sport_robot import MOTIONS, POSE, SportRobot
 from controller.executor import Aborted
