@@ -20,7 +20,6 @@ from cyclonedds.core import (
     WaitSet,
 )
 from cyclonedds.domain import Domain, DomainParticipant
-from cyclonedds.idl import IdlStruct
 from cyclonedds.pub import DataWriter
 from cyclonedds.qos import Policy, Qos
 from cyclonedds.sub import DataReader
@@ -110,15 +109,13 @@ class Bus:
             self._participant = DomainParticipant(domain)
         self._owned: list[Any] = []
 
-    def writer(self, topic: str, kind: type[IdlStruct]) -> Writer:
+    def writer(self, topic: str, kind: type) -> Writer:
         """A writer of ``topic``, with the quality of service that Unitree's SDK has."""
         writer = DataWriter(self._participant, Topic(self._participant, topic, kind))
         self._owned.append(writer)
         return Writer(writer)
 
-    def reader(
-        self, topic: str, kind: type[IdlStruct], *, depth: int, reliable: bool = False
-    ) -> Reader:
+    def reader(self, topic: str, kind: type, *, depth: int, reliable: bool = False) -> Reader:
         """A reader of ``topic`` that keeps the newest ``depth`` samples until they are taken."""
         policies = [Policy.History.KeepLast(depth)]
         if reliable:

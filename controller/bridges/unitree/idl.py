@@ -36,47 +36,47 @@ _NESTED: Final = {
     "path_point": "PathPoint_",
 }
 """Unitree's name of the struct that a field holds."""
-_made: dict[str, type[IdlStruct]] = {}
+_made: dict[str, type] = {}
 
 
-def low_state() -> type[IdlStruct]:
+def low_state() -> type:
     """Type of ``rt/lowstate``."""
     return _from_layout("LowState_", layout.LOW_STATE)
 
 
-def low_cmd() -> type[IdlStruct]:
+def low_cmd() -> type:
     """Type of ``rt/lowcmd``."""
     return _from_layout("LowCmd_", layout.LOW_CMD)
 
 
-def sport_state() -> type[IdlStruct]:
+def sport_state() -> type:
     """Type of ``rt/sportmodestate``."""
     return _from_layout("SportModeState_", layout.SPORT_STATE)
 
 
-def request() -> type[IdlStruct]:
+def request() -> type:
     """Type of a service's requests."""
     identity, lease, policy = _identity(), _api("RequestLease_", id=kinds.int64), _policy()
     header = _api("RequestHeader_", identity=identity, lease=lease, policy=policy)
     return _api("Request_", header=header, parameter=str, binary=kinds.sequence[kinds.byte])
 
 
-def response() -> type[IdlStruct]:
+def response() -> type:
     """Type of a service's responses."""
     status = _api("ResponseStatus_", code=kinds.int32)
     header = _api("ResponseHeader_", identity=_identity(), status=status)
     return _api("Response_", header=header, data=str, binary=kinds.sequence[kinds.byte])
 
 
-def _identity() -> type[IdlStruct]:
+def _identity() -> type:
     return _api("RequestIdentity_", id=kinds.int64, api_id=kinds.int64)
 
 
-def _policy() -> type[IdlStruct]:
+def _policy() -> type:
     return _api("RequestPolicy_", priority=kinds.int32, noreply=bool)
 
 
-def _from_layout(name: str, struct: np.dtype[np.void]) -> type[IdlStruct]:
+def _from_layout(name: str, struct: np.dtype[np.void]) -> type:
     kinds_by_name = {key: _kind(key, struct[key]) for key in struct.names or ()}
     return _made_once("unitree_go", name, kinds_by_name)
 
@@ -90,11 +90,11 @@ def _kind(field: str, kind: np.dtype[np.generic]) -> type:
     return _KINDS[kind.str[1:]]
 
 
-def _api(name: str, **fields: type) -> type[IdlStruct]:
+def _api(name: str, **fields: type) -> type:
     return _made_once("unitree_api", name, fields)
 
 
-def _made_once(module: str, name: str, fields: dict[str, type]) -> type[IdlStruct]:
+def _made_once(module: str, name: str, fields: dict[str, type]) -> type:
     if name not in _made:
         body = {"__annotations__": fields, "__module__": __name__}
         keywords = {"typename": f"{module}.msg.dds_.{name}"}
