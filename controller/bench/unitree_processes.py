@@ -51,8 +51,11 @@ class Process:
 
     def _read(self) -> None:
         stream = self._process.stdout
-        for line in stream or ():
-            self.lines.append(line.rstrip())
+        if stream is None:
+            return
+        with stream:
+            for line in stream:
+                self.lines.append(line.rstrip())
 
     @property
     def text(self) -> str:

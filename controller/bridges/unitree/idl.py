@@ -81,7 +81,7 @@ def _from_layout(name: str, struct: np.dtype[np.void]) -> type:
     return _made_once("unitree_go", name, kinds_by_name)
 
 
-def _kind(field: str, kind: np.dtype[np.generic]) -> type:
+def _kind(field: str, kind: np.dtype[np.generic]) -> object:
     if kind.subdtype is not None:
         item, shape = kind.subdtype
         return kinds.array[_kind(field, item), shape[0]]
@@ -90,11 +90,11 @@ def _kind(field: str, kind: np.dtype[np.generic]) -> type:
     return _KINDS[kind.str[1:]]
 
 
-def _api(name: str, **fields: type) -> type:
+def _api(name: str, **fields: object) -> type:
     return _made_once("unitree_api", name, fields)
 
 
-def _made_once(module: str, name: str, fields: dict[str, type]) -> type:
+def _made_once(module: str, name: str, fields: dict[str, object]) -> type:
     if name not in _made:
         body = {"__annotations__": fields, "__module__": __name__}
         keywords = {"typename": f"{module}.msg.dds_.{name}"}

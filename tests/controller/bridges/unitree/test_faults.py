@@ -14,7 +14,14 @@ from controller.bench.unitree_processes import Observer, Process, driver, simula
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.layout import LOW_CMD
 from controller.bridges.unitree.low_client import low_cmd_message
-from controller.bridges.unitree.sport_api import SPORT_SERVICE, Api, Code, SportMode
+from controller.bridges.unitree.sport_api import (
+    SPORT_SERVICE,
+    SWITCHER_SERVICE,
+    Api,
+    Code,
+    SportMode,
+    SwitcherApi,
+)
 from controller.cli.common import ExitCode
 from go2_wbc.robot.state import JointCommand
 from tests.controller.bridges.unitree.support import free_domain, needs_dds
@@ -46,6 +53,14 @@ class Robot:
         assert self.client.call(Api.RECOVERY_STAND, timeout=10.0).code == Code.OK
         assert self.observer.wait_for_rest()
         assert self.stands
+
+    def take_back(self) -> None:
+        from controller.bridges.unitree.rpc import Client
+
+        switcher = Client(self.observer.bus, SWITCHER_SERVICE)
+        assert switcher.wait_for_server(LIMIT)
+        assert switcher.call(SwitcherApi.SELECT_MODE, '{"name": "normal"}').code == Code.OK
+        assert wait_until(lambda: "low-level control has ended" in self.process.text, LIMIT)
 
     @property
     def stands(self) -> bool:
@@ -137,6 +152,8 @@ def test_a_controller_killed_in_the_middle_of_a_trot_leaves_the_robot_limp(robot
         peer.kill()
     assert wait_until(lambda: robot.lies, LIMIT)
     assert "no good lowcmd" in robot.process.text
+    assert robot.client.call(Api.STAND_UP).code == Code.NOT_READY  # the driver has released it
+    robot.take_back()
     robot.stand()
 
 
