@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     require_dds()
     from controller.bridges.unitree.simulator import SimulatorSettings, UnitreeSimulator
 
-    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    logging.getLogger("controller.bridges").setLevel(logging.INFO)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())

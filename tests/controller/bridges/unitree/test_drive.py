@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Iterator
 
 import pytest
 
-from controller.bench.bridges_unitree import codec_time, drive
+from controller.bench.bridges_unitree import drive
 from controller.bench.unitree_processes import simulator
 from controller.bridges.unitree.guards import GuardConfig
 from go2_wbc.errors import CommandError, PlantTimeout
@@ -23,7 +25,10 @@ LOCKED_IN = 20  # writes after which plant and simulator go tick by tick
 
 
 def test_encoding_and_decoding_take_little_cpu() -> None:
-    assert min(codec_time() for _ in range(3)) < CODEC_BAR
+    # In a process of its own: the run-time checks of these tests cost more than what is measured.
+    script = "from controller.bench.bridges_unitree import codec_time; print(codec_time())"
+    times = [subprocess.check_output([sys.executable, "-c", script]) for _ in range(3)]
+    assert min(map(float, times)) < CODEC_BAR
 
 
 @needs_dds
@@ -35,15 +40,16 @@ def test_it_stands_trots_and_gives_a_high_five(sensors: str) -> None:
     assert result.values["unitree.mae"] < MAE_BAR
 
 
+@pytest.fixture(scope="module")
+def domain() -> Iterator[int]:
+    domain = free_domain()
+    with simulator(domain, "--lockstep"):
+        yield domain
+
+
 @needs_dds
 @pytest.mark.slow
 class TestUnitreePlant(PlantContract):
-    @pytest.fixture(scope="class")
-    def domain(self) -> Iterator[int]:
-        domain = free_domain()
-        with simulator(domain, "--lockstep"):
-            yield domain
-
     @pytest.fixture
     def plant(self, domain: int) -> Iterator[Plant]:
         from controller.bridges.unitree.plant import UnitreePlant

@@ -60,7 +60,7 @@ def test_the_cpp_sdk_reads_our_state_and_stands_the_robot_up() -> None:
     if not has_own_network():
         pytest.skip("needs the right to make a network namespace (unshare -n)")
     peer = f"{python} {PEERS / 'cpp_stand.py'} lo"
-    script = f"{NETWORK} && {' '.join(PROGRAM)} unitree-sim --domain 0 & sim=$!; sleep 8; {peer}; "
+    script = f"{' '.join(PROGRAM)} unitree-sim --domain 0 & sim=$!; sleep 8; {peer}; "
     script += "code=$?; kill -TERM $sim; wait $sim; exit $code"
     with Process(["unshare", "-n", "sh", "-c", f"{NETWORK}; {script}"]) as process:
         text = process.finish(LIMIT)
