@@ -75,7 +75,7 @@ class BridgeReport:
             }
             for row in ROS2_ROWS
         ]
-        return {"ok": self.ok, "rows": rows, "reasons": list(self.reasons)}
+        return {"passed": self.ok, "rows": rows, "reasons": list(self.reasons)}
 
 
 def measure_bridges(on_progress: Callable[[str], None] = lambda _text: None) -> BridgeReport:

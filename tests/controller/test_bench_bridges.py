@@ -16,7 +16,7 @@ def test_values_at_their_bars_are_ok() -> None:
     report = BridgeReport(GOOD)
     assert report.ok
     assert render(report).count("  ok") == len(ROS2_ROWS)
-    assert report.as_dict()["ok"] is True
+    assert report.as_dict()["passed"] is True
 
 
 @pytest.mark.parametrize(
