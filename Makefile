@@ -4,7 +4,7 @@
 SHELL := bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-ros2 gates format bench doctor clean
+.PHONY: help demo test test-ros2 test-unitree gates format bench doctor clean
 
 # A shell that has sourced another robot stack would put its own Pinocchio before ours.
 unexport PYTHONPATH
@@ -21,7 +21,7 @@ help: ## show this list
 	@echo
 	@while IFS= read -r line; do \
 		if [[ $$line =~ ^([a-z0-9-]+):.*'## '(.*)$$ ]]; then \
-			printf '  %-10s %s\n' "$${BASH_REMATCH[1]}" "$${BASH_REMATCH[2]}"; \
+			printf '  %-14s %s\n' "$${BASH_REMATCH[1]}" "$${BASH_REMATCH[2]}"; \
 		fi; \
 	done < Makefile
 	@echo
@@ -35,6 +35,11 @@ test: $(VENV)/.stamp-dev ## install with the test tools, then run every test
 
 test-ros2: ## build the ROS 2 interfaces, install the extra [ros2], run its tests
 	ros2/test.sh $(ARGS)
+
+test-unitree: $(VENV)/.stamp-unitree ## the tests of Unitree's protocol, with its peers
+	GO2_WBC_STOCK_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/stock/bin/python \
+	GO2_WBC_CPP_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/cpp/bin/python \
+	$(BIN)/python -m pytest tests/controller/bridges/unitree tests/robot/test_estimator.py $(ARGS)
 
 gates: $(VENV)/.stamp-dev ## lint, formatting and types
 	$(BIN)/ruff check .
@@ -70,6 +75,17 @@ endef
 $(VENV)/.stamp-dev: pyproject.toml $(VENV)/.stamp-venv
 	$(call install,.[dev])
 	@touch $(VENV)/.stamp-run $@
+
+# The peers are other people's SDKs, each in an environment of its own. The C++ one has wheels up to
+# Python 3.11 only: without it that test says so and is skipped.
+$(VENV)/.stamp-unitree: $(VENV)/.stamp-dev
+	$(call install,.[unitree])
+	$(BIN)/python -m venv $(VENV)/peers/stock
+	$(VENV)/peers/stock/bin/python -m pip install --quiet cyclonedds==11.0.1 unitree-sdk2py-dimos==1.0.3
+	$(BIN)/python -m venv $(VENV)/peers/cpp
+	$(VENV)/peers/cpp/bin/python -m pip install --quiet far-unitree-sdk==0.1.8 numpy \
+		|| rm -rf $(VENV)/peers/cpp
+	@touch $@
 
 $(VENV)/.stamp-run: pyproject.toml $(VENV)/.stamp-venv
 	$(call install,.)

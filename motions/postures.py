@@ -37,6 +37,14 @@ def rise(start: Float[np.ndarray, "6"], entry: Stance, duration: float = 1.2) ->
     )
 
 
+def lean(
+    start: Float[np.ndarray, "6"], rpy: Float[np.ndarray, "3"], duration: float = 1.0
+) -> KeyframePlan:
+    """From a standing CoM pose (6,) to standing with the trunk at roll, pitch, yaw [rad]."""
+    poses = (start, np.concatenate([STAND_POSE[:3], rpy]))
+    return _posture_plan("lean", Stance.STAND, Stance.STAND, TrackedPoint.COM, poses, duration)
+
+
 def sit_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> KeyframePlan:
     """From a standing base pose (6,) to the dog-like sit."""
     poses = (start, SIT_POSE)

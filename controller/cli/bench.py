@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from controller.cli.progress import ProgressLine
+from go2_wbc.errors import CommandError, MissingDependency, unknown_name
 
 if TYPE_CHECKING:
     from controller.bench.rows import Family
@@ -29,9 +30,11 @@ go2-wbc bench feasibility --motions 40 --near 0
 go2-wbc bench feasibility --json --out feasibility.json
 """
 BRIDGES_EXAMPLES = """
-go2-wbc bench bridges              two minutes; needs the extra [ros2]
+go2-wbc bench bridges              two minutes each; those whose extras are installed
+go2-wbc bench bridges ros2         only this one
 go2-wbc bench bridges --json --out bridges.json
 """
+DOORS = ("ros2", "unitree")
 SEEDS, QUICK_SEEDS = 20, 3
 MOTIONS, NEAR = 160, 64
 
@@ -81,9 +84,12 @@ def register(subparsers: Subparsers) -> None:
     bridges = add_parser(
         benches,
         "bridges",
-        "A server in a process of its own, on the loopback: round trips, lost messages,\n"
-        "speed against command, CPU of the middleware, and the demo over it.",
+        "A server in a process of its own, on the loopback: answers, losses, latencies,\n"
+        "and the robot driven through them. Needs the extras; wants an idle machine.",
         examples=BRIDGES_EXAMPLES,
+    )
+    bridges.add_argument(
+        "doors", metavar="DOOR", nargs="*", help=f"{' or '.join(DOORS)}; default: both"
     )
     for bench in (behaviour, feasibility):
         bench.add_argument(
@@ -132,13 +138,46 @@ def _run_feasibility(args: argparse.Namespace) -> int:
 
 
 def _run_bridges(args: argparse.Namespace) -> int:
+    target = _checked_target(args)
+    values: dict[str, Any] = {}
+    tables: list[str] = []
+    missing: list[MissingDependency] = []
+    for door in args.doors or DOORS:
+        if door not in DOORS:
+            raise CommandError(unknown_name("door", door, DOORS))
+        try:
+            values[door], table = _DOOR_BENCHES[door]()
+            tables.append(table)
+        except MissingDependency as error:
+            missing.append(error)
+            print(f"{door} was not measured: {error}", file=sys.stderr)
+    if not tables or (args.doors and missing):
+        raise missing[0]
+    ok = all(value["passed"] for value in values.values())
+    _publish({"passed": ok, **values}, "\n\n".join(tables), args, target)
+    return ExitCode.OK if ok else ExitCode.FAILED
+
+
+def _ros2_bench() -> tuple[dict[str, Any], str]:
     from controller.bench.bridges import measure_bridges, render
 
-    target = _checked_target(args)
     with ProgressLine(sys.stderr) as line:
         report = measure_bridges(line.done)
-    _publish(report.as_dict(), render(report), args, target)
-    return ExitCode.OK if report.ok else ExitCode.FAILED
+    return report.as_dict(), render(report)
+
+
+def _unitree_bench() -> tuple[dict[str, Any], str]:
+    from controller.bridges.unitree.extra import require_dds
+
+    require_dds()
+    from controller.bench.bridges_unitree import FAMILY
+    from controller.bench.report import render, summarise
+
+    report = summarise((FAMILY,), _measure((FAMILY,), 1, 1))
+    return report.as_dict(), render(report)
+
+
+_DOOR_BENCHES = {"ros2": _ros2_bench, "unitree": _unitree_bench}
 
 
 def _measure(families: tuple[Family, ...], seeds: int, jobs: int) -> Results:

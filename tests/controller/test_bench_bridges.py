@@ -8,6 +8,7 @@ import pytest
 
 from controller.bench.bridges import ROS2_ROWS, BridgeReport, render
 
+BARRED = [row for row in ROS2_ROWS if row.bar is not None]
 GOOD = {row.name: row.bar or 0.0 for row in ROS2_ROWS}
 
 
@@ -15,10 +16,12 @@ def test_values_at_their_bars_are_ok() -> None:
     report = BridgeReport(GOOD)
     assert report.ok
     assert render(report).count("  ok") == len(ROS2_ROWS)
-    assert report.as_dict()["ok"] is True
+    assert report.as_dict()["passed"] is True
 
 
-@pytest.mark.parametrize("row", ROS2_ROWS, ids=lambda row: row.name)
+@pytest.mark.parametrize(
+    "row", [row for row in ROS2_ROWS if row.bar is not None], ids=lambda row: row.name
+)
 @pytest.mark.parametrize("value", [None, math.nan, 1e3])
 def test_a_value_that_is_missing_or_beyond_its_bar_fails(row: object, value: float | None) -> None:
     name = getattr(row, "name", "")

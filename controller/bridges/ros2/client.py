@@ -248,6 +248,11 @@ class GO2ControllerNode(ros.Node):
         """Namespace of the robot."""
         return self._namespace
 
+    def check_served(self) -> None:
+        """Raise BridgeError, with the line that starts a server, if there is none."""
+        if not self._behavior_client.service_is_ready():
+            raise BridgeError(self._absence())
+
     def state(self) -> RobotState | None:
         """The next state from odometry: base pose and velocity; None if there is none."""
         return self._next_state()

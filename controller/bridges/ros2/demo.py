@@ -99,10 +99,12 @@ def run_ros_demo(
 
     Raises:
         MissingDependency: if ROS 2 or the interfaces are not installed.
+        BridgeError: if there is no server.
     """
     ros.rclpy.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
     go2 = GO2ControllerNode(namespace, node_name="go2_demo")
     try:
+        go2.check_served()
         return run_steps(go2, on_step)
     finally:
         go2.destroy_node()

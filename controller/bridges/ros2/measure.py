@@ -50,13 +50,15 @@ class Drive:
     Attributes:
         sent: commands.
         received: commands, counted by the server.
-        speed: mean forward speed [m/s] by odometry.
+        speed: mean forward speed [m/s], in the robot's own time.
+        pace: robot time per wall time; below 1 the machine is too busy for real time.
         cpu_share: processor time of the server's ROS side per wall time.
     """
 
     sent: int
     received: int
     speed: float
+    pace: float
     cpu_share: float
 
 
@@ -109,34 +111,34 @@ class Meter:
         """Walk straight ahead, with 50 commands a second.
 
         Raises:
-            BridgeError: if the robot does not walk or there is no odometry.
+            BridgeError: if the robot does not walk or the server does not answer.
         """
         if not self.go2.walk():
             raise BridgeError(f"the robot does not walk: {self.go2.last_message}")
         before, began = self._figures(), time.monotonic()
         message = ros.Twist()
         message.linear.x = SPEED
-        sent, start = 0, None
+        sent, start = 0, before
         while time.monotonic() - began < DRIVE_TIME:
             self._publisher.publish(message)
             sent += 1
             while time.monotonic() - began < sent * COMMAND_PERIOD:
                 self._spin(sent * COMMAND_PERIOD - (time.monotonic() - began))
-            if start is None and time.monotonic() - began > SETTLE_TIME:
-                start = self.go2.state()
-        end, after = self.go2.state(), self._figures()
+            if start is before and time.monotonic() - began > SETTLE_TIME:
+                start = self._figures()
+        after = self._figures()
         self.go2.stop()
-        if start is None or end is None:
-            raise BridgeError("no odometry during the drive")
-        way = math.dist(end.p_world_base[:2].tolist(), start.p_world_base[:2].tolist())
+        way = math.dist(after["position"][:2], start["position"][:2])
+        wall_time = after["wall_time"] - before["wall_time"]
         cpu = sum(
             after[name] - before[name] for name in ("ros_cpu_in_loop", "cpu_of_other_threads")
         )
         return Drive(
             sent,
             after["cmd_vel"]["received"] - before["cmd_vel"]["received"],
-            way / (end.time - start.time),
-            cpu / (after["wall_time"] - before["wall_time"]),
+            way / (after["robot_time"] - start["robot_time"]),
+            (after["robot_time"] - before["robot_time"]) / wall_time,
+            cpu / wall_time,
         )
 
     def _figures(self) -> dict[str, Any]:

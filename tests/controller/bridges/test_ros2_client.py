@@ -116,6 +116,20 @@ def test_the_demo_runs_over_ros_and_its_figures_come_from_odometry(server: Serve
     assert steps["forward"]["figures"][0]["measured"] == pytest.approx(0.4, abs=0.06)
 
 
+def test_a_demo_without_a_server_ends_with_the_line_that_starts_one() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "controller.cli.main", "demo", "--ros2", "--namespace", "ghost"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=60.0,
+        check=False,
+    )
+    assert done.returncode == 3
+    assert "go2-wbc ros2 --namespace ghost" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_errands_are_closed_on_odometry(go2: Any) -> None:
     assert go2.turn_left(math.pi / 2)
     yaw = go2.state().yaw

@@ -1,0 +1,94 @@
+"""A short drive through the low-level interface: stand, trot, high five, lie down; measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from statistics import fmean
+from typing import Any, Final
+
+from controller.bridges.unitree.plant import UnitreePlant
+from controller.go2_controller import GO2Controller
+from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
+
+SETTLE: Final = 1.5
+"""Time [s] of a trot before its speed is measured."""
+SAMPLE: Final = 0.02
+"""Time [s] between two samples of the speed."""
+REST: Final = 0.5
+"""Time [s] of standing still after a trot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trot:
+    """How a trot is driven: speed [m/s], and time [s] at that speed."""
+
+    speed: float = 0.5
+    seconds: float = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One thing that was asked for, whether it was done, and why not."""
+
+    name: str
+    ok: bool
+    reason: str
+    speed_error: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return asdict(self)
+
+
+def drive(plant: UnitreePlant, names: list[str], trot: Trot) -> Iterator[Step]:
+    """Do the steps one after the other; ends with the first that is not done, the robot limp.
+
+    Raises:
+        CommandError: for an unknown step; lists the valid ones.
+    """
+    for name in names:
+        if name not in STEPS:
+            raise CommandError(unknown_name("step", name, STEPS))
+    with GO2Controller(plant=plant, realtime=True) as go2:
+        for name in names:
+            step = _do(go2, name, trot)
+            yield step
+            if not step.ok:
+                return
+
+
+def _do(go2: GO2Controller, name: str, trot: Trot) -> Step:
+    error = None
+    try:
+        if name == "trot":
+            ok = go2.walk()
+            error = _trot(go2, trot) if ok else None
+        else:
+            ok = STEPS[name](go2)
+    except Go2WbcError as failure:
+        return Step(name, False, str(failure))
+    return Step(name, ok, go2.last_outcome.reason, error)
+
+
+def _trot(go2: GO2Controller, trot: Trot) -> float:
+    """Mean absolute error [m/s] of the estimated forward speed."""
+    go2.move(trot.speed)
+    go2.wait(SETTLE)
+    errors = []
+    for _ in range(round(trot.seconds / SAMPLE)):
+        go2.wait(SAMPLE)
+        errors.append(abs(float(go2.state.v[0]) - trot.speed))
+    go2.stop()
+    go2.wait(REST)
+    return fmean(errors)
+
+
+STEPS: Final[dict[str, Callable[[GO2Controller], bool]]] = {
+    "stand": lambda go2: go2.stand(),
+    "sit": lambda go2: go2.sit(),
+    "trot": lambda go2: go2.walk(),
+    "high_five": lambda go2: go2.high_five(),
+    "lie_down": lambda go2: go2.lie_down(),
+}
+"""What can be driven, by name."""

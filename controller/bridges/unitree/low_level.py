@@ -1,0 +1,188 @@
+"""The robot's side of low-level control: ``rt/lowstate`` out, ``rt/lowcmd`` in.
+
+Commands are checked before they reach a motor. One that is broken is refused, counted and reported;
+when no good one has come for a while, the robot is damped.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections import Counter
+from collections.abc import Callable
+from typing import Final, final
+
+import numpy as np
+from jaxtyping import Float, Shaped
+
+from controller.behaviours.joints import DAMPING
+from controller.bridges.unitree import layout
+from controller.bridges.unitree.checksum import is_intact, seal
+from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.layout import (
+    FEET_TO_UNITREE,
+    JOINTS_FROM_UNITREE,
+    JOINTS_TO_UNITREE,
+    MOTORS,
+)
+from go2_wbc.errors import CommandError
+from go2_wbc.plant.sensors import ImuSample
+from go2_wbc.robot.state import JointCommand, RobotState
+
+_log = logging.getLogger(__name__)
+
+SILENCE: Final = 0.05
+"""Time [s] without a good command after which the robot is damped."""
+RELEASE: Final = 0.5
+"""Time [s] without a good command after which the sport service has the robot again."""
+KP_MAX, KD_MAX = 500.0, 50.0
+"""Largest gains [N m/rad], [N m s/rad] that count as meant."""
+TAU_MAX, SPEED_MAX = 100.0, 100.0
+"""Torque [N m] and speed [rad/s] beyond which a command counts as garbage; motors clip below."""
+ANGLE_MARGIN: Final = 0.1
+"""Angle [rad] by which a desired angle may lie beyond the joint's limit."""
+REPORT_PERIOD: Final = 1.0
+"""Time [s] between two reports of the same kind."""
+
+
+def joint_command(
+    message: Shaped[np.ndarray, "1"], lower: Float[np.ndarray, "12"], upper: Float[np.ndarray, "12"]
+) -> JointCommand:
+    """What a ``rt/lowcmd`` message asks of the motors, in our joint order.
+
+    Raises:
+        CommandError: if the checksum is wrong or a value is not finite or out of limits.
+    """
+    if not is_intact(message):
+        raise CommandError("wrong checksum")
+    motors = message["motor_cmd"][0, :MOTORS][JOINTS_FROM_UNITREE]
+    obeys = motors["mode"] == layout.SERVO
+    q, dq, tau, kp, kd = (motors[name].astype(float) for name in ("q", "dq", "tau", "kp", "kd"))
+    for name, values in (("q", q), ("dq", dq), ("tau", tau), ("kp", kp), ("kd", kd)):
+        if not np.isfinite(values).all():
+            raise CommandError(f"{name} is not finite")
+    kp = np.where(obeys & (np.abs(q) < 0.5 * layout.POSITION_STOP), kp, 0.0)
+    kd, tau = np.where(obeys, kd, 0.0), np.where(obeys, tau, 0.0)
+    dq = np.where(np.abs(dq) >= layout.VELOCITY_STOP, 0.0, dq)
+    q = np.where(kp > 0.0, q, 0.0)
+    _require(kp, 0.0, KP_MAX, "kp")
+    _require(kd, 0.0, KD_MAX, "kd")
+    _require(tau, -TAU_MAX, TAU_MAX, "tau")
+    _require(dq, -SPEED_MAX, SPEED_MAX, "dq")
+    held = kp > 0.0
+    _require(q[held], lower[held] - ANGLE_MARGIN, upper[held] + ANGLE_MARGIN, "q")
+    return JointCommand(tau, q, dq, kp, kd)
+
+
+def _require(
+    values: Float[np.ndarray, " n"],
+    least: float | Float[np.ndarray, " n"],
+    greatest: float | Float[np.ndarray, " n"],
+    name: str,
+) -> None:
+    outside = (values < least) | (values > greatest)
+    if outside.any():
+        raise CommandError(f"{name} out of limits: {values[outside][0]:.4g}")
+
+
+def low_state_message(state: RobotState, imu: ImuSample) -> Shaped[np.ndarray, "1"]:
+    """``rt/lowstate`` of a state and what the IMU reads; battery, temperatures, remote are zero."""
+    message = layout.new_message(layout.LOW_STATE)
+    message["head"], message["level_flag"] = layout.HEAD, layout.LOW_LEVEL
+    fill_imu(message["imu_state"], imu, state)
+    motors = message["motor_state"][0, :MOTORS]
+    motors["mode"] = layout.SERVO
+    motors["q"] = state.joint_positions[JOINTS_TO_UNITREE]
+    motors["dq"] = state.joint_velocities[JOINTS_TO_UNITREE]
+    motors["tau_est"] = state.tau[JOINTS_TO_UNITREE]
+    message["foot_force"] = np.rint(state.foot_forces[FEET_TO_UNITREE])
+    message["tick"] = round(1000 * state.time)
+    seal(message)
+    return message
+
+
+def fill_imu(target: Shaped[np.ndarray, "1"], imu: ImuSample, state: RobotState) -> None:
+    """Write the IMU's part of a message; Unitree's quaternion is w x y z."""
+    target["quaternion"] = imu.quaternion[[3, 0, 1, 2]]
+    target["gyroscope"], target["accelerometer"] = imu.gyro, imu.accelerometer
+    target["rpy"] = state.rpy
+
+
+@final
+class CommandGate:
+    """Decides, tick by tick, whether the motors obey ``rt/lowcmd`` or the controller's own command.
+
+    Attributes:
+        is_open: whether low-level commands may take the robot over.
+        accepted: number of good commands.
+        refused: number of refused ones by reason.
+    """
+
+    def __init__(
+        self,
+        lower: Float[np.ndarray, "12"],
+        upper: Float[np.ndarray, "12"],
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """Guard joints with these limits [rad]; ``clock`` tells the wall clock's seconds."""
+        self.is_open = True
+        self.accepted = 0
+        self.refused: Counter[str] = Counter()
+        self._lower, self._upper, self._clock = lower, upper, clock
+        self._codec = codec_of(layout.LOW_CMD)
+        self._last: JointCommand | None = None
+        self._heard = -np.inf
+        self._is_damping = False
+        self._reported: dict[str, float] = {}
+
+    @property
+    def is_active(self) -> bool:
+        """Whether low-level commands have the robot."""
+        return self._last is not None
+
+    def choose(self, samples: list[bytes], own: JointCommand) -> JointCommand:
+        """The command of this tick: the newest good one of ``samples``, ``own``, or damping."""
+        newest = self._newest(samples)
+        if newest is not None:
+            self._offer(newest)
+        if self._last is None:
+            return own
+        silence = self._clock() - self._heard
+        if silence <= SILENCE:
+            return self._last
+        if not self._is_damping:
+            _log.warning("no good lowcmd for %.0f ms: damped", 1000 * silence)
+            self._is_damping = True
+        if silence > RELEASE:
+            _log.info("low-level control has ended; the sport service has the robot")
+            self._last = None
+        return JointCommand.damping(DAMPING)
+
+    def _offer(self, command: JointCommand) -> None:
+        if not (self.is_open or self.is_active):
+            self._report("lowcmd ignored: the sport service has the robot; lie down or Damp first")
+            return
+        if self._last is None:
+            _log.info("low-level commands have the robot")
+        elif self._is_damping:
+            _log.info("low-level commands go on")
+        self._last, self._heard, self._is_damping = command, self._clock(), False
+
+    def _newest(self, samples: list[bytes]) -> JointCommand | None:
+        found = None
+        for data in samples:
+            try:
+                message = self._codec.decode(data)
+                found = joint_command(message, self._lower, self._upper)
+                self.accepted += 1
+            except CommandError as error:
+                kind = str(error).split(":")[0]
+                self.refused[kind] += 1
+                self._report(f"lowcmd refused, {self.refused[kind]} so far: {kind}", str(error))
+        return found
+
+    def _report(self, line: str, detail: str = "") -> None:
+        kind, now = line.split(":")[-1], self._clock()
+        if now - self._reported.get(kind, -np.inf) >= REPORT_PERIOD:
+            self._reported[kind] = now
+            _log.warning("%s%s", line, f" ({detail})" if detail else "")

@@ -1,0 +1,257 @@
+"""``UnitreePlant``: a Go2, or a simulator of one, driven by ``rt/lowcmd`` and ``rt/lowstate``."""
+
+from __future__ import annotations
+
+import logging
+import sys
+import threading
+import time
+from typing import Final, final
+
+import numpy as np
+
+from controller.behaviours.joints import DAMPING
+from controller.bridges.unitree.checksum import is_intact
+from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.extra import require_dds
+from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_finite
+from controller.bridges.unitree.last_word import at_the_end, forget
+from controller.bridges.unitree.layout import LOW_CMD, LOW_STATE
+from controller.bridges.unitree.low_client import low_cmd_message, sensor_reading
+from go2_wbc.errors import ClosedError, CommandError, PlantError, PlantTimeout
+from go2_wbc.plant.base import Plant
+from go2_wbc.robot.estimator import EstimatorConfig, StateEstimator
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.state import JointCommand, RobotState
+
+_log = logging.getLogger(__name__)
+
+PERIOD: Final = 0.002
+"""Seconds between two ``rt/lowstate`` of the robot."""
+FIRST_STATE_LIMIT: Final = 5.0
+"""Time [s] in which the robot must be found."""
+QUEUE: Final = 64
+"""States that are kept while the controller is busy; the estimator takes in all of them."""
+FAREWELL, FAREWELL_PERIOD = 0.2, 0.005
+"""Time [s] for which damping is sent at the end, and between two of these commands."""
+WATCH: Final = 0.02
+"""Time [s] between two looks whether the controller still sends commands."""
+SWITCH_INTERVAL: Final = 0.0005
+"""Time [s] for which another thread may keep Python to itself, so that the loop keeps its pace."""
+CONSENT: Final = (
+    "this moves a robot: lay it on its belly, keep people away, take the remote in your hand (L2+B "
+    "damps it), then say so by --i-have-the-remote-in-hand (in Python "
+    "i_have_the_remote_in_hand=True)"
+)
+
+
+@final
+class UnitreePlant(Plant):
+    """Drives a Go2 through Unitree's low-level interface, its state estimated from its sensors.
+
+    Every guard that trips damps the robot and ends the plant: a new one starts from lying again.
+    Commands must not stop, so drive it with ``GO2Controller(plant=..., realtime=True)``.
+
+    Example:
+        >>> plant = UnitreePlant("lo", 1, i_have_the_remote_in_hand=True)  # go2-wbc unitree-sim
+        >>> with GO2Controller(plant=plant, realtime=True) as go2:
+        ...     go2.stand()
+        True
+    """
+
+    def __init__(
+        self,
+        interface: str,
+        domain: int = 0,
+        *,
+        i_have_the_remote_in_hand: bool = False,
+        guards: GuardConfig | None = None,
+        estimator: EstimatorConfig | None = None,
+    ) -> None:
+        """Find the robot, make sure that it lies, and take it over from its sport service.
+
+        Args:
+            interface: network interface that the robot is on; ``lo`` for a simulator.
+            domain: DDS domain: 0 is the robot, 1 by custom a simulator.
+            i_have_the_remote_in_hand: that you can stop the robot by hand.
+            guards: when to soften and when to stop.
+            estimator: numbers of the state estimator.
+
+        Raises:
+            CommandError: without consent, or for a wrong interface or domain.
+            MissingDependency: without the extra.
+            PlantTimeout: if no robot is found.
+            PlantError: if it does not lie on its belly, or its sport service keeps it.
+        """
+        if i_have_the_remote_in_hand is not True:
+            raise CommandError(CONSENT)
+        require_dds()
+        from controller.bridges.unitree import idl
+        from controller.bridges.unitree.bus import Bus
+        from controller.bridges.unitree.takeover import release_sport
+
+        model = RobotModel()
+        self._config = guards or GuardConfig()
+        self._guards = Guards(model, self._config)
+        self._estimator = StateEstimator(model, estimator)
+        self._model = model
+        self._where = f"DDS domain {domain}, interface {interface}"
+        bus = Bus(domain, interface)
+        self._states = bus.reader("rt/lowstate", idl.low_state(), depth=QUEUE)
+        self._commands = bus.writer("rt/lowcmd", idl.low_cmd())
+        self._decode, self._encode = codec_of(LOW_STATE).decode, codec_of(LOW_CMD).encode
+        self._bad_states = 0
+        self._tick = -1
+        self._heard = time.monotonic()
+        self._written: float | None = None
+        self._failure: str | None = None
+        self._is_closed = False
+        self._state = self._first_state()
+        self._require_lying()
+        release_sport(bus)
+        self._go_live()
+
+    def _go_live(self) -> None:
+        sys.setswitchinterval(min(sys.getswitchinterval(), SWITCH_INTERVAL))
+        at_the_end(self.close)
+        self._watchdog = threading.Thread(target=self._watch, name="unitree-watchdog", daemon=True)
+        self._watchdog.start()
+        self._catch_up()
+        self._send(JointCommand.damping(DAMPING))
+
+    @property
+    def control_period(self) -> float:
+        """Seconds that pass in one ``write``."""
+        return PERIOD
+
+    @property
+    def bad_states(self) -> int:
+        """How many ``rt/lowstate`` were refused for their checksum or length."""
+        return self._bad_states
+
+    def read(self) -> RobotState:
+        """The newest estimated state."""
+        self._check_open()
+        return self._state
+
+    def write(self, command: JointCommand) -> None:
+        """Send ``command``, softened by the guards, and wait for the robot's next state.
+
+        Raises:
+            CommandError: if a value is not finite; nothing is sent.
+            PlantTimeout: if no state comes in time, or commands had stopped; the robot is damped.
+            PlantError: if a guard trips; the robot is damped.
+        """
+        self._check_open()
+        require_finite(command)
+        if self._failure is not None and not is_passive(command):
+            raise PlantError(f"damped: {self._failure}; lay the robot down and make a new plant")
+        fault = self._guards.fault(self._state)
+        if fault is not None and not is_passive(command):
+            raise self._stop(PlantError(fault))
+        self._send(self._guards.soften(command, self._state))
+        self._wait_for_state()
+
+    def close(self) -> None:
+        """Damp the robot and let go of it; idempotent."""
+        if self._is_closed:
+            return
+        self._is_closed = True
+        forget(self.close)
+        end = time.monotonic() + FAREWELL
+        while time.monotonic() < end:
+            self._send(JointCommand.damping(DAMPING))
+            time.sleep(FAREWELL_PERIOD)
+
+    def _check_open(self) -> None:
+        if self._is_closed:
+            raise ClosedError("the plant was closed")
+
+    # --- commands -------------------------------------------------------------------------
+
+    def _send(self, command: JointCommand) -> None:
+        self._commands.write(self._encode(low_cmd_message(command)))
+        self._written = None if is_passive(command) else time.monotonic()
+
+    def _stop(self, error: PlantError) -> PlantError:
+        """Damp the robot for good; returns ``error`` to be raised."""
+        self._failure = str(error)
+        self._send(JointCommand.damping(DAMPING))
+        return error
+
+    def _watch(self) -> None:
+        """Damps the robot when the controller has stopped sending, though Python still runs."""
+        while not self._is_closed:
+            time.sleep(WATCH)
+            written = self._written
+            if written is not None and time.monotonic() - written > self._config.hang_limit:
+                reason = (
+                    f"no command for {1000 * self._config.hang_limit:.0f} ms; a robot needs one "
+                    "every 2 ms: GO2Controller(plant=..., realtime=True)"
+                )
+                _log.warning("damped: %s", reason)
+                self._stop(PlantTimeout(reason))
+
+    # --- states ---------------------------------------------------------------------------
+
+    def _first_state(self) -> RobotState:
+        deadline = time.monotonic() + FIRST_STATE_LIMIT
+        while time.monotonic() < deadline:
+            self._states.wait(0.1)
+            state = self._take()
+            if state is not None:
+                return state
+        what = f"only {self._bad_states} broken ones" if self._bad_states else "none"
+        raise PlantTimeout(
+            f"no rt/lowstate on {self._where} within {FIRST_STATE_LIMIT:g} s ({what}): "
+            "is the robot, or go2-wbc unitree-sim, on, and the interface right?"
+        )
+
+    def _wait_for_state(self) -> None:
+        while True:
+            state = self._take()
+            if state is not None:
+                self._state = state
+                return
+            silence = time.monotonic() - self._heard
+            if silence > self._config.stale_limit:
+                reason = f"no rt/lowstate for {1000 * silence:.0f} ms on {self._where}"
+                raise self._stop(PlantTimeout(reason))
+            self._states.wait(self._config.stale_limit - silence + 0.001)
+
+    def _catch_up(self) -> None:
+        """Take the newest state, after something that took long."""
+        self._heard = time.monotonic()
+        self._wait_for_state()
+
+    def _take(self) -> RobotState | None:
+        """The state after all samples that have come, or None if there is no new one."""
+        state = None
+        for data in self._states.take():
+            try:
+                message = self._decode(data)
+            except CommandError:
+                self._bad_states += 1
+                continue
+            if not is_intact(message):
+                self._bad_states += 1
+                continue
+            tick = int(message["tick"][0])
+            if tick < self._tick:
+                raise self._stop(PlantError("the robot's clock went back: it has started anew"))
+            if tick > self._tick:
+                self._tick, self._heard = tick, time.monotonic()
+                state = self._estimator.update(sensor_reading(message))
+        return state
+
+    # --- taking over ----------------------------------------------------------------------
+
+    def _require_lying(self) -> None:
+        state = self._state
+        _, p_feet = self._model.forward_kinematics(state.q)
+        height = float(state.q[2] - p_feet[:, 2].min()) + self._model.foot_radius
+        if not self._guards.is_lying(state, height):
+            raise PlantError(
+                f"the robot must lie on its belly at the start; its base is {height:.2f} m above "
+                f"its feet, tilted by {np.degrees(state.tilt):.0f} deg"
+            )

@@ -1,0 +1,120 @@
+"""A simulated Go2 that is also on Unitree's bus: every tick goes out, commands may come in."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Final, final
+
+import numpy as np
+from jaxtyping import Shaped
+
+from controller.bridges.unitree import idl, layout
+from controller.bridges.unitree.bus import Bus
+from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.low_level import CommandGate, fill_imu, low_state_message
+from controller.bridges.unitree.sport_api import SportMode
+from go2_wbc.plant import MujocoPlant, Plant
+from go2_wbc.plant.sensors import ImuSample
+from go2_wbc.robot.state import JointCommand, RobotState
+
+SPORT_STATE_TICKS: Final = 10
+"""Control periods between two samples of ``rt/sportmodestate``."""
+COMMAND_QUEUE: Final = 64
+"""Low-level commands that are looked at in one tick; of more, the oldest are lost."""
+LOCKSTEP_LIMIT: Final = 1.0
+"""Time [s] for which a simulator in lockstep waits for the next low-level command."""
+CATCH_UP: Final = 0.9
+"""Share of a control period that passes at least between two ticks under low-level control: a
+simulator that is late must not run ahead of its peer's commands to catch up."""
+
+
+@dataclass(slots=True)
+class SportStatus:
+    """What the sport service says of itself in ``rt/sportmodestate``.
+
+    Attributes:
+        mode: see ``SportMode``.
+        is_acting: whether an action is running.
+        is_trotting: whether the robot is in walking mode.
+        error_code: of the last action that failed, else 0.
+    """
+
+    mode: SportMode = SportMode.DAMPING
+    is_acting: bool = False
+    is_trotting: bool = False
+    error_code: int = 0
+
+
+@final
+class ServedPlant(Plant):
+    """Hands everything on to a ``MujocoPlant``, publishes its state, obeys low-level commands.
+
+    Attributes:
+        gate: decides who has the motors.
+        status: what ``rt/sportmodestate`` says; written by the sport service.
+    """
+
+    def __init__(
+        self, inner: MujocoPlant, bus: Bus, gate: CommandGate, *, lockstep: bool = False
+    ) -> None:
+        """Serve ``inner`` on ``bus``; with ``lockstep`` time waits for the low-level peer."""
+        self._is_lockstep = lockstep
+        self.gate, self.status = gate, SportStatus()
+        self._inner = inner
+        self._commands = bus.reader("rt/lowcmd", idl.low_cmd(), depth=COMMAND_QUEUE)
+        self._states = bus.writer("rt/lowstate", idl.low_state())
+        self._sport_states = bus.writer("rt/sportmodestate", idl.sport_state())
+        self._encode_state = codec_of(layout.LOW_STATE).encode
+        self._encode_sport_state = codec_of(layout.SPORT_STATE).encode
+        self._ticks = 0
+        self._written = 0.0
+
+    @property
+    def control_period(self) -> float:
+        """Seconds that pass in one ``write``."""
+        return self._inner.control_period
+
+    def read(self) -> RobotState:
+        """The simulator's true state, or the noisy one."""
+        return self._inner.read()
+
+    def write(self, command: JointCommand) -> None:
+        """Apply ``command``, or what the low-level peer asks instead, and publish the new state."""
+        if self.gate.is_active and self._is_lockstep:
+            self._commands.wait(LOCKSTEP_LIMIT)
+        elif self.gate.is_active:
+            self._keep_apart()
+        self._inner.write(self.gate.choose(self._commands.take(), command))
+        state, imu = self._inner.read(), self._inner.imu()
+        self._states.write(self._encode_state(low_state_message(state, imu)))
+        if self._ticks % SPORT_STATE_TICKS == 0:
+            message = sport_state_message(state, imu, self.status)
+            self._sport_states.write(self._encode_sport_state(message))
+        self._ticks += 1
+
+    def close(self) -> None:
+        """Release everything; idempotent."""
+        self._inner.close()
+
+    def _keep_apart(self) -> None:
+        due = self._written + CATCH_UP * self.control_period
+        time.sleep(max(0.0, due - time.monotonic()))
+        self._written = time.monotonic()
+
+
+def sport_state_message(
+    state: RobotState, imu: ImuSample, status: SportStatus
+) -> Shaped[np.ndarray, "1"]:
+    """``rt/sportmodestate``: position, velocity in the world, what the sport service is doing."""
+    message = layout.new_message(layout.SPORT_STATE)
+    seconds = int(state.time)
+    message["stamp"] = (seconds, round(1e9 * (state.time - seconds)))
+    fill_imu(message["imu_state"], imu, state)
+    message["mode"], message["error_code"] = status.mode, status.error_code
+    message["progress"], message["gait_type"] = status.is_acting, status.is_trotting
+    message["position"], message["body_height"] = state.q[:3], state.q[2]
+    message["velocity"] = state.R_world_base @ state.v[:3]
+    message["yaw_speed"] = imu.gyro[2]
+    message["foot_force"] = np.rint(state.foot_forces[layout.FEET_TO_UNITREE])
+    return message

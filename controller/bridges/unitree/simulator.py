@@ -1,0 +1,158 @@
+"""A simulated Go2 that speaks Unitree's protocol as the robot does: sport service, low level."""
+
+from __future__ import annotations
+
+import json
+import logging
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Final, final
+
+from controller.bridges.unitree.bus import Bus
+from controller.bridges.unitree.codec import Reply, Request
+from controller.bridges.unitree.low_level import CommandGate
+from controller.bridges.unitree.rpc import LeaseServer, Server
+from controller.bridges.unitree.served_plant import ServedPlant, SportStatus
+from controller.bridges.unitree.sport_api import (
+    SPORT_SERVICE,
+    SWITCHER_SERVICE,
+    Code,
+    SwitcherApi,
+)
+from controller.bridges.unitree.sport_robot import SportRobot
+from controller.bridges.unitree.sport_service import SportService
+from go2_wbc.config import Config, load_config
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.model import RobotModel
+
+_log = logging.getLogger(__name__)
+
+SIMULATOR_DOMAIN: Final = 1
+"""DDS domain of simulators, as in ``unitree_mujoco``; the robot is on 0."""
+LOOPBACK: Final = "lo"
+SWITCH_INTERVAL: Final = 0.0005
+"""Time [s] for which one thread may keep Python to itself: a quarter of a control period, not two
+and a half, so that planning a motion does not hold up the control loop."""
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatorSettings:
+    """Where the simulator is found, and what it simulates.
+
+    Attributes:
+        domain: DDS domain.
+        interface: network interface.
+        mjcf: a user's own Go2 model or scene.
+        friction: of the feet; None is the model's.
+        payload: extra mass [kg].
+        sensors: "ideal" or "noisy".
+        seed: of the noise.
+        config: TOML with other numbers.
+        lockstep: under low-level control let time pass only command by command.
+    """
+
+    domain: int = SIMULATOR_DOMAIN
+    interface: str = LOOPBACK
+    mjcf: Path | None = None
+    friction: float | None = None
+    payload: float = 0.0
+    sensors: str = "ideal"
+    seed: int = 0
+    config: Path | None = None
+    lockstep: bool = False
+
+
+@final
+class UnitreeSimulator:
+    """Serves a simulated robot until it is closed."""
+
+    def __init__(self, settings: SimulatorSettings) -> None:
+        """Start serving.
+
+        Raises:
+            CommandError: for a domain or interface that does not exist.
+        """
+        sys.setswitchinterval(SWITCH_INTERVAL)
+        config = Config() if settings.config is None else load_config(settings.config)
+        bus = Bus(settings.domain, settings.interface)
+        inner = MujocoPlant(
+            settings.mjcf,
+            friction=settings.friction,
+            payload=settings.payload,
+            sensors=settings.sensors,
+            seed=settings.seed,
+        )
+        model = RobotModel()
+        self._gate = CommandGate(model.q_lower, model.q_upper)
+        self._plant = ServedPlant(inner, bus, self._gate, lockstep=settings.lockstep)
+        self._robot = SportRobot(self._plant, config)
+        self._is_released = False
+        self._sport = SportService(self._robot, self._has_low_level)
+        self._lease = LeaseServer(bus, SPORT_SERVICE)
+        self._servers = (
+            Server(bus, SPORT_SERVICE, self._handle_sport, self._patrol),
+            Server(bus, SWITCHER_SERVICE, self._handle_switcher),
+        )
+
+    @property
+    def gate(self) -> CommandGate:
+        """Who has the motors, with the counts of good and refused commands."""
+        return self._gate
+
+    @property
+    def status(self) -> SportStatus:
+        """What the sport service says of itself."""
+        return self._plant.status
+
+    def close(self) -> None:
+        """Go limp and stop serving; idempotent."""
+        for server in self._servers:
+            server.close()
+        self._lease.close()
+        self._sport.close()
+        self._robot.close()
+        self._plant.close()
+
+    def __enter__(self) -> UnitreeSimulator:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _has_low_level(self) -> bool:
+        return self._is_released or self._gate.is_active
+
+    def _patrol(self) -> None:
+        self._sport.patrol()
+        self._gate.is_open = self._is_released or self._sport.is_idle
+        status = self._plant.status
+        status.mode = self._sport.sport_mode()
+        status.is_acting, status.error_code = self._sport.is_acting, self._sport.error_code
+        status.is_trotting = self._robot.mode.value == "walking"
+
+    def _handle_sport(self, request: Request, reply: Reply) -> None:
+        if self._lease.allows(request):
+            self._sport.handle(request, reply)
+        else:
+            reply(Code.LEASE_DENIED, "")
+
+    def _handle_switcher(self, request: Request, reply: Reply) -> None:
+        """Hands the robot to low-level control and back, as ``MotionSwitcherClient`` asks."""
+        if request.api_id == SwitcherApi.CHECK_MODE:
+            name = "" if self._is_released else "normal"
+            reply(Code.OK, json.dumps({"form": "0", "name": name}))
+        elif request.api_id == SwitcherApi.RELEASE_MODE:
+            self._is_released = self._is_released or self._sport.is_idle
+            reply(Code.OK if self._is_released else Code.NOT_READY, "")
+        elif request.api_id == SwitcherApi.SELECT_MODE:
+            self._is_released = False
+            reply(Code.OK, "")
+        else:
+            reply(Code.NOT_SUPPORTED, "")

@@ -1,0 +1,133 @@
+"""Unitree's sport service in names and numbers (unitree_sdk2, ``go2/sport`` and ``rpc``)."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from enum import IntEnum
+from typing import Final
+
+from go2_wbc.errors import CommandError
+
+SPORT_SERVICE: Final = "sport"
+SWITCHER_SERVICE: Final = "motion_switcher"
+API_VERSION: Final = "1.0.0.1"
+
+
+class Api(IntEnum):
+    """Procedures that are supported, and those of every service."""
+
+    VERSION = 1
+    LEASE_APPLY = 101
+    LEASE_RENEWAL = 102
+    DAMP = 1001
+    BALANCE_STAND = 1002
+    STOP_MOVE = 1003
+    STAND_UP = 1004
+    STAND_DOWN = 1005
+    RECOVERY_STAND = 1006
+    EULER = 1007
+    MOVE = 1008
+    SIT = 1009
+    RISE_SIT = 1010
+    SPEED_LEVEL = 1015
+    HELLO = 1016
+    STRETCH = 1017
+    DANCE1 = 1022
+    POSE = 1028
+    SCRAPE = 1029
+
+
+class SwitcherApi(IntEnum):
+    """Procedures of the service that hands the robot to low-level control."""
+
+    CHECK_MODE = 1001
+    SELECT_MODE = 1002
+    RELEASE_MODE = 1003
+
+
+class Code(IntEnum):
+    """What a response carries."""
+
+    OK = 0
+    API_TIMEOUT = 3104
+    INTERNAL = 3202
+    NOT_SUPPORTED = 3203
+    BAD_PARAMETER = 3204
+    LEASE_DENIED = 3205
+    LEASE_NOT_EXIST = 3206
+    LEASE_EXIST = 3207
+    ACTION_TIMEOUT = 4201
+    NOT_READY = 4205
+    POSE_REFUSED = 4206
+
+
+class SportMode(IntEnum):
+    """``mode`` of ``rt/sportmodestate``."""
+
+    IDLE = 0
+    BALANCE_STAND = 1
+    POSE = 2
+    LOCOMOTION = 3
+    LIE_DOWN = 5
+    JOINT_LOCK = 6
+    DAMPING = 7
+    RECOVERY_STAND = 8
+    SIT = 10
+
+
+MOVE_RANGES: Final = ((-2.5, 3.8), (-1.0, 1.0), (-4.0, 4.0))
+"""Of ``Move``: forward, left [m/s], turning left [rad/s]."""
+EULER_LIMITS: Final = (0.75, 0.75, 0.6)
+"""Of ``Euler``: roll, pitch, yaw [rad], either way."""
+SPEED_LEVELS: Final[Mapping[int, float]] = {-1: 0.4, 0: 0.7, 1: 1.0}
+"""Share of the walking envelope for ``Move``, by ``SpeedLevel``; ours, not the firmware's."""
+
+
+def vector(parameter: str) -> tuple[float, float, float]:
+    """``x``, ``y`` and ``z`` of a parameter.
+
+    Raises:
+        CommandError: if there are no three finite numbers.
+    """
+    fields = _fields(parameter)
+    values = tuple(fields.get(name) for name in "xyz")
+    numbers = [float(v) for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+        raise CommandError(f"x, y and z must be finite numbers, got {values}")
+    return numbers[0], numbers[1], numbers[2]
+
+
+def flag(parameter: str) -> bool:
+    """``data`` of a parameter as a truth value.
+
+    Raises:
+        CommandError: if it is none.
+    """
+    value = _fields(parameter).get("data")
+    if not isinstance(value, bool | int):
+        raise CommandError(f"data must be true or false, got {value!r}")
+    return bool(value)
+
+
+def level(parameter: str) -> int:
+    """``data`` of a parameter as a speed level.
+
+    Raises:
+        CommandError: if it is none.
+    """
+    value = _fields(parameter).get("data")
+    if isinstance(value, bool) or not isinstance(value, int) or value not in SPEED_LEVELS:
+        raise CommandError(f"data must be one of {sorted(SPEED_LEVELS)}, got {value!r}")
+    return value
+
+
+def _fields(parameter: str) -> Mapping[str, object]:
+    try:
+        fields = json.loads(parameter or "{}")
+    except ValueError as error:
+        raise CommandError(f"the parameter is not JSON: {error}") from error
+    if not isinstance(fields, dict):
+        raise CommandError(f"the parameter must be a JSON object, got {fields!r}")
+    return fields

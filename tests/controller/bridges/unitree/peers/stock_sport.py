@@ -1,0 +1,68 @@
+"""Peer: Unitree's stock ``SportClient`` runs a script; prints one JSON line per call.
+
+Runs in an environment of its own with ``unitree-sdk2py-dimos`` and CycloneDDS 11, without this
+project. CycloneDDS 11 announces the SDK's octets as another type than the robot's CycloneDDS 0.10
+does; they are turned back here, so that the stock client meets types as on the robot.
+"""
+
+import importlib
+import json
+import sys
+import time
+from typing import Any
+
+kinds: Any = importlib.import_module("cyclonedds.idl.types")
+uint8, kinds.uint8 = kinds.uint8, kinds.byte
+channel = importlib.import_module("unitree_sdk2py.core.channel")
+sport = importlib.import_module("unitree_sdk2py.go2.sport.sport_client")
+messages = importlib.import_module("unitree_sdk2py.idl.unitree_go.msg.dds_")
+kinds.uint8 = uint8
+states: list[Any] = []
+
+
+def report(name: str, code: int) -> None:
+    """Wait until the robot rests, then say what came of a call."""
+    time.sleep(0.2)
+    deadline = time.monotonic() + 60.0
+    while states[-1].progress and time.monotonic() < deadline:
+        time.sleep(0.05)
+    state = states[-1]
+    values = {
+        "call": name,
+        "code": code,
+        "mode": state.mode,
+        "position": list(state.position),
+        "rpy": list(state.imu_state.rpy),
+    }
+    print(json.dumps(values), flush=True)
+
+
+def main() -> None:
+    """Find the robot, then run the script."""
+    channel.ChannelFactoryInitialize(int(sys.argv[1]), "lo")
+    subscriber = channel.ChannelSubscriber("rt/sportmodestate", messages.SportModeState_)
+    subscriber.Init(states.append, 1)
+    client = sport.SportClient()
+    client.SetTimeout(float(sys.argv[2]))
+    client.Init()
+    deadline = time.monotonic() + 10.0
+    while not states or client.GetServerApiVersion()[0]:
+        if time.monotonic() > deadline:
+            sys.exit("the robot was not found")
+        time.sleep(0.2)
+    report("StandUp", client.StandUp())
+    report("BalanceStand", client.BalanceStand())
+    codes = []
+    for _ in range(60):
+        codes.append(client.Move(0.5, 0.0, 0.0))
+        time.sleep(0.05)
+    report("Move", max(codes))
+    report("StopMove", client.StopMove())
+    time.sleep(1.0)
+    report("Hello", client.Hello())
+    report("Euler", client.Euler(0.1, 0.15, 0.1))
+    report("FrontFlip", client.FrontFlip())
+    report("StandDown", client.StandDown())
+
+
+main()

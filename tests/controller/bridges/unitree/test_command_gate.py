@@ -1,0 +1,156 @@
+"""What reaches the motors of the simulated robot: good commands, or damping. Needs no DDS."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from controller.behaviours.joints import DAMPING
+from controller.bridges.unitree import layout
+from controller.bridges.unitree.checksum import seal
+from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.low_level import RELEASE, SILENCE, CommandGate
+from go2_wbc.legs import Leg
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.state import JointCommand
+from tests.controller.plants import is_limp
+
+OWN = JointCommand.torque(np.full(12, 1.5))
+TICK = 0.002
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def sample(
+    change: Callable[[np.ndarray], None] = lambda message: None, *, sealed: bool = True
+) -> bytes:
+    """A good command: the front right thigh held at 0.8 rad, the rest damped; then changed."""
+    message = layout.new_message(layout.LOW_CMD)
+    motors = message["motor_cmd"]
+    motors["mode"][0, :12] = layout.SERVO
+    motors["q"][0, :12], motors["kd"][0, :12] = layout.POSITION_STOP, 2.0
+    motors["q"][0, 1], motors["kp"][0, 1], motors["tau"][0, 1] = 0.8, 30.0, 4.0
+    if sealed:
+        change(message)
+    seal(message)
+    if not sealed:
+        change(message)
+    return codec_of(layout.LOW_CMD).encode(message)
+
+
+def setting(name: str, motor: int, value: float) -> Callable[[np.ndarray], None]:
+    def change(message: np.ndarray) -> None:
+        message["motor_cmd"][name][0, motor] = value
+
+    return change
+
+
+@pytest.fixture
+def clock() -> Clock:
+    return Clock()
+
+
+@pytest.fixture
+def gate(clock: Clock) -> CommandGate:
+    model = RobotModel()
+    return CommandGate(model.q_lower, model.q_upper, clock)
+
+
+def test_without_commands_the_controller_has_the_robot(gate: CommandGate) -> None:
+    assert gate.choose([], OWN) is OWN
+    assert not gate.is_active
+
+
+def test_a_good_command_reaches_the_right_motor(gate: CommandGate) -> None:
+    command = gate.choose([sample()], OWN)
+    thigh = 3 * Leg.FR + 1
+    assert command.kp[thigh] == 30.0
+    assert command.q_des[thigh] == pytest.approx(0.8)
+    assert command.tau[thigh] == 4.0
+    assert np.count_nonzero(command.kp) == np.count_nonzero(command.tau) == 1
+    assert (command.kd == 2.0).all()
+
+
+def test_a_motor_that_is_switched_off_gets_nothing(gate: CommandGate) -> None:
+    command = gate.choose([sample(setting("mode", 1, 0))], OWN)
+    thigh = 3 * Leg.FR + 1
+    assert command.kp[thigh] == command.kd[thigh] == command.tau[thigh] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("reason", "name", "motor", "value"),
+    [
+        ("tau is not finite", "tau", 3, np.nan),
+        ("q is not finite", "q", 1, np.inf),
+        ("kp is not finite", "kp", 0, -np.inf),
+        ("q out of limits", "q", 1, 9.0),
+        ("kp out of limits", "kp", 1, 5000.0),
+        ("kp out of limits", "kp", 1, -1.0),
+        ("kd out of limits", "kd", 1, -1.0),
+        ("tau out of limits", "tau", 11, 1e9),
+        ("dq out of limits", "dq", 2, 500.0),
+    ],
+)
+def test_garbage_is_refused_and_counted(
+    gate: CommandGate, reason: str, name: str, motor: int, value: float
+) -> None:
+    assert gate.choose([sample(setting(name, motor, value))], OWN) is OWN
+    assert gate.refused == {reason: 1}
+    assert gate.accepted == 0
+
+
+def test_a_wrong_checksum_and_cut_off_bytes_are_refused(gate: CommandGate) -> None:
+    broken = sample(setting("q", 1, 0.9), sealed=False)
+    assert gate.choose([broken, b"rubbish"], OWN) is OWN
+    assert gate.refused["wrong checksum"] == 1
+    assert sum(gate.refused.values()) == 2
+
+
+def test_among_garbage_the_newest_good_command_counts(gate: CommandGate) -> None:
+    bad = sample(setting("tau", 1, np.nan))
+    command = gate.choose([sample(setting("tau", 1, 1.0)), sample(), bad, bad], OWN)
+    assert command.tau.max() == 4.0
+
+
+def test_silence_damps_and_later_gives_the_robot_back(gate: CommandGate, clock: Clock) -> None:
+    gate.choose([sample()], OWN)
+    clock.now = SILENCE - TICK
+    assert not is_limp(gate.choose([], OWN))
+    clock.now = SILENCE + TICK
+    assert is_limp(gate.choose([], OWN))
+    clock.now = RELEASE + TICK
+    assert is_limp(gate.choose([], OWN))
+    assert gate.choose([], OWN) is OWN
+    assert not gate.is_active
+
+
+def test_garbage_is_as_good_as_silence(gate: CommandGate, clock: Clock) -> None:
+    gate.choose([sample()], OWN)
+    clock.now = SILENCE + TICK
+    assert is_limp(gate.choose([sample(setting("kp", 1, np.nan))], OWN))
+
+
+def test_commands_go_on_after_a_gap(gate: CommandGate, clock: Clock) -> None:
+    gate.choose([sample()], OWN)
+    clock.now = SILENCE + TICK
+    assert gate.choose([], OWN).kd[0] == DAMPING
+    assert gate.choose([sample()], OWN).kp.max() == 30.0
+
+
+def test_a_closed_gate_lets_nothing_in_but_does_not_cut_off_who_is_inside(
+    gate: CommandGate,
+) -> None:
+    gate.is_open = False
+    assert gate.choose([sample()], OWN) is OWN
+    gate.is_open = True
+    gate.choose([sample()], OWN)
+    gate.is_open = False
+    assert gate.choose([sample()], OWN).kp.max() == 30.0

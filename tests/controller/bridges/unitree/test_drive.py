@@ -1,0 +1,76 @@
+"""Our controller drives the simulator in another process through ``UnitreePlant``."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from controller.bench.bridges_unitree import drive
+from controller.bench.unitree_processes import simulator
+from controller.bridges.unitree.guards import GuardConfig
+from go2_wbc.errors import CommandError, PlantTimeout
+from go2_wbc.plant.base import Plant
+from go2_wbc.robot.state import JointCommand
+from tests.controller.bridges.unitree.support import free_domain, needs_dds
+from tests.plant.contract import PlantContract
+
+MAE_BAR = 0.04  # m/s
+CODEC_BAR = 50.0  # us
+# s; a loaded test machine pauses processes for longer than the 30 ms of the real limit.
+PATIENT = GuardConfig(stale_limit=2.0, hang_limit=5.0)
+LOCKED_IN = 20  # writes after which plant and simulator go tick by tick
+
+
+def test_encoding_and_decoding_take_little_cpu() -> None:
+    # In a process of its own: the run-time checks of these tests cost more than what is measured.
+    script = "from controller.bench.bridges_unitree import codec_time; print(codec_time())"
+    times = [subprocess.check_output([sys.executable, "-c", script]) for _ in range(3)]
+    assert min(map(float, times)) < CODEC_BAR
+
+
+@needs_dds
+@pytest.mark.slow
+@pytest.mark.parametrize("sensors", ["ideal", "noisy"])
+def test_it_stands_trots_and_gives_a_high_five(sensors: str) -> None:
+    result = drive(free_domain(), ["--lockstep", "--sensors", sensors], ["--stale-limit", "2.0"])
+    assert result.values.get("unitree.steps") == 0.0, result
+    assert result.values["unitree.mae"] < MAE_BAR
+
+
+@pytest.fixture(scope="module")
+def domain() -> Iterator[int]:
+    domain = free_domain()
+    with simulator(domain, "--lockstep"):
+        yield domain
+
+
+@needs_dds
+@pytest.mark.slow
+class TestUnitreePlant(PlantContract):
+    @pytest.fixture
+    def plant(self, domain: int) -> Iterator[Plant]:
+        from controller.bridges.unitree.plant import UnitreePlant
+
+        plant = UnitreePlant("lo", domain, i_have_the_remote_in_hand=True, guards=PATIENT)
+        for _ in range(LOCKED_IN):
+            plant.write(JointCommand.damping(3.0))
+        yield plant
+        plant.close()
+
+
+@needs_dds
+def test_a_robot_that_is_not_there_is_named() -> None:
+    from controller.bridges.unitree.plant import UnitreePlant
+
+    with pytest.raises(PlantTimeout, match="no rt/lowstate on DDS domain 9, interface lo"):
+        UnitreePlant("lo", 9, i_have_the_remote_in_hand=True)
+
+
+def test_without_consent_nothing_is_touched() -> None:
+    from controller.bridges.unitree.plant import UnitreePlant
+
+    with pytest.raises(CommandError, match="--i-have-the-remote-in-hand"):
+        UnitreePlant("lo", 1)

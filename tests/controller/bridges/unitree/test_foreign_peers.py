@@ -1,0 +1,81 @@
+"""Other people's programs move our robot: the stock ``SportClient``, the C++ SDK."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from controller.bench.unitree_processes import PROGRAM, Process, good_commands, simulator
+from controller.bridges.unitree.sport_api import Code, SportMode
+from tests.controller.bridges.unitree.support import (
+    CPP_SDK,
+    STOCK_SDK,
+    free_domain,
+    needs_dds,
+    peer_python,
+)
+
+pytestmark = [needs_dds, pytest.mark.slow]
+PEERS = Path(__file__).parent / "peers"
+LIMIT = 120.0  # s; only ends a test that hangs
+# s; the default of 1 s is kept by an idle machine, a loaded one pauses processes for longer.
+PATIENT = 5.0
+GRAVITY = pytest.approx(9.8, abs=0.5)
+# rad; joint servos of 60 N m/rad sag by about 0.12 under the robot's weight.
+SAG = 0.2
+# Loopback with multicast, which CycloneDDS 0.10 needs, in a network of our own.
+NETWORK = "ip link set lo up && ip link set lo multicast on && ip route add 224.0.0.0/4 dev lo"
+
+
+def test_the_stock_sport_client_moves_the_robot() -> None:
+    python, domain = peer_python(STOCK_SDK), free_domain()
+    with simulator(domain):
+        peer = [python, str(PEERS / "stock_sport.py"), str(domain), str(PATIENT)]
+        with Process(peer) as process:
+            text = process.finish(LIMIT)
+    said = [json.loads(line) for line in text.splitlines() if line.startswith("{")]
+    by_call = {answer["call"]: answer for answer in said}
+    codes = {name: answer["code"] for name, answer in by_call.items()}
+    assert codes.pop("FrontFlip", None) == Code.NOT_SUPPORTED, text
+    assert len(codes) == 7, text
+    assert set(codes.values()) == {0}, codes
+    assert by_call["StandUp"]["mode"] == SportMode.JOINT_LOCK
+    assert by_call["BalanceStand"]["mode"] == SportMode.BALANCE_STAND
+    assert by_call["Move"]["mode"] == SportMode.LOCOMOTION
+    way = by_call["StopMove"]["position"][0] - by_call["BalanceStand"]["position"][0]
+    assert 0.8 < way < 1.6
+    assert by_call["Euler"]["mode"] == SportMode.POSE
+    assert by_call["Euler"]["rpy"][1] == pytest.approx(0.15, abs=0.06)
+    assert by_call["StandDown"]["mode"] == SportMode.LIE_DOWN
+    assert by_call["StandDown"]["position"][2] < 0.12
+
+
+def test_the_cpp_sdk_reads_our_state_and_stands_the_robot_up() -> None:
+    python = peer_python(CPP_SDK)
+    if not has_own_network():
+        pytest.skip("needs the right to make a network namespace (unshare -n)")
+    peer = f"{python} {PEERS / 'cpp_stand.py'} lo"
+    script = f"{' '.join(PROGRAM)} unitree-sim --domain 0 & sim=$!; sleep 8; {peer}; "
+    script += "code=$?; kill -TERM $sim; wait $sim; exit $code"
+    with Process(["unshare", "-n", "sh", "-c", f"{NETWORK}; {script}"]) as process:
+        text = process.finish(LIMIT)
+        code = process.code
+    assert code == 0, text
+    line = next(line for line in text.splitlines() if line.startswith("{"))
+    said = json.loads(line)
+    assert said["accelerometer"] == GRAVITY
+    assert said["start"][1] > 1.0  # a folded thigh: the front right one, first in Unitree's order
+    assert said["error"] < SAG
+    assert good_commands(text) > 0.9 * said["sent"]
+    assert "refused: none" in text
+
+
+def has_own_network() -> bool:
+    if shutil.which("unshare") is None or os.geteuid() != 0:
+        return False
+    return subprocess.run(["unshare", "-n", "true"], check=False).returncode == 0

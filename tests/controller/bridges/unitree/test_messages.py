@@ -1,0 +1,136 @@
+"""Unitree's messages: layout, checksum and wire format. Needs no DDS library."""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.bridges.unitree import layout
+from controller.bridges.unitree.checksum import checksum, is_intact, seal
+from controller.bridges.unitree.codec import (
+    Request,
+    Response,
+    codec_of,
+    decode_request,
+    decode_response,
+    encode_request,
+    encode_response,
+)
+from go2_wbc.errors import CommandError
+from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
+
+# Sizes of the C structs in unitree_sdk2's headers and motor order of its examples.
+LOW_STATE_SIZE, LOW_CMD_SIZE = 1180, 812
+MOTOR_ORDER = [
+    f"{leg}_{part}_joint" for leg in ("FR", "FL", "RR", "RL") for part in ("hip", "thigh", "calf")
+]
+
+
+def random_message(kind: np.dtype[np.void], seed: int) -> np.ndarray:
+    """All bytes of all fields drawn; the padding between them stays zero."""
+    rng = np.random.default_rng(seed)
+    message = layout.new_message(kind)
+
+    def fill(part: np.ndarray) -> None:
+        for name in part.dtype.names or ():
+            if part[name].dtype.names:
+                fill(part[name])
+            elif part[name].dtype.kind == "f":
+                part[name] = rng.normal(size=part[name].shape)
+            else:
+                part[name] = rng.integers(0, 100, part[name].shape)
+
+    fill(message)
+    return message
+
+
+def crc_bit_by_bit(message: np.ndarray) -> int:
+    """``crc32_core`` of unitree_sdk2, line by line."""
+    crc, polynomial = 0xFFFFFFFF, 0x04C11DB7
+    for word in message.view("<u4")[:-1].tolist():
+        bit = 1 << 31
+        for _ in range(32):
+            crc = ((crc << 1) & 0xFFFFFFFF) ^ (polynomial if crc & 0x80000000 else 0)
+            if word & bit:
+                crc ^= polynomial
+            bit >>= 1
+    return crc
+
+
+@pytest.mark.parametrize("kind", [layout.LOW_STATE, layout.LOW_CMD])
+def test_the_checksum_is_the_one_of_the_sdk(kind: np.dtype[np.void]) -> None:
+    for seed in range(3):
+        message = random_message(kind, seed)
+        assert checksum(message) == crc_bit_by_bit(message)
+
+
+def test_a_sealed_message_is_intact_until_a_single_bit_changes() -> None:
+    message = random_message(layout.LOW_CMD, 1)
+    seal(message)
+    assert is_intact(message)
+    message["motor_cmd"]["mode"][0, 5] ^= 1
+    assert not is_intact(message)
+
+
+def test_the_structs_have_the_sizes_of_the_c_structs() -> None:
+    assert layout.LOW_STATE.itemsize == LOW_STATE_SIZE
+    assert layout.LOW_CMD.itemsize == LOW_CMD_SIZE
+
+
+def test_motors_and_feet_are_mapped_to_the_order_of_the_sdk_and_back() -> None:
+    assert [JOINT_NAMES[index] for index in layout.JOINTS_TO_UNITREE] == MOTOR_ORDER
+    assert [JOINT_NAMES.index(name) for name in MOTOR_ORDER] == list(layout.JOINTS_TO_UNITREE)
+    joints, feet = np.arange(12), np.array(LEGS)
+    assert np.array_equal(joints[layout.JOINTS_TO_UNITREE][layout.JOINTS_FROM_UNITREE], joints)
+    assert np.array_equal(feet[layout.FEET_TO_UNITREE], [Leg.FR, Leg.FL, Leg.RR, Leg.RL])
+    assert np.array_equal(feet[layout.FEET_TO_UNITREE][layout.FEET_FROM_UNITREE], feet)
+
+
+@pytest.mark.parametrize("kind", [layout.LOW_STATE, layout.LOW_CMD, layout.SPORT_STATE])
+def test_what_is_encoded_comes_back(kind: np.dtype[np.void]) -> None:
+    codec, message = codec_of(kind), random_message(kind, 2)
+    assert np.array_equal(codec.decode(codec.encode(message)), message)
+
+
+def test_numbers_are_aligned_to_their_own_size_on_the_wire() -> None:
+    message = layout.new_message(layout.LOW_CMD)
+    message["motor_cmd"]["mode"][0, :2] = 1, 2
+    message["motor_cmd"]["q"][0, 0] = 0.5
+    body = codec_of(layout.LOW_CMD).encode(message)[4:]
+    # head 2, flags 2, sn 8, version 8, bandwidth 2: the first motor begins at 22
+    assert body[22] == 1
+    assert struct.unpack_from("<f", body, 24) == (0.5,)
+    assert body[24 + 5 * 4 + 3 * 4] == 2
+
+
+def test_a_message_that_is_cut_off_or_big_endian_is_refused() -> None:
+    codec = codec_of(layout.LOW_CMD)
+    data = codec.encode(layout.new_message(layout.LOW_CMD))
+    for broken in (data[:-1], b"", b"\x00\x00" + data[2:]):
+        with pytest.raises(CommandError, match="no message"):
+            codec.decode(broken)
+
+
+@pytest.mark.parametrize("text", ["", "{}", '{"x": 0.5}', "abc", "ä"])
+def test_requests_and_responses_come_back(text: str) -> None:
+    request = Request(2**62, 1008, lease_id=7, wants_reply=False, parameter=text)
+    assert decode_request(encode_request(request)) == request
+    response = Response(-5, 1016, 4205, text)
+    assert decode_response(encode_response(response)) == response
+    assert decode_request(encode_request(replace(request, wants_reply=True))).wants_reply
+
+
+@pytest.mark.parametrize("size", [0, 3, 20, 38, 41])
+def test_a_request_that_is_cut_off_is_refused(size: int) -> None:
+    data = encode_request(Request(1, 1008, parameter='{"x": 1}'))
+    with pytest.raises(CommandError):
+        decode_request(data[:size])
+
+
+def test_a_request_with_bytes_that_are_no_text_is_refused() -> None:
+    data = encode_request(Request(1, 1008, parameter="abcd")).replace(b"abcd", b"\xff\xfe\xfd\xfc")
+    with pytest.raises(CommandError, match="broken"):
+        decode_request(data)
