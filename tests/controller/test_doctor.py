@@ -229,3 +229,11 @@ def test_long_details_wrap_at_80_columns_and_lines_to_type_never() -> None:
     text = doctor.render([Finding("A", "b", Status.PROBLEM, "word " * 40, line)])
     assert f"-> {line}" in text
     assert max(len(row) for row in text.splitlines() if "->" not in row) <= 80
+
+
+def test_a_missing_extra_is_a_note_with_its_install_line() -> None:
+    missing, old, right = (doctor.judge_extra("unitree", v) for v in (None, "0.10.2", "11.0.1"))
+    assert missing.status is old.status is doctor.Status.NOTE
+    assert 'pip install "cyclonedds==11.0.1"' in missing.remedy
+    assert "does not fit" in old.detail
+    assert right.status is doctor.Status.OK
