@@ -62,6 +62,10 @@ ROS2: Mapping[str, str] = {
 """What ``go2-wbc ros2`` uses, and the module that each brings; those of ``BUILT`` are built."""
 BUILT = ("quadropted-msgs", "tf2-msgs")
 BUILD_LINE = "ros2/build_interfaces.sh {python} dist && {pip} dist/*.whl"
+EXTRAS: Mapping[str, tuple[str, str, str]] = {
+    "unitree": ("cyclonedds", "==11.0.1", "Unitree's protocol: unitree-sim, unitree-drive"),
+}
+"""What an optional extra brings: a package, its version, and what it is for."""
 NEEDED_SOLVERS = ("daqp", "proxqp", "quadprog")
 
 
@@ -128,6 +132,7 @@ def examine() -> list[Finding]:
     findings += judge_pairing(versions["placo"], versions["pin"], pairing, bounds.get("placo", ""))
     findings += judge_robot_files(bounds.get("example-robot-data", ""))
     findings += judge_solvers(probes["qpsolvers"].solvers, bounds)
+    findings += [judge_extra(name, installed_version(EXTRAS[name][0])) for name in EXTRAS]
     findings.append(judge_display(sys.platform, os.environ))
     return findings + _examine_ros2()
 
@@ -282,6 +287,23 @@ def judge_solvers(available: tuple[str, ...], bounds: Mapping[str, str]) -> list
     if others:
         found.append(Finding("QP solvers", "others", Status.NOTE, others))
     return found
+
+
+def judge_extra(name: str, version: str | None) -> Finding:
+    """Whether an optional extra is there; nothing else needs it.
+
+    Args:
+        name: of the extra.
+        version: installed version of its package.
+    """
+    package, bounds, purpose = EXTRAS[name]
+    remedy = install_line(package, bounds)
+    if version is None:
+        return Finding("Extras", name, Status.NOTE, f"not installed; for {purpose}", remedy)
+    if not satisfies(version, bounds):
+        detail = f"{package} {version} does not fit {bounds}; for {purpose}"
+        return Finding("Extras", name, Status.NOTE, detail, remedy)
+    return Finding("Extras", name, Status.OK, f"{package} {version}")
 
 
 def judge_display(system: str, environment: Mapping[str, str]) -> Finding:

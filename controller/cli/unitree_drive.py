@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 EXAMPLES = """
 go2-wbc unitree-drive --interface lo --domain 1 --i-have-the-remote-in-hand
-go2-wbc unitree-drive --interface eth0 --steps stand lie_down --i-have-the-remote-in-hand
+go2-wbc unitree-drive --interface eth0 --json --i-have-the-remote-in-hand
 """
 
 

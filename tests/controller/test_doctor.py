@@ -252,3 +252,11 @@ def test_interfaces_that_are_missing_are_built_and_ros_that_is_broken_is_install
     others = [item for name, item in found.items() if name not in ("tf2-msgs", "ros-nav-msgs")]
     assert {item.status for item in others} == {Status.OK}
     assert not any(item.status is Status.PROBLEM for item in found.values())
+
+
+def test_a_missing_extra_is_a_note_with_its_install_line() -> None:
+    missing, old, right = (doctor.judge_extra("unitree", v) for v in (None, "0.10.2", "11.0.1"))
+    assert missing.status is old.status is doctor.Status.NOTE
+    assert 'pip install "cyclonedds==11.0.1"' in missing.remedy
+    assert "does not fit" in old.detail
+    assert right.status is doctor.Status.OK
