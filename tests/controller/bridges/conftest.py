@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -35,3 +35,15 @@ def probe(graph: None) -> Iterator[Probe]:
     node = Probe()
     yield node
     node.close()
+
+
+@pytest.fixture
+def real_time(server: Server, probe: Probe) -> Callable[[], None]:
+    """Skips a test whose limits are wall-clock times if the server could not keep that pace."""
+    before = probe.statistics()["paces_given_up"]
+
+    def check() -> None:
+        if probe.statistics()["paces_given_up"] > before:
+            pytest.skip("this machine is too busy for real time")
+
+    return check
