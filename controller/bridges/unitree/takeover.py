@@ -45,10 +45,10 @@ def release_sport(bus: Bus) -> None:
 
 
 def _active_service(client: Client) -> str:
-    for _ in range(TRIES):  # its answers may not find the way before it has discovered us
-        response = client.call(SwitcherApi.CHECK_MODE)
-        if response.code != Code.API_TIMEOUT:
-            break
+    response = client.call(SwitcherApi.CHECK_MODE)
+    for _ in range(TRIES - 1):  # an answer gets lost as long as the service has not discovered us
+        if response.code == Code.API_TIMEOUT:
+            response = client.call(SwitcherApi.CHECK_MODE)
     if response.code != Code.OK:
         raise PlantError(f"the motion switcher answered {response.code} to CheckMode")
     try:
