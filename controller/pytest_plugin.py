@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 _CHECKER: pytest.StashKey[FeasibilityChecker] = pytest.StashKey()
 _SIGNS = ("@motion", "import")
 """What a file with motions contains."""
+PINOCCHIO_WARNING = "ignore:Please update your 'hppfcl' imports:DeprecationWarning:hppfcl"
+"""Pinocchio 3.8 imports its collision library under that library's former name."""
 
 
 class InfeasibleMotion(Exception):
@@ -54,6 +56,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers", "motion_margins(**margins): margins that check_motion requires, by check"
     )
+    config.addinivalue_line("filterwarnings", PINOCCHIO_WARNING)
     for folder in _folders(config):
         if not Path(folder).exists():
             raise pytest.UsageError(f"--motions: there is no folder {folder}")

@@ -11,6 +11,9 @@ from jaxtyping import Float
 
 from go2_wbc.errors import MotionInfeasible
 
+NOISE = 1e-6
+"""A value below this is nothing but rounding, and is shown as 0."""
+
 
 @dataclass(frozen=True, slots=True)
 class Finding:
@@ -148,7 +151,8 @@ class FeasibilityReport:
             mark = "x" if finding.margin < 0.0 else "!" if finding in self.warnings else "ok"
             line = f"{check:<16}{finding.subject:<17.16}{finding.time:>6.2f} s"
             if np.isfinite(finding.value):
-                line += f"{finding.value:>10.3g}{finding.limit:>9.3g}{finding.margin:>10.3g}"
+                value = 0.0 if abs(finding.value) < NOISE else finding.value
+                line += f"{value:>10.3g}{finding.limit:>9.3g}{finding.margin:>10.3g}"
                 lines.append(f"{line} {mark:<2} {finding.unit}")
             else:
                 lines.append(f"{line}{'-':>10}{'-':>9}{'-':>10} {mark}")
