@@ -30,7 +30,7 @@ go2-wbc bench feasibility --motions 40 --near 0
 go2-wbc bench feasibility --json --out feasibility.json
 """
 BRIDGES_EXAMPLES = """
-go2-wbc bench bridges              two minutes each; those whose extras are installed
+go2-wbc bench bridges              two minutes each; needs the extras
 go2-wbc bench bridges ros2         only this one
 go2-wbc bench bridges --json --out bridges.json
 """
