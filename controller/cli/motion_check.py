@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import sys
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from controller.cli.motion_args import add_motion, timelines
+from controller.cli.progress import ProgressLine
 
 EXAMPLES = """
 go2-wbc check                     every motion of the library, a line each
@@ -36,7 +38,11 @@ def run(args: argparse.Namespace) -> int:
 
     lines = timelines(args.motion, args.values)
     checker = FeasibilityChecker()
-    reports = [checker.check(line) for line in lines]
+    reports = []
+    with ProgressLine(sys.stderr) as progress:
+        for number, line in enumerate(lines):
+            progress.update(number / len(lines), line.name)
+            reports.append(checker.check(line))
     if args.json:
         print_json([report.as_dict() for report in reports])
     elif len(reports) == 1:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from controller.cli.motion_args import add_motion, timelines
 from go2_wbc.errors import CommandError
 from go2_wbc.legs import JOINT_NAMES, LEGS
@@ -39,6 +39,7 @@ def register(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--out", metavar="FILE", type=Path, required=True, help="ends in .csv or .npz"
     )
+    parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -70,7 +71,11 @@ def run(args: argparse.Namespace) -> int:
     else:
         content = _csv(path.times, path.q, path.v, path.rpy, path.p_com, path.stance).encode()
     write_atomically(target, content)
-    print(f"wrote {args.out}: {len(path.times)} rows of {lines[0].name}")
+    rows, name = len(path.times), lines[0].name
+    if args.json:
+        print_json({"motion": name, "file": str(target), "rows": rows})
+    else:
+        print(f"wrote {args.out}: {rows} rows of {name}")
     return ExitCode.OK
 
 

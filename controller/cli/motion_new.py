@@ -6,7 +6,7 @@ import argparse
 import keyword
 from pathlib import Path
 
-from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from go2_wbc.errors import CommandError, ConfigError
 
 EXAMPLES = """
@@ -46,6 +46,7 @@ def register(subparsers: Subparsers) -> None:
     )
     parser.add_argument("name", metavar="NAME", help="of the motion and its file")
     parser.add_argument("--out", metavar="DIR", type=Path, default=Path(), help="default: here")
+    parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -59,5 +60,8 @@ def run(args: argparse.Namespace) -> int:
         raise ConfigError(f"{args.out / target.name} exists already: choose another name")
     title = args.name.replace("_", " ").capitalize()
     write_atomically(target, STARTER.format(name=args.name, title=title).encode())
-    print(f"wrote {args.out / target.name}; now: go2-wbc check {args.out / target.name}")
+    if args.json:
+        print_json({"motion": args.name, "file": str(target)})
+    else:
+        print(f"wrote {args.out / target.name}; now: go2-wbc check {args.out / target.name}")
     return ExitCode.OK

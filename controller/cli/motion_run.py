@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from controller.cli.motion_args import add_motion, the_motion
-from go2_wbc.errors import StanceMismatch
+from controller.cli.progress import ProgressLine
+from go2_wbc.errors import PlantError, StanceMismatch
 
 if TYPE_CHECKING:
     from controller.bench.motion_runs import MotionRun
+    from controller.bench.trials import Subject
 
+TELL_EVERY = 50
+"""Ticks between two looks at the progress line."""
+GETTING_READY = 2.5
+"""About how long [s] the robot takes to stand up before the motion."""
 EXAMPLES = """
 go2-wbc run high_five
 go2-wbc run wave --set side=left --html wave.html
@@ -43,7 +51,7 @@ def register(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Check, play, measure, print."""
     from controller.bench.motion_runs import run_motion
-    from controller.bench.trials import Subject
+    from controller.bench.trials import Failed, Subject
     from controller.watching import performed
     from go2_wbc.plant import MujocoPlant
     from go2_wbc.reference import Stance
@@ -58,11 +66,18 @@ def run(args: argparse.Namespace) -> int:
     plan, report = rehearsal.plan, rehearsal.report
     if not args.force:
         report.raise_if_infeasible()
-    with Subject(MujocoPlant(friction=args.friction)) as robot:
+    with (
+        ProgressLine(sys.stderr) as line,
+        Subject(MujocoPlant(friction=args.friction)) as robot,
+    ):
+        robot.witness.on_tick = _teller(line, robot, plan.name, plan.duration)
         starts = {Stance.STAND: robot.go2.stand, Stance.SIT: robot.go2.sit}
         if plan.entry not in starts:
             raise StanceMismatch(f"{plan.name} starts from {plan.entry.value}: cannot be run")
-        robot.require(starts[plan.entry]())
+        try:
+            robot.require(starts[plan.entry]())
+        except Failed as failed:
+            raise PlantError(f"the robot did not get ready: {failed}") from failed
         result = run_motion(robot, plan, checker.model)
         recording = robot.go2.recording()
     if args.json:
@@ -74,6 +89,20 @@ def run(args: argparse.Namespace) -> int:
         if not args.json:
             print(f"3D replay beside the plan, offline: {args.html}")
     return ExitCode.OK if result.ok else ExitCode.FAILED
+
+
+def _teller(line: ProgressLine, robot: Subject, name: str, duration: float) -> Callable[[], None]:
+    """Shows after every so many ticks how far the robot has come."""
+    ticks = 0
+
+    def tell() -> None:
+        nonlocal ticks
+        ticks += 1
+        if ticks % TELL_EVERY == 0:
+            time = ticks * robot.plant.control_period
+            line.update(min(time / (GETTING_READY + duration), 1.0), f"{name}, {time:.1f} s")
+
+    return tell
 
 
 def _print(name: str, duration: float, result: MotionRun) -> None:

@@ -106,6 +106,24 @@ def test_a_new_motion_is_feasible_and_is_not_written_twice(
     assert path.read_bytes() == before
 
 
+def test_new_and_export_tell_a_program_what_they_wrote(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["new", "greet", "--out", str(tmp_path), "--json"]) == ExitCode.OK
+    file = tmp_path / "greet.py"
+    assert json.loads(capsys.readouterr().out) == {"motion": "greet", "file": str(file)}
+    table = tmp_path / "greet.csv"
+    assert main(["export", str(file), "--out", str(table), "--json"]) == ExitCode.OK
+    told = json.loads(capsys.readouterr().out)
+    assert told == {"motion": "greet", "file": str(table), "rows": told["rows"]}
+    assert len(table.read_text().splitlines()) == told["rows"] + 1
+
+
+def test_a_robot_that_cannot_get_up_is_a_message(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "bow", "--friction", "0.0001"]) == ExitCode.RUNTIME
+    assert "the robot did not get ready: " in capsys.readouterr().err
+
+
 def test_export_writes_the_same_trajectory_as_csv_and_npz(tmp_path: Path) -> None:
     for name in ("wave.csv", "wave.npz"):
         assert main(["export", "wave", "--out", str(tmp_path / name)]) == ExitCode.OK
