@@ -37,6 +37,7 @@ test-ros2: ## build the ROS 2 interfaces, install the extra [ros2], run its test
 	ros2/test.sh $(ARGS)
 
 test-unitree: $(VENV)/.stamp-unitree ## the tests of Unitree's protocol, with its peers
+	GO2_WBC_REQUIRE_UNITREE=1 \
 	GO2_WBC_STOCK_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/stock/bin/python \
 	GO2_WBC_CPP_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/cpp/bin/python \
 	$(BIN)/python -m pytest tests/controller/bridges/unitree tests/robot/test_estimator.py $(ARGS)

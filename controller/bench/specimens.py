@@ -41,35 +41,22 @@ class Specimen:
     def plan(self, model: RobotModel) -> MotionPlan:
         """What is checked and played."""
         plan = compile_timeline(self.line, model)
-        return LateStart(plan, self.start) if self.start > 0.0 else plan
+        if self.start == 0.0:
+            return plan
+        left = plan.duration - self.start
+        return LateStart(plan.name, plan.entry, plan.exit, left, plan, self.start)
 
 
 @dataclass(frozen=True, slots=True)
 class LateStart(MotionPlan):
     """A plan without its first ``start`` seconds, as if it began where that leaves the robot."""
 
+    name: str
+    entry: Stance
+    exit: Stance
+    duration: float
     inner: MotionPlan
     start: float
-
-    @property
-    def name(self) -> str:  # type: ignore[override]
-        """Name of the whole plan."""
-        return self.inner.name
-
-    @property
-    def entry(self) -> Stance:  # type: ignore[override]
-        """Stance that it claims to start in."""
-        return self.inner.entry
-
-    @property
-    def exit(self) -> Stance:  # type: ignore[override]
-        """Stance in which it ends."""
-        return self.inner.exit
-
-    @property
-    def duration(self) -> float:  # type: ignore[override]
-        """Length of what is left [s]."""
-        return self.inner.duration - self.start
 
     def at(self, t: float) -> Reference:
         """The reference ``t`` seconds after the late start."""

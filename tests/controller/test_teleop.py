@@ -91,7 +91,6 @@ def test_without_a_terminal_it_says_so(capsys: pytest.CaptureFixture[str]) -> No
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_in_a_real_terminal_keys_drive_it_and_the_terminal_is_left_as_it_was() -> None:
     import pty
     import termios

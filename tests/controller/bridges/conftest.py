@@ -39,11 +39,11 @@ def probe(graph: None) -> Iterator[Probe]:
 
 @pytest.fixture
 def real_time(server: Server, probe: Probe) -> Callable[[], None]:
-    """Skips a test whose limits are wall-clock times if the server could not keep that pace."""
+    """Says so if the server could not keep the pace that a test's wall-clock limits count on."""
     before = probe.statistics()["paces_given_up"]
 
     def check() -> None:
         if probe.statistics()["paces_given_up"] > before:
-            pytest.skip("this machine is too busy for real time")
+            pytest.fail("the server lost real time: the loop is too slow, or the machine too busy")
 
     return check

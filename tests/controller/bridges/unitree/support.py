@@ -6,12 +6,16 @@ import importlib.util
 import itertools
 import os
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 HAS_DDS = importlib.util.find_spec("cyclonedds") is not None
+IS_REQUIRED = "GO2_WBC_REQUIRE_UNITREE" in os.environ
+"""Set by ``make test-unitree``: what is missing is then a failure, not a test that is skipped."""
 needs_dds = pytest.mark.skipif(
-    not HAS_DDS, reason="CycloneDDS is not installed: pip install 'go2-wbc[unitree]'"
+    not HAS_DDS and not IS_REQUIRED,
+    reason="CycloneDDS is not installed: pip install 'go2-wbc[unitree]'",
 )
 STOCK_SDK = "GO2_WBC_STOCK_SDK_PYTHON"
 CPP_SDK = "GO2_WBC_CPP_SDK_PYTHON"
@@ -24,8 +28,15 @@ def free_domain() -> int:
 
 
 def peer_python(variable: str) -> str:
-    """Python of a foreign SDK's environment; skips the test if there is none."""
+    """Python of a foreign SDK's environment; without one the test is skipped, or has failed."""
     python = os.environ.get(variable, "")
     if not Path(python).is_file():
-        pytest.skip(f"{variable} names no environment with that SDK: make test-unitree makes one")
+        absent(f"{variable} names no environment with that SDK: make test-unitree makes one")
     return python
+
+
+def absent(reason: str) -> NoReturn:
+    """End the test: as failed where nothing may be missing, else as skipped."""
+    if IS_REQUIRED:
+        pytest.fail(reason)
+    pytest.skip(reason)

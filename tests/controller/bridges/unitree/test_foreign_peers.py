@@ -15,6 +15,7 @@ from controller.bridges.unitree.sport_api import Code, SportMode
 from tests.controller.bridges.unitree.support import (
     CPP_SDK,
     STOCK_SDK,
+    absent,
     free_domain,
     needs_dds,
     peer_python,
@@ -58,7 +59,7 @@ def test_the_stock_sport_client_moves_the_robot() -> None:
 def test_the_cpp_sdk_reads_our_state_and_stands_the_robot_up() -> None:
     python = peer_python(CPP_SDK)
     if not has_own_network():
-        pytest.skip("needs the right to make a network namespace (unshare -n)")
+        absent("needs the right to make a network namespace (unshare -n)")
     peer = f"{python} {PEERS / 'cpp_stand.py'} lo"
     script = f"{' '.join(PROGRAM)} unitree-sim --domain 0 & sim=$!; sleep 8; {peer}; "
     script += "code=$?; kill -TERM $sim; wait $sim; exit $code"
