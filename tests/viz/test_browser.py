@@ -103,6 +103,19 @@ def test_the_readouts_follow_the_time(browser: Chromium) -> None:
     assert float(shown.split()[0]) == pytest.approx(100 * height, abs=0.06)
 
 
+def test_what_lies_on_the_floor_is_drawn_above_it_although_feet_press_into_it(
+    browser: Chromium,
+) -> None:
+    lower = "replay.data.feet = replay.data.feet.map((value, i) => i % 3 === 2 ? value {} : value);"
+    corners = "replay.scene.polygon.geometry.attributes.position"
+    try:
+        browser.evaluate(lower.format("- 0.004") + "replay.seek(0.2)")
+        heights = browser.evaluate(f"[0, 1, 2].map((i) => {corners}.getZ(i))")
+    finally:
+        browser.evaluate(lower.format("+ 0.004") + "replay.seek(0.2)")
+    assert min(heights) > 0.001
+
+
 def test_hiding_the_forces_changes_the_picture(browser: Chromium) -> None:
     browser.evaluate("replay.scrub(0.1); replay.scene.setView('side')")
     shown = _stage(browser)

@@ -165,7 +165,7 @@ class RobotScene {
     this.legs.forEach((leg, k) => {
       const [x, y, z] = scratch.subarray(3 * k, 3 * k + 3);
       const force = data.forces[4 * frame + k];
-      const ground = z - this.footRadius;
+      const ground = this.underside(z);
       const arrow = this.node(`forces/${leg}`);
       arrow.visible = shown.forces && force > LEAST_FORCE;
       arrow.position.set(x, y, ground);
@@ -203,9 +203,15 @@ class RobotScene {
     for (const { material } of [this.polygon, this.outline]) material.depthTest = !isSteep;
   }
 
+  // Below a foot whose centre is at z. Simulated feet press a little into the floor, which would hide
+  // what is drawn there.
+  underside(z) {
+    return Math.max(z - this.footRadius, 0);
+  }
+
   groundHeights(t) {
     const frame = this.data.frameAt(t);
-    return this.legs.map((_, k) => this.data.feet[12 * frame + 3 * k + 2] - this.footRadius);
+    return this.legs.map((_, k) => this.underside(this.data.feet[12 * frame + 3 * k + 2]));
   }
 
   stanceFeet(t) {
@@ -213,7 +219,7 @@ class RobotScene {
     const frame = this.data.frameAt(t);
     return this.legs.map((_, k) => k).filter((k) => stance[4 * frame + k]).map((k) => {
       const at = 12 * frame + 3 * k;
-      return [feet[at], feet[at + 1], feet[at + 2] - this.footRadius];
+      return [feet[at], feet[at + 1], this.underside(feet[at + 2])];
     });
   }
 
