@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from controller.cli.progress import ProgressLine
-from go2_wbc.errors import CommandError, MissingDependency, unknown_name
+from go2_wbc.errors import MissingDependency
 
 if TYPE_CHECKING:
     from controller.bench.rows import Family
@@ -31,10 +31,10 @@ go2-wbc bench feasibility --json --out feasibility.json
 """
 BRIDGES_EXAMPLES = """
 go2-wbc bench bridges              two minutes each; needs the extras
-go2-wbc bench bridges ros2         only this one
+go2-wbc bench bridges ros2 --runs 5
+go2-wbc bench bridges --list       the rows and their bars
 go2-wbc bench bridges --json --out bridges.json
 """
-DOORS = ("ros2", "unitree")
 SEEDS, QUICK_SEEDS = 20, 3
 MOTIONS, NEAR = 160, 64
 
@@ -89,8 +89,12 @@ def register(subparsers: Subparsers) -> None:
         examples=BRIDGES_EXAMPLES,
     )
     bridges.add_argument(
-        "doors", metavar="DOOR", nargs="*", help=f"{' or '.join(DOORS)}; default: both"
+        "names", metavar="NAME", nargs="*", help="ros2, unitree, or a name of --list; default: all"
     )
+    bridges.add_argument(
+        "--runs", metavar="N", type=_positive, default=1, help="default %(default)s"
+    )
+    bridges.add_argument("--list", action="store_true", help="list the rows and run nothing")
     for bench in (behaviour, feasibility):
         bench.add_argument(
             "--jobs", metavar="N", type=_positive, default=2, help="processes, default %(default)s"
@@ -138,46 +142,27 @@ def _run_feasibility(args: argparse.Namespace) -> int:
 
 
 def _run_bridges(args: argparse.Namespace) -> int:
-    target = _checked_target(args)
-    values: dict[str, Any] = {}
-    tables: list[str] = []
-    missing: list[MissingDependency] = []
-    for door in args.doors or DOORS:
-        if door not in DOORS:
-            raise CommandError(unknown_name("door", door, DOORS))
-        try:
-            values[door], table = _DOOR_BENCHES[door]()
-            tables.append(table)
-        except MissingDependency as error:
-            missing.append(error)
-            print(f"{door} was not measured: {error}", file=sys.stderr)
-    if not tables or (args.doors and missing):
-        raise missing[0]
-    ok = all(value["passed"] for value in values.values())
-    _publish({"passed": ok, **values}, "\n\n".join(tables), args, target)
-    return ExitCode.OK if ok else ExitCode.FAILED
-
-
-def _ros2_bench() -> tuple[dict[str, Any], str]:
-    from controller.bench.bridges import measure_bridges, render
-
-    with ProgressLine(sys.stderr) as line:
-        report = measure_bridges(line.done)
-    return report.as_dict(), render(report)
-
-
-def _unitree_bench() -> tuple[dict[str, Any], str]:
-    from controller.bridges.unitree.extra import require_dds
-
-    require_dds()
-    from controller.bench.bridges_unitree import FAMILY
+    from controller.bench.bridges import find_doors
     from controller.bench.report import render, summarise
 
-    report = summarise((FAMILY,), _measure((FAMILY,), 1, 1))
-    return report.as_dict(), render(report)
-
-
-_DOOR_BENCHES = {"ros2": _ros2_bench, "unitree": _unitree_bench}
+    families: list[Family] = []
+    missing: list[MissingDependency] = []
+    for door in find_doors(args.names):
+        try:
+            door.require()
+            families += door.families
+        except MissingDependency as error:
+            missing.append(error)
+            print(f"{door.name} is not measured: {error}", file=sys.stderr)
+    if missing and (args.names or not families):
+        raise missing[0]
+    if args.list:
+        _print_list(tuple(families))
+        return ExitCode.OK
+    target = _checked_target(args)
+    report = summarise(families, _measure(tuple(families), args.runs, 1))
+    _publish(report.as_dict(), render(report), args, target)
+    return ExitCode.OK if report.ok else ExitCode.FAILED
 
 
 def _measure(families: tuple[Family, ...], seeds: int, jobs: int) -> Results:

@@ -1,39 +1,52 @@
-"""The report of the bridges' bench: no value, or one on the wrong side, is never ok."""
+"""Which benches of the bridges a name stands for, and what is said when one cannot run."""
 
 from __future__ import annotations
 
-import math
+import sys
 
 import pytest
 
-from controller.bench.bridges import ROS2_ROWS, BridgeReport, render
+from controller.bench.bridges import DOORS, find_doors
+from controller.bench.rows import Family
+from controller.cli import main as cli
+from controller.cli.common import ExitCode
+from go2_wbc.errors import CommandError
 
-BARRED = [row for row in ROS2_ROWS if row.bar is not None]
-GOOD = {row.name: row.bar or 0.0 for row in ROS2_ROWS}
-
-
-def test_values_at_their_bars_are_ok() -> None:
-    report = BridgeReport(GOOD)
-    assert report.ok
-    assert render(report).count("  ok") == len(ROS2_ROWS)
-    assert report.as_dict()["passed"] is True
+FAMILIES = [family for door in DOORS for family in door.families]
 
 
-@pytest.mark.parametrize(
-    "row", [row for row in ROS2_ROWS if row.bar is not None], ids=lambda row: row.name
-)
-@pytest.mark.parametrize("value", [None, math.nan, 1e3])
-def test_a_value_that_is_missing_or_beyond_its_bar_fails(row: object, value: float | None) -> None:
-    name = getattr(row, "name", "")
-    values = {key: item for key, item in GOOD.items() if key != name}
-    if value is not None:
-        values[name] = value
-    report = BridgeReport(values, ("sit: fell",))
-    assert not report.ok
-    assert render(report).count("  NO") == 1
-    assert "sit: fell" in render(report)
-    assert [row["passed"] for row in report.as_dict()["rows"]].count(False) == 1
+def chosen(*names: str) -> list[Family]:
+    return [family for door in find_doors(names) for family in door.families]
 
 
-def test_the_table_fits_a_terminal() -> None:
-    assert max(map(len, render(BridgeReport({})).splitlines())) <= 80
+def test_no_name_stands_for_everything() -> None:
+    assert chosen() == FAMILIES
+
+
+def test_a_door_stands_for_its_families() -> None:
+    assert chosen("unitree") == list(DOORS[1].families)
+
+
+@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
+def test_a_family_stands_for_itself(family: Family) -> None:
+    assert chosen(family.name) == [family]
+
+
+def test_an_unknown_name_is_answered_with_the_valid_ones() -> None:
+    with pytest.raises(CommandError, match=r"ros3.*ros2.*unitree-drive"):
+        find_doors(["ros3"])
+
+
+def test_row_names_are_unique() -> None:
+    names = [row.name for family in FAMILIES for row in family.rows]
+    assert len(names) == len(set(names))
+
+
+def test_without_the_extra_the_bench_names_the_line_that_installs_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "cyclonedds", None)
+    assert cli.main(["bench", "bridges", "unitree"]) == ExitCode.RUNTIME
+    complaint = capsys.readouterr().err
+    assert "pip install 'go2-wbc[unitree]'" in complaint
+    assert "Traceback" not in complaint

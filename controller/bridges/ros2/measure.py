@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -130,9 +131,7 @@ class Meter:
         self.go2.stop()
         way = math.dist(after["position"][:2], start["position"][:2])
         wall_time = after["wall_time"] - before["wall_time"]
-        cpu = sum(
-            after[name] - before[name] for name in ("ros_cpu_in_loop", "cpu_of_other_threads")
-        )
+        cpu = sum(after[name] - before[name] for name in ROS_CPU)
         return Drive(
             sent,
             after["cmd_vel"]["received"] - before["cmd_vel"]["received"],
@@ -159,10 +158,11 @@ class Meter:
         self._spinner.remove_node(self.go2)
 
 
-def with_meter(namespace: str, measure: Callable[[Meter], None]) -> None:
-    """Call ``measure`` with a meter that is closed afterwards."""
+@contextmanager
+def metering(namespace: str) -> Iterator[Meter]:
+    """A meter that is closed afterwards."""
     meter = Meter(namespace)
     try:
-        measure(meter)
+        yield meter
     finally:
         meter.close()

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from controller.bench.bridges_unitree import drive
-from controller.bench.unitree_processes import simulator
+from controller.bench.bridges.unitree import drive
+from controller.bench.bridges.unitree_processes import simulator
 from controller.bridges.unitree.guards import GuardConfig
 from go2_wbc.errors import CommandError, PlantTimeout
 from go2_wbc.plant.base import Plant
@@ -27,7 +27,7 @@ LOCKED_IN = 20  # writes after which plant and simulator go tick by tick
 
 def test_encoding_and_decoding_take_little_cpu() -> None:
     # In a process of its own: the run-time checks of these tests cost more than what is measured.
-    script = "from controller.bench.bridges_unitree import codec_time; print(codec_time())"
+    script = "from controller.bench.bridges.unitree import codec_time; print(codec_time())"
     times = [subprocess.check_output([sys.executable, "-c", script]) for _ in range(3)]
     assert min(map(float, times)) < CODEC_BAR
 

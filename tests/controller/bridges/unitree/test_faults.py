@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.bench.unitree_processes import Observer, Process, driver, simulator, wait_until
+from controller.bench.bridges.processes import Process, wait_until
+from controller.bench.bridges.unitree_processes import Observer, driver, simulator
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.layout import LOW_CMD
 from controller.bridges.unitree.low_client import low_cmd_message

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from controller.bench.unitree_processes import PROGRAM, Process, good_commands, simulator
+from controller.bench.bridges.processes import PROGRAM, Process
+from controller.bench.bridges.unitree_processes import good_commands, simulator
 from controller.bridges.unitree.sport_api import Code, SportMode
 from tests.controller.bridges.unitree.support import (
     CPP_SDK,

@@ -10,20 +10,19 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from controller.bench.rows import Direction, Family, Measurement, Row
-from controller.bench.trials import Trial
-from controller.bench.unitree_processes import (
+from controller.bench.bridges.unitree_processes import (
     Observer,
     driver,
     good_commands,
     simulator,
 )
+from controller.bench.rows import Direction, Family, Measurement, Row
+from controller.bench.trials import Trial
 from controller.bridges.unitree import layout
 from controller.bridges.unitree.checksum import is_intact
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.low_client import low_cmd_message
 from controller.bridges.unitree.sport_api import SPORT_SERVICE, Api
-from go2_wbc.errors import PlantTimeout
 from go2_wbc.robot.state import JointCommand
 
 if TYPE_CHECKING:
@@ -42,7 +41,8 @@ DAMPED: Final = JointCommand.damping(3.0)
 DRIVE_LIMIT: Final = 120.0
 """Time [s] after which a drive counts as hanging."""
 
-_SPORT, _STREAM, _DRIVE = "sport service", "lowstate and lowcmd, 500 Hz", "UnitreePlant"
+_SPORT, _STREAM = "Unitree: sport service", "Unitree: lowstate and lowcmd, 500 Hz, 10 s"
+_DRIVE = "Unitree: our controller through UnitreePlant"
 SPORT_ROWS: Final = (
     Row("unitree.codes", _SPORT, "calls not answered 0", "", 0.0),
     Row("unitree.move", _SPORT, "Move 0.5: mean speed error", "m/s", 0.04),
@@ -216,20 +216,6 @@ def _true_speeds(observer: Observer, lines: list[str], deadline: float) -> list[
     return [speed for moment, speed in samples if start <= moment <= end]
 
 
-def measure(trial: Trial) -> Measurement:
-    """All of it, one after the other: processes on one bus want the machine for themselves."""
-    values: dict[str, float] = {}
-    failures: dict[str, str] = {}
-    reasons = []
-    for part in (measure_sport, measure_stream, measure_drive):
-        try:
-            result = part(trial)
-        except PlantTimeout as error:
-            result = Measurement({}, reason=str(error))
-        values |= result.values
-        failures |= result.failures
-        reasons += [result.reason] if result.reason else []
-    return Measurement(values, failures, "; ".join(reasons))
-
-
-FAMILY = Family("unitree", (*SPORT_ROWS, *STREAM_ROWS, *DRIVE_ROWS), measure)
+SPORT: Final = Family("unitree-sport", SPORT_ROWS, measure_sport)
+STREAM: Final = Family("unitree-stream", STREAM_ROWS, measure_stream)
+DRIVE: Final = Family("unitree-drive", DRIVE_ROWS, measure_drive)

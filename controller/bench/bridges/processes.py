@@ -1,0 +1,140 @@
+"""Programs of this project as child processes: started, listened to, ended, killed."""
+
+from __future__ import annotations
+
+import functools
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from types import TracebackType
+from typing import Final, final
+
+from go2_wbc.errors import BridgeError
+
+START_LIMIT: Final = 60.0
+"""Time [s] in which a process must be ready; a loaded machine needs many."""
+PROGRAM: Final = (sys.executable, "-m", "controller.cli.main")
+REALTIME: Final = ("chrt", "-f", "10")
+"""What lets a process keep its pace on a busy machine, where the system allows it."""
+
+
+@functools.cache
+def realtime_prefix() -> tuple[str, ...]:
+    """``REALTIME``, or nothing where it is not allowed."""
+    if shutil.which(REALTIME[0]) is None:
+        return ()
+    may = subprocess.run([*REALTIME, "true"], capture_output=True, check=False).returncode == 0
+    return REALTIME if may else ()
+
+
+@final
+class Process:
+    """A child process whose output is collected; killed at the end of the ``with`` block."""
+
+    def __init__(
+        self, command: Sequence[str], environment: Mapping[str, str] | None = None
+    ) -> None:
+        """Start ``command``, with real-time priority where that is allowed."""
+        self.lines: list[str] = []
+        self._process = subprocess.Popen(
+            [*realtime_prefix(), *command],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        stream = self._process.stdout
+        if stream is None:
+            return
+        with stream:
+            for line in stream:
+                self.lines.append(line.rstrip())
+
+    @property
+    def text(self) -> str:
+        """Everything that the process has said."""
+        return "\n".join(self.lines)
+
+    @property
+    def code(self) -> int | None:
+        """Its exit code, None while it runs."""
+        return self._process.poll()
+
+    def wait_for(self, text: str, limit: float = START_LIMIT) -> None:
+        """Wait until the process has said ``text``.
+
+        Raises:
+            BridgeError: if it does not, or ends before.
+        """
+        wait_until(lambda: text in self.text or self.code is not None, limit)
+        if self.code is not None:
+            self._reader.join(5.0)
+        if text not in self.text:
+            raise BridgeError(f"the process did not say {text!r} but: {self.text}")
+
+    def kill(self) -> None:
+        """End it as hard as possible, in the middle of whatever it does."""
+        self._process.kill()
+        self._process.wait()
+
+    def stop(self, by: signal.Signals = signal.SIGTERM) -> str:
+        """End it politely; returns everything that it has said."""
+        if self.code is None:
+            self._process.send_signal(by)
+        return self.finish(20.0)
+
+    def finish(self, limit: float) -> str:
+        """Wait for its end, for ``limit`` seconds at most; returns everything that it has said."""
+        try:
+            self._process.wait(limit)
+        except subprocess.TimeoutExpired:
+            self.kill()
+        self._reader.join(5.0)
+        return self.text
+
+    def __enter__(self) -> Process:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self.code is None:
+            self.kill()
+        self._reader.join(5.0)
+
+
+def program(*arguments: str, says: str) -> Process:
+    """``go2-wbc`` with these arguments, once it has said ``says``.
+
+    Raises:
+        BridgeError: if it does not say so.
+    """
+    process = Process([*PROGRAM, *arguments])
+    try:
+        process.wait_for(says)
+    except BridgeError:
+        process.kill()
+        raise
+    return process
+
+
+def wait_until(is_so: Callable[[], bool], limit: float) -> bool:
+    """Whether it became so within ``limit`` seconds."""
+    deadline = time.monotonic() + limit
+    while not is_so():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.02)
+    return True

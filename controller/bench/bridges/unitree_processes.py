@@ -1,0 +1,98 @@
+"""Processes that talk Unitree's protocol on the loopback, and an observer of their bus."""
+
+from __future__ import annotations
+
+import re
+import time
+from typing import Final, final
+
+import numpy as np
+from jaxtyping import Shaped
+
+from controller.bench.bridges.processes import PROGRAM, Process, program, wait_until
+from controller.bridges.unitree.extra import require_dds
+from go2_wbc.errors import PlantTimeout
+
+LOOPBACK: Final = "lo"
+
+
+def simulator(domain: int, *options: str) -> Process:
+    """A ``go2-wbc unitree-sim`` that serves.
+
+    Raises:
+        BridgeError: if it does not start.
+    """
+    return program("unitree-sim", "--domain", str(domain), *options, says="serving on")
+
+
+def driver(domain: int, *options: str) -> Process:
+    """A ``go2-wbc unitree-drive`` on the loopback."""
+    consent = "--i-have-the-remote-in-hand"
+    where = ["--interface", LOOPBACK, "--domain", str(domain)]
+    return Process([*PROGRAM, "unitree-drive", *where, consent, "--json", *options])
+
+
+def good_commands(text: str) -> int:
+    """How many low-level commands a simulator that has ended says were good."""
+    found = re.search(r"low-level commands: (\d+) good", text)
+    return int(found[1]) if found else 0
+
+
+@final
+class Observer:
+    """Listens to a domain: what the robot says of itself, which for a simulator is the truth.
+
+    Attributes:
+        bus: to write on, for tests.
+    """
+
+    def __init__(self, domain: int) -> None:
+        """Listen on the loopback."""
+        require_dds()
+        from controller.bridges.unitree import idl
+        from controller.bridges.unitree.bus import Bus
+        from controller.bridges.unitree.codec import codec_of
+        from controller.bridges.unitree.layout import SPORT_STATE
+
+        self.bus = Bus(domain, LOOPBACK)
+        self._reader = self.bus.reader("rt/sportmodestate", idl.sport_state(), depth=1000)
+        self._decode = codec_of(SPORT_STATE).decode
+        self._newest: Shaped[np.ndarray, "1"] | None = None
+
+    def take(self) -> list[Shaped[np.ndarray, "1"]]:
+        """All ``rt/sportmodestate`` since the last call, oldest first."""
+        messages = [self._decode(data) for data in self._reader.take()]
+        if messages:
+            self._newest = messages[-1]
+        return messages
+
+    def now(self) -> Shaped[np.ndarray, "1"]:
+        """The newest ``rt/sportmodestate``.
+
+        Raises:
+            PlantTimeout: if there is none.
+        """
+        wait_until(lambda: bool(self.take()), 2.0)
+        if self._newest is None:
+            raise PlantTimeout("nobody publishes rt/sportmodestate")
+        return self._newest
+
+    @property
+    def height(self) -> float:
+        """Of the base [m]."""
+        return float(self.now()["body_height"][0])
+
+    @property
+    def tilt(self) -> float:
+        """Largest of roll and pitch [rad]."""
+        return float(np.abs(self.now()["imu_state"]["rpy"][0, :2]).max())
+
+    @property
+    def mode(self) -> int:
+        """See ``SportMode``."""
+        return int(self.now()["mode"][0])
+
+    def wait_for_rest(self, limit: float = 60.0) -> bool:
+        """Wait until no action runs."""
+        time.sleep(0.1)
+        return wait_until(lambda: not self.now()["progress"][0], limit)
