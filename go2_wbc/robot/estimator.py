@@ -95,7 +95,7 @@ class EstimatorConfig:
 
 
 class StateEstimator:
-    """Turns sensor readings into ``RobotState``; the world's origin is where it began."""
+    """Turns sensor readings into ``RobotState``; the world's origin is where the base was first."""
 
     def __init__(self, model: RobotModel, config: EstimatorConfig | None = None) -> None:
         """Estimate the state of ``model``'s robot."""
@@ -128,6 +128,8 @@ class StateEstimator:
         p_feet, v_feet, rolling = self._feet(reading, R)
         trust = self._trust(reading.foot_forces)
         step = 0.0 if self._time is None else reading.time - self._time
+        if self._time is None:
+            self._x[0] = R @ self._p_base_imu
         if self._time is None or not 0.0 <= step <= self._config.longest_step:
             self._begin(p_feet)
         else:

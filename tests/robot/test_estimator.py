@@ -21,6 +21,7 @@ PERIOD = 0.004
 MEAN_BAR, RMS_BAR = 0.015, 0.03
 STILL_BAR = 0.01  # m/s
 PLACE_BAR = 0.05  # of the distance walked
+LYING_DRIFT = 0.015  # m in 4 s; the feet of a limp robot slide a little, which looks like walking
 
 
 class BlindPlant(Plant):
@@ -109,16 +110,14 @@ def test_a_standing_robot_stands_still(
     assert np.sqrt((walked[3] ** 2).mean(axis=0)).max() < STILL_BAR
 
 
-def test_a_lying_robot_does_not_drift_away() -> None:
-    plant = BlindPlant(seed=1)
-    for _ in range(500):  # it settles: the feet slide, which the estimate takes for walking
+@pytest.mark.parametrize("seed", range(3))
+def test_a_lying_robot_does_not_drift_away(seed: int) -> None:
+    plant = BlindPlant(seed)
+    start = plant.truth.read().q[:2]
+    for _ in range(1000):
         plant.write(JointCommand.damping(3.0))
-    settled = plant.read().q[:2] - plant.truth.read().q[:2]
-    for _ in range(500):
-        plant.write(JointCommand.damping(3.0))
-    drift = plant.read().q[:2] - plant.truth.read().q[:2] - settled
-    assert np.linalg.norm(settled) < 0.08
-    assert np.linalg.norm(drift) < 0.02
+    drift = plant.read().q[:2] - (plant.truth.read().q[:2] - start)
+    assert np.linalg.norm(drift) < LYING_DRIFT
     assert np.abs(plant.read().v[:3]).max() < 0.05
     plant.close()
 
@@ -137,6 +136,7 @@ def test_it_begins_above_the_lowest_foot_and_stays_there() -> None:
     model = RobotModel()
     estimator = StateEstimator(model)
     states = [estimator.update(reading(0.002 * tick)) for tick in range(200)]
+    assert states[0].q[:2] == pytest.approx([0.0, 0.0], abs=1e-9)
     _, p_feet = model.forward_kinematics(states[-1].q)
     assert p_feet[:, 2] == pytest.approx(model.foot_radius, abs=1e-3)
     assert np.abs(states[-1].v).max() < 1e-6

@@ -36,6 +36,8 @@ FAREWELL, FAREWELL_PERIOD = 0.2, 0.005
 """Time [s] for which damping is sent at the end, and between two of these commands."""
 WATCH: Final = 0.02
 """Time [s] between two looks whether the controller still sends commands."""
+STEP_LIMIT, STEP_SILENCE = 0.1, 0.02
+"""Time [s] in which the plant falls into step with the robot, and silence [s] that ends it."""
 SWITCH_INTERVAL: Final = 0.0005
 """Time [s] for which another thread may keep Python to itself, so that the loop keeps its pace."""
 CONSENT: Final = (
@@ -116,8 +118,8 @@ class UnitreePlant(Plant):
         at_the_end(self.close)
         self._watchdog = threading.Thread(target=self._watch, name="unitree-watchdog", daemon=True)
         self._watchdog.start()
-        self._catch_up()
         self._send(JointCommand.damping(DAMPING))
+        self._fall_into_step()
 
     @property
     def control_period(self) -> float:
@@ -219,10 +221,15 @@ class UnitreePlant(Plant):
                 raise self._stop(PlantTimeout(reason))
             self._states.wait(self._config.stale_limit - silence + 0.001)
 
-    def _catch_up(self) -> None:
-        """Take the newest state, after something that took long."""
+    def _fall_into_step(self) -> None:
+        """Take in what came before the first command was heard: from then on a write is a period.
+
+        A simulator in lockstep is silent then. What lives by the clock never is.
+        """
+        end = time.monotonic() + STEP_LIMIT
+        while time.monotonic() < end and self._states.wait(STEP_SILENCE):
+            self._state = self._take() or self._state
         self._heard = time.monotonic()
-        self._wait_for_state()
 
     def _take(self) -> RobotState | None:
         """The state after all samples that have come, or None if there is no new one."""

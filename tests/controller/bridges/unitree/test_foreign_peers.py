@@ -6,7 +6,9 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -30,6 +32,8 @@ PATIENT = 5.0
 GRAVITY = pytest.approx(9.8, abs=0.5)
 # rad; joint servos of 60 N m/rad sag by about 0.12 under the robot's weight.
 SAG = 0.2
+# What own_low_level.py commands, in Unitree's order of joints.
+ANGLES = [0.4, 0.5, 0.6, 0.1, 0.2, 0.3, 1.0, 1.1, 1.2, 0.7, 0.8, 0.9]
 # Loopback with multicast, which CycloneDDS 0.10 needs, in a network of our own.
 NETWORK = "ip link set lo up && ip link set lo multicast on && ip route add 224.0.0.0/4 dev lo"
 
@@ -40,8 +44,7 @@ def test_the_stock_sport_client_moves_the_robot() -> None:
         peer = [python, str(PEERS / "stock_sport.py"), str(domain), str(PATIENT)]
         with Process(peer) as process:
             text = process.finish(LIMIT)
-    said = [json.loads(line) for line in text.splitlines() if line.startswith("{")]
-    by_call = {answer["call"]: answer for answer in said}
+    by_call = {answer["call"]: answer for answer in json_lines(text)}
     codes = {name: answer["code"] for name, answer in by_call.items()}
     assert codes.pop("FrontFlip", None) == Code.NOT_SUPPORTED, text
     assert len(codes) == 7, text
@@ -59,22 +62,57 @@ def test_the_stock_sport_client_moves_the_robot() -> None:
 
 def test_the_cpp_sdk_reads_our_state_and_stands_the_robot_up() -> None:
     python = peer_python(CPP_SDK)
-    if not has_own_network():
-        absent("needs the right to make a network namespace (unshare -n)")
     peer = f"{python} {PEERS / 'cpp_stand.py'} lo"
     script = f"{' '.join(PROGRAM)} unitree-sim --domain 0 & sim=$!; sleep 8; {peer}; "
-    script += "code=$?; kill -TERM $sim; wait $sim; exit $code"
-    with Process(["unshare", "-n", "sh", "-c", f"{NETWORK}; {script}"]) as process:
-        text = process.finish(LIMIT)
-        code = process.code
+    code, text = in_own_network(f"{script} code=$?; kill -TERM $sim; wait $sim; exit $code")
     assert code == 0, text
-    line = next(line for line in text.splitlines() if line.startswith("{"))
-    said = json.loads(line)
+    (said,) = json_lines(text)
     assert said["accelerometer"] == GRAVITY
     assert said["start"][1] > 1.0  # a folded thigh: the front right one, first in Unitree's order
     assert said["error"] < SAG
     assert good_commands(text) > 0.9 * said["sent"]
     assert "refused: none" in text
+    assert "CRC Error" not in text
+
+
+def cpp_checks(mask: int) -> tuple[dict[str, Any], str]:
+    """The C++ SDK plays the robot to our low level; what both say. ``mask`` breaks checksums."""
+    robot = f"{peer_python(CPP_SDK)} {PEERS / 'cpp_robot.py'} lo 4"
+    own = f"{sys.executable} {PEERS / 'own_low_level.py'} 3 {mask}"
+    code, text = in_own_network(f"{robot} & {own}; code=$?; wait; exit $code")
+    assert code == 0, text
+    said: dict[str, Any] = {}
+    for line in json_lines(text):
+        said |= line
+    return said, text
+
+
+def test_the_cpp_sdk_accepts_our_checksums_and_we_accept_its() -> None:
+    said, text = cpp_checks(mask=0)
+    assert "CRC Error" not in text
+    assert said["q_target"] == pytest.approx(ANGLES)
+    assert said["intact"] > 500
+    assert said["broken"] == 0
+
+
+def test_the_cpp_sdk_refuses_wrong_checksums() -> None:
+    said, text = cpp_checks(mask=1)
+    assert text.count("incoming low_cmd CRC Error") > 500
+    assert text.count("low_state CRC Error") > 500
+    assert said["q_target"] == [0.0] * 12
+
+
+def in_own_network(script: str) -> tuple[int | None, str]:
+    """Exit code and output of a shell script in a network of its own, as a robot's is."""
+    if not has_own_network():
+        absent("needs the right to make a network namespace (unshare -n)")
+    with Process(["unshare", "-n", "sh", "-c", f"{NETWORK}; {script}"]) as process:
+        text = process.finish(LIMIT)
+        return process.code, text
+
+
+def json_lines(text: str) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in text.splitlines() if line.startswith("{")]
 
 
 def has_own_network() -> bool:

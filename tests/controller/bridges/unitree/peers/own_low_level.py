@@ -1,0 +1,51 @@
+"""Our own low level, writing ``rt/lowcmd`` and ``rt/lowstate`` and reading the peer's states.
+
+    python own_low_level.py SECONDS MASK
+
+``MASK`` is XORed into the checksums: 0 leaves them right. Prints one JSON line.
+"""
+
+import json
+import sys
+import time
+
+import numpy as np
+
+from controller.bridges.unitree import idl, layout
+from controller.bridges.unitree.bus import Bus
+from controller.bridges.unitree.checksum import is_intact, seal
+from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.low_client import low_cmd_message
+from go2_wbc.robot.state import JointCommand
+
+PERIOD = 0.002
+ANGLES = np.linspace(0.1, 1.2, 12)
+
+
+def main() -> None:
+    """Write both messages at 500 Hz, count the states that came."""
+    seconds, mask = float(sys.argv[1]), int(sys.argv[2])
+    bus = Bus(0, "lo")
+    reader = bus.reader("rt/lowstate", idl.low_state(), depth=64)
+    commands = bus.writer("rt/lowcmd", idl.low_cmd())
+    states = bus.writer("rt/lowstate", idl.low_state())
+    command_codec, state_codec = codec_of(layout.LOW_CMD), codec_of(layout.LOW_STATE)
+    command = low_cmd_message(JointCommand.servo(ANGLES, np.zeros(12), 20.0, 1.0))
+    state = layout.new_message(layout.LOW_STATE)
+    state["head"], state["foot_force"] = layout.HEAD, 77
+    seal(state)
+    for message in (command, state):
+        message["crc"] ^= mask
+    counts = {"intact": 0, "broken": 0}
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
+        commands.write(command_codec.encode(command))
+        states.write(state_codec.encode(state))
+        for message in map(state_codec.decode, reader.take()):
+            if message["foot_force"][0, 0] != 77:  # the peer's, not our own
+                counts["intact" if is_intact(message) else "broken"] += 1
+        time.sleep(PERIOD)
+    print(json.dumps(counts), flush=True)
+
+
+main()
