@@ -45,7 +45,7 @@ def test_row_names_are_unique() -> None:
 def test_without_the_extra_the_bench_names_the_line_that_installs_it(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setitem(sys.modules, "cyclonedds", None)
+    monkeypatch.setitem(sys.modules, "cyclonedds.core", None)
     assert cli.main(["bench", "bridges", "unitree"]) == ExitCode.RUNTIME
     complaint = capsys.readouterr().err
     assert "pip install 'go2-wbc[unitree]'" in complaint

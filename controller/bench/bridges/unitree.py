@@ -216,6 +216,8 @@ def _true_speeds(observer: Observer, lines: list[str], deadline: float) -> list[
     return [speed for moment, speed in samples if start <= moment <= end]
 
 
-SPORT: Final = Family("unitree-sport", SPORT_ROWS, measure_sport)
-STREAM: Final = Family("unitree-stream", STREAM_ROWS, measure_stream)
-DRIVE: Final = Family("unitree-drive", DRIVE_ROWS, measure_drive)
+FAMILIES: Final = (
+    Family("unitree-sport", SPORT_ROWS, measure_sport),
+    Family("unitree-stream", STREAM_ROWS, measure_stream),
+    Family("unitree-drive", DRIVE_ROWS, measure_drive),
+)

@@ -43,7 +43,8 @@ class Observer:
     """Listens to a domain: what the robot says of itself, which for a simulator is the truth.
 
     Attributes:
-        bus: to write on, for tests.
+        bus: to write on.
+        largest_tilt: of all that was heard [deg].
     """
 
     def __init__(self, domain: int) -> None:
@@ -58,12 +59,14 @@ class Observer:
         self._reader = self.bus.reader("rt/sportmodestate", idl.sport_state(), depth=1000)
         self._decode = codec_of(SPORT_STATE).decode
         self._newest: Shaped[np.ndarray, "1"] | None = None
+        self.largest_tilt = 0.0
 
     def take(self) -> list[Shaped[np.ndarray, "1"]]:
         """All ``rt/sportmodestate`` since the last call, oldest first."""
         messages = [self._decode(data) for data in self._reader.take()]
-        if messages:
-            self._newest = messages[-1]
+        for message in messages:
+            self._newest = message
+            self.largest_tilt = max(self.largest_tilt, float(np.degrees(tilt_of(message))))
         return messages
 
     def now(self) -> Shaped[np.ndarray, "1"]:
@@ -85,7 +88,12 @@ class Observer:
     @property
     def tilt(self) -> float:
         """Largest of roll and pitch [rad]."""
-        return float(np.abs(self.now()["imu_state"]["rpy"][0, :2]).max())
+        return tilt_of(self.now())
+
+    @property
+    def speed(self) -> float:
+        """Horizontal speed [m/s] of the base."""
+        return float(np.linalg.norm(self.now()["velocity"][0, :2]))
 
     @property
     def mode(self) -> int:
@@ -96,3 +104,8 @@ class Observer:
         """Wait until no action runs."""
         time.sleep(0.1)
         return wait_until(lambda: not self.now()["progress"][0], limit)
+
+
+def tilt_of(message: Shaped[np.ndarray, "1"]) -> float:
+    """Larger of roll and pitch [rad] in a ``rt/sportmodestate``."""
+    return float(np.abs(message["imu_state"]["rpy"][0, :2]).max())

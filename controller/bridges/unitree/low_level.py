@@ -140,11 +140,15 @@ class CommandGate:
         """Whether low-level commands have the robot."""
         return self._last is not None
 
-    def choose(self, samples: list[bytes], own: JointCommand) -> JointCommand:
-        """The command of this tick: the newest good one of ``samples``, ``own``, or damping."""
+    def hear(self, samples: list[bytes]) -> bool:
+        """Take in what has come since the last call; whether a good command was among it."""
         newest = self._newest(samples)
         if newest is not None:
             self._offer(newest)
+        return newest is not None
+
+    def choose(self, own: JointCommand) -> JointCommand:
+        """The command of this tick: the newest good one that was heard, ``own``, or damping."""
         if self._last is None:
             return own
         silence = self._clock() - self._heard

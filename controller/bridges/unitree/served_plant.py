@@ -20,10 +20,11 @@ from go2_wbc.robot.state import JointCommand, RobotState
 
 SPORT_STATE_TICKS: Final = 10
 """Control periods between two samples of ``rt/sportmodestate``."""
-COMMAND_QUEUE: Final = 64
-"""Low-level commands that are looked at in one tick; of more, the oldest are lost."""
+COMMAND_QUEUE: Final = 512
+"""Low-level commands that are looked at in one tick; of more, the oldest are lost. Garbage at 5 kHz
+must not push out the good ones while a process is paused for a moment."""
 LOCKSTEP_LIMIT: Final = 1.0
-"""Time [s] for which a simulator in lockstep waits for the next low-level command."""
+"""Time [s] for which a simulator in lockstep waits for the next good low-level command."""
 CATCH_UP: Final = 0.9
 """Share of a control period that passes at least between two ticks under low-level control: a
 simulator that is late must not run ahead of its peer's commands to catch up."""
@@ -81,11 +82,8 @@ class ServedPlant(Plant):
 
     def write(self, command: JointCommand) -> None:
         """Apply ``command``, or what the low-level peer asks instead, and publish the new state."""
-        if self.gate.is_active and self._is_lockstep:
-            self._commands.wait(LOCKSTEP_LIMIT)
-        elif self.gate.is_active:
-            self._keep_apart()
-        self._inner.write(self.gate.choose(self._commands.take(), command))
+        self._hear()
+        self._inner.write(self.gate.choose(command))
         state, imu = self._inner.read(), self._inner.imu()
         self._states.write(self._encode_state(low_state_message(state, imu)))
         if self._ticks % SPORT_STATE_TICKS == 0:
@@ -96,6 +94,17 @@ class ServedPlant(Plant):
     def close(self) -> None:
         """Release everything; idempotent."""
         self._inner.close()
+
+    def _hear(self) -> None:
+        if not self.gate.is_active:
+            self.gate.hear(self._commands.take())
+        elif self._is_lockstep:
+            deadline = time.monotonic() + LOCKSTEP_LIMIT
+            while not self.gate.hear(self._commands.take()) and time.monotonic() < deadline:
+                self._commands.wait(max(0.0, deadline - time.monotonic()))
+        else:
+            self._keep_apart()
+            self.gate.hear(self._commands.take())
 
     def _keep_apart(self) -> None:
         due = self._written + CATCH_UP * self.control_period

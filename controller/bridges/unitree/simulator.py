@@ -13,6 +13,7 @@ from typing import Final, final
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.low_level import CommandGate
+from controller.bridges.unitree.neighbours import require_no_robot
 from controller.bridges.unitree.rpc import LeaseServer, Server
 from controller.bridges.unitree.served_plant import ServedPlant, SportStatus
 from controller.bridges.unitree.sport_api import (
@@ -73,9 +74,11 @@ class UnitreeSimulator:
 
         Raises:
             CommandError: for a domain or interface that does not exist.
+            BridgeError: if there is a robot on the domain already, real or simulated.
         """
         sys.setswitchinterval(SWITCH_INTERVAL)
         config = Config() if settings.config is None else load_config(settings.config)
+        require_no_robot(settings.domain, settings.interface)
         bus = Bus(settings.domain, settings.interface)
         inner = MujocoPlant(
             settings.mjcf,

@@ -53,6 +53,12 @@ def setting(name: str, motor: int, value: float) -> Callable[[np.ndarray], None]
     return change
 
 
+def tick(gate: CommandGate, samples: list[bytes], own: JointCommand) -> JointCommand:
+    """The command of a tick before which these samples have come."""
+    gate.hear(samples)
+    return gate.choose(own)
+
+
 @pytest.fixture
 def clock() -> Clock:
     return Clock()
@@ -65,12 +71,12 @@ def gate(clock: Clock) -> CommandGate:
 
 
 def test_without_commands_the_controller_has_the_robot(gate: CommandGate) -> None:
-    assert gate.choose([], OWN) is OWN
+    assert tick(gate, [], OWN) is OWN
     assert not gate.is_active
 
 
 def test_a_good_command_reaches_the_right_motor(gate: CommandGate) -> None:
-    command = gate.choose([sample()], OWN)
+    command = tick(gate, [sample()], OWN)
     thigh = 3 * Leg.FR + 1
     assert command.kp[thigh] == 30.0
     assert command.q_des[thigh] == pytest.approx(0.8)
@@ -80,7 +86,7 @@ def test_a_good_command_reaches_the_right_motor(gate: CommandGate) -> None:
 
 
 def test_a_motor_that_is_switched_off_gets_nothing(gate: CommandGate) -> None:
-    command = gate.choose([sample(setting("mode", 1, 0))], OWN)
+    command = tick(gate, [sample(setting("mode", 1, 0))], OWN)
     thigh = 3 * Leg.FR + 1
     assert command.kp[thigh] == command.kd[thigh] == command.tau[thigh] == 0.0
 
@@ -102,55 +108,55 @@ def test_a_motor_that_is_switched_off_gets_nothing(gate: CommandGate) -> None:
 def test_garbage_is_refused_and_counted(
     gate: CommandGate, reason: str, name: str, motor: int, value: float
 ) -> None:
-    assert gate.choose([sample(setting(name, motor, value))], OWN) is OWN
+    assert tick(gate, [sample(setting(name, motor, value))], OWN) is OWN
     assert gate.refused == {reason: 1}
     assert gate.accepted == 0
 
 
 def test_a_wrong_checksum_and_cut_off_bytes_are_refused(gate: CommandGate) -> None:
     broken = sample(setting("q", 1, 0.9), sealed=False)
-    assert gate.choose([broken, b"rubbish"], OWN) is OWN
+    assert tick(gate, [broken, b"rubbish"], OWN) is OWN
     assert gate.refused["wrong checksum"] == 1
     assert sum(gate.refused.values()) == 2
 
 
 def test_among_garbage_the_newest_good_command_counts(gate: CommandGate) -> None:
     bad = sample(setting("tau", 1, np.nan))
-    command = gate.choose([sample(setting("tau", 1, 1.0)), sample(), bad, bad], OWN)
+    command = tick(gate, [sample(setting("tau", 1, 1.0)), sample(), bad, bad], OWN)
     assert command.tau.max() == 4.0
 
 
 def test_silence_damps_and_later_gives_the_robot_back(gate: CommandGate, clock: Clock) -> None:
-    gate.choose([sample()], OWN)
+    tick(gate, [sample()], OWN)
     clock.now = SILENCE - TICK
-    assert not is_limp(gate.choose([], OWN))
+    assert not is_limp(tick(gate, [], OWN))
     clock.now = SILENCE + TICK
-    assert is_limp(gate.choose([], OWN))
+    assert is_limp(tick(gate, [], OWN))
     clock.now = RELEASE + TICK
-    assert is_limp(gate.choose([], OWN))
-    assert gate.choose([], OWN) is OWN
+    assert is_limp(tick(gate, [], OWN))
+    assert tick(gate, [], OWN) is OWN
     assert not gate.is_active
 
 
 def test_garbage_is_as_good_as_silence(gate: CommandGate, clock: Clock) -> None:
-    gate.choose([sample()], OWN)
+    tick(gate, [sample()], OWN)
     clock.now = SILENCE + TICK
-    assert is_limp(gate.choose([sample(setting("kp", 1, np.nan))], OWN))
+    assert is_limp(tick(gate, [sample(setting("kp", 1, np.nan))], OWN))
 
 
 def test_commands_go_on_after_a_gap(gate: CommandGate, clock: Clock) -> None:
-    gate.choose([sample()], OWN)
+    tick(gate, [sample()], OWN)
     clock.now = SILENCE + TICK
-    assert gate.choose([], OWN).kd[0] == DAMPING
-    assert gate.choose([sample()], OWN).kp.max() == 30.0
+    assert tick(gate, [], OWN).kd[0] == DAMPING
+    assert tick(gate, [sample()], OWN).kp.max() == 30.0
 
 
 def test_a_closed_gate_lets_nothing_in_but_does_not_cut_off_who_is_inside(
     gate: CommandGate,
 ) -> None:
     gate.is_open = False
-    assert gate.choose([sample()], OWN) is OWN
+    assert tick(gate, [sample()], OWN) is OWN
     gate.is_open = True
-    gate.choose([sample()], OWN)
+    tick(gate, [sample()], OWN)
     gate.is_open = False
-    assert gate.choose([sample()], OWN).kp.max() == 30.0
+    assert tick(gate, [sample()], OWN).kp.max() == 30.0
