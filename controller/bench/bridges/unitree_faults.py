@@ -46,7 +46,6 @@ BAD_MOVES: Final = ('{"x": NaN, "y": 0, "z": 0}', "rubbish", "[1]", '{"x": "fast
 PATIENT: Final = ("--stale-limit", "1.0")
 """A busy machine pauses processes for longer than the 30 ms of the real limit."""
 ENDLESS_TROT: Final = (*PATIENT, "--steps", "stand", "trot", "--seconds", "60")
-DAMPED: Final = JointCommand.damping(3.0)
 MOVER: Final = """
 import sys, time
 from controller.bench.bridges.unitree_faults import MOVE
@@ -61,6 +60,8 @@ while True:
 """
 """A program that asks for ``Move`` until it is killed."""
 _encode = codec_of(LOW_CMD).encode
+DAMPED: Final = _encode(low_cmd_message(JointCommand.damping(3.0)))
+"""A good ``rt/lowcmd``."""
 _domains = itertools.count(os.getpid())
 
 
@@ -171,7 +172,7 @@ def garbage_while_standing() -> float:
         at.stand_up()
         at.flood(garbage(), 3.0)
         at.require_standing()
-        at.flood([_encode(low_cmd_message(DAMPED))], 2.0)
+        at.flood([DAMPED], 2.0)
         at.require_standing()
         reasons = ("tau is not finite", "q out of limits", "wrong checksum", "lie down or Damp")
         at.require_said(*reasons)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from controller.bench.bridges.unitree import drive
+from controller.bench.bridges.unitree_faults import DAMPED, garbage, scene
 from controller.bench.bridges.unitree_processes import simulator
 from controller.bridges.unitree.guards import GuardConfig
 from go2_wbc.errors import CommandError, PlantTimeout
@@ -55,6 +56,17 @@ class TestUnitreePlant(PlantContract):
         plant = UnitreePlant("lo", domain, i_have_the_remote_in_hand=True, guards=PATIENT)
         yield plant
         plant.close()
+
+
+@needs_dds
+@pytest.mark.slow
+def test_in_lockstep_garbage_lets_no_time_pass() -> None:
+    with scene("--lockstep") as at:
+        at.flood([DAMPED], 0.2)
+        at.flood(garbage(), 0.1)  # for what is still on its way
+        assert len(at.observer.take()) > 1
+        at.flood(garbage(), 0.4)
+        assert len(at.observer.take()) <= 1  # one comes in 20 ms of robot time
 
 
 @needs_dds
