@@ -12,6 +12,7 @@ import numpy as np
 
 from controller.bench.bridges.unitree_processes import (
     Observer,
+    client_of,
     driver,
     good_commands,
     simulator,
@@ -64,14 +65,10 @@ DRIVE_ROWS: Final = (
 
 def measure_sport(trial: Trial) -> Measurement:
     """The script of a SportClient: up, balance, move, stop, hello, Euler, down."""
-    from controller.bridges.unitree.rpc import Client
-
     domain = domain_of(trial)
     with simulator(domain):
         observer = Observer(domain)
-        client = Client(observer.bus, SPORT_SERVICE)
-        if not client.wait_for_server(10.0):
-            return Measurement({}, reason="the sport service was not found")
+        client = client_of(observer.bus, SPORT_SERVICE)
         codes = [_act(client, observer, Api.STAND_UP), _act(client, observer, Api.BALANCE_STAND)]
         speed = _move(client, observer)
         codes.append(_act(client, observer, Api.STOP_MOVE))

@@ -16,7 +16,7 @@ import numpy as np
 
 from controller.bench.bridges.faults import Fault, require, rows_of, run_all
 from controller.bench.bridges.processes import PROGRAM, Process, wait_until
-from controller.bench.bridges.unitree_processes import Observer, driver, simulator
+from controller.bench.bridges.unitree_processes import Observer, client_of, driver, simulator
 from controller.bench.rows import Family, Measurement
 from controller.bench.trials import Trial
 from controller.bridges.unitree.codec import codec_of
@@ -79,13 +79,11 @@ class Scene:
     def __init__(self, process: Process, domain: int) -> None:
         """Join the domain of a simulator that serves."""
         from controller.bridges.unitree import idl
-        from controller.bridges.unitree.rpc import Client
 
         self.process, self.domain = process, domain
         self.observer = Observer(domain)
-        self.client = Client(self.observer.bus, SPORT_SERVICE)
+        self.client = client_of(self.observer.bus, SPORT_SERVICE)
         self._commands = self.observer.bus.writer("rt/lowcmd", idl.low_cmd())
-        require(self.client.wait_for_server(LIMIT), "the sport service was not found")
 
     def call(self, api: int, parameter: str = "{}") -> int:
         """The code that a call of the sport service is answered with."""
@@ -100,10 +98,7 @@ class Scene:
 
     def take_back(self) -> None:
         """Give the robot back to the sport service after low-level control."""
-        from controller.bridges.unitree.rpc import Client
-
-        switcher = Client(self.observer.bus, SWITCHER_SERVICE)
-        require(switcher.wait_for_server(LIMIT), "the motion switcher was not found")
+        switcher = client_of(self.observer.bus, SWITCHER_SERVICE)
         code = switcher.call(SwitcherApi.SELECT_MODE, '{"name": "normal"}').code
         require(code == Code.OK, f"SelectMode was answered {code}")
         self.require_said("low-level control has ended")

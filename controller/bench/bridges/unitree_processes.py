@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import re
 import time
-from typing import Final, final
+from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 from jaxtyping import Shaped
 
-from controller.bench.bridges.processes import PROGRAM, Process, program, wait_until
+from controller.bench.bridges.processes import (
+    PROGRAM,
+    START_LIMIT,
+    Process,
+    program,
+    wait_until,
+)
 from controller.bridges.unitree.extra import require_dds
-from go2_wbc.errors import PlantTimeout
+from controller.bridges.unitree.sport_api import Api, Code
+from go2_wbc.errors import BridgeError, PlantTimeout
+
+if TYPE_CHECKING:
+    from controller.bridges.unitree.bus import Bus
+    from controller.bridges.unitree.rpc import Client
 
 LOOPBACK: Final = "lo"
 
@@ -36,6 +47,20 @@ def good_commands(text: str) -> int:
     """How many low-level commands a simulator that has ended says were good."""
     found = re.search(r"low-level commands: (\d+) good", text)
     return int(found[1]) if found else 0
+
+
+def client_of(bus: Bus, service: str) -> Client:
+    """A client of ``service`` that has got an answer from it.
+
+    Raises:
+        BridgeError: if it gets none.
+    """
+    from controller.bridges.unitree.rpc import Client
+
+    client = Client(bus, service)
+    if not client.wait_for_server(START_LIMIT) or client.ask(Api.VERSION).code != Code.OK:
+        raise BridgeError(f"the service {service} does not answer")
+    return client
 
 
 @final

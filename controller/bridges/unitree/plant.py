@@ -36,8 +36,9 @@ FAREWELL, FAREWELL_PERIOD = 0.2, 0.005
 """Time [s] for which damping is sent at the end, and between two of these commands."""
 WATCH: Final = 0.02
 """Time [s] between two looks whether the controller still sends commands."""
-STEP_LIMIT, STEP_SILENCE = 0.1, 0.02
-"""Time [s] in which the plant falls into step with the robot, and silence [s] that ends it."""
+STEP_TRIES, STEP_LIMIT, STEP_SILENCE = 5, 0.1, 0.02
+"""How often, and how long each time [s], the plant tries to fall into step with the robot, and the
+silence [s] that shows that it has."""
 SWITCH_INTERVAL: Final = 0.0005
 """Time [s] for which another thread may keep Python to itself, so that the loop keeps its pace."""
 CONSENT: Final = (
@@ -118,7 +119,6 @@ class UnitreePlant(Plant):
         at_the_end(self.close)
         self._watchdog = threading.Thread(target=self._watch, name="unitree-watchdog", daemon=True)
         self._watchdog.start()
-        self._send(JointCommand.damping(DAMPING))
         self._fall_into_step()
 
     @property
@@ -222,14 +222,23 @@ class UnitreePlant(Plant):
             self._states.wait(self._config.stale_limit - silence + 0.001)
 
     def _fall_into_step(self) -> None:
-        """Take in what came before the first command was heard: from then on a write is a period.
+        """Take in what came before a command was heard: from then on a write is a period.
 
-        A simulator in lockstep is silent then. What lives by the clock never is.
+        A simulator in lockstep falls silent once it obeys. What lives by the clock never does.
         """
-        end = time.monotonic() + STEP_LIMIT
-        while time.monotonic() < end and self._states.wait(STEP_SILENCE):
-            self._state = self._take() or self._state
+        for _ in range(STEP_TRIES):
+            self._send(JointCommand.damping(DAMPING))
+            if self._hears_silence(STEP_LIMIT):
+                break
         self._heard = time.monotonic()
+
+    def _hears_silence(self, limit: float) -> bool:
+        end = time.monotonic() + limit
+        while time.monotonic() < end:
+            if not self._states.wait(STEP_SILENCE):
+                return True
+            self._state = self._take() or self._state
+        return False
 
     def _take(self) -> RobotState | None:
         """The state after all samples that have come, or None if there is no new one."""

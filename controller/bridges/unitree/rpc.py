@@ -29,6 +29,8 @@ PATROL: Final = 0.02
 """Time [s] after which a server without requests looks after what is pending."""
 QUEUE: Final = 64
 """Requests that are kept for a server that is busy; of more, the oldest are lost."""
+TRIES: Final = 3
+"""How often a question is asked before silence is taken for an answer."""
 LEASE_TERM: Final = 1.0
 """Time [s] for which a lease holds without renewal."""
 
@@ -167,6 +169,14 @@ class Client:
                 if response.id == request.id:
                     return response
         return Response(request.id, api_id, Code.API_TIMEOUT)
+
+    def ask(self, api_id: int, parameter: str = "{}") -> Response:
+        """Call what may be repeated: an answer gets lost until the server has discovered us."""
+        response = self.call(api_id, parameter)
+        for _ in range(TRIES - 1):
+            if response.code == Code.API_TIMEOUT:
+                response = self.call(api_id, parameter)
+        return response
 
     def send(self, api_id: int, parameter: str = "{}") -> None:
         """Call without an answer."""

@@ -18,8 +18,6 @@ DISCOVERY: Final = 1.0
 """Time [s] in which the service must be found."""
 RELEASE_LIMIT: Final = 5.0
 """Time [s] in which it must let go."""
-TRIES: Final = 3
-"""How often a question is asked before silence is taken for an answer."""
 PAUSE: Final = 0.2
 """Time [s] between two requests."""
 
@@ -45,10 +43,7 @@ def release_sport(bus: Bus) -> None:
 
 
 def _active_service(client: Client) -> str:
-    response = client.call(SwitcherApi.CHECK_MODE)
-    for _ in range(TRIES - 1):  # an answer gets lost as long as the service has not discovered us
-        if response.code == Code.API_TIMEOUT:
-            response = client.call(SwitcherApi.CHECK_MODE)
+    response = client.ask(SwitcherApi.CHECK_MODE)
     if response.code != Code.OK:
         raise PlantError(f"the motion switcher answered {response.code} to CheckMode")
     try:
