@@ -40,7 +40,7 @@ test-unitree: $(VENV)/.stamp-unitree ## the tests of Unitree's protocol, with it
 	GO2_WBC_REQUIRE_UNITREE=1 \
 	GO2_WBC_STOCK_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/stock/bin/python \
 	GO2_WBC_CPP_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/cpp/bin/python \
-	$(BIN)/python -m pytest tests/controller/bridges/unitree tests/robot/test_estimator.py $(ARGS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal tests/controller/bridges/unitree $(ARGS)
 
 gates: $(VENV)/.stamp-dev ## lint, formatting and types
 	$(BIN)/ruff check .

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Final
@@ -15,6 +14,7 @@ from controller.bench.bridges.unitree_processes import (
     client_of,
     driver,
     good_commands,
+    own_domain,
     simulator,
 )
 from controller.bench.rows import Direction, Family, Measurement, Row
@@ -29,8 +29,6 @@ from go2_wbc.robot.state import JointCommand
 if TYPE_CHECKING:
     from controller.bridges.unitree.rpc import Client
 
-DOMAINS: Final = range(100, 200)
-"""DDS domains of which each measurement takes one, by seed and process."""
 SPEED: Final = 0.5
 """Of ``Move`` and of the trot [m/s]."""
 MOVE_TIME, MOVE_PERIOD = 3.0, 0.05
@@ -63,10 +61,9 @@ DRIVE_ROWS: Final = (
 )
 
 
-def measure_sport(trial: Trial) -> Measurement:
+def measure_sport(_trial: Trial) -> Measurement:
     """The script of a SportClient: up, balance, move, stop, hello, Euler, down."""
-    domain = domain_of(trial)
-    with simulator(domain):
+    with own_domain() as domain, simulator(domain):
         observer = Observer(domain)
         client = client_of(observer.bus, SPORT_SERVICE)
         codes = [_act(client, observer, Api.STAND_UP), _act(client, observer, Api.BALANCE_STAND)]
@@ -86,11 +83,6 @@ def measure_sport(trial: Trial) -> Measurement:
             "unitree.latency_p99": float(np.percentile(trips, 99)),
         }
     )
-
-
-def domain_of(trial: Trial) -> int:
-    """A DDS domain that no other trial at the same time is likely to use."""
-    return DOMAINS[(os.getpid() + 7 * trial.seed) % len(DOMAINS)]
 
 
 def _act(
@@ -125,12 +117,11 @@ def _round_trips(client: Client) -> list[float]:
     return times
 
 
-def measure_stream(trial: Trial) -> Measurement:
+def measure_stream(_trial: Trial) -> Measurement:
     """Answer every ``rt/lowstate`` with a damping command for ten seconds."""
     from controller.bridges.unitree import idl
 
-    domain = domain_of(trial)
-    with simulator(domain) as process:
+    with own_domain() as domain, simulator(domain) as process:
         bus = Observer(domain).bus
         states = bus.reader("rt/lowstate", idl.low_state(), depth=64)
         commands = bus.writer("rt/lowcmd", idl.low_cmd())
@@ -173,14 +164,14 @@ def codec_time() -> float:
     return 1e6 * (time.process_time() - start) / CODINGS
 
 
-def measure_drive(trial: Trial) -> Measurement:
+def measure_drive(_trial: Trial) -> Measurement:
     """Our controller in one process drives the simulator in another through ``UnitreePlant``."""
-    return drive(domain_of(trial), [], [])
+    return drive([], [])
 
 
-def drive(domain: int, simulator_options: list[str], driver_options: list[str]) -> Measurement:
+def drive(simulator_options: list[str], driver_options: list[str]) -> Measurement:
     """Stand, trot, high five, lie down; the speed is the simulator's truth."""
-    with simulator(domain, *simulator_options) as process:
+    with own_domain() as domain, simulator(domain, *simulator_options) as process:
         observer = Observer(domain)
         with driver(domain, *driver_options) as peer:
             speeds = _true_speeds(observer, peer.lines, time.monotonic() + DRIVE_LIMIT)

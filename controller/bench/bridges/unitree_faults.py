@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import json
-import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -16,7 +14,13 @@ import numpy as np
 
 from controller.bench.bridges.faults import Fault, require, rows_of, run_all
 from controller.bench.bridges.processes import PROGRAM, Process, wait_until
-from controller.bench.bridges.unitree_processes import Observer, client_of, driver, simulator
+from controller.bench.bridges.unitree_processes import (
+    Observer,
+    client_of,
+    driver,
+    own_domain,
+    simulator,
+)
 from controller.bench.rows import Family, Measurement
 from controller.bench.trials import Trial
 from controller.bridges.unitree.codec import codec_of
@@ -62,7 +66,6 @@ while True:
 _encode = codec_of(LOW_CMD).encode
 DAMPED: Final = _encode(low_cmd_message(JointCommand.damping(3.0)))
 """A good ``rt/lowcmd``."""
-_domains = itertools.count(os.getpid())
 
 
 @final
@@ -144,8 +147,7 @@ def flood(write: Callable[[int], None], seconds: float) -> None:
 @contextmanager
 def scene(*options: str) -> Iterator[Scene]:
     """A simulator with these options, and what is needed to watch it."""
-    domain = 110 + next(_domains) % 100
-    with simulator(domain, *options) as process:
+    with own_domain() as domain, simulator(domain, *options) as process:
         yield Scene(process, domain)
 
 

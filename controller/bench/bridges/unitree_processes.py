@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+import os
 import re
+import socket
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
@@ -25,6 +30,30 @@ if TYPE_CHECKING:
     from controller.bridges.unitree.rpc import Client
 
 LOOPBACK: Final = "lo"
+DOMAINS: Final = range(100, 230)
+"""DDS domains of which each scene takes one."""
+_CLAIM_PORT: Final = 27000
+"""TCP port on the loopback that stands for domain 0: who has bound it has the domain."""
+_tries = itertools.count(os.getpid())
+
+
+@contextmanager
+def own_domain() -> Iterator[int]:
+    """A DDS domain that nobody else who asks here, on this machine, has meanwhile.
+
+    Raises:
+        BridgeError: if there is none left.
+    """
+    for _ in DOMAINS:
+        domain = DOMAINS[next(_tries) % len(DOMAINS)]
+        with socket.socket() as claim:
+            try:
+                claim.bind(("127.0.0.1", _CLAIM_PORT + domain))
+            except OSError:
+                continue
+            yield domain
+            return
+    raise BridgeError("no DDS domain is left")
 
 
 def simulator(domain: int, *options: str) -> Process:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import itertools
 import os
 from pathlib import Path
 from typing import NoReturn
@@ -19,12 +18,6 @@ needs_dds = pytest.mark.skipif(
 )
 STOCK_SDK = "GO2_WBC_STOCK_SDK_PYTHON"
 CPP_SDK = "GO2_WBC_CPP_SDK_PYTHON"
-_numbers = itertools.count(os.getpid())
-
-
-def free_domain() -> int:
-    """A DDS domain that no other test is likely to use."""
-    return 110 + next(_numbers) % 100
 
 
 def peer_python(variable: str) -> str:

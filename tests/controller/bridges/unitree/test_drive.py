@@ -10,11 +10,11 @@ import pytest
 
 from controller.bench.bridges.unitree import drive
 from controller.bench.bridges.unitree_faults import DAMPED, garbage, scene
-from controller.bench.bridges.unitree_processes import simulator
+from controller.bench.bridges.unitree_processes import own_domain, simulator
 from controller.bridges.unitree.guards import GuardConfig
 from go2_wbc.errors import CommandError, PlantTimeout
 from go2_wbc.plant.base import Plant
-from tests.controller.bridges.unitree.support import free_domain, needs_dds
+from tests.controller.bridges.unitree.support import needs_dds
 from tests.plant.contract import PlantContract
 
 MAE_BAR = 0.04  # m/s
@@ -34,15 +34,14 @@ def test_encoding_and_decoding_take_little_cpu() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("sensors", ["ideal", "noisy"])
 def test_it_stands_trots_and_gives_a_high_five(sensors: str) -> None:
-    result = drive(free_domain(), ["--lockstep", "--sensors", sensors], ["--stale-limit", "2.0"])
+    result = drive(["--lockstep", "--sensors", sensors], ["--stale-limit", "2.0"])
     assert result.values.get("unitree.steps") == 0.0, result
     assert result.values["unitree.mae"] < MAE_BAR
 
 
 @pytest.fixture(scope="module")
 def domain() -> Iterator[int]:
-    domain = free_domain()
-    with simulator(domain, "--lockstep"):
+    with own_domain() as domain, simulator(domain, "--lockstep"):
         yield domain
 
 

@@ -13,13 +13,12 @@ from typing import Any
 import pytest
 
 from controller.bench.bridges.processes import PROGRAM, Process
-from controller.bench.bridges.unitree_processes import good_commands, simulator
+from controller.bench.bridges.unitree_processes import good_commands, own_domain, simulator
 from controller.bridges.unitree.sport_api import Code, SportMode
 from tests.controller.bridges.unitree.support import (
     CPP_SDK,
     STOCK_SDK,
     absent,
-    free_domain,
     needs_dds,
     peer_python,
 )
@@ -39,8 +38,8 @@ NETWORK = "ip link set lo up && ip link set lo multicast on && ip route add 224.
 
 
 def test_the_stock_sport_client_moves_the_robot() -> None:
-    python, domain = peer_python(STOCK_SDK), free_domain()
-    with simulator(domain):
+    python = peer_python(STOCK_SDK)
+    with own_domain() as domain, simulator(domain):
         peer = [python, str(PEERS / "stock_sport.py"), str(domain), str(PATIENT)]
         with Process(peer) as process:
             text = process.finish(LIMIT)
