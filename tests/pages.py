@@ -23,7 +23,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = tuple(f"docs/{name}.md" for name in ("tutorial", "motions", "feasibility", "gallery"))
-PAGES = ("README.md", "CONTRIBUTING.md", *DOCS)
+BRIDGES = tuple(f"docs/{name}.md" for name in ("ros2", "unitree", "real_robot"))
+PAGES = ("README.md", "CONTRIBUTING.md", *DOCS, *BRIDGES)
 FENCE = re.compile(r"^(?:<!-- ([^>]*) -->\n)?```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 NOT_RUN = "# not run by the tests"
 # Numbers of a feasibility table repeat to the last digit on one machine; elsewhere the QP and the

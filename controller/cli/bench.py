@@ -145,9 +145,13 @@ def _run_bridges(args: argparse.Namespace) -> int:
     from controller.bench.bridges import find_doors
     from controller.bench.report import render, summarise
 
+    doors = find_doors(args.names)
+    if args.list:
+        _print_list(tuple(family for door in doors for family in door.families))
+        return ExitCode.OK
     families: list[Family] = []
     missing: list[MissingDependency] = []
-    for door in find_doors(args.names):
+    for door in doors:
         try:
             door.require()
             families += door.families
@@ -156,9 +160,6 @@ def _run_bridges(args: argparse.Namespace) -> int:
             print(f"{door.name} is not measured: {error}", file=sys.stderr)
     if missing and (args.names or not families):
         raise missing[0]
-    if args.list:
-        _print_list(tuple(families))
-        return ExitCode.OK
     target = _checked_target(args)
     report = summarise(families, _measure(tuple(families), args.runs, 1))
     _publish(report.as_dict(), render(report), args, target)

@@ -37,6 +37,17 @@ def test_an_unknown_name_is_answered_with_the_valid_ones() -> None:
         find_doors(["ros3"])
 
 
+def test_the_rows_are_listed_without_the_extras(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "cyclonedds.core", None)
+    monkeypatch.setitem(sys.modules, "rclpy", None)
+    assert cli.main(["bench", "bridges", "--list"]) == ExitCode.OK
+    lines = capsys.readouterr().out.splitlines()
+    assert {family.name for family in FAMILIES} <= set(lines)
+    assert max(map(len, lines)) <= 80
+
+
 def test_row_names_are_unique() -> None:
     names = [row.name for family in FAMILIES for row in family.rows]
     assert len(names) == len(set(names))
