@@ -12,13 +12,15 @@ from typing import Any
 import pytest
 
 from controller.bench.bridges.processes import Process, wait_until
-from controller.bench.bridges.ros2_processes import DISCOVERY, Probe, serving, without
+from controller.bench.bridges.ros2_processes import DISCOVERY, Place, Probe, serving, without
 from tests.controller.bridges.ros2_graph import needs_ros2
 
 pytestmark = needs_ros2
 
 SPEED_TOLERANCE = 0.02
 """Share of the commanded speed, over several strides."""
+DRIVES = 4
+"""How often a busy machine gets the chance to send commands without a gap of half a second."""
 RATE_TOLERANCE = 0.05
 """Share of a rate: a few messages are on their way when the counting begins and ends."""
 
@@ -56,19 +58,30 @@ def test_a_second_call_during_one_is_refused_at_once(server: Process, probe: Pro
 
 def test_velocities_are_real_ones_and_end_with_silence(server: Process, probe: Probe) -> None:
     assert probe.call("walk").success
-    before = probe.statistics()["cmd_vel"]
-    probe.drive(1.0, 0.3)
-    start = probe.place()
-    probe.drive(5.0, 0.3)
-    end = probe.place()
+    start, end = driven(probe, 5.0, 0.3)
     assert end.speed_from(start) == pytest.approx(0.3, rel=SPEED_TOLERANCE)
+    before = probe.statistics()["cmd_vel"]
     probe.let_pass(1.5)
     resting = probe.place()
     probe.let_pass(0.5)
     assert probe.place().way_from(resting) < 0.005
     after = probe.statistics()["cmd_vel"]
     assert after["silences"] == before["silences"] + 1
-    assert after["followed"] > before["followed"]
+    assert after["followed"] == before["followed"]
+
+
+def driven(
+    probe: Probe, seconds: float, x: float, turn: float = 0.0, *, y: float = 0.0
+) -> tuple[Place, Place]:
+    """Start and end of a drive without a gap; if the machine made one, of another drive."""
+    for left in reversed(range(DRIVES)):
+        probe.drive(1.0, x, turn, y=y)
+        silences, start = probe.statistics()["cmd_vel"]["silences"], probe.place()
+        probe.drive(seconds, x, turn, y=y)
+        end = probe.place()
+        if probe.statistics()["cmd_vel"]["silences"] == silences or not left:
+            return start, end
+    raise AssertionError("no drive")
 
 
 def test_an_order_ends_the_velocity_that_came_before_it(server: Process, probe: Probe) -> None:
@@ -84,16 +97,10 @@ def test_an_order_ends_the_velocity_that_came_before_it(server: Process, probe: 
 
 def test_sideways_and_turning_velocities_are_followed_too(server: Process, probe: Probe) -> None:
     assert probe.call("walk").success
-    probe.drive(1.0, 0.0, 0.5)
-    start = probe.place()
-    probe.drive(3.0, 0.0, 0.5)
-    end = probe.place()
+    start, end = driven(probe, 3.0, 0.0, 0.5)
     turned = math.remainder(end.yaw - start.yaw, math.tau)
     assert turned / (end.time - start.time) == pytest.approx(0.5, rel=0.05)
-    probe.drive(1.0, 0.0, y=0.2)
-    start = probe.place()
-    probe.drive(3.0, 0.0, y=0.2)
-    end = probe.place()
+    start, end = driven(probe, 3.0, 0.0, y=0.2)
     dx, dy = end.xy[0] - start.xy[0], end.xy[1] - start.xy[1]
     aside = -math.sin(start.yaw) * dx + math.cos(start.yaw) * dy
     assert aside / (end.time - start.time) == pytest.approx(0.2, rel=0.1)
