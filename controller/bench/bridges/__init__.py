@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from controller.bench.bridges import ros2, unitree, unitree_faults
+from controller.bench.bridges import ros2, ros2_faults, unitree, unitree_faults
 from controller.bench.rows import Family
 from controller.bridges.unitree.extra import require_dds
 from go2_wbc.errors import CommandError, unknown_name
@@ -27,7 +27,7 @@ class Door:
 
 
 DOORS: tuple[Door, ...] = (
-    Door("ros2", (ros2.FAMILY,), ros2.require),
+    Door("ros2", (ros2.FAMILY, ros2_faults.FAMILY), ros2.require),
     Door("unitree", (*unitree.FAMILIES, unitree_faults.FAMILY), require_dds),
 )
 

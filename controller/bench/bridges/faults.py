@@ -47,7 +47,7 @@ def run_all(faults: Sequence[Fault]) -> Measurement:
     return Measurement(values, failures)
 
 
-def require(is_so: object, why_not: str) -> None:
+def require(is_so: bool, why_not: str) -> None:
     """Raise ``Failed`` with ``why_not`` unless it is so."""
     if not is_so:
         raise Failed(why_not)

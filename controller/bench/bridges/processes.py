@@ -36,12 +36,23 @@ class Process:
     """A child process whose output is collected; killed at the end of the ``with`` block."""
 
     def __init__(
-        self, command: Sequence[str], environment: Mapping[str, str] | None = None
+        self,
+        command: Sequence[str],
+        environment: Mapping[str, str] | None = None,
+        *,
+        has_priority: bool = True,
     ) -> None:
-        """Start ``command``, with real-time priority where that is allowed."""
+        """Start ``command``.
+
+        Args:
+            command: the program and its arguments.
+            environment: its variables; None takes those of this process.
+            has_priority: give it real-time priority, where that is allowed. Not for what never
+                sleeps: it would leave nothing to the others.
+        """
         self.lines: list[str] = []
         self._process = subprocess.Popen(
-            [*realtime_prefix(), *command],
+            [*(realtime_prefix() if has_priority else ()), *command],
             env=environment,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Final
 
-from controller.bench.bridges.processes import Process, program
+from controller.bench.bridges.ros2_processes import serving, stay_on_this_machine
 from controller.bench.rows import Direction, Family, Measurement, Row
 from controller.bench.trials import Trial
 from go2_wbc.errors import MissingDependency
@@ -28,20 +25,6 @@ ROWS: Final = (
 )
 
 
-@contextmanager
-def server(*options: str, namespace: str = NAMESPACE) -> Iterator[Process]:
-    """A ``go2-wbc ros2`` in real time.
-
-    Raises:
-        BridgeError: if it does not start.
-    """
-    arguments = ("ros2", "--realtime", "--namespace", namespace, *options)
-    with program(*arguments, says="serving") as process:
-        yield process
-        if process.code is None:
-            process.stop()
-
-
 def measure(_trial: Trial) -> Measurement:
     """Three hundred calls, twenty seconds of walking and the demo, with one server.
 
@@ -53,7 +36,7 @@ def measure(_trial: Trial) -> Measurement:
     from controller.bridges.ros2.demo import run_steps
     from controller.bridges.ros2.measure import SPEED, metering
 
-    with server(), metering(NAMESPACE) as meter:
+    with serving(namespace=NAMESPACE), metering(NAMESPACE) as meter:
         trips, drive, steps = meter.round_trips(), meter.drive(), run_steps(meter.go2)
     undone = [f"{step.label}: {step.reason}" for step in steps if not step.ok]
     values = {
@@ -80,11 +63,6 @@ def require() -> None:
     missing = imports.missing_interfaces()
     if missing:
         raise MissingDependency(f"{', '.join(missing)} not installed: {imports.BUILD}")
-
-
-def stay_on_this_machine() -> None:
-    """Keep this process and its children on the loopback, unless a range was chosen."""
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 
 FAMILY: Final = Family("ros2-calls", ROWS, measure)

@@ -50,6 +50,7 @@ Context = needed("rclpy.context").Context
 MultiThreadedExecutor = needed("rclpy.executors").MultiThreadedExecutor
 SingleThreadedExecutor = needed("rclpy.executors").SingleThreadedExecutor
 ReentrantCallbackGroup = needed("rclpy.callback_groups").ReentrantCallbackGroup
+LoggingSeverity = needed("rclpy.logging").LoggingSeverity
 QoSProfile = needed("rclpy.qos").QoSProfile
 SignalHandlerOptions = needed("rclpy.signals").SignalHandlerOptions
 

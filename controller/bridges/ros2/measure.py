@@ -79,6 +79,7 @@ class Meter:
         """
         ros.rclpy.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
         self.go2 = GO2ControllerNode(namespace, node_name="go2_meter")
+        self.go2.get_logger().set_level(ros.LoggingSeverity.WARN)
         self._statistics = self.go2.create_client(ros.Trigger, topic(namespace, STATISTICS_SERVICE))
         self._publisher = self.go2.create_publisher(
             ros.Twist, topic(namespace, CMD_VEL), COMMAND_QUEUE

@@ -1,4 +1,8 @@
-"""Other servers in the same graph: two of one namespace would fight for every call."""
+"""Other servers in the same graph: two of one namespace would fight for every call.
+
+Those of this machine are kept away by a ``Claim``; what is found here runs on another one, or has
+been killed a moment ago.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +12,15 @@ import time
 from typing import Any
 
 from controller.bridges.ros2 import imports as ros
+from controller.bridges.ros2.claim import already_served
 from controller.bridges.ros2.names import SERVER_NODE
-from go2_wbc.errors import BridgeError
 
 _log = logging.getLogger(__name__)
 
 DISCOVERY = 1.2
 """Time [s] that other nodes get to be found before the robot is served."""
+LEASE = 6.0
+"""Time [s] after which the graph has forgotten a process that was killed; four, and some."""
 PERIOD = 5.0
 """Time [s] between two looks for a second server, which may have come at the same moment."""
 
@@ -36,7 +42,7 @@ class Neighbours:
         self.have_clock = False
 
     def check(self) -> None:
-        """Give the others time to be found.
+        """Give the others time to be found, and a dead one to be forgotten.
 
         Raises:
             BridgeError: if one of them serves this namespace.
@@ -44,11 +50,11 @@ class Neighbours:
         end = time.monotonic() + DISCOVERY
         while time.monotonic() < end and not self._servers():
             time.sleep(0.05)
-        if self._servers():
-            raise BridgeError(
-                f"{self._namespace} is already served by another process; choose another "
-                "--namespace, or another ROS_DOMAIN_ID"
-            )
+        end = time.monotonic() + LEASE
+        while self._servers():
+            if time.monotonic() > end:
+                raise already_served(self._namespace.removeprefix("/"))
+            time.sleep(0.05)
         self.have_clock = self._node.count_publishers("/clock") > 0
         if self.have_clock:
             _log.warning("another process publishes /clock: this one does not; use --realtime")

@@ -23,6 +23,7 @@ from controller import arguments
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.actions import MotionActions
 from controller.bridges.ros2.behaviors import COMMANDS, order
+from controller.bridges.ros2.claim import Claim
 from controller.bridges.ros2.desk import Answer, Desk
 from controller.bridges.ros2.hooked_plant import HookedPlant
 from controller.bridges.ros2.names import (
@@ -99,6 +100,7 @@ def serve(
         context = ros.Context()
         ros.rclpy.init(args=[], context=context, signal_handler_options=ros.SignalHandlerOptions.NO)
         stack.callback(ros.rclpy.shutdown, context=context)
+        stack.callback(Claim(namespace, context.get_domain_id()).close)
         neighbours = Neighbours(context, namespace)
         stack.callback(neighbours.close)
         neighbours.check()

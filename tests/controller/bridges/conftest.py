@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Callable, Iterator
 
 import pytest
 
-from tests.controller.bridges.ros2_graph import HAS_ROS2, Probe, Server, isolate, serving
+from controller.bench.bridges.processes import Process
+from controller.bench.bridges.ros2_processes import Probe, joined, serving
+from tests.controller.bridges.ros2_graph import HAS_ROS2, isolate
+
+PACED_ATTEMPTS = 3
+"""How often a busy machine gets the chance to keep real time for a demo."""
+Done = subprocess.CompletedProcess[str]
 
 if HAS_ROS2:
     isolate()
@@ -14,19 +21,14 @@ if HAS_ROS2:
 
 @pytest.fixture(scope="module")
 def graph() -> Iterator[None]:
-    import rclpy
-
-    import controller.bridges.ros2.imports  # noqa: F401  (sets the discovery profile)
-
-    rclpy.init()
-    yield
-    rclpy.try_shutdown()
+    with joined():
+        yield
 
 
 @pytest.fixture(scope="module")
-def server(graph: None) -> Iterator[Server]:
+def server(graph: None) -> Iterator[Process]:
     """A robot in real time."""
-    with serving("--realtime") as running:
+    with serving(namespace="robot1") as running:
         yield running
 
 
@@ -38,12 +40,16 @@ def probe(graph: None) -> Iterator[Probe]:
 
 
 @pytest.fixture
-def real_time(server: Server, probe: Probe) -> Callable[[], None]:
-    """Says so if the server could not keep the pace that a test's wall-clock limits count on."""
-    before = probe.statistics()["paces_given_up"]
+def paced(server: Process, probe: Probe) -> Callable[[Callable[[], Done]], Done]:
+    """Runs a program whose limits count on real time, again if the server has lost it."""
 
-    def check() -> None:
-        if probe.statistics()["paces_given_up"] > before:
-            pytest.fail("the server lost real time: the loop is too slow, or the machine too busy")
+    def run(act: Callable[[], Done]) -> Done:
+        for left in reversed(range(PACED_ATTEMPTS)):
+            before = probe.statistics()["paces_given_up"]
+            done = act()
+            has_lost_pace = probe.statistics()["paces_given_up"] > before
+            if done.returncode == 0 or not (has_lost_pace and left):
+                return done
+        raise AssertionError("no attempt")
 
-    return check
+    return run

@@ -13,11 +13,14 @@ from unittest.mock import patch
 
 import pytest
 
+from controller.bench.bridges.processes import Process, wait_until
+from controller.bench.bridges.ros2_processes import Probe
 from go2_wbc.errors import BridgeError, CommandError, ConfigError
-from tests.controller.bridges.ros2_graph import ROOT, Probe, Server, needs_ros2
+from tests.controller.bridges.ros2_graph import ROOT, needs_ros2
 
 pytestmark = needs_ros2
 
+Done = subprocess.CompletedProcess[str]
 CLIENT = "controller.bridges.ros2.client.GO2ControllerNode"
 
 
@@ -33,7 +36,7 @@ def alone(graph: None) -> Iterator[Any]:
 
 
 @pytest.fixture
-def go2(server: Server) -> Iterator[Any]:
+def go2(server: Process) -> Iterator[Any]:
     from controller.bridges.ros2 import GO2ControllerNode
 
     node = GO2ControllerNode()
@@ -58,10 +61,9 @@ def test_move_is_published_at_once_and_repeated_until_stop(alone: Any) -> None:
     with patch.object(alone, "_cmd_vel_pub") as publisher:
         alone.move(linear_x=0.2, angular_z=-0.5, linear_y=0.1)
         publisher.publish.assert_called_once()
-        time.sleep(0.3)
+        assert wait_until(lambda: publisher.publish.call_count >= 3, 10.0)
         sent = publisher.publish.call_args.args[0]
         assert (sent.linear.x, sent.linear.y, sent.angular.z) == (0.2, 0.1, -0.5)
-        assert publisher.publish.call_count >= 3
         alone.stop()
         count = publisher.publish.call_count
         sent = publisher.publish.call_args.args[0]
@@ -99,18 +101,21 @@ def test_without_init_the_client_says_what_to_call_first() -> None:
 # --- against a server ---------------------------------------------------------------------------
 
 
-def test_the_demo_runs_over_ros_and_its_figures_come_from_odometry(
-    real_time: Callable[[], None],
-) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "controller.cli.main", "demo", "--ros2", "--json"],
+def demo(*options: str) -> Done:
+    return subprocess.run(
+        [sys.executable, "-m", "controller.cli.main", "demo", "--ros2", *options],
         cwd=ROOT,
         capture_output=True,
         text=True,
         timeout=180.0,
         check=False,
     )
-    real_time()
+
+
+def test_the_demo_runs_over_ros_and_its_figures_come_from_odometry(
+    paced: Callable[[Callable[[], Done]], Done],
+) -> None:
+    done = paced(lambda: demo("--json"))
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout[done.stdout.index("{") :])
     assert report["ok"] is True
@@ -120,14 +125,7 @@ def test_the_demo_runs_over_ros_and_its_figures_come_from_odometry(
 
 
 def test_a_demo_without_a_server_ends_with_the_line_that_starts_one() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "controller.cli.main", "demo", "--ros2", "--namespace", "ghost"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=60.0,
-        check=False,
-    )
+    done = demo("--namespace", "ghost")
     assert done.returncode == 3
     assert "go2-wbc ros2 --namespace ghost" in done.stderr
     assert "Traceback" not in done.stderr
@@ -157,25 +155,22 @@ def test_a_motion_tells_its_progress_and_can_be_cancelled(go2: Any) -> None:
     assert go2.state().q[2] > 0.27
 
 
-def test_a_class_from_the_course_runs_unmodified(
-    probe: Probe, real_time: Callable[[], None]
-) -> None:
+def test_a_class_from_the_course_runs_unmodified(server: Process, probe: Probe) -> None:
     from tests.controller.bridges.student import StudentController
 
     student = StudentController()
     try:
-        done, heights = [student.stand()], [probe.pose()[2]]
+        done, heights = [student.stand()], [probe.height()]
         done.append(student.sit())
-        heights.append(probe.pose()[2])
+        heights.append(probe.height())
         done.append(student.walk())
-        before = probe.pose()
+        before = probe.place()
         student.move(linear_x=0.2)
-        time.sleep(2.0)
+        probe.let_pass(1.5)
         student.stop()
-        time.sleep(1.0)
-        way = math.dist(probe.pose()[:2], before[:2])
+        probe.let_pass(0.5)
+        way = probe.place().way_from(before)
         done.append(student.sit())
-        real_time()
         assert done == [True] * 4
         assert heights == pytest.approx([0.31, 0.235], abs=0.02)
         # It publishes once, and a robot that hears nothing stops after half a second.

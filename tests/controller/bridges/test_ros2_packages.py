@@ -7,11 +7,12 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from tests.controller.bridges.ros2_graph import IS_REQUIRED, ROOT, Server, needs_ros2
+from tests.controller.bridges.ros2_graph import IS_REQUIRED, ROOT, needs_ros2
 
 HAS_COLCON = importlib.util.find_spec("colcon_core") is not None
 pytestmark = [
@@ -21,10 +22,11 @@ pytestmark = [
     ),
 ]
 
+Done = subprocess.CompletedProcess[str]
 PACKAGE = "go2_high_five"
 
 
-def run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+def run(command: list[str], folder: Path) -> Done:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     return subprocess.run(
         command,
@@ -68,7 +70,10 @@ def test_the_tests_that_patch_two_methods_pass_without_a_robot(workspace: Path) 
     assert "5 passed" in done.stdout
 
 
-def test_the_installed_executable_runs_the_demo(workspace: Path, server: Server) -> None:
-    done = run(sourced(f"install/{PACKAGE}/lib/{PACKAGE}/high_five_demo"), workspace)
+def test_the_installed_executable_runs_the_demo(
+    workspace: Path, paced: Callable[[Callable[[], Done]], Done]
+) -> None:
+    line = sourced(f"install/{PACKAGE}/lib/{PACKAGE}/high_five_demo")
+    done = paced(lambda: run(line, workspace))
     assert done.returncode == 0, done.stdout
     assert "5 of 5 behaviours done" in done.stdout

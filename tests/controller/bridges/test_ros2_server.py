@@ -2,72 +2,89 @@
 
 from __future__ import annotations
 
-import json
 import math
-import time
+import re
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
 
-from tests.controller.bridges.ros2_graph import DISCOVERY, Probe, Server, needs_ros2, serving
+from controller.bench.bridges.processes import Process, wait_until
+from controller.bench.bridges.ros2_processes import DISCOVERY, Place, Probe, serving, without
+from tests.controller.bridges.ros2_graph import needs_ros2
 
 pytestmark = needs_ros2
 
 SPEED_TOLERANCE = 0.02
 """Share of the commanded speed, over several strides."""
+DRIVES = 4
+"""How often a busy machine gets the chance to send commands without a gap of half a second."""
 RATE_TOLERANCE = 0.05
 """Share of a rate: a few messages are on their way when the counting begins and ends."""
 
 
-def test_a_behaviour_is_answered_when_odometry_bears_it_out(server: Server, probe: Probe) -> None:
-    low = probe.pose()[2]
+def test_a_behaviour_is_answered_when_odometry_bears_it_out(server: Process, probe: Probe) -> None:
+    low = probe.height()
     answer = probe.call("UP")
     assert answer.success, answer.message
-    assert probe.pose()[2] > 0.29 > low
-    assert probe.statistics()["position"] == pytest.approx(probe.pose()[:3], abs=0.01)
+    assert probe.height() > 0.29 > low
+    assert probe.statistics()["position"] == pytest.approx(probe.state().q[:3], abs=0.01)
     answer = probe.call("Sit")
     assert answer.success, answer.message
-    assert probe.pose()[2] == pytest.approx(0.235, abs=0.02)
+    assert probe.height() == pytest.approx(0.235, abs=0.02)
 
 
-def test_an_unknown_behaviour_is_refused_with_the_valid_names(server: Server, probe: Probe) -> None:
+def test_an_unknown_behaviour_is_refused_with_the_valid_names(
+    server: Process, probe: Probe
+) -> None:
     answer = probe.call("moonwalk")
     assert not answer.success
     assert "valid: damp, high_five, lie_down, recover, sit, stand, stop, up, walk" in answer.message
 
 
-def test_a_second_call_during_one_is_refused_at_once(server: Server, probe: Probe) -> None:
+def test_a_second_call_during_one_is_refused_at_once(server: Process, probe: Probe) -> None:
     probe.call("up")
     first = probe.send("sit")
-    began = time.monotonic()
     second = probe.result(probe.send("up"))
     assert not second.success
-    assert "busy with 'sit'" in second.message
-    assert time.monotonic() - began < 1.0
+    since = re.search(r"busy with 'sit' since (\d+\.\d) s", second.message)
+    assert since is not None
+    assert float(since[1]) < 1.0
     assert not first.done()
     assert probe.result(first).success
 
 
-def test_velocities_are_real_ones_and_end_with_silence(server: Server, probe: Probe) -> None:
+def test_velocities_are_real_ones_and_end_with_silence(server: Process, probe: Probe) -> None:
     assert probe.call("walk").success
+    start, end = driven(probe, 5.0, 0.3)
+    assert end.speed_from(start) == pytest.approx(0.3, rel=SPEED_TOLERANCE)
     before = probe.statistics()["cmd_vel"]
-    probe.drive(1.0, 0.3)
-    start = probe.place()
-    probe.drive(5.0, 0.3)
-    end = probe.place()
-    assert math.dist(end.xy, start.xy) / (end.time - start.time) == pytest.approx(
-        0.3, rel=SPEED_TOLERANCE
-    )
     probe.let_pass(1.5)
     resting = probe.place()
     probe.let_pass(0.5)
-    assert math.dist(probe.place().xy, resting.xy) < 0.005
+    assert probe.place().way_from(resting) < 0.005
     after = probe.statistics()["cmd_vel"]
     assert after["silences"] == before["silences"] + 1
-    assert after["followed"] > before["followed"]
+    assert after["followed"] == before["followed"]
 
 
-def test_an_order_ends_the_velocity_that_came_before_it(server: Server, probe: Probe) -> None:
+def driven(
+    probe: Probe, seconds: float, x: float, turn: float = 0.0, *, y: float = 0.0
+) -> tuple[Place, Place]:
+    """Start and end of a drive without a gap; if the machine made one, of another drive."""
+    for left in reversed(range(DRIVES)):
+        probe.drive(1.0, x, turn, y=y)
+        silences, start = probe.statistics()["cmd_vel"]["silences"], probe.place()
+        probe.drive(seconds, x, turn, y=y)
+        end = probe.place()
+        if probe.statistics()["cmd_vel"]["silences"] == silences or not left:
+            return start, end
+    raise AssertionError("no drive")
+
+
+def test_an_order_ends_the_velocity_that_came_before_it(server: Process, probe: Probe) -> None:
     # A robot that was told to walk while it walked forgot to stop when the commands ceased.
     assert probe.call("walk").success
     probe.drive(1.0, 0.3)
@@ -75,52 +92,46 @@ def test_an_order_ends_the_velocity_that_came_before_it(server: Server, probe: P
     probe.let_pass(1.5)
     resting = probe.place()
     probe.let_pass(0.5)
-    assert math.dist(probe.place().xy, resting.xy) < 0.005
+    assert probe.place().way_from(resting) < 0.005
 
 
-def test_sideways_and_turning_velocities_are_followed_too(server: Server, probe: Probe) -> None:
+def test_sideways_and_turning_velocities_are_followed_too(server: Process, probe: Probe) -> None:
     assert probe.call("walk").success
-    probe.drive(1.0, 0.0, 0.5)
-    start = probe.place()
-    probe.drive(3.0, 0.0, 0.5)
-    end = probe.place()
+    start, end = driven(probe, 3.0, 0.0, 0.5)
     turned = math.remainder(end.yaw - start.yaw, math.tau)
     assert turned / (end.time - start.time) == pytest.approx(0.5, rel=0.05)
-    probe.drive(1.0, 0.0, y=0.2)
-    start = probe.place()
-    probe.drive(3.0, 0.0, y=0.2)
-    end = probe.place()
+    start, end = driven(probe, 3.0, 0.0, y=0.2)
     dx, dy = end.xy[0] - start.xy[0], end.xy[1] - start.xy[1]
     aside = -math.sin(start.yaw) * dx + math.cos(start.yaw) * dy
     assert aside / (end.time - start.time) == pytest.approx(0.2, rel=0.1)
 
 
 def test_a_velocity_that_is_not_finite_or_out_of_mode_moves_nothing(
-    server: Server, probe: Probe
+    server: Process, probe: Probe
 ) -> None:
     assert probe.call("walk").success
     assert probe.trigger("stop").success
-    before, counts = probe.pose(), probe.statistics()["cmd_vel"]
+    before, counts = probe.place(), probe.statistics()["cmd_vel"]
     probe.drive(0.5, math.nan)
     assert probe.call("up").success
     probe.drive(0.5, 0.5)
-    after, later = probe.pose(), probe.statistics()["cmd_vel"]
-    assert math.dist(before[:2], after[:2]) < 0.02
+    after, later = probe.place(), probe.statistics()["cmd_vel"]
+    assert after.way_from(before) < 0.02
     assert later["not_finite"] > counts["not_finite"]
     assert later["out_of_mode"] > counts["out_of_mode"]
     assert later["followed"] == counts["followed"]
-    assert "not finite" in server.said
+    assert "not finite" in server.text
 
 
-def test_the_triggers_do_the_same_as_the_command(server: Server, probe: Probe) -> None:
+def test_the_triggers_do_the_same_as_the_command(server: Process, probe: Probe) -> None:
     assert probe.trigger("up").success
     assert probe.trigger("stop").success
     assert probe.statistics()["mode"] == "standing"
 
 
-def test_every_topic_comes_at_its_rate(server: Server, probe: Probe) -> None:
+def test_every_topic_comes_at_its_rate(server: Process, probe: Probe) -> None:
     first = probe.statistics()
-    probe.spin(3.0)
+    probe.let_pass(3.0)
     second = probe.statistics()
     time_passed = second["robot_time"] - first["robot_time"]
     rates = {
@@ -134,7 +145,7 @@ def test_every_topic_comes_at_its_rate(server: Server, probe: Probe) -> None:
     assert second["errors"] == 0
 
 
-def test_the_messages_say_what_a_standing_robot_measures(server: Server, probe: Probe) -> None:
+def test_the_messages_say_what_a_standing_robot_measures(server: Process, probe: Probe) -> None:
     from quadropted_msgs.msg import RobotFootContact
     from sensor_msgs.msg import Imu, JointState
     from tf2_msgs.msg import TFMessage
@@ -159,7 +170,7 @@ def test_the_messages_say_what_a_standing_robot_measures(server: Server, probe: 
         "robot1/odom",
         "robot1/base_link",
     )
-    assert transform.transform.translation.z == pytest.approx(probe.pose()[2], abs=0.01)
+    assert transform.transform.translation.z == pytest.approx(probe.height(), abs=0.01)
 
 
 def listen(probe: Probe, topics: dict[str, tuple[Any, str]]) -> dict[str, Any]:
@@ -167,9 +178,7 @@ def listen(probe: Probe, topics: dict[str, tuple[Any, str]]) -> dict[str, Any]:
     for key, (kind, name) in topics.items():
         note = lambda message, key=key: heard.setdefault(key, message)  # noqa: E731
         probe.node.create_subscription(kind, name, note, 10)
-    end = time.monotonic() + DISCOVERY
-    while len(heard) < len(topics) and time.monotonic() < end:
-        probe.spin(0.1)
+    wait_until(lambda: len(heard) == len(topics), DISCOVERY)
     assert heard.keys() == topics.keys()
     return heard
 
@@ -189,7 +198,7 @@ def goal_of(probe: Probe, motion: str, *settings: str) -> tuple[Any, list[Any]]:
     return probe.result(client.send_goal_async(goal, feedback_callback=note)), feedback
 
 
-def test_a_motion_has_feedback_with_progress_and_a_result(server: Server, probe: Probe) -> None:
+def test_a_motion_has_feedback_with_progress_and_a_result(server: Process, probe: Probe) -> None:
     handle, feedback = goal_of(probe, "nod", "times=1")
     assert handle.accepted
     answer = probe.result(handle.get_result_async())
@@ -202,11 +211,10 @@ def test_a_motion_has_feedback_with_progress_and_a_result(server: Server, probe:
     assert {message.phase for message in feedback} >= {"playing"}
 
 
-def test_a_high_five_that_is_cancelled_ends_standing(server: Server, probe: Probe) -> None:
+def test_a_high_five_that_is_cancelled_ends_standing(server: Process, probe: Probe) -> None:
     assert probe.call("up").success
     handle, feedback = goal_of(probe, "high_five", "hold=5.0")
-    while not feedback or feedback[-1].progress < 0.4:
-        probe.spin(0.05)
+    probe.wait_until(lambda: bool(feedback) and feedback[-1].progress >= 0.4, "40 % of a motion")
     busy, _ = goal_of(probe, "nod")
     assert not busy.accepted
     probe.result(handle.cancel_goal_async())
@@ -218,7 +226,7 @@ def test_a_high_five_that_is_cancelled_ends_standing(server: Server, probe: Prob
 
 
 def test_a_motion_that_does_not_exist_is_aborted_with_the_names(
-    server: Server, probe: Probe
+    server: Process, probe: Probe
 ) -> None:
     handle, _ = goal_of(probe, "moonwalk")
     answer = probe.result(handle.get_result_async())
@@ -229,35 +237,89 @@ def test_a_motion_that_does_not_exist_is_aborted_with_the_names(
 # --- other ways to serve ------------------------------------------------------------------------
 
 
-def test_free_running_time_is_the_clock(graph: None) -> None:
+@pytest.fixture(scope="module")
+def free_runners(
+    graph: None, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[tuple[Process, Process]]:
+    """robot3 runs freely; so does robot4, which has no interfaces and no display either."""
+    poor = without(tmp_path_factory.mktemp("hollow"), "quadropted_msgs", "tf2_msgs")
+    poor |= {"DISPLAY": "", "WAYLAND_DISPLAY": ""}
+    with (
+        serving(namespace="robot3", realtime=False) as rich,
+        serving("--viewer", namespace="robot4", realtime=False, environment=poor) as second,
+    ):
+        yield rich, second
+
+
+@contextmanager
+def probing(namespace: str) -> Iterator[Probe]:
+    probe = Probe(namespace)
+    yield probe
+    probe.close()
+
+
+def test_free_running_time_is_the_clock(free_runners: tuple[Process, Process]) -> None:
     from rosgraph_msgs.msg import Clock
 
-    with serving(namespace="robot3") as server:
-        probe = Probe("robot3")
+    with probing("robot3") as probe:
         assert probe.call("up").success
         first = listen(probe, {"clock": (Clock, "/clock")})["clock"].clock
-        probe.spin(1.0)
-        stamp = probe.pose()[3]
+        probe.let_pass(0.5)
+        before = probe.place().time
+        stamp = probe.state().time
         assert first.sec + 1e-9 * first.nanosec < stamp
-        assert stamp == pytest.approx(probe.statistics()["robot_time"], abs=1.0)
-        probe.close()
-        assert server.end() == 0
+        assert before - 1.0 <= stamp <= probe.place().time
+
+
+def test_the_clock_is_left_to_the_first_of_two_servers(
+    free_runners: tuple[Process, Process],
+) -> None:
+    first, second = free_runners
+    with probing("robot3") as one, probing("robot4") as other:
+        assert one.trigger("up").success
+        assert other.trigger("up").success
+        assert "another process publishes /clock" in second.text
+        assert "/clock" not in first.text
+        assert one.statistics()["published"]["/clock"] > 0
+        assert "/clock" not in other.statistics()["published"]
+        (publisher,) = one.node.get_publishers_info_by_topic("/clock")
+        assert publisher.node_namespace == "/robot3"
+
+
+def test_a_viewer_without_a_display_is_one_line_and_the_robot_is_served(
+    free_runners: tuple[Process, Process],
+) -> None:
+    _, second = free_runners
+    assert second.text.count("no viewer: cannot open the viewer: there is no display") == 1
+    assert "Traceback" not in second.text
+    assert second.code is None
 
 
 def test_without_the_interfaces_the_triggers_remain_and_the_server_says_so(
-    graph: None, tmp_path: Any
+    free_runners: tuple[Process, Process],
 ) -> None:
-    for package in ("quadropted_msgs", "tf2_msgs"):
-        (tmp_path / package).mkdir()
-        (tmp_path / package / "__init__.py").write_text("", encoding="utf-8")
-    with serving(namespace="robot4", path=str(tmp_path)) as server:
-        probe = Probe("robot4")
+    _, second = free_runners
+    with probing("robot4") as probe:
         assert probe.trigger("up").success
-        assert "without quadropted_msgs and tf2_msgs" in server.said
-        assert "ros2/build_interfaces.sh" in server.said
-        assert "/robot4/sit" in server.said
-        published = json.loads(probe.trigger("statistics").message)["published"]
+        assert "without quadropted_msgs and tf2_msgs" in second.text
+        assert "ros2/build_interfaces.sh" in second.text
+        assert "/robot4/sit" in second.text
+        published = probe.statistics()["published"]
         assert "/robot4/odom" in published
         assert "/tf" not in published
-        probe.close()
-        assert server.end() == 0
+
+
+def test_a_free_running_server_ends_well_too(free_runners: tuple[Process, Process]) -> None:
+    for server in free_runners:
+        server.stop(signal.SIGINT)
+        assert server.code == 0
+
+
+def test_two_robots_live_side_by_side(server: Process, probe: Probe) -> None:
+    with serving(namespace="robot2") as second, probing("robot2") as other:
+        assert other.call("up").success
+        assert probe.call("sit").success
+        assert other.height() > 0.29
+        assert probe.height() == pytest.approx(0.235, abs=0.02)
+        second.stop(signal.SIGINT)
+        assert second.code == 0
