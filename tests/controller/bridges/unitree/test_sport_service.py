@@ -1,0 +1,208 @@
+"""Each call of the sport service does what Unitree's does, or is answered why not."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from controller.bench.bridges.processes import wait_until
+from controller.bench.bridges.unitree_faults import Scene, scene
+from controller.bench.bridges.unitree_processes import client_of
+from controller.bridges.unitree.rpc import LEASE_TERM
+from controller.bridges.unitree.sport_api import (
+    SWITCHER_SERVICE,
+    Api,
+    Code,
+    SportMode,
+    SwitcherApi,
+)
+from controller.bridges.unitree.sport_robot import POSE
+from controller.bridges.unitree.sport_service import PATIENCE
+from tests.controller.bridges.unitree.support import needs_dds
+
+pytestmark = [needs_dds, pytest.mark.slow]
+FRONT = slice(0, 2)  # of the feet in Unitree's order: FR FL RR RL
+FAST = json.dumps({"x": 3.8, "y": 0.0, "z": 0.0})
+LIMIT = 60.0  # s; only ends a test that hangs
+
+
+@pytest.fixture(scope="module")
+def simulated() -> Iterator[Scene]:
+    with scene() as at:
+        yield at
+
+
+@pytest.fixture
+def at(simulated: Scene) -> Scene:
+    """A robot that stands, ready for anything."""
+    simulated.stand_up()
+    return simulated
+
+
+def progress(at: Scene) -> float:
+    return float(at.observer.now()["progress"][0])
+
+
+def rpy(at: Scene) -> np.ndarray:
+    return np.array(at.observer.now()["imu_state"]["rpy"][0])
+
+
+def begin(at: Scene, api: Api) -> None:
+    """Start an action that takes longer than its answer."""
+    assert at.call(api) == Code.OK
+    assert progress(at) == 1
+
+
+def test_after_stand_up_it_does_not_walk_until_balance_stand(simulated: Scene) -> None:
+    at = simulated
+    assert at.call(Api.STAND_UP) == Code.OK
+    at.observer.wait_for_rest()
+    assert at.observer.mode == SportMode.JOINT_LOCK
+    assert at.call(Api.MOVE, FAST) == Code.OK
+    time.sleep(0.5)
+    assert at.observer.speed < 0.05
+    assert at.call(Api.BALANCE_STAND) == Code.OK
+    at.observer.wait_for_rest()
+    assert at.observer.mode == SportMode.BALANCE_STAND
+
+
+def test_sit_and_rise(at: Scene) -> None:
+    assert at.call(Api.RISE_SIT) == Code.NOT_READY  # it does not sit
+    assert at.call(Api.SIT) == Code.OK
+    at.observer.wait_for_rest()
+    assert at.observer.mode == SportMode.SIT
+    assert rpy(at)[1] < -0.4
+    assert at.call(Api.HELLO) == Code.NOT_READY
+    assert at.call(Api.EULER, '{"x": 0, "y": 0, "z": 0}') == Code.NOT_READY
+    assert at.call(Api.RISE_SIT) == Code.OK
+    at.observer.wait_for_rest()
+    at.require_standing()
+
+
+@pytest.mark.parametrize("api", [Api.HELLO, Api.SCRAPE])
+def test_a_front_paw_is_raised_and_put_back(at: Scene, api: Api) -> None:
+    begin(at, api)
+    least = np.inf
+    while progress(at):
+        least = min(least, float(at.observer.now()["foot_force"][0, FRONT].min()))
+    assert least == 0.0
+    at.require_standing()
+    assert at.observer.now()["error_code"][0] == Code.OK
+
+
+def test_stretch_bows_and_comes_back(at: Scene) -> None:
+    begin(at, Api.STRETCH)
+    most = 0.0
+    while progress(at):
+        most = max(most, abs(rpy(at)[1]))
+    assert most > 0.15
+    at.require_standing()
+
+
+def test_pose_is_held_until_it_is_taken_back(at: Scene) -> None:
+    assert at.call(Api.POSE, '{"data": true}') == Code.OK
+    at.observer.wait_for_rest()
+    assert at.observer.mode == SportMode.POSE
+    assert rpy(at)[:2] == pytest.approx(POSE[:2], abs=0.05)
+    assert at.call(Api.POSE, '{"data": false}') == Code.OK
+    at.observer.wait_for_rest()
+    assert at.observer.mode == SportMode.BALANCE_STAND
+    assert rpy(at)[:2] == pytest.approx([0.0, 0.0], abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("angles", "code"),
+    [
+        ((0.1, 0.15, 0.1), Code.OK),
+        ((0.8, 0.0, 0.0), Code.POSE_REFUSED),  # beyond Unitree's range
+        ((0.74, 0.74, 0.59), Code.POSE_REFUSED),  # within it, beyond the legs'
+    ],
+)
+def test_an_attitude_is_taken_or_refused(
+    at: Scene, angles: tuple[float, float, float], code: Code
+) -> None:
+    before = rpy(at)
+    assert at.call(Api.EULER, json.dumps(dict(zip("xyz", angles, strict=True)))) == code
+    at.observer.wait_for_rest()
+    there = angles if code == Code.OK else before
+    assert rpy(at)[:2] == pytest.approx(there[:2], abs=0.06)
+
+
+@pytest.mark.parametrize(("level", "speed"), [(-1, 0.6), (0, 1.05)])
+def test_the_speed_level_bounds_move(at: Scene, level: int, speed: float) -> None:
+    assert at.call(Api.SPEED_LEVEL, json.dumps({"data": level})) == Code.OK
+    for _ in range(60):
+        at.client.send(Api.MOVE, FAST)
+        time.sleep(0.05)
+    assert at.observer.speed == pytest.approx(speed, abs=0.1)
+    assert at.call(Api.STOP_MOVE) == Code.OK
+    assert at.call(Api.SPEED_LEVEL, '{"data": 0}') == Code.OK
+
+
+def test_an_action_that_meets_a_long_one_waits_a_while_then_is_refused(at: Scene) -> None:
+    begin(at, Api.DANCE1)
+    start = time.monotonic()
+    assert at.call(Api.HELLO) == Code.NOT_READY
+    assert time.monotonic() - start > 0.9 * PATIENCE
+    assert progress(at) == 1
+    assert at.call(Api.DAMP) == Code.OK
+    at.require_lying()
+    assert at.observer.now()["error_code"][0] == Code.ACTION_TIMEOUT
+
+
+def test_damp_ends_an_action_whose_caller_hears_that_it_was_not_done(at: Scene) -> None:
+    caller = client_of(at.observer.bus, "sport")
+    codes: list[int] = []
+    call = threading.Thread(target=lambda: codes.append(caller.call(Api.HELLO, timeout=5.0).code))
+    call.start()
+    assert wait_until(lambda: progress(at) == 1, LIMIT)
+    assert at.call(Api.DAMP) == Code.OK
+    call.join(LIMIT)
+    assert codes == [Code.ACTION_TIMEOUT]
+    at.require_lying()
+
+
+def test_who_has_the_lease_has_the_robot_until_it_ends(at: Scene) -> None:
+    lease = client_of(at.observer.bus, "sport_lease")
+    assert lease.call(Api.LEASE_APPLY, '{"name": "somebody else"}').code == Code.OK
+    assert at.call(Api.STOP_MOVE) == Code.LEASE_DENIED
+    assert lease.call(Api.LEASE_APPLY, '{"name": "me"}').code == Code.LEASE_EXIST
+    time.sleep(1.2 * LEASE_TERM)
+    assert at.call(Api.STOP_MOVE) == Code.OK
+
+
+def test_the_switcher_releases_a_robot_that_lies_only(at: Scene) -> None:
+    switcher = client_of(at.observer.bus, SWITCHER_SERVICE)
+    assert json.loads(switcher.call(SwitcherApi.CHECK_MODE).data)["name"] == "normal"
+    assert switcher.call(SwitcherApi.RELEASE_MODE).code == Code.NOT_READY
+    assert at.call(Api.STAND_DOWN) == Code.OK
+    at.observer.wait_for_rest()
+    assert wait_until(lambda: switcher.call(SwitcherApi.RELEASE_MODE).code == Code.OK, LIMIT)
+    assert json.loads(switcher.call(SwitcherApi.CHECK_MODE).data)["name"] == ""
+    assert at.call(Api.STAND_UP) == Code.NOT_READY
+    assert switcher.call(SwitcherApi.SELECT_MODE, '{"name": "normal"}').code == Code.OK
+    at.stand_up()
+
+
+@pytest.mark.parametrize("api", [1011, 1030, 1031, 1042, 2049])
+def test_what_the_library_lacks_is_not_supported(simulated: Scene, api: int) -> None:
+    assert simulated.call(api) == Code.NOT_SUPPORTED
+
+
+@pytest.mark.parametrize(
+    ("api", "parameter"),
+    [
+        (Api.MOVE, '{"x": NaN, "y": 0, "z": 0}'),
+        (Api.MOVE, '{"x": 1}'),
+        (Api.EULER, "rubbish"),
+        (Api.POSE, '{"data": "yes"}'),
+        (Api.SPEED_LEVEL, '{"data": 7}'),
+    ],
+)
+def test_a_parameter_that_is_wrong_is_refused(simulated: Scene, api: Api, parameter: str) -> None:
+    assert simulated.call(api, parameter) == Code.BAD_PARAMETER
