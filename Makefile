@@ -39,6 +39,7 @@ test-ros2: ## build the ROS 2 interfaces, install the extra [ros2], run its test
 test-unitree: $(VENV)/.stamp-unitree ## the tests of Unitree's protocol, with its peers
 	GO2_WBC_REQUIRE_UNITREE=1 \
 	GO2_WBC_STOCK_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/stock/bin/python \
+	GO2_WBC_OLD_STOCK_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/stock-old/bin/python \
 	GO2_WBC_CPP_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/cpp/bin/python \
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal tests/controller/bridges/unitree $(ARGS)
 
@@ -81,8 +82,7 @@ $(VENV)/.stamp-dev: pyproject.toml $(VENV)/.stamp-venv
 # Python 3.11 only: without it that test says so and is skipped.
 $(VENV)/.stamp-unitree: $(VENV)/.stamp-dev
 	$(call install,.[unitree])
-	$(BIN)/python -m venv $(VENV)/peers/stock
-	$(VENV)/peers/stock/bin/python -m pip install --quiet cyclonedds==11.0.1 unitree-sdk2py-dimos==1.0.3
+	tests/controller/bridges/unitree/peers/make_stock.sh $(BIN)/python $(VENV)/peers
 	$(BIN)/python -m venv $(VENV)/peers/cpp
 	$(VENV)/peers/cpp/bin/python -m pip install --quiet far-unitree-sdk==0.1.8 numpy \
 		|| rm -rf $(VENV)/peers/cpp

@@ -17,6 +17,8 @@ needs_dds = pytest.mark.skipif(
     reason="CycloneDDS is not installed: pip install 'go2-wbc[unitree]'",
 )
 STOCK_SDK = "GO2_WBC_STOCK_SDK_PYTHON"
+OLD_STOCK_SDK = "GO2_WBC_OLD_STOCK_SDK_PYTHON"
+"""The SDK on CycloneDDS 0.10.2, which needs a package of the system: never a failure without."""
 CPP_SDK = "GO2_WBC_CPP_SDK_PYTHON"
 
 
@@ -24,7 +26,10 @@ def peer_python(variable: str) -> str:
     """Python of a foreign SDK's environment; without one the test is skipped, or has failed."""
     python = os.environ.get(variable, "")
     if not Path(python).is_file():
-        absent(f"{variable} names no environment with that SDK: make test-unitree makes one")
+        reason = f"{variable} names no environment with that SDK: make test-unitree makes one"
+        if variable == OLD_STOCK_SDK:
+            pytest.skip(reason + ", with cyclonedds-dev 0.10.2 of the system")
+        absent(reason)
     return python
 
 

@@ -17,6 +17,7 @@ from controller.bench.bridges.unitree_processes import good_commands, own_domain
 from controller.bridges.unitree.sport_api import Code, SportMode
 from tests.controller.bridges.unitree.support import (
     CPP_SDK,
+    OLD_STOCK_SDK,
     STOCK_SDK,
     absent,
     needs_dds,
@@ -42,7 +43,17 @@ def test_the_stock_sport_client_moves_the_robot() -> None:
     with own_domain() as domain, simulator(domain):
         peer = [python, str(PEERS / "stock_sport.py"), str(domain), str(PATIENT)]
         with Process(peer) as process:
-            text = process.finish(LIMIT)
+            require_a_script_done(process.finish(LIMIT))
+
+
+def test_the_stock_sport_client_on_the_dds_of_the_robot_moves_it_too() -> None:
+    peer = f"{peer_python(OLD_STOCK_SDK)} {PEERS / 'stock_sport.py'} 0 {PATIENT}"
+    code, text = beside_a_simulator(peer)
+    assert code == 0, text
+    require_a_script_done(text)
+
+
+def require_a_script_done(text: str) -> None:
     by_call = {answer["call"]: answer for answer in json_lines(text)}
     codes = {name: answer["code"] for name, answer in by_call.items()}
     assert codes.pop("FrontFlip", None) == Code.NOT_SUPPORTED, text
@@ -61,9 +72,7 @@ def test_the_stock_sport_client_moves_the_robot() -> None:
 
 def test_the_cpp_sdk_reads_our_state_and_stands_the_robot_up() -> None:
     python = peer_python(CPP_SDK)
-    peer = f"{python} {PEERS / 'cpp_stand.py'} lo"
-    script = f"{' '.join(PROGRAM)} unitree-sim --domain 0 & sim=$!; sleep 8; {peer}; "
-    code, text = in_own_network(f"{script} code=$?; kill -TERM $sim; wait $sim; exit $code")
+    code, text = beside_a_simulator(f"{python} {PEERS / 'cpp_stand.py'} lo")
     assert code == 0, text
     (said,) = json_lines(text)
     assert said["accelerometer"] == GRAVITY
@@ -99,6 +108,12 @@ def test_the_cpp_sdk_refuses_wrong_checksums() -> None:
     assert text.count("incoming low_cmd CRC Error") > 500
     assert text.count("low_state CRC Error") > 500
     assert said["q_target"] == [0.0] * 12
+
+
+def beside_a_simulator(peer: str) -> tuple[int | None, str]:
+    """Exit code of a command on the domain of a simulator, and what both said."""
+    script = f"{' '.join(PROGRAM)} unitree-sim --domain 0 & sim=$!; sleep 8; {peer}; "
+    return in_own_network(f"{script} code=$?; kill -TERM $sim; wait $sim; exit $code")
 
 
 def in_own_network(script: str) -> tuple[int | None, str]:

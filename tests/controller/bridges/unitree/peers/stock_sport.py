@@ -1,18 +1,21 @@
 """Peer: Unitree's stock ``SportClient`` runs a script; prints one JSON line per call.
 
-Runs in an environment of its own with ``unitree-sdk2py-dimos`` and CycloneDDS 11, without this
-project. CycloneDDS 11 announces the SDK's octets as another type than the robot's CycloneDDS 0.10
-does; they are turned back here, so that the stock client meets types as on the robot.
+Runs in an environment of its own with ``unitree-sdk2py-dimos``, without this project. On CycloneDDS
+0.10, which the robot speaks, the SDK is as it is. CycloneDDS 11 announces its octets as another
+type; they are turned back there, so that the stock client meets types as on the robot.
 """
 
 import importlib
+import importlib.metadata
 import json
 import sys
 import time
 from typing import Any
 
 kinds: Any = importlib.import_module("cyclonedds.idl.types")
-uint8, kinds.uint8 = kinds.uint8, kinds.byte
+uint8 = kinds.uint8
+if not importlib.metadata.version("cyclonedds").startswith("0.10."):
+    kinds.uint8 = kinds.byte
 channel = importlib.import_module("unitree_sdk2py.core.channel")
 sport = importlib.import_module("unitree_sdk2py.go2.sport.sport_client")
 messages = importlib.import_module("unitree_sdk2py.idl.unitree_go.msg.dds_")
