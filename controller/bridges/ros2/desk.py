@@ -119,8 +119,8 @@ class Desk:
         with self._lock:
             refusal = self.refusal()
             if not refusal:
-                self._job = job
                 job.begin(self.go2.state.time)
+                self._job = job  # from here on the loop may carry it out
         return refusal
 
     def work(self) -> bool:

@@ -11,11 +11,13 @@ from go2_wbc.errors import MissingDependency
 
 INSTALL = 'python -m pip install -e ".[ros2]"'
 BUILD = "ros2/build_interfaces.sh python3 dist && python -m pip install dist/*.whl"
-PROFILE_VARIABLE = "FASTDDS_DEFAULT_PROFILES_FILE"
+PROFILE_VARIABLES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
+"""What names the file to the Fast DDS of Kilted, and to that of Jazzy."""
 
 # Announces a participant five times a second: nodes find each other in half a second instead of
 # three, and a process that was killed is missed after four seconds.
-os.environ.setdefault(PROFILE_VARIABLE, str(Path(__file__).with_name("fast_discovery.xml")))
+for variable in PROFILE_VARIABLES:
+    os.environ.setdefault(variable, str(Path(__file__).with_name("fast_discovery.xml")))
 
 
 def needed(module: str) -> Any:

@@ -45,6 +45,20 @@ def test_an_order_is_answered_after_it_has_happened(command: str, call: str) -> 
     assert "done in" in answers[0].message
 
 
+def test_an_order_is_begun_before_the_loop_can_see_it() -> None:
+    # A motion that another thread ordered was played before it was prepared: the server ended.
+    desk, seen = Desk(FakeGo2()), []
+
+    class Watched(Job):
+        def begin(self, now: float) -> None:
+            seen.append(desk.job)
+            super().begin(now)
+
+    desk.submit(Watched("nod", lambda _go2, _job: True, lambda _answer: None))
+    assert seen == [None]
+    assert desk.job is not None
+
+
 def test_an_unknown_order_is_refused_with_the_valid_names() -> None:
     (answer,) = ordered(Desk(FakeGo2()), "moonwalk")
     assert not answer.success
