@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import os
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,29 @@ from go2_wbc.errors import MissingDependency
 
 INSTALL = 'python -m pip install -e ".[ros2]"'
 BUILD = "ros2/build_interfaces.sh python3 dist && python -m pip install dist/*.whl"
-PROFILE_VARIABLES = ("FASTDDS_DEFAULT_PROFILES_FILE", "FASTRTPS_DEFAULT_PROFILES_FILE")
-"""What names the file to the Fast DDS of Kilted, and to that of Jazzy."""
+PROFILE_VARIABLE, JAZZY_PROFILE_VARIABLE = (
+    "FASTDDS_DEFAULT_PROFILES_FILE",
+    "FASTRTPS_DEFAULT_PROFILES_FILE",
+)
+"""What names a profile to Fast DDS; the one of Kilted complains about the name of Jazzy."""
+KILTED = 9
+"""Major version of rclpy from which on the distribution is Kilted or newer; Jazzy has 7."""
+
+
+def profile_variable() -> str:
+    """The variable that the installed Fast DDS reads."""
+    for name in ("ros-rclpy", "rclpy"):
+        try:
+            major = int(metadata.version(name).partition(".")[0])
+        except metadata.PackageNotFoundError:
+            continue
+        return PROFILE_VARIABLE if major >= KILTED else JAZZY_PROFILE_VARIABLE
+    return PROFILE_VARIABLE
+
 
 # Announces a participant five times a second: nodes find each other in half a second instead of
 # three, and a process that was killed is missed after four seconds.
-for variable in PROFILE_VARIABLES:
-    os.environ.setdefault(variable, str(Path(__file__).with_name("fast_discovery.xml")))
+os.environ.setdefault(profile_variable(), str(Path(__file__).with_name("fast_discovery.xml")))
 
 
 def needed(module: str) -> Any:
