@@ -34,7 +34,7 @@ test: $(VENV)/.stamp-dev ## install with the test tools, then run every test
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
 
 test-ros2: ## build the ROS 2 interfaces, install the extra [ros2], run its tests
-	ros2/test.sh $(ARGS)
+	WORKERS=$(WORKERS) ros2/test.sh $(ARGS)
 
 test-unitree: $(VENV)/.stamp-unitree ## the tests of Unitree's protocol, with its peers
 	GO2_WBC_REQUIRE_UNITREE=1 \

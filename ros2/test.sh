@@ -4,6 +4,7 @@
 #
 #   usage: ros2/test.sh [PYTEST ARGUMENTS]
 #   PYTHON=python3.12   with another Python;   ROS=jazzy   with the other distribution
+#   WORKERS=1           processes that run tests (2)
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
@@ -30,4 +31,4 @@ if [[ ! -f $stamp || $(cat "$stamp") != "$made_from" ]]; then
     echo "$made_from" >"$stamp"
 fi
 GO2_WBC_REQUIRE_ROS2=1 exec "$venv/bin/python" -m pytest tests/controller/bridges \
-    --ignore=tests/controller/bridges/unitree "$@"
+    --ignore=tests/controller/bridges/unitree -n "${WORKERS:-2}" --dist loadfile "$@"
