@@ -59,5 +59,5 @@ def test_without_the_extra_the_bench_names_the_line_that_installs_it(
     monkeypatch.setitem(sys.modules, "cyclonedds.core", None)
     assert cli.main(["bench", "bridges", "unitree"]) == ExitCode.RUNTIME
     complaint = capsys.readouterr().err
-    assert "pip install 'go2-wbc[unitree]'" in complaint
+    assert 'pip install -e ".[unitree]"' in complaint
     assert "Traceback" not in complaint

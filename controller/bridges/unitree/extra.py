@@ -7,7 +7,7 @@ from typing import Final
 
 from go2_wbc.errors import MissingDependency
 
-INSTALL_LINE: Final = "pip install 'go2-wbc[unitree]', in a checkout: pip install -e '.[unitree]'"
+INSTALL_LINE: Final = 'python -m pip install -e ".[unitree]"'
 
 
 def require_dds() -> None:

@@ -20,7 +20,7 @@ from controller.bridges.unitree.codec import (
     encode_request,
     encode_response,
 )
-from controller.bridges.unitree.sport_api import API_VERSION, Api, Code
+from controller.bridges.unitree.sport_api import API_VERSION, LEASE_TERM, Api, Code
 from go2_wbc.errors import CommandError
 
 _log = logging.getLogger(__name__)
@@ -31,8 +31,6 @@ QUEUE: Final = 64
 """Requests that are kept for a server that is busy; of more, the oldest are lost."""
 TRIES: Final = 3
 """How often a question is asked before silence is taken for an answer."""
-LEASE_TERM: Final = 1.0
-"""Time [s] for which a lease holds without renewal."""
 
 
 @final

@@ -13,6 +13,8 @@ from go2_wbc.errors import CommandError
 SPORT_SERVICE: Final = "sport"
 SWITCHER_SERVICE: Final = "motion_switcher"
 API_VERSION: Final = "1.0.0.1"
+LEASE_TERM: Final = 1.0
+"""Time [s] for which a lease holds without renewal."""
 
 
 class Api(IntEnum):

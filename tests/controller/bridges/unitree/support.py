@@ -14,7 +14,7 @@ IS_REQUIRED = "GO2_WBC_REQUIRE_UNITREE" in os.environ
 """Set by ``make test-unitree``: what is missing is then a failure, not a test that is skipped."""
 needs_dds = pytest.mark.skipif(
     not HAS_DDS and not IS_REQUIRED,
-    reason="CycloneDDS is not installed: pip install 'go2-wbc[unitree]'",
+    reason="CycloneDDS is not installed: `make test-unitree` installs it",
 )
 STOCK_SDK = "GO2_WBC_STOCK_SDK_PYTHON"
 OLD_STOCK_SDK = "GO2_WBC_OLD_STOCK_SDK_PYTHON"

@@ -13,8 +13,8 @@ import pytest
 from controller.bench.bridges.processes import wait_until
 from controller.bench.bridges.unitree_faults import Scene, scene
 from controller.bench.bridges.unitree_processes import client_of
-from controller.bridges.unitree.rpc import LEASE_TERM
 from controller.bridges.unitree.sport_api import (
+    LEASE_TERM,
     SWITCHER_SERVICE,
     Api,
     Code,
