@@ -86,6 +86,11 @@ class Runner:
         finally:
             self._lock.release()
 
+    @property
+    def is_alive(self) -> bool:
+        """Whether the background thread, if there is one, can still move the robot."""
+        return self._failure is None
+
     def begin(self) -> None:
         """Begin a call: a fault from before it may be cleared, one during it ends it.
 

@@ -54,10 +54,12 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Drive step by step; the robot ends limp."""
-    from controller.bridges.unitree.drive import Trot, drive
+    from controller.bridges.unitree.drive import Trot, check_steps, drive
     from controller.bridges.unitree.guards import GuardConfig
     from controller.bridges.unitree.plant import UnitreePlant
 
+    check_steps(args.steps)
+    trot = Trot(args.speed, args.seconds)
     plant = UnitreePlant(
         args.interface,
         args.domain,
@@ -68,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     )
     done = True
     with closing(plant):
-        for step in drive(plant, args.steps, Trot(args.speed, args.seconds)):
+        for step in drive(plant, args.steps, trot):
             _tell(step, as_json=args.json)
             done = done and step.ok
     return ExitCode.OK if done else ExitCode.FAILED

@@ -9,6 +9,7 @@ import threading
 from pathlib import Path
 
 from controller.cli.common import ExitCode, Subparsers, add_parser
+from go2_wbc.errors import PlantError
 
 EXAMPLES = """
 go2-wbc unitree-sim                      domain 1 on the loopback interface
@@ -68,7 +69,8 @@ def run(args: argparse.Namespace) -> int:
     with UnitreeSimulator(settings) as simulator:
         print(f"serving on DDS domain {args.domain}, interface {args.interface}", flush=True)
         while not stop.wait(0.5):
-            pass
+            if not simulator.is_alive:
+                raise PlantError("the simulation has ended; what was said before tells why")
         gate = simulator.gate
     refused = ", ".join(f"{reason} {count}" for reason, count in gate.refused.items())
     print(f"low-level commands: {gate.accepted} good, refused: {refused or 'none'}", flush=True)

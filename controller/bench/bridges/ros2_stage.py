@@ -130,8 +130,8 @@ class Stage:
 
 
 def script(code: str, namespace: str) -> Process:
-    """A client in a process of its own."""
-    return Process([sys.executable, "-c", code, namespace])
+    """A client in a process of its own; without priority, since a flood never sleeps."""
+    return Process([sys.executable, "-c", code, namespace], has_priority=False)
 
 
 @contextmanager

@@ -293,8 +293,8 @@ FAULTS: Final = (
     Fault("unitree.controller_killed", "kill -9 of the controller", controller_killed),
     Fault("unitree.controller_ended", "SIGTERM at the controller", controller_told_to_end),
     Fault("unitree.robot_killed", "kill -9 of the simulator", simulator_killed),
-    Fault("unitree.robot_claimed", "controller for one that stands", standing_robot_claimed),
-    Fault("unitree.second", "second simulator, same domain", second_simulator),
+    Fault("unitree.robot_claimed", "a standing robot is claimed", standing_robot_claimed),
+    Fault("unitree.second", "a second simulator", second_simulator),
 )
 
 

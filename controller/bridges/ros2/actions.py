@@ -69,7 +69,7 @@ class MotionActions:
         if refusal:
             reply(Answer(False, refusal))
         while not answered.wait(self._period):
-            if handle.is_cancel_requested and not self._is_returning():
+            if handle.is_cancel_requested:  # again and again: one that came early gets lost
                 self._desk.cancel(handle.request.motion)
             job = self._desk.job
             if job is not None:
@@ -82,10 +82,6 @@ class MotionActions:
         except CommandError as error:
             return str(error)
         return self._desk.submit(motion_job(goal.motion, list(goal.settings), reply))
-
-    def _is_returning(self) -> bool:
-        job = self._desk.job
-        return job is None or job.is_cancelled
 
     def _feedback(self, job: Job) -> Any:
         feedback, go2 = ros.PlayMotion.Feedback(), self._desk.go2

@@ -186,7 +186,10 @@ class Desk:
         return True
 
     def damp(self) -> Answer:
-        """Go limp at once."""
+        """Go limp at once; what is being prepared or carried out is called off."""
+        with self._lock:
+            if self._job is not None:
+                self._job.is_cancelled = True
         try:
             self.go2.damp()
         except Go2WbcError as error:

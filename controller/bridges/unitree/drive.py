@@ -10,6 +10,7 @@ from typing import Any, Final
 from controller.bridges.unitree.plant import UnitreePlant
 from controller.go2_controller import GO2Controller
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
+from go2_wbc.validation import require_finite, require_positive
 
 SETTLE: Final = 1.5
 """Time [s] of a trot before its speed is measured."""
@@ -26,6 +27,11 @@ class Trot:
     speed: float = 0.5
     seconds: float = 4.0
 
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a time that is not positive or a speed that is not finite."""
+        require_positive(self, "seconds")
+        require_finite(self, "speed")
+
 
 @dataclass(frozen=True, slots=True)
 class Step:
@@ -41,15 +47,15 @@ class Step:
         return asdict(self)
 
 
-def drive(plant: UnitreePlant, names: list[str], trot: Trot) -> Iterator[Step]:
-    """Do the steps one after the other; ends with the first that is not done, the robot limp.
-
-    Raises:
-        CommandError: for an unknown step; lists the valid ones.
-    """
+def check_steps(names: list[str]) -> None:
+    """Raise CommandError for an unknown step; lists the valid ones."""
     for name in names:
         if name not in STEPS:
             raise CommandError(unknown_name("step", name, STEPS))
+
+
+def drive(plant: UnitreePlant, names: list[str], trot: Trot) -> Iterator[Step]:
+    """Do the steps one after the other; ends with the first that is not done, the robot limp."""
     with GO2Controller(plant=plant, realtime=True) as go2:
         for name in names:
             step = _do(go2, name, trot)
@@ -76,7 +82,7 @@ def _trot(go2: GO2Controller, trot: Trot) -> float:
     go2.move(trot.speed)
     go2.wait(SETTLE)
     errors = []
-    for _ in range(round(trot.seconds / SAMPLE)):
+    for _ in range(max(1, round(trot.seconds / SAMPLE))):
         go2.wait(SAMPLE)
         errors.append(abs(float(go2.state.v[0]) - trot.speed))
     go2.stop()

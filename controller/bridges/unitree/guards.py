@@ -9,11 +9,17 @@ from typing import Final, final
 import numpy as np
 
 from controller.behaviours.joints import DAMPING
+from controller.bridges.unitree import layout
 from go2_wbc.errors import CommandError
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, RobotState
 from go2_wbc.validation import require_positive
 
+_BOUNDS: Final = (
+    ("kp", 0.0, layout.KP_MAX),
+    ("kd", 0.0, layout.KD_MAX),
+    ("v_des", -layout.SPEED_MAX, layout.SPEED_MAX),
+)
 _PARTS: Final = tuple(field.name for field in fields(JointCommand))
 
 
@@ -51,12 +57,16 @@ def is_passive(command: JointCommand) -> bool:
     return not (command.tau.any() or command.kp.any() or command.v_des.any())
 
 
-def require_finite(command: JointCommand) -> None:
-    """Raise CommandError, naming the part, unless a command consists of finite numbers."""
+def require_sane(command: JointCommand) -> None:
+    """Raise CommandError, naming the part, unless a command is finite and its gains are meant."""
     for name in _PARTS:
         values = getattr(command, name)
         if values.shape != (12,) or not np.isfinite(values).all():
             raise CommandError(f"{name} must be 12 finite numbers, got {values}")
+    for name, least, greatest in _BOUNDS:
+        values = getattr(command, name)
+        if values.min() < least or values.max() > greatest:
+            raise CommandError(f"{name} must be from {least:g} to {greatest:g}, got {values}")
 
 
 @final
@@ -108,7 +118,7 @@ class Guards:
         return JointCommand(
             tau=share * tau,
             q_des=np.clip(command.q_des, self._lower, self._upper),
-            v_des=command.v_des,
+            v_des=share * command.v_des,
             kp=share * command.kp,
             kd=np.maximum(command.kd, (1.0 - share) * DAMPING),
         )

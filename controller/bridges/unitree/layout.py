@@ -35,6 +35,8 @@ SERVO: Final = 0x01
 POSITION_STOP: Final = 2.146e9
 """A desired angle that means: no position control (``PosStopF``)."""
 VELOCITY_STOP: Final = 16000.0
+KP_MAX, KD_MAX = 500.0, 50.0
+TAU_MAX, SPEED_MAX = 100.0, 100.0
 """A desired speed that means: no speed control (``VelStopF``)."""
 
 _U1, _U2, _U4, _I2, _I4, _F4 = "u1", "<u2", "<u4", "<i2", "<i4", "<f4"

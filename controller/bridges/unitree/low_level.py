@@ -34,11 +34,7 @@ _log = logging.getLogger(__name__)
 SILENCE: Final = 0.05
 """Time [s] without a good command after which the robot is damped."""
 RELEASE: Final = 0.5
-"""Time [s] without a good command after which the sport service has the robot again."""
-KP_MAX, KD_MAX = 500.0, 50.0
-"""Largest gains [N m/rad], [N m s/rad] that count as meant."""
-TAU_MAX, SPEED_MAX = 100.0, 100.0
-"""Torque [N m] and speed [rad/s] beyond which a command counts as garbage; motors clip below."""
+"""Time [s] without a good command after which low-level control has ended."""
 ANGLE_MARGIN: Final = 0.1
 """Angle [rad] by which a desired angle may lie beyond the joint's limit."""
 REPORT_PERIOD: Final = 1.0
@@ -65,10 +61,10 @@ def joint_command(
     kd, tau = np.where(obeys, kd, 0.0), np.where(obeys, tau, 0.0)
     dq = np.where(np.abs(dq) >= layout.VELOCITY_STOP, 0.0, dq)
     q = np.where(kp > 0.0, q, 0.0)
-    _require(kp, 0.0, KP_MAX, "kp")
-    _require(kd, 0.0, KD_MAX, "kd")
-    _require(tau, -TAU_MAX, TAU_MAX, "tau")
-    _require(dq, -SPEED_MAX, SPEED_MAX, "dq")
+    _require(kp, 0.0, layout.KP_MAX, "kp")
+    _require(kd, 0.0, layout.KD_MAX, "kd")
+    _require(tau, -layout.TAU_MAX, layout.TAU_MAX, "tau")
+    _require(dq, -layout.SPEED_MAX, layout.SPEED_MAX, "dq")
     held = kp > 0.0
     _require(q[held], lower[held] - ANGLE_MARGIN, upper[held] + ANGLE_MARGIN, "q")
     return JointCommand(tau, q, dq, kp, kd)
@@ -158,7 +154,7 @@ class CommandGate:
             _log.warning("no good lowcmd for %.0f ms: damped", 1000 * silence)
             self._is_damping = True
         if silence > RELEASE:
-            _log.info("low-level control has ended; the sport service has the robot")
+            _log.info("low-level control has ended")
             self._last = None
         return JointCommand.damping(DAMPING)
 

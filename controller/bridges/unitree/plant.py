@@ -14,7 +14,7 @@ from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree.checksum import is_intact
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.extra import require_dds
-from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_finite
+from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
 from controller.bridges.unitree.last_word import at_the_end, forget
 from controller.bridges.unitree.layout import LOW_CMD, LOW_STATE
 from controller.bridges.unitree.low_client import low_cmd_message, sensor_reading
@@ -41,6 +41,8 @@ STEP_TRIES, STEP_LIMIT, STEP_SILENCE = 5, 0.1, 0.02
 silence [s] that shows that it has."""
 SWITCH_INTERVAL: Final = 0.0005
 """Time [s] for which another thread may keep Python to itself, so that the loop keeps its pace."""
+LOOPBACK: Final = "lo"
+"""Where simulators live, which need not have a motion switcher; a robot has one."""
 CONSENT: Final = (
     "this moves a robot: lay it on its belly, keep people away, take the remote in your hand (L2+B "
     "damps it), then say so by --i-have-the-remote-in-hand (in Python "
@@ -84,7 +86,8 @@ class UnitreePlant(Plant):
             CommandError: without consent, or for a wrong interface or domain.
             MissingDependency: without the extra.
             PlantTimeout: if no robot is found.
-            PlantError: if it does not lie on its belly, or its sport service keeps it.
+            PlantError: if it does not lie on its belly, or its sport service keeps it, or is not
+                found on another interface than the loopback.
         """
         if i_have_the_remote_in_hand is not True:
             raise CommandError(CONSENT)
@@ -109,13 +112,17 @@ class UnitreePlant(Plant):
         self._written: float | None = None
         self._failure: str | None = None
         self._is_closed = False
+        self._sending = threading.RLock()
+        self._is_live = False
         self._state = self._first_state()
         self._require_lying()
-        release_sport(bus)
+        release_sport(bus, self._require_lying, may_lack=interface == LOOPBACK)
+        self._require_lying()
         self._go_live()
 
     def _go_live(self) -> None:
         sys.setswitchinterval(min(sys.getswitchinterval(), SWITCH_INTERVAL))
+        self._is_live = True
         at_the_end(self.close)
         self._watchdog = threading.Thread(target=self._watch, name="unitree-watchdog", daemon=True)
         self._watchdog.start()
@@ -132,7 +139,7 @@ class UnitreePlant(Plant):
         return self._bad_states
 
     def read(self) -> RobotState:
-        """The newest estimated state."""
+        """The estimated state after the last ``write``, or at the start."""
         self._check_open()
         return self._state
 
@@ -140,19 +147,24 @@ class UnitreePlant(Plant):
         """Send ``command``, softened by the guards, and wait for the robot's next state.
 
         Raises:
-            CommandError: if a value is not finite; nothing is sent.
+            CommandError: if a value is not finite or a gain out of bounds; nothing is sent.
             PlantTimeout: if no state comes in time, or commands had stopped; the robot is damped.
             PlantError: if a guard trips; the robot is damped.
         """
         self._check_open()
-        require_finite(command)
-        if self._failure is not None and not is_passive(command):
+        require_sane(command)
+        with self._sending:
+            if not is_passive(command):
+                self._require_sound()
+            self._send(self._guards.soften(command, self._state))
+        self._wait_for_state()
+
+    def _require_sound(self) -> None:
+        if self._failure is not None:
             raise PlantError(f"damped: {self._failure}; lay the robot down and make a new plant")
         fault = self._guards.fault(self._state)
-        if fault is not None and not is_passive(command):
+        if fault is not None:
             raise self._stop(PlantError(fault))
-        self._send(self._guards.soften(command, self._state))
-        self._wait_for_state()
 
     def close(self) -> None:
         """Damp the robot and let go of it; idempotent."""
@@ -162,7 +174,7 @@ class UnitreePlant(Plant):
         forget(self.close)
         end = time.monotonic() + FAREWELL
         while time.monotonic() < end:
-            self._send(JointCommand.damping(DAMPING))
+            self._damp_once()
             time.sleep(FAREWELL_PERIOD)
 
     def _check_open(self) -> None:
@@ -172,27 +184,48 @@ class UnitreePlant(Plant):
     # --- commands -------------------------------------------------------------------------
 
     def _send(self, command: JointCommand) -> None:
-        self._commands.write(self._encode(low_cmd_message(command)))
-        self._written = None if is_passive(command) else time.monotonic()
+        with self._sending:
+            self._commands.write(self._encode(low_cmd_message(command)))
+            self._written = None if is_passive(command) else time.monotonic()
+
+    def _damp_once(self) -> None:
+        try:
+            self._send(JointCommand.damping(DAMPING))
+        except PlantError as error:  # others may get through
+            _log.warning("a damping command could not be sent: %s", error)
 
     def _stop(self, error: PlantError) -> PlantError:
-        """Damp the robot for good; returns ``error`` to be raised."""
-        self._failure = str(error)
-        self._send(JointCommand.damping(DAMPING))
+        """Damp the robot for good, once it was taken over; returns ``error`` to be raised."""
+        with self._sending:
+            self._failure = self._failure or str(error)
+            if self._is_live:
+                self._damp_once()
         return error
 
     def _watch(self) -> None:
-        """Damps the robot when the controller has stopped sending, though Python still runs."""
+        """Damps the robot when the controller has stopped sending, though Python still runs.
+
+        A robot that was stopped is sent damping until the plant is closed: one message may get
+        lost, and what a robot does without any is not known.
+        """
         while not self._is_closed:
-            time.sleep(WATCH)
-            written = self._written
-            if written is not None and time.monotonic() - written > self._config.hang_limit:
-                reason = (
-                    f"no command for {1000 * self._config.hang_limit:.0f} ms; a robot needs one "
-                    "every 2 ms: GO2Controller(plant=..., realtime=True)"
-                )
-                _log.warning("damped: %s", reason)
-                self._stop(PlantTimeout(reason))
+            time.sleep(WATCH if self._failure is None else FAREWELL_PERIOD)
+            with self._sending:
+                if self._is_closed:
+                    return
+                if self._failure is not None:
+                    self._damp_once()
+                elif self._is_hanging():
+                    reason = (
+                        f"no command for {1000 * self._config.hang_limit:.0f} ms; a robot needs "
+                        "one every 2 ms: GO2Controller(plant=..., realtime=True)"
+                    )
+                    _log.warning("damped: %s", reason)
+                    self._stop(PlantTimeout(reason))
+
+    def _is_hanging(self) -> bool:
+        written = self._written
+        return written is not None and time.monotonic() - written > self._config.hang_limit
 
     # --- states ---------------------------------------------------------------------------
 
@@ -263,7 +296,7 @@ class UnitreePlant(Plant):
     # --- taking over ----------------------------------------------------------------------
 
     def _require_lying(self) -> None:
-        state = self._state
+        self._state = state = self._take() or self._state
         _, p_feet = self._model.forward_kinematics(state.q)
         height = float(state.q[2] - p_feet[:, 2].min()) + self._model.foot_radius
         if not self._guards.is_lying(state, height):

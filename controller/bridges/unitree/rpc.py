@@ -63,9 +63,9 @@ class Server:
     def _serve(self) -> None:
         while not self._stopping.is_set():
             self._reader.wait(PATROL)
-            for data in self._reader.take():
-                self._serve_one(data)
             try:
+                for data in self._reader.take():
+                    self._serve_one(data)
                 self._patrol()
             except Exception:
                 _log.exception("%s: the service goes on after an error", self._name)

@@ -100,6 +100,11 @@ class UnitreeSimulator:
         )
 
     @property
+    def is_alive(self) -> bool:
+        """Whether the simulation goes on."""
+        return self._robot.is_alive
+
+    @property
     def gate(self) -> CommandGate:
         """Who has the motors, with the counts of good and refused commands."""
         return self._gate

@@ -87,13 +87,25 @@ class SportRobot:
         """What the robot is doing."""
         return self.pilot.mode
 
+    @property
+    def is_alive(self) -> bool:
+        """Whether the control loop still runs."""
+        return self._runner.is_alive
+
+    def begin(self) -> None:
+        """Begin an action: whatever makes the robot limp from now on ends it.
+
+        Raises:
+            PlantError: if the control loop has ended.
+        """
+        self.pilot.begin()
+
     def perform(self, api: int) -> None:
-        """Do an action, or play the motion that stands for it.
+        """Do an action that has begun, or play the motion that stands for it.
 
         Raises:
             Aborted: if it was not done; says why.
         """
-        self.pilot.begin()
         if api in self._plans:
             self._stand_if_leaning()
             self.is_locked = False
@@ -107,7 +119,6 @@ class SportRobot:
         Raises:
             Aborted: if it does not get there.
         """
-        self.pilot.begin()
         if self.mode is Mode.WALKING:
             self.pilot.square_up()
         target = np.array(rpy)

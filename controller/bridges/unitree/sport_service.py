@@ -34,6 +34,7 @@ WAITING: Final = 8
 """Requests that may wait for the running action."""
 _SUPPORTED: Final = frozenset(map(int, Api))
 _STANDING_UP: Final = frozenset({Api.STAND_UP, Api.BALANCE_STAND, Api.RECOVERY_STAND})
+_LIMP: Final = frozenset({Mode.LYING, Mode.DAMPED, Mode.FALLEN})
 _ON_FEET: Final = frozenset({Mode.STANDING, Mode.WALKING})
 _ENTRY: Final = {
     Api.SIT: _ON_FEET | {Mode.SITTING},
@@ -53,6 +54,7 @@ class _Job:
     reply: Reply
     due: float
     is_answered: bool = False
+    is_over: bool = False
 
     def answer(self, code: Code) -> None:
         if not self.is_answered:
@@ -140,7 +142,8 @@ class SportService:
     def _submit(self, job: _Job) -> None:
         with self._changed:
             running = self._running
-            if running is not None and {running.api, job.api} <= _STANDING_UP:
+            is_running = running is not None and not running.is_over
+            if running and is_running and {running.api, job.api} <= _STANDING_UP:
                 if job.api is not Api.STAND_UP:
                     running.perform = job.perform  # what the worker does at the end: see _work
                     running.api = job.api
@@ -202,9 +205,22 @@ class SportService:
                 if self._stopping:
                     return
                 job = self._running = self._waiting.popleft()
-            code = self._refusal(job) or self._perform(job)
-            job.answer(code)
+                code = self._begin(job)  # under the lock: a Damp after it ends the action
+            code = code or self._perform(job)
             self.error_code = int(code)
+            try:
+                job.answer(code)
+            except Exception:
+                _log.exception("%s could not be answered", Api(job.api).name)
+
+    def _begin(self, job: _Job) -> Code | None:
+        """Why the action cannot begin, or None when it has."""
+        try:
+            self._robot.begin()
+        except Go2WbcError as error:
+            _log.error("%s not begun: %s", Api(job.api).name, error)
+            return Code.INTERNAL
+        return self._refusal(job)
 
     def _refusal(self, job: _Job) -> Code | None:
         mode, api = self._robot.mode, Api(job.api)
@@ -215,11 +231,12 @@ class SportService:
         return None
 
     def _perform(self, job: _Job) -> Code:
-        perform = job.perform
         try:
-            perform()
-            if job.perform is not perform:  # BalanceStand came while it stood up
-                job.perform()
+            while not job.is_over:
+                perform = job.perform
+                perform()
+                with self._changed:  # BalanceStand may have come while it stood up
+                    job.is_over = job.perform is perform
             return Code.OK
         except _PoseRefused:
             return Code.POSE_REFUSED
@@ -235,8 +252,9 @@ class SportService:
     @property
     def is_idle(self) -> bool:
         """Whether no action runs or waits and the robot lies limp."""
-        is_limp = self._robot.mode in (Mode.LYING, Mode.DAMPED, Mode.FALLEN)
-        return is_limp and self._running is None and not self._waiting
+        is_limp = self._robot.mode in _LIMP
+        with self._changed:
+            return is_limp and self._running is None and not self._waiting
 
     @property
     def is_acting(self) -> bool:
@@ -246,7 +264,7 @@ class SportService:
     def sport_mode(self) -> SportMode:
         """What ``rt/sportmodestate`` calls what the robot is doing."""
         running, robot = self._running, self._robot
-        if robot.is_leaning:
+        if robot.is_leaning and robot.mode not in _LIMP:
             return SportMode.POSE
         if running is not None and running.api in _MODE_OF_ACTION:
             return _MODE_OF_ACTION[running.api]

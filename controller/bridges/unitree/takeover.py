@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import time
+from collections.abc import Callable
 from typing import Final
 
 from controller.bridges.unitree.bus import Bus
@@ -22,14 +23,23 @@ PAUSE: Final = 0.2
 """Time [s] between two requests."""
 
 
-def release_sport(bus: Bus) -> None:
-    """Release whatever motion service has the robot; simulators without one are left alone.
+def release_sport(bus: Bus, require_lying: Callable[[], None], *, may_lack: bool) -> None:
+    """Release whatever motion service has the robot.
+
+    Args:
+        bus: the robot's.
+        require_lying: called before each release; raises if the robot does not lie any more.
+        may_lack: whether the robot may have no motion switcher, as some simulators.
 
     Raises:
-        PlantError: if it keeps the robot.
+        PlantError: if the service keeps the robot, or there is no switcher although there must.
     """
     client = Client(bus, SWITCHER_SERVICE)
     if not client.wait_for_server(DISCOVERY):
+        if not may_lack:
+            raise PlantError(
+                "no motion switcher answers, so nobody can tell what else moves this robot"
+            )
         _log.warning("no motion switcher answers: taking for granted that nobody has the robot")
         return
     deadline = time.monotonic() + RELEASE_LIMIT
@@ -38,6 +48,7 @@ def release_sport(bus: Bus) -> None:
             raise PlantError(
                 f"the motion service {name!r} keeps the robot: lay it down and end what runs there"
             )
+        require_lying()
         client.call(SwitcherApi.RELEASE_MODE)
         time.sleep(PAUSE)
 

@@ -127,6 +127,16 @@ def test_damp_in_a_posture_ends_it() -> None:
 # --- motions ------------------------------------------------------------------------------------
 
 
+def test_damp_calls_off_an_order_that_has_not_begun() -> None:
+    go2 = FakeGo2()
+    desk, answers = Desk(go2), []
+    order(desk, "up", answers.append)
+    order(desk, "damp", lambda _answer: None)
+    desk.work()
+    assert go2.calls == ["damp"]
+    assert [answer.success for answer in answers] == [False]
+
+
 def played(go2: GO2Controller, motion: str, *settings: str) -> Answer:
     desk, answers, answered = Desk(go2), [], threading.Event()
     assert desk.submit(motion_job(motion, settings, answers.append)) == ""

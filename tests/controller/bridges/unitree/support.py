@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import sys
 from pathlib import Path
 from typing import NoReturn
 
@@ -29,6 +30,8 @@ def peer_python(variable: str) -> str:
         reason = f"{variable} names no environment with that SDK: make test-unitree makes one"
         if variable == OLD_STOCK_SDK:
             pytest.skip(reason + ", with cyclonedds-dev 0.10.2 of the system")
+        if variable == CPP_SDK and sys.version_info >= (3, 12):
+            pytest.skip("the C++ SDK has wheels up to Python 3.11")
         absent(reason)
     return python
 

@@ -19,7 +19,6 @@ from tests.controller.bridges.unitree.support import (
     CPP_SDK,
     OLD_STOCK_SDK,
     STOCK_SDK,
-    absent,
     needs_dds,
     peer_python,
 )
@@ -112,14 +111,14 @@ def test_the_cpp_sdk_refuses_wrong_checksums() -> None:
 
 def beside_a_simulator(peer: str) -> tuple[int | None, str]:
     """Exit code of a command on the domain of a simulator, and what both said."""
-    script = f"{' '.join(PROGRAM)} unitree-sim --domain 0 & sim=$!; sleep 8; {peer}; "
+    script = f"{' '.join(PROGRAM)} unitree-sim --domain 0 & sim=$!; {peer}; "
     return in_own_network(f"{script} code=$?; kill -TERM $sim; wait $sim; exit $code")
 
 
 def in_own_network(script: str) -> tuple[int | None, str]:
     """Exit code and output of a shell script in a network of its own, as a robot's is."""
     if not has_own_network():
-        absent("needs the right to make a network namespace (unshare -n)")
+        pytest.skip("needs the right to make a network namespace (unshare -n)")
     with Process(["unshare", "-n", "sh", "-c", f"{NETWORK}; {script}"]) as process:
         text = process.finish(LIMIT)
         return process.code, text

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_finite
+from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import quaternion_from_rpy
@@ -94,7 +94,7 @@ def test_only_damping_is_passive() -> None:
 
 def test_a_command_that_is_not_finite_is_named() -> None:
     with pytest.raises(CommandError, match="kp must be 12 finite numbers"):
-        require_finite(replace(TAU, kp=np.full(12, np.nan)))
+        require_sane(replace(TAU, kp=np.full(12, np.nan)))
 
 
 def test_limits_must_be_positive() -> None:

@@ -48,6 +48,14 @@ def progress(at: Scene) -> float:
     return float(at.observer.now()["progress"][0])
 
 
+def while_acting(at: Scene) -> Iterator[None]:
+    """As long as the action goes on; one that never ends fails."""
+    deadline = time.monotonic() + LIMIT
+    while progress(at):
+        assert time.monotonic() < deadline
+        yield
+
+
 def rpy(at: Scene) -> np.ndarray:
     return np.array(at.observer.now()["imu_state"]["rpy"][0])
 
@@ -88,7 +96,7 @@ def test_sit_and_rise(at: Scene) -> None:
 def test_a_front_paw_is_raised_and_put_back(at: Scene, api: Api) -> None:
     begin(at, api)
     least = np.inf
-    while progress(at):
+    for _ in while_acting(at):
         least = min(least, float(at.observer.now()["foot_force"][0, FRONT].min()))
     assert least == 0.0
     at.require_standing()
@@ -98,7 +106,7 @@ def test_a_front_paw_is_raised_and_put_back(at: Scene, api: Api) -> None:
 def test_stretch_bows_and_comes_back(at: Scene) -> None:
     begin(at, Api.STRETCH)
     most = 0.0
-    while progress(at):
+    for _ in while_acting(at):
         most = max(most, abs(rpy(at)[1]))
     assert most > 0.15
     at.require_standing()
@@ -165,6 +173,16 @@ def test_damp_ends_an_action_whose_caller_hears_that_it_was_not_done(at: Scene) 
     call.join(LIMIT)
     assert codes == [Code.ACTION_TIMEOUT]
     at.require_lying()
+
+
+def test_damp_wins_against_an_attitude_that_is_still_being_checked(at: Scene) -> None:
+    at.client.send(Api.EULER, '{"x": 0.1, "y": 0.1, "z": 0.0}')
+    time.sleep(0.05)  # the check takes longer
+    assert at.call(Api.DAMP) == Code.OK
+    at.require_lying()
+    time.sleep(1.0)
+    at.require_lying()
+    assert at.observer.mode == SportMode.DAMPING
 
 
 def test_who_has_the_lease_has_the_robot_until_it_ends(at: Scene) -> None:

@@ -18,7 +18,7 @@ RISE, HOLD, PERIOD = 2.0, 1.0, 0.002
 def main() -> None:
     """Rise over two seconds, hold for one, then go limp."""
     robot = unitree.UnitreeInterface.create_go2(sys.argv[1])
-    deadline = time.monotonic() + 5.0
+    deadline = time.monotonic() + 60.0
     while robot.read_low_state().imu.accel[2] < 1.0 and time.monotonic() < deadline:
         time.sleep(0.01)
     first = robot.read_low_state()

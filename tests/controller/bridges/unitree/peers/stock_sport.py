@@ -48,7 +48,7 @@ def main() -> None:
     client = sport.SportClient()
     client.SetTimeout(float(sys.argv[2]))
     client.Init()
-    deadline = time.monotonic() + 10.0
+    deadline = time.monotonic() + 60.0
     while not states or client.GetServerApiVersion()[0]:
         if time.monotonic() > deadline:
             sys.exit("the robot was not found")

@@ -1,0 +1,230 @@
+"""Whatever goes wrong with a robot, ``UnitreePlant`` damps it and goes on damping it.
+
+The bus is played by this file: states come from here, and every command is kept.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from controller.bridges.unitree import layout
+from controller.bridges.unitree.checksum import seal
+from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.guards import GuardConfig
+from controller.bridges.unitree.low_client import low_cmd_message
+from controller.bridges.unitree.low_level import low_state_message
+from go2_wbc.errors import CommandError, PlantError, PlantTimeout
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.base import Plant
+from go2_wbc.robot.state import JointCommand
+from tests.controller.bridges.unitree.support import needs_dds
+
+pytestmark = needs_dds
+PUSH = JointCommand.torque(np.full(12, 0.5))
+DAMPED = JointCommand.damping(3.0)
+PERIOD = 0.002
+# s; a busy machine pauses this process for longer than the real limits of 30 and 100 ms.
+GUARDS = GuardConfig(stale_limit=0.3, hang_limit=0.5)
+LONG = 1.0  # s; longer than both
+Change = Callable[[np.ndarray], None]
+
+
+class Robot:
+    """Both ends of the bus: publishes a lying robot's state, doctored by ``change``."""
+
+    def __init__(self) -> None:
+        plant = MujocoPlant()
+        self._lying = plant.read(), plant.imu()
+        plant.close()
+        self.change: Change = lambda message: None
+        self.is_alive = True
+        self.tick, self._next = 1000, time.monotonic()
+        self.commands: list[np.ndarray] = []
+        self.writers = self.readers = 1
+
+    def reader(self, topic: str, kind: type, *, depth: int) -> Robot:
+        return self
+
+    def writer(self, topic: str, kind: type) -> Robot:
+        return self
+
+    def wait(self, seconds: float) -> bool:
+        time.sleep(min(seconds, PERIOD) if self.is_alive else seconds)
+        return self.is_alive
+
+    def take(self) -> list[bytes]:
+        if not self.is_alive or time.monotonic() < self._next:
+            return []
+        self._next = time.monotonic() + PERIOD
+        self.tick += 2
+        message = low_state_message(*self._lying)
+        message["tick"] = self.tick
+        self.change(message)
+        seal(message)
+        return [codec_of(layout.LOW_STATE).encode(message)]
+
+    def write(self, data: bytes) -> None:
+        self.commands.append(codec_of(layout.LOW_CMD).decode(data))
+
+    def is_damped_by(self, since: int) -> bool:
+        """Whether many commands came since then, and all but brake."""
+        damping = low_cmd_message(DAMPED)["motor_cmd"]
+        new = self.commands[since:]
+        return len(new) > 10 and all((c["motor_cmd"] == damping).all() for c in new)
+
+
+@pytest.fixture
+def robot(monkeypatch: pytest.MonkeyPatch) -> Robot:
+    import controller.bridges.unitree.takeover  # noqa: F401  (it must see the real bus's type)
+
+    robot = Robot()
+    monkeypatch.setattr("controller.bridges.unitree.bus.Bus", lambda domain, interface: robot)
+    monkeypatch.setattr(
+        "controller.bridges.unitree.takeover.release_sport", lambda *args, **options: None
+    )
+    return robot
+
+
+def driven() -> Plant:
+    from controller.bridges.unitree.plant import UnitreePlant
+
+    return UnitreePlant("lo", 1, i_have_the_remote_in_hand=True, guards=GUARDS)
+
+
+@pytest.fixture
+def plant(robot: Robot) -> Iterator[Plant]:
+    plant = driven()
+    for _ in range(5):
+        plant.write(PUSH)
+    assert robot.commands[-1]["motor_cmd"]["tau"].any()
+    yield plant
+    plant.close()
+
+
+def write_often(plant: Plant) -> None:
+    for _ in range(5):
+        plant.write(PUSH)
+
+
+def tilted(message: np.ndarray) -> None:
+    message["imu_state"]["quaternion"] = (np.cos(0.7), np.sin(0.7), 0.0, 0.0)
+
+
+def overstretched(message: np.ndarray) -> None:
+    message["motor_state"]["q"][0, 0] = 2.0
+
+
+def broken(message: np.ndarray) -> None:
+    message["motor_state"]["q"][0, 3] = np.nan
+
+
+def restarted(message: np.ndarray) -> None:
+    message["tick"] = 5
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        (tilted, "tilted: roll 80 deg"),
+        (overstretched, "rad beyond its limit"),
+        (broken, "not finite"),
+        (restarted, "clock went back"),
+    ],
+)
+def test_a_bad_state_damps_the_robot_for_good(
+    robot: Robot, plant: Plant, change: Change, reason: str
+) -> None:
+    robot.change = change
+    with pytest.raises(PlantError, match=reason):
+        write_often(plant)
+    stopped = len(robot.commands)
+    robot.change = lambda message: None
+    time.sleep(0.2)
+    assert robot.is_damped_by(stopped)
+    with pytest.raises(PlantError, match=reason):  # also when the state is fine again
+        plant.write(PUSH)
+
+
+def test_silence_of_the_robot_damps_it_for_good(robot: Robot, plant: Plant) -> None:
+    robot.is_alive = False
+    with pytest.raises(PlantTimeout, match="no rt/lowstate for"):
+        plant.write(PUSH)
+    stopped = len(robot.commands)
+    time.sleep(0.2)
+    assert robot.is_damped_by(stopped)
+
+
+def test_silence_of_the_controller_damps_the_robot_for_good(robot: Robot, plant: Plant) -> None:
+    time.sleep(LONG)
+    stopped = len(robot.commands)
+    time.sleep(0.2)
+    assert robot.is_damped_by(stopped)
+    with pytest.raises(PlantError, match="no command for 500 ms"):
+        plant.write(PUSH)
+
+
+def test_the_last_words_are_damping_then_nothing(robot: Robot) -> None:
+    plant = driven()
+    plant.write(PUSH)
+    pushed = len(robot.commands)
+    plant.close()
+    assert robot.is_damped_by(pushed)
+    said = len(robot.commands)
+    time.sleep(0.1)
+    assert len(robot.commands) == said
+
+
+def test_a_robot_that_does_not_lie_is_sent_nothing(robot: Robot) -> None:
+    def standing(message: np.ndarray) -> None:
+        message["motor_state"]["q"][0, :12] = np.tile([0.0, 0.67, -1.3], 4)
+
+    robot.change = standing
+    with pytest.raises(PlantError, match="must lie on its belly"):
+        driven()
+    assert robot.commands == []
+
+
+def test_a_robot_that_gets_up_while_it_is_taken_over_is_let_go(
+    robot: Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def get_up(*args: object, **options: object) -> None:
+        robot.change = tilted
+
+    monkeypatch.setattr("controller.bridges.unitree.takeover.release_sport", get_up)
+    with pytest.raises(PlantError, match="must lie on its belly"):
+        driven()
+    assert robot.commands == []
+
+
+def test_the_soft_start_grows_over_half_a_second(robot: Robot) -> None:
+    plant = driven()
+    start = len(robot.commands)
+    for _ in range(260):  # of 2 ms
+        plant.write(PUSH)
+    torques = [float(c["motor_cmd"]["tau"][0, 0]) for c in robot.commands[start:]]
+    assert torques[0] == pytest.approx(0.0, abs=0.02)
+    assert torques == sorted(torques)
+    assert torques[-1] == pytest.approx(0.5)
+    plant.close()
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [
+        (JointCommand.damping(-1.0), "kd"),
+        (JointCommand.damping(1000.0), "kd"),
+        (JointCommand.servo(np.zeros(12), np.zeros(12), 1e4, 1.0), "kp"),
+        (JointCommand.servo(np.zeros(12), np.full(12, 500.0), 10.0, 1.0), "v_des"),
+    ],
+)
+def test_gains_that_nobody_means_are_refused(
+    robot: Robot, plant: Plant, command: JointCommand, name: str
+) -> None:
+    before = len(robot.commands)
+    with pytest.raises(CommandError, match=name):
+        plant.write(command)
+    assert len(robot.commands) == before
