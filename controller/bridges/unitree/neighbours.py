@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Final
 
 from controller.bridges.unitree import idl
@@ -10,7 +9,7 @@ from controller.bridges.unitree.bus import Bus
 from go2_wbc.errors import BridgeError
 
 DISCOVERY: Final = 0.5
-"""Time [s] that a robot gets to be found; some hundredths on an idle machine."""
+"""Time [s] that a robot gets to be heard; some hundredths on an idle machine."""
 
 
 def require_no_robot(domain: int, interface: str) -> None:
@@ -21,11 +20,8 @@ def require_no_robot(domain: int, interface: str) -> None:
         CommandError: for a domain or interface that does not exist.
     """
     states = Bus(domain, interface).reader("rt/lowstate", idl.low_state(), depth=1)
-    deadline = time.monotonic() + DISCOVERY
-    while time.monotonic() < deadline:
-        if states.writers:
-            raise BridgeError(
-                f"a robot is already on DDS domain {domain}, interface {interface}; "
-                "choose another --domain, or end the other simulator"
-            )
-        time.sleep(0.02)
+    if states.wait(DISCOVERY):  # not its writer: the C++ SDK has one and uses it for nothing
+        raise BridgeError(
+            f"a robot is already on DDS domain {domain}, interface {interface}; "
+            "choose another --domain, or end the other simulator"
+        )
