@@ -128,7 +128,11 @@ def test_damp_in_a_posture_ends_it() -> None:
 
 
 def test_damp_calls_off_an_order_that_has_not_begun() -> None:
-    go2 = FakeGo2()
+    class Limp(FakeGo2):
+        def damp(self) -> None:
+            self.calls.append("damp")
+
+    go2 = Limp()
     desk, answers = Desk(go2), []
     order(desk, "up", answers.append)
     order(desk, "damp", lambda _answer: None)
