@@ -6,6 +6,7 @@ import argparse
 import logging
 import signal
 import threading
+from contextlib import closing
 from pathlib import Path
 
 from controller.cli.common import ExitCode, Subparsers, add_parser
@@ -66,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         config=args.config,
         lockstep=args.lockstep,
     )
-    with UnitreeSimulator(settings) as simulator:
+    with closing(UnitreeSimulator(settings)) as simulator:
         print(f"serving on DDS domain {args.domain}, interface {args.interface}", flush=True)
         while not stop.wait(0.5):
             if not simulator.is_alive:

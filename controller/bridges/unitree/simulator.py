@@ -7,7 +7,6 @@ import logging
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Final, final
 
 from controller.bridges.unitree.bus import Bus
@@ -122,17 +121,6 @@ class UnitreeSimulator:
         self._sport.close()
         self._robot.close()
         self._plant.close()
-
-    def __enter__(self) -> UnitreeSimulator:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _has_low_level(self) -> bool:
         return self._is_released or self._gate.is_active

@@ -19,6 +19,7 @@ from tests.controller.bridges.unitree.support import (
     CPP_SDK,
     OLD_STOCK_SDK,
     STOCK_SDK,
+    absent,
     needs_dds,
     peer_python,
 )
@@ -33,6 +34,8 @@ GRAVITY = pytest.approx(9.8, abs=0.5)
 SAG = 0.2
 # What own_low_level.py commands, in Unitree's order of joints.
 ANGLES = [0.4, 0.5, 0.6, 0.1, 0.2, 0.3, 1.0, 1.1, 1.2, 0.7, 0.8, 0.9]
+# A network of one's own; who is not root is root in a user namespace.
+UNSHARE = ("unshare", "--net") if os.geteuid() == 0 else ("unshare", "--map-root-user", "--net")
 # Loopback with multicast, which CycloneDDS 0.10 needs, in a network of our own.
 NETWORK = "ip link set lo up && ip link set lo multicast on && ip route add 224.0.0.0/4 dev lo"
 
@@ -118,8 +121,8 @@ def beside_a_simulator(peer: str) -> tuple[int | None, str]:
 def in_own_network(script: str) -> tuple[int | None, str]:
     """Exit code and output of a shell script in a network of its own, as a robot's is."""
     if not has_own_network():
-        pytest.skip("needs the right to make a network namespace (unshare -n)")
-    with Process(["unshare", "-n", "sh", "-c", f"{NETWORK}; {script}"]) as process:
+        absent(f"needs the right to make a network namespace ({' '.join(UNSHARE)})")
+    with Process([*UNSHARE, "sh", "-c", f"{NETWORK}; {script}"]) as process:
         text = process.finish(LIMIT)
         return process.code, text
 
@@ -129,6 +132,6 @@ def json_lines(text: str) -> list[dict[str, Any]]:
 
 
 def has_own_network() -> bool:
-    if shutil.which("unshare") is None or os.geteuid() != 0:
+    if shutil.which(UNSHARE[0]) is None:
         return False
-    return subprocess.run(["unshare", "-n", "true"], check=False).returncode == 0
+    return subprocess.run([*UNSHARE, "true"], check=False).returncode == 0
