@@ -25,6 +25,7 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
+from go2_wbc.errors import ConfigError
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import cross
@@ -90,8 +91,13 @@ class EstimatorConfig:
     longest_step: float = 0.1
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is not positive."""
+        """Raise ConfigError for a number that is not positive, or forces the wrong way round."""
         require_positive(self, *(f.name for f in fields(self)))
+        if self.trusted_force <= self.contact_force:
+            raise ConfigError(
+                f"trusted_force must be above contact_force ({self.contact_force:g} N), "
+                f"got {self.trusted_force:g} N"
+            )
 
 
 class StateEstimator:

@@ -153,3 +153,8 @@ def test_a_gap_in_the_readings_begins_the_filter_anew() -> None:
 def test_numbers_must_be_positive() -> None:
     with pytest.raises(ConfigError, match="velocity"):
         EstimatorConfig(velocity=-1.0)
+
+
+def test_a_foot_is_trusted_above_the_force_at_which_it_touches() -> None:
+    with pytest.raises(ConfigError, match="trusted_force must be above contact_force"):
+        EstimatorConfig(contact_force=30.0)
