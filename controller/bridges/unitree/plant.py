@@ -39,6 +39,9 @@ WATCH: Final = 0.02
 STEP_TRIES, STEP_LIMIT, STEP_SILENCE = 5, 0.1, 0.02
 """How often, and how long each time [s], the plant tries to fall into step with the robot, and the
 silence [s] that shows that it has."""
+REPEAT: Final = 0.01
+"""Silence [s] of the robot after which a command is sent again: it, or its answer, may be lost, and
+a simulator in lockstep waits for it."""
 SWITCH_INTERVAL: Final = 0.0005
 """Time [s] for which another thread may keep Python to itself, so that the loop keeps its pace."""
 LOOPBACK: Final = "lo"
@@ -153,11 +156,15 @@ class UnitreePlant(Plant):
         """
         self._check_open()
         require_sane(command)
+        self._send_softened(command)
+        while not self._hears_a_state():
+            self._send_softened(command)
+
+    def _send_softened(self, command: JointCommand) -> None:
         with self._sending:
             if not is_passive(command):
                 self._require_sound()
             self._send(self._guards.soften(command, self._state))
-        self._wait_for_state()
 
     def _require_sound(self) -> None:
         if self._failure is not None:
@@ -242,17 +249,18 @@ class UnitreePlant(Plant):
             "is the robot, or go2-wbc unitree-sim, on, and the interface right?"
         )
 
-    def _wait_for_state(self) -> None:
-        while True:
-            state = self._take()
-            if state is not None:
-                self._state = state
-                return
+    def _hears_a_state(self) -> bool:
+        """Take the next state; False if the robot is silent for ``REPEAT``."""
+        while (state := self._take()) is None:
             silence = time.monotonic() - self._heard
-            if silence > self._config.stale_limit:
+            left = self._config.stale_limit - silence
+            if left < 0.0:
                 reason = f"no rt/lowstate for {1000 * silence:.0f} ms on {self._where}"
                 raise self._stop(PlantTimeout(reason))
-            self._states.wait(self._config.stale_limit - silence + 0.001)
+            if not self._states.wait(min(REPEAT, left + 0.001)):
+                return False
+        self._state = state
+        return True
 
     def _fall_into_step(self) -> None:
         """Take in what came before a command was heard: from then on a write is a period.

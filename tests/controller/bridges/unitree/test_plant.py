@@ -158,6 +158,26 @@ def test_silence_of_the_robot_damps_it_for_good(robot: Robot, plant: Plant) -> N
     assert robot.is_damped_by(stopped)
 
 
+def test_a_command_that_gets_lost_on_the_way_to_a_waiting_robot_is_sent_again(
+    robot: Robot, plant: Plant
+) -> None:
+    robot.is_alive = False  # in lockstep: silent until it hears the command
+    heard = robot.write
+    losses = iter(range(3))
+
+    def lose_some(data: bytes) -> None:
+        heard(data)
+        robot.is_alive = next(losses, None) is None
+
+    robot.write = lose_some
+    before, tick = len(robot.commands), robot.tick
+    plant.write(PUSH)
+    sent = [command.tobytes() for command in robot.commands[before:]]
+    assert len(sent) == 4
+    assert len(set(sent)) == 1
+    assert robot.tick == tick + 2
+
+
 def test_silence_of_the_controller_damps_the_robot_for_good(robot: Robot, plant: Plant) -> None:
     time.sleep(LONG)
     stopped = len(robot.commands)
