@@ -67,6 +67,20 @@ def flag(name: str, value: bool) -> bool:
     return value
 
 
+def pace(realtime: bool, plant: Plant | None) -> bool:
+    """``realtime``.
+
+    Raises:
+        ConfigError: if it is neither True nor False, or False though ``plant`` needs it.
+    """
+    if not flag("realtime", realtime) and plant is not None and plant.is_live:
+        raise ConfigError(
+            f"{type(plant).__name__} must get commands without a break: give "
+            "GO2Controller(plant=..., realtime=True)"
+        )
+    return realtime
+
+
 def namespace(value: str) -> str:
     """``value``.
 

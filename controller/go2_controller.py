@@ -78,15 +78,17 @@ class GO2Controller:
                 the robot for. Without ``plant`` the simulated robot is built from it, too.
 
         Raises:
-            ConfigError: for a namespace or configuration that is not valid.
+            ConfigError: for a namespace or configuration that is not valid, or without
+                ``realtime`` for a plant that needs it.
             SolverUnavailable: if the configured QP solver is unknown or not installed.
             DescriptionError: if the robot's files are missing, broken, or not a Go2's.
             PlantError: if the plant does not answer.
         """
         self._namespace = arguments.namespace(namespace)
-        realtime, viewer = arguments.flag("realtime", realtime), arguments.flag("viewer", viewer)
+        viewer = arguments.flag("viewer", viewer)
         self._config = arguments.config(config)
         plant = arguments.plant_or_none(plant)
+        realtime = arguments.pace(realtime, plant)
         model = RobotModel(find_description(arguments.path_or_none("urdf", urdf)))
         wbc = WholeBodyController(model, self._config.backend, self._config.wbc)
         self._owns_plant = plant is None

@@ -18,6 +18,11 @@ class Plant(ABC):
     def control_period(self) -> float:
         """Seconds that pass in one ``write``."""
 
+    @property
+    def is_live(self) -> bool:
+        """Whether time also passes between two ``write``, so that commands must not stop."""
+        return False
+
     @abstractmethod
     def read(self) -> RobotState:
         """The newest measured state.

@@ -80,6 +80,19 @@ def test_a_namespace_that_is_not_a_name_is_refused(name: str) -> None:
         GO2Controller(namespace=name, plant=StillPlant())
 
 
+def test_a_plant_whose_time_does_not_wait_is_refused_without_realtime(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    plant = StillPlant()
+    with GO2Controller(plant=plant):
+        pass
+    monkeypatch.setattr(StillPlant, "is_live", True)
+    with pytest.raises(ConfigError, match=r"StillPlant must get commands.*realtime=True"):
+        GO2Controller(plant=plant)
+    with GO2Controller(plant=plant, realtime=True) as go2:
+        assert go2.mode is Mode.LYING
+
+
 def test_a_refused_call_is_the_last_outcome() -> None:
     with GO2Controller(plant=StillPlant()) as go2:
         with pytest.raises(CommandError):

@@ -116,7 +116,7 @@ class UnitreePlant(Plant):
         self._failure: str | None = None
         self._is_closed = False
         self._sending = threading.RLock()
-        self._is_live = False
+        self._is_taken_over = False
         self._state = self._first_state()
         self._require_lying()
         release_sport(bus, self._require_lying, may_lack=interface == LOOPBACK)
@@ -125,7 +125,7 @@ class UnitreePlant(Plant):
 
     def _go_live(self) -> None:
         sys.setswitchinterval(min(sys.getswitchinterval(), SWITCH_INTERVAL))
-        self._is_live = True
+        self._is_taken_over = True
         at_the_end(self.close)
         self._watchdog = threading.Thread(target=self._watch, name="unitree-watchdog", daemon=True)
         self._watchdog.start()
@@ -135,6 +135,11 @@ class UnitreePlant(Plant):
     def control_period(self) -> float:
         """Seconds that pass in one ``write``."""
         return PERIOD
+
+    @property
+    def is_live(self) -> bool:
+        """True: a robot does not wait."""
+        return True
 
     @property
     def bad_states(self) -> int:
@@ -205,7 +210,7 @@ class UnitreePlant(Plant):
         """Damp the robot for good, once it was taken over; returns ``error`` to be raised."""
         with self._sending:
             self._failure = self._failure or str(error)
-            if self._is_live:
+            if self._is_taken_over:
                 self._damp_once()
         return error
 

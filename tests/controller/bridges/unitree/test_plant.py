@@ -11,13 +11,14 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+from controller import GO2Controller
 from controller.bridges.unitree import layout
 from controller.bridges.unitree.checksum import seal
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.guards import GuardConfig
 from controller.bridges.unitree.low_client import low_cmd_message
 from controller.bridges.unitree.low_level import low_state_message
-from go2_wbc.errors import CommandError, PlantError, PlantTimeout
+from go2_wbc.errors import CommandError, ConfigError, PlantError, PlantTimeout
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.state import JointCommand
@@ -185,6 +186,11 @@ def test_silence_of_the_controller_damps_the_robot_for_good(robot: Robot, plant:
     assert robot.is_damped_by(stopped)
     with pytest.raises(PlantError, match="no command for 500 ms"):
         plant.write(PUSH)
+
+
+def test_a_controller_that_would_pause_between_calls_is_refused(plant: Plant) -> None:
+    with pytest.raises(ConfigError, match="UnitreePlant must get commands without a break"):
+        GO2Controller(plant=plant)
 
 
 def test_the_last_words_are_damping_then_nothing(robot: Robot) -> None:
