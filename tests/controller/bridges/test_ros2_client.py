@@ -186,11 +186,18 @@ def test_somebody_else_may_spin_the_node(go2: Any) -> None:
 
     executor = SingleThreadedExecutor()
     executor.add_node(go2)
-    thread = threading.Thread(target=executor.spin, daemon=True)
+    is_over = threading.Event()
+
+    def spin() -> None:
+        while not is_over.is_set():
+            executor.spin_once(timeout_sec=0.1)
+
+    thread = threading.Thread(target=spin, daemon=True)
     thread.start()
     try:
         assert go2.stand()
         assert go2.state() is not None
     finally:
-        executor.shutdown()
+        is_over.set()
         thread.join(5.0)
+        executor.shutdown()
