@@ -16,6 +16,10 @@ if [[ ! -f $header ]]; then
     echo "The SDK on the robot's own CycloneDDS is not tested: apt-get install cyclonedds-dev"
     exit
 fi
+if "$python" -c 'import sys; sys.exit(sys.version_info < (3, 13))'; then
+    echo "The SDK on the robot's own CycloneDDS is not tested: 0.10.2 knows Python up to 3.12"
+    exit
+fi
 library=$(dirname "$(find /usr/lib -name libddsc.so | head -n 1)")
 home=$(mktemp -d)
 trap 'rm -rf "$home"' EXIT
