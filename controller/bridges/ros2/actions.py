@@ -19,8 +19,6 @@ _log = logging.getLogger(__name__)
 
 THREADS = 3
 """One waits for the motion, the others serve cancels and further goals."""
-SPIN_PERIOD = 0.2
-"""Time [s] between two looks whether this is to end."""
 
 
 class MotionActions:
@@ -43,14 +41,13 @@ class MotionActions:
         )
         self._executor = ros.MultiThreadedExecutor(THREADS, context=context)
         self._executor.add_node(self._node)
-        self._is_ending = False
+        self._end = ros.Future()
         self._thread = threading.Thread(target=self._spin, name="go2-actions", daemon=True)
         self._thread.start()
 
     def _spin(self) -> None:
         try:
-            while not self._is_ending:
-                self._executor.spin_once(timeout_sec=SPIN_PERIOD)
+            self._executor.spin_until_future_complete(self._end)
         except Exception as error:  # the robot goes on without the action
             _log.error("the action %s has ended: %s", MOTION_ACTION, error)
 
@@ -106,7 +103,7 @@ class MotionActions:
 
     def close(self) -> None:
         """Stop spinning and release the node; the desk must have answered before."""
-        self._is_ending = True  # an executor that is shut down while it spins fails at times
+        self._end.set_result(None)  # an executor that is shut down while it spins fails at times
         self._thread.join(2.0)
         self._executor.shutdown(timeout_sec=2.0)
         self._server.destroy()

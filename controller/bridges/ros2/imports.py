@@ -72,6 +72,7 @@ ReentrantCallbackGroup = needed("rclpy.callback_groups").ReentrantCallbackGroup
 LoggingSeverity = needed("rclpy.logging").LoggingSeverity
 QoSProfile = needed("rclpy.qos").QoSProfile
 SignalHandlerOptions = needed("rclpy.signals").SignalHandlerOptions
+Future = needed("rclpy.task").Future
 
 Time = needed("builtin_interfaces.msg").Time
 Twist = needed("geometry_msgs.msg").Twist
