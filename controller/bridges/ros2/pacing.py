@@ -24,7 +24,7 @@ class Pacer:
         self.give_ups = 0
 
     def wait(self, meanwhile: Callable[[], None]) -> None:
-        """Sleep until the next period is due; ``meanwhile`` is called between naps."""
+        """Sleep until the next period is due; ``meanwhile`` is called between two naps."""
         self._due += self._period
         now = time.monotonic()
         if now - self._due > LATE:
@@ -32,4 +32,5 @@ class Pacer:
             self.give_ups += 1
         while (left := self._due - time.monotonic()) > 0.0:
             time.sleep(min(left, NAP))
-            meanwhile()
+            if left > NAP:
+                meanwhile()
