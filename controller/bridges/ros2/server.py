@@ -215,13 +215,14 @@ class Door:
         service, act = next(self._triggers)
         for call in service.take():
             act(call)
-        self._take_messages()
+        self._take_orders()
+        self._take_velocities()
         self._velocity.expire()
         self._states.publish_due()
 
     def _listen(self) -> None:
         began = time.thread_time()
-        self._guarded(self._take_messages)
+        self._guarded(self._take_orders)
         self._cpu += time.thread_time() - began
 
     def _guarded(self, act: Callable[[], object]) -> None:
@@ -231,10 +232,12 @@ class Door:
             self._errors += 1
             self._throttle.warn(type(error).__name__, f"{type(error).__name__}: {error}")
 
-    def _take_messages(self) -> None:
+    def _take_orders(self) -> None:
         if self._command is not None:
             for call in self._command.take():
                 self._order(call.request.command, call)
+
+    def _take_velocities(self) -> None:
         is_busy = self._desk.job is not None
         for twist in self._cmd_vel.take():
             linear, turn = twist.linear, twist.angular.z
