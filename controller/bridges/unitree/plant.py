@@ -121,9 +121,9 @@ class UnitreePlant(Plant):
         self._require_lying()
         release_sport(bus, self._require_lying, may_lack=interface == LOOPBACK)
         self._require_lying()
-        self._go_live()
+        self._take_over()
 
-    def _go_live(self) -> None:
+    def _take_over(self) -> None:
         sys.setswitchinterval(min(sys.getswitchinterval(), SWITCH_INTERVAL))
         self._is_taken_over = True
         at_the_end(self.close)
