@@ -29,7 +29,7 @@ from go2_wbc.errors import ModeError, StanceMismatch
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionPlanner
-from go2_wbc.reference import MotionPlan, Stance, TrackedPoint
+from go2_wbc.reference import MotionPlan, Posture, TrackedPoint
 from motions.compiler import CompiledPlan
 from motions.postures import SPLAYED_JOINTS, TUCKED_JOINTS, lie_down, rise, sit_down
 
@@ -99,7 +99,7 @@ class Pilot:
             self.rest()
         if mode in (Mode.LYING, Mode.DAMPED) or self.is_on_the_ground:
             self._tuck()
-        entry = {Mode.SITTING: Stance.SIT, Mode.LYING: Stance.LIE}.get(mode, Stance.STAND)
+        entry = {Mode.SITTING: Posture.SIT, Mode.LYING: Posture.LIE}.get(mode, Posture.STAND)
         duration = 0.4 if mode in (Mode.STANDING, Mode.WALKING) else 1.2
         self._take_posture("stand", lambda pose: rise(pose, entry, duration), TrackedPoint.COM)
         self._executor.settle("stand", is_standing)
@@ -282,10 +282,10 @@ class Pilot:
             self._executor.until(finished, plan.duration + 1.0, plan.name)
             if self._is_recalled:
                 raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
-            self._executor.settle(plan.name, _CHECK_OF_STANCE[plan.exit])
+            self._executor.settle(plan.name, _CHECK_OF_POSTURE[plan.exit])
         finally:
             self.playing = None
-        self._mode = _MODE_OF_STANCE[plan.exit]
+        self._mode = _MODE_OF_POSTURE[plan.exit]
         figures = {**self._executor.figures(), **behaviour.deviation.figures()}
         if not behaviour.deviation.is_small:
             raise Aborted(f"{plan.name} went another way: {listed(figures)}", figures)
@@ -299,14 +299,14 @@ class Pilot:
 
     def _meet_entry(self, plan: MotionPlan) -> None:
         mode = self.mode
-        if mode is Mode.WALKING and plan.entry is Stance.STAND:
+        if mode is Mode.WALKING and plan.entry is Posture.STAND:
             self.square_up()
             mode = self.mode
-        if _MODE_OF_STANCE[plan.entry] is not mode:
+        if _MODE_OF_POSTURE[plan.entry] is not mode:
             raise StanceMismatch(
                 f"motion {plan.name!r} starts from {plan.entry.value}, the robot is {mode.value}"
             )
-        if plan.entry is Stance.STAND:
+        if plan.entry is Posture.STAND:
             self.square_up()
 
     def high_five(self, plan: CompiledPlan, leg: Leg, height: float) -> Figures:
@@ -388,9 +388,9 @@ class Pilot:
         return math.isfinite(height) and height < LYING_HEIGHT
 
 
-_MODE_OF_STANCE = {
-    Stance.LIE: Mode.LYING,
-    Stance.SIT: Mode.SITTING,
-    Stance.STAND: Mode.STANDING,
+_MODE_OF_POSTURE = {
+    Posture.LIE: Mode.LYING,
+    Posture.SIT: Mode.SITTING,
+    Posture.STAND: Mode.STANDING,
 }
-_CHECK_OF_STANCE = {Stance.LIE: is_lying, Stance.SIT: is_sitting, Stance.STAND: is_standing}
+_CHECK_OF_POSTURE = {Posture.LIE: is_lying, Posture.SIT: is_sitting, Posture.STAND: is_standing}

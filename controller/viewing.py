@@ -6,7 +6,7 @@ import logging
 
 from go2_wbc.errors import PlantError
 from go2_wbc.plant import MujocoPlant, Plant
-from go2_wbc.plant.viewer import PlantViewer
+from go2_wbc.plant.mujoco.viewer import PlantViewer
 
 _log = logging.getLogger(__name__)
 

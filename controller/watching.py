@@ -16,7 +16,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions import FeasibilityReport, Finding, Rehearsal
 from motions.feasibility import Series
-from viz.screening import CENTRE_OF_MASS, MarginCurve, Remark, Screening, Verdict
+from viz.content import CENTRE_OF_MASS, MarginCurve, Remark, Screening, Verdict
 
 _AFTERWARDS = 1.0
 """How long [s] a run is shown after the end of its motion."""

@@ -17,12 +17,16 @@ from jaxtyping import Bool, Float
 from go2_wbc.robot.rotations import yaw_rotation
 
 
-class Stance(Enum):
+class Posture(Enum):
     """Resting postures between which motions lead."""
 
     LIE = "lie"
     SIT = "sit"
     STAND = "stand"
+
+
+Stance = Posture
+"""The former name of ``Posture``, kept for scripts that use it."""
 
 
 class LegTask(IntEnum):
@@ -151,8 +155,8 @@ class MotionPlan(ABC):
     """
 
     name: str
-    entry: Stance
-    exit: Stance
+    entry: Posture
+    exit: Posture
     duration: float
 
     @abstractmethod

@@ -1,10 +1,22 @@
 """Motions: written in Python, checked without simulation, played by ``GO2Controller``."""
 
-from motions.authoring import Choice, Motion, Range, motion
-from motions.compiler import CompiledPlan, compile_timeline
-from motions.feasibility import FeasibilityChecker, FeasibilityReport, Finding, Rehearsal, check
-from motions.registry import find_motion, load_file, load_motion, motion_names
-from motions.timeline import Timeline, deg
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from motions.authoring import Choice, Motion, Range, motion
+    from motions.compiler import CompiledPlan, compile_timeline
+    from motions.feasibility import (
+        FeasibilityChecker,
+        FeasibilityReport,
+        Finding,
+        Rehearsal,
+        check,
+    )
+    from motions.registry import find_motion, load_file, load_motion, motion_names
+    from motions.timeline import Timeline, deg
 
 __all__ = [
     "Choice",
@@ -25,3 +37,20 @@ __all__ = [
     "motion",
     "motion_names",
 ]
+
+_HOMES = {
+    "authoring": ("Choice", "Motion", "Range", "motion"),
+    "compiler": ("CompiledPlan", "compile_timeline"),
+    "feasibility": ("FeasibilityChecker", "FeasibilityReport", "Finding", "Rehearsal", "check"),
+    "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
+    "timeline": ("Timeline", "deg"),
+}
+"""The module of every public name."""
+
+
+def __getattr__(name: str) -> object:
+    """Import the heavy parts when first asked for: the pytest plugin lies in this package."""
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f"motions.{home}"), name)
+    raise AttributeError(f"module 'motions' has no attribute {name!r}")

@@ -19,7 +19,7 @@ from go2_wbc.contacts import ContactSchedule
 from go2_wbc.curves import CurvePoint
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS
-from go2_wbc.reference import LegTask, MotionPlan, Reference, Stance, TrackedPoint
+from go2_wbc.reference import LegTask, MotionPlan, Posture, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from motions.balance import Balancer, Unbalanced
 from motions.keys import Mark
@@ -58,8 +58,8 @@ class CompiledPlan(MotionPlan):
     """
 
     name: str
-    entry: Stance
-    exit: Stance
+    entry: Posture
+    exit: Posture
     curves: CubicSpline
     contacts: ContactSchedule
     ramp: float

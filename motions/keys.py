@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from go2_wbc.curves import Ease
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Stance
+from go2_wbc.reference import Posture
 
 BODY_CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw")
 """What of the trunk can move: places [m] and angles [rad], as offsets from the posture."""
@@ -103,7 +103,7 @@ class BodyKey(Key):
 class PostureKey(Key):
     """The trunk moves to another resting posture, from which offsets count from then on."""
 
-    stance: Stance
+    stance: Posture
 
     @property
     def track(self) -> str:

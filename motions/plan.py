@@ -12,8 +12,8 @@ from go2_wbc.reference import (
     BodyTarget,
     LegTask,
     MotionPlan,
+    Posture,
     Reference,
-    Stance,
     TrackedPoint,
 )
 from go2_wbc.robot.rotations import angular_velocity_from_rpy, rotation_from_rpy
@@ -38,8 +38,8 @@ class KeyframePlan(MotionPlan):
     """
 
     name: str
-    entry: Stance
-    exit: Stance
+    entry: Posture
+    exit: Posture
     point: TrackedPoint
     body: Curve
     joints: Curve

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from go2_wbc.contacts import standing
 from go2_wbc.curves import Curve, keyframes
-from go2_wbc.reference import Stance, TrackedPoint
+from go2_wbc.reference import Posture, TrackedPoint
 from motions.plan import KeyframePlan
 
 STAND_HEIGHT = 0.29
@@ -30,10 +30,10 @@ SPLAYED_JOINTS = TUCKED_JOINTS + np.tile([0.3, 0.0, 0.0, -0.3, 0.0, 0.0], 2)
 """Joint angles [rad] with the feet beside the hips, so that the folded legs carry nothing."""
 
 
-def rise(start: Float[np.ndarray, "6"], entry: Stance, duration: float = 1.2) -> KeyframePlan:
+def rise(start: Float[np.ndarray, "6"], entry: Posture, duration: float = 1.2) -> KeyframePlan:
     """From a CoM pose (6,) to standing."""
     return _posture_plan(
-        "rise", entry, Stance.STAND, TrackedPoint.COM, (start, STAND_POSE), duration
+        "rise", entry, Posture.STAND, TrackedPoint.COM, (start, STAND_POSE), duration
     )
 
 
@@ -42,32 +42,32 @@ def lean(
 ) -> KeyframePlan:
     """From a standing CoM pose (6,) to standing with the trunk at roll, pitch, yaw [rad]."""
     poses = (start, np.concatenate([STAND_POSE[:3], rpy]))
-    return _posture_plan("lean", Stance.STAND, Stance.STAND, TrackedPoint.COM, poses, duration)
+    return _posture_plan("lean", Posture.STAND, Posture.STAND, TrackedPoint.COM, poses, duration)
 
 
 def sit_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> KeyframePlan:
     """From a standing base pose (6,) to the dog-like sit."""
     poses = (start, SIT_POSE)
-    return _posture_plan("sit", Stance.STAND, Stance.SIT, TrackedPoint.BASE, poses, duration)
+    return _posture_plan("sit", Posture.STAND, Posture.SIT, TrackedPoint.BASE, poses, duration)
 
 
 def lie_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> KeyframePlan:
     """From a standing base pose (6,) down to the ground."""
     poses = (start, LIE_POSE)
-    return _posture_plan("lie down", Stance.STAND, Stance.LIE, TrackedPoint.BASE, poses, duration)
+    return _posture_plan("lie down", Posture.STAND, Posture.LIE, TrackedPoint.BASE, poses, duration)
 
 
 def _posture_plan(
     name: str,
-    entry: Stance,
-    exit_stance: Stance,
+    entry: Posture,
+    exit_posture: Posture,
     point: TrackedPoint,
     poses: Sequence[Float[np.ndarray, "6"]],
     duration: float,
 ) -> KeyframePlan:
     times = np.linspace(0.0, duration, len(poses)).tolist()
     return KeyframePlan(
-        name, entry, exit_stance, point, keyframes(times, poses), _no_joints(), standing()
+        name, entry, exit_posture, point, keyframes(times, poses), _no_joints(), standing()
     )
 
 

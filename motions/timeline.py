@@ -21,7 +21,7 @@ from typing import TypeVar
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Stance
+from go2_wbc.reference import Posture
 from motions.keys import (
     BODY_CHANNELS,
     BodyKey,
@@ -68,8 +68,8 @@ class Timeline:
         floor: the cursor does not fall behind this time [s] after ``also``.
     """
 
-    entry: Stance = Stance.STAND
-    exit: Stance = Stance.STAND
+    entry: Posture = Posture.STAND
+    exit: Posture = Posture.STAND
     name: str = field(default="motion", kw_only=True)
     balance: bool = field(default=True, kw_only=True)
     shift_time: float = field(default=SHIFT_TIME, kw_only=True)
@@ -82,8 +82,8 @@ class Timeline:
     def __post_init__(self) -> None:
         """Raise TimelineError for stances that are none, or a track that moves twice at once."""
         for name in ("entry", "exit"):
-            if not isinstance(getattr(self, name), Stance):
-                valid = ", ".join(f"Stance.{stance.name}" for stance in Stance)
+            if not isinstance(getattr(self, name), Posture):
+                valid = ", ".join(f"Posture.{stance.name}" for stance in Posture)
                 raise TimelineError(f"{name} must be one of {valid}, got {getattr(self, name)!r}")
         _positive("shift_time", self.shift_time)
         _require_no_overlap(self.keys)
@@ -118,10 +118,10 @@ class Timeline:
         ]
         return self._longer(keys, end)
 
-    def posture(self, stance: Stance | str, *, over: float) -> Timeline:
+    def posture(self, stance: Posture | str, *, over: float) -> Timeline:
         """Move the trunk to another resting posture, on four feet; offsets count from there."""
-        known = {item.value: item for item in Stance}
-        which = stance if isinstance(stance, Stance) else known.get(stance)
+        known = {item.value: item for item in Posture}
+        which = stance if isinstance(stance, Posture) else known.get(stance)
         if which is None:
             raise TimelineError(unknown_name("posture", str(stance), known))
         start, end = self._span(over)

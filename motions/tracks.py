@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.curves import Ease
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.reference import Stance
+from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import quaternion_from_rpy, rotation_from_rpy
@@ -46,7 +46,7 @@ class LegPath:
 
 
 def body_path(
-    timeline: Timeline, home: Mapping[Stance, Float[np.ndarray, "6"]], times: Times
+    timeline: Timeline, home: Mapping[Posture, Float[np.ndarray, "6"]], times: Times
 ) -> Poses:
     """Base position [m] and roll, pitch, yaw [rad] at ``times``, without the shift for balance."""
     path = np.tile(home[timeline.entry], (len(times), 1))
@@ -161,7 +161,7 @@ def configuration(
     return np.concatenate([pose[:3], quaternion_from_rpy(roll, pitch, yaw), joints])
 
 
-def home_poses(model: RobotModel) -> dict[Stance, Float[np.ndarray, "6"]]:
+def home_poses(model: RobotModel) -> dict[Posture, Float[np.ndarray, "6"]]:
     """Pose of the base in every resting posture, on four feet below the hips."""
     stand = STAND_POSE.copy()
     tracks = LegTracks(model, STAND_POSE)
@@ -170,4 +170,4 @@ def home_poses(model: RobotModel) -> dict[Stance, Float[np.ndarray, "6"]]:
         joints = [tracks.path(still, leg, start, stand[None]).q[0] for leg in LEGS]
         com, _ = model.forward_kinematics(configuration(stand, np.concatenate(joints)))
         stand[:3] += STAND_POSE[:3] - com
-    return {Stance.STAND: stand, Stance.SIT: SIT_POSE, Stance.LIE: LIE_POSE}
+    return {Posture.STAND: stand, Posture.SIT: SIT_POSE, Posture.LIE: LIE_POSE}

@@ -21,12 +21,13 @@ SIBLINGS: dict[str, frozenset[str]] = {
     "motions": frozenset({"go2_wbc"}),
     "viz": frozenset({"go2_wbc"}),
     "controller": frozenset({"go2_wbc", "motions", "viz"}),
+    "benchmarks": frozenset({"go2_wbc", "motions", "viz", "controller"}),
 }
 """What each package may import of ours, besides itself."""
 
 LAYERS: tuple[frozenset[str], ...] = (
     frozenset({"errors"}),
-    frozenset({"legs", "geometry", "validation"}),
+    frozenset({"legs", "geometry", "validation", "files"}),
     frozenset({"curves", "contacts", "robot", "recording"}),
     frozenset({"reference"}),
     frozenset({"planning", "wbc", "plant"}),
@@ -38,8 +39,8 @@ LAYERS: tuple[frozenset[str], ...] = (
 FENCES: dict[str, tuple[str, ...]] = {
     "mujoco": (
         "go2_wbc/plant/mujoco_*.py",
-        "go2_wbc/plant/agreement.py",
-        "go2_wbc/plant/viewer.py",
+        "benchmarks/agreement.py",
+        "go2_wbc/plant/mujoco/viewer.py",
     ),
     "meshcat": ("viz/*",),
     "placo": ("go2_wbc/wbc/placo_backend.py", "go2_wbc/robot/inverse_kinematics.py"),
@@ -57,8 +58,7 @@ OPTIONAL = frozenset({"rclpy", "cyclonedds", "pytest"})
 PRINTERS = (
     "controller/cli/*",
     "controller/demo*",
-    "controller/bench/*",
-    "controller/examples/*",
+    "benchmarks/*",
 )
 """Files that talk to a person and may print."""
 

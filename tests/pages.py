@@ -95,7 +95,7 @@ def run_command(words: Sequence[str], folder: Path) -> subprocess.CompletedProce
     """Run ``go2-wbc``, ``pytest`` or ``python`` of this checkout, installed or not."""
     program = {
         "go2-wbc": ["-m", "controller.cli.main"],
-        "pytest": ["-m", "pytest", "-p", "controller.pytest_plugin"],
+        "pytest": ["-m", "pytest", "-p", "motions.pytest_plugin"],
         "python": [],
     }[words[0]]
     return _run([*program, *words[1:]], folder)

@@ -184,8 +184,8 @@ def test_a_library_outside_its_fence_is_caught(tmp_path: Path, path: str, statem
 
 def test_a_library_inside_its_fence_is_not_reported(tmp_path: Path) -> None:
     files = {
-        "go2_wbc/plant/mujoco_plant.py": "import mujoco",
-        "go2_wbc/plant/viewer.py": "import mujoco.viewer",
+        "go2_wbc/plant/mujoco/plant.py": "import mujoco",
+        "go2_wbc/plant/mujoco/viewer.py": "import mujoco.viewer",
         "viz/scene/meshes.py": "import meshcat",
         "controller/bridges/ros2.py": "import rclpy",
     }

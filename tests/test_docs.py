@@ -15,7 +15,7 @@ import pytest
 import motions
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError
-from go2_wbc.reference import Stance
+from go2_wbc.reference import Posture
 from motions import FeasibilityChecker, Timeline, check, compile_timeline, load_motion
 from motions.feasibility import FeasibilityLimits
 from motions.keys import BODY_CHANNELS, Frame
@@ -152,7 +152,7 @@ def test_the_reference_names_every_frame_and_posture() -> None:
     text = page(LANGUAGE)
     for frame in (Frame.GROUND, Frame.BODY):
         assert f'frame="{frame.value}"' in text
-    for stance in Stance:
+    for stance in Posture:
         assert f'"{stance.value}"' in text
 
 
@@ -162,7 +162,7 @@ ERRORS = _ERROR.findall(page(LANGUAGE).split("## Errors")[1])
 
 @pytest.mark.parametrize(("code", "message"), ERRORS, ids=[code for code, _ in ERRORS])
 def test_an_error_of_the_reference_reads_as_it_says(code: str, message: str) -> None:
-    names = {"Timeline": Timeline, "Stance": Stance, "check": check, "load_motion": load_motion}
+    names = {"Timeline": Timeline, "Posture": Posture, "check": check, "load_motion": load_motion}
     with pytest.raises(Go2WbcError) as caught:
         eval(code, names)
     assert str(caught.value) == message

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from viz.animation import ANIMATION_SUFFIXES, export_animation
-from viz.html_page import HTML_SUFFIXES, export_html
-from viz.margin_plot import PLOT_SUFFIXES, export_plot
-from viz.screening import MarginCurve, Remark, Screening, Verdict
-from viz.still import export_filmstrip
+from viz.content import MarginCurve, Remark, Screening, Verdict
+from viz.render.animation import ANIMATION_SUFFIXES, export_animation
+from viz.render.margin_plot import PLOT_SUFFIXES, export_plot
+from viz.render.still import export_filmstrip
+from viz.replay.html_page import HTML_SUFFIXES, export_html
 
 __all__ = [
     "ANIMATION_SUFFIXES",

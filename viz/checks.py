@@ -6,7 +6,7 @@ import numpy as np
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
-from viz.screening import Screening
+from viz.content import Screening
 
 _LEAST_SAMPLES = 2
 

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from controller.behaviours.base import Behaviour
 from controller.behaviours.recall import Recall
 from go2_wbc.planning.correction import SteadyStateCorrection, tracked_position
-from go2_wbc.reference import Anchor, LegTask, MotionPlan, Reference, Stance, TrackedPoint
+from go2_wbc.reference import Anchor, LegTask, MotionPlan, Posture, Reference, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, wrap_angle, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -146,4 +146,4 @@ class ChangePosture(PlayPlan):
         position = yaw_rotation(anchor.yaw).T @ (p - anchor.p_world)
         pose = np.array([*position, roll, pitch, wrap_angle(float(yaw) - anchor.yaw)])
         self.plan = self._make_plan(pose)
-        self.may_lie = bool(pose[2] < LOW) or self.plan.exit is Stance.LIE
+        self.may_lie = bool(pose[2] < LOW) or self.plan.exit is Posture.LIE

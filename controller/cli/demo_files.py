@@ -15,9 +15,9 @@ from jaxtyping import Int
 
 from controller.demo.report import DemoReport
 from go2_wbc.errors import ConfigError
+from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording
 from viz import export_animation, export_filmstrip, export_html
-from viz.files import checked_output, write_atomically
 
 TITLE = "Go2: stand, sit, walk, turn, high five"
 

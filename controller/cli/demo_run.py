@@ -17,7 +17,7 @@ from controller.go2_controller import GO2Controller
 from go2_wbc.config import Config, load_config
 from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.viewer import display_problem
+from go2_wbc.plant.mujoco.viewer import display_problem
 from go2_wbc.recording import Recording
 
 START_NOISE = 0.05

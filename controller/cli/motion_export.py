@@ -44,10 +44,10 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compile, sample, write."""
+    from go2_wbc.files import checked_output, write_atomically
     from go2_wbc.robot.model import RobotModel
     from motions import compile_timeline
     from motions.trajectory import Trajectory, trajectory_of
-    from viz.files import checked_output, write_atomically
 
     target = checked_output(args.out, [".csv", ".npz"])
     lines = timelines([args.motion], args.values)

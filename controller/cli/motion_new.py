@@ -51,7 +51,7 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the file; never over another one."""
-    from viz.files import checked_output, write_atomically
+    from go2_wbc.files import checked_output, write_atomically
 
     if not args.name.isidentifier() or keyword.iskeyword(args.name):
         raise CommandError(f"NAME must be a Python name such as my_motion, got {args.name!r}")

@@ -16,7 +16,8 @@ from controller.cli.motion_source import MotionSource
 from controller.cli.progress import ProgressLine
 from controller.watching import planned
 from go2_wbc.errors import Go2WbcError
-from go2_wbc.plant.viewer import display_problem
+from go2_wbc.files import checked_output
+from go2_wbc.plant.mujoco.viewer import display_problem
 from motions import FeasibilityChecker, FeasibilityReport, Rehearsal
 from viz import (
     ANIMATION_SUFFIXES,
@@ -26,8 +27,7 @@ from viz import (
     export_html,
     export_plot,
 )
-from viz.files import checked_output
-from viz.preview_server import PreviewServer
+from viz.replay.preview_server import PreviewServer
 
 POLL_PERIOD = 0.05
 """Time [s] between two looks at the file."""

@@ -14,8 +14,8 @@ from controller.cli.progress import ProgressLine
 from go2_wbc.errors import PlantError, StanceMismatch
 
 if TYPE_CHECKING:
-    from controller.bench.motion_runs import MotionRun
-    from controller.bench.trials import Subject
+    from benchmarks.motion_runs import MotionRun
+    from benchmarks.trials import Subject
 
 TELL_EVERY = 50
 """Ticks between two looks at the progress line."""
@@ -50,14 +50,14 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check, play, measure, print."""
-    from controller.bench.motion_runs import run_motion
-    from controller.bench.trials import Failed, Subject
+    from benchmarks.motion_runs import run_motion
+    from benchmarks.trials import Failed, Subject
     from controller.watching import performed
+    from go2_wbc.files import checked_output
     from go2_wbc.plant import MujocoPlant
-    from go2_wbc.reference import Stance
+    from go2_wbc.reference import Posture
     from motions import FeasibilityChecker
     from viz import HTML_SUFFIXES, export_html
-    from viz.files import checked_output
 
     timeline = the_motion(args.motion, args.values)
     target = None if args.html is None else checked_output(args.html, HTML_SUFFIXES)
@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
         Subject(MujocoPlant(friction=args.friction)) as robot,
     ):
         robot.witness.on_tick = _teller(line, robot, plan.name, plan.duration)
-        starts = {Stance.STAND: robot.go2.stand, Stance.SIT: robot.go2.sit}
+        starts = {Posture.STAND: robot.go2.stand, Posture.SIT: robot.go2.sit}
         if plan.entry not in starts:
             raise StanceMismatch(f"{plan.name} starts from {plan.entry.value}: cannot be run")
         try:

@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from go2_wbc.plant.base import Plant
-from go2_wbc.plant.mujoco_plant import MujocoPlant
+from go2_wbc.plant.mujoco.plant import MujocoPlant
 
 __all__ = ["MujocoPlant", "Plant"]

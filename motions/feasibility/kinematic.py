@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.legs import JOINT_NAMES, LEGS
-from go2_wbc.reference import MotionPlan, Stance
+from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
 from motions.feasibility.limits import FeasibilityLimits
@@ -119,7 +119,7 @@ def ends(
         off = pose - home[stance]
         values += [float(np.abs(off[:3]).max()), float(np.abs(off[3:]).max())]
         values.append(float(np.abs(motion.v[row]).max()))
-    if plan.entry is Stance.LIE or not motion.stance[0].all():
+    if plan.entry is Posture.LIE or not motion.stance[0].all():
         values[0] = np.inf
     if not motion.stance[-1].all():
         values[3] = np.inf

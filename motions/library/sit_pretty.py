@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from go2_wbc.reference import Stance
+from go2_wbc.reference import Posture
 from motions.authoring import Choice, motion
 from motions.timeline import Timeline, deg
 
@@ -14,13 +14,13 @@ def sit_pretty(side: Annotated[str, Choice("left", "right")] = "right") -> Timel
     """Sit pretty: sit down like a dog, tilt the head to one side and the other, stand up again."""
     line = (
         Timeline()
-        .posture(Stance.SIT, over=1.8)
+        .posture(Posture.SIT, over=1.8)
         .hold(0.4)
         .body(roll=deg(6.0), over=0.9)
         .hold(0.6)
         .body(roll=deg(-6.0), pitch=deg(-4.0), over=1.2)
         .hold(0.6)
         .home(over=0.9)
-        .posture(Stance.STAND, over=1.6)
+        .posture(Posture.STAND, over=1.6)
     )
     return line if side == "right" else line.mirror()

@@ -17,7 +17,7 @@ from controller.cli.motion_source import MotionSource
 from go2_wbc.errors import CommandError
 from tests.live_preview import BROKEN, GOOD, TOO_HIGH, LivePreview
 from tests.viz.page_reader import read_data
-from viz.html_page import PAGE_LIMIT
+from viz.replay.html_page import PAGE_LIMIT
 
 Output = pytest.CaptureFixture[str]
 

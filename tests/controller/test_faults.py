@@ -30,7 +30,7 @@ from tests.controller.plants import (
     in_thread,
     is_limp,
 )
-from tests.plant.contract import PlantContract
+from tests.go2_wbc.plant.contract import PlantContract
 
 # A share of the motors' torque with which the legs cannot carry the trunk.
 FEEBLE = 0.05

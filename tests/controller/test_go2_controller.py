@@ -21,8 +21,8 @@ from tests.controller.plants import (
     PERIOD,
     WatchedPlant,
 )
+from tests.go2_wbc.plant.contract import same
 from tests.motions.doctored import with_joint_beyond_its_limit
-from tests.plant.contract import same
 
 # What the errands promise.
 DISTANCE_TOLERANCE = 0.02

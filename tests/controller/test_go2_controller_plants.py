@@ -11,7 +11,7 @@ import pytest
 from controller import GO2Controller, Mode
 from go2_wbc.errors import ClosedError, PlantError
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.mujoco_model import JointDynamics, build_spec
+from go2_wbc.plant.mujoco.model import JointDynamics, build_spec
 from go2_wbc.robot.description import find_description
 from tests.controller.plants import (
     HANG_GUARD,

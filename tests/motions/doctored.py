@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from go2_wbc.legs import Leg
-from go2_wbc.reference import MotionPlan, Reference, Stance
+from go2_wbc.reference import MotionPlan, Posture, Reference
 from motions import CompiledPlan
 
 # rad; beyond the upper limit of a calf, -0.838.
@@ -32,11 +32,11 @@ class DoctoredPlan(MotionPlan):
         return self.inner.name
 
     @property
-    def entry(self) -> Stance:  # type: ignore[override]
+    def entry(self) -> Posture:  # type: ignore[override]
         return self.inner.entry
 
     @property
-    def exit(self) -> Stance:  # type: ignore[override]
+    def exit(self) -> Posture:  # type: ignore[override]
         return self.inner.exit
 
     @property

@@ -15,7 +15,7 @@ import numpy as np
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.legs import LEGS
-from go2_wbc.reference import Stance
+from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, load_motion, motion_names
 from motions.keys import BodyKey, Frame, LegKey, LegTarget, ShiftKey
@@ -146,7 +146,7 @@ def _jumping(line: Timeline, rng: np.random.Generator) -> Timeline | None:
 
 def _mislabelled(line: Timeline, rng: np.random.Generator) -> Timeline | None:
     """It says that it starts or ends in another posture."""
-    others = [stance for stance in Stance if stance is not line.exit]
+    others = [stance for stance in Posture if stance is not line.exit]
     return replace(line, exit=others[int(rng.integers(len(others)))])
 
 
@@ -224,7 +224,7 @@ def _beyond(joints: np.ndarray, model: RobotModel) -> bool:
 
 def _ends_elsewhere(plan: CompiledPlan, values: np.ndarray) -> bool:
     sits_or_lies = bool(values[-1, 2] < 0.24)
-    if sits_or_lies is not (plan.exit is not Stance.STAND):
+    if sits_or_lies is not (plan.exit is not Posture.STAND):
         return True
     start, end = values[0, :6], values[-1, :6]
     return plan.entry is plan.exit and bool(np.abs(end - start).max() > AWAY)

@@ -9,7 +9,7 @@ import pytest
 
 from go2_wbc.errors import CommandError, MotionInfeasible, TimelineError
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Stance
+from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg, load_motion
 from motions.feasibility import FeasibilityReport
@@ -172,8 +172,8 @@ def test_a_motion_that_starts_lying_or_ends_elsewhere_is_refused(
     checker: FeasibilityChecker,
 ) -> None:
     for line in (
-        Timeline(entry=Stance.LIE).body(z=0.0, roll=0.01, over=1.0),
-        Timeline(exit=Stance.SIT).body(z=-0.05, over=1.0).home(over=1.0),
+        Timeline(entry=Posture.LIE).body(z=0.0, roll=0.01, over=1.0),
+        Timeline(exit=Posture.SIT).body(z=-0.05, over=1.0).home(over=1.0),
     ):
         assert "entry and exit" in failed(checker.check(line))
 

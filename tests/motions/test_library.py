@@ -7,7 +7,7 @@ import pytest
 
 from go2_wbc.errors import CommandError, TimelineError
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Stance
+from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import (
     FeasibilityChecker,
@@ -132,7 +132,7 @@ def test_the_paw_is_held_for_the_time_asked_for(model: RobotModel, hold: float) 
     assert end - start == pytest.approx(hold)
     joints = [plan.at(float(t)).q_joints for t in np.linspace(start, end, 9)]
     assert np.ptp(joints, axis=0).max() < 1e-3  # rad; the spline swings a little about a hold
-    assert (plan.entry, plan.exit) == (Stance.STAND, Stance.STAND)
+    assert (plan.entry, plan.exit) == (Posture.STAND, Posture.STAND)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from go2_wbc.reference import MotionPlan, Stance
+from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
 from motions.postures import LIE_POSE, SIT_POSE, STAND_POSE, lie_down, rise, sit_down
@@ -15,16 +15,16 @@ from motions.postures import LIE_POSE, SIT_POSE, STAND_POSE, lie_down, rise, sit
 # m; with 3 cm the leg's determinant is a third of that of a leg that still moves smoothly.
 LEAST_DROP = 0.03
 START = np.array([0.02, -0.01, 0.25, 0.05, -0.1, 0.2])
-WAYS: list[tuple[Callable[[np.ndarray], MotionPlan], np.ndarray, Stance]] = [
-    (lambda pose: rise(pose, Stance.LIE), STAND_POSE, Stance.STAND),
-    (sit_down, SIT_POSE, Stance.SIT),
-    (lie_down, LIE_POSE, Stance.LIE),
+WAYS: list[tuple[Callable[[np.ndarray], MotionPlan], np.ndarray, Posture]] = [
+    (lambda pose: rise(pose, Posture.LIE), STAND_POSE, Posture.STAND),
+    (sit_down, SIT_POSE, Posture.SIT),
+    (lie_down, LIE_POSE, Posture.LIE),
 ]
 
 
 @pytest.mark.parametrize(("make", "goal", "stance"), WAYS)
 def test_a_way_leads_from_the_measured_pose_to_its_posture_at_rest_on_four_feet(
-    make: Callable[[np.ndarray], MotionPlan], goal: np.ndarray, stance: Stance
+    make: Callable[[np.ndarray], MotionPlan], goal: np.ndarray, stance: Posture
 ) -> None:
     plan = make(START)
     first, last = plan.at(0.0), plan.at(plan.duration)
@@ -37,7 +37,7 @@ def test_a_way_leads_from_the_measured_pose_to_its_posture_at_rest_on_four_feet(
 
 @pytest.mark.parametrize(("make", "goal", "stance"), WAYS)
 def test_a_way_does_not_overshoot(
-    make: Callable[[np.ndarray], MotionPlan], goal: np.ndarray, stance: Stance
+    make: Callable[[np.ndarray], MotionPlan], goal: np.ndarray, stance: Posture
 ) -> None:
     plan = make(START)
     assert plan.exit is stance
@@ -60,5 +60,5 @@ def test_a_sitting_robot_keeps_its_rear_feet_below_their_hips_axes() -> None:
 
 
 def test_the_stance_in_which_a_rise_starts_is_the_one_that_was_given() -> None:
-    for stance in Stance:
+    for stance in Posture:
         assert rise(START, stance).entry is stance

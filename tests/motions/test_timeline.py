@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from go2_wbc.errors import TimelineError
 from go2_wbc.geometry import support_margin
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Stance
+from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, deg
@@ -22,7 +22,7 @@ from motions.timeline import SHIFT_TIME
 from motions.tracks import home_poses
 
 MODEL = RobotModel()
-HOME = home_poses(MODEL)[Stance.STAND]
+HOME = home_poses(MODEL)[Posture.STAND]
 EXACT = 1e-9
 NEAR = 1e-6  # m, rad; of a spline through samples, at a sample
 
@@ -142,8 +142,8 @@ def test_a_place_out_of_reach_is_a_problem_of_the_plan_and_no_near_miss() -> Non
 
 
 def test_postures_join_stand_and_sit() -> None:
-    line = Timeline(exit=Stance.SIT).posture("sit", over=1.5)
-    up = Timeline(entry=Stance.SIT).posture("stand", over=1.5)
+    line = Timeline(exit=Posture.SIT).posture("sit", over=1.5)
+    up = Timeline(entry=Posture.SIT).posture("stand", over=1.5)
     value, _, _ = plan_of(line.then(up))._curves_at(1.5)
     assert value[4] == pytest.approx(deg(-38.0), abs=NEAR)
     value, _, _ = plan_of(line.then(up))._curves_at(3.0)
@@ -182,7 +182,7 @@ NOD = Timeline().body(pitch=0.1, over=0.5)
         (lambda: NOD.then(NOD), "needs motions that end at home.*away: body pitch"),
         (lambda: NOD.repeat(0), "whole number of 1 or more, got 0"),
         (lambda: NOD.repeat(2), "needs motions that end at home"),
-        (lambda: NOD.home(over=1.0).then(Timeline(entry=Stance.SIT)), "this ends in stand"),
+        (lambda: NOD.home(over=1.0).then(Timeline(entry=Posture.SIT)), "this ends in stand"),
         (lambda: compile_timeline(Timeline(), MODEL), "motion 'motion' is empty"),
     ],
 )

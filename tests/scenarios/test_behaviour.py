@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import pytest
 
-from controller.bench.families import FAMILIES, find_families
-from controller.bench.report import render, summarise
-from controller.bench.runner import run_families
+from benchmarks.families import FAMILIES, find_families
+from benchmarks.report import render, summarise
+from benchmarks.runner import run_families
 
 SEEDS = {
     "model": 3,

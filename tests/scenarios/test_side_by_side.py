@@ -8,7 +8,7 @@ from controller import GO2Controller, Mode
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.state import RobotState
 from tests.controller.plants import HANG_GUARD, PERIOD, in_thread
-from tests.plant.contract import same
+from tests.go2_wbc.plant.contract import same
 
 SPEED = {"left": 0.2, "right": -0.2}
 SEED = {"left": 1, "right": 2}

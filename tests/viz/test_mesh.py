@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 
-from viz.mesh import simplify, smooth_surface
+from viz.render.mesh import simplify, smooth_surface
 
 _CREASE = np.deg2rad(40.0)
 

@@ -15,8 +15,8 @@ import viz
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
 from tests.viz.page_reader import packed_parts, placement, read_data
-from viz.html_page import PAGE_LIMIT
-from viz.robot_meshes import load_robot_visuals
+from viz.render.robot_meshes import load_robot_visuals
+from viz.replay.html_page import PAGE_LIMIT
 
 _TITLE = 'Demo <b> & "co" @DATA@ </script>'
 _ANGLE_STEP = 2e-4  # [rad] 16-bit steps over the joints' range
@@ -138,7 +138,7 @@ def test_an_hour_still_fits_into_the_page(recording: Recording, tmp_path: Path) 
 def test_a_page_over_the_limit_is_refused(
     recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("viz.html_page.PAGE_LIMIT", 1000)
+    monkeypatch.setattr("viz.replay.html_page.PAGE_LIMIT", 1000)
     with pytest.raises(ConfigError, match="limit 1000"):
         viz.export_html(recording, tmp_path / "big.html", title="t")
     assert list(tmp_path.iterdir()) == []

@@ -13,7 +13,7 @@ from go2_wbc.recording import Recording
 from tests.viz.browsing import DRAWN, complaints, requested, stage
 from tests.viz.chromium import Chromium, find_chromium
 from tests.viz.verdicts import made_up_verdict
-from viz.screening import Screening
+from viz.content import Screening
 
 pytestmark = pytest.mark.browser
 

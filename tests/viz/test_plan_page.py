@@ -17,9 +17,9 @@ from go2_wbc.recording import Recording
 from motions import FeasibilityChecker
 from tests.viz.page_reader import packed_parts, read_data
 from tests.viz.verdicts import made_up_verdict
-from viz.html_page import PAGE_LIMIT
-from viz.replay_data import reduced
-from viz.screening import Screening
+from viz.content import Screening
+from viz.replay.html_page import PAGE_LIMIT
+from viz.replay.replay_data import reduced
 
 _ROUNDING = 1e-3
 """Steps of the 16-bit numbers [m, rad, N]."""

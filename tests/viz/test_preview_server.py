@@ -16,8 +16,8 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
 from tests.viz.page_reader import packed_parts, read_data, read_pack
 from tests.viz.verdicts import made_up_verdict
-from viz.preview_server import PreviewServer
-from viz.screening import Screening
+from viz.content import Screening
+from viz.replay.preview_server import PreviewServer
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from viz.camera import Camera
-from viz.rasterizer import rasterize
+from viz.render.camera import Camera
+from viz.render.rasterizer import rasterize
 
 _EDGE = 1e-5  # [px] a sample this close to an edge may fall on either side
 

@@ -7,12 +7,12 @@ import pytest
 
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import FOOT_RADIUS
-from viz.camera import Camera
-from viz.floor import FloorStyle, paint_floor
-from viz.posed_robot import PosedRobot, WorldTriangles
-from viz.rasterizer import rasterize
-from viz.renderer import Lighting, RenderStyle, render
-from viz.robot_meshes import load_robot_visuals
+from viz.render.camera import Camera
+from viz.render.floor import FloorStyle, paint_floor
+from viz.render.posed_robot import PosedRobot, WorldTriangles
+from viz.render.rasterizer import rasterize
+from viz.render.renderer import Lighting, RenderStyle, render
+from viz.render.robot_meshes import load_robot_visuals
 
 _TOUCH = 2.5  # [px] sole in the picture against the projected contact point
 

@@ -10,10 +10,10 @@ import pytest
 
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
-from viz.posed_robot import PosedRobot
-from viz.replay_data import label_spans, replay_frames
-from viz.robot_meshes import load_robot_visuals
-from viz.smoothing import smoothed
+from viz.render.posed_robot import PosedRobot
+from viz.render.robot_meshes import load_robot_visuals
+from viz.render.smoothing import smoothed
+from viz.replay.replay_data import label_spans, replay_frames
 
 
 @pytest.fixture(scope="module")

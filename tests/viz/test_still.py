@@ -13,11 +13,11 @@ import viz
 from go2_wbc.errors import ConfigError
 from go2_wbc.legs import Leg
 from go2_wbc.recording import Recording
-from viz.framing import camera_path, heading_path, nearest_rows
-from viz.posed_robot import PosedRobot
-from viz.robot_meshes import load_robot_visuals
-from viz.scene_shots import Photographer, ShotStyle
-from viz.still import telling_times
+from viz.render.framing import camera_path, heading_path, nearest_rows
+from viz.render.posed_robot import PosedRobot
+from viz.render.robot_meshes import load_robot_visuals
+from viz.render.scene_shots import Photographer, ShotStyle
+from viz.render.still import telling_times
 
 
 def test_it_is_a_picture_with_round_transparent_corners(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viz.screening import MarginCurve, Remark, Verdict
+from viz.content import MarginCurve, Remark, Verdict
 
 
 def made_up_verdict(duration: float) -> Verdict:

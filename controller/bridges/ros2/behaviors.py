@@ -8,7 +8,7 @@ from controller.bridges.ros2.desk import Answer, Desk, Job, Reply
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from go2_wbc.errors import CommandError, unknown_name
-from go2_wbc.reference import MotionPlan, Stance
+from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, compile_timeline, load_motion, motion_names
 from motions.authoring import Value
@@ -86,9 +86,9 @@ def motion_job(motion: str, settings: Sequence[str], reply: Reply) -> Job:
 
 
 def _take_entry(go2: GO2Controller, plan: MotionPlan) -> bool:
-    if plan.entry is Stance.STAND:
+    if plan.entry is Posture.STAND:
         return go2.mode in (Mode.STANDING, Mode.WALKING) or go2.stand()
-    if plan.entry is Stance.SIT:
+    if plan.entry is Posture.SIT:
         return go2.sit()
     return go2.lie_down()
 

@@ -12,7 +12,7 @@ from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.names import ODOM, QUEUE, Rates, topic
 from go2_wbc.legs import JOINT_NAMES, Leg
 from go2_wbc.plant.base import Plant
-from go2_wbc.plant.mujoco_plant import MujocoPlant
+from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.robot.state import RobotState
 
 FEET_ORDER = (Leg.FR, Leg.FL, Leg.RR, Leg.RL)

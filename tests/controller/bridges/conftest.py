@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from controller.bench.bridges.processes import Process
-from controller.bench.bridges.ros2_processes import Probe, joined, serving
+from benchmarks.bridges.processes import Process
+from benchmarks.bridges.ros2_processes import Probe, joined, serving
 from tests.controller.bridges.ros2_graph import HAS_ROS2, isolate
 
 PACED_ATTEMPTS = 3

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from controller.bench.bridges.processes import Process
+from benchmarks.bridges.processes import Process
 from controller.bridges.ros2.claim import Claim
 from go2_wbc.errors import BridgeError
 

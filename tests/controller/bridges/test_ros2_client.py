@@ -13,8 +13,8 @@ from unittest.mock import patch
 
 import pytest
 
-from controller.bench.bridges.processes import Process, wait_until
-from controller.bench.bridges.ros2_processes import Probe
+from benchmarks.bridges.processes import Process, wait_until
+from benchmarks.bridges.ros2_processes import Probe
 from go2_wbc.errors import BridgeError, CommandError, ConfigError
 from tests.controller.bridges.ros2_graph import ROOT, needs_ros2
 

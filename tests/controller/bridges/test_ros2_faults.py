@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from controller.bench.bridges.faults import TILT_BAR
-from controller.bench.bridges.ros2_faults import ACTS
-from controller.bench.bridges.ros2_stage import Stage
-from controller.bench.trials import Failed
+from benchmarks.bridges.faults import TILT_BAR
+from benchmarks.bridges.ros2_faults import ACTS
+from benchmarks.bridges.ros2_stage import Stage
+from benchmarks.trials import Failed
 from tests.controller.bridges.ros2_graph import needs_ros2
 
 

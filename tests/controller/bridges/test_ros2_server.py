@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from controller.bench.bridges.processes import Process, wait_until
-from controller.bench.bridges.ros2_processes import DISCOVERY, Place, Probe, serving, without
+from benchmarks.bridges.processes import Process, wait_until
+from benchmarks.bridges.ros2_processes import DISCOVERY, Place, Probe, serving, without
 from tests.controller.bridges.ros2_graph import needs_ros2
 
 pytestmark = needs_ros2

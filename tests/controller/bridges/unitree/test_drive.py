@@ -8,14 +8,14 @@ from collections.abc import Iterator
 
 import pytest
 
-from controller.bench.bridges.unitree import drive
-from controller.bench.bridges.unitree_faults import DAMPED, garbage, scene
-from controller.bench.bridges.unitree_processes import own_domain, simulator
+from benchmarks.bridges.unitree import drive
+from benchmarks.bridges.unitree_faults import DAMPED, garbage, scene
+from benchmarks.bridges.unitree_processes import own_domain, simulator
 from controller.bridges.unitree.guards import GuardConfig
 from go2_wbc.errors import CommandError, PlantTimeout
 from go2_wbc.plant.base import Plant
 from tests.controller.bridges.unitree.support import needs_dds
-from tests.plant.contract import PlantContract
+from tests.go2_wbc.plant.contract import PlantContract
 
 MAE_BAR = 0.04  # m/s
 CODEC_BAR = 50.0  # us
@@ -25,7 +25,7 @@ PATIENT = GuardConfig(stale_limit=2.0, hang_limit=5.0)
 
 def test_encoding_and_decoding_take_little_cpu() -> None:
     # In a process of its own: the run-time checks of these tests cost more than what is measured.
-    script = "from controller.bench.bridges.unitree import codec_time; print(codec_time())"
+    script = "from benchmarks.bridges.unitree import codec_time; print(codec_time())"
     times = [subprocess.check_output([sys.executable, "-c", script]) for _ in range(3)]
     assert min(map(float, times)) < CODEC_BAR
 

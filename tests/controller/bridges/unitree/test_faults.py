@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from controller.bench.bridges.faults import TILT_BAR, Fault, run_all
-from controller.bench.bridges.unitree_faults import FAULTS
-from controller.bench.trials import Failed
+from benchmarks.bridges.faults import TILT_BAR, Fault, run_all
+from benchmarks.bridges.unitree_faults import FAULTS
+from benchmarks.trials import Failed
 from tests.controller.bridges.unitree.support import needs_dds
 
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from controller.bench.bridges.processes import PROGRAM, Process
-from controller.bench.bridges.unitree_processes import good_commands, own_domain, simulator
+from benchmarks.bridges.processes import PROGRAM, Process
+from benchmarks.bridges.unitree_processes import good_commands, own_domain, simulator
 from controller.bridges.unitree.sport_api import Code, SportMode
 from tests.controller.bridges.unitree.support import (
     CPP_SDK,

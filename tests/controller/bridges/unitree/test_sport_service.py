@@ -10,9 +10,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from controller.bench.bridges.processes import wait_until
-from controller.bench.bridges.unitree_faults import Scene, scene
-from controller.bench.bridges.unitree_processes import client_of
+from benchmarks.bridges.processes import wait_until
+from benchmarks.bridges.unitree_faults import Scene, scene
+from benchmarks.bridges.unitree_processes import client_of
 from controller.bridges.unitree.sport_api import (
     LEASE_TERM,
     SWITCHER_SERVICE,

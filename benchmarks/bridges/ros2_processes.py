@@ -1,0 +1,273 @@
+"""Servers of ROS 2 as processes on the loopback, and a probe that talks to them.
+
+Importing this module needs no ROS; what it offers does.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final, final
+
+from benchmarks.bridges.processes import PROGRAM, Process, wait_until
+from controller.bridges.ros2.names import (
+    BEHAVIOR_SERVICE,
+    CMD_VEL,
+    ODOM,
+    STATISTICS_SERVICE,
+    topic,
+)
+from controller.bridges.ros2.odometry import state_of
+from go2_wbc.errors import BridgeError
+from go2_wbc.robot.state import RobotState
+
+DISCOVERY: Final = 20.0
+"""Time [s] in which processes must find each other; half a second on an idle machine."""
+ANSWER: Final = 60.0
+"""Time [s] in which a call must be answered; four on an idle machine."""
+COMMAND_PERIOD: Final = 0.02
+"""Time [s] between two velocity commands of a drive."""
+ODOM_QUEUE: Final = 5
+"""Messages of odometry that wait for a probe: more of them would be stale on a busy machine."""
+READY: Final = "serving /"
+
+
+def stay_on_this_machine() -> None:
+    """Keep this process and its children on the loopback, unless a range was chosen."""
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+
+
+@contextmanager
+def joined() -> Iterator[None]:
+    """ROS in this process, as ``rclpy.init()`` makes it."""
+    from controller.bridges.ros2 import imports as ros
+
+    ros.rclpy.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
+    try:
+        yield
+    finally:
+        ros.rclpy.try_shutdown()
+
+
+def start_server(
+    *options: str,
+    namespace: str,
+    realtime: bool = True,
+    environment: Mapping[str, str] | None = None,
+) -> Process:
+    """A ``go2-wbc ros2`` that has been started, but need not serve yet.
+
+    Args:
+        options: further ones.
+        namespace: of its topics and services.
+        realtime: at the pace of the wall clock. A server that runs freely gets no real-time
+            priority, since it would take a whole core from everybody else.
+        environment: variables beside those of this process.
+    """
+    arguments = [*PROGRAM, "ros2", "--namespace", namespace, *options]
+    variables = {**os.environ, "PYTHONUNBUFFERED": "1", **(environment or {})}
+    if realtime:
+        arguments.append("--realtime")
+    return Process(arguments, variables, has_priority=realtime)
+
+
+@contextmanager
+def serving(
+    *options: str,
+    namespace: str,
+    realtime: bool = True,
+    environment: Mapping[str, str] | None = None,
+) -> Iterator[Process]:
+    """A ``go2-wbc ros2`` that serves, and is ended politely; see ``start_server``.
+
+    Raises:
+        BridgeError: if it does not start.
+    """
+    server = start_server(*options, namespace=namespace, realtime=realtime, environment=environment)
+    with server:
+        server.wait_for(READY)
+        yield server
+        server.stop()
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Position [m] and heading [rad] in the world, and the robot's own time [s]."""
+
+    xy: tuple[float, float]
+    yaw: float
+    time: float
+
+    def way_from(self, start: Place) -> float:
+        """Distance [m] from ``start`` on the ground."""
+        return math.dist(start.xy, self.xy)
+
+    def speed_from(self, start: Place) -> float:
+        """Mean speed [m/s] on the straight way from ``start``."""
+        return self.way_from(start) / (self.time - start.time)
+
+
+@final
+class Probe:
+    """A node of plain rclpy, with nothing of the client's, which spins in a thread of its own.
+
+    It watches odometry all the time, whatever the others do.
+
+    Attributes:
+        node: to add subscriptions and clients to.
+        namespace: of the robot.
+        largest_tilt: of the base since this was set to None [rad]; None without odometry.
+    """
+
+    def __init__(self, namespace: str = "robot1") -> None:
+        """Join the graph; ``rclpy.init()`` must have been called."""
+        from controller.bridges.ros2 import imports as ros
+
+        self._ros, self.namespace = ros, namespace
+        self.largest_tilt: float | None = None
+        self._newest: RobotState | None = None
+        self.node = ros.Node(
+            f"probe_{namespace}", start_parameter_services=False, enable_rosout=False
+        )
+        self._request = ros.RobotBehaviorCommand.Request
+        self._client = self.node.create_client(
+            ros.RobotBehaviorCommand, topic(namespace, BEHAVIOR_SERVICE)
+        )
+        self._triggers: dict[str, Any] = {}
+        self._publisher = self.node.create_publisher(ros.Twist, topic(namespace, CMD_VEL), 10)
+        self.node.create_subscription(ros.Odometry, topic(namespace, ODOM), self._note, ODOM_QUEUE)
+        self._executor = ros.SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        self._is_closing = threading.Event()
+        self._thread = threading.Thread(target=self._spin, name="probe", daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        while not self._is_closing.is_set():
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def _note(self, message: Any) -> None:
+        self._newest = state = state_of(message)
+        self.largest_tilt = max(self.largest_tilt or 0.0, state.tilt)
+
+    # --- calls ----------------------------------------------------------------------------
+
+    def send(self, command: str) -> Any:
+        """The future of a behaviour.
+
+        Raises:
+            BridgeError: if there is no server.
+        """
+        return self._called(self._client, self._request(command=command))
+
+    def result(self, future: Any, limit: float = ANSWER) -> Any:
+        """What ``future`` comes to.
+
+        Raises:
+            BridgeError: if it does not within ``limit`` seconds.
+        """
+        arrived = threading.Event()
+        future.add_done_callback(lambda _future: arrived.set())
+        if not arrived.wait(limit):
+            raise BridgeError(f"/{self.namespace} has not answered within {limit:g} s")
+        return future.result()
+
+    def call(self, command: str) -> Any:
+        """The answer to a behaviour; see ``send`` and ``result``."""
+        return self.result(self.send(command))
+
+    def trigger(self, name: str) -> Any:
+        """The answer of one of the ``std_srvs/Trigger`` services; see ``send`` and ``result``."""
+        kind = self._ros.Trigger
+        if name not in self._triggers:
+            self._triggers[name] = self.node.create_client(kind, topic(self.namespace, name))
+        return self.result(self._called(self._triggers[name], kind.Request()))
+
+    def _called(self, client: Any, request: Any) -> Any:
+        if not client.wait_for_service(DISCOVERY):
+            raise BridgeError(f"nobody offers {client.srv_name}")
+        return client.call_async(request)
+
+    def statistics(self) -> dict[str, Any]:
+        """What the server counts and measures; see ``send`` and ``result``."""
+        return json.loads(self.trigger(STATISTICS_SERVICE).message)
+
+    # --- velocities -----------------------------------------------------------------------
+
+    def move(self, x: float, turn: float = 0.0, *, y: float = 0.0) -> None:
+        """Publish one velocity command: x, y [m/s], turn [rad/s]."""
+        message = self._ros.Twist()
+        message.linear.x, message.linear.y, message.angular.z = x, y, turn
+        self._publisher.publish(message)
+
+    def drive(self, seconds: float, x: float, turn: float = 0.0, *, y: float = 0.0) -> None:
+        """Command at 50 Hz for so long on the wall clock."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.move(x, turn, y=y)
+            time.sleep(COMMAND_PERIOD)
+
+    # --- looking --------------------------------------------------------------------------
+
+    def state(self) -> RobotState:
+        """The next base pose and velocity of odometry.
+
+        Raises:
+            BridgeError: if there is none.
+        """
+        self._newest = None
+        if not wait_until(lambda: self._newest is not None, DISCOVERY) or self._newest is None:
+            raise BridgeError(f"no odometry of /{self.namespace}")
+        return self._newest
+
+    def height(self) -> float:
+        """Of the base [m]; see ``state``."""
+        return float(self.state().q[2])
+
+    def place(self) -> Place:
+        """Where the robot is, and its own time: on a busy machine less passes than on the wall."""
+        figures = self.statistics()
+        x, y, _ = figures["position"]
+        return Place((x, y), figures["heading"], figures["robot_time"])
+
+    def let_pass(self, seconds: float) -> None:
+        """Let this much of the robot's own time pass."""
+        end = self.place().time + seconds
+        while (left := end - self.place().time) > 0.0:
+            time.sleep(min(left, 0.05))
+
+    def wait_until(self, is_so: Callable[[], bool], what: str, limit: float = ANSWER) -> None:
+        """Wait for something.
+
+        Raises:
+            BridgeError: if it is not so within ``limit`` seconds; says ``what`` was awaited.
+        """
+        if not wait_until(is_so, limit):
+            raise BridgeError(f"/{self.namespace}: {what} was awaited for {limit:g} s in vain")
+
+    def close(self) -> None:
+        """Leave the graph."""
+        self._is_closing.set()
+        self._thread.join(5.0)
+        self._executor.shutdown()
+        self.node.destroy_node()
+
+
+def without(folder: Path, *packages: str) -> dict[str, str]:
+    """The variables of a process to which ``packages`` are as if they were not installed.
+
+    Args:
+        folder: an empty one, in which hollow packages are made.
+        packages: Python packages of interfaces.
+    """
+    for package in packages:
+        (folder / package).mkdir()
+        (folder / package / "__init__.py").touch()
+    return {"PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}

@@ -1,0 +1,211 @@
+"""Unitree's protocol between real processes on the loopback: the sport service, the low level."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from benchmarks.bridges.unitree_processes import (
+    Observer,
+    client_of,
+    driver,
+    good_commands,
+    own_domain,
+    simulator,
+)
+from benchmarks.rows import Direction, Family, Measurement, Row
+from benchmarks.trials import Trial
+from controller.bridges.unitree import layout
+from controller.bridges.unitree.checksum import is_intact
+from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.low_client import low_cmd_message
+from controller.bridges.unitree.sport_api import SPORT_SERVICE, Api
+from go2_wbc.robot.state import JointCommand
+
+if TYPE_CHECKING:
+    from controller.bridges.unitree.rpc import Client
+
+SPEED: Final = 0.5
+"""Of ``Move`` and of the trot [m/s]."""
+MOVE_TIME, MOVE_PERIOD = 3.0, 0.05
+STREAM_TIME: Final = 10.0
+"""Time [s] of listening at 500 Hz."""
+ROUND_TRIPS: Final = 200
+CODINGS: Final = 2000
+DAMPED: Final = JointCommand.damping(3.0)
+DRIVE_LIMIT: Final = 120.0
+"""Time [s] after which a drive counts as hanging."""
+
+_SPORT, _STREAM = "Unitree: sport service", "Unitree: lowstate and lowcmd, 500 Hz, 10 s"
+_DRIVE = "Unitree: our controller through UnitreePlant"
+SPORT_ROWS: Final = (
+    Row("unitree.codes", _SPORT, "calls not answered 0", "", 0.0),
+    Row("unitree.move", _SPORT, "Move 0.5: mean speed error", "m/s", 0.04),
+    Row("unitree.latency", _SPORT, "round trip, median", "ms", 10.0),
+    Row("unitree.latency_p99", _SPORT, "round trip, 99 %", "ms", None),
+)
+STREAM_ROWS: Final = (
+    Row("unitree.lost_states", _STREAM, "lowstate lost", "%", 0.5),
+    Row("unitree.lost_commands", _STREAM, "lowcmd lost or refused", "%", 0.5),
+    Row("unitree.bad_crc", _STREAM, "bad checksums", "", 0.0),
+    Row("unitree.rate", _STREAM, "lowstate rate", "Hz", None, Direction.AT_LEAST),
+    Row("unitree.codec", _STREAM, "CPU encode + decode", "us", 50.0),
+)
+DRIVE_ROWS: Final = (
+    Row("unitree.steps", _DRIVE, "steps not done, of 4", "", 0.0),
+    Row("unitree.mae", _DRIVE, "trot 0.5, MAE of true speed", "m/s", 0.04),
+)
+
+
+def measure_sport(_trial: Trial) -> Measurement:
+    """The script of a SportClient: up, balance, move, stop, hello, Euler, down."""
+    with own_domain() as domain, simulator(domain):
+        observer = Observer(domain)
+        client = client_of(observer.bus, SPORT_SERVICE)
+        codes = [_act(client, observer, Api.STAND_UP), _act(client, observer, Api.BALANCE_STAND)]
+        speed = _move(client, observer)
+        codes.append(_act(client, observer, Api.STOP_MOVE))
+        trips = _round_trips(client)
+        codes.append(_act(client, observer, Api.HELLO))
+        codes.append(_act(client, observer, Api.EULER, {"x": 0.1, "y": 0.1, "z": 0.1}))
+        codes.append(_act(client, observer, Api.STAND_DOWN))
+        if observer.height > 0.12:
+            return Measurement({}, reason=f"StandDown left the base at {observer.height:.2f} m")
+    return Measurement(
+        {
+            "unitree.codes": float(sum(code != 0 for code in codes)),
+            "unitree.move": abs(speed - SPEED),
+            "unitree.latency": float(np.median(trips)),
+            "unitree.latency_p99": float(np.percentile(trips, 99)),
+        }
+    )
+
+
+def _act(
+    client: Client, observer: Observer, api: Api, values: Mapping[str, float] | None = None
+) -> int:
+    code = client.call(api, json.dumps(values or {}), timeout=5.0).code
+    observer.wait_for_rest()
+    return code
+
+
+def _move(client: Client, observer: Observer) -> float:
+    """Mean forward speed [m/s] over the last two of three seconds of ``Move``."""
+    parameter = json.dumps({"x": SPEED, "y": 0.0, "z": 0.0})
+    end = time.monotonic() + MOVE_TIME
+    speeds: list[float] = []
+    while time.monotonic() < end:
+        client.send(Api.MOVE, parameter)
+        time.sleep(MOVE_PERIOD)
+        messages = observer.take()
+        if end - time.monotonic() < MOVE_TIME - 1.0:
+            speeds += [float(message["velocity"][0, 0]) for message in messages]
+    return float(np.mean(speeds)) if speeds else 0.0
+
+
+def _round_trips(client: Client) -> list[float]:
+    """Times [ms] of calls that are answered at once."""
+    times = []
+    for _ in range(ROUND_TRIPS):
+        start = time.perf_counter()
+        client.call(Api.STOP_MOVE)
+        times.append(1000 * (time.perf_counter() - start))
+    return times
+
+
+def measure_stream(_trial: Trial) -> Measurement:
+    """Answer every ``rt/lowstate`` with a damping command for ten seconds."""
+    from controller.bridges.unitree import idl
+
+    with own_domain() as domain, simulator(domain) as process:
+        bus = Observer(domain).bus
+        states = bus.reader("rt/lowstate", idl.low_state(), depth=64)
+        commands = bus.writer("rt/lowcmd", idl.low_cmd())
+        decode, encode = codec_of(layout.LOW_STATE).decode, codec_of(layout.LOW_CMD).encode
+        states.wait(5.0)
+        time.sleep(1.0)  # both ends must have found each other before losses count
+        states.take()
+        ticks, bad, sent, start = [], 0, 0, time.monotonic()
+        while time.monotonic() - start < STREAM_TIME:
+            states.wait(0.1)
+            for data in states.take():
+                message = decode(data)
+                bad += not is_intact(message)
+                ticks.append(int(message["tick"][0]))
+                commands.write(encode(low_cmd_message(DAMPED)))
+                sent += 1
+        elapsed = time.monotonic() - start
+        time.sleep(0.2)
+        good = good_commands(process.stop())
+    expected = (ticks[-1] - ticks[0]) // 2 + 1
+    return Measurement(
+        {
+            "unitree.lost_states": 100.0 * (expected - len(set(ticks))) / expected,
+            "unitree.lost_commands": 100.0 * (sent - good) / sent,
+            "unitree.bad_crc": float(bad),
+            "unitree.rate": len(ticks) / elapsed,
+            "unitree.codec": codec_time(),
+        }
+    )
+
+
+def codec_time() -> float:
+    """CPU time [us] of one lowcmd made, sealed and encoded, one lowstate decoded and checked."""
+    encode, codec = codec_of(layout.LOW_CMD).encode, codec_of(layout.LOW_STATE)
+    data = codec.encode(layout.new_message(layout.LOW_STATE))
+    start = time.process_time()
+    for _ in range(CODINGS):
+        encode(low_cmd_message(DAMPED))
+        is_intact(codec.decode(data))
+    return 1e6 * (time.process_time() - start) / CODINGS
+
+
+def measure_drive(_trial: Trial) -> Measurement:
+    """Our controller in one process drives the simulator in another through ``UnitreePlant``."""
+    return drive([], [])
+
+
+def drive(simulator_options: list[str], driver_options: list[str]) -> Measurement:
+    """Stand, trot, high five, lie down; the speed is the simulator's truth."""
+    with own_domain() as domain, simulator(domain, *simulator_options) as process:
+        observer = Observer(domain)
+        with driver(domain, *driver_options) as peer:
+            speeds = _true_speeds(observer, peer.lines, time.monotonic() + DRIVE_LIMIT)
+            text = peer.finish(DRIVE_LIMIT)
+        said = process.stop()
+    steps = [json.loads(line) for line in text.splitlines() if line.startswith("{")]
+    undone = 4 - sum(bool(step["ok"]) for step in steps)
+    reason = "; ".join(step["reason"] for step in steps if not step["ok"]) or text[-400:] + said
+    if not speeds:
+        return Measurement({"unitree.steps": float(undone)}, reason=reason)
+    failures = {"unitree.steps": reason} if undone else {}
+    error = float(np.mean(np.abs(np.array(speeds) - SPEED)))
+    return Measurement({"unitree.steps": float(undone), "unitree.mae": error}, failures)
+
+
+def _true_speeds(observer: Observer, lines: list[str], deadline: float) -> list[float]:
+    """Forward speeds over the four seconds before the trot's end, while the driver runs."""
+    samples: list[tuple[float, float]] = []
+    while time.monotonic() < deadline:
+        for message in observer.take():
+            seconds, nanoseconds = message["stamp"][0]
+            samples.append((seconds + 1e-9 * nanoseconds, float(message["velocity"][0, 0])))
+        if any('"high_five"' in line or '"ok": false' in line for line in lines):
+            break
+        time.sleep(0.05)
+    walking = [time for time, speed in samples if speed > 0.8 * SPEED]
+    if not walking:
+        return []
+    start, end = walking[0] + 1.5, walking[-1] - 0.3
+    return [speed for moment, speed in samples if start <= moment <= end]
+
+
+FAMILIES: Final = (
+    Family("unitree-sport", SPORT_ROWS, measure_sport),
+    Family("unitree-stream", STREAM_ROWS, measure_stream),
+    Family("unitree-drive", DRIVE_ROWS, measure_drive),
+)

@@ -1,0 +1,161 @@
+"""The model and the equations: MuJoCo against Pinocchio, and every whole-body solution audited."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from benchmarks.agreement import model_agreement
+from benchmarks.rows import Family, Measurement, Row
+from benchmarks.trials import Trial
+from controller.executor import Aborted
+from controller.loop import ControlLoop
+from controller.pilot import Pilot
+from controller.runner import Runner
+from controller.telemetry import Telemetry
+from go2_wbc.config import Config
+from go2_wbc.legs import Leg
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.reference import Reference
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.solution import WbcSolution
+from motions import compile_timeline, load_motion
+from motions.library.high_five import HEIGHT
+
+STATES = 200
+"""Random states of a trial on which the two models are compared."""
+AGREEMENT_BAR = 1e-12
+MOTION_BAR = 1e-8
+"""N and N m; the robot weighs 158 N."""
+TORQUE_BAR = 1e-5
+"""N m"""
+ORACLE_PERIOD = 10
+"""Ticks between those that the other back ends solve as well."""
+DRIVERS = ("condensed", "placo")
+"""Back ends that drive a whole run each, every solution audited."""
+BACKENDS = ("condensed", "full", "placo")
+"""Back ends that are compared with the driving one."""
+
+_AGREEMENT_QUANTITIES = {
+    "mass": "mass",
+    "com": "centre of mass",
+    "composite_inertia": "inertia",
+    "mass_matrix": "mass matrix",
+    "inverse_dynamics": "inverse dynamics",
+    "forward_dynamics": "forward dynamics",
+}
+_MODEL_ITEM = "Pinocchio against MuJoCo, relative"
+_SOLUTION_ITEM = "whole-body solutions"
+
+AGREEMENT_ROWS = tuple(
+    Row(f"model.{name}", _MODEL_ITEM, quantity, "", AGREEMENT_BAR)
+    for name, quantity in _AGREEMENT_QUANTITIES.items()
+)
+SOLUTION_ROWS = (
+    *(
+        Row(f"wbc.motion_{name}", _SOLUTION_ITEM, f"motion, {name}", "N, N m", MOTION_BAR)
+        for name in BACKENDS
+    ),
+    Row("wbc.torque", _SOLUTION_ITEM, "torque between back ends", "N m", TORQUE_BAR),
+    Row("wbc.failures", _SOLUTION_ITEM, "QP failures", "", 0.0),
+)
+
+
+def measure_agreement(trial: Trial) -> Measurement:
+    """Largest relative error of each quantity over ``STATES`` random states."""
+    errors = model_agreement(STATES, trial.seed)
+    return Measurement({f"model.{name}": error for name, error in errors.items()})
+
+
+class AuditedController(WholeBodyController):
+    """Checks every solution, and solves some ticks with the other back ends as well.
+
+    Attributes:
+        worst: largest value so far, by row name; see ``measure_solutions``.
+    """
+
+    def __init__(self, model: RobotModel, backend: str, config: WbcConfig) -> None:
+        """Solve with ``backend``; the others share its numbers."""
+        super().__init__(model, backend, config)
+        others = [name for name in BACKENDS if name != backend]
+        self._others = [WholeBodyController(model, name, config) for name in others]
+        self._ticks = 0
+        self.worst: dict[str, float] = {}
+
+    def solve(self, snapshot: Snapshot, reference: Reference) -> WbcSolution:
+        """Solve one tick and audit the solution."""
+        solution = super().solve(snapshot, reference)
+        self._audit(snapshot, solution)
+        if self._ticks % ORACLE_PERIOD == 0:
+            for controller in self._others:
+                other = controller.solve(snapshot, reference)
+                self._audit(snapshot, other)
+                self._note("wbc.torque", float(np.abs(solution.tau - other.tau).max()))
+        self._ticks += 1
+        return solution
+
+    def _audit(self, snapshot: Snapshot, solution: WbcSolution) -> None:
+        error = motion_error(self.model, snapshot, solution)
+        self._note(f"wbc.motion_{solution.backend}", error)
+
+    def _note(self, row: str, value: float) -> None:
+        self.worst[row] = max(value, self.worst.get(row, 0.0))
+
+
+def motion_error(model: RobotModel, snapshot: Snapshot, solution: WbcSolution) -> float:
+    """Largest entry [N, N m] of M qdd + h - S' tau - J' f, by recursive Newton-Euler."""
+    generalised: Float[np.ndarray, "18"] = np.concatenate([np.zeros(6), solution.tau])
+    for J, force in zip(snapshot.J_contacts, solution.forces, strict=True):
+        generalised += J.T @ force
+    state = snapshot.state
+    return float(np.abs(model.inverse_dynamics(state.q, state.v, solution.qdd) - generalised).max())
+
+
+def measure_solutions(trial: Trial) -> Measurement:
+    """Stand up, trot with a push, give a high five, sit; once with each of ``DRIVERS``.
+
+    - motion: |M qdd + h - S' tau - sum J_i' f_i|, largest entry, of every solution that drives the
+      robot, and of every tenth for the back ends that do not. Evaluated by Pinocchio's recursive
+      Newton-Euler algorithm, not with the mass matrix and bias that the QP was made from;
+    - torque between back ends: largest difference of any joint's torque for the same snapshot and
+      reference, on every tenth tick.
+    """
+    worst: dict[str, float] = {}
+    failures = 0
+    for driver in DRIVERS:
+        config, model = Config(), RobotModel()
+        wbc = AuditedController(model, driver, config.wbc)
+        telemetry = Telemetry(model, capacity=1)
+        plant = trial.plant()
+        loop = ControlLoop(plant, model, wbc, telemetry, config.safety)
+        try:
+            _exercise(Pilot(Runner(loop, realtime=False, after_tick=lambda: None), config), plant)
+        except Aborted as aborted:
+            return Measurement({}, reason=f"driven by {driver}: {aborted}")
+        finally:
+            plant.close()
+        worst = {name: max(value, worst.get(name, 0.0)) for name, value in wbc.worst.items()}
+        failures += telemetry.qp_failures
+    return Measurement({**worst, "wbc.failures": float(failures)})
+
+
+def _exercise(pilot: Pilot, plant: MujocoPlant) -> None:
+    pilot.stand()
+    pilot.walk("trot")
+    pilot.set_command(VelocityCommand(0.6, 0.2, 0.5))
+    pilot.wait(2.0)
+    plant.push(np.array([0.0, 120.0, 0.0]), 0.1)
+    pilot.wait(2.0)
+    pilot.rest()
+    pilot.stand()
+    plan = compile_timeline(load_motion("high_five", hold=1.0), RobotModel())
+    pilot.high_five(plan, Leg.FR, HEIGHT)
+    pilot.sit()
+
+
+AGREEMENT = Family("model", AGREEMENT_ROWS, measure_agreement)
+SOLUTIONS = Family("solutions", SOLUTION_ROWS, measure_solutions)

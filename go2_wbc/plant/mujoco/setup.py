@@ -1,0 +1,190 @@
+"""Turns a plant's settings into a compiled model and lays the robot on the ground."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.errors import ConfigError, DescriptionError, ModelMismatch
+from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms_of
+from go2_wbc.plant.mujoco.model import JointDynamics, add_payload, build_spec, finish
+from go2_wbc.plant.mujoco.user_model import load_user_model
+from go2_wbc.plant.terrain import Boxes
+from go2_wbc.robot.description import BASE_LINK, RobotDescription, find_description
+from go2_wbc.validation import require_finite, require_not_negative, require_positive
+
+# Dry rubber on a hard floor; Unitree publishes none. The prototype's runs used it.
+DEFAULT_FRICTION = 0.8
+# Joint angles [rad] of the Go2 lying limp, belly down: where this model comes to rest within 1e-3
+# after 15 s of damped simulation. Gravity folds the calves onto their limit of -2.7227.
+LYING_POSE = (
+    *(0.053, 1.236, -2.722),
+    *(-0.053, 1.236, -2.722),
+    *(0.372, 1.239, -2.722),
+    *(-0.372, 1.239, -2.722),
+)
+
+_MULTIPLE_TOLERANCE = 1e-9  # relative; only rounding of the two decimal numbers
+_DROP_HEIGHT = 0.11  # m of the base above the ground; it rests at 0.085
+_SETTLE_LIMIT = 3.0  # s of simulation; it settles in well under one
+_SETTLED_SPEED = 1e-3  # rad/s and m/s, largest entry of the velocity
+_RAY_TOP = 20.0  # m above the world's origin from which the ground is looked for
+_FOOTPRINT = (-0.3, 0.0, 0.3)  # m; the grid, about the Go2's size, on which it is looked for
+
+
+@dataclass(frozen=True, slots=True)
+class PlantSetup:
+    """The settings of a ``MujocoPlant``; its docstring says what they mean.
+
+    Attributes:
+        lying_damping: joint damping while lying [N m s/rad]; the value of Unitree's damping mode.
+    """
+
+    mjcf: Path | None
+    urdf: Path | None
+    timestep: float
+    control_period: float
+    friction: float | None
+    payload: float
+    mass_scale: float
+    terrain: Boxes | None
+    initial_yaw: float
+    initial_joint_noise: float
+    joint_dynamics: JointDynamics | None
+    visuals: bool
+    seed: int
+    lying_damping: float = 3.0
+
+    def __post_init__(self) -> None:
+        for name in ("mjcf", "urdf"):
+            path = getattr(self, name)
+            if path is not None and not isinstance(path, Path):
+                raise ConfigError(f"{name} must be a path, got {path!r}")
+        if self.terrain is not None and not isinstance(self.terrain, Boxes):
+            raise ConfigError(f"terrain must be Boxes(...) or None, got {self.terrain!r}")
+        require_positive(self, "timestep", "control_period", "mass_scale")
+        if self.friction is not None:
+            require_positive(self, "friction")
+        require_not_negative(self, "payload", "initial_joint_noise", "seed")
+        require_finite(self, "initial_yaw")
+        ratio = self.control_period / self.timestep
+        if round(ratio) < 1 or abs(ratio - round(ratio)) > _MULTIPLE_TOLERANCE * ratio:
+            raise ConfigError(
+                f"control_period must be an integer multiple of timestep: "
+                f"{self.control_period!r} s is {ratio:.6g} times {self.timestep!r} s"
+            )
+        if self.mjcf is not None and self.terrain is not None:
+            raise ConfigError("terrain is only for the built model; put it into the mjcf instead")
+
+    @property
+    def substeps(self) -> int:
+        """Physics steps in one control period."""
+        return round(self.control_period / self.timestep)
+
+
+def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout]:
+    """The compiled model and its index tables.
+
+    Raises:
+        ModelMismatch: if the user's MJCF cannot be used.
+        DescriptionError: if the robot's files are missing or broken.
+    """
+    description = find_description(setup.urdf)
+    if setup.mjcf is None:
+        model = _compile_urdf(setup, description)
+    else:
+        model = _compile_mjcf(setup, setup.mjcf, description)
+    return model, find_layout(model, foot_geoms_of(model), np.array(description.efforts))
+
+
+def _compile_urdf(setup: PlantSetup, description: RobotDescription) -> mujoco.MjModel:
+    spec = build_spec(
+        description,
+        setup.joint_dynamics or JointDynamics(),
+        friction=DEFAULT_FRICTION if setup.friction is None else setup.friction,
+        terrain=setup.terrain,
+        visuals=setup.visuals,
+    )
+    if setup.payload > 0.0:
+        add_payload(spec, BASE_LINK, setup.payload)
+    try:
+        return finish(spec, timestep=setup.timestep, mass_scale=setup.mass_scale)
+    except ValueError as error:
+        message = f"MuJoCo cannot compile {description.urdf_path}: {error}"
+        raise DescriptionError(message) from error
+
+
+def _compile_mjcf(setup: PlantSetup, mjcf: Path, description: RobotDescription) -> mujoco.MjModel:
+    spec, base = load_user_model(mjcf, description, setup.joint_dynamics)
+    if setup.payload > 0.0:
+        add_payload(spec, base, setup.payload)
+    try:
+        model = finish(spec, timestep=setup.timestep, mass_scale=setup.mass_scale)
+    except ValueError as error:
+        raise ModelMismatch(f"MuJoCo cannot compile {mjcf}: {error}") from error
+    if setup.friction is not None:
+        feet = np.concatenate(foot_geoms_of(model))
+        model.geom_friction[feet, 0] = setup.friction
+        model.geom_priority[feet] = model.geom_priority.max() + 1
+    return model
+
+
+def settle(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    layout: MujocoLayout,
+    setup: PlantSetup,
+    rng: np.random.Generator,
+) -> None:
+    """Lets the damped robot drop a few centimetres, belly down and legs folded, and come to rest.
+
+    Leaves ``data`` as ``mj_step1`` does.
+    """
+    _place(model, data, layout, setup.initial_yaw)
+    pose = np.array(LYING_POSE) + setup.initial_joint_noise * rng.standard_normal(12)
+    data.qpos[layout.joint_q] = _clip_to_range(model, layout, pose)
+    data.ctrl[:] = 0.0
+    limits = layout.torque_limits
+    mujoco.mj_step1(model, data)
+    for _ in range(round(_SETTLE_LIMIT / setup.timestep)):
+        tau = -setup.lying_damping * data.qvel[layout.joint_v]
+        data.ctrl[layout.motors] = np.clip(tau, -limits, limits)
+        mujoco.mj_step2(model, data)
+        mujoco.mj_step1(model, data)
+        if data.ncon and np.abs(data.qvel).max() < _SETTLED_SPEED:
+            break
+
+
+def _place(model: mujoco.MjModel, data: mujoco.MjData, layout: MujocoLayout, yaw: float) -> None:
+    base_q = data.qpos[layout.base_q]
+    base_q[:2] = 0.0
+    base_q[2] = 2.0 * _RAY_TOP  # out of the rays' way
+    base_q[3:] = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
+    mujoco.mj_kinematics(model, data)
+    base_q[2] = _ground_height(model, data) + _DROP_HEIGHT
+
+
+def _ground_height(model: mujoco.MjModel, data: mujoco.MjData) -> float:
+    """Height of the highest ground under the robot at the origin; 0 if there is none."""
+    geom, down = np.zeros(1, dtype=np.int32), np.array([0.0, 0.0, -1.0])
+    heights = [0.0]
+    for x in _FOOTPRINT:
+        for y in _FOOTPRINT:
+            top = np.array([x, y, _RAY_TOP])
+            distance = mujoco.mj_ray(model, data, top, down, None, True, -1, geom)
+            if distance >= 0.0:
+                heights.append(_RAY_TOP - distance)
+    return max(heights[1:], default=0.0)
+
+
+def _clip_to_range(
+    model: mujoco.MjModel, layout: MujocoLayout, pose: Float[np.ndarray, "12"]
+) -> Float[np.ndarray, "12"]:
+    joints = model.dof_jntid[layout.joint_v]
+    limited, ranges = model.jnt_limited[joints].astype(bool), model.jnt_range[joints]
+    return np.where(limited, np.clip(pose, ranges[:, 0], ranges[:, 1]), pose)

@@ -1,0 +1,155 @@
+"""Loads a user's own Go2 MJCF or scene, checks it, and adds what may be added.
+
+The file must have the Go2's twelve joints below one body with a free joint, and its four feet as
+bodies ``FL_foot`` or geoms ``FL_foot`` or ``FL``. Added when absent: a floor, a torque motor for a
+joint that no actuator drives, and the IMU. Everything else stays as the file says, except that the
+time step is the plant's and keyframes are not used. An actuator that is not a plain torque motor
+is refused, never replaced.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+
+from go2_wbc.errors import ModelMismatch
+from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
+from go2_wbc.plant.mujoco.model import (
+    GYRO,
+    JointDynamics,
+    add_floor,
+    add_imu,
+    add_motors,
+    set_joint_dynamics,
+)
+from go2_wbc.robot.description import RobotDescription
+
+_BASE_FALLBACK = "go2_wbc_base"
+
+
+def load_user_model(
+    mjcf: Path, description: RobotDescription, joint_dynamics: JointDynamics | None = None
+) -> tuple[mujoco.MjSpec, str]:
+    """Reads and checks a user's MJCF; returns the completed spec and the name of its base body.
+
+    Args:
+        mjcf: the file; what it includes is read relative to it.
+        description: gives the torque limits of motors that are added.
+        joint_dynamics: replaces the file's joint friction, damping and armature; ``None`` keeps
+            the file's.
+
+    Raises:
+        ModelMismatch: if the file cannot be read, or lacks something; the message names all that
+            it lacks.
+    """
+    spec = _read(mjcf)
+    problems = _joint_problems(spec) + _foot_problems(spec) + _actuator_problems(spec)
+    if problems:
+        listing = "".join(f"\n  - {problem}" for problem in problems)
+        raise ModelMismatch(f"{mjcf} cannot be driven as a Go2:{listing}")
+    base = _root(spec.joint(JOINT_NAMES[0]))
+    base.name = base.name or _BASE_FALLBACK
+    driven = {actuator.target for actuator in spec.actuators if _is_on_joint(actuator)}
+    add_motors(spec, [name for name in JOINT_NAMES if name not in driven], description)
+    if all(sensor.name != GYRO for sensor in spec.sensors):  # else it is an export of our own
+        add_imu(spec, base.name)
+    if not _has_ground(spec):
+        add_floor(spec)
+    if joint_dynamics is not None:
+        set_joint_dynamics(spec, joint_dynamics)
+    return spec, base.name
+
+
+def _read(mjcf: Path) -> mujoco.MjSpec:
+    path = Path(mjcf)
+    if not path.is_file():
+        raise ModelMismatch(f"cannot read {path}: no such file")
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except (ValueError, OSError) as error:
+        raise ModelMismatch(f"MuJoCo cannot read {path}: {error}") from error
+
+
+def _joint_problems(spec: mujoco.MjSpec) -> list[str]:
+    joints = {joint.name: joint for joint in spec.joints}
+    problems = [f"no joint {name}" for name in JOINT_NAMES if name not in joints]
+    present = [joints[name] for name in JOINT_NAMES if name in joints]
+    problems += [
+        f"joint {joint.name} is not a hinge"
+        for joint in present
+        if joint.type != mujoco.mjtJoint.mjJNT_HINGE
+    ]
+    bases = {_root(joint).id: _root(joint) for joint in present}
+    if len(bases) > 1:
+        names = ", ".join(repr(body.name) for body in bases.values())
+        problems.append(f"the joints belong to several robots ({names}); need exactly one")
+    for body in bases.values():
+        kinds = [joint.type for joint in body.joints]
+        if kinds != [mujoco.mjtJoint.mjJNT_FREE]:
+            problems.append(f"base body {body.name!r} has no free joint")
+    return problems
+
+
+def _foot_problems(spec: mujoco.MjSpec) -> list[str]:
+    return [
+        f"no foot {leg.name}: need a colliding geom in a body {leg.foot}, "
+        f"or one named {leg.foot} or {leg.name}"
+        for leg in LEGS
+        if not any(_is_foot(geom, leg) for geom in spec.geoms)
+    ]
+
+
+def _is_foot(geom: mujoco.MjsGeom, leg: Leg) -> bool:
+    named = geom.parent.name == leg.foot or geom.name in (leg.foot, leg.name)
+    return named and bool(geom.contype or geom.conaffinity)
+
+
+def _actuator_problems(spec: mujoco.MjSpec) -> list[str]:
+    problems: list[str] = []
+    seen: dict[str, str] = {}
+    for actuator in spec.actuators:
+        joint = actuator.target
+        if not _is_on_joint(actuator) or joint not in JOINT_NAMES:
+            continue
+        label = f"actuator {actuator.name or '(unnamed)'} of {joint}"
+        if joint in seen:
+            problems.append(f"{label} is a second actuator of the joint, besides {seen[joint]}")
+        seen[joint] = actuator.name or "(unnamed)"
+        problems += [f"{label} {fault}" for fault in _motor_faults(actuator)]
+    return problems
+
+
+def _motor_faults(actuator: mujoco.MjsActuator) -> list[str]:
+    """What keeps an actuator from being a plain torque motor: 1 N m for a control of 1."""
+    if actuator.biastype != mujoco.mjtBias.mjBIAS_NONE:
+        return ["is a position or velocity servo; the controller needs a torque <motor>"]
+    if (
+        actuator.dyntype != mujoco.mjtDyn.mjDYN_NONE
+        or actuator.gaintype != mujoco.mjtGain.mjGAIN_FIXED
+    ):
+        return ["has internal dynamics; the controller needs a torque <motor>"]
+    ratio = float(actuator.gear[0] * actuator.gainprm[0])
+    return [] if ratio == 1.0 else [f"has gear times gain {ratio:g}; the controller needs 1"]
+
+
+def _is_on_joint(actuator: mujoco.MjsActuator) -> bool:
+    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+    return actuator.trntype in kinds
+
+
+def _root(joint: mujoco.MjsJoint) -> mujoco.MjsBody:
+    """The top body above ``joint``, whose parent is the world."""
+    body = joint.parent
+    while body.parent.name != "world":
+        body = body.parent
+    return body
+
+
+def _has_ground(spec: mujoco.MjSpec) -> bool:
+    """Whether the file has ground: a plane, a height field, or any colliding geom of the world."""
+    kinds = (mujoco.mjtGeom.mjGEOM_PLANE, mujoco.mjtGeom.mjGEOM_HFIELD)
+    return any(
+        (geom.contype or geom.conaffinity) and (geom.type in kinds or geom.parent.name == "world")
+        for geom in spec.geoms
+    )

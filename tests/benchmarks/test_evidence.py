@@ -1,0 +1,41 @@
+"""The README's evidence comes from the bench, whole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.evidence import BEGIN, END, LINES, filled, table
+from benchmarks.families import FAMILIES
+from go2_wbc.errors import ConfigError
+
+README = Path(__file__).resolve().parents[2] / "README.md"
+ROWS = {line.row: {"n": 20, "mean": 0.5, "worst": 0.25} for line in LINES}
+
+
+def test_every_line_is_a_row_of_the_bench() -> None:
+    names = {row.name for family in FAMILIES for row in family.rows}
+    assert {line.row for line in LINES} <= names
+
+
+def test_the_table_is_put_between_the_marks_and_nothing_else_changes() -> None:
+    text = f"before\n{BEGIN}: x -->\nold\n{END}\nafter\n"
+    assert filled(text, ROWS) == f"before\n{BEGIN}: x -->\n{table(ROWS)}\n{END}\nafter\n"
+
+
+def test_a_missing_row_or_mark_is_named() -> None:
+    short = {name: row for name, row in ROWS.items() if name != "five.load"}
+    with pytest.raises(ConfigError, match=r"no value for five\.load"):
+        table(short)
+    with pytest.raises(ConfigError, match="the text has no"):
+        filled("nothing here", ROWS)
+
+
+def test_no_figure_of_the_readme_is_blank() -> None:
+    text = README.read_text(encoding="utf-8")
+    block = text[text.index(BEGIN) : text.index(END)]
+    lines = [line for line in block.splitlines() if line.startswith("|")][2:]
+    assert len(lines) == len(LINES)
+    for line in lines:
+        assert all(cell.strip() for cell in line.split("|")[1:5]), line

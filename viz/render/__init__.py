@@ -1,0 +1,1 @@
+"""Drawing without a GPU: the posed robot, a rasterizer, and the pictures made with them."""

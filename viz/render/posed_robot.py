@@ -1,0 +1,140 @@
+"""Triangles in the world: the whole robot placed by a configuration, and arrows."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float, Int
+
+from go2_wbc.legs import FOOT_NAMES
+from viz.render.robot_meshes import RobotVisuals
+
+_ARROW_SIDES = 12
+_HEAD_SHARE = 2.4  # arrow head: its radius over the shaft's
+_HEAD_LENGTH = 4.5  # arrow head: its length over the shaft's radius
+
+
+@dataclass(frozen=True, slots=True)
+class WorldTriangles:
+    """Triangles in the world, with what the renderer needs to shade them.
+
+    Attributes:
+        points: (n, 3) [m].
+        normals: (n, 3) unit.
+        triangles: (m, 3) rows of ``points``.
+        colors: (m, 3) in 0..1.
+    """
+
+    points: Float[np.ndarray, "n 3"]
+    normals: Float[np.ndarray, "n 3"]
+    triangles: Int[np.ndarray, "m 3"]
+    colors: Float[np.ndarray, "m 3"]
+
+    @staticmethod
+    def joined(parts: Sequence[WorldTriangles]) -> WorldTriangles:
+        """All triangles of several sets as one."""
+        offsets = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
+        return WorldTriangles(
+            np.concatenate([part.points for part in parts]),
+            np.concatenate([part.normals for part in parts]),
+            np.concatenate([part.triangles + o for part, o in zip(parts, offsets, strict=True)]),
+            np.concatenate([part.colors for part in parts]),
+        )
+
+
+@final
+class PosedRobot:
+    """Places the robot's surface in the world."""
+
+    def __init__(self, visuals: RobotVisuals) -> None:
+        """Gather all meshes, in the frames of their joints, into one array sorted by joint."""
+        self._model = visuals.model
+        self._data = visuals.model.createData()
+        self._foot_frames = [visuals.model.getFrameId(name) for name in FOOT_NAMES]
+        parts = []
+        self._slices: list[tuple[int, slice]] = []
+        count = 0
+        for visual in visuals.visuals:
+            start = count
+            R, p = visual.T_joint_visual[:3, :3], visual.T_joint_visual[:3, 3]
+            for part in visuals.meshes[visual.mesh]:
+                surface = part.surface
+                colors = np.tile(np.array(part.color) / 255, (len(surface.triangles), 1))
+                points, normals = surface.points @ R.T + p, surface.normals @ R.T
+                parts.append(WorldTriangles(points, normals, surface.triangles, colors))
+                count += len(points)
+            self._slices.append((visual.joint, slice(start, count)))
+        self._local = WorldTriangles.joined(parts)
+
+    def at(self, q: Float[np.ndarray, "19"]) -> WorldTriangles:
+        """The robot's surface in the configuration ``q`` (quaternion x y z w)."""
+        pin.forwardKinematics(self._model, self._data, q)
+        local = self._local
+        points, normals = np.empty_like(local.points), np.empty_like(local.normals)
+        for joint, rows in self._slices:
+            T_world_joint = self._data.oMi[joint]
+            R = T_world_joint.rotation.T
+            np.matmul(local.points[rows], R, out=points[rows])
+            points[rows] += T_world_joint.translation
+            np.matmul(local.normals[rows], R, out=normals[rows])
+        return WorldTriangles(points, normals, local.triangles, local.colors)
+
+    def feet(self, q: Float[np.ndarray, "19"]) -> Float[np.ndarray, "4 3"]:
+        """Centres of the four feet in the world [m]."""
+        pin.framesForwardKinematics(self._model, self._data, q)
+        return np.array([self._data.oMf[frame].translation for frame in self._foot_frames])
+
+    def on_trunk(self, points: Float[np.ndarray, "k 3"]) -> Float[np.ndarray, "k 3"]:
+        """Points of the base frame in the world [m], in the configuration placed last."""
+        T_world_base = self._data.oMi[1]
+        return points @ T_world_base.rotation.T + T_world_base.translation
+
+
+def arrow(
+    start: Float[np.ndarray, "3"], length: float, radius: float, color: tuple[float, float, float]
+) -> WorldTriangles:
+    """An upright arrow.
+
+    Args:
+        start: its foot in the world [m].
+        length: shaft and head together [m].
+        radius: of the shaft [m].
+        color: red, green, blue in 0..1.
+    """
+    head = min(_HEAD_LENGTH * radius, 0.6 * length)
+    wide = _HEAD_SHARE * radius
+    neck = length - head
+    profile = [(0.0, 0.0), (radius, 0.0), (radius, neck), (wide, neck), (0.0, length)]
+    return WorldTriangles.joined(
+        [_cone_band(start, *band, color=color) for band in itertools.pairwise(profile)]
+    )
+
+
+def _cone_band(
+    start: Float[np.ndarray, "3"],
+    low: tuple[float, float],
+    high: tuple[float, float],
+    *,
+    color: tuple[float, float, float],
+) -> WorldTriangles:
+    """The surface between two rings (radius, height) around the vertical through ``start``."""
+    angles = np.arange(_ARROW_SIDES) * 2 * np.pi / _ARROW_SIDES
+    circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(_ARROW_SIDES)])
+    rings = [start + radius * circle + [0.0, 0.0, height] for radius, height in (low, high)]
+    outward, upward = high[1] - low[1], low[0] - high[0]
+    normal = (outward * circle + [0.0, 0.0, upward]) / np.hypot(outward, upward)
+    a, b = np.arange(_ARROW_SIDES), (np.arange(_ARROW_SIDES) + 1) % _ARROW_SIDES
+    faces = [np.column_stack([a, b, b + _ARROW_SIDES])]
+    faces += [np.column_stack([a, b + _ARROW_SIDES, a + _ARROW_SIDES])]
+    triangles = np.concatenate(faces)
+    return WorldTriangles(
+        np.concatenate(rings),
+        np.tile(normal, (2, 1)),
+        triangles,
+        np.tile(color, (len(triangles), 1)),
+    )

@@ -1,0 +1,132 @@
+"""Pictures of a recording at chosen times: camera that follows, force arrows, captions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import final
+
+import numpy as np
+from jaxtyping import UInt8
+
+from go2_wbc.recording import Recording
+from go2_wbc.robot.model import FOOT_RADIUS
+from viz.content import Remark
+from viz.palette import FORCE, rgb
+from viz.render.camera import Camera
+from viz.render.framing import camera_path, heading_path, nearest_rows
+from viz.render.overlay import Caption, draw_caption
+from viz.render.posed_robot import PosedRobot, WorldTriangles, arrow
+from viz.render.renderer import RenderStyle, render
+from viz.render.robot_meshes import load_robot_visuals
+
+_INSTANT = 0.04  # [s] a limit that is broken for an instant is told for this long around it
+
+
+@dataclass(frozen=True, slots=True)
+class ShotStyle:
+    """How pictures of a recording are taken.
+
+    Attributes:
+        size: width and height [px].
+        azimuth: mean direction of the camera seen from the robot, 0 is ahead of it [rad].
+        sway: the azimuth swings by this much [rad] around its mean ...
+        sway_period: ... once in this time [s]; a still camera looks dead.
+        elevation: camera angle above the floor [rad].
+        distance: from the camera to the robot [m].
+        smoothing: standard deviation [s] of the low-pass filter on where the camera looks.
+        turn_smoothing: the same for its turning with the robot.
+        detail: size of the smallest feature kept of the meshes [m].
+        metres_per_newton: length of the force arrows.
+        least_force: weaker forces draw no arrow [N].
+        render: lights, floor, samples.
+    """
+
+    size: tuple[int, int] = (640, 400)
+    azimuth: float = np.deg2rad(-52.0)
+    sway: float = np.deg2rad(14.0)
+    sway_period: float = 26.0
+    elevation: float = np.deg2rad(17.0)
+    distance: float = 1.62
+    smoothing: float = 0.6
+    turn_smoothing: float = 1.5
+    detail: float = 0.006
+    metres_per_newton: float = 0.002
+    least_force: float = 4.0
+    render: RenderStyle = field(default_factory=RenderStyle)
+
+
+@final
+class Photographer:
+    """Takes pictures of a recording."""
+
+    def __init__(
+        self, recording: Recording, style: ShotStyle, remarks: Sequence[Remark] = ()
+    ) -> None:
+        """Prepare the meshes and the path of the camera.
+
+        Args:
+            recording: what happened.
+            style: how pictures are taken.
+            remarks: broken limits take the label's place in captions while they are broken.
+        """
+        self._recording = recording
+        self._broken = [remark for remark in remarks if remark.is_broken]
+        self._style = style
+        self._robot = PosedRobot(load_robot_visuals().simplified(style.detail))
+        self._path = camera_path(recording, self._robot, smoothing=style.smoothing)
+        self._heading = heading_path(recording, smoothing=style.turn_smoothing)
+
+    def shoot(self, time: float) -> UInt8[np.ndarray, "h w 3"]:
+        """The picture at ``time`` seconds after the start of the recording."""
+        recording, style = self._recording, self._style
+        k = int(nearest_rows(recording, np.array([time]))[0])
+        robot = self._robot.at(recording.q[k])
+        camera = self._camera(time)
+        lighting = style.render.lighting.turned(camera.azimuth - style.azimuth)
+        shown = replace(style.render, lighting=lighting)
+        return render(camera, robot, shown, extras=self._arrows(recording, k))
+
+    def caption(
+        self, time: float, *, speed: float | int = 1.0, with_progress: bool = True
+    ) -> Caption:
+        """What there is to say about the same time."""
+        recording = self._recording
+        k = int(nearest_rows(recording, np.array([time]))[0])
+        progress = time / max(recording.duration, 1e-9) if with_progress else None
+        touching = recording.foot_forces[k] > self._style.least_force
+        broken = self._broken_at(time)
+        if broken is None:
+            return Caption(recording.labels[k], time, progress, touching, speed)
+        label = f"{broken.limit}: {broken.subject}"
+        return Caption(label, time, progress, touching, speed, is_alarm=True)
+
+    def shoot_captioned(
+        self, time: float, *, speed: float | int = 1.0
+    ) -> UInt8[np.ndarray, "h w 3"]:
+        """The picture at ``time`` with its caption."""
+        return draw_caption(self.shoot(time), self.caption(time, speed=speed))
+
+    def _broken_at(self, time: float) -> Remark | None:
+        for remark in self._broken:
+            if any(start - _INSTANT <= time <= end + _INSTANT for start, end in remark.spans):
+                return remark
+        return None
+
+    def _camera(self, time: float) -> Camera:
+        style = self._style
+        times, points = self._path
+        target = np.array([np.interp(time, times, points[:, axis]) for axis in range(3)])
+        heading = np.interp(self._recording.time[0] + time, self._recording.time, self._heading)
+        sway = style.sway * np.sin(2 * np.pi * time / style.sway_period)
+        azimuth = style.azimuth + heading + sway
+        return Camera(target, float(azimuth), style.elevation, style.distance, style.size)
+
+    def _arrows(self, recording: Recording, k: int) -> list[WorldTriangles]:
+        style = self._style
+        feet = self._robot.feet(recording.q[k]) - [0.0, 0.0, FOOT_RADIUS]
+        return [
+            arrow(foot, float(force) * style.metres_per_newton, 0.006, rgb(FORCE))
+            for foot, force in zip(feet, recording.foot_forces[k], strict=True)
+            if force > style.least_force
+        ]

@@ -1,0 +1,123 @@
+"""A still picture of a recording: its moments side by side."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from go2_wbc.errors import ConfigError
+from go2_wbc.files import checked_output, write_atomically
+from go2_wbc.recording import Recording
+from go2_wbc.robot.model import FOOT_RADIUS
+from viz.checks import check_recording
+from viz.render.framing import nearest_rows
+from viz.render.overlay import draw_caption
+from viz.render.posed_robot import PosedRobot
+from viz.render.renderer import RenderStyle
+from viz.render.robot_meshes import load_robot_visuals
+from viz.render.scene_shots import Photographer, ShotStyle
+from viz.replay.replay_data import Span, label_spans
+
+FILMSTRIP_SUFFIXES = (".png",)
+_MOST_PANELS = 6
+_COLUMNS = 3
+_PANEL = (560, 380)  # [px]
+_GAP = 12  # [px]
+_CORNER = 18  # [px] radius
+_STYLE = ShotStyle(size=_PANEL, distance=1.6, detail=0.003, render=RenderStyle(samples=3))
+_LIFTED = 0.02  # [m] a foot this high makes a better picture than the middle of the span
+_SETTLED = 0.7  # share of a span after which a slow behaviour has taken its shape
+_CANDIDATES = 60  # poses of a span that are looked at
+
+
+def export_filmstrip(
+    recording: Recording, path: Path, *, times: Sequence[float | int] | None = None
+) -> Path:
+    """Write moments of a recording side by side as one PNG with a transparent background.
+
+    Args:
+        recording: what happened.
+        path: file to write, ``.png``.
+        times: seconds after the start, one per panel; by default one telling moment of each
+            behaviour.
+
+    Returns:
+        The absolute path.
+
+    Raises:
+        ConfigError: for a path that cannot be written, a recording that cannot be drawn, or times
+            outside it.
+    """
+    target = checked_output(path, FILMSTRIP_SUFFIXES)
+    check_recording(recording)
+    chosen = telling_times(recording) if times is None else [float(time) for time in times]
+    if not chosen:
+        raise ConfigError("a filmstrip needs at least one time")
+    outside = [time for time in chosen if not 0 <= time <= recording.duration]
+    if outside:
+        raise ConfigError(
+            f"time {outside[0]:g} s is outside the recording; valid: 0 to {recording.duration:g} s"
+        )
+    photographer = Photographer(recording, _STYLE)
+    panels = []
+    for time in chosen:
+        caption = photographer.caption(time, with_progress=False)
+        panels.append(Image.fromarray(draw_caption(photographer.shoot(time), caption)))
+    stream = io.BytesIO()
+    _assemble(panels).save(stream, "PNG", optimize=True)
+    return write_atomically(target, stream.getvalue())
+
+
+def telling_times(recording: Recording) -> list[float]:
+    """One moment for each behaviour, in order: where a foot is highest, or the pose settled."""
+    spans = _interesting_spans(label_spans(recording))
+    robot = PosedRobot(load_robot_visuals())
+    return [_telling_time(recording, robot, span) for span in spans]
+
+
+def _interesting_spans(spans: Sequence[Span]) -> list[Span]:
+    """The longest span of each label, at most ``_MOST_PANELS``, in order of time."""
+    longest: dict[str, Span] = {}
+    for span in spans:
+        best = longest.get(span.label)
+        if best is None or span.end - span.start > best.end - best.start:
+            longest[span.label] = span
+    by_length = sorted(longest.values(), key=lambda span: span.start - span.end)
+    return sorted(by_length[:_MOST_PANELS], key=lambda span: span.start)
+
+
+def _telling_time(recording: Recording, robot: PosedRobot, span: Span) -> float:
+    times = np.linspace(span.start, span.end, _CANDIDATES + 2)[1:-1]
+    rows = nearest_rows(recording, times)
+    heights = [robot.feet(recording.q[row])[:, 2].max() - FOOT_RADIUS for row in rows]
+    best = int(np.argmax(heights))
+    if heights[best] > _LIFTED:
+        return float(times[best])
+    return span.start + _SETTLED * (span.end - span.start)
+
+
+def _assemble(panels: Sequence[Image.Image]) -> Image.Image:
+    """Panels in rows of at most three, with round corners; a shorter last row is centred."""
+    columns = (
+        len(panels) if len(panels) <= _COLUMNS else -(-len(panels) // -(-len(panels) // _COLUMNS))
+    )
+    rows = -(-len(panels) // columns)
+    width, height = _PANEL
+    size = (columns * width + (columns - 1) * _GAP, rows * height + (rows - 1) * _GAP)
+    sheet = Image.new("RGBA", size, (255, 255, 255, 0))
+    mask = Image.new("L", (2 * width, 2 * height), 0)
+    ImageDraw.Draw(mask).rounded_rectangle(
+        (0, 0, 2 * width - 1, 2 * height - 1), 2 * _CORNER, fill=255
+    )
+    mask = mask.resize(_PANEL, Image.Resampling.BOX)
+    for k, panel in enumerate(panels):
+        row, column = divmod(k, columns)
+        missing = max(0, (row + 1) * columns - len(panels))
+        x = column * (width + _GAP) + missing * (width + _GAP) // 2
+        y = row * (height + _GAP)
+        sheet.paste(panel, (x, y), mask)
+    return sheet

@@ -1,0 +1,1 @@
+"""Pages: the offline 3D replay, its data, and the live preview that serves it."""

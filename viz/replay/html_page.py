@@ -1,0 +1,88 @@
+"""Writes a recording or a plan as one web page that needs nothing else: no server, no network."""
+
+from __future__ import annotations
+
+import html
+from importlib import resources
+from pathlib import Path
+
+import meshcat
+
+from go2_wbc.errors import ConfigError
+from go2_wbc.files import checked_output, write_atomically
+from go2_wbc.recording import Recording
+from viz.checks import checked_screening
+from viz.content import Screening
+from viz.replay.packing import compressed_text
+from viz.replay.page_data import scene_text, screening_text
+
+HTML_SUFFIXES = (".html", ".htm")
+PAGE_LIMIT = 4_000_000
+"""Largest page [bytes]."""
+_SCRIPTS = (
+    "replay_data.js",
+    "replay_stage.js",
+    "replay_scene.js",
+    "replay_ghost.js",
+    "replay_flags.js",
+    "replay_charts.js",
+    "replay_verdict.js",
+    "replay_app.js",
+)
+_LIVE_SCRIPT = "replay_live.js"
+
+
+def export_html(shown: Recording | Screening, path: Path, *, title: str) -> Path:
+    """Write an interactive 3D replay as one self-contained page.
+
+    Args:
+        shown: what happened, or a plan, with what there is to say about it.
+        path: file to write, ``.html``.
+        title: heading and window title; any text.
+
+    Returns:
+        The absolute path.
+
+    Raises:
+        ConfigError: for a path that cannot be written, a recording that cannot be drawn, or one
+            so large that the page would exceed ``PAGE_LIMIT``.
+        DescriptionError: if the robot's files are missing.
+    """
+    target = checked_output(path, HTML_SUFFIXES)
+    screening = checked_screening(shown)
+    page = page_text(title, scene_text(), screening_text(screening, title)).encode()
+    if len(page) > PAGE_LIMIT:
+        raise ConfigError(
+            f"the page would have {len(page)} bytes, limit {PAGE_LIMIT}; record a shorter run"
+        )
+    return write_atomically(target, page)
+
+
+def page_text(title: str, scene: str, data: str, *, is_live: bool = False) -> str:
+    """The page.
+
+    Args:
+        title: any text.
+        scene: the packed scene.
+        data: what happens in it, packed.
+        is_live: the page listens to the server that it came from.
+    """
+    scripts = (*_SCRIPTS, _LIVE_SCRIPT) if is_live else _SCRIPTS
+    parts = {
+        "TITLE": html.escape(title),
+        "STYLE": _asset("replay.css"),
+        "SCRIPT": "\n".join(_asset(name) for name in scripts),
+        "MESHCAT": compressed_text(_meshcat_bundle()),
+        "SCENE": scene,
+        "DATA": data,
+    }
+    pieces = _asset("replay.html").split("@")
+    return "".join(parts[piece] if k % 2 else piece for k, piece in enumerate(pieces))
+
+
+def _asset(name: str) -> str:
+    return resources.files("viz.replay").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+def _meshcat_bundle() -> bytes:
+    return (Path(meshcat.viewer_assets_path()) / "dist" / "main.min.js").read_bytes()

@@ -1,0 +1,111 @@
+"""What a page holds besides its code: the scene, once, and what happens in it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from go2_wbc.legs import LEGS
+from go2_wbc.recording import Recording
+from go2_wbc.robot.model import FOOT_RADIUS
+from viz.content import Remark, Screening, Verdict
+from viz.palette import LEG_COLORS
+from viz.render.posed_robot import PosedRobot
+from viz.render.robot_meshes import load_robot_visuals
+from viz.replay.meshcat_scene import robot_scene
+from viz.replay.packing import Pack
+from viz.replay.replay_data import ReplayFrames, label_spans, reduced, replay_frames
+
+_FORCE_PERCENTILE = 99.5  # a touchdown spike beyond it may be cut off in the contact strip
+_LEAST_FORCE_SCALE = 50.0  # [N] a full row of the contact strip is at least this much
+
+
+def scene_text() -> str:
+    """The robot and the markers, packed: the same for every page."""
+    pack = Pack()
+    header = {
+        **robot_scene(load_robot_visuals(), pack),
+        "legs": [leg.name for leg in LEGS],
+        "leg_colors": list(LEG_COLORS),
+        "foot_radius": FOOT_RADIUS,
+    }
+    return pack.packed(header)
+
+
+def screening_text(screening: Screening, title: str, version: str = "") -> str:
+    """What happens, packed; ``version`` tells one text of a live page from the next."""
+    robot = PosedRobot(load_robot_visuals())
+    pack = Pack()
+    frames = replay_frames(screening.recording, robot)
+    header: dict[str, object] = {
+        "title": title,
+        "version": version,
+        "is_plan": screening.is_plan,
+        "rate": frames.rate,
+        "frames": len(frames.q),
+        "labels": [[s.start, s.end, s.label] for s in label_spans(screening.recording)],
+        "force_scale": _force_scale(frames),
+        "verdict": None,
+        "ghost": None,
+    }
+    _add_frames(pack, "", frames)
+    if screening.verdict is not None:
+        header["verdict"] = _add_verdict(pack, screening.verdict)
+    if screening.ghost is not None:
+        header["ghost"] = _add_ghost(pack, screening.ghost, robot)
+    return pack.packed(header)
+
+
+def _add_ghost(pack: Pack, recording: Recording, robot: PosedRobot) -> dict[str, object]:
+    frames = replay_frames(recording, robot)
+    _add_frames(pack, "ghost.", frames)
+    return {"rate": frames.rate, "frames": len(frames.q)}
+
+
+def _force_scale(frames: ReplayFrames) -> float:
+    highest = float(np.percentile(frames.foot_forces, _FORCE_PERCENTILE))
+    return max(highest, _LEAST_FORCE_SCALE)
+
+
+def _add_frames(pack: Pack, prefix: str, frames: ReplayFrames) -> None:
+    pack.add_quantised(f"{prefix}q", frames.q)
+    pack.add_quantised(f"{prefix}feet", frames.p_world_feet)
+    pack.add_quantised(f"{prefix}com", frames.p_world_com)
+    pack.add_quantised(f"{prefix}target", frames.p_world_camera_target)
+    pack.add_quantised(f"{prefix}forces", frames.foot_forces)
+    pack.add(f"{prefix}stance", frames.stance.astype(np.uint8))
+    pack.add(f"{prefix}margin", frames.support_margin.astype(np.float32))
+    pack.add(f"{prefix}torque", frames.torque_ratio.astype(np.float32))
+
+
+def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
+    curves = []
+    for k, curve in enumerate(map(reduced, verdict.ranked())):
+        pack.add(f"curve{k}.time", curve.time.astype(np.float32))
+        pack.add(f"curve{k}.margin", curve.margin.astype(np.float32))
+        pack.add(f"curve{k}.worst", curve.worst.astype(np.uint8))
+        curves.append(
+            {
+                "name": curve.name,
+                "unit": curve.unit,
+                "subjects": list(curve.subjects),
+                "tight": float(curve.tight),
+            }
+        )
+    return {
+        "ok": verdict.ok,
+        "text": verdict.text,
+        "remarks": [_plain(remark) for remark in verdict.remarks],
+        "curves": curves,
+    }
+
+
+def _plain(remark: Remark) -> dict[str, object]:
+    return {
+        "limit": remark.limit,
+        "subject": remark.subject,
+        "time": remark.time,
+        "text": remark.text,
+        "is_broken": remark.is_broken,
+        "spans": [list(span) for span in remark.spans],
+        "parts": list(remark.parts),
+    }

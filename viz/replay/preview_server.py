@@ -1,0 +1,223 @@
+"""Serves a live page on this machine only: what is published reaches open pages by itself.
+
+Bound to the loopback address, so that no other machine reaches it; and requests whose ``Host`` is
+not the loopback's are refused, so that no web site reaches it through a name of its own that it
+points at this machine (DNS rebinding).
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import threading
+import uuid
+from collections.abc import Mapping
+from dataclasses import dataclass
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from types import TracebackType
+from typing import final
+
+from go2_wbc.errors import ConfigError
+from viz.checks import checked_screening
+from viz.content import Screening
+from viz.replay.html_page import page_text
+from viz.replay.page_data import scene_text, screening_text
+
+_log = logging.getLogger(__name__)
+
+LOOPBACK = "127.0.0.1"
+LOOPBACK_NAMES = (LOOPBACK, "localhost", "[::1]")
+_HEARTBEAT = 10.0
+"""A page that hears nothing for so long [s] gets an empty line, which finds closed pages."""
+_HEADERS = {
+    "Cache-Control": "no-store",
+    "Content-Security-Policy": "default-src 'self' 'unsafe-inline' data: blob:",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """What pages show now: packed data with its version, and what is wrong with the newest."""
+
+    data: str
+    version: str
+    error: str | None
+
+
+@final
+class PreviewServer:
+    """A context manager that serves a page until its end.
+
+    Attributes:
+        url: address of the page.
+    """
+
+    def __init__(self, screening: Screening, title: str, port: int) -> None:
+        """Bind and serve in the background.
+
+        Args:
+            screening: what the page shows at first.
+            title: of the page.
+            port: to listen on; 0 takes any that is free.
+
+        Raises:
+            ConfigError: if the port is in use or out of range, or for a recording that cannot be
+                drawn.
+        """
+        self._title = title
+        self._scene = scene_text()
+        self._changed = threading.Condition()
+        self._is_open = True
+        self._state = self._packed(screening)
+        self._http = _bind(port, self)
+        self.url = f"http://{LOOPBACK}:{self._http.server_port}/"
+        self._thread = threading.Thread(target=self._http.serve_forever, args=(0.05,), daemon=True)
+        self._thread.start()
+
+    def publish(self, screening: Screening) -> None:
+        """Show this from now on, and no error.
+
+        Raises:
+            ConfigError: for a recording that cannot be drawn.
+        """
+        self._set(self._packed(screening))
+
+    def publish_error(self, message: str) -> None:
+        """Say what is wrong, and keep what was shown."""
+        self._set(_State(self._state.data, self._state.version, message))
+
+    def close(self) -> None:
+        """End; open pages say so."""
+        with self._changed:
+            self._is_open = False
+            self._changed.notify_all()
+        self._http.shutdown()
+        self._thread.join()
+        self._http.server_close()
+
+    def __enter__(self) -> PreviewServer:
+        """The server itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End."""
+        self.close()
+
+    def page(self) -> str:
+        """The live page."""
+        return page_text(self._title, self._scene, self._state.data, is_live=True)
+
+    def data(self) -> str:
+        """What the page shows now, packed."""
+        return self._state.data
+
+    def news(self, seen: str | None) -> str | None:
+        """Wait until there is other news than ``seen``; "" if there is none for long.
+
+        Returns:
+            Version and error as JSON; ``None`` once the server ends.
+        """
+        with self._changed:
+            self._changed.wait_for(lambda: not self._is_open or self._told() != seen, _HEARTBEAT)
+            if not self._is_open:
+                return None
+            told = self._told()
+        return "" if told == seen else told
+
+    def _told(self) -> str:
+        return json.dumps({"version": self._state.version, "error": self._state.error})
+
+    def _packed(self, screening: Screening) -> _State:
+        version = uuid.uuid4().hex
+        checked = checked_screening(screening)
+        return _State(screening_text(checked, self._title, version), version, None)
+
+    def _set(self, state: _State) -> None:
+        with self._changed:
+            self._state = state
+            self._changed.notify_all()
+
+
+class _Http(ThreadingHTTPServer):
+    """Binds without stealing the port of another program; ends without waiting for pages."""
+
+    daemon_threads = True
+    block_on_close = False
+    source: PreviewServer
+
+    def handle_error(self, request: object, client_address: object) -> None:
+        """Log what went wrong in an answer; the page may have been closed meanwhile."""
+        _log.info("no answer to %s", client_address, exc_info=True)
+
+
+def _bind(port: int, source: PreviewServer) -> _Http:
+    try:
+        http = _Http((LOOPBACK, port), _Handler)
+    except OverflowError as error:
+        raise ConfigError(f"port {port} is not valid: 0 to 65535") from error
+    except OSError as error:
+        raise ConfigError(
+            f"cannot listen on port {port} of {LOOPBACK}: {error.strerror or error}; choose another"
+            " one, or 0 for any that is free"
+        ) from error
+    http.source = source
+    return http
+
+
+@final
+class _Handler(BaseHTTPRequestHandler):
+    """Answers GET of ``/``, ``/data`` and ``/events``, and nothing else."""
+
+    server: _Http  # type: ignore[reportIncompatibleVariableOverride]
+
+    def do_GET(self) -> None:
+        """Answer one request."""
+        source = self.server.source
+        if not _is_loopback(self.headers.get("Host", ""), self.server.server_port):
+            self._answer("only for this machine\n", "text/plain", HTTPStatus.FORBIDDEN)
+        elif self.path == "/":
+            self._answer(source.page(), "text/html")
+        elif self.path == "/data":
+            self._answer(source.data(), "text/plain")
+        elif self.path == "/events":
+            self._tell(source)
+        else:
+            self._answer("not here\n", "text/plain", HTTPStatus.NOT_FOUND)
+
+    def _answer(self, text: str, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
+        content = text.encode()
+        self._begin(status, kind, {"Content-Length": str(len(content))})
+        self.wfile.write(content)
+
+    def _tell(self, source: PreviewServer) -> None:
+        """Server-sent events until the page or the server ends."""
+        self._begin(HTTPStatus.OK, "text/event-stream", {})
+        seen: str | None = None
+        try:
+            while (told := source.news(seen)) is not None:
+                self.wfile.write(f"data: {told}\n\n".encode() if told else b":\n\n")
+                seen = told or seen
+        except OSError:
+            return  # the page was closed
+
+    def _begin(self, status: HTTPStatus, kind: str, more: Mapping[str, str]) -> None:
+        self.send_response(status)
+        for name, value in {**_HEADERS, "Content-Type": f"{kind}; charset=utf-8", **more}.items():
+            self.send_header(name, value)
+        self.end_headers()
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Say nothing: the terminal belongs to the verdicts."""
+
+
+def _is_loopback(host: str, port: int) -> bool:
+    return host in {f"{name}:{port}" for name in LOOPBACK_NAMES}
