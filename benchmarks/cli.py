@@ -52,7 +52,7 @@ def register(subparsers: Subparsers) -> None:
     behaviour = add_parser(
         benches,
         "behaviour",
-        "Stand, trot, pushes, errands, high five, slaps, the motions and the whole demo\n"
+        "Stand, trot, pushes, goals, high five, slaps, the motions and the whole demo\n"
         "in MuJoCo, with friction, mass, heading and joint angles drawn by each seed.",
         examples=BEHAVIOUR_EXAMPLES,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from benchmarks import (
-    errands,
+    goals,
     high_fives,
     library,
     model,
@@ -24,7 +24,7 @@ FAMILIES: tuple[Family, ...] = (
     postures.PUSHES,
     trotting.TROT,
     trotting.PUSHES,
-    errands.FAMILY,
+    goals.FAMILY,
     high_fives.FAMILY,
     slaps.FAMILY,
     library.FAMILY,

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from benchmarks.generated_motions import GeneratedMotion, generated_motion, near_specimen
 from benchmarks.motion_runs import MotionRun, run_motion
 from benchmarks.rows import Family, Measurement, Row
 from benchmarks.runner import Results
-from benchmarks.specimens import Specimen, near_specimen, specimen
 from benchmarks.trials import Subject, Trial
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import MotionPlan
@@ -39,7 +39,7 @@ _FAILED = Row("feasibility.failed", "physics", "went wrong in MuJoCo", "", None)
 
 def measure(trial: Trial) -> Measurement:
     """Check and play one clear motion, good or broken."""
-    return _judged(specimen(trial.seed), trial)
+    return _judged(generated_motion(trial.seed), trial)
 
 
 def measure_near(trial: Trial) -> Measurement:
@@ -47,7 +47,7 @@ def measure_near(trial: Trial) -> Measurement:
     return _judged(near_specimen(trial.seed), trial)
 
 
-def _judged(made: Specimen, trial: Trial) -> Measurement:
+def _judged(made: GeneratedMotion, trial: Trial) -> Measurement:
     """The reasons of the check and of physics are kept as the rows' failures."""
     model = RobotModel()
     plan = made.plan(model)
@@ -169,7 +169,7 @@ class Verdicts:
 
 def verdicts_of(results: Results, family: Family = FAMILY) -> Verdicts:
     """The matrix of what ``run_families`` measured of a family."""
-    make = near_specimen if family.name == NEAR_FAMILY.name else specimen
+    make = near_specimen if family.name == NEAR_FAMILY.name else generated_motion
     cases, lost = [], {}
     for seed, measured in sorted(results[family.name].items()):
         if not measured.values:

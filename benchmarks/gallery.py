@@ -26,10 +26,10 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.recording import Recording
 from motions import Motion, Timeline, find_motion, motion_names
 from viz.palette import INK
+from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.posed_robot import PosedRobot
 from viz.render.renderer import RenderStyle
 from viz.render.robot_meshes import load_robot_visuals
-from viz.render.scene_shots import Photographer, ShotStyle
 
 MOMENTS = 3
 """Panels in a line; a long motion has two lines of them."""
@@ -131,7 +131,7 @@ def telling_rows(recording: Recording) -> list[int]:
 
 def picture(recording: Recording, rows: Sequence[int]) -> bytes:
     """The moments, ``MOMENTS`` in a line, as one WebP of at most ``SIZE_LIMIT`` bytes."""
-    photographer = Photographer(recording, STYLE)
+    frame_renderer = FrameRenderer(recording, STYLE)
     width, height = PANEL
     lines = -(-len(rows) // MOMENTS)
     size = (MOMENTS * (width + GAP) - GAP, lines * (height + GAP) - GAP)
@@ -139,7 +139,7 @@ def picture(recording: Recording, rows: Sequence[int]) -> bytes:
     font = ImageFont.load_default(15)
     for place, row in enumerate(rows):
         time = float(recording.time[row] - recording.time[0])
-        panel = Image.fromarray(photographer.shoot(time))
+        panel = Image.fromarray(frame_renderer.shoot(time))
         corner = (width - 12, height - 10)
         ImageDraw.Draw(panel).text(corner, f"{time:.1f} s", INK, font, anchor="rs")
         line, column = divmod(place, MOMENTS)

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Bool, Float
 
+from benchmarks.ground_truth import Track
 from benchmarks.rows import Direction, Family, Measurement, Row
 from benchmarks.trials import Failed, Subject, Trial
-from benchmarks.witness import Track
 from go2_wbc.geometry import support_margin
 from go2_wbc.legs import LEGS, SIDES, Leg
 from go2_wbc.robot.model import RobotModel
@@ -54,9 +54,9 @@ def measure(trial: Trial) -> Measurement:
         try:
             robot.require(robot.go2.stand())
             for side, leg in SIDES.items():
-                robot.witness.clear()
+                robot.truth.clear()
                 robot.require(robot.go2.high_five(side, hold=HOLD))
-                figures = _figures(robot.witness.track(), leg)
+                figures = _figures(robot.truth.track(), leg)
                 worst = {row.name: _worse(row, figures, worst) for row in ROWS}
         except Failed as failed:
             reason = str(failed)

@@ -8,9 +8,9 @@ from jaxtyping import Float
 from benchmarks.agreement import model_agreement
 from benchmarks.rows import Family, Measurement, Row
 from benchmarks.trials import Trial
-from controller.executor import Aborted
 from controller.loop import ControlLoop
 from controller.pilot import Pilot
+from controller.procedures import Aborted
 from controller.runner import Runner
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config

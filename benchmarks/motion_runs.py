@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from jaxtyping import Float
 
+from benchmarks.ground_truth import Track
 from benchmarks.trials import Subject
-from benchmarks.witness import Track
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import Anchor, LegTask, MotionPlan, TrackedPoint
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
@@ -80,9 +80,9 @@ class MotionRun:
 
 def run_motion(robot: Subject, plan: MotionPlan, model: RobotModel) -> MotionRun:
     """Play ``plan`` on a standing robot, unchecked."""
-    robot.witness.clear()
+    robot.truth.clear()
     said = robot.go2.play(plan, check=False)
-    fall = robot.witness.fall()
+    fall = robot.truth.fall()
     track = _of_motion(robot, plan)
     q, dt = track.q[:, 7:], robot.plant.control_period
     shares = (np.abs(track.tau) / model.torque_limits).max(axis=1)
@@ -107,9 +107,9 @@ def run_motion(robot: Subject, plan: MotionPlan, model: RobotModel) -> MotionRun
 def _of_motion(robot: Subject, plan: MotionPlan) -> Track:
     """The ticks in which the plan was played."""
     recording = robot.go2.recording(rate=1.0 / robot.plant.control_period)
-    track = robot.witness.track()
+    track = robot.truth.track()
     times = recording.time[np.array(recording.labels) == plan.name]
-    times = times[times >= robot.witness.start]
+    times = times[times >= robot.truth.start]
     if len(times) == 0:
         return track
     first, last = np.searchsorted(track.time, [times[0], times[-1] + 1e-9])

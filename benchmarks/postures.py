@@ -34,11 +34,11 @@ MOVED = Row("stand.push_moved", _PUSH, "a foot moved, up to the bar", "mm", None
 
 
 def standing_fault(robot: Subject) -> str | None:
-    """What the witness finds missing for standing, or None.
+    """What the truth finds missing for standing, or None.
 
     Standing is: CoM within 20 mm of its height, tilt below 6 deg, every foot loaded.
     """
-    state, height = robot.plant.read(), float(robot.witness.p_world_com[2])
+    state, height = robot.plant.read(), float(robot.truth.p_world_com[2])
     if abs(height - STAND_HEIGHT) > HEIGHT_TOLERANCE:
         return f"CoM at {height:.3f} m instead of {STAND_HEIGHT:.2f} m"
     if state.tilt > TILT_TOLERANCE:
@@ -61,7 +61,7 @@ def measure_stand(trial: Trial) -> Measurement:
             robot.require(robot.go2.stand())
         except Failed as failed:
             return Measurement({}, reason=str(failed))
-        track = robot.witness.track()
+        track = robot.truth.track()
         values = {
             "stand.time": robot.plant.time - start,
             "stand.torque": float((np.abs(track.tau) / RobotModel().torque_limits).max()),

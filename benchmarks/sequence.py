@@ -49,13 +49,13 @@ def measure(trial: Trial) -> Measurement:
     - True not borne out: steps called done for which this module's own criteria, on MuJoCo's
       state, are not met;
     - real-time factor: robot time over processor time of the process, from building the plant to
-      closing it, imports and the witness excluded.
+      closing it, imports and the truth excluded.
     """
     cpu_start = time.process_time()
     with Subject(trial) as robot:
         judge = Judge(robot)
         report = run_demo(robot.go2, judge)
-        robot_time, watching = robot.plant.time, robot.witness.cpu_time
+        robot_time, watching = robot.plant.time, robot.truth.cpu_time
     cpu_time = time.process_time() - cpu_start - watching
     values = {
         "demo.done": float(report.ok),
@@ -88,11 +88,11 @@ class Judge:
         """Take note of a step's begin, or judge its end."""
         if progress.result is None:
             self._before = self._robot.plant.read()
-            self._robot.witness.clear()
+            self._robot.truth.clear()
             return
         name = progress.result.name
         if progress.result.ok:
-            fault = self._robot.witness.fall() if "sit" not in name else None
+            fault = self._robot.truth.fall() if "sit" not in name else None
             fault = fault or FAULTS[name](self._robot, self._before)
             if fault is not None:
                 self.untrue.append(f"{name}: {fault}")
@@ -123,7 +123,7 @@ def _forward_fault(robot: Subject, before: RobotState) -> str | None:
 
 
 def _stop_fault(robot: Subject, _before: RobotState) -> str | None:
-    last = robot.witness.track().com_velocity[-1]
+    last = robot.truth.track().com_velocity[-1]
     speed = float(np.linalg.norm(last[:2]))
     return f"moves at {speed:.2f} m/s" if speed > STOP_SPEED else standing_fault(robot)
 
@@ -137,7 +137,7 @@ def _turn_fault(robot: Subject, before: RobotState) -> str | None:
 
 
 def _high_five_fault(robot: Subject, _before: RobotState) -> str | None:
-    track, leg = robot.witness.track(), Leg.FR
+    track, leg = robot.truth.track(), Leg.FR
     ticks = round(PAW_TIME / robot.plant.control_period)
     try:
         held = track.part(highest_window(track.p_world_feet[:, leg, 2], ticks))

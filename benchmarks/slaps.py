@@ -120,12 +120,12 @@ def _slap_all(trial: Trial, side: str, slap: Slap) -> _Slapped:
     while remaining:
         with Subject(trial) as robot:
             slapper = Slapper(robot, SIDES[side], slap, remaining)
-            robot.witness.on_tick = slapper
+            robot.truth.on_tick = slapper
             try:
                 robot.require(robot.go2.stand())
                 hold = SETTLE_TIME + slap.cycle * len(remaining)
                 said = robot.go2.high_five(side, hold=hold)
-                fault = robot.witness.fall() or standing_fault(robot)
+                fault = robot.truth.fall() or standing_fault(robot)
             except Failed as failed:
                 fault = str(failed)
             distances |= slapper.distances
@@ -177,7 +177,7 @@ class Slapper:
         self._robot.push(self._slap.force * direction, self._slap.duration, self._leg.foot)
 
     def _look(self) -> None:
-        fall = self._robot.witness.fall()
+        fall = self._robot.truth.fall()
         if fall is not None or self._paw[2] < RAISED:
             raise Failed(fall or f"the paw is at {self._paw[2]:.2f} m two seconds later")
         distance = 1000.0 * float(np.linalg.norm(self._paw - self._place))

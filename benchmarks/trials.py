@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from benchmarks.witness import Witness
+from benchmarks.ground_truth import GroundTruth
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from go2_wbc.plant import MujocoPlant
@@ -83,14 +83,14 @@ class Subject:
     Attributes:
         go2: the controller.
         plant: the simulated robot, for pushes.
-        witness: what MuJoCo says.
+        truth: what MuJoCo says.
     """
 
     def __init__(self, trial: Trial | MujocoPlant) -> None:
         """Set up a robot under the conditions of ``trial``, or the one given."""
         self.plant = trial.plant() if isinstance(trial, Trial) else trial
-        self.witness = Witness(self.plant)
-        self.go2 = GO2Controller(plant=self.witness)
+        self.truth = GroundTruth(self.plant)
+        self.go2 = GO2Controller(plant=self.truth)
 
     def close(self) -> None:
         """End the robot; idempotent."""
@@ -109,7 +109,7 @@ class Subject:
         return float(self.plant.read().rpy[2])
 
     def require(self, ok: bool) -> None:
-        """Raise ``Failed`` unless a call said True and the robot is upright for the witness."""
+        """Raise ``Failed`` unless a call said True and the robot is upright for the truth."""
         if not ok:
             raise Failed(self.go2.last_outcome.reason)
         self._require_upright()
@@ -118,7 +118,7 @@ class Subject:
         """Let time pass.
 
         Raises:
-            Failed: if the robot falls meanwhile, for the controller or for the witness.
+            Failed: if the robot falls meanwhile, for the controller or for the truth.
         """
         self.go2.wait(seconds)
         if self.go2.mode in (Mode.FALLEN, Mode.DAMPED):
@@ -130,7 +130,7 @@ class Subject:
         self.plant.push(yaw_rotation(self.heading) @ f_heading, duration, where)
 
     def _require_upright(self) -> None:
-        fall = self.witness.fall()
+        fall = self.truth.fall()
         if fall is not None:
             raise Failed(fall)
 

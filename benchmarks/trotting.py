@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from benchmarks.ground_truth import Track
 from benchmarks.pushes import PUSH_TIME, Heading, force_of, measure_rungs, push_rows
 from benchmarks.rows import Family, Measurement, Row
 from benchmarks.trials import Failed, Subject, Supply, Trial
-from benchmarks.witness import Track
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.robot.model import RobotModel
@@ -82,9 +82,9 @@ def measure_trot(trial: Trial) -> Measurement:
 def _trot(trial: Trial, command: VelocityCommand) -> Track:
     with Subject(trial) as robot:
         _start(robot, command)
-        robot.witness.clear()
+        robot.truth.clear()
         robot.wait(START_TIME + WINDOW)
-        return robot.witness.track()
+        return robot.truth.track()
 
 
 def _start(robot: Subject, command: VelocityCommand) -> None:
@@ -139,20 +139,20 @@ def measure_pushes(trial: Trial) -> Measurement:
 
 def _start_pushed(robot: Subject) -> None:
     _start(robot, VelocityCommand(PUSHED_SPEED))
-    robot.witness.clear()
+    robot.truth.clear()
     robot.wait(START_TIME)
 
 
 def _push_trotting(robot: Subject, force: np.ndarray, phase: int) -> None:
     period = GAITS["trot"].period
     # The gait's clock started with the command, when the track was cleared.
-    elapsed = robot.plant.time - robot.witness.start
+    elapsed = robot.plant.time - robot.truth.start
     phase_time = phase * period / PHASES
     target = phase_time + math.ceil((elapsed - phase_time) / period) * period
     robot.wait(max(target - elapsed, 0.0))
     robot.push(force, PUSH_TIME)
     robot.wait(RECOVERY_TIME)
-    track = robot.witness.track().since(robot.plant.time - 2.0 * period)
+    track = robot.truth.track().since(robot.plant.time - 2.0 * period)
     speed = float(track.com_velocity[:, 0].mean())
     if abs(speed - PUSHED_SPEED) > SPEED_TOLERANCE:
         raise Failed(f"walks at {speed:.2f} m/s two seconds after the push")

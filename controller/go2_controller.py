@@ -10,10 +10,10 @@ from pathlib import Path
 from types import TracebackType
 
 from controller import arguments
-from controller.executor import Aborted, Figures
 from controller.loop import ControlLoop
 from controller.modes import Mode, Outcome
 from controller.pilot import Pilot
+from controller.procedures import Aborted, Figures
 from controller.runner import Runner
 from controller.telemetry import Telemetry
 from controller.viewing import open_viewer
@@ -174,8 +174,8 @@ class GO2Controller:
         self._check_open()
         if self._pilot.mode is not Mode.WALKING:
             return
-        ends_errand = self._pilot.halt()
-        if not (ends_errand or self._runner.is_realtime or self._busy.locked()):
+        ends_goal = self._pilot.halt()
+        if not (ends_goal or self._runner.is_realtime or self._busy.locked()):
             self._call("stop", self._pilot.rest)
 
     def turn_left(self, angle: float) -> bool:

@@ -1,4 +1,4 @@
-"""Errands: turning by an angle and walking a distance, closed on the measured pose."""
+"""Goals: turning by an angle and walking a distance, closed on the measured pose."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from go2_wbc.robot.rotations import wrap_angle
 from go2_wbc.robot.state import RobotState
 
 TURN_RATE = 1.0
-"""Greatest turning rate [rad/s] of an errand."""
+"""Greatest turning rate [rad/s] of a goal."""
 WALK_SPEED = 0.4
-"""Greatest speed [m/s] of an errand."""
+"""Greatest speed [m/s] of a goal."""
 APPROACH = 2.0
-"""Speed per remaining way [1/s]: the errand slows down before its goal."""
+"""Speed per remaining way [1/s]: the goal slows down before its goal."""
 HEADING_TOLERANCE = math.radians(1.5)
 DISTANCE_TOLERANCE = 0.02
 GREATEST_TURN = 20 * math.pi
-"""Greatest angle [rad] of one errand: ten turns, a minute's work; more is a mistake in units."""
+"""Greatest angle [rad] of one goal: ten turns, a minute's work; more is a mistake in units."""
 GREATEST_DISTANCE = 100.0
-"""Greatest distance [m] of one errand: four minutes' work; more is a mistake in units."""
+"""Greatest distance [m] of one goal: four minutes' work; more is a mistake in units."""
 
 
-class Errand(ABC):
+class Goal(ABC):
     """A walk with a measured goal."""
 
     name: str
@@ -53,8 +53,8 @@ class Errand(ABC):
         """What was asked and achieved, by name with unit."""
 
 
-class Course:
-    """Where the robot stands, seen from where an errand began, over any number of turns."""
+class Odometer:
+    """Where the robot stands, seen from where a goal began, over any number of turns."""
 
     def __init__(self, state: RobotState) -> None:
         """Begin at ``state``."""
@@ -76,7 +76,7 @@ class Course:
         return c * dx + s * dy, -s * dx + c * dy
 
 
-class TurnInPlace(Errand):
+class TurnInPlace(Goal):
     """Turn left by an angle, staying in place."""
 
     def __init__(self, angle: float) -> None:
@@ -93,13 +93,13 @@ class TurnInPlace(Errand):
 
     def begin(self, state: RobotState) -> None:
         """Note the heading."""
-        self._course = Course(state)
+        self._odometer = Odometer(state)
 
     def command(self, state: RobotState) -> VelocityCommand:
         """Turn towards the goal, slower as it comes near, and hold the place."""
-        remaining = self._angle - self._course.turned(state)
-        ahead, left = self._course.displacement(state)
-        yaw = self._course.turned(state)
+        remaining = self._angle - self._odometer.turned(state)
+        ahead, left = self._odometer.displacement(state)
+        yaw = self._odometer.turned(state)
         c, s = math.cos(yaw), math.sin(yaw)
         return VelocityCommand(
             float(np.clip(-0.5 * (c * ahead + s * left), -0.1, 0.1)),
@@ -109,22 +109,22 @@ class TurnInPlace(Errand):
 
     def is_done(self, state: RobotState) -> bool:
         """Whether less than a third of a degree is left and the robot hardly turns."""
-        remaining = self._angle - self._course.turned(state)
+        remaining = self._angle - self._odometer.turned(state)
         return abs(remaining) < math.radians(0.3) and abs(float(state.v[5])) < 0.15
 
     def is_within_tolerance(self, state: RobotState) -> bool:
         """Whether the heading is right to 1.5 deg."""
-        return abs(self._angle - self._course.turned(state)) < HEADING_TOLERANCE
+        return abs(self._angle - self._odometer.turned(state)) < HEADING_TOLERANCE
 
     def figures(self, state: RobotState) -> dict[str, float]:
         """Angle asked and turned."""
         return {
             "asked [deg]": math.degrees(self._angle),
-            "turned [deg]": math.degrees(self._course.turned(state)),
+            "turned [deg]": math.degrees(self._odometer.turned(state)),
         }
 
 
-class DriveStraight(Errand):
+class DriveStraight(Goal):
     """Walk a distance along the heading of the start."""
 
     def __init__(self, distance: float) -> None:
@@ -142,12 +142,12 @@ class DriveStraight(Errand):
 
     def begin(self, state: RobotState) -> None:
         """Note the place and heading."""
-        self._course = Course(state)
+        self._odometer = Odometer(state)
 
     def command(self, state: RobotState) -> VelocityCommand:
         """Walk towards the goal, slower as it comes near, and hold the line and the heading."""
-        ahead, left = self._course.displacement(state)
-        turned = self._course.turned(state)
+        ahead, left = self._odometer.displacement(state)
+        turned = self._odometer.turned(state)
         speed = float(np.clip(APPROACH * (self._distance - ahead), -WALK_SPEED, WALK_SPEED))
         sideways = float(np.clip(-1.0 * left, -0.15, 0.15))
         c, s = math.cos(turned), math.sin(turned)
@@ -159,21 +159,21 @@ class DriveStraight(Errand):
 
     def is_done(self, state: RobotState) -> bool:
         """Whether less than 4 mm are left and the robot hardly moves on."""
-        ahead, _ = self._course.displacement(state)
+        ahead, _ = self._odometer.displacement(state)
         return abs(self._distance - ahead) < 0.004 and abs(float(state.v[0])) < 0.06
 
     def is_within_tolerance(self, state: RobotState) -> bool:
         """Whether the robot is within 20 mm of the goal and 1.5 deg of the heading."""
-        ahead, left = self._course.displacement(state)
+        ahead, left = self._odometer.displacement(state)
         miss = math.hypot(self._distance - ahead, left)
-        return miss < DISTANCE_TOLERANCE and abs(self._course.turned(state)) < HEADING_TOLERANCE
+        return miss < DISTANCE_TOLERANCE and abs(self._odometer.turned(state)) < HEADING_TOLERANCE
 
     def figures(self, state: RobotState) -> dict[str, float]:
         """Distance asked and walked, and the heading error."""
-        ahead, left = self._course.displacement(state)
+        ahead, left = self._odometer.displacement(state)
         return {
             "asked [m]": self._distance,
             "walked [m]": ahead,
             "aside [m]": left,
-            "heading error [deg]": math.degrees(self._course.turned(state)),
+            "heading error [deg]": math.degrees(self._odometer.turned(state)),
         }

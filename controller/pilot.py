@@ -17,10 +17,10 @@ from controller.behaviours.joints import Damped, ServoJoints
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.walking import Walking
 from controller.checks import LYING_HEIGHT, ground_height, is_lying, is_sitting, is_standing
-from controller.executor import Aborted, Executor, Figures, listed
 from controller.loop import Fault
 from controller.modes import Mode
-from controller.navigation import DriveStraight, Errand, TurnInPlace
+from controller.navigation import DriveStraight, Goal, TurnInPlace
+from controller.procedures import Aborted, Figures, ProcedureRunner, listed
 from controller.recovery import roll_over
 from controller.runner import Runner
 from go2_wbc.config import Config
@@ -61,10 +61,10 @@ class Pilot:
         self._loop = runner.loop
         self._model = runner.loop.model
         self._config = config
-        self._executor = Executor(runner)
+        self._procedures = ProcedureRunner(runner)
         self._walking: Walking | None = None
         self._gait: Gait | None = None
-        self._errand: Errand | None = None
+        self._goal: Goal | None = None
         self.playing: PlayPlan | None = None
         self._is_recalled = False
         self._mode = Mode.LYING if self.is_on_the_ground else Mode.DAMPED
@@ -102,40 +102,40 @@ class Pilot:
         entry = {Mode.SITTING: Posture.SIT, Mode.LYING: Posture.LIE}.get(mode, Posture.STAND)
         duration = 0.4 if mode in (Mode.STANDING, Mode.WALKING) else 1.2
         self._take_posture("stand", lambda pose: rise(pose, entry, duration), TrackedPoint.COM)
-        self._executor.settle("stand", is_standing)
+        self._procedures.settle("stand", is_standing)
         self._mode = Mode.STANDING
-        return self._executor.figures()
+        return self._procedures.figures()
 
     def sit(self) -> Figures:
         """Sit like a dog, from any mode but fallen."""
         if self.mode is Mode.SITTING:
-            self._executor.settle("sit", is_sitting)
-            return self._executor.figures()
+            self._procedures.settle("sit", is_sitting)
+            return self._procedures.figures()
         self._ensure_standing()
         self._take_posture("sit", sit_down, TrackedPoint.BASE)
-        self._executor.settle("sit", is_sitting)
+        self._procedures.settle("sit", is_sitting)
         self._mode = Mode.SITTING
-        return self._executor.figures()
+        return self._procedures.figures()
 
     def lie_down(self) -> Figures:
         """Lie down and go limp."""
         if self.mode in (Mode.LYING, Mode.DAMPED) or self.is_on_the_ground:
             self._go_limp()
-            return self._executor.figures()
+            return self._procedures.figures()
         if self.mode is not Mode.MOVING:  # a stand that failed need not succeed to lie down
             self._ensure_standing()
         self._take_posture("lie down", lie_down, TrackedPoint.BASE)
         self._go_limp()
-        return self._executor.figures()
+        return self._procedures.figures()
 
     def recover(self) -> Figures:
         """Get up after a fall onto the belly, a side or the back."""
         if self.mode.is_upright:
             return self.stand()
         self._mode = Mode.DAMPED
-        self._executor.run(Damped("recover", LIMP_TIME), LIMP_TIME + 1.0)
+        self._procedures.run(Damped("recover", LIMP_TIME), LIMP_TIME + 1.0)
         for step in roll_over(self._loop):
-            self._executor.run(step, 4.0)
+            self._procedures.run(step, 4.0)
         if self._loop.state.tilt > 0.6:
             reason = f"could not roll onto the belly: {self._attitude()}"
             with self._runner.lock():
@@ -148,15 +148,15 @@ class Pilot:
         if self._loop.state.tilt > 0.6:
             raise Aborted(f"cannot stand up from {self._attitude()}; call recover()")
         self._mode = Mode.MOVING
-        self._executor.run(ServoJoints("tuck", ((TUCK_TIME, TUCKED_JOINTS),)), TUCK_TIME + 0.5)
+        self._procedures.run(ServoJoints("tuck", ((TUCK_TIME, TUCKED_JOINTS),)), TUCK_TIME + 0.5)
 
     def _go_limp(self) -> None:
         if self._loop.state.tilt < 0.6:  # or it would rest on folded legs, belly in the air
-            self._executor.run(
+            self._procedures.run(
                 ServoJoints("splay", ((SPLAY_TIME, SPLAYED_JOINTS),)), SPLAY_TIME + 0.5
             )
-        self._executor.run(Damped("lie", LIMP_TIME), LIMP_TIME + 0.5)
-        self._executor.settle("lie down", is_lying)
+        self._procedures.run(Damped("lie", LIMP_TIME), LIMP_TIME + 0.5)
+        self._procedures.settle("lie down", is_lying)
         self._mode = Mode.LYING
 
     def _ensure_standing(self) -> None:
@@ -176,16 +176,16 @@ class Pilot:
             self._start_walking(wanted)
         self.wait(READY_TIME)
         self._mode = Mode.WALKING
-        return self._executor.figures()
+        return self._procedures.figures()
 
     def set_command(self, command: VelocityCommand) -> VelocityCommand:
         """Follow ``command``, clipped to the envelope; returns what is followed.
 
         Raises:
-            ModeError: outside walking mode, or during an errand.
+            ModeError: outside walking mode, or during a goal.
         """
-        if self._errand is not None:
-            raise ModeError(f"move() during an errand ({self._errand.name}): end it by stop()")
+        if self._goal is not None:
+            raise ModeError(f"move() during a goal ({self._goal.name}): end it by stop()")
         if self.mode is not Mode.WALKING or self._walking is None:
             raise ModeError(f"move() needs walking mode, not {self.mode.value}: call walk() first")
         self._walking.command = self._config.envelope.clip(command)
@@ -197,14 +197,14 @@ class Pilot:
         if self.mode is Mode.WALKING and walking is not None:
             walking.command = ZERO_COMMAND
             loop = self._loop
-            self._executor.until(
+            self._procedures.until(
                 lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "come to rest"
             )
-        return self._executor.figures()
+        return self._procedures.figures()
 
-    def run_errand(self, errand: Errand) -> Figures:
-        """Walk an errand to its measured end and come to rest."""
-        self._errand, loop = errand, self._loop
+    def run_goal(self, goal: Goal) -> Figures:
+        """Walk a goal to its measured end and come to rest."""
+        self._goal, loop = goal, self._loop
         try:
             if self.mode is not Mode.WALKING:
                 self.walk("trot")
@@ -212,48 +212,48 @@ class Pilot:
             walking = self._walking or self._start_walking("trot")
 
             def is_over() -> bool:
-                if self._errand is None:
+                if self._goal is None:
                     return True
-                walking.command = self._config.envelope.clip(errand.command(loop.state))
-                return errand.is_done(loop.state)
+                walking.command = self._config.envelope.clip(goal.command(loop.state))
+                return goal.is_done(loop.state)
 
-            errand.begin(loop.state)
-            self._executor.until(is_over, errand.time_limit, errand.name)
+            goal.begin(loop.state)
+            self._procedures.until(is_over, goal.time_limit, goal.name)
             self.rest()
-            was_halted = self._errand is None
+            was_halted = self._goal is None
         finally:
-            self._errand = None
+            self._goal = None
             if self._walking is not None:
                 self._walking.command = ZERO_COMMAND
-        figures = errand.figures(loop.state)
+        figures = goal.figures(loop.state)
         if was_halted:
-            raise Aborted(f"{errand.name} ended by stop()", figures)
-        if not errand.is_within_tolerance(loop.state):
-            raise Aborted(f"{errand.name} missed: {listed(figures)}", figures)
+            raise Aborted(f"{goal.name} ended by stop()", figures)
+        if not goal.is_within_tolerance(loop.state):
+            raise Aborted(f"{goal.name} missed: {listed(figures)}", figures)
         return figures
 
     def halt(self) -> bool:
-        """Zero the command, from any thread; returns whether that ends an errand.
+        """Zero the command, from any thread; returns whether that ends a goal.
 
-        The errand's own call then brings the robot to rest.
+        The goal's own call then brings the robot to rest.
         """
-        had_errand, self._errand = self._errand is not None, None
+        had_goal, self._goal = self._goal is not None, None
         if self._walking is not None:
             self._walking.command = ZERO_COMMAND
-        return had_errand
+        return had_goal
 
     def turn(self, angle: float) -> Figures:
         """Turn left by ``angle`` [rad]."""
-        return self.run_errand(TurnInPlace(angle))
+        return self.run_goal(TurnInPlace(angle))
 
     def drive(self, distance: float) -> Figures:
         """Walk ``distance`` [m] straight ahead; negative is backward."""
-        return self.run_errand(DriveStraight(distance))
+        return self.run_goal(DriveStraight(distance))
 
     def _start_walking(self, gait: str | Gait) -> Walking:
         self._gait = find_gait(gait)
         walking = Walking(LocomotionPlanner(self._model, self._gait, self._config.locomotion))
-        self._executor.engage(walking)
+        self._procedures.engage(walking)
         self._walking = walking
         return walking
 
@@ -267,10 +267,10 @@ class Pilot:
         """
         self._meet_entry(plan)
         if self._is_recalled:
-            raise Aborted(f"{plan.name} was cancelled before it began", self._executor.figures())
+            raise Aborted(f"{plan.name} was cancelled before it began", self._procedures.figures())
         self._mode = Mode.MOVING
         behaviour = PlayPlan(plan, self._model.foot_radius)
-        self._executor.engage(behaviour)
+        self._procedures.engage(behaviour)
         start, self.playing = self._loop.state.time, behaviour
 
         def finished() -> bool:
@@ -279,14 +279,14 @@ class Pilot:
             return behaviour.is_finished(self._loop.snapshot)
 
         try:
-            self._executor.until(finished, plan.duration + 1.0, plan.name)
+            self._procedures.until(finished, plan.duration + 1.0, plan.name)
             if self._is_recalled:
                 raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
-            self._executor.settle(plan.name, _CHECK_OF_POSTURE[plan.exit])
+            self._procedures.settle(plan.name, _CHECK_OF_POSTURE[plan.exit])
         finally:
             self.playing = None
         self._mode = _MODE_OF_POSTURE[plan.exit]
-        figures = {**self._executor.figures(), **behaviour.deviation.figures()}
+        figures = {**self._procedures.figures(), **behaviour.deviation.figures()}
         if not behaviour.deviation.is_small:
             raise Aborted(f"{plan.name} went another way: {listed(figures)}", figures)
         return figures
@@ -345,7 +345,7 @@ class Pilot:
         if not walking.square_up(self._loop.snapshot):
             loop = self._loop
             self._mode = Mode.WALKING
-            self._executor.until(
+            self._procedures.until(
                 lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "square the feet"
             )
             self._mode = Mode.STANDING
@@ -360,11 +360,11 @@ class Pilot:
     def wait(self, seconds: float) -> Figures:
         """Let time pass, whatever happens in it; a fault ends up in ``mode``."""
         known_fault = self._loop.fault
-        self._executor.let_pass(seconds)
+        self._procedures.let_pass(seconds)
         fault = self._loop.fault
         if fault is not None and fault is not known_fault:
-            raise Aborted(fault.reason, self._executor.figures())
-        return self._executor.figures()
+            raise Aborted(fault.reason, self._procedures.figures())
+        return self._procedures.figures()
 
     def _take_posture(
         self,
@@ -374,7 +374,7 @@ class Pilot:
     ) -> None:
         behaviour = ChangePosture(label, make_plan, point, self._model.foot_radius)
         self._mode = Mode.MOVING
-        self._executor.run(behaviour, 5.0)
+        self._procedures.run(behaviour, 5.0)
 
     def _attitude(self) -> str:
         roll, pitch, _ = np.degrees(self._loop.state.rpy)

@@ -9,16 +9,17 @@ if TYPE_CHECKING:
     from motions.authoring import Choice, Motion, Range, motion
     from motions.compiler import CompiledPlan, compile_timeline
     from motions.feasibility import (
+        CheckedMotion,
         FeasibilityChecker,
         FeasibilityReport,
         Finding,
-        Rehearsal,
         check,
     )
     from motions.registry import find_motion, load_file, load_motion, motion_names
     from motions.timeline import Timeline, deg
 
 __all__ = [
+    "CheckedMotion",
     "Choice",
     "CompiledPlan",
     "FeasibilityChecker",
@@ -26,7 +27,6 @@ __all__ = [
     "Finding",
     "Motion",
     "Range",
-    "Rehearsal",
     "Timeline",
     "check",
     "compile_timeline",
@@ -41,7 +41,7 @@ __all__ = [
 _HOMES = {
     "authoring": ("Choice", "Motion", "Range", "motion"),
     "compiler": ("CompiledPlan", "compile_timeline"),
-    "feasibility": ("FeasibilityChecker", "FeasibilityReport", "Finding", "Rehearsal", "check"),
+    "feasibility": ("FeasibilityChecker", "FeasibilityReport", "Finding", "CheckedMotion", "check"),
     "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
     "timeline": ("Timeline", "deg"),
 }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from viz.content import MarginCurve, Remark, Screening, Verdict
+from viz.content import Annotation, MarginCurve, ReplayContent, Verdict
 from viz.render.animation import ANIMATION_SUFFIXES, export_animation
 from viz.render.margin_plot import PLOT_SUFFIXES, export_plot
 from viz.render.still import export_filmstrip
@@ -12,9 +12,9 @@ __all__ = [
     "ANIMATION_SUFFIXES",
     "HTML_SUFFIXES",
     "PLOT_SUFFIXES",
+    "Annotation",
     "MarginCurve",
-    "Remark",
-    "Screening",
+    "ReplayContent",
     "Verdict",
     "export_animation",
     "export_filmstrip",

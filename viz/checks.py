@@ -6,22 +6,22 @@ import numpy as np
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
-from viz.content import Screening
+from viz.content import ReplayContent
 
 _LEAST_SAMPLES = 2
 
 
-def checked_screening(shown: Recording | Screening) -> Screening:
+def checked_content(shown: Recording | ReplayContent) -> ReplayContent:
     """What to show, once it is known that it can be drawn.
 
     Raises:
         ConfigError: for a recording that cannot be drawn.
     """
-    screening = Screening(shown) if isinstance(shown, Recording) else shown
-    check_recording(screening.recording)
-    if screening.ghost is not None:
-        check_recording(screening.ghost)
-    return screening
+    content = ReplayContent(shown) if isinstance(shown, Recording) else shown
+    check_recording(content.recording)
+    if content.ghost is not None:
+        check_recording(content.ghost)
+    return content
 
 
 def check_recording(recording: Recording) -> None:

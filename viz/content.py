@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 from go2_wbc.recording import Recording
 
 CENTRE_OF_MASS = "com"
-"""Stands in ``Remark.parts`` for the centre of mass."""
+"""Stands in ``Annotation.parts`` for the centre of mass."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class MarginCurve:
 
 
 @dataclass(frozen=True, slots=True)
-class Remark:
+class Annotation:
     """A limit that one subject breaks, or nearly does.
 
     Attributes:
@@ -80,13 +80,13 @@ class Verdict:
     Attributes:
         ok: no limit is broken.
         text: the verdict in a few words.
-        remarks: the broken limits, then the tight ones.
+        annotations: the broken limits, then the tight ones.
         curves: the margin of every limit.
     """
 
     ok: bool
     text: str
-    remarks: tuple[Remark, ...]
+    annotations: tuple[Annotation, ...]
     curves: tuple[MarginCurve, ...]
 
     def ranked(self) -> tuple[MarginCurve, ...]:
@@ -95,7 +95,7 @@ class Verdict:
 
 
 @dataclass(frozen=True, slots=True)
-class Screening:
+class ReplayContent:
     """What to show.
 
     Attributes:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from controller.behaviours.base import Behaviour
-from controller.behaviours.recall import Recall
+from controller.behaviours.safe_return import SafeReturn
 from go2_wbc.planning.correction import SteadyStateCorrection, tracked_position
 from go2_wbc.reference import Anchor, LegTask, MotionPlan, Posture, Reference, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, wrap_angle, yaw_rotation
@@ -83,7 +83,7 @@ class PlayPlan(Behaviour):
     def start(self, snapshot: Snapshot) -> None:
         """Anchor the plan at the feet."""
         self._start = self._last = snapshot.state.time
-        self._recall: Recall | None = None
+        self._recall: SafeReturn | None = None
         self._is_recalled = False
         self._correction = SteadyStateCorrection()
         self.deviation = Deviation()
@@ -109,7 +109,7 @@ class PlayPlan(Behaviour):
 
     def _planned(self, now: float) -> Reference:
         if self._is_recalled and self._recall is None:
-            self._recall = Recall(self.plan, self._last - self._start)
+            self._recall = SafeReturn(self.plan, self._last - self._start)
         if self._recall is not None:
             return self._recall.advance(now - self._last)
         return self.plan.at(now - self._start)

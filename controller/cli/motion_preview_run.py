@@ -14,11 +14,11 @@ from controller.cli.common import ExitCode, print_json
 from controller.cli.motion_args import the_motion
 from controller.cli.motion_source import MotionSource
 from controller.cli.progress import ProgressLine
-from controller.watching import planned
+from controller.report_view import planned
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.files import checked_output
 from go2_wbc.plant.mujoco.viewer import display_problem
-from motions import FeasibilityChecker, FeasibilityReport, Rehearsal
+from motions import CheckedMotion, FeasibilityChecker, FeasibilityReport
 from viz import (
     ANIMATION_SUFFIXES,
     HTML_SUFFIXES,
@@ -47,9 +47,9 @@ def write_files(args: argparse.Namespace) -> int:
         for kind, (path, suffixes) in wanted.items()
         if path is not None
     }
-    rehearsal = FeasibilityChecker().rehearse(the_motion(args.motion, args.values))
-    written = _written(rehearsal, targets)
-    report = rehearsal.report
+    checked = FeasibilityChecker().evaluate(the_motion(args.motion, args.values))
+    written = _written(checked, targets)
+    report = checked.report
     if args.json:
         files = {kind: str(path) for kind, path in written.items()}
         print_json({**report.as_dict(), "files": files})
@@ -60,19 +60,19 @@ def write_files(args: argparse.Namespace) -> int:
     return _code(report)
 
 
-def _written(rehearsal: Rehearsal, targets: dict[str, Path]) -> dict[str, Path]:
-    screening, title = planned(rehearsal), rehearsal.plan.name
+def _written(checked: CheckedMotion, targets: dict[str, Path]) -> dict[str, Path]:
+    content, title = planned(checked), checked.plan.name
     written = {}
     with ProgressLine(sys.stderr) as line:
         if "html" in targets:
             line.update(0.0, f"writing {targets['html'].name}")
-            written["html"] = export_html(screening, targets["html"], title=title)
-        if "plot" in targets and screening.verdict is not None:
-            written["plot"] = export_plot(screening.verdict, targets["plot"], title=title)
+            written["html"] = export_html(content, targets["html"], title=title)
+        if "plot" in targets and content.verdict is not None:
+            written["plot"] = export_plot(content.verdict, targets["plot"], title=title)
         if "video" in targets:
             video = targets["video"]
             written["video"] = export_animation(
-                screening,
+                content,
                 video,
                 speed=1.0,
                 fps=VIDEO_RATE,
@@ -85,11 +85,11 @@ def serve(args: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C."""
     source = MotionSource(args.motion, args.values)
     checker = FeasibilityChecker()
-    rehearsal = checker.rehearse(source.timeline())
-    with PreviewServer(planned(rehearsal), source.name, args.port) as server:
+    checked = checker.evaluate(source.timeline())
+    with PreviewServer(planned(checked), source.name, args.port) as server:
         live = _Live(source, checker, server, is_json=args.json)
         try:
-            live.greet(rehearsal.report)
+            live.greet(checked.report)
             if not args.no_open and display_problem() is None:
                 webbrowser.open(server.url)
             while True:
@@ -133,12 +133,12 @@ class _Live:
         if not self._source.has_changed():
             return
         try:
-            rehearsal = self._checker.rehearse(self._source.timeline())
-            self._server.publish(planned(rehearsal))
+            checked = self._checker.evaluate(self._source.timeline())
+            self._server.publish(planned(checked))
         except (Go2WbcError, OSError) as error:
             self._complain(str(error))
         else:
-            self._tell(rehearsal.report)
+            self._tell(checked.report)
 
     def _tell(self, report: FeasibilityReport) -> None:
         self.code = _code(report)

@@ -52,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     """Check, play, measure, print."""
     from benchmarks.motion_runs import run_motion
     from benchmarks.trials import Failed, Subject
-    from controller.watching import performed
+    from controller.report_view import performed
     from go2_wbc.files import checked_output
     from go2_wbc.plant import MujocoPlant
     from go2_wbc.reference import Posture
@@ -62,15 +62,15 @@ def run(args: argparse.Namespace) -> int:
     timeline = the_motion(args.motion, args.values)
     target = None if args.html is None else checked_output(args.html, HTML_SUFFIXES)
     checker = FeasibilityChecker()
-    rehearsal = checker.rehearse(timeline)
-    plan, report = rehearsal.plan, rehearsal.report
+    checked = checker.evaluate(timeline)
+    plan, report = checked.plan, checked.report
     if not args.force:
         report.raise_if_infeasible()
     with (
         ProgressLine(sys.stderr) as line,
         Subject(MujocoPlant(friction=args.friction)) as robot,
     ):
-        robot.witness.on_tick = _teller(line, robot, plan.name, plan.duration)
+        robot.truth.on_tick = _teller(line, robot, plan.name, plan.duration)
         starts = {Posture.STAND: robot.go2.stand, Posture.SIT: robot.go2.sit}
         if plan.entry not in starts:
             raise StanceMismatch(f"{plan.name} starts from {plan.entry.value}: cannot be run")
@@ -85,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         _print(plan.name, plan.duration, result)
     if target is not None:
-        export_html(performed(rehearsal, recording, checker.model), target, title=plan.name)
+        export_html(performed(checked, recording, checker.model), target, title=plan.name)
         if not args.json:
             print(f"3D replay beside the plan, offline: {args.html}")
     return ExitCode.OK if result.ok else ExitCode.FAILED

@@ -11,9 +11,9 @@ from motions.authoring import Motion
 from motions.balance import Unbalanced
 from motions.compiler import CompiledPlan, OutOfReach, compile_timeline
 from motions.feasibility import dynamic, kinematic
+from motions.feasibility.checked_motion import CheckedMotion
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.limits import FeasibilityLimits
-from motions.feasibility.rehearsal import Rehearsal
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.registry import load_motion
 from motions.timeline import Timeline
@@ -53,7 +53,7 @@ class FeasibilityChecker:
             unknown = _failed("numbers", "plan", 0.0, np.nan, str(error))
             return FeasibilityReport.of(plan.name, plan.duration, [unknown])
 
-    def rehearse(self, motion: str | Motion | Timeline | MotionPlan) -> Rehearsal:
+    def evaluate(self, motion: str | Motion | Timeline | MotionPlan) -> CheckedMotion:
         """The report on ``motion`` with the movement and the forces that it judges.
 
         Args:
@@ -76,7 +76,7 @@ class FeasibilityChecker:
         is_plan = isinstance(motion, MotionPlan)
         return motion if is_plan else compile_timeline(motion, self.model)
 
-    def _rehearsed(self, plan: MotionPlan) -> Rehearsal:
+    def _rehearsed(self, plan: MotionPlan) -> CheckedMotion:
         model, limits = self.model, self._limits
         path = trajectory_of(plan, model)
         forces = dynamic.forces_of(path, model)
@@ -95,7 +95,7 @@ class FeasibilityChecker:
             kinematic.ends(plan, path, model, limits),
         ]
         report = FeasibilityReport.of(plan.name, plan.duration, series)
-        return Rehearsal(plan, report, path, forces)
+        return CheckedMotion(plan, report, path, forces)
 
 
 def check(motion: str | Motion | Timeline | MotionPlan) -> FeasibilityReport:

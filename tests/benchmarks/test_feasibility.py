@@ -10,9 +10,9 @@ import pytest
 
 from benchmarks import feasibility
 from benchmarks.feasibility import FAMILY, Verdicts, harms, render, verdicts_of
+from benchmarks.generated_motions import BROKEN, GOOD, NEAR, generated_motion, near_specimen
 from benchmarks.motion_runs import MotionRun
 from benchmarks.rows import Family, Measurement
-from benchmarks.specimens import BROKEN, GOOD, NEAR, near_specimen, specimen
 from benchmarks.trials import Trial
 from controller.cli import main as cli
 from controller.cli.common import ExitCode
@@ -42,7 +42,7 @@ def model() -> RobotModel:
 
 
 def test_there_are_as_many_good_motions_as_broken_ones_of_every_kind() -> None:
-    made = [specimen(seed) for seed in range(COUNT)]
+    made = [generated_motion(seed) for seed in range(COUNT)]
     assert [one.is_broken for one in made].count(True) == COUNT / 2
     kinds = [one.kind for one in made]
     assert set(kinds) == {*GOOD, *BROKEN}
@@ -50,8 +50,8 @@ def test_there_are_as_many_good_motions_as_broken_ones_of_every_kind() -> None:
 
 
 def test_a_seed_gives_the_same_motion_every_time_and_another_seed_another_one() -> None:
-    assert specimen(7) == specimen(7)
-    assert specimen(7).line.keys != specimen(7 + 2 * len(BROKEN)).line.keys
+    assert generated_motion(7) == generated_motion(7)
+    assert generated_motion(7).line.keys != generated_motion(7 + 2 * len(BROKEN)).line.keys
 
 
 def test_near_the_limits_there_are_motions_of_every_kind() -> None:
@@ -60,14 +60,14 @@ def test_near_the_limits_there_are_motions_of_every_kind() -> None:
 
 def test_a_wrong_entry_begins_where_the_robot_is_not(model: RobotModel) -> None:
     seed = 1 + 2 * list(BROKEN).index("wrong entry")
-    made = specimen(seed)
+    made = generated_motion(seed)
     plan, whole = made.plan(model), compile_timeline(made.line, model)
     assert plan.duration == pytest.approx(whole.duration - made.start)
     assert plan.at(0.0).body.p_world == pytest.approx(whole.at(made.start).body.p_world)
 
 
 def test_nothing_is_held_against_a_clean_run(model: RobotModel) -> None:
-    assert harms(CLEAN, specimen(0).plan(model)) == []
+    assert harms(CLEAN, generated_motion(0).plan(model)) == []
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_nothing_is_held_against_a_clean_run(model: RobotModel) -> None:
     ],
 )
 def test_what_physics_shows_is_said_in_words(model: RobotModel, run: MotionRun, word: str) -> None:
-    (harm,) = harms(run, specimen(0).plan(model))
+    (harm,) = harms(run, generated_motion(0).plan(model))
     assert word in harm
 
 
@@ -156,5 +156,5 @@ def test_the_command_reports_and_writes_the_matrix(
 @pytest.mark.parametrize("seed", range(0, 2 * len(BROKEN), 3))
 def test_the_check_foresees_what_physics_does(seed: int) -> None:
     measured = feasibility.measure(Trial(seed))
-    assert measured.values["feasibility.failed"] == float(specimen(seed).is_broken is True)
-    assert measured.values["feasibility.refused"] == float(specimen(seed).is_broken is True)
+    assert measured.values["feasibility.failed"] == float(generated_motion(seed).is_broken is True)
+    assert measured.values["feasibility.refused"] == float(generated_motion(seed).is_broken is True)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.ground_truth import Track
 from benchmarks.high_fives import highest_window, largest_slip, longest_run
 from benchmarks.pushes import CLIMB, RUNG, highest_rung
 from benchmarks.sequence import FAULTS, Judge
@@ -20,7 +21,6 @@ from benchmarks.trials import (
     Subject,
     Trial,
 )
-from benchmarks.witness import Track
 from controller.demo.report import StepResult
 from controller.demo.run import DemoProgress
 from controller.demo.steps import DEMO_STEPS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from controller.behaviours.recall import Recall, nearest_safe_instant, retimed
+from controller.behaviours.safe_return import SafeReturn, nearest_safe_instant, retimed
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from go2_wbc.robot.model import RobotModel
@@ -73,7 +73,7 @@ def test_the_safe_instant_has_four_fully_loaded_feet_and_is_the_nearer_one(
 
 
 def test_the_way_back_is_smooth_and_its_rates_are_the_derivatives(plan: CompiledPlan) -> None:
-    recall = Recall(plan, 3.0)
+    recall = SafeReturn(plan, 3.0)
     steps = [recall.advance(TICK) for _ in range(2500)]
     assert recall.is_over
     q = np.array([step.q_joints for step in steps])

@@ -53,8 +53,10 @@ def test_an_infeasible_motion_is_written_too_with_exit_code_1(
     assert not report["ok"]
     assert report["files"] == {"html": str(page)}
     header, _ = read_data(page.read_text(encoding="utf-8"))
-    remarks = [remark for remark in header["verdict"]["remarks"] if remark["is_broken"]]
-    assert {remark["limit"] for remark in remarks} >= {"reach", "joint position"}
+    annotations = [
+        annotation for annotation in header["verdict"]["annotations"] if annotation["is_broken"]
+    ]
+    assert {annotation["limit"] for annotation in annotations} >= {"reach", "joint position"}
 
 
 @pytest.mark.slow
@@ -101,7 +103,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(
     def work(*_: object) -> None:
         pytest.fail("the check ran first")
 
-    monkeypatch.setattr(motion_preview_run.FeasibilityChecker, "rehearse", work)
+    monkeypatch.setattr(motion_preview_run.FeasibilityChecker, "evaluate", work)
     (tmp_path / "file").write_text("")
     target = tmp_path / "file" / "bow.html"
     assert main(["preview", "bow", "--html", str(target)]) == ExitCode.USAGE

@@ -24,7 +24,7 @@ from tests.controller.plants import (
 from tests.go2_wbc.plant.contract import same
 from tests.motions.doctored import with_joint_beyond_its_limit
 
-# What the errands promise.
+# What the goals promise.
 DISTANCE_TOLERANCE = 0.02
 ANGLE_TOLERANCE = np.radians(1.5)
 # m; a walked way sags and sways by less than this.
@@ -348,10 +348,10 @@ def test_a_high_five_plays_by_its_name_and_measures_how_high_the_paw_was_held(
     assert standing.mode is Mode.STANDING
 
 
-# --- errands and other threads ----------------------------------------------------------------
+# --- goals and other threads ----------------------------------------------------------------
 
 
-def test_during_an_errand_move_is_refused_and_stop_ends_it() -> None:
+def test_during_an_goal_move_is_refused_and_stop_ends_it() -> None:
     plant = WatchedPlant()
     refused: list[str] = []
 
@@ -367,7 +367,7 @@ def test_during_an_errand_move_is_refused_and_stop_ends_it() -> None:
         assert go2.move_forward(2.0) is False
         assert go2.last_outcome.reason == "walk 2.000 m ended by stop()"
         assert 0.1 < go2.last_outcome.measured["walked [m]"] < 1.0
-        assert refused == ["move() during an errand (walk 2.000 m): end it by stop()"]
+        assert refused == ["move() during a goal (walk 2.000 m): end it by stop()"]
         assert go2.mode is Mode.WALKING
         go2.move(0.2)
         assert go2.command.linear_x == 0.2

@@ -1,4 +1,4 @@
-"""Errands point at their goal, slow down before it, and judge the measured pose."""
+"""Goals point at their goal, slow down before it, and judge the measured pose."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from controller.navigation import (
     HEADING_TOLERANCE,
     TURN_RATE,
     WALK_SPEED,
-    Course,
     DriveStraight,
-    Errand,
+    Goal,
+    Odometer,
     TurnInPlace,
 )
 from go2_wbc.errors import CommandError
@@ -40,19 +40,19 @@ def pose(x: float = 0.0, y: float = 0.0, yaw: float = 0.0) -> RobotState:
     return RobotState(0.0, q, np.zeros(18), np.zeros(12), np.zeros(4), np.ones(4, bool))
 
 
-def begun(errand: Errand, state: RobotState) -> Errand:
-    errand.begin(state)
-    return errand
+def begun(goal: Goal, state: RobotState) -> Goal:
+    goal.begin(state)
+    return goal
 
 
-def walk(errand: Errand, x: float, y: float, yaw: float) -> RobotState:
-    """Follows the commands exactly, as an ideal robot would, until the errand is done."""
+def walk(goal: Goal, x: float, y: float, yaw: float) -> RobotState:
+    """Follows the commands exactly, as an ideal robot would, until the goal is done."""
     state = pose(x, y, yaw)
-    errand.begin(state)
-    for _ in range(round(errand.time_limit / STEP)):
-        if errand.is_done(state):
+    goal.begin(state)
+    for _ in range(round(goal.time_limit / STEP)):
+        if goal.is_done(state):
             break
-        command = errand.command(state)
+        command = goal.command(state)
         x += STEP * (command.linear_x * cos(yaw) - command.linear_y * sin(yaw))
         y += STEP * (command.linear_x * sin(yaw) + command.linear_y * cos(yaw))
         yaw += STEP * command.angular_z
@@ -64,21 +64,21 @@ def walk(errand: Errand, x: float, y: float, yaw: float) -> RobotState:
 def test_displacement_is_measured_in_the_frame_of_the_start(
     x: float, y: float, yaw: float, ahead: float, left: float
 ) -> None:
-    course = Course(pose(x, y, yaw))
+    course = Odometer(pose(x, y, yaw))
     end = pose(x + ahead * cos(yaw) - left * sin(yaw), y + ahead * sin(yaw) + left * cos(yaw))
     assert course.displacement(end) == pytest.approx((ahead, left), abs=EXACT)
 
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_the_angle_turned_is_counted_over_several_turns(direction: int) -> None:
-    course = Course(pose(yaw=3.0))
+    course = Odometer(pose(yaw=3.0))
     for step in range(1, 200):
         turned = course.turned(pose(yaw=3.0 + direction * 0.1 * step))
         assert turned == pytest.approx(direction * 0.1 * step, abs=EXACT)
 
 
 @pytest.mark.parametrize(
-    ("errand", "sign"),
+    ("goal", "sign"),
     [
         (lambda: TurnInPlace(1.0), 1),
         (lambda: TurnInPlace(-1.0), -1),
@@ -86,10 +86,10 @@ def test_the_angle_turned_is_counted_over_several_turns(direction: int) -> None:
         (lambda: DriveStraight(-1.0), -1),
     ],
 )
-def test_an_errand_starts_towards_its_goal_at_its_full_speed(
-    errand: Callable[[], Errand], sign: int
+def test_an_goal_starts_towards_its_goal_at_its_full_speed(
+    goal: Callable[[], Goal], sign: int
 ) -> None:
-    made = errand()
+    made = goal()
     command = begun(made, pose()).command(pose())
     turn, speed = command.angular_z, command.linear_x
     if isinstance(made, TurnInPlace):
@@ -102,11 +102,11 @@ def test_an_errand_starts_towards_its_goal_at_its_full_speed(
 def test_an_ideal_robot_turns_by_the_angle_and_stays_in_place(
     x: float, y: float, yaw: float, angle: float
 ) -> None:
-    errand = TurnInPlace(angle)
-    end = walk(errand, x, y, yaw)
-    assert errand.is_within_tolerance(end)
-    assert errand.figures(end)["turned [deg]"] == pytest.approx(
-        errand.figures(end)["asked [deg]"], abs=0.5
+    goal = TurnInPlace(angle)
+    end = walk(goal, x, y, yaw)
+    assert goal.is_within_tolerance(end)
+    assert goal.figures(end)["turned [deg]"] == pytest.approx(
+        goal.figures(end)["asked [deg]"], abs=0.5
     )
     assert end.q[:2] == pytest.approx([x, y], abs=0.01)
 
@@ -115,25 +115,25 @@ def test_an_ideal_robot_turns_by_the_angle_and_stays_in_place(
 def test_an_ideal_robot_walks_the_distance_along_its_heading(
     x: float, y: float, yaw: float, distance: float
 ) -> None:
-    errand = DriveStraight(distance)
-    end = walk(errand, x, y, yaw)
-    assert errand.is_within_tolerance(end)
+    goal = DriveStraight(distance)
+    end = walk(goal, x, y, yaw)
+    assert goal.is_within_tolerance(end)
     goal = [x + distance * cos(yaw), y + distance * sin(yaw)]
     assert end.q[:2] == pytest.approx(goal, abs=0.01)
 
 
 def test_a_robot_beside_its_line_is_led_back_to_it() -> None:
-    errand = begun(DriveStraight(1.0), pose())
-    assert errand.command(pose(y=0.1)).linear_y < 0.0
-    assert errand.command(pose(y=-0.1)).linear_y > 0.0
-    assert errand.command(pose(yaw=0.1)).angular_z < 0.0
+    goal = begun(DriveStraight(1.0), pose())
+    assert goal.command(pose(y=0.1)).linear_y < 0.0
+    assert goal.command(pose(y=-0.1)).linear_y > 0.0
+    assert goal.command(pose(yaw=0.1)).angular_z < 0.0
 
 
 def test_a_turning_robot_that_drifts_is_led_back_to_its_place() -> None:
-    errand = begun(TurnInPlace(pi / 2), pose())
-    assert errand.command(pose(x=0.1)).linear_x < 0.0
+    goal = begun(TurnInPlace(pi / 2), pose())
+    assert goal.command(pose(x=0.1)).linear_x < 0.0
     # A quarter turn on, the start lies behind it to its left.
-    turned = errand.command(pose(x=0.1, yaw=pi / 2))
+    turned = goal.command(pose(x=0.1, yaw=pi / 2))
     assert turned.linear_y > 0.0
     assert abs(turned.linear_x) < EXACT
 
@@ -180,7 +180,7 @@ def test_the_time_limit_leaves_three_times_the_time_at_full_speed() -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_an_errand_beyond_the_limits_is_refused(sign: float) -> None:
+def test_an_goal_beyond_the_limits_is_refused(sign: float) -> None:
     TurnInPlace(sign * GREATEST_TURN)
     DriveStraight(sign * GREATEST_DISTANCE)
     with pytest.raises(CommandError, match=r"angle must be within \+-62\.8 rad"):

@@ -21,7 +21,7 @@ SEEDS = {
     "stand-pushes": 1,
     "trot": 1,
     "trot-pushes": 1,
-    "errands": 2,
+    "goals": 2,
     "high-five": 2,
     "slaps": 1,
     "sequence": 2,

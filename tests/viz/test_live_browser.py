@@ -39,7 +39,7 @@ def test_the_page_follows_every_save(tmp_path: Path) -> None:
         assert _camera(browser) == pytest.approx(camera, abs=1e-5)
         after = stage(browser)
         assert np.abs(after - before).mean() > 2.0
-        assert browser.evaluate("document.querySelectorAll('.remark.broken').length") > 0
+        assert browser.evaluate("document.querySelectorAll('.annotation.broken').length") > 0
 
         file.write_text(BROKEN, encoding="utf-8")
         browser.wait_for(f"!{_TROUBLE}.hidden")

@@ -13,7 +13,7 @@ from go2_wbc.recording import Recording
 from tests.viz.browsing import DRAWN, complaints, requested, stage
 from tests.viz.chromium import Chromium, find_chromium
 from tests.viz.verdicts import made_up_verdict
-from viz.content import Screening
+from viz.content import ReplayContent
 
 pytestmark = pytest.mark.browser
 
@@ -27,8 +27,8 @@ def browser(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> I
     verdict = made_up_verdict(recording.duration)
     lower = recording.q.copy()
     lower[:, 2] += 0.03
-    screening = Screening(recording, verdict=verdict, ghost=replace(recording, q=lower))
-    page = viz.export_html(screening, folder / "plan.html", title="A plan")
+    content = ReplayContent(recording, verdict=verdict, ghost=replace(recording, q=lower))
+    page = viz.export_html(content, folder / "plan.html", title="A plan")
     executable = find_chromium()
     assert executable is not None
     with Chromium(executable, folder / "profile", (1280, 720)) as opened:
@@ -119,7 +119,7 @@ def test_a_note_points_at_its_part(browser: Chromium) -> None:
 
 
 def test_an_instant_is_shown_too(browser: Chromium) -> None:
-    time = browser.evaluate("replay.data.remarks[0].time")
+    time = browser.evaluate("replay.data.annotations[0].time")
     browser.evaluate(f"replay.scrub({time})")
     assert _text(browser, ".note b") == "support: CoM"
     ball = "replay.scene.node('com/ball').scale.x"
@@ -133,20 +133,20 @@ def test_a_finding_in_the_list_jumps_to_its_time_and_shows_its_margin(browser: C
     browser.evaluate("replay.scrub(0)")
     box = browser.evaluate(
         "(({x, y, width, height}) => [x + width / 2, y + height / 2])"
-        "(document.querySelectorAll('.remark')[1].getBoundingClientRect())"
+        "(document.querySelectorAll('.annotation')[1].getBoundingClientRect())"
     )
     browser.click(*box)
-    time = browser.evaluate("replay.data.remarks[1].time")
+    time = browser.evaluate("replay.data.annotations[1].time")
     assert browser.evaluate("replay.time") == pytest.approx(time)
     assert _text(browser, "#chosen h2") == "joint position"
     assert _text(browser, "#chosen output") == "FR calf: 0.2 rad over"
-    assert browser.evaluate("document.querySelectorAll('.remark')[1].classList.contains('now')")
+    assert browser.evaluate("document.querySelectorAll('.annotation')[1].classList.contains('now')")
     browser.evaluate(f"replay.scrub({_FINE})")
     assert _text(browser, "#chosen output") == "FR calf: 0.5 rad left"
 
 
 def test_the_key_n_goes_from_finding_to_finding(browser: Chromium) -> None:
-    times = sorted(browser.evaluate("replay.data.remarks.map(remark => remark.time)"))
+    times = sorted(browser.evaluate("replay.data.annotations.map(annotation => annotation.time)"))
     browser.evaluate("replay.scrub(replay.data.duration)")
     seen = []
     for _ in times:

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import viz
-from controller.watching import planned
+from controller.report_view import planned
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
 from motions import FeasibilityChecker
 from tests.viz.page_reader import packed_parts, read_data
 from tests.viz.verdicts import made_up_verdict
-from viz.content import Screening
+from viz.content import ReplayContent
 from viz.replay.html_page import PAGE_LIMIT
 from viz.replay.replay_data import reduced
 
@@ -26,16 +26,16 @@ _ROUNDING = 1e-3
 
 
 @pytest.fixture(scope="module")
-def screening(recording: Recording) -> Screening:
+def content(recording: Recording) -> ReplayContent:
     ghost = replace(recording, q=recording.q + 0.001, foot_forces=recording.foot_forces * 0.5)
     verdict = made_up_verdict(recording.duration)
-    return Screening(recording, is_plan=True, verdict=verdict, ghost=ghost)
+    return ReplayContent(recording, is_plan=True, verdict=verdict, ghost=ghost)
 
 
 @pytest.fixture(scope="module")
-def page(screening: Screening, tmp_path_factory: pytest.TempPathFactory) -> str:
+def page(content: ReplayContent, tmp_path_factory: pytest.TempPathFactory) -> str:
     path = tmp_path_factory.mktemp("page") / "plan.html"
-    return viz.export_html(screening, path, title="A plan").read_text(encoding="utf-8")
+    return viz.export_html(content, path, title="A plan").read_text(encoding="utf-8")
 
 
 def test_the_header_is_strict_json(page: str) -> None:
@@ -50,25 +50,29 @@ def test_broken_limits_come_first_then_tight_ones(page: str) -> None:
     assert names == ["joint position", "support", "entry and exit", "friction", "torque"]
 
 
-def test_the_curves_are_the_given_ones(page: str, screening: Screening) -> None:
+def test_the_curves_are_the_given_ones(page: str, content: ReplayContent) -> None:
     header, arrays = read_data(page)
-    assert screening.verdict is not None
-    for k, curve in enumerate(screening.verdict.ranked()):
+    assert content.verdict is not None
+    for k, curve in enumerate(content.verdict.ranked()):
         np.testing.assert_allclose(arrays[f"curve{k}.margin"], curve.margin, rtol=1e-6)
         np.testing.assert_allclose(arrays[f"curve{k}.time"], curve.time, rtol=1e-6)
         subjects = header["verdict"]["curves"][k]["subjects"]
         assert subjects[arrays[f"curve{k}.worst"][0]] == curve.subjects[curve.worst[0]]
 
 
-def test_the_remarks_are_all_there_with_their_times_and_parts(page: str) -> None:
+def test_the_annotations_are_all_there_with_their_times_and_parts(page: str) -> None:
     header, _ = read_data(page)
-    remarks = header["verdict"]["remarks"]
-    assert [remark["limit"] for remark in remarks] == ["support", "joint position", "friction"]
-    assert remarks[1]["parts"] == ["FR_calf"]
-    assert remarks[1]["spans"][0][0] < remarks[1]["time"] < remarks[1]["spans"][0][1]
+    annotations = header["verdict"]["annotations"]
+    assert [annotation["limit"] for annotation in annotations] == [
+        "support",
+        "joint position",
+        "friction",
+    ]
+    assert annotations[1]["parts"] == ["FR_calf"]
+    assert annotations[1]["spans"][0][0] < annotations[1]["time"] < annotations[1]["spans"][0][1]
 
 
-def test_the_ghost_is_stored_beside_the_robot(page: str, screening: Screening) -> None:
+def test_the_ghost_is_stored_beside_the_robot(page: str, content: ReplayContent) -> None:
     header, arrays = read_data(page)
     assert header["ghost"]["frames"] == len(arrays["ghost.q"])
     np.testing.assert_allclose(arrays["ghost.q"], arrays["q"] + 0.001, atol=_ROUNDING)
@@ -81,9 +85,9 @@ def test_nothing_in_it_is_loaded_from_elsewhere(page: str) -> None:
     assert re.findall(asks, code) == []
 
 
-def test_a_long_curve_keeps_its_least_values(screening: Screening) -> None:
-    assert screening.verdict is not None
-    curve = screening.verdict.curves[2]
+def test_a_long_curve_keeps_its_least_values(content: ReplayContent) -> None:
+    assert content.verdict is not None
+    curve = content.verdict.curves[2]
     rows = np.arange(100_000) * len(curve.time) // 100_000
     margin = curve.margin[rows] + 0.01
     margin[[3, 77_777]] = -5.0, -7.0
@@ -95,14 +99,14 @@ def test_a_long_curve_keeps_its_least_values(screening: Screening) -> None:
 
 @pytest.mark.parametrize("name", ["bow", "high_five", "dance"])
 def test_pages_of_the_library_are_small(name: str, tmp_path: Path) -> None:
-    rehearsal = FeasibilityChecker().rehearse(name)
-    path = viz.export_html(planned(rehearsal), tmp_path / "page.html", title=name)
+    checked = FeasibilityChecker().evaluate(name)
+    path = viz.export_html(planned(checked), tmp_path / "page.html", title=name)
     assert path.stat().st_size < PAGE_LIMIT / 2
 
 
-def test_a_ghost_that_cannot_be_drawn_is_refused(screening: Screening, tmp_path: Path) -> None:
-    assert screening.ghost is not None
-    broken = replace(screening, ghost=replace(screening.ghost, q=screening.ghost.q * np.nan))
+def test_a_ghost_that_cannot_be_drawn_is_refused(content: ReplayContent, tmp_path: Path) -> None:
+    assert content.ghost is not None
+    broken = replace(content, ghost=replace(content.ghost, q=content.ghost.q * np.nan))
     with pytest.raises(ConfigError, match="not finite"):
         viz.export_html(broken, tmp_path / "page.html", title="t")
     assert list(tmp_path.iterdir()) == []

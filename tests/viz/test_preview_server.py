@@ -16,13 +16,13 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
 from tests.viz.page_reader import packed_parts, read_data, read_pack
 from tests.viz.verdicts import made_up_verdict
-from viz.content import Screening
+from viz.content import ReplayContent
 from viz.replay.preview_server import PreviewServer
 
 
 @pytest.fixture
 def server(recording: Recording) -> Iterator[PreviewServer]:
-    with PreviewServer(Screening(recording), "A <plan>", 0) as opened:
+    with PreviewServer(ReplayContent(recording), "A <plan>", 0) as opened:
         yield opened
 
 
@@ -87,7 +87,7 @@ def test_what_is_published_is_told_and_served(server: PreviewServer, recording: 
     server.publish_error("line 3: oops")
     second = json.loads(server.news(json.dumps(first)) or "")
     assert second == {"version": first["version"], "error": "line 3: oops"}
-    server.publish(Screening(recording, verdict=made_up_verdict(recording.duration)))
+    server.publish(ReplayContent(recording, verdict=made_up_verdict(recording.duration)))
     third = json.loads(server.news(json.dumps(second)) or "")
     assert third["version"] != first["version"]
     assert third["error"] is None
@@ -100,7 +100,7 @@ def test_what_is_published_is_told_and_served(server: PreviewServer, recording: 
 
 
 def test_pages_hear_at_once_and_hear_the_end(recording: Recording) -> None:
-    with PreviewServer(Screening(recording), "t", 0) as server:
+    with PreviewServer(ReplayContent(recording), "t", 0) as server:
         connection = http.client.HTTPConnection("127.0.0.1", _port(server), timeout=30)
         connection.request("GET", "/events")
         stream = connection.getresponse()
@@ -116,12 +116,12 @@ def test_pages_hear_at_once_and_hear_the_end(recording: Recording) -> None:
 def test_a_port_in_use_is_named(server: PreviewServer, recording: Recording) -> None:
     port = _port(server)
     with pytest.raises(ConfigError, match=f"cannot listen on port {port} of 127.0.0.1"):
-        PreviewServer(Screening(recording), "t", port)
+        PreviewServer(ReplayContent(recording), "t", port)
 
 
 def test_a_port_out_of_range_is_refused(recording: Recording) -> None:
     with pytest.raises(ConfigError, match="port 70000 is not valid"):
-        PreviewServer(Screening(recording), "t", 70_000)
+        PreviewServer(ReplayContent(recording), "t", 70_000)
 
 
 def _unpacked(text: str) -> bytes:

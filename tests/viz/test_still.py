@@ -13,10 +13,10 @@ import viz
 from go2_wbc.errors import ConfigError
 from go2_wbc.legs import Leg
 from go2_wbc.recording import Recording
+from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.framing import camera_path, heading_path, nearest_rows
 from viz.render.posed_robot import PosedRobot
 from viz.render.robot_meshes import load_robot_visuals
-from viz.render.scene_shots import Photographer, ShotStyle
 from viz.render.still import telling_times
 
 
@@ -83,6 +83,6 @@ def test_the_picture_of_a_robot_that_turned_round_shows_it_from_the_same_side(
     turned = q.copy()
     turned[:, 3:7] = [0.0, 0.0, 1.0, 0.0]
     style = ShotStyle(size=(160, 100), sway=0.0)
-    ahead = Photographer(replace(recording, q=q), style).shoot(0.1).astype(float)
-    back = Photographer(replace(recording, q=turned), style).shoot(0.1).astype(float)
+    ahead = FrameRenderer(replace(recording, q=q), style).shoot(0.1).astype(float)
+    back = FrameRenderer(replace(recording, q=turned), style).shoot(0.1).astype(float)
     assert np.abs(ahead - back).mean() < 4.0  # the tiles of the floor differ, the robot does not

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viz.content import MarginCurve, Remark, Verdict
+from viz.content import Annotation, MarginCurve, Verdict
 
 
 def made_up_verdict(duration: float) -> Verdict:
@@ -19,10 +19,10 @@ def made_up_verdict(duration: float) -> Verdict:
     return Verdict(
         ok=False,
         text="2 limits broken, 1 tight margin",
-        remarks=(
-            _remark("support", "CoM", instant, ((instant, instant),), ("com",)),
-            _remark("joint position", "FR_calf", duration / 2, spans, ("FR_calf",)),
-            _remark("friction", "RL", 0.0, ((0.0, 0.1),), ("RL_foot",), is_broken=False),
+        annotations=(
+            _annotation("support", "CoM", instant, ((instant, instant),), ("com",)),
+            _annotation("joint position", "FR_calf", duration / 2, spans, ("FR_calf",)),
+            _annotation("friction", "RL", 0.0, ((0.0, 0.1),), ("RL_foot",), is_broken=False),
         ),
         curves=(
             _curve("torque", "N m", time, np.full(400, 9.0)),
@@ -34,7 +34,7 @@ def made_up_verdict(duration: float) -> Verdict:
     )
 
 
-def _remark(
+def _annotation(
     limit: str,
     subject: str,
     time: float,
@@ -42,8 +42,8 @@ def _remark(
     parts: tuple[str, ...],
     *,
     is_broken: bool = True,
-) -> Remark:
-    return Remark(limit, subject, time, "1.2, limit 1 <b>", is_broken, spans, parts)
+) -> Annotation:
+    return Annotation(limit, subject, time, "1.2, limit 1 <b>", is_broken, spans, parts)
 
 
 def _curve(

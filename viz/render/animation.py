@@ -12,9 +12,9 @@ from PIL import Image
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording
-from viz.checks import checked_screening
-from viz.content import Screening
-from viz.render.scene_shots import Photographer, ShotStyle
+from viz.checks import checked_content
+from viz.content import ReplayContent
+from viz.render.frame_renderer import FrameRenderer, ShotStyle
 
 ANIMATION_SUFFIXES = (".webp", ".gif")
 SIZE_LIMIT = 3_000_000
@@ -29,7 +29,7 @@ _RENDER_SHARE = 0.75  # share of the progress bar for the pictures; the rest is 
 
 
 def export_animation(
-    shown: Recording | Screening,
+    shown: Recording | ReplayContent,
     path: Path,
     *,
     speed: float | int = 2.0,
@@ -58,19 +58,19 @@ def export_animation(
             rate or size out of range, or a file that stays too large at the lowest quality.
     """
     target = checked_output(path, ANIMATION_SUFFIXES)
-    screening = checked_screening(shown)
-    recording = screening.recording
+    content = checked_content(shown)
+    recording = content.recording
     if not (speed > 0 and fps > 0 and min(size) >= 16):
         raise ConfigError(
             f"speed {speed} and fps {fps} must be positive, size {size} at least 16 by 16 px"
         )
     report = progress or (lambda _share: None)
-    remarks = () if screening.verdict is None else screening.verdict.remarks
-    photographer = Photographer(recording, ShotStyle(size=size), remarks)
+    annotations = () if content.verdict is None else content.verdict.annotations
+    frame_renderer = FrameRenderer(recording, ShotStyle(size=size), annotations)
     times = frame_times(recording, speed=speed, fps=fps)
     frames = []
     for k, time in enumerate(times):
-        frames.append(Image.fromarray(photographer.shoot_captioned(time, speed=speed)))
+        frames.append(Image.fromarray(frame_renderer.shoot_captioned(time, speed=speed)))
         report(_RENDER_SHARE * (k + 1) / len(times))
     is_gif = target.suffix.lower() == ".gif"
     limit = GIF_SIZE_LIMIT if is_gif else SIZE_LIMIT

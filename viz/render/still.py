@@ -14,12 +14,12 @@ from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import FOOT_RADIUS
 from viz.checks import check_recording
+from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.framing import nearest_rows
 from viz.render.overlay import draw_caption
 from viz.render.posed_robot import PosedRobot
 from viz.render.renderer import RenderStyle
 from viz.render.robot_meshes import load_robot_visuals
-from viz.render.scene_shots import Photographer, ShotStyle
 from viz.replay.replay_data import Span, label_spans
 
 FILMSTRIP_SUFFIXES = (".png",)
@@ -62,11 +62,11 @@ def export_filmstrip(
         raise ConfigError(
             f"time {outside[0]:g} s is outside the recording; valid: 0 to {recording.duration:g} s"
         )
-    photographer = Photographer(recording, _STYLE)
+    frame_renderer = FrameRenderer(recording, _STYLE)
     panels = []
     for time in chosen:
-        caption = photographer.caption(time, with_progress=False)
-        panels.append(Image.fromarray(draw_caption(photographer.shoot(time), caption)))
+        caption = frame_renderer.caption(time, with_progress=False)
+        panels.append(Image.fromarray(draw_caption(frame_renderer.shoot(time), caption)))
     stream = io.BytesIO()
     _assemble(panels).save(stream, "PNG", optimize=True)
     return write_atomically(target, stream.getvalue())

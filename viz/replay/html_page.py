@@ -11,10 +11,10 @@ import meshcat
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording
-from viz.checks import checked_screening
-from viz.content import Screening
+from viz.checks import checked_content
+from viz.content import ReplayContent
 from viz.replay.packing import compressed_text
-from viz.replay.page_data import scene_text, screening_text
+from viz.replay.page_data import content_text, scene_text
 
 HTML_SUFFIXES = (".html", ".htm")
 PAGE_LIMIT = 4_000_000
@@ -32,7 +32,7 @@ _SCRIPTS = (
 _LIVE_SCRIPT = "replay_live.js"
 
 
-def export_html(shown: Recording | Screening, path: Path, *, title: str) -> Path:
+def export_html(shown: Recording | ReplayContent, path: Path, *, title: str) -> Path:
     """Write an interactive 3D replay as one self-contained page.
 
     Args:
@@ -49,8 +49,8 @@ def export_html(shown: Recording | Screening, path: Path, *, title: str) -> Path
         DescriptionError: if the robot's files are missing.
     """
     target = checked_output(path, HTML_SUFFIXES)
-    screening = checked_screening(shown)
-    page = page_text(title, scene_text(), screening_text(screening, title)).encode()
+    content = checked_content(shown)
+    page = page_text(title, scene_text(), content_text(content, title)).encode()
     if len(page) > PAGE_LIMIT:
         raise ConfigError(
             f"the page would have {len(page)} bytes, limit {PAGE_LIMIT}; record a shorter run"

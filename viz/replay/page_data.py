@@ -7,7 +7,7 @@ import numpy as np
 from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import FOOT_RADIUS
-from viz.content import Remark, Screening, Verdict
+from viz.content import Annotation, ReplayContent, Verdict
 from viz.palette import LEG_COLORS
 from viz.render.posed_robot import PosedRobot
 from viz.render.robot_meshes import load_robot_visuals
@@ -31,27 +31,27 @@ def scene_text() -> str:
     return pack.packed(header)
 
 
-def screening_text(screening: Screening, title: str, version: str = "") -> str:
+def content_text(content: ReplayContent, title: str, version: str = "") -> str:
     """What happens, packed; ``version`` tells one text of a live page from the next."""
     robot = PosedRobot(load_robot_visuals())
     pack = Pack()
-    frames = replay_frames(screening.recording, robot)
+    frames = replay_frames(content.recording, robot)
     header: dict[str, object] = {
         "title": title,
         "version": version,
-        "is_plan": screening.is_plan,
+        "is_plan": content.is_plan,
         "rate": frames.rate,
         "frames": len(frames.q),
-        "labels": [[s.start, s.end, s.label] for s in label_spans(screening.recording)],
+        "labels": [[s.start, s.end, s.label] for s in label_spans(content.recording)],
         "force_scale": _force_scale(frames),
         "verdict": None,
         "ghost": None,
     }
     _add_frames(pack, "", frames)
-    if screening.verdict is not None:
-        header["verdict"] = _add_verdict(pack, screening.verdict)
-    if screening.ghost is not None:
-        header["ghost"] = _add_ghost(pack, screening.ghost, robot)
+    if content.verdict is not None:
+        header["verdict"] = _add_verdict(pack, content.verdict)
+    if content.ghost is not None:
+        header["ghost"] = _add_ghost(pack, content.ghost, robot)
     return pack.packed(header)
 
 
@@ -94,18 +94,18 @@ def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
     return {
         "ok": verdict.ok,
         "text": verdict.text,
-        "remarks": [_plain(remark) for remark in verdict.remarks],
+        "annotations": [_plain(annotation) for annotation in verdict.annotations],
         "curves": curves,
     }
 
 
-def _plain(remark: Remark) -> dict[str, object]:
+def _plain(annotation: Annotation) -> dict[str, object]:
     return {
-        "limit": remark.limit,
-        "subject": remark.subject,
-        "time": remark.time,
-        "text": remark.text,
-        "is_broken": remark.is_broken,
-        "spans": [list(span) for span in remark.spans],
-        "parts": list(remark.parts),
+        "limit": annotation.limit,
+        "subject": annotation.subject,
+        "time": annotation.time,
+        "text": annotation.text,
+        "is_broken": annotation.is_broken,
+        "spans": [list(span) for span in annotation.spans],
+        "parts": list(annotation.parts),
     }

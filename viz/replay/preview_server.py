@@ -19,10 +19,10 @@ from types import TracebackType
 from typing import final
 
 from go2_wbc.errors import ConfigError
-from viz.checks import checked_screening
-from viz.content import Screening
+from viz.checks import checked_content
+from viz.content import ReplayContent
 from viz.replay.html_page import page_text
-from viz.replay.page_data import scene_text, screening_text
+from viz.replay.page_data import content_text, scene_text
 
 _log = logging.getLogger(__name__)
 
@@ -56,11 +56,11 @@ class PreviewServer:
         url: address of the page.
     """
 
-    def __init__(self, screening: Screening, title: str, port: int) -> None:
+    def __init__(self, content: ReplayContent, title: str, port: int) -> None:
         """Bind and serve in the background.
 
         Args:
-            screening: what the page shows at first.
+            content: what the page shows at first.
             title: of the page.
             port: to listen on; 0 takes any that is free.
 
@@ -72,19 +72,19 @@ class PreviewServer:
         self._scene = scene_text()
         self._changed = threading.Condition()
         self._is_open = True
-        self._state = self._packed(screening)
+        self._state = self._packed(content)
         self._http = _bind(port, self)
         self.url = f"http://{LOOPBACK}:{self._http.server_port}/"
         self._thread = threading.Thread(target=self._http.serve_forever, args=(0.05,), daemon=True)
         self._thread.start()
 
-    def publish(self, screening: Screening) -> None:
+    def publish(self, content: ReplayContent) -> None:
         """Show this from now on, and no error.
 
         Raises:
             ConfigError: for a recording that cannot be drawn.
         """
-        self._set(self._packed(screening))
+        self._set(self._packed(content))
 
     def publish_error(self, message: str) -> None:
         """Say what is wrong, and keep what was shown."""
@@ -136,10 +136,10 @@ class PreviewServer:
     def _told(self) -> str:
         return json.dumps({"version": self._state.version, "error": self._state.error})
 
-    def _packed(self, screening: Screening) -> _State:
+    def _packed(self, content: ReplayContent) -> _State:
         version = uuid.uuid4().hex
-        checked = checked_screening(screening)
-        return _State(screening_text(checked, self._title, version), version, None)
+        checked = checked_content(content)
+        return _State(content_text(checked, self._title, version), version, None)
 
     def _set(self, state: _State) -> None:
         with self._changed:

@@ -19,7 +19,7 @@ from controller.bridges.ros2.names import (
 )
 from controller.bridges.ros2.odometry import state_of
 from controller.bridges.ros2.repeater import Repeater
-from controller.navigation import DriveStraight, Errand, TurnInPlace
+from controller.navigation import DriveStraight, Goal, TurnInPlace
 from go2_wbc.errors import BridgeError, MissingDependency
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.robot.state import RobotState
@@ -29,7 +29,7 @@ ANSWER_LIMIT = 30.0
 MOTION_LIMIT = 180.0
 """Time [s] in which a motion must be over."""
 ODOM_LIMIT = 2.0
-"""Time [s] without odometry after which an errand is given up."""
+"""Time [s] without odometry after which a goal is given up."""
 SLICE = 0.1
 """Time [s] between two looks whether the server is still there."""
 REST_SPEED, REST_TIME, REST_LIMIT = 0.02, 0.3, 4.0
@@ -143,34 +143,34 @@ class GO2ControllerNode(ros.Node):
 
     def turn_left(self, angle: float) -> bool:
         """Turn left in place by ``angle`` [rad], closed on odometry; negative turns right."""
-        return self._run_errand(TurnInPlace(arguments.finite("angle", angle)))
+        return self._run_goal(TurnInPlace(arguments.finite("angle", angle)))
 
     def turn_right(self, angle: float) -> bool:
         """Turn right in place by ``angle`` [rad], closed on odometry."""
-        return self._run_errand(TurnInPlace(-arguments.finite("angle", angle)))
+        return self._run_goal(TurnInPlace(-arguments.finite("angle", angle)))
 
     def move_forward(self, distance: float) -> bool:
         """Walk ``distance`` [m] straight ahead, closed on odometry; negative is backward."""
-        return self._run_errand(DriveStraight(arguments.finite("distance", distance)))
+        return self._run_goal(DriveStraight(arguments.finite("distance", distance)))
 
-    def _run_errand(self, errand: Errand) -> bool:
+    def _run_goal(self, goal: Goal) -> bool:
         if not self.walk():
             return False
         state = self._next_state()
         if state is None:
-            return self._conclude(errand.name, False, "no odometry")
-        errand.begin(state)
-        end = state.time + errand.time_limit
-        while not errand.is_done(state) and state.time < end:
-            self._cmd_vel_pub.publish(_twist(errand.command(state)))
+            return self._conclude(goal.name, False, "no odometry")
+        goal.begin(state)
+        end = state.time + goal.time_limit
+        while not goal.is_done(state) and state.time < end:
+            self._cmd_vel_pub.publish(_twist(goal.command(state)))
             newer = self._next_state()
             if newer is None:
                 self.stop()
-                return self._conclude(errand.name, False, "odometry has ceased")
+                return self._conclude(goal.name, False, "odometry has ceased")
             state = newer
         state = self._come_to_rest(state)
-        figures = ", ".join(f"{name} {value:.3f}" for name, value in errand.figures(state).items())
-        return self._conclude(errand.name, errand.is_within_tolerance(state), figures)
+        figures = ", ".join(f"{name} {value:.3f}" for name, value in goal.figures(state).items())
+        return self._conclude(goal.name, goal.is_within_tolerance(state), figures)
 
     def _come_to_rest(self, state: RobotState) -> RobotState:
         end, moved_at = state.time + REST_LIMIT, state.time

@@ -11,9 +11,9 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from controller.executor import listed
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
+from controller.procedures import listed
 from go2_wbc.errors import Go2WbcError
 
 _log = logging.getLogger(__name__)

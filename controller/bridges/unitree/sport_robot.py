@@ -11,10 +11,10 @@ from jaxtyping import Float
 
 from controller.behaviours.plans import ChangePosture
 from controller.bridges.unitree.sport_api import Api
-from controller.executor import Executor
 from controller.loop import ControlLoop
 from controller.modes import Mode
 from controller.pilot import Pilot
+from controller.procedures import ProcedureRunner
 from controller.runner import Runner
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
@@ -69,7 +69,7 @@ class SportRobot:
         self._loop = ControlLoop(plant, model, wbc, Telemetry(model, 1), config.safety)
         self._runner = Runner(self._loop, realtime=True, after_tick=after_tick)
         self.pilot = Pilot(self._runner, config)
-        self._executor = Executor(self._runner)
+        self._procedures = ProcedureRunner(self._runner)
         self.is_locked = False
         self.is_leaning = False
         self._actions: Mapping[int, Callable[[], None]] = {
@@ -129,8 +129,8 @@ class SportRobot:
             self._model.foot_radius,
         )
         self.is_leaning = True
-        self._executor.run(behaviour, LEAN_LIMIT)
-        self._executor.settle("lean", lambda snapshot, _: self._is_at(target, snapshot.state.rpy))
+        self._procedures.run(behaviour, LEAN_LIMIT)
+        self._procedures.settle("lean", lambda snapshot, _: self._is_at(target, snapshot.state.rpy))
 
     def _is_at(self, wanted: Float[np.ndarray, "3"], rpy: Float[np.ndarray, "3"]) -> bool:
         return bool(np.abs(rpy[:2] - wanted[:2]).max() < ATTITUDE_TOLERANCE)

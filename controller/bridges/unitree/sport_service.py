@@ -19,8 +19,8 @@ from controller.bridges.unitree import sport_api
 from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
 from controller.bridges.unitree.sport_robot import MOTIONS, POSE, SportRobot
-from controller.executor import Aborted
 from controller.modes import Mode
+from controller.procedures import Aborted
 from go2_wbc.errors import ClosedError, Go2WbcError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 

@@ -131,7 +131,7 @@ def test_a_demo_without_a_server_ends_with_the_line_that_starts_one() -> None:
     assert "Traceback" not in done.stderr
 
 
-def test_errands_are_closed_on_odometry(go2: Any) -> None:
+def test_goals_are_closed_on_odometry(go2: Any) -> None:
     assert go2.turn_left(math.pi / 2)
     yaw = go2.state().yaw
     assert go2.turn_right(math.pi / 2)

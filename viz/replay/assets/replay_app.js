@@ -93,7 +93,7 @@ class Player {
 
   // To the next broken or tight limit, after the last one to the first.
   jumpToNext() {
-    const times = this.data.remarks.map((remark) => remark.time).sort((a, b) => a - b);
+    const times = this.data.annotations.map((annotation) => annotation.time).sort((a, b) => a - b);
     this.scrub(times.find((t) => t > this.time + INSTANT) ?? times[0]);
   }
 
@@ -156,7 +156,7 @@ function bindControls(player) {
     else if (views[key]) player.scene.setView(views[key]);
     else if (toggles[key]) player.toggle(toggles[key]);
     else if (key === "g" && player.data.ghost) player.cycleGhost();
-    else if (key === "n" && player.data.remarks.length) player.jumpToNext();
+    else if (key === "n" && player.data.annotations.length) player.jumpToNext();
     else return;
     event.preventDefault();
   });

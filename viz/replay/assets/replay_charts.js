@@ -82,10 +82,10 @@ class Timeline extends TimeCanvas {
   draw(paint) {
     paint.clearRect(0, 0, this.width, this.height);
     const [labels, axis] = [22, 18];
-    const top = labels + 6 + (this.data.remarks.length ? LANE + 5 : 0);
+    const top = labels + 6 + (this.data.annotations.length ? LANE + 5 : 0);
     const row = (this.height - top - axis) / 4;
     this.drawLabels(paint, labels);
-    this.drawRemarks(paint, labels + 5);
+    this.drawAnnotations(paint, labels + 5);
     this.data.header.legs.forEach((leg, k) => {
       this.drawLeg(paint, leg, k, top + k * row, row - 3);
     });
@@ -109,11 +109,11 @@ class Timeline extends TimeCanvas {
   }
 
   // When limits are nearly broken (amber) and broken (red).
-  drawRemarks(paint, top) {
-    if (!this.data.remarks.length) return;
+  drawAnnotations(paint, top) {
+    if (!this.data.annotations.length) return;
     paint.fillStyle = "#f3f5f9";
     paint.fillRect(this.left, top, this.width - this.left - this.right, LANE);
-    const sorted = [...this.data.remarks].sort((a, b) => a.is_broken - b.is_broken);
+    const sorted = [...this.data.annotations].sort((a, b) => a.is_broken - b.is_broken);
     for (const { is_broken: isBroken, spans } of sorted) {
       paint.fillStyle = isBroken ? BAD : WARN;
       for (const [from, to] of spans) {

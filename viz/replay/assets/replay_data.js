@@ -75,7 +75,7 @@ class ReplayData extends Run {
     this.header = { ...scene.header, ...pack.header };
     this.ghost = pack.header.ghost ? new Run(pack, "ghost.", pack.header.ghost) : null;
     this.duration = Math.max(this.end, this.ghost ? this.ghost.end : 0);
-    this.remarks = this.header.verdict ? this.header.verdict.remarks : [];
+    this.annotations = this.header.verdict ? this.header.verdict.annotations : [];
     this.curves = (this.header.verdict ? this.header.verdict.curves : []).map((curve, k) => ({
       ...curve,
       time: pack.array(`curve${k}.time`),
@@ -96,7 +96,7 @@ class ReplayData extends Run {
 
   // Broken limits at time t; an instant is widened so that it can be seen in passing.
   brokenAt(t) {
-    return this.remarks.filter((remark) => remark.is_broken && remark.spans.some(
+    return this.annotations.filter((annotation) => annotation.is_broken && annotation.spans.some(
       ([from, to]) => t >= from - INSTANT && t <= to + INSTANT));
   }
 }

@@ -31,10 +31,10 @@ class Flags {
 
   show(t) {
     const broken = this.data.brokenAt(t);
-    const key = [this.scene.ghost.isShown, ...broken.map((remark) => remark.limit + remark.subject)].join();
+    const key = [this.scene.ghost.isShown, ...broken.map((annotation) => annotation.limit + annotation.subject)].join();
     if (key !== this.active) {
       this.active = key;
-      this.paint(new Set(broken.flatMap((remark) => remark.parts)));
+      this.paint(new Set(broken.flatMap((annotation) => annotation.parts)));
       this.write(broken);
     }
     this.placeNotes();
@@ -60,13 +60,13 @@ class Flags {
   }
 
   write(broken) {
-    this.notes = broken.slice(0, MOST_NOTES).map((remark) => {
+    this.notes = broken.slice(0, MOST_NOTES).map((annotation) => {
       const note = document.createElement("div");
       note.className = "note";
-      const what = plainText("b", `${remark.limit}: ${readableSubject(remark.subject)}`);
-      note.append(what, plainText("span", remark.text));
+      const what = plainText("b", `${annotation.limit}: ${readableSubject(annotation.subject)}`);
+      note.append(what, plainText("span", annotation.text));
       const lead = document.createElementNS(this.leads.namespaceURI, "path");
-      return { note, lead, remark };
+      return { note, lead, annotation };
     });
     const more = broken.length - this.notes.length;
     this.box.replaceChildren(this.leads, ...this.notes.map(({ note }) => note));
@@ -82,7 +82,7 @@ class Flags {
     const { camera } = this.scene.viewer;
     camera.updateMatrixWorld();
     const placed = this.notes.map((item) => {
-      const seen = this.placeOf(item.remark.parts[0]).project(camera);
+      const seen = this.placeOf(item.annotation.parts[0]).project(camera);
       return { ...item, x: (seen.x + 1) / 2 * width, y: (1 - seen.y) / 2 * height };
     }).sort((a, b) => a.y - b.y);
     let top = this.header.offsetTop + this.header.offsetHeight + NOTE_GAP;

@@ -8,7 +8,7 @@ class VerdictPanel {
   constructor(data, onJump) {
     this.onJump = onJump;
     this.panel = document.getElementById("verdict");
-    this.list = document.getElementById("remarks");
+    this.list = document.getElementById("annotations");
     this.rows = document.getElementById("margins");
     this.time = 0;
     this.large = new MarginCurve(document.querySelector("#chosen canvas"), data, true);
@@ -26,8 +26,8 @@ class VerdictPanel {
     badge.textContent = verdict ? verdict.text : "";
     badge.className = verdict ? `badge ${verdict.ok ? "good" : "bad"}` : "badge";
     if (!verdict) return;
-    this.list.replaceChildren(...data.remarks.map((remark) => this.remarkRow(remark)));
-    if (!data.remarks.length) this.list.append(plainText("li", "No limit is broken, no margin is tight.", "calm"));
+    this.list.replaceChildren(...data.annotations.map((annotation) => this.annotationRow(annotation)));
+    if (!data.annotations.length) this.list.append(plainText("li", "No limit is broken, no margin is tight.", "calm"));
     this.sparks = data.curves.map((curve) => new MarginRow(data, curve, () => this.choose(curve.name), this.onJump));
     this.rows.replaceChildren(...this.sparks.map((spark) => spark.row));
     const kept = data.curves.find((curve) => curve.name === this.chosen);
@@ -35,17 +35,17 @@ class VerdictPanel {
     this.choose(kept && !isWorse ? kept.name : (data.curves[0] || {}).name);
   }
 
-  remarkRow(remark) {
+  annotationRow(annotation) {
     const row = document.createElement("li");
     const button = document.createElement("button");
-    button.className = remark.is_broken ? "remark broken" : "remark tight";
+    button.className = annotation.is_broken ? "annotation broken" : "annotation tight";
     button.title = "Go there";
-    const time = plainText("time", `${remark.time.toFixed(2)} s`);
-    const what = plainText("b", `${remark.limit}: ${readableSubject(remark.subject)}`);
-    button.append(what, time, plainText("span", remark.text));
+    const time = plainText("time", `${annotation.time.toFixed(2)} s`);
+    const what = plainText("b", `${annotation.limit}: ${readableSubject(annotation.subject)}`);
+    button.append(what, time, plainText("span", annotation.text));
     button.addEventListener("click", () => {
-      this.onJump(remark.time);
-      this.choose(remark.limit);
+      this.onJump(annotation.time);
+      this.choose(annotation.limit);
       button.blur();
     });
     row.append(button);
@@ -90,8 +90,8 @@ class VerdictPanel {
     this.large.show(t);
     this.readOut(t);
     for (const spark of this.sparks) spark.show(t);
-    this.list.querySelectorAll(".remark").forEach((button, k) => {
-      const now = this.data.remarks[k].spans.some(([from, to]) => t >= from - INSTANT && t <= to + INSTANT);
+    this.list.querySelectorAll(".annotation").forEach((button, k) => {
+      const now = this.data.annotations[k].spans.some(([from, to]) => t >= from - INSTANT && t <= to + INSTANT);
       button.classList.toggle("now", now);
     });
   }

@@ -1,4 +1,4 @@
-"""The witness: a plant that passes everything on, and writes down what MuJoCo says every tick."""
+"""The truth: a plant that passes everything on, and writes down what MuJoCo says every tick."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Track:
 
 
 @final
-class Witness(Plant):
+class GroundTruth(Plant):
     """Passes everything on to a ``MujocoPlant`` and keeps a track since the last ``clear``.
 
     Attributes:

@@ -29,7 +29,7 @@ class Aborted(Exception):
         self.figures = dict(figures or {})
 
 
-class Executor:
+class ProcedureRunner:
     """Lets time pass on a runner until something is measured.
 
     Every method but ``figures`` and ``let_pass`` raises ``Aborted`` if it cannot do its work.

@@ -14,37 +14,39 @@ from go2_wbc.recording import Recording
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
-from motions import FeasibilityReport, Finding, Rehearsal
+from motions import CheckedMotion, FeasibilityReport, Finding
 from motions.feasibility import Series
-from viz.content import CENTRE_OF_MASS, MarginCurve, Remark, Screening, Verdict
+from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Verdict
 
 _AFTERWARDS = 1.0
 """How long [s] a run is shown after the end of its motion."""
 _TOGETHER = 0.05
-"""Remarks on one limit that are this close in time [s] become one."""
+"""Annotations on one limit that are this close in time [s] become one."""
 _LEAST_SAMPLES = 2
 
 
-def planned(rehearsal: Rehearsal) -> Screening:
+def planned(checked: CheckedMotion) -> ReplayContent:
     """The plan with its verdict."""
-    return Screening(rehearsal.recording(), is_plan=True, verdict=verdict_of(rehearsal.report))
+    return ReplayContent(checked.recording(), is_plan=True, verdict=verdict_of(checked.report))
 
 
-def performed(rehearsal: Rehearsal, run: Recording, model: RobotModel) -> Screening:
+def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> ReplayContent:
     """A run of the motion with the verdict on its plan, and the plan as the ghost.
 
     Args:
-        rehearsal: of the motion that was played.
+        checked: of the motion that was played.
         run: holds samples that are labelled with the motion's name, from standing on four feet.
         model: of the robot that ran.
 
     Raises:
         PlantError: if the motion is not in the run.
     """
-    own = _in_motion_frame(_part(run, rehearsal.plan.name), model)
-    plan = rehearsal.recording()
+    own = _in_motion_frame(_part(run, checked.plan.name), model)
+    plan = checked.recording()
     labels = tuple(_label_at(plan, float(time)) for time in own.time)
-    return Screening(replace(own, labels=labels), verdict=verdict_of(rehearsal.report), ghost=plan)
+    return ReplayContent(
+        replace(own, labels=labels), verdict=verdict_of(checked.report), ghost=plan
+    )
 
 
 def verdict_of(report: FeasibilityReport) -> Verdict:
@@ -56,16 +58,18 @@ def verdict_of(report: FeasibilityReport) -> Verdict:
     judged = [item for item in report.series if len(item.times) >= _LEAST_SAMPLES]
     judged = [item for item in judged if item.check in report.margins]
     judged.sort(key=lambda item: _share_left(report.margins[item.check]))
-    remarks = [_remark(finding, report.series) for finding in (*report.failures, *report.warnings)]
+    annotations = [
+        _annotation(finding, report.series) for finding in (*report.failures, *report.warnings)
+    ]
     return Verdict(
         ok=report.ok,
         text=text,
-        remarks=_grouped(remarks),
+        annotations=_grouped(annotations),
         curves=tuple(_curve(item) for item in judged),
     )
 
 
-def _remark(finding: Finding, series: tuple[Series, ...]) -> Remark:
+def _annotation(finding: Finding, series: tuple[Series, ...]) -> Annotation:
     is_broken = not finding.margin >= 0.0
     item = next(
         item
@@ -77,7 +81,7 @@ def _remark(finding: Finding, series: tuple[Series, ...]) -> Remark:
     margins = item.margins[:, item.subjects.index(finding.subject)]
     known = ~np.isnan(margins)
     flags = known & (margins < 0.0) if is_broken else known & (margins < item.tight)
-    return Remark(
+    return Annotation(
         limit=finding.check,
         subject=finding.subject,
         time=finding.time,
@@ -88,27 +92,27 @@ def _remark(finding: Finding, series: tuple[Series, ...]) -> Remark:
     )
 
 
-def _grouped(remarks: Sequence[Remark]) -> tuple[Remark, ...]:
-    """One remark for the subjects that meet the same limit at about the same time."""
-    groups: list[list[Remark]] = []
-    for remark in remarks:
+def _grouped(annotations: Sequence[Annotation]) -> tuple[Annotation, ...]:
+    """One annotation for the subjects that meet the same limit at about the same time."""
+    groups: list[list[Annotation]] = []
+    for annotation in annotations:
         for group in groups:
             first = group[0]
-            is_same = (first.limit, first.is_broken) == (remark.limit, remark.is_broken)
-            if is_same and abs(first.time - remark.time) < _TOGETHER:
-                group.append(remark)
+            is_same = (first.limit, first.is_broken) == (annotation.limit, annotation.is_broken)
+            if is_same and abs(first.time - annotation.time) < _TOGETHER:
+                group.append(annotation)
                 break
         else:
-            groups.append([remark])
+            groups.append([annotation])
     return tuple(_joined(group) for group in groups)
 
 
-def _joined(group: Sequence[Remark]) -> Remark:
+def _joined(group: Sequence[Annotation]) -> Annotation:
     return replace(
         group[0],
-        subject=_together([remark.subject for remark in group]),
-        spans=tuple(sorted({span for remark in group for span in remark.spans})),
-        parts=tuple(dict.fromkeys(part for remark in group for part in remark.parts)),
+        subject=_together([annotation.subject for annotation in group]),
+        spans=tuple(sorted({span for annotation in group for span in annotation.spans})),
+        parts=tuple(dict.fromkeys(part for annotation in group for part in annotation.parts)),
     )
 
 

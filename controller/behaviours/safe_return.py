@@ -22,7 +22,7 @@ _BRAKING = 0.8
 """Share of the clock's deceleration that the approach counts on."""
 
 
-class Recall:
+class SafeReturn:
     """Runs the clock of a plan smoothly from one instant to the nearest safe one.
 
     Attributes:

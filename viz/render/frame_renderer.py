@@ -11,7 +11,7 @@ from jaxtyping import UInt8
 
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import FOOT_RADIUS
-from viz.content import Remark
+from viz.content import Annotation
 from viz.palette import FORCE, rgb
 from viz.render.camera import Camera
 from viz.render.framing import camera_path, heading_path, nearest_rows
@@ -57,21 +57,21 @@ class ShotStyle:
 
 
 @final
-class Photographer:
+class FrameRenderer:
     """Takes pictures of a recording."""
 
     def __init__(
-        self, recording: Recording, style: ShotStyle, remarks: Sequence[Remark] = ()
+        self, recording: Recording, style: ShotStyle, annotations: Sequence[Annotation] = ()
     ) -> None:
         """Prepare the meshes and the path of the camera.
 
         Args:
             recording: what happened.
             style: how pictures are taken.
-            remarks: broken limits take the label's place in captions while they are broken.
+            annotations: broken limits take the label's place in captions while they are broken.
         """
         self._recording = recording
-        self._broken = [remark for remark in remarks if remark.is_broken]
+        self._broken = [annotation for annotation in annotations if annotation.is_broken]
         self._style = style
         self._robot = PosedRobot(load_robot_visuals().simplified(style.detail))
         self._path = camera_path(recording, self._robot, smoothing=style.smoothing)
@@ -107,10 +107,10 @@ class Photographer:
         """The picture at ``time`` with its caption."""
         return draw_caption(self.shoot(time), self.caption(time, speed=speed))
 
-    def _broken_at(self, time: float) -> Remark | None:
-        for remark in self._broken:
-            if any(start - _INSTANT <= time <= end + _INSTANT for start, end in remark.spans):
-                return remark
+    def _broken_at(self, time: float) -> Annotation | None:
+        for annotation in self._broken:
+            if any(start - _INSTANT <= time <= end + _INSTANT for start, end in annotation.spans):
+                return annotation
         return None
 
     def _camera(self, time: float) -> Camera:

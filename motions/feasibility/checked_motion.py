@@ -22,7 +22,7 @@ _LEAST_FEET = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Rehearsal:
+class CheckedMotion:
     """A checked motion, with what the check worked out on its way.
 
     Attributes:

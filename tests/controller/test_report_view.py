@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.watching import parts_of, performed, planned, verdict_of
+from controller.report_view import parts_of, performed, planned, verdict_of
 from go2_wbc.errors import PlantError
 from go2_wbc.recording import Recording
 from go2_wbc.robot.rotations import yaw_rotation
-from motions import FeasibilityChecker, Rehearsal, Timeline
+from motions import CheckedMotion, FeasibilityChecker, Timeline
 
 _YAW, _PLACE = 1.1, np.array([0.7, -0.4, 0.0])
 _ROUNDING = 1e-9
@@ -23,45 +23,47 @@ def checker() -> FeasibilityChecker:
 
 
 @pytest.fixture(scope="module")
-def nod(checker: FeasibilityChecker) -> Rehearsal:
-    return checker.rehearse(Timeline(name="nod").body(pitch=0.1, over=0.6).home(over=0.6))
+def nod(checker: FeasibilityChecker) -> CheckedMotion:
+    return checker.evaluate(Timeline(name="nod").body(pitch=0.1, over=0.6).home(over=0.6))
 
 
 @pytest.fixture(scope="module")
-def stretched(checker: FeasibilityChecker) -> Rehearsal:
+def stretched(checker: FeasibilityChecker) -> CheckedMotion:
     line = Timeline(name="up").body(z=0.15, over=1.0).hold(0.5).home(over=1.0)
-    return checker.rehearse(line)
+    return checker.evaluate(line)
 
 
-def test_a_feasible_plan_has_a_green_verdict(nod: Rehearsal) -> None:
-    screening = planned(nod)
-    assert screening.is_plan
-    assert screening.verdict is not None
-    assert screening.verdict.ok
-    assert screening.verdict.text == "feasible"
-    names = {curve.name for curve in screening.verdict.curves}
+def test_a_feasible_plan_has_a_green_verdict(nod: CheckedMotion) -> None:
+    content = planned(nod)
+    assert content.is_plan
+    assert content.verdict is not None
+    assert content.verdict.ok
+    assert content.verdict.text == "feasible"
+    names = {curve.name for curve in content.verdict.curves}
     assert {"support", "torque", "friction", "joint position", "self-collision"} <= names
-    assert not any(curve.is_broken for curve in screening.verdict.curves)
+    assert not any(curve.is_broken for curve in content.verdict.curves)
 
 
-def test_what_is_broken_says_where_and_when(stretched: Rehearsal) -> None:
+def test_what_is_broken_says_where_and_when(stretched: CheckedMotion) -> None:
     verdict = verdict_of(stretched.report)
     assert not verdict.ok
     assert verdict.text.startswith(f"{len(stretched.report.failures)} limits broken")
-    (reach,) = [remark for remark in verdict.remarks if remark.limit == "reach"]
+    (reach,) = [annotation for annotation in verdict.annotations if annotation.limit == "reach"]
     assert reach.subject == "FL, FR, RL, RR"
     assert {"FL_foot", "RR_calf"} <= set(reach.parts)
     start = min(start for start, _ in reach.spans)
     end = max(end for _, end in reach.spans)
     assert 0.4 < start < reach.time <= end < 2.1
-    (calves,) = [remark for remark in verdict.remarks if remark.limit == "joint position"]
+    (calves,) = [
+        annotation for annotation in verdict.annotations if annotation.limit == "joint position"
+    ]
     assert calves.subject == "FL, FR, RL, RR calf"
     assert "-0 rad" not in calves.text
 
 
-def test_the_spans_are_where_the_margin_is_negative(stretched: Rehearsal) -> None:
+def test_the_spans_are_where_the_margin_is_negative(stretched: CheckedMotion) -> None:
     verdict = verdict_of(stretched.report)
-    (reach,) = [remark for remark in verdict.remarks if remark.limit == "reach"]
+    (reach,) = [annotation for annotation in verdict.annotations if annotation.limit == "reach"]
     (curve,) = [curve for curve in verdict.curves if curve.name == "reach"]
     inside = np.zeros(len(curve.time), dtype=bool)
     for start, end in reach.spans:
@@ -88,24 +90,26 @@ def test_a_subject_has_its_parts(subject: str, parts: tuple[str, ...]) -> None:
 
 
 def test_a_run_is_seen_in_the_frame_and_at_the_time_of_its_motion(
-    nod: Rehearsal, checker: FeasibilityChecker
+    nod: CheckedMotion, checker: FeasibilityChecker
 ) -> None:
     plan = nod.recording()
-    screening = performed(nod, _elsewhere(plan), checker.model)
-    own = screening.recording
-    assert not screening.is_plan
-    assert screening.ghost is not None
+    content = performed(nod, _elsewhere(plan), checker.model)
+    own = content.recording
+    assert not content.is_plan
+    assert content.ghost is not None
     rows = slice(0, len(plan.time))
     np.testing.assert_allclose(own.time[rows], plan.time, atol=_ROUNDING)
     np.testing.assert_allclose(own.q[rows], plan.q, atol=_ROUNDING)
     np.testing.assert_allclose(own.p_world_com[rows], plan.p_world_com, atol=_ROUNDING)
-    np.testing.assert_allclose(screening.ghost.q, plan.q)
+    np.testing.assert_allclose(content.ghost.q, plan.q)
     assert own.duration == pytest.approx(plan.duration + 1.0, abs=0.02)
     assert own.labels[0] == plan.labels[0]
     assert own.labels[-1] == "afterwards"
 
 
-def test_a_run_without_the_motion_is_refused(nod: Rehearsal, checker: FeasibilityChecker) -> None:
+def test_a_run_without_the_motion_is_refused(
+    nod: CheckedMotion, checker: FeasibilityChecker
+) -> None:
     run = _elsewhere(nod.recording())
     with pytest.raises(PlantError, match="no motion 'nod'"):
         performed(nod, replace(run, labels=("stand",) * len(run.labels)), checker.model)

@@ -23,7 +23,7 @@ Maker = Callable[[np.random.Generator], Timeline]
 
 
 @dataclass(frozen=True, slots=True)
-class Specimen:
+class GeneratedMotion:
     """A motion with its origin.
 
     Attributes:
@@ -333,18 +333,20 @@ LATE = 1.0
 """When [s] a motion with a wrong entry is entered: it is where its first move has led."""
 
 
-def specimen(seed: int) -> Specimen:
+def generated_motion(seed: int) -> GeneratedMotion:
     """The motion of a seed: even seeds give good ones, odd ones broken, each kind in turn."""
     is_broken = bool(seed % 2)
     return _made(BROKEN if is_broken else GOOD, seed // 2, seed, is_broken=is_broken)
 
 
-def near_specimen(seed: int) -> Specimen:
+def near_specimen(seed: int) -> GeneratedMotion:
     """The motion of a seed among those from easy to impossible, each kind in turn."""
     return _made(NEAR, seed, seed, is_broken=None)
 
 
-def _made(makers: Mapping[str, Maker], turn: int, seed: int, *, is_broken: bool | None) -> Specimen:
+def _made(
+    makers: Mapping[str, Maker], turn: int, seed: int, *, is_broken: bool | None
+) -> GeneratedMotion:
     kind = list(makers)[turn % len(makers)]
     line = replace(makers[kind](np.random.default_rng([seed, 7])), name=f"{kind} {seed}")
-    return Specimen(kind, is_broken, line, LATE if kind == "wrong entry" else 0.0)
+    return GeneratedMotion(kind, is_broken, line, LATE if kind == "wrong entry" else 0.0)

@@ -1,4 +1,4 @@
-"""Errands: walking a metre and turning a quarter, measured from before the call to after it."""
+"""Goals: walking a metre and turning a quarter, measured from before the call to after it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ ANGLE = math.pi / 2
 
 _DRIVE, _TURN = "move_forward(1.0)", "turn_left(pi/2)"
 ROWS = (
-    Row("errand.miss", _DRIVE, "distance from the goal", "mm", 20.0),
-    Row("errand.heading", _DRIVE, "heading error", "deg", 1.0),
-    Row("errand.turn", _TURN, "angle error", "deg", 1.5),
-    Row("errand.drift", _TURN, "base moved by", "mm", None),
+    Row("goal.miss", _DRIVE, "distance from the goal", "mm", 20.0),
+    Row("goal.heading", _DRIVE, "heading error", "deg", 1.0),
+    Row("goal.turn", _TURN, "angle error", "deg", 1.5),
+    Row("goal.drift", _TURN, "base moved by", "mm", None),
 )
 
 
@@ -46,8 +46,8 @@ def _drive(robot: Subject) -> dict[str, float]:
     yaw = float(before.rpy[2])
     x, y, _ = yaw_rotation(yaw).T @ (after.p_world_base - before.p_world_base)
     return {
-        "errand.miss": 1000.0 * math.hypot(x - DISTANCE, y),
-        "errand.heading": math.degrees(abs(wrap_angle(float(after.rpy[2]) - yaw))),
+        "goal.miss": 1000.0 * math.hypot(x - DISTANCE, y),
+        "goal.heading": math.degrees(abs(wrap_angle(float(after.rpy[2]) - yaw))),
     }
 
 
@@ -58,9 +58,9 @@ def _turn(robot: Subject) -> dict[str, float]:
     turned = wrap_angle(float(after.rpy[2] - before.rpy[2]))
     x, y, _ = after.p_world_base - before.p_world_base
     return {
-        "errand.turn": math.degrees(abs(wrap_angle(turned - ANGLE))),
-        "errand.drift": 1000.0 * math.hypot(x, y),
+        "goal.turn": math.degrees(abs(wrap_angle(turned - ANGLE))),
+        "goal.drift": 1000.0 * math.hypot(x, y),
     }
 
 
-FAMILY = Family("errands", ROWS, measure)
+FAMILY = Family("goals", ROWS, measure)
