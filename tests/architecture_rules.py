@@ -26,7 +26,7 @@ SIBLINGS: dict[str, frozenset[str]] = {
 """What each package may import of ours, besides itself."""
 
 LAYERS: tuple[frozenset[str], ...] = (
-    frozenset({"errors"}),
+    frozenset({"errors", "lazy"}),
     frozenset({"legs", "geometry", "validation", "files"}),
     frozenset({"curves", "contacts", "robot", "recording"}),
     frozenset({"reference"}),
