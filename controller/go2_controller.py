@@ -5,18 +5,16 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 
 from controller import arguments
-from controller.loop import ControlLoop
+from controller.assembly import PilotSettings, build_pilot
 from controller.modes import Mode, Outcome
-from controller.pilot import Pilot
 from controller.procedures import Aborted, Figures
-from controller.runner import Runner
 from controller.telemetry import Telemetry
-from controller.viewing import open_viewer
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError
@@ -28,16 +26,10 @@ from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
-from go2_wbc.wbc.controller import WholeBodyController
 from motions import FeasibilityChecker, Motion, Timeline, compile_timeline, load_motion
 from motions.library.high_five import HEIGHT as HIGH_FIVE_HEIGHT
 
 _log = logging.getLogger(__name__)
-
-RECORDED_TIME = 240.0
-"""Seconds of robot time that the telemetry keeps."""
-VIEWER_RATE = 50.0
-"""Frames per second of robot time that the viewer shows."""
 
 
 class GO2Controller:
@@ -89,26 +81,22 @@ class GO2Controller:
         self._config = arguments.config(config)
         plant = arguments.plant_or_none(plant)
         realtime = arguments.pace(realtime, plant)
-        model = RobotModel(find_description(arguments.path_or_none("urdf", urdf)))
-        wbc = WholeBodyController(model, self._config.backend, self._config.wbc)
-        self._owns_plant = plant is None
-        self._plant = (
-            MujocoPlant(urdf=model.description.urdf_path, visuals=viewer)
-            if plant is None
-            else plant
-        )
+        description = find_description(arguments.path_or_none("urdf", urdf))
+        settings = PilotSettings(realtime=realtime, viewer=viewer, description=description)
+        with ExitStack() as opened:
+            if plant is None:
+                plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer)
+                opened.callback(plant.close)
+            self._plant = plant
+            self._assembly = build_pilot(plant, self._config, settings)
+            opened.callback(self._assembly.close)
+            self._resources = opened.pop_all()
+        self._runner, self._pilot = self._assembly.runner, self._assembly.pilot
         self._closed = False
         self._busy = threading.Lock()
         self._busy_with = ""
-        self._checker: FeasibilityChecker | None = None
+        self._planning = threading.Lock()
         self._last_outcome = Outcome(True, "lying, nothing asked yet", 0.0)
-        capacity = round(RECORDED_TIME / self._plant.control_period)
-        self._telemetry = Telemetry(model, capacity)
-        loop = ControlLoop(self._plant, model, wbc, self._telemetry, self._config.safety)
-        self._viewer = open_viewer(self._plant) if viewer else None
-        self._shown_at = loop.state.time
-        self._runner = Runner(loop, realtime=realtime, after_tick=lambda: self._show(loop.state))
-        self._pilot = Pilot(self._runner, self._config)
 
     # --- postures -------------------------------------------------------------------------
 
@@ -215,7 +203,8 @@ class GO2Controller:
         if not 0.5 <= hold <= 30.0:
             raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
         timeline = load_motion("high_five", side=side, hold=hold, height=HIGH_FIVE_HEIGHT)
-        plan = compile_timeline(timeline, self._runner.loop.model)
+        with self._planning:
+            plan = compile_timeline(timeline, self._checker.model)
         return self._call("high_five", lambda: self._pilot.high_five(plan, leg, HIGH_FIVE_HEIGHT))
 
     def play(self, motion: str | Motion | Timeline | MotionPlan, *, check: bool = True) -> bool:
@@ -230,10 +219,7 @@ class GO2Controller:
             MotionInfeasible: if the motion breaks a limit of the robot; carries the findings.
         """
         self._check_open()
-        plan = self._plan(motion)
-        if check:
-            self._checker = self._checker or FeasibilityChecker(self._runner.loop.model)
-            self._checker.check(plan).raise_if_infeasible()
+        plan = self._plan(motion, check=check)
         return self._call("play", lambda: self._pilot.play(plan))
 
     def cancel(self) -> None:
@@ -250,14 +236,22 @@ class GO2Controller:
         playing = self._pilot.playing
         return 0.0 if playing is None else playing.progress
 
-    def _plan(self, motion: str | Motion | Timeline | MotionPlan) -> MotionPlan:
-        if isinstance(motion, MotionPlan):
-            return motion
+    @cached_property
+    def _checker(self) -> FeasibilityChecker:
+        """Plans on a model of its own: the control loop's belongs to the thread that ticks."""
+        return FeasibilityChecker(RobotModel(self._assembly.description))
+
+    def _plan(self, motion: str | Motion | Timeline | MotionPlan, *, check: bool) -> MotionPlan:
         if isinstance(motion, Motion):
             motion = motion()
-        if not isinstance(motion, Timeline):
+        if not isinstance(motion, Timeline | MotionPlan):
             motion = load_motion(arguments.motion_name(motion))
-        return compile_timeline(motion, self._runner.loop.model)
+        with self._planning:  # one thread at a time
+            if isinstance(motion, Timeline):
+                motion = compile_timeline(motion, self._checker.model)
+            if check:
+                self._checker.check(motion).raise_if_infeasible()
+        return motion
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
@@ -302,12 +296,12 @@ class GO2Controller:
     @property
     def telemetry(self) -> Telemetry:
         """Peaks and counts of the run so far."""
-        return self._telemetry
+        return self._assembly.telemetry
 
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""
         with self._runner.lock():
-            samples = self._telemetry.samples(rate)
+            samples = self._assembly.telemetry.samples(rate)
         return samples.recording()
 
     # --- ending ---------------------------------------------------------------------------
@@ -317,11 +311,7 @@ class GO2Controller:
         if self._closed:
             return
         self._closed = True
-        self._runner.close()
-        if self._viewer is not None:
-            self._viewer.close()
-        if self._owns_plant:
-            self._plant.close()
+        self._resources.close()
 
     def destroy_node(self) -> None:
         """The same as ``close``, under the name that ROS 2 code uses."""
@@ -386,11 +376,6 @@ class GO2Controller:
     def _check_open(self) -> None:
         if self._closed:
             raise ClosedError("this GO2Controller is closed")
-
-    def _show(self, state: RobotState) -> None:
-        if self._viewer is not None and state.time - self._shown_at >= 1.0 / VIEWER_RATE:
-            self._shown_at = state.time
-            self._viewer.sync()
 
 
 def _interruption(name: str, error: BaseException) -> str:

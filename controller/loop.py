@@ -17,10 +17,11 @@ from controller.behaviours.base import Behaviour
 from controller.behaviours.joints import DAMPING, Damped
 from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
+from go2_wbc.planning.correction import tracked_position
 from go2_wbc.plant.base import Plant
 from go2_wbc.reference import JointReference, Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.safety import SafetyConfig, fall_reason
+from go2_wbc.robot.safety import FallDetector, SafetyConfig
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import JointCommand, RobotState
 from go2_wbc.wbc.controller import WholeBodyController
@@ -71,6 +72,8 @@ class ControlLoop:
         """
         self.plant, self.model, self.wbc, self.telemetry = plant, model, wbc, telemetry
         self._safety = safety
+        self._falls = FallDetector(safety, model.foot_radius)
+        self._sag = 0.0
         self.fault: Fault | None = None
         self.state: RobotState = plant.read()
         if not _is_finite(self.state):
@@ -96,6 +99,8 @@ class ControlLoop:
             self._observe()
         self.fault = None
         self._qp_failures_in_a_row = 0
+        self._falls.begin()
+        self._sag = 0.0
         behaviour.start(self.snapshot)
         self.behaviour = behaviour
 
@@ -122,6 +127,7 @@ class ControlLoop:
             self._observe()
             self._guard()
             target = self.behaviour.update(self.snapshot)
+            self._sag = _sag(target, self.snapshot)
             command = self._command(target)
             self._last_command = command
             self.plant.write(command)
@@ -151,8 +157,7 @@ class ControlLoop:
         is_tipping = fault is not None and self.state.tilt > self._safety.tilt_limit
         if not (self.behaviour.needs_balance or is_tipping):
             return
-        lowest_foot = float(self.snapshot.p_world_feet[:, 2].min())
-        reason = fall_reason(self.state, lowest_foot, self._safety, may_lie=self.behaviour.may_lie)
+        reason = self._falls.reason(self.snapshot, self._sag, may_lie=self.behaviour.may_lie)
         if reason is None:
             return
         if fault is None:
@@ -185,6 +190,14 @@ class ControlLoop:
             _log.warning("QP failure at t=%.3f s, holding the last torque: %s", time, what)
             return self._last_command
         return JointCommand.damping(DAMPING)
+
+
+def _sag(target: Reference | JointReference, snapshot: Snapshot) -> float:
+    """Depth [m] of the trunk below where it shall be; 0 if nothing is asked of it."""
+    if isinstance(target, JointReference):
+        return 0.0
+    body = target.body
+    return float(body.p_world[2] - tracked_position(snapshot, body.point)[2])
 
 
 def _is_finite(state: RobotState) -> bool:

@@ -17,6 +17,8 @@ from go2_wbc.robot.snapshot import Snapshot
 
 LOW = 0.15
 """Height [m] of the trunk over the ground below which a posture may begin on the belly."""
+RISEN = 0.22
+"""Height [m] of the tracked point over the ground from which on the robot has left its belly."""
 PLACE_TOLERANCE = 0.03
 """Distance [m] that the tracked point may be off its plan, on the average."""
 ATTITUDE_TOLERANCE = 0.1
@@ -147,3 +149,10 @@ class ChangePosture(PlayPlan):
         pose = np.array([*position, roll, pitch, wrap_angle(float(yaw) - anchor.yaw)])
         self.plan = self._make_plan(pose)
         self.may_lie = bool(pose[2] < LOW) or self.plan.exit is Posture.LIE
+
+    def update(self, snapshot: Snapshot) -> Reference:
+        """The plan's reference; once the robot has risen, its belly must stay off the ground."""
+        height = float(tracked_position(snapshot, self._point)[2] - self._anchor.p_world[2])
+        if height > RISEN and self.plan.exit is not Posture.LIE:
+            self.may_lie = False
+        return super().update(snapshot)

@@ -40,10 +40,10 @@ from controller.bridges.ros2.polling import Call, PolledService, PolledSubscript
 from controller.bridges.ros2.states import StatePublisher
 from controller.bridges.ros2.throttle import Throttle
 from controller.bridges.ros2.velocity import VelocityInput
-from controller.go2_controller import VIEWER_RATE, GO2Controller
-from controller.viewing import open_viewer
+from controller.go2_controller import GO2Controller
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.viewer import open_viewer
 
 _log = logging.getLogger(__name__)
 
@@ -154,7 +154,6 @@ class Door:
             else None
         )
         self._viewer = open_viewer(plant.inner) if settings.viewer else None
-        self._shown_at = 0.0
         self._pacer = Pacer(plant.control_period) if settings.realtime else None
         self._throttle, self._errors = Throttle(_log), 0
         self._cpu, self._ticks, self._began = 0.0, 0, time.monotonic()
@@ -209,7 +208,7 @@ class Door:
         if self._pacer is not None and not stop.is_set():
             self._pacer.wait(self._listen)
         if self._viewer is not None:
-            self._show()
+            self._viewer.show(self._go2.state.time)
 
     def _turn(self) -> None:
         service, act = next(self._triggers)
@@ -242,12 +241,6 @@ class Door:
         for twist in self._cmd_vel.take():
             linear, turn = twist.linear, twist.angular.z
             self._velocity.accept(linear.x, linear.y, turn, is_busy=is_busy)
-
-    def _show(self) -> None:
-        now = self._go2.state.time
-        if self._viewer is not None and now - self._shown_at >= 1.0 / VIEWER_RATE:
-            self._shown_at = now
-            self._viewer.sync()
 
     # --- services -------------------------------------------------------------------------
 

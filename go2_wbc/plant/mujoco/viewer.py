@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import sys
 from collections.abc import Mapping
@@ -10,8 +11,13 @@ from typing import Any, final
 import mujoco.viewer
 
 from go2_wbc.errors import PlantError
+from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 
+_log = logging.getLogger(__name__)
+
+FRAME_RATE = 50.0
+"""Frames per second of robot time that ``PlantViewer.show`` shows at most."""
 _DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
@@ -48,11 +54,18 @@ class PlantViewer:
         if problem is not None:
             raise PlantError(f"cannot open the viewer: {problem}")
         self._handle: Any = mujoco.viewer.launch_passive(plant.model, plant.data)
+        self._shown_at = plant.time
 
     @property
     def is_running(self) -> bool:
         """Whether the window is still open."""
         return bool(self._handle.is_running())
+
+    def show(self, time: float) -> None:
+        """Shows the plant's state at ``time`` [s], unless the last frame is still recent."""
+        if time - self._shown_at >= 1.0 / FRAME_RATE:
+            self._shown_at = time
+            self.sync()
 
     def sync(self) -> None:
         """Shows the plant's present state."""
@@ -61,3 +74,15 @@ class PlantViewer:
     def close(self) -> None:
         """Closes the window; idempotent."""
         self._handle.close()
+
+
+def open_viewer(plant: Plant) -> PlantViewer | None:
+    """A window on ``plant``; None, with a warning, if it cannot be shown here."""
+    if not isinstance(plant, MujocoPlant):
+        _log.warning("the viewer shows MuJoCo plants only; going on without")
+        return None
+    try:
+        return PlantViewer(plant)
+    except PlantError as error:
+        _log.warning("no viewer: %s", error)
+        return None

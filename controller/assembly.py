@@ -1,0 +1,110 @@
+"""Puts a controller together: robot model, control loop, runner and pilot on one plant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+from controller.loop import ControlLoop
+from controller.pilot import Pilot
+from controller.runner import Runner
+from controller.telemetry import Telemetry
+from go2_wbc.config import Config
+from go2_wbc.plant.base import Plant
+from go2_wbc.plant.mujoco.viewer import PlantViewer, open_viewer
+from go2_wbc.robot.description import RobotDescription
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.wbc.controller import WholeBodyController
+
+RECORDED_TIME = 240.0
+"""Seconds of robot time that the telemetry keeps."""
+
+
+@dataclass(frozen=True, slots=True)
+class PilotSettings:
+    """How a pilot drives its plant.
+
+    Attributes:
+        realtime: let time pass in a background thread at wall-clock pace.
+        viewer: open MuJoCo's window, if there is a display.
+        recorded_time: robot time [s] that the telemetry keeps; 0 keeps the last tick.
+        description: what the controller takes the robot for; by default the installed Go2.
+        after_tick: is called after every tick, in the thread that ticks.
+    """
+
+    realtime: bool = False
+    viewer: bool = False
+    recorded_time: float = RECORDED_TIME
+    description: RobotDescription | None = None
+    after_tick: Callable[[], None] = lambda: None
+
+
+@dataclass(frozen=True, slots=True)
+class Assembly:
+    """A pilot and what it is made of; ``close`` it in the end.
+
+    The loop's robot model belongs to the thread that ticks: it is not here, and whoever plans makes
+    a ``RobotModel`` from ``description``.
+
+    Attributes:
+        pilot: runs procedures.
+        runner: lets time pass; ``runner.loop`` has the newest state.
+        telemetry: what the loop records.
+        description: of the robot that the loop controls.
+        viewer: the open window, or None.
+    """
+
+    pilot: Pilot
+    runner: Runner
+    telemetry: Telemetry
+    description: RobotDescription
+    viewer: PlantViewer | None
+
+    def close(self) -> None:
+        """Go limp, stop and close the window; the plant stays open. Idempotent."""
+        self.runner.close()
+        if self.viewer is not None:
+            self.viewer.close()
+
+
+def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = None) -> Assembly:
+    """Take over a robot that lies on the ground, damped.
+
+    Nothing is left open if it fails; ``plant`` stays the caller's to close.
+
+    Args:
+        plant: what to drive; no other pilot may drive it.
+        config: numbers of the engine.
+        settings: by default headless and without realtime.
+
+    Raises:
+        ConfigError: for a back end that does not exist.
+        SolverUnavailable: if the configured QP solver is unknown or not installed.
+        DescriptionError: if the robot's files are missing, broken, or not a Go2's.
+        PlantError: if the plant does not answer, or another pilot drives it.
+    """
+    settings = settings or PilotSettings()
+    model = RobotModel(settings.description)
+    wbc = WholeBodyController(model, config.backend, config.wbc)
+    telemetry = Telemetry(model, max(1, round(settings.recorded_time / plant.control_period)))
+    loop = ControlLoop(plant, model, wbc, telemetry, config.safety)
+    with ExitStack() as undo:
+        viewer = open_viewer(plant) if settings.viewer else None
+        after_tick = settings.after_tick
+        if viewer is not None:
+            undo.callback(viewer.close)
+            after_tick = _in_turn(lambda: viewer.show(loop.state.time), settings.after_tick)
+        runner = Runner(loop, realtime=settings.realtime, after_tick=after_tick)
+        undo.callback(runner.close)
+        pilot = Pilot(runner, config)
+        undo.pop_all()
+    return Assembly(pilot, runner, telemetry, model.description, viewer)
+
+
+def _in_turn(first: Callable[[], None], then: Callable[[], None]) -> Callable[[], None]:
+    def both() -> None:
+        first()
+        then()
+
+    return both

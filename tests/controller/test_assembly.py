@@ -1,0 +1,101 @@
+"""A controller is put together whole or not at all."""
+
+from __future__ import annotations
+
+import threading
+
+import pytest
+
+from controller import GO2Controller, assembly
+from controller.assembly import PilotSettings, build_pilot
+from go2_wbc.config import Config
+from go2_wbc.errors import ConfigError, PlantError
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco import viewer
+from tests.controller.plants import StillPlant
+
+
+class Window:
+    """Stands in for MuJoCo's window, which needs a display."""
+
+    def __init__(self) -> None:
+        self.frames = 0
+        self.is_closed = False
+
+    def sync(self) -> None:
+        assert not self.is_closed
+        self.frames += 1
+
+    def close(self) -> None:
+        self.is_closed = True
+
+
+@pytest.fixture
+def window(monkeypatch: pytest.MonkeyPatch) -> Window:
+    window = Window()
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(viewer.mujoco.viewer, "launch_passive", lambda _model, _data: window)
+    return window
+
+
+def test_a_plant_that_another_pilot_drives_leaves_no_window_open(window: Window) -> None:
+    # The window was opened before the runner refused the plant, and nobody closed it.
+    plant = MujocoPlant()
+    first = build_pilot(plant, Config())
+    try:
+        with pytest.raises(PlantError, match="another controller drives this plant"):
+            GO2Controller(plant=plant, viewer=True)
+    finally:
+        first.close()
+        plant.close()
+    assert window.is_closed
+
+
+def test_a_pilot_that_cannot_be_made_leaves_no_thread_behind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError("no pilot")
+
+    before = threading.active_count()
+    monkeypatch.setattr(assembly, "Pilot", fail)
+    with pytest.raises(RuntimeError, match="no pilot"):
+        build_pilot(StillPlant(), Config(), PilotSettings(realtime=True))
+    assert threading.active_count() == before
+
+
+def test_a_refused_configuration_closes_the_robot_that_was_made_for_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    closed: list[MujocoPlant] = []
+    monkeypatch.setattr(MujocoPlant, "close", lambda plant: closed.append(plant))
+    with pytest.raises(ConfigError):
+        GO2Controller(config=Config(backend="magic"))
+    assert len(closed) == 1
+
+
+def test_the_window_shows_fifty_frames_a_second_and_is_closed_in_the_end(window: Window) -> None:
+    with GO2Controller(viewer=True) as go2:
+        go2.wait(0.5)
+        assert window.frames == pytest.approx(0.5 * viewer.FRAME_RATE, abs=1)
+        assert not window.is_closed
+    assert window.is_closed
+
+
+def test_what_is_asked_to_follow_a_tick_follows_the_window(window: Window) -> None:
+    seen: list[int] = []
+    settings = PilotSettings(viewer=True, after_tick=lambda: seen.append(window.frames))
+    plant = MujocoPlant(control_period=1.0 / viewer.FRAME_RATE)
+    built = build_pilot(plant, Config(), settings)
+    built.runner.advance_until(lambda: len(seen) == 3, 1.0)
+    built.close()
+    plant.close()
+    assert seen == [0, 1, 2]  # the first tick is the state that the window opened with
+
+
+def test_the_last_ticks_are_recorded_for_as_long_as_is_asked() -> None:
+    plant = StillPlant()
+    built = build_pilot(plant, Config(), PilotSettings(recorded_time=10 * plant.control_period))
+    built.pilot.wait(30 * plant.control_period)
+    built.close()
+    assert len(built.telemetry.samples(1e6).unfinished.time) == 10

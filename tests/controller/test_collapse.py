@@ -1,0 +1,172 @@
+"""Whatever the robot is doing: when its trunk comes to rest on the ground, it says so at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from controller import GO2Controller, Mode
+from controller.behaviours.plans import ChangePosture
+from controller.procedures import ProcedureRunner
+from go2_wbc.reference import TrackedPoint
+from go2_wbc.robot.model import FOOT_RADIUS
+from motions.postures import lean
+from tests.controller.plants import WatchedPlant
+
+# s; a push is as short as a kick.
+PUSH_TIME = 0.1
+# s of robot time that follow the push.
+AFTER = 2.0
+# N; the trunk weighs on the ground.
+TOUCH = 1.0
+# s; shorter touches are stumbles.
+STUMBLE = 0.05
+# s; in which a collapse must be noticed.
+NOTICED = 0.2
+# rad; roll and pitch of a robot that leans, as for a command from outside.
+LEANING = (0.1, 0.15, 0.0)
+
+
+class PushedPlant(WatchedPlant):
+    """A robot that is pushed at a time, and the truth about its trunk after every tick."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.push_at = np.inf
+        self.impulse = np.zeros(3)
+        self.is_down: list[tuple[float, bool]] = []
+        self.on_write = self._watch
+
+    def _watch(self) -> None:
+        if self.inner.time >= self.push_at - 1e-9:
+            self.inner.push(self.impulse / PUSH_TIME, PUSH_TIME)
+            self.push_at = np.inf
+        self.is_down.append((self.inner.time, self.inner.base_contact_force > TOUCH))
+
+    @property
+    def came_to_rest(self) -> float:
+        """When [s] the trunk touched the ground for longer than a stumble, by the simulator."""
+        since = None
+        for time, is_down in self.is_down:
+            if not is_down:
+                since = None
+                continue
+            since = time if since is None else since
+            if time - since > STUMBLE:
+                return since
+        return np.inf
+
+
+Do = Callable[[GO2Controller], object]
+
+
+def _nothing(_go2: GO2Controller) -> None: ...
+
+
+def _stand_again(go2: GO2Controller) -> None:
+    go2.stand()
+
+
+def _sit(go2: GO2Controller) -> None:
+    go2.sit()
+
+
+def _trot_ready(go2: GO2Controller) -> None:
+    go2.walk()
+
+
+def _lean(go2: GO2Controller) -> None:
+    posture = ChangePosture(
+        "lean", lambda pose: lean(pose, np.array(LEANING)), TrackedPoint.COM, FOOT_RADIUS
+    )
+    ProcedureRunner(go2._runner).run(posture, 2.0)
+
+
+def _walk(go2: GO2Controller) -> None:
+    go2.walk()
+    go2.move(linear_x=0.4)
+    go2.wait(1.0)
+
+
+def _wait(go2: GO2Controller) -> None:
+    go2.wait(AFTER)
+
+
+@dataclass(frozen=True)
+class Push:
+    """What the robot does, and the push [N s] that makes it collapse ``delay`` s into ``act``."""
+
+    before: Do
+    impulse: tuple[float, float, float]
+    act: Do = _wait
+    delay: float = 0.0
+
+
+PUSHES = {
+    "standing, up from the belly": Push(_nothing, (24.0, 0.0, 0.0)),
+    "standing for a while": Push(_stand_again, (30.0, 0.0, 0.0)),
+    "leaning": Push(_lean, (26.0, 0.0, 0.0)),
+    "sitting, forward": Push(_sit, (42.0, 0.0, 0.0)),
+    "sitting, aslant": Push(_sit, (21.0, 21.0, 0.0)),
+    "ready to walk": Push(_trot_ready, (29.4, 29.4, 0.0)),
+    "walking, forward": Push(_walk, (45.0, 0.0, 0.0)),
+    "walking, aslant": Push(_walk, (29.4, 29.4, 0.0)),
+    "turning": Push(_trot_ready, (-45.0, 0.0, 0.0), lambda go2: go2.turn_left(1.5)),
+    "push-ups": Push(_nothing, (26.0, 0.0, 0.0), lambda go2: go2.play("push_ups"), 3.0),
+    "high five": Push(_nothing, (26.0, 0.0, 0.0), lambda go2: go2.high_five(), 3.0),
+}
+
+
+@pytest.mark.parametrize("name", PUSHES)
+def test_a_robot_whose_trunk_comes_to_rest_on_the_ground_says_so_at_once(name: str) -> None:
+    # After rising from its belly it lay there again, and was said to stand; one that was pushed
+    # while it sat or walked took up to a second to notice.
+    push, plant = PUSHES[name], PushedPlant()
+    plant.impulse = np.array(push.impulse)
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        push.before(go2)
+        assert go2.mode.is_upright
+        plant.is_down.clear()
+        plant.push_at = go2.state.time + push.delay
+        noticed: list[float] = []
+
+        def watch() -> None:
+            plant._watch()
+            if go2.mode in (Mode.FALLEN, Mode.DAMPED):
+                noticed.append(plant.inner.time)
+
+        plant.on_write = watch
+        push.act(go2)
+        assert not go2.last_outcome
+        assert go2.mode in (Mode.FALLEN, Mode.DAMPED)
+    assert noticed[0] < plant.came_to_rest + NOTICED
+
+
+@pytest.mark.parametrize("before", [_nothing, _sit, _walk])
+def test_a_push_that_the_robot_withstands_is_no_fall(before: Do) -> None:
+    plant = PushedPlant()
+    plant.impulse = np.array([10.0, 10.0, 0.0])
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        before(go2)
+        mode = go2.mode
+        plant.push_at = go2.state.time
+        go2.wait(1.0)
+        assert go2.last_outcome.ok
+        assert go2.mode is mode
+
+
+def test_a_trot_that_stumbles_and_catches_itself_has_not_fallen() -> None:
+    # Its trunk sinks by 13 cm; a limit that is too strict would make it go limp.
+    plant = PushedPlant()
+    plant.impulse = np.array([21.0, 21.0, 0.0])
+    with GO2Controller(plant=plant) as go2:
+        assert go2.walk()
+        plant.push_at = go2.state.time
+        go2.wait(2.0)
+        assert go2.mode is Mode.WALKING
+        assert go2.state.tilt < 0.1

@@ -1,0 +1,138 @@
+"""What counts as a fall: tilt at once, a trunk on the ground or far too low after a while."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from go2_wbc.errors import ConfigError
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.description import BASE_LINK
+from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.safety import TRUNK_UNDERSIDE, FallDetector, SafetyConfig, trunk_clearance
+from go2_wbc.robot.snapshot import Snapshot
+from tests.engine_helpers import standing_q, state_of
+
+# m; how closely few points can stand for the mesh of the trunk.
+POINT_TOLERANCE = 0.01
+TICK = 0.01
+# rad; the foot is 89 mm below the hip.
+FOLDED_LEG = (0.0, 1.36, -2.72)
+
+
+@pytest.fixture(scope="module")
+def model() -> RobotModel:
+    return RobotModel()
+
+
+@pytest.fixture
+def falls() -> FallDetector:
+    return FallDetector(SafetyConfig(), FOOT_RADIUS)
+
+
+def standing(model: RobotModel, time: float = 0.0) -> Snapshot:
+    return model.snapshot(state_of(standing_q(), time=time))
+
+
+def on_the_belly(model: RobotModel, time: float = 0.0) -> Snapshot:
+    """Legs folded so far that the trunk touches, but not below the limit of its height."""
+    q = standing_q(0.11)
+    q[7:] = np.tile(FOLDED_LEG, 4)
+    snapshot = model.snapshot(state_of(q, time=time))
+    height = q[2] - snapshot.p_world_feet[:, 2].min()
+    assert height > SafetyConfig().height_limit
+    return snapshot
+
+
+def tilted(model: RobotModel, angle: float) -> Snapshot:
+    q = standing_q()
+    q[3:7] = [np.sin(angle / 2), 0.0, 0.0, np.cos(angle / 2)]
+    return model.snapshot(state_of(q))
+
+
+def test_the_points_of_the_trunk_lie_where_its_mesh_does_however_it_is_tilted() -> None:
+    plant = MujocoPlant()
+    model, base = plant.model, plant.model.body(BASE_LINK).id
+    is_mesh = model.geom_type == mujoco.mjtGeom.mjGEOM_MESH
+    (geom, *_) = np.flatnonzero(is_mesh & (model.geom_bodyid == base) & (model.geom_contype > 0))
+    mesh = model.geom_dataid[geom]
+    rows = slice(model.mesh_vertadr[mesh], model.mesh_vertadr[mesh] + model.mesh_vertnum[mesh])
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, model.geom_quat[geom])
+    vertices = model.mesh_vert[rows] @ R.reshape(3, 3).T + model.geom_pos[geom]
+    rng = np.random.default_rng(1)
+    for tilt, azimuth in zip(
+        rng.uniform(0.0, SafetyConfig().tilt_limit, 500), rng.uniform(-np.pi, np.pi, 500),
+        strict=True,
+    ):  # fmt: skip
+        z = [np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)]
+        assert (TRUNK_UNDERSIDE @ z).min() == pytest.approx(
+            (vertices @ z).min(), abs=POINT_TOLERANCE
+        )
+
+
+def test_a_standing_robot_has_not_fallen(falls: FallDetector, model: RobotModel) -> None:
+    snapshot = standing(model)
+    assert falls.reason(snapshot, 0.0, may_lie=False) is None
+    assert trunk_clearance(snapshot, 0.0) == pytest.approx(0.3 - 0.107, abs=1e-6)
+
+
+def test_a_tilted_trunk_is_a_fall_at_once_even_where_the_belly_may_be_down(
+    falls: FallDetector, model: RobotModel
+) -> None:
+    limit = SafetyConfig().tilt_limit
+    for may_lie in (False, True):
+        assert falls.reason(tilted(model, limit - 0.01), 0.0, may_lie=may_lie) is None
+        reason = falls.reason(tilted(model, limit + 0.01), 0.0, may_lie=may_lie)
+        assert reason == "fell at t=0.00 s: roll 61 deg, pitch 0 deg"
+
+
+def test_a_trunk_on_the_ground_is_a_fall_after_the_limit(
+    falls: FallDetector, model: RobotModel
+) -> None:
+    limit = SafetyConfig().touch_limit
+    first = None
+    for time in np.arange(1.0, 1.5, TICK).tolist():
+        reason = falls.reason(on_the_belly(model, time), 0.0, may_lie=False)
+        first = time if reason and first is None else first
+    assert first == pytest.approx(1.0 + limit, abs=1.5 * TICK)
+
+
+def test_touches_that_end_in_between_are_stumbles(falls: FallDetector, model: RobotModel) -> None:
+    limit = SafetyConfig().touch_limit
+    for time in np.arange(0.0, 1.0, 0.8 * limit).tolist():
+        assert falls.reason(on_the_belly(model, time), 0.0, may_lie=False) is None
+        assert falls.reason(standing(model, time + 0.01), 0.0, may_lie=False) is None
+
+
+def test_where_the_belly_may_be_down_it_may_lie_for_ever(
+    falls: FallDetector, model: RobotModel
+) -> None:
+    for time in np.arange(0.0, 2.0, 0.1).tolist():
+        assert falls.reason(on_the_belly(model, time), 0.5, may_lie=True) is None
+    assert falls.reason(on_the_belly(model, 2.0), 0.5, may_lie=False) is None
+
+
+def test_a_trunk_far_below_where_it_should_be_is_a_fall_after_the_limit(
+    falls: FallDetector, model: RobotModel
+) -> None:
+    config = SafetyConfig()
+    sag, just_less = config.sink_limit + 0.01, config.sink_limit - 0.01
+    assert falls.reason(standing(model, 0.0), sag, may_lie=False) is None
+    assert falls.reason(standing(model, 0.2), just_less, may_lie=False) is None
+    assert falls.reason(standing(model, 0.3), sag, may_lie=False) is None
+    assert falls.reason(standing(model, 0.3 + config.sink_limit_time), sag, may_lie=False) is None
+    late = standing(model, 0.31 + config.sink_limit_time)
+    reason = falls.reason(late, sag, may_lie=False)
+    assert reason == "fell at t=0.61 s: trunk 13 cm below where it should be"
+    falls.begin()
+    assert falls.reason(late, sag, may_lie=False) is None
+
+
+@pytest.mark.parametrize("name", [name for name in SafetyConfig.__slots__])
+def test_a_limit_that_is_not_positive_is_refused(name: str) -> None:
+    with pytest.raises(ConfigError, match=f"SafetyConfig.{name} must be positive"):
+        replace(SafetyConfig(), **{name: 0})
