@@ -1,4 +1,4 @@
-"""The picture of the margins, as SVG and as PNG."""
+"""The picture of the margins, and what it says."""
 
 from __future__ import annotations
 
@@ -13,40 +13,61 @@ from PIL import Image
 import viz
 from go2_wbc.errors import ConfigError
 from tests.viz.verdicts import made_up_verdict
+from viz.content import MarginCurve, Verdict
 
 _SVG = "{http://www.w3.org/2000/svg}"
 _FILL = (243, 167, 167)
 
 
 def test_the_svg_names_every_limit_and_the_worst_subject(tmp_path: Path) -> None:
-    path = viz.export_plot(made_up_verdict(3.0), tmp_path / "m.svg", title='a < "b"')
+    path = viz.export_plot(made_up_verdict(3.0), tmp_path / "m.svg", title='a < "b" $c$')
     root = ElementTree.fromstring(path.read_text(encoding="utf-8"))
     words = [item.text or "" for item in root.iter(f"{_SVG}text")]
-    assert words[0] == 'a < "b"'
-    assert {"torque", "friction", "joint position", "support"} <= set(words)
+    assert {'a < "b" $c$', "torque", "friction", "joint position", "support"} <= set(words)
+    assert {"margin [rad]", "margin [N m]", "time [s]", "2 limits broken, 1 tight margin"} <= set(
+        words
+    )
     assert any(text.startswith("least -0.2 rad: FR calf at 1.") for text in words)
     assert "trunk: not possible" in words
 
 
-def test_a_curve_below_its_limit_is_drawn_below_the_dashed_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize("suffix", viz.PLOT_SUFFIXES)
+def test_the_same_verdict_gives_the_same_file(tmp_path: Path, suffix: str) -> None:
+    files = [tmp_path / f"{name}{suffix}" for name in ("a", "b")]
+    first, second = (viz.export_plot(made_up_verdict(3.0), file, title="t") for file in files)
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_curve_below_its_limit_is_drawn_and_filled_below_the_dashed_line() -> None:
     verdict = made_up_verdict(3.0)
-    only = replace(verdict, curves=(verdict.curves[2],))
-    path = viz.export_plot(only, tmp_path / "m.svg", title="t")
-    lines = list(ElementTree.fromstring(path.read_bytes()).iter(f"{_SVG}polyline"))
-    (limit,) = [item for item in lines if item.get("stroke-dasharray")]
-    (curve,) = [item for item in lines if not item.get("stroke-dasharray")]
-    zero = _points(limit)[0, 1]
-    points = _points(curve)
-    middle = points[np.abs(np.arange(len(points)) - 200) < 30, 1]
-    assert (middle > zero + 3).all()
-    assert (points[:100, 1] < zero - 3).all()
-    (red,) = [
-        item
-        for item in ElementTree.fromstring(path.read_bytes()).iter(f"{_SVG}polygon")
-        if item.get("fill") == "#f3a7a7"
-    ]
-    assert _points(red)[:, 1].min() == pytest.approx(zero, abs=0.1)
-    assert _points(red)[:, 1].max() == pytest.approx(middle.max(), abs=0.1)
+    curve = verdict.curves[2]
+    (axes,) = viz.margin_figure(replace(verdict, curves=(curve,)), title="t").axes
+    limit, margin, _ = axes.lines
+    assert limit.get_linestyle() == "--"
+    np.testing.assert_array_equal(limit.get_ydata(), 0.0)
+    np.testing.assert_array_equal(margin.get_xdata(), curve.time)
+    np.testing.assert_array_equal(margin.get_ydata(), curve.margin)
+    low, high = axes.get_ylim()
+    assert low < -0.2 < 0.5 < high
+    (red,) = axes.collections
+    box = red.get_datalim(axes.transData)
+    assert (box.y0, box.y1) == pytest.approx((-0.2, 0.0))
+    broken = curve.time[curve.margin < 0]
+    deep = np.concatenate([path.vertices for path in red.get_paths()])
+    deep = deep[deep[:, 1] < -0.1, 0]
+    assert (deep.min(), deep.max()) == pytest.approx((broken[0], broken[-1]))
+
+
+def test_broken_limits_come_first_and_instants_are_dots() -> None:
+    axes = viz.margin_figure(made_up_verdict(3.0), title="t").axes
+    names = [panel.get_title(loc="left") for panel in axes]
+    assert names == ["joint position", "support", "entry and exit", "friction", "torque"]
+    curve = MarginCurve("landing", "m", np.arange(3.0), np.array([np.nan, 0.1, np.nan]), ("FR",),
+                        np.zeros(3, dtype=int))  # fmt: skip
+    (panel,) = viz.margin_figure(Verdict(True, "feasible", (), (curve,)), title="t").axes
+    dots = panel.lines[2]
+    np.testing.assert_array_equal(dots.get_xydata(), [[1.0, 0.1]])
+    assert dots.get_marker() == "o"
 
 
 def test_the_png_shows_what_is_broken(tmp_path: Path) -> None:
@@ -61,13 +82,8 @@ def test_the_png_shows_what_is_broken(tmp_path: Path) -> None:
 
 
 def test_other_suffixes_and_empty_verdicts_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"valid: \.svg, \.png"):
-        viz.export_plot(made_up_verdict(3.0), tmp_path / "m.pdf", title="t")
+    with pytest.raises(ConfigError, match=r"valid: \.svg, \.png, \.pdf"):
+        viz.export_plot(made_up_verdict(3.0), tmp_path / "m.eps", title="t")
     with pytest.raises(ConfigError, match="no margin to plot"):
         viz.export_plot(replace(made_up_verdict(3.0), curves=()), tmp_path / "m.svg", title="t")
     assert list(tmp_path.iterdir()) == []
-
-
-def _points(line: ElementTree.Element) -> np.ndarray:
-    pairs = (line.get("points") or "").split()
-    return np.array([[float(value) for value in pair.split(",")] for pair in pairs])
