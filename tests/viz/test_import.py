@@ -29,4 +29,4 @@ def test_a_name_that_viz_does_not_have_is_an_attribute_error() -> None:
 
     assert all(hasattr(viz, name) for name in viz.__all__)
     with pytest.raises(AttributeError, match="no attribute 'export_film'"):
-        _ = viz.export_film  # type: ignore[reportAttributeAccessIssue]
+        _ = viz.export_film
