@@ -12,7 +12,6 @@ from __future__ import annotations
 import io
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -109,7 +108,7 @@ def played(motion: Timeline, robot: GO2Controller) -> Recording:
         raise MotionError(f"{motion.name} was not done: {robot.last_outcome.reason}")
     whole = robot.recording(rate=RATE)
     rows = np.flatnonzero(np.array(whole.labels) == motion.name)
-    return _part(whole, rows)
+    return whole.part(rows)
 
 
 def telling_rows(recording: Recording) -> list[int]:
@@ -169,13 +168,6 @@ def main(argv: Sequence[str]) -> None:
             write_atomically(file, picture(recording, rows))
             print(f"{line.name:<14}{file.stat().st_size:>7} bytes")
     write_atomically(target, page().encode())
-
-
-def _part(recording: Recording, rows: np.ndarray) -> Recording:
-    arrays = {
-        name: getattr(recording, name)[rows] for name in Recording.__slots__ if name != "labels"
-    }
-    return replace(recording, **arrays, labels=tuple(recording.labels[row] for row in rows))
 
 
 def _points(q: Float[np.ndarray, "19"], robot: PosedRobot) -> Float[np.ndarray, " k"]:

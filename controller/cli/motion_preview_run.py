@@ -10,6 +10,7 @@ import webbrowser
 from pathlib import Path
 from typing import final
 
+import viz
 from controller.cli.common import ExitCode, print_json
 from controller.cli.motion_args import the_motion
 from controller.cli.motion_source import MotionSource
@@ -19,14 +20,6 @@ from go2_wbc.errors import Go2WbcError
 from go2_wbc.files import checked_output
 from go2_wbc.plant.mujoco.viewer import display_problem
 from motions import CheckedMotion, FeasibilityChecker, FeasibilityReport
-from viz import (
-    ANIMATION_SUFFIXES,
-    HTML_SUFFIXES,
-    PLOT_SUFFIXES,
-    export_animation,
-    export_html,
-    export_plot,
-)
 from viz.replay.preview_server import PreviewServer
 
 POLL_PERIOD = 0.05
@@ -37,16 +30,13 @@ VIDEO_RATE = 12.5
 
 def write_files(args: argparse.Namespace) -> int:
     """Check the motion and write what was asked for."""
-    wanted = {
-        "html": (args.html, HTML_SUFFIXES),
-        "video": (args.video, ANIMATION_SUFFIXES),
-        "plot": (args.plot, PLOT_SUFFIXES),
-    }
-    targets = {
-        kind: checked_output(path, suffixes)
-        for kind, (path, suffixes) in wanted.items()
-        if path is not None
-    }
+    targets: dict[str, Path] = {}
+    if args.html is not None:
+        targets["html"] = checked_output(args.html, viz.HTML_SUFFIXES)
+    if args.plot is not None:
+        targets["plot"] = checked_output(args.plot, viz.PLOT_SUFFIXES)
+    if args.video is not None:
+        targets["video"] = checked_output(args.video, viz.ANIMATION_SUFFIXES)
     checked = FeasibilityChecker().evaluate(the_motion(args.motion, args.values))
     written = _written(checked, targets)
     report = checked.report
@@ -66,12 +56,12 @@ def _written(checked: CheckedMotion, targets: dict[str, Path]) -> dict[str, Path
     with ProgressLine(sys.stderr) as line:
         if "html" in targets:
             line.update(0.0, f"writing {targets['html'].name}")
-            written["html"] = export_html(content, targets["html"], title=title)
+            written["html"] = viz.export_html(content, targets["html"], title=title)
         if "plot" in targets and content.verdict is not None:
-            written["plot"] = export_plot(content.verdict, targets["plot"], title=title)
+            written["plot"] = viz.export_plot(content.verdict, targets["plot"], title=title)
         if "video" in targets:
             video = targets["video"]
-            written["video"] = export_animation(
+            written["video"] = viz.export_animation(
                 content,
                 video,
                 speed=1.0,

@@ -13,7 +13,7 @@ from viz.render.posed_robot import PosedRobot
 from viz.render.robot_meshes import load_robot_visuals
 from viz.replay.meshcat_scene import robot_scene
 from viz.replay.packing import Pack
-from viz.replay.replay_data import ReplayFrames, label_spans, reduced, replay_frames
+from viz.replay.replay_data import ReplayFrames, reduced, replay_frames
 
 _FORCE_PERCENTILE = 99.5  # a touchdown spike beyond it may be cut off in the contact strip
 _LEAST_FORCE_SCALE = 50.0  # [N] a full row of the contact strip is at least this much
@@ -42,7 +42,7 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         "is_plan": content.is_plan,
         "rate": frames.rate,
         "frames": len(frames.q),
-        "labels": [[s.start, s.end, s.label] for s in label_spans(content.recording)],
+        "labels": [[s.start, s.end, s.label] for s in content.recording.spans()],
         "force_scale": _force_scale(frames),
         "verdict": None,
         "ghost": None,

@@ -20,20 +20,6 @@ _CAMERA_SMOOTHING = 0.7  # [s]
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
-    """A stretch of time with one label.
-
-    Attributes:
-        start, end: seconds after the start of the recording.
-        label: what the robot was doing.
-    """
-
-    start: float
-    end: float
-    label: str
-
-
-@dataclass(frozen=True, slots=True)
 class ReplayFrames:
     """A recording at even steps.
 
@@ -108,14 +94,6 @@ def reduced(curve: MarginCurve) -> MarginCurve:
     edges = range(0, len(known), step)
     rows = np.array([start + int(known[start : start + step].argmin()) for start in edges])
     return replace(curve, time=curve.time[rows], margin=curve.margin[rows], worst=curve.worst[rows])
-
-
-def label_spans(recording: Recording) -> tuple[Span, ...]:
-    """Stretches of equal labels, in order; each ends where the next begins."""
-    labels, time = recording.labels, recording.time - recording.time[0]
-    starts = [0] + [k for k in range(1, len(labels)) if labels[k] != labels[k - 1]]
-    ends = [*(float(time[k]) for k in starts[1:]), float(time[-1])]
-    return tuple(Span(float(time[k]), end, labels[k]) for k, end in zip(starts, ends, strict=True))
 
 
 def _extreme(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,7 @@ from go2_wbc.robot.description import find_description
 from viz.render.posed_robot import PosedRobot
 from viz.render.robot_meshes import load_robot_visuals
 from viz.render.smoothing import smoothed
-from viz.replay.replay_data import label_spans, replay_frames
+from viz.replay.replay_data import replay_frames
 
 
 @pytest.fixture(scope="module")
@@ -68,14 +67,6 @@ def test_feet_in_the_page_are_the_feet_of_the_robot(
 ) -> None:
     frames = replay_frames(recording, robot)
     np.testing.assert_allclose(frames.p_world_feet[40], robot.feet(frames.q[40]).ravel())
-
-
-def test_equal_labels_become_one_span_and_spans_leave_no_gap(recording: Recording) -> None:
-    spans = label_spans(recording)
-    assert [span.label for span in spans] == ["stand", "walk", "high_five", "sit"]
-    assert spans[0].start == 0.0
-    assert spans[-1].end == pytest.approx(recording.duration)
-    assert all(a.end == b.start for a, b in itertools.pairwise(spans))
 
 
 def test_smoothing_keeps_a_constant_and_has_no_delay() -> None:

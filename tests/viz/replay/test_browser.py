@@ -2,98 +2,84 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from PIL import Image
 
 import viz
 from go2_wbc.recording import Recording
-from tests.viz.chromium import Chromium, find_chromium
+from tests.viz.replay.browsing import DRAWN, Tab
 
-pytestmark = pytest.mark.browser
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
-_SIZE = (1280, 720)
-_STAGE = (20, 60, 955, 440)  # [px] the 3D view without its buttons
 _FRAME_TRAVEL = 0.006  # [m] the robot moves this far in half a frame
-_DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
 
 
 @pytest.fixture(scope="module")
-def browser(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
-    folder = tmp_path_factory.mktemp("browser")
-    page = viz.export_html(recording, folder / "demo.html", title="A walk")
-    executable = find_chromium()
-    assert executable is not None
-    with Chromium(executable, folder / "profile", _SIZE) as opened:
-        opened.open(page.as_uri())
-        opened.wait_for("window.replay")
-        opened.evaluate("replay.play(false)")
-        yield opened
+def browser(
+    recording: Recording, chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Tab]:
+    file = tmp_path_factory.mktemp("browser") / "demo.html"
+    page = viz.export_html(recording, file, title="A walk")
+    with Tab(chromium_browser) as tab:
+        tab.open(page.as_uri())
+        tab.evaluate("replay.play(false)")
+        yield tab
 
 
-def _stage(browser: Chromium) -> np.ndarray:
-    browser.evaluate(_DRAWN)
-    with Image.open(io.BytesIO(browser.screenshot())) as image:
-        return np.asarray(image.convert("RGB").crop(_STAGE), dtype=float)
+def test_it_opens_without_a_request_or_an_error(browser: Tab) -> None:
+    (url,) = browser.requested
+    assert url.startswith("file:")
+    assert browser.complaints == []
 
 
-def test_it_opens_without_a_request_or_an_error(browser: Chromium) -> None:
-    requests = browser.seen("Network.requestWillBeSent")
-    urls = [event["request"]["url"] for event in requests]
-    assert [url for url in urls if not url.startswith(("file:", "data:", "blob:"))] == []
-    assert len(urls) == 1
-    assert browser.seen("Runtime.exceptionThrown") == []
-    assert browser.seen("Log.entryAdded", lambda p: p["entry"]["level"] == "error") == []
-    assert browser.seen("Runtime.consoleAPICalled", lambda p: p["type"] == "error") == []
-
-
-def test_the_robot_is_drawn(browser: Chromium) -> None:
+def test_the_robot_is_drawn(browser: Tab) -> None:
     browser.evaluate("replay.seek(0.2)")
-    stage = _stage(browser)
+    stage = browser.stage()
     dark = (stage.max(axis=2) < 90).mean()
     assert 0.002 < dark < 0.2
     assert stage.std() > 10
 
 
-def test_scrubbing_changes_the_picture_and_comes_back_to_the_same(browser: Chromium) -> None:
+def test_scrubbing_changes_the_picture_and_comes_back_to_the_same(browser: Tab) -> None:
     pictures = []
     for time in (0.2, 2.0, 0.2):
         browser.evaluate(f"replay.scrub({time}); replay.scene.setView('side')")
-        pictures.append(_stage(browser))
+        pictures.append(browser.stage())
     assert np.abs(pictures[1] - pictures[0]).mean() > 2.0
     assert np.abs(pictures[2] - pictures[0]).mean() < 0.5
 
 
-def test_a_click_on_the_timeline_goes_to_that_time(browser: Chromium) -> None:
+def test_a_click_on_the_timeline_goes_to_that_time(browser: Tab) -> None:
     box = browser.evaluate(
         "(({left, right, top}) => [left, right, top])"
         "(document.getElementById('timeline').getBoundingClientRect())"
     )
-    browser.click(0.5 * (box[0] + 34 + box[1] - 6), box[2] + 60)
+    browser.page.mouse.click(0.5 * (box[0] + 34 + box[1] - 6), box[2] + 60)
     half = browser.evaluate("replay.data.duration / 2")
     assert browser.evaluate("replay.time") == pytest.approx(half, abs=0.05)
 
 
-def test_space_plays_and_pauses_and_arrows_step_by_one_frame(browser: Chromium) -> None:
+def test_space_plays_and_pauses_and_arrows_step_by_one_frame(browser: Tab) -> None:
     browser.evaluate("replay.scrub(0.5)")
     frame = browser.evaluate("replay.data.frameAt(replay.time)")
-    browser.key("ArrowRight", "ArrowRight")
+    browser.page.keyboard.press("ArrowRight")
     assert browser.evaluate("replay.data.frameAt(replay.time)") == frame + 1
-    browser.key("ArrowLeft", "ArrowLeft")
+    browser.page.keyboard.press("ArrowLeft")
     assert browser.evaluate("replay.data.frameAt(replay.time)") == frame
-    browser.key(" ", "Space", text=" ")
+    browser.page.keyboard.press("Space")
     browser.wait_for("replay.time > 0.7")
-    browser.key(" ", "Space", text=" ")
+    browser.page.keyboard.press("Space")
     stopped = browser.evaluate("replay.time")
-    browser.evaluate(_DRAWN)
+    browser.evaluate(DRAWN)
     assert browser.evaluate("replay.time") == stopped
     assert browser.evaluate("replay.isPlaying") is False
 
 
-def test_the_readouts_follow_the_time(browser: Chromium) -> None:
+def test_the_readouts_follow_the_time(browser: Tab) -> None:
     browser.evaluate("replay.scrub(2.0)")
     text = "document.getElementById('{}').textContent"
     assert browser.evaluate(text.format("behaviour")) == "High five"
@@ -104,7 +90,7 @@ def test_the_readouts_follow_the_time(browser: Chromium) -> None:
 
 
 def test_what_lies_on_the_floor_is_drawn_above_it_although_feet_press_into_it(
-    browser: Chromium,
+    browser: Tab,
 ) -> None:
     lower = "replay.data.feet = replay.data.feet.map((value, i) => i % 3 === 2 ? value {} : value);"
     corners = "replay.scene.polygon.geometry.attributes.position"
@@ -116,18 +102,18 @@ def test_what_lies_on_the_floor_is_drawn_above_it_although_feet_press_into_it(
     assert min(heights) > 0.001
 
 
-def test_hiding_the_forces_changes_the_picture(browser: Chromium) -> None:
+def test_hiding_the_forces_changes_the_picture(browser: Tab) -> None:
     browser.evaluate("replay.scrub(0.1); replay.scene.setView('side')")
-    shown = _stage(browser)
+    shown = browser.stage()
     browser.evaluate("document.querySelector('[data-toggle=forces]').click()")
-    hidden = _stage(browser)
+    hidden = browser.stage()
     browser.evaluate("document.querySelector('[data-toggle=forces]').click()")
     orange = (shown[:, :, 0] > 220) & (shown[:, :, 1] < 170) & (shown[:, :, 2] < 90)
     assert orange.sum() > 100
     assert np.abs(shown - hidden)[orange].mean() > 30
 
 
-def test_the_camera_follows_the_robot(browser: Chromium) -> None:
+def test_the_camera_follows_the_robot(browser: Tab) -> None:
     ask = (
         "[replay.scene.viewer.controls.target.x, replay.data.target[2 * replay.data.frameAt({t})]]"
     )
@@ -139,15 +125,8 @@ def test_the_camera_follows_the_robot(browser: Chromium) -> None:
     assert after[0] - before[0] > 0.1
 
 
-def test_the_page_fits_a_narrow_window(browser: Chromium) -> None:
-    browser.command(
-        "Emulation.setDeviceMetricsOverride",
-        width=640,
-        height=860,
-        deviceScaleFactor=1,
-        mobile=False,
-    )
-    browser.evaluate(_DRAWN)
+def test_the_page_fits_a_narrow_window(browser: Tab) -> None:
+    browser.resize(640, 860)
     app = "document.getElementById('app')"
     overflow = f"{app}.scrollWidth > innerWidth || {app}.scrollHeight > innerHeight"
     assert browser.evaluate(overflow) is False

@@ -3,41 +3,37 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 from tests.live_preview import BROKEN, GOOD, TOO_HIGH, LivePreview
-from tests.viz.browsing import complaints, requested, stage
-from tests.viz.chromium import Chromium, find_chromium
+from tests.viz.replay.browsing import Tab
 
-pytestmark = pytest.mark.browser
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 _BADGE = "document.getElementById('badge').textContent"
 _TROUBLE = "document.getElementById('trouble')"
 
 
 @pytest.mark.slow
-def test_the_page_follows_every_save(tmp_path: Path) -> None:
+def test_the_page_follows_every_save(tmp_path: Path, chromium_browser: Browser) -> None:
     file = tmp_path / "rise.py"
     file.write_text(GOOD, encoding="utf-8")
-    executable = find_chromium()
-    assert executable is not None
-    with (
-        LivePreview(str(file)) as preview,
-        Chromium(executable, tmp_path / "profile", (1280, 720)) as browser,
-    ):
+    with LivePreview(str(file)) as preview, Tab(chromium_browser) as browser:
         browser.open(preview.url)
-        browser.wait_for("window.replay && replay.version")
+        browser.wait_for("replay.version")
         browser.evaluate("replay.scrub(1.0); replay.scene.setView('side')")
         assert browser.evaluate(_BADGE) == "feasible"
-        before, camera = stage(browser), _camera(browser)
+        before, camera = browser.stage(), _camera(browser)
 
         file.write_text(TOO_HIGH, encoding="utf-8")
         browser.wait_for(f"{_BADGE}.includes('broken')")
         assert browser.evaluate("replay.time") == 1.0
         assert _camera(browser) == pytest.approx(camera, abs=1e-5)
-        after = stage(browser)
+        after = browser.stage()
         assert np.abs(after - before).mean() > 2.0
         assert browser.evaluate("document.querySelectorAll('.annotation.broken').length") > 0
 
@@ -48,14 +44,13 @@ def test_the_page_follows_every_save(tmp_path: Path) -> None:
 
         file.write_text(GOOD, encoding="utf-8")
         browser.wait_for(f"{_TROUBLE}.hidden && {_BADGE} === 'feasible'")
-        assert np.abs(stage(browser) - before).mean() < 0.5
-        assert complaints(browser) == []
-        urls = requested(browser)
-        assert all(url.startswith(preview.url) for url in urls)
+        assert np.abs(browser.stage() - before).mean() < 0.5
+        assert browser.complaints == []
+        assert all(url.startswith(preview.url) for url in browser.requested)
 
         assert preview.interrupt() == 0
         browser.wait_for(f"{_TROUBLE}.textContent.includes('The preview has ended')")
 
 
-def _camera(browser: Chromium) -> list[float]:
+def _camera(browser: Tab) -> list[float]:
     return browser.evaluate("replay.scene.viewer.camera.position.toArray()")

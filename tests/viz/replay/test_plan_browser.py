@@ -4,45 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 
 import viz
 from go2_wbc.recording import Recording
-from tests.viz.browsing import DRAWN, complaints, requested, stage
-from tests.viz.chromium import Chromium, find_chromium
+from tests.viz.replay.browsing import DRAWN, Tab
 from tests.viz.verdicts import made_up_verdict
 from viz.content import ReplayContent
 
-pytestmark = pytest.mark.browser
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 _BROKEN, _FINE = 1.7, 2.8
 """Times [s] at which the made-up verdict has a calf over its limit, and nothing broken."""
 
 
 @pytest.fixture(scope="module")
-def browser(recording: Recording, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Chromium]:
-    folder = tmp_path_factory.mktemp("browser")
+def browser(
+    recording: Recording, chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Tab]:
     verdict = made_up_verdict(recording.duration)
     lower = recording.q.copy()
     lower[:, 2] += 0.03
     content = ReplayContent(recording, verdict=verdict, ghost=replace(recording, q=lower))
-    page = viz.export_html(content, folder / "plan.html", title="A plan")
-    executable = find_chromium()
-    assert executable is not None
-    with Chromium(executable, folder / "profile", (1280, 720)) as opened:
-        opened.command(
-            "Network.emulateNetworkConditions",
-            offline=True,
-            latency=0,
-            downloadThroughput=0,
-            uploadThroughput=0,
-        )
-        opened.open(page.as_uri())
-        opened.wait_for("window.replay")
-        opened.evaluate("replay.play(false)")
-        yield opened
+    file = tmp_path_factory.mktemp("browser") / "plan.html"
+    page = viz.export_html(content, file, title="A plan")
+    with Tab(chromium_browser, offline=True) as tab:
+        tab.open(page.as_uri())
+        tab.evaluate("replay.play(false)")
+        yield tab
 
 
 def _red(picture: np.ndarray) -> int:
@@ -50,37 +43,32 @@ def _red(picture: np.ndarray) -> int:
     return int(((red > 120) & (green < 0.42 * red) & (blue < 0.42 * red)).sum())
 
 
-def _text(browser: Chromium, selector: str) -> str:
-    return browser.evaluate(f"document.querySelector('{selector}').textContent")
+def test_it_opens_offline_without_a_request_or_an_error(browser: Tab) -> None:
+    assert browser.complaints == []
+    (url,) = browser.requested
+    assert url.startswith("file:")
 
 
-def test_it_opens_offline_without_a_request_or_an_error(browser: Chromium) -> None:
-    assert complaints(browser) == []
-    urls = requested(browser)
-    assert len(urls) == 1
-    assert urls[0].startswith("file:")
-
-
-def test_scrubbing_changes_the_picture(browser: Chromium) -> None:
+def test_scrubbing_changes_the_picture(browser: Tab) -> None:
     pictures = []
     for time in (0.2, _FINE, 0.2):
         browser.evaluate(f"replay.scrub({time}); replay.scene.setView('side')")
-        pictures.append(stage(browser))
+        pictures.append(browser.stage())
     assert pictures[0].std() > 10
     assert np.abs(pictures[1] - pictures[0]).mean() > 2.0
     assert np.abs(pictures[2] - pictures[0]).mean() < 0.5
 
 
-def test_a_broken_limit_is_red_where_and_when_it_is_broken(browser: Chromium) -> None:
+def test_a_broken_limit_is_red_where_and_when_it_is_broken(browser: Tab) -> None:
     browser.evaluate("replay.scene.setView('corner')")
     browser.evaluate(f"replay.scrub({_FINE})")
-    fine = _red(stage(browser))
+    fine = _red(browser.stage())
     browser.evaluate(f"replay.scrub({_BROKEN}); replay.scene.flags.box.style.display = 'none'")
-    broken = _red(stage(browser))
+    broken = _red(browser.stage())
     browser.evaluate("replay.scene.flags.box.style.display = ''")
     assert broken > fine + 300
-    assert _text(browser, ".note b") == "joint position: FR calf"
-    assert _text(browser, ".note span") == "1.2, limit 1 <b>"
+    assert browser.text(".note b") == "joint position: FR calf"
+    assert browser.text(".note span") == "1.2, limit 1 <b>"
     painted = (
         "[...replay.scene.flags.{}].filter(([, meshes]) => "
         "meshes[0].material.color.getHex() === FLAG_COLOR).map(([name]) => name)"
@@ -91,11 +79,11 @@ def test_a_broken_limit_is_red_where_and_when_it_is_broken(browser: Chromium) ->
     browser.evaluate(f"{button}.click(); {button}.click()")
     assert browser.evaluate(painted.format("parts")) == ["FR_calf"]
     assert browser.evaluate(painted.format("ghostParts")) == []
-    assert _red(stage(browser)) > fine + 300
+    assert _red(browser.stage()) > fine + 300
     browser.evaluate(f"{button}.click()")
 
 
-def test_a_note_points_at_its_part(browser: Chromium) -> None:
+def test_a_note_points_at_its_part(browser: Tab) -> None:
     browser.evaluate(f"replay.scrub({_FINE}); replay.scene.setView('corner')")
     browser.evaluate(DRAWN)
     browser.evaluate(f"replay.scrub({_BROKEN})")
@@ -118,10 +106,10 @@ def test_a_note_points_at_its_part(browser: Chromium) -> None:
     assert foot < 0.22
 
 
-def test_an_instant_is_shown_too(browser: Chromium) -> None:
+def test_an_instant_is_shown_too(browser: Tab) -> None:
     time = browser.evaluate("replay.data.annotations[0].time")
     browser.evaluate(f"replay.scrub({time})")
-    assert _text(browser, ".note b") == "support: CoM"
+    assert browser.text(".note b") == "support: CoM"
     ball = "replay.scene.node('com/ball').scale.x"
     assert browser.evaluate(ball) > 1
     browser.evaluate(f"replay.scrub({_FINE})")
@@ -129,40 +117,36 @@ def test_an_instant_is_shown_too(browser: Chromium) -> None:
     assert browser.evaluate("document.querySelector('.note')") is None
 
 
-def test_a_finding_in_the_list_jumps_to_its_time_and_shows_its_margin(browser: Chromium) -> None:
+def test_a_finding_in_the_list_jumps_to_its_time_and_shows_its_margin(browser: Tab) -> None:
     browser.evaluate("replay.scrub(0)")
-    box = browser.evaluate(
-        "(({x, y, width, height}) => [x + width / 2, y + height / 2])"
-        "(document.querySelectorAll('.annotation')[1].getBoundingClientRect())"
-    )
-    browser.click(*box)
+    browser.page.locator(".annotation").nth(1).click()
     time = browser.evaluate("replay.data.annotations[1].time")
     assert browser.evaluate("replay.time") == pytest.approx(time)
-    assert _text(browser, "#chosen h2") == "joint position"
-    assert _text(browser, "#chosen output") == "FR calf: 0.2 rad over"
+    assert browser.text("#chosen h2") == "joint position"
+    assert browser.text("#chosen output") == "FR calf: 0.2 rad over"
     assert browser.evaluate("document.querySelectorAll('.annotation')[1].classList.contains('now')")
     browser.evaluate(f"replay.scrub({_FINE})")
-    assert _text(browser, "#chosen output") == "FR calf: 0.5 rad left"
+    assert browser.text("#chosen output") == "FR calf: 0.5 rad left"
 
 
-def test_the_key_n_goes_from_finding_to_finding(browser: Chromium) -> None:
+def test_the_key_n_goes_from_finding_to_finding(browser: Tab) -> None:
     times = sorted(browser.evaluate("replay.data.annotations.map(annotation => annotation.time)"))
     browser.evaluate("replay.scrub(replay.data.duration)")
     seen = []
     for _ in times:
-        browser.key("n", "KeyN", text="n")
+        browser.page.keyboard.press("n")
         seen.append(browser.evaluate("replay.time"))
     assert seen == pytest.approx(times)
 
 
-def test_a_margin_that_is_clicked_is_shown_large(browser: Chromium) -> None:
+def test_a_margin_that_is_clicked_is_shown_large(browser: Tab) -> None:
     browser.evaluate("document.querySelectorAll('.margin button')[4].click()")
-    assert _text(browser, "#chosen h2") == "torque"
+    assert browser.text("#chosen h2") == "torque"
     assert browser.evaluate("document.querySelectorAll('.margin')[4].className") == "margin fine on"
     assert browser.evaluate("document.querySelector('.margin').className") == "margin broken"
 
 
-def test_the_timeline_is_red_where_a_limit_is_broken(browser: Chromium) -> None:
+def test_the_timeline_is_red_where_a_limit_is_broken(browser: Tab) -> None:
     browser.evaluate("replay.scrub(0)")
     browser.evaluate(DRAWN)
     color = (
@@ -174,7 +158,7 @@ def test_the_timeline_is_red_where_a_limit_is_broken(browser: Chromium) -> None:
     assert browser.evaluate(f"{color}({_FINE})") == [243, 245, 249]
 
 
-def test_the_support_polygon_has_the_standing_feet_as_corners(browser: Chromium) -> None:
+def test_the_support_polygon_has_the_standing_feet_as_corners(browser: Tab) -> None:
     browser.evaluate("replay.scrub(2.0)")
     corners = browser.evaluate(
         "[...replay.scene.polygon.geometry.attributes.position.array].slice(0, 9)"
@@ -190,46 +174,39 @@ def test_the_support_polygon_has_the_standing_feet_as_corners(browser: Chromium)
     assert sorted(map(tuple, found.round(4))) == sorted(map(tuple, standing.round(4)))
 
 
-def test_the_ghost_follows_the_plan_beside_the_robot(browser: Chromium) -> None:
+def test_the_ghost_follows_the_plan_beside_the_robot(browser: Tab) -> None:
     browser.evaluate("replay.scrub(2.0); replay.scene.setView('corner')")
     place = browser.evaluate("(({x, y, z}) => [x, y, z])(replay.scene.ghost.body.base.position)")
     robot = browser.evaluate("(({x, y, z}) => [x, y, z])(replay.scene.body.base.position)")
     assert np.subtract(place, robot) == pytest.approx([0.0, 0.0, 0.03], abs=1e-3)
     shift = "(({x, y}) => [x, y])(replay.scene.ghost.body.root.position)"
     button = "document.querySelector('[data-ghost]')"
-    pictures = [stage(browser)]
+    pictures = [browser.stage()]
     assert browser.evaluate(shift) == [0, 0.62]
     browser.evaluate(f"{button}.click()")
-    pictures.append(stage(browser))
+    pictures.append(browser.stage())
     assert browser.evaluate(shift) == [0, 0]
     browser.evaluate(f"{button}.click()")
-    pictures.append(stage(browser))
+    pictures.append(browser.stage())
     assert browser.evaluate(f"{button}.textContent") == "Ghost: off"
     browser.evaluate(f"{button}.click()")
-    pictures.append(stage(browser))
+    pictures.append(browser.stage())
     beside, overlaid, alone, again = pictures
     assert (np.abs(beside - alone).max(axis=2) > 20).sum() > 5000
     assert (np.abs(overlaid - alone).max(axis=2) > 20).sum() > 1000
     assert np.abs(beside - again).mean() < 0.5
 
 
-def test_the_legend_tells_measured_from_planned(browser: Chromium) -> None:
-    assert _text(browser, "#force-key") == "measured force"
+def test_the_legend_tells_measured_from_planned(browser: Tab) -> None:
+    assert browser.text("#force-key") == "measured force"
     shown = "getComputedStyle(document.querySelector('{}')).display !== 'none'"
     assert browser.evaluate(shown.format(".ghost-key"))
     assert browser.evaluate(shown.format("#who"))
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 800), (640, 860), (420, 800)])
-def test_the_page_fits_its_window(browser: Chromium, width: int, height: int) -> None:
-    browser.command(
-        "Emulation.setDeviceMetricsOverride",
-        width=width,
-        height=height,
-        deviceScaleFactor=1,
-        mobile=False,
-    )
-    browser.evaluate(DRAWN)
+def test_the_page_fits_its_window(browser: Tab, width: int, height: int) -> None:
+    browser.resize(width, height)
     app = "document.getElementById('app')"
     overflow = f"{app}.scrollWidth > innerWidth || {app}.scrollHeight > innerHeight"
     for tab in ("curves", "check"):
@@ -238,4 +215,4 @@ def test_the_page_fits_its_window(browser: Chromium, width: int, height: int) ->
         assert browser.evaluate(overflow) is False
     pane = browser.evaluate("replay.scene.pane.clientHeight")
     assert pane > 200
-    assert complaints(browser) == []
+    assert browser.complaints == []

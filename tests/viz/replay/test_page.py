@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,16 @@ def test_nothing_in_the_page_is_loaded_from_elsewhere(page: str) -> None:
     assert re.findall(r"https?://|wss?://|\ssrc\s*=|@import|url\(|fetch\(|XMLHttp", code) == []
     assert re.findall(r'href="([^"]*)"', code) == ["data:,"]
     assert "connect()" not in code
+
+
+def test_the_page_has_every_element_and_style_that_its_scripts_name(page: str) -> None:
+    assets = resources.files("viz.replay") / "assets"
+    names = [file.name for file in assets.iterdir() if file.name.endswith(".js")]
+    scripts = "".join((assets / name).read_text(encoding="utf-8") for name in names)
+    wanted = re.findall(r"getElementById\(\"([\w-]+)\"\)", scripts)
+    assert len(wanted) > 10
+    assert set(wanted) <= set(re.findall(r"\bid=\"([\w-]+)\"", page))
+    assert set(re.findall(r"className = \"(\w+)", scripts)) <= set(re.findall(r"\.(\w+)", page))
 
 
 def test_the_title_is_shown_as_text(page: str) -> None:
