@@ -86,6 +86,7 @@ class Judge:
         for stage, targets, baseline, marker in stages:
             limit = self._limit(baseline, marker)
             excluded = self._excluded | (self._late if stage != SUITE else set())
+            excluded |= set(near) if stage == PACKAGE else set()  # they have passed
             sandbox.write(mutant.path, mutant.applied(source))
             outcome = sandbox.test(targets, marker, sorted(excluded), limit)
             sandbox.write(mutant.path, source)

@@ -79,9 +79,11 @@ class Sandbox:
         )
         try:
             told, _ = process.communicate(timeout=BUSY * limit or None)
-        except subprocess.TimeoutExpired:
+        except BaseException as reason:  # also when the run is interrupted
             os.killpg(process.pid, signal.SIGKILL)
             told, _ = process.communicate()
+            if not isinstance(reason, subprocess.TimeoutExpired):
+                raise
         passed = process.returncode in _PASSED_CODES
         failed = tuple(_FAILED.findall(told)) or (f"exit code {process.returncode}",)
         return Outcome(passed, () if passed else failed, _used() - before)
