@@ -122,7 +122,7 @@ class Results:
         record = {
             "mutant": mutant.name,
             "line": mutant.line,
-            "operator": mutant.operator,
+            "kind": mutant.kind,
             "stage": stage,
             "failed": outcome.failed[:1],
             "seconds": round(outcome.seconds, 1),

@@ -2,7 +2,7 @@
 
 The operators are those that Offutt et al., *An experimental determination of sufficient mutant
 operators*, ACM TOSEM 5(2), 1996, found to be enough (arithmetic, relational, logical, sign), and
-the usual ones of today's tools: constants, calls of opposite meaning, flags, ``return``, ``break``.
+the usual ones of today's tools: constants, calls of opposite meaning, ``return``, ``break``.
 What only talks is left alone: annotations, decorators, f-strings, raised errors and log lines.
 """
 
@@ -34,7 +34,6 @@ SWAPPED: dict[type[ast.AST], type[ast.AST]] = {
 }
 OPPOSITE = {**dict(_CALLS), **{b: a for a, b in _CALLS}}
 _LOGGERS = frozenset({"_log", "_logger", "logging"})
-_TALK = (ast.Raise, ast.JoinedStr, ast.Assert)
 _UNRUN_FIELDS = frozenset({"annotation", "returns", "decorator_list", "type_params"})
 
 
@@ -45,7 +44,7 @@ class Mutant:
     name: str
     path: str
     line: int
-    operator: str
+    kind: str
     start: int
     end: int
     after: str
@@ -73,12 +72,13 @@ def functions_of(source: bytes, path: str) -> list[Function]:
             begin = starts[node.lineno - 1] + node.col_offset
             end = starts[(node.end_lineno or 0) - 1] + (node.end_col_offset or 0)
             before = " ".join(source[begin:end].decode().split())
-            for operator, new in _changes(node, function):
+            for new in (*_other_operators(node), *_other_meanings(node, function)):
                 after = ast.unparse(new) if isinstance(new, ast.stmt) else f"({ast.unparse(new)})"
                 name = f"{path} {function_name}: {before} -> {after}"
                 names[name] += 1
                 name += f" #{names[name]}" if names[name] > 1 else ""
-                mutants.append(Mutant(name, path, node.lineno, operator, begin, end, after))
+                kind = type(node).__name__
+                mutants.append(Mutant(name, path, node.lineno, kind, begin, end, after))
         if mutants:
             found.append(Function((function.end_lineno or 0) - function.lineno + 1, mutants))
     return found
@@ -111,66 +111,67 @@ def _sites(node: ast.AST) -> Iterator[ast.expr | ast.stmt]:
     """The statements and expressions of a function that run."""
     for field, value in ast.iter_fields(node):
         for child in value if isinstance(value, list) else [value]:
-            is_code = isinstance(child, ast.AST) and not isinstance(child, _TALK)
-            if field in _UNRUN_FIELDS or not is_code or _is_log(child):
+            if field in _UNRUN_FIELDS or not isinstance(child, ast.AST) or _is_talk(child):
                 continue
             if isinstance(child, ast.expr | ast.stmt):
                 yield child
-            if not _is_negative_number(child):  # one number, one change of its sign
-                yield from _sites(child)
+            match child:
+                case ast.UnaryOp(op=ast.USub(), operand=ast.Constant()):
+                    pass  # one number, one change of its sign
+                case _:
+                    yield from _sites(child)
 
 
-def _is_log(node: ast.AST) -> bool:
+def _is_talk(node: ast.AST) -> bool:
     match node:
+        case ast.Raise() | ast.JoinedStr() | ast.Assert():
+            return True
         case ast.Call(func=ast.Attribute(value=ast.Name(id=name))):
             return name in _LOGGERS
     return False
 
 
-def _is_negative_number(node: ast.AST) -> bool:
+def _other_operators(node: ast.expr | ast.stmt) -> Iterator[ast.expr | ast.stmt]:
     match node:
-        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant()):
-            return True
-    return False
-
-
-def _changes(
-    node: ast.expr | ast.stmt, function: ast.FunctionDef
-) -> Iterator[tuple[str, ast.expr | ast.stmt]]:
-    """Every change of this very node, with the operator's name."""
-    match node:
-        case ast.BinOp(op=op) | ast.AugAssign(op=op) if type(op) in SWAPPED and not _is_text(node):
-            yield "arithmetic", _with(node, op=SWAPPED[type(op)]())
-        case ast.BoolOp(op=op):
-            yield "logic", _with(node, op=SWAPPED[type(op)]())
+        case ast.BinOp(op=op) | ast.AugAssign(op=op) | ast.BoolOp(op=op):
+            if type(op) in SWAPPED and not _is_text(node):  # joining strings has no opposite
+                yield _with(node, op=SWAPPED[type(op)]())
         case ast.Compare(ops=ops):
             for index, op in enumerate(ops):
-                changed = [*ops[:index], SWAPPED[type(op)](), *ops[index + 1 :]]
-                yield "comparison", _with(node, ops=changed)
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            yield "sign", operand
-        case ast.UnaryOp(op=ast.Not(), operand=operand):
-            yield "not", operand
+                yield _with(node, ops=[*ops[:index], SWAPPED[type(op)](), *ops[index + 1 :]])
+        case ast.UnaryOp(op=ast.USub() | ast.Not(), operand=operand):
+            yield operand
+
+
+def _other_meanings(
+    node: ast.expr | ast.stmt, function: ast.FunctionDef
+) -> Iterator[ast.expr | ast.stmt]:
+    match node:
         case ast.Constant(value=bool(value)):
-            yield "flag", ast.Constant(not value)
+            yield ast.Constant(not value)
         case ast.Constant(value=int(value)):
-            yield "off by one", ast.Constant(value + 1)
+            yield ast.Constant(value + 1)
         case ast.Constant(value=float(value)):
-            yield "sign", ast.Constant(-value if value else 1.0)
+            yield ast.Constant(-value or 1.0)
         case ast.Call(func=ast.Name(id=name)) if name in OPPOSITE:
-            yield "opposite", _with(node, func=ast.Name(OPPOSITE[name]))
+            yield _with(node, func=ast.Name(OPPOSITE[name]))
         case ast.Call(func=ast.Attribute(attr=name)) if name in OPPOSITE:
-            yield "opposite", _with(node, func=_with(node.func, attr=OPPOSITE[name]))
-        case ast.Return(value=ast.expr() as value) if _may_be_none(value, function):
-            yield "return", ast.Return(ast.Constant(None))
+            yield _with(node, func=_with(node.func, attr=OPPOSITE[name]))
+        case ast.Return(value=ast.expr()) if "None" in ast.unparse(function.returns or node):
+            yield ast.Return(ast.Constant(None))  # else a check of types would notice
         case ast.Break() | ast.Continue():
-            yield "loop", SWAPPED[type(node)]()  # type: ignore[misc]
+            yield SWAPPED[type(node)]()  # type: ignore[misc]
 
 
-def _may_be_none(value: ast.expr, function: ast.FunctionDef) -> bool:
-    """Whether only a test, and no check of types, can tell this value from None."""
-    allowed = ast.unparse(function.returns) if function.returns else "None"
-    return "None" in allowed and ast.unparse(value) != "None"
+def _is_text(node: ast.AST) -> bool:
+    match node:
+        case ast.BinOp(left=left, right=right):
+            return _is_text(left) or _is_text(right)
+        case ast.AugAssign(value=value):
+            return _is_text(value)
+        case ast.JoinedStr() | ast.Constant(value=str()):
+            return True
+    return False
 
 
 def _with(node: Node, **fields: object) -> Node:
@@ -178,13 +179,3 @@ def _with(node: Node, **fields: object) -> Node:
     for name, value in fields.items():
         setattr(changed, name, value)
     return changed
-
-
-def _is_text(node: ast.BinOp | ast.AugAssign) -> bool:
-    """Whether strings are joined, which has no opposite."""
-    parts = (node.left, node.right) if isinstance(node, ast.BinOp) else (node.value,)
-    return any(
-        isinstance(part, ast.JoinedStr)
-        or (isinstance(part, ast.Constant) and isinstance(part.value, str))
-        for part in parts
-    )

@@ -91,11 +91,12 @@ class Sandbox:
 
 
 def nearest_tests(root: Path, path: str) -> list[str]:
-    """The tests of a module: those of its name, then those of its package that import it."""
-    package, stem = path.split("/")[0], Path(path).stem
+    """A module's tests: those at its place and its folder's, then its package's that import it."""
+    place, package = Path("tests", path), path.split("/")[0]
     module = path.removesuffix(".py").replace("/", ".")
+    named = sorted((root / place.parent).glob(f"test_{place.stem}*.py"))
+    named += (root / place.parent.parent).glob(f"test_{place.parent.stem}.py")
     files = sorted((root / "tests" / package).rglob("test_*.py"))
-    named = [file for file in files if re.fullmatch(rf"test_{stem}(_\w+)?", file.stem)]
     importing = [file for file in files if file not in named and module in file.read_text()]
     return [str(file.relative_to(root)) for file in [*named, *importing]]
 
