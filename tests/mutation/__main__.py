@@ -11,17 +11,16 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.mutation.operators import Function, Mutant, draw, functions_of
+from tests.mutation.operators import Mutant, draw, mutants_of
 from tests.mutation.runner import Outcome, Sandbox, nearest_tests
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-PACKAGES = ("go2_wbc", "motions", "viz", "controller")
+PACKAGES: tuple[str, ...] = ("go2_wbc", "motions", "viz", "controller")
 # Not mutated: their tests need ROS 2 or DDS.
 LEFT_OUT = ("controller/bridges", "controller/cli/ros2", "controller/cli/unitree")
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 # Fast tests that take long or need a browser; they run with the whole suite only.
-LATE = ("tests/motions/test_seeded_faults.py", "tests/motions/test_pytest_plugin.py")
-LATE_NAME = "browser"
+LATE = ("test_seeded_faults.py", "test_pytest_plugin.py", "test_*browser.py")
 # A mutant hangs when it takes this many times the good code's CPU time, and the time to start [s].
 PATIENCE, START_UP = 3.0, 20.0
 NEAR, PACKAGE, SUITE, ALIVE = "own tests", "package's", "whole suite", "alive"
@@ -29,36 +28,37 @@ NEAR, PACKAGE, SUITE, ALIVE = "own tests", "package's", "whole suite", "alive"
 
 def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
     """Run what the command line asks for; returns 1 if a mutant lives that is not equivalent."""
-    options = _options(arguments)
-    results = Results(options.out / f"seed_{options.seed}.jsonl", keep=options.resume)
-    functions = [f for name in options.package for f in mutable_functions(root, name)]
-    mutants = draw(functions, options.n, options.seed)
+    parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
+    parser.add_argument("--n", type=int, default=120, help="mutants to draw")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--package", action="append", help="may be repeated")
+    parser.add_argument("--out", type=Path, default=ROOT / "out" / "mutation" / "results.jsonl")
+    parser.add_argument("--resume", action="store_true", help="skip what the file already lists")
+    parser.add_argument("--again", action="store_true", help="try the survivors of the file again")
+    parser.add_argument("--whole", action="store_true", help="survivors against the whole suite")
+    options = parser.parse_args(arguments)
+    packages = options.package or list(PACKAGES)
+    results = Results(options.out, keep=options.resume or options.again)
+    mutants = [mutant for name in packages for mutant in package_mutants(root, name)]
     if options.again:
-        mutants = [m for f in functions for m in f.mutants if m.name in results.named(ALIVE)]
-    mutants.sort(key=lambda mutant: options.package.index(mutant.path.split("/")[0]))
+        mutants = [mutant for mutant in mutants if mutant.name in results.alive()]
+    else:
+        mutants = draw(mutants, options.n, options.seed)
+    mutants.sort(key=lambda mutant: packages.index(mutant.path.split("/")[0]))
     with tempfile.TemporaryDirectory(prefix="mutation_") as folder:
         judge = Judge(Sandbox(root, Path(folder, "tree")), whole=options.whole)
         for mutant in mutants:
             if options.again or mutant.name not in results.latest:
                 results.add(mutant, *judge.judge(mutant))
     sys.stdout.write(results.table())
-    return 1 if results.named(ALIVE) - equivalent_names() else 0
+    return 1 if results.alive() else 0
 
 
-def mutable_functions(root: Path, package: str) -> list[Function]:
+def package_mutants(root: Path, package: str) -> list[Mutant]:
     """What can be mutated in a package; ``__init__`` files only export."""
-    found = []
-    for file in sorted((root / package).rglob("*.py")):
-        path = str(file.relative_to(root))
-        if file.name != "__init__.py" and not path.startswith(LEFT_OUT):
-            found += functions_of(file.read_bytes(), path)
-    return found
-
-
-def equivalent_names() -> set[str]:
-    """The mutants that behave as the code does, each recorded with its reason."""
-    table = tomllib.loads(EQUIVALENT.read_text())
-    return {entry["mutant"] for entry in table.get("equivalent", [])}
+    files = {str(file.relative_to(root)): file for file in sorted((root / package).rglob("*.py"))}
+    kept = (p for p in files if not p.endswith("__init__.py") and not p.startswith(LEFT_OUT))
+    return [mutant for path in kept for mutant in mutants_of(files[path].read_bytes(), path)]
 
 
 class Judge:
@@ -67,9 +67,10 @@ class Judge:
     def __init__(self, sandbox: Sandbox, *, whole: bool) -> None:
         self._sandbox, self._whole = sandbox, whole
         self._limits: dict[tuple[str, str], float] = {}
-        self._excluded: set[str] = set()
-        files = (sandbox.home / "tests").rglob(f"test_*{LATE_NAME}*.py")
-        self._late = {*LATE, *(str(file.relative_to(sandbox.home)) for file in files)}
+        self._failing: set[str] = set()
+        tests = sandbox.home / "tests"
+        late = (file for pattern in LATE for file in tests.rglob(pattern))
+        self._late = {str(file.relative_to(sandbox.home)) for file in late}
 
     def judge(self, mutant: Mutant) -> tuple[str, Outcome]:
         """Which tests noticed it, and what they said."""
@@ -85,7 +86,7 @@ class Judge:
             sandbox.require_import(mutant.path)
         for stage, targets, baseline, marker in stages:
             limit = self._limit(baseline, marker)
-            excluded = self._excluded | (self._late if stage != SUITE else set())
+            excluded = self._failing | (self._late if stage != SUITE else set())
             excluded |= set(near) if stage == PACKAGE else set()  # they have passed
             sandbox.write(mutant.path, mutant.applied(source))
             outcome = sandbox.test(targets, marker, sorted(excluded), limit)
@@ -98,11 +99,10 @@ class Judge:
         """CPU time [s] for a mutant; tests that fail without any are left out from here on."""
         if (target, marker) not in self._limits:
             late = self._late if target != "tests" else set()
-            good = self._sandbox.test([target], marker, sorted(self._excluded | late), limit=0.0)
-            self._excluded |= set(good.failed)
+            good = self._sandbox.test([target], marker, sorted(self._failing | late), limit=0.0)
+            self._failing |= set(good.failed)
             self._limits[target, marker] = START_UP + PATIENCE * good.seconds
-            sys.stdout.write(f"{target}, {marker}: {good.seconds:.0f} s, failing: {good.failed}\n")
-            sys.stdout.flush()
+            sys.stderr.write(f"{target}, {marker}: {good.seconds:.0f} s, failing: {good.failed}\n")
         return self._limits[target, marker]
 
 
@@ -112,56 +112,36 @@ class Results:
     def __init__(self, file: Path, *, keep: bool) -> None:
         self._file = file
         file.parent.mkdir(parents=True, exist_ok=True)
-        if not keep:
-            file.write_text("")
-        lines = file.read_text().splitlines() if file.exists() else []
+        lines = file.read_text().splitlines() if keep and file.exists() else []
+        file.write_text("".join(f"{line}\n" for line in lines))
         self.latest = {record["mutant"]: record for record in map(json.loads, lines)}
+        entries = tomllib.loads(EQUIVALENT.read_text()).get("equivalent", [])
+        self._equivalent = {entry["mutant"] for entry in entries}
 
     def add(self, mutant: Mutant, stage: str, outcome: Outcome) -> None:
         """Append a result."""
-        record = {
-            "mutant": mutant.name,
-            "line": mutant.line,
-            "kind": mutant.kind,
-            "stage": stage,
-            "failed": outcome.failed[:1],
-            "seconds": round(outcome.seconds, 1),
-        }
-        self.latest[mutant.name] = record
+        told = {"failed": outcome.failed[:1], "seconds": round(outcome.seconds, 1)}
+        self.latest[mutant.name] = {"mutant": mutant.name, "stage": stage, **told}
         with self._file.open("a") as stream:
-            stream.write(json.dumps(record) + "\n")
+            stream.write(json.dumps(self.latest[mutant.name]) + "\n")
 
-    def named(self, stage: str) -> set[str]:
-        """The mutants that ended at ``stage``."""
-        return {name for name, record in self.latest.items() if record["stage"] == stage}
+    def alive(self) -> set[str]:
+        """The mutants that no test noticed, although they are not equivalent."""
+        alive = {name for name, record in self.latest.items() if record["stage"] == ALIVE}
+        return alive - self._equivalent
 
     def table(self) -> str:
         """How many lived and died, by package, and the names of the living."""
-        equivalent, counts = equivalent_names(), dict[str, Counter[str]]()
+        counts: dict[str, Counter[str]] = {}
         for name, record in self.latest.items():
-            stage = "equivalent" if name in equivalent else record["stage"]
+            stage = "equivalent" if name in self._equivalent else record["stage"]
             counts.setdefault(name.split("/")[0], Counter())[stage] += 1
         columns = (NEAR, PACKAGE, SUITE, "equivalent", ALIVE)
         rows = [" | ".join(("package", "mutants", *columns))]
         for package, count in counts.items():
             numbers = (count.total(), *(count[column] for column in columns))
             rows.append(" | ".join((package, *map(str, numbers))))
-        return "\n".join([*rows, *sorted(self.named(ALIVE) - equivalent)]) + "\n"
-
-
-def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
-    parser.add_argument("--n", type=int, default=120, help="mutants to draw")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--package", action="append", help="may be repeated")
-    parser.add_argument("--out", type=Path, default=ROOT / "out" / "mutation")
-    parser.add_argument("--resume", action="store_true", help="skip what the file already lists")
-    parser.add_argument("--again", action="store_true", help="try the survivors of the file again")
-    parser.add_argument("--whole", action="store_true", help="survivors against the whole suite")
-    options = parser.parse_args(arguments)
-    options.package = options.package or list(PACKAGES)
-    options.resume = options.resume or options.again
-    return options
+        return "\n".join([*rows, *sorted(self.alive())]) + "\n"
 
 
 if __name__ == "__main__":

@@ -43,8 +43,7 @@ class Mutant:
 
     name: str
     path: str
-    line: int
-    kind: str
+    weight: float
     start: int
     end: int
     after: str
@@ -54,49 +53,31 @@ class Mutant:
         return source[: self.start] + self.after.encode() + source[self.end :]
 
 
-@dataclass(frozen=True, slots=True)
-class Function:
-    """A function's mutants, and its length, by which it is drawn."""
-
-    lines: int
-    mutants: list[Mutant]
-
-
-def functions_of(source: bytes, path: str) -> list[Function]:
-    """Every function and method of a module that can be mutated."""
+def mutants_of(source: bytes, path: str) -> list[Mutant]:
+    """Every mutant of a module's functions; those of a function weigh as much as it has lines."""
     starts = np.cumsum([0, *(len(line) for line in source.splitlines(keepends=True))]).tolist()
-    found, names = [], Counter[str]()
+    mutants, names = [], Counter[str]()
     for function_name, function in _functions(ast.parse(source), ""):
-        mutants = []
-        for node in _sites(function):
-            begin = starts[node.lineno - 1] + node.col_offset
+        sites = [(node, new) for node in _sites(function) for new in _changes(node, function)]
+        for node, new in sites:
+            start = starts[node.lineno - 1] + node.col_offset
             end = starts[(node.end_lineno or 0) - 1] + (node.end_col_offset or 0)
-            before = " ".join(source[begin:end].decode().split())
-            for new in (*_other_operators(node), *_other_meanings(node, function)):
-                after = ast.unparse(new) if isinstance(new, ast.stmt) else f"({ast.unparse(new)})"
-                name = f"{path} {function_name}: {before} -> {after}"
-                names[name] += 1
-                name += f" #{names[name]}" if names[name] > 1 else ""
-                kind = type(node).__name__
-                mutants.append(Mutant(name, path, node.lineno, kind, begin, end, after))
-        if mutants:
-            found.append(Function((function.end_lineno or 0) - function.lineno + 1, mutants))
-    return found
+            before = " ".join(source[start:end].decode().split())
+            after = ast.unparse(new) if isinstance(new, ast.stmt) else f"({ast.unparse(new)})"
+            name = f"{path} {function_name}: {before} -> {after}"
+            names[name] += 1
+            name += f" #{names[name]}" if names[name] > 1 else ""
+            weight = ((function.end_lineno or 0) - function.lineno + 1) / len(sites)
+            mutants.append(Mutant(name, path, weight, start, end, after))
+    return mutants
 
 
-def draw(functions: list[Function], count: int, seed: int) -> list[Mutant]:
-    """``count`` different mutants: a function by its length, then one of its mutants evenly."""
-    rng = np.random.default_rng(seed)
-    left = [Function(function.lines, list(function.mutants)) for function in functions]
-    drawn: list[Mutant] = []
-    while left and len(drawn) < count:
-        weights = np.array([function.lines for function in left], dtype=float)
-        index = int(rng.choice(len(left), p=weights / weights.sum()))
-        mutants = left[index].mutants
-        drawn.append(mutants.pop(int(rng.integers(len(mutants)))))
-        if not mutants:
-            left.pop(index)
-    return drawn
+def draw(mutants: list[Mutant], count: int, seed: int) -> list[Mutant]:
+    """``count`` of the mutants by their weights, none twice."""
+    weights = np.array([mutant.weight for mutant in mutants])
+    rng, size = np.random.default_rng(seed), min(count, len(mutants))
+    chosen = rng.choice(len(mutants), size, replace=False, p=weights / weights.sum())
+    return [mutants[index] for index in chosen]
 
 
 def _functions(node: ast.AST, prefix: str) -> Iterator[tuple[str, ast.FunctionDef]]:
@@ -115,11 +96,7 @@ def _sites(node: ast.AST) -> Iterator[ast.expr | ast.stmt]:
                 continue
             if isinstance(child, ast.expr | ast.stmt):
                 yield child
-            match child:
-                case ast.UnaryOp(op=ast.USub(), operand=ast.Constant()):
-                    pass  # one number, one change of its sign
-                case _:
-                    yield from _sites(child)
+            yield from _sites(child)
 
 
 def _is_talk(node: ast.AST) -> bool:
@@ -131,6 +108,11 @@ def _is_talk(node: ast.AST) -> bool:
     return False
 
 
+def _changes(node: ast.expr | ast.stmt, function: ast.FunctionDef) -> Iterator[ast.expr | ast.stmt]:
+    yield from _other_operators(node)
+    yield from _other_meanings(node, function)
+
+
 def _other_operators(node: ast.expr | ast.stmt) -> Iterator[ast.expr | ast.stmt]:
     match node:
         case ast.BinOp(op=op) | ast.AugAssign(op=op) | ast.BoolOp(op=op):
@@ -139,8 +121,10 @@ def _other_operators(node: ast.expr | ast.stmt) -> Iterator[ast.expr | ast.stmt]
         case ast.Compare(ops=ops):
             for index, op in enumerate(ops):
                 yield _with(node, ops=[*ops[:index], SWAPPED[type(op)](), *ops[index + 1 :]])
-        case ast.UnaryOp(op=ast.USub() | ast.Not(), operand=operand):
+        case ast.UnaryOp(op=ast.Not(), operand=operand):
             yield operand
+        case ast.UnaryOp(op=ast.USub(), operand=operand) if not isinstance(operand, ast.Constant):
+            yield operand  # the sign of a number is changed with the number
 
 
 def _other_meanings(
@@ -157,8 +141,9 @@ def _other_meanings(
             yield _with(node, func=ast.Name(OPPOSITE[name]))
         case ast.Call(func=ast.Attribute(attr=name)) if name in OPPOSITE:
             yield _with(node, func=_with(node.func, attr=OPPOSITE[name]))
-        case ast.Return(value=ast.expr()) if "None" in ast.unparse(function.returns or node):
-            yield ast.Return(ast.Constant(None))  # else a check of types would notice
+        case ast.Return(value=ast.expr() as value) if ast.unparse(value) != "None":
+            if "None" in ast.unparse(function.returns or node):  # else a check of types notices
+                yield ast.Return(ast.Constant(None))
         case ast.Break() | ast.Continue():
             yield SWAPPED[type(node)]()  # type: ignore[misc]
 
