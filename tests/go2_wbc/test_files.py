@@ -12,12 +12,18 @@ import viz
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording
+from tests.viz.synthetic import synthetic_recording
 
 _EXPORTS: dict[str, Callable[[Recording, Path], Path]] = {
     ".html": lambda recording, path: viz.export_html(recording, path, title="t"),
     ".webp": lambda recording, path: viz.export_animation(recording, path),
     ".png": lambda recording, path: viz.export_filmstrip(recording, path),
 }
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return synthetic_recording(script=(("stand", 0.4),))
 
 
 @pytest.mark.parametrize("suffix", _EXPORTS)
