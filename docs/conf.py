@@ -1,4 +1,4 @@
-"""The documentation site: ``sphinx-build -W --keep-going docs build/docs``, without network."""
+"""The documentation site: ``sphinx-build -W --keep-going docs docs/_build/html``, without network."""
 
 from __future__ import annotations
 

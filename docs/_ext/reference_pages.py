@@ -24,6 +24,7 @@ from plain_docstrings import as_markup
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
+from controller.cli.main import COMMANDS, PROGRAM
 from go2_wbc.wbc.tasks import Gains
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -109,13 +110,11 @@ def write_api_pages(app: Sphinx) -> None:
 
 def help_of(name: str) -> str:
     """The help of a subcommand of ``go2-wbc``, 80 columns wide."""
-    from controller.cli import main as cli
-
-    module = import_module({command.name: command.module for command in cli.COMMANDS}[name])
-    parser = cli.build_parser(module, name)
-    groups = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
+    module = import_module({command.name: command.module for command in COMMANDS}[name])
+    subparsers = argparse.ArgumentParser(PROGRAM).add_subparsers()
+    module.register(subparsers)
     with mock.patch.dict(os.environ, {"COLUMNS": "80"}):
-        return groups[0].choices[name].format_help()
+        return subparsers.choices[name].format_help()
 
 
 def config_rows(kind: type) -> Iterator[tuple[str, str, str]]:

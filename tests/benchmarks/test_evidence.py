@@ -1,4 +1,4 @@
-"""The README's evidence comes from the bench, whole."""
+"""The evidence of the documentation comes from the benchmark, whole."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from benchmarks.evidence import BEGIN, END, LINES, filled, table
 from benchmarks.families import FAMILIES
 from go2_wbc.errors import ConfigError
 
-README = Path(__file__).resolve().parents[2] / "README.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs/evidence.md"
 ROWS = {line.row: {"n": 20, "mean": 0.5, "worst": 0.25} for line in LINES}
 
 
@@ -32,8 +32,8 @@ def test_a_missing_row_or_mark_is_named() -> None:
         filled("nothing here", ROWS)
 
 
-def test_no_figure_of_the_readme_is_blank() -> None:
-    text = README.read_text(encoding="utf-8")
+def test_no_figure_of_the_page_is_blank() -> None:
+    text = PAGE.read_text(encoding="utf-8")
     block = text[text.index(BEGIN) : text.index(END)]
     lines = [line for line in block.splitlines() if line.startswith("|")][2:]
     assert len(lines) == len(LINES)
