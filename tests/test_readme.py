@@ -182,7 +182,15 @@ def test_no_line_is_wider_than_a_page_outside_tables(name: str) -> None:
     assert wide == []
 
 
-METAPHORS = ("door", "the eyes", "witness", "nobody means", "line that gets it", "specimen", "errand")
+METAPHORS = (
+    "door",
+    "the eyes",
+    "witness",
+    "nobody means",
+    "line that gets it",
+    "specimen",
+    "errand",
+)
 
 
 @pytest.mark.parametrize("name", [name for name in PAGES if name not in BRIDGES])

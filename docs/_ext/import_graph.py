@@ -219,7 +219,9 @@ def sizes(modules: Mapping[str, Module], package: str) -> dict[str, str]:
     for name, module in modules.items():
         rooms.setdefault(room_of(name, package), []).append(module.lines)
     return {
-        room: f"{sum(lines)} lines" if len(lines) == 1 else f"{len(lines)} files, {sum(lines)} lines"
+        room: f"{sum(lines)} lines"
+        if len(lines) == 1
+        else f"{len(lines)} files, {sum(lines)} lines"
         for room, lines in rooms.items()
     }
 
