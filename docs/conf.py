@@ -1,4 +1,4 @@
-"""The documentation site: ``sphinx-build -W --keep-going docs docs/_build/html``, without network."""
+"""The documentation site: ``python -m sphinx -W docs docs/_build/html`` builds it offline."""
 
 from __future__ import annotations
 
@@ -41,7 +41,6 @@ highlight_language = "none"
 # What needs ROS 2 or DDS is described by hand; its docstrings need neither.
 autodoc_mock_imports = ["rclpy", "cyclonedds"]
 autodoc_member_order = "bysource"
-autodoc_default_options = {"show-inheritance": True}
 autodoc_preserve_defaults = True
 autodoc_typehints_format = "short"
 autodoc_class_signature = "mixed"

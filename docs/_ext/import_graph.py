@@ -93,7 +93,7 @@ def _imports(
 
 
 def layers_of(graph: Graph) -> dict[str, int]:
-    """The height of every room: one more than the highest that it imports; a circle is one height."""
+    """The height of every room: one above the highest that it imports; a circle has one height."""
     reach = {room: _reachable(graph, room) for room in graph}
     height: dict[str, int] = {}
 
@@ -219,9 +219,7 @@ def sizes(modules: Mapping[str, Module], package: str) -> dict[str, str]:
     for name, module in modules.items():
         rooms.setdefault(room_of(name, package), []).append(module.lines)
     return {
-        room: f"{sum(lines)} lines"
-        if len(lines) == 1
-        else f"{len(lines)} files, {sum(lines)} lines"
+        room: (f"{len(lines)} files, " if len(lines) > 1 else "") + f"{sum(lines)} lines"
         for room, lines in rooms.items()
     }
 

@@ -50,9 +50,9 @@ def rooms(root: Path = ROOT) -> dict[str, list[str]]:
 
 
 def _important_first(page: str, modules: list[str], root: Path) -> list[str]:
-    """The package itself, the modules whose names it passes on, and the others."""
-    init = root / page.replace(".", "/") / "__init__.py"
-    homes = set(_exports(init).values()) if init.is_file() else set()
+    """The package itself, the modules whose names it or its parent passes on, and the others."""
+    packages = {page, page.split(".")[0]}
+    homes = {home for name in packages for home in exports_of(name, root).values()}
     return sorted(modules, key=lambda name: (name != page, name not in homes))
 
 
@@ -60,35 +60,34 @@ def api_page(room: str, modules: list[str], root: Path = ROOT) -> str:
     """A page of the API reference in MyST."""
     lines = [f"# {room}", ""]
     for name in modules:
-        folder = root / name.replace(".", "/")
-        if folder.is_dir():
-            lines += [*([f"## {name}", ""] * (name != room)), *_package(folder / "__init__.py")]
+        if (root / name.replace(".", "/")).is_dir():
+            lines += [*([f"## {name}", ""] * (name != room)), *_package(name, root)]
         else:
             lines += [f"## {name}", "", "```{eval-rst}", f".. automodule:: {name}", "   :members:"]
             lines += ["```", ""]
     return "\n".join(lines)
 
 
-def _exports(file: Path) -> dict[str, str]:
-    """The public names that a package passes on, and the module of each."""
-    nodes_of = ast.walk(ast.parse(file.read_text(encoding="utf-8")))
-    found = {
-        alias.name: node.module
-        for node in nodes_of
-        if isinstance(node, ast.ImportFrom) and node.module
-        for alias in node.names
-        if not (ROOT / f"{node.module}.{alias.name}".replace(".", "/")).with_suffix(".py").is_file()
-    }
-    package = file.parent.name
-    return {name: home for name, home in sorted(found.items()) if package in home.split(".")}
+def exports_of(package: str, root: Path = ROOT) -> dict[str, str]:
+    """The public names that a package passes on, and the module that each is defined in."""
+    init = root / package.replace(".", "/") / "__init__.py"
+    if not init.is_file():
+        return {}
+    found: dict[str, str] = {}
+    for node in ast.walk(ast.parse(init.read_text(encoding="utf-8"))):
+        home = node.module or "" if isinstance(node, ast.ImportFrom) else ""
+        if isinstance(node, ast.ImportFrom) and home.startswith(f"{package}."):
+            for name in (alias.name for alias in node.names):
+                found[name] = exports_of(home, root).get(name, home)
+    return dict(sorted(found.items()))
 
 
-def _package(file: Path) -> Iterator[str]:
+def _package(name: str, root: Path) -> Iterator[str]:
     """What a package is and which names it passes on; they are described where they live."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
-    name = ".".join(file.relative_to(ROOT).parts[:-1])
-    links = [f":py:obj:`{key} <{home}.{key}>`" for key, home in _exports(file).items()]
-    yield from ("```{eval-rst}", *as_markup((ast.get_docstring(tree) or "").splitlines()), "")
+    init = root / name.replace(".", "/") / "__init__.py"
+    about = ast.get_docstring(ast.parse(init.read_text(encoding="utf-8"))) or ""
+    links = [f":py:obj:`{key} <{home}.{key}>`" for key, home in exports_of(name, root).items()]
+    yield from ("```{eval-rst}", *as_markup(about.splitlines()), "")
     if links:
         yield f"``from {name} import``: {', '.join(links)}."
     yield from ("```", "")
