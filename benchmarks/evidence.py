@@ -1,6 +1,6 @@
-"""Fills the documentation's table of evidence from what ``go2-wbc bench behaviour --out`` wrote.
+"""Fills the README's table of evidence from what ``go2-wbc bench behaviour --out`` wrote.
 
-python -m benchmarks.evidence docs/evidence.md behaviour.json [MORE.json ...]
+python -m benchmarks.evidence README.md behaviour.json [MORE.json ...]
 """
 
 from __future__ import annotations
