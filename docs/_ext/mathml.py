@@ -1,6 +1,6 @@
 """Equations as MathML, which browsers draw by themselves: no script, no network.
 
-Docutils turns LaTeX into MathML; this registers it as a maths renderer of Sphinx.
+Registers math-core, which turns LaTeX into MathML, as a maths renderer of Sphinx.
 """
 
 from __future__ import annotations
@@ -8,30 +8,31 @@ from __future__ import annotations
 from typing import Any
 
 from docutils import nodes
-from docutils.utils.math.latex2mathml import tex2mathml
+from math_core import LatexError, LatexToMathML
 from sphinx.application import Sphinx
-from sphinx.errors import ExtensionError
+from sphinx.util.logging import getLogger
+
+_log = getLogger(__name__)
+_converter = LatexToMathML()
 
 
-def converted(source: str, *, is_block: bool) -> str:
-    """LaTeX as a MathML element.
-
-    Raises:
-        ExtensionError: if docutils does not know a command of it.
-    """
+def converted(node: nodes.math | nodes.math_block, *, is_block: bool) -> str:
+    """The equation as a MathML element; a warning and its source if it is not valid LaTeX."""
+    source = node.astext()
     try:
-        return tex2mathml(source, as_block=is_block)
-    except Exception as error:
-        raise ExtensionError(f"cannot convert {source!r} to MathML: {error}") from error
+        return _converter.convert_with_local_state(source, displaystyle=is_block)
+    except LatexError as error:
+        _log.warning("cannot convert %r to MathML: %s", source, error, location=node)
+        return f"<code>{source}</code>"
 
 
 def _visit_inline(writer: Any, node: nodes.math) -> None:  # noqa: ANN401
-    writer.body.append(f'<span class="math">{converted(node.astext(), is_block=False)}</span>')
+    writer.body.append(f'<span class="math">{converted(node, is_block=False)}</span>')
     raise nodes.SkipNode
 
 
 def _visit_block(writer: Any, node: nodes.math_block) -> None:  # noqa: ANN401
-    element = converted(node.astext(), is_block=True)
+    element = converted(node, is_block=True)
     writer.body.append(f'<div class="math-block" tabindex="0">{element}</div>\n')
     raise nodes.SkipNode
 
