@@ -18,7 +18,7 @@ with GO2Controller() as go2:
         x, y, _ = go2.state.p_world_base - start
         heading = math.degrees(go2.state.yaw)
         print(f"corner {corner}: x {x:+.2f} m, y {y:+.2f} m, heading {heading:+.0f} deg")
-    gap = math.hypot(x, y)
+    gap = math.dist(start[:2], go2.state.p_world_base[:2])
     print(f"back at the start to within {1000 * gap:.0f} mm")
 
 if not all(done) or gap > 0.15:

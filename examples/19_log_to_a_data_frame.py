@@ -41,5 +41,5 @@ table = frame.groupby("doing", sort=False).agg(
 )
 print(table.round(2).to_string())
 print(f"{len(frame)} rows, {len(frame.columns)} columns in {file}")
-if not table["fastest"].max() > 0.45:
+if run.v[:, 0].max() < 0.45:
     raise SystemExit("the walk is not in the table")

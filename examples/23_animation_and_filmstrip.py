@@ -21,7 +21,7 @@ with GO2Controller() as go2:
 film = export_animation(recording, FOLDER / "run.webp", speed=3.0, fps=10, size=(400, 260))
 stills = export_filmstrip(recording, FOLDER / "run.png", times=[0.0, 3.0, recording.duration])
 with Image.open(film) as image:
-    frames = image.n_frames
+    frames = getattr(image, "n_frames", 1)
     print(
         f"{FOLDER / film.name}: {frames} pictures of {image.size} px for {recording.duration:.1f} s"
     )

@@ -3,9 +3,12 @@
 cancel() is for another thread; the call that plays then returns False and says why.
 """
 
+import logging
 import threading
 
 from controller import GO2Controller
+
+logging.getLogger("controller").addHandler(logging.NullHandler())  # the reason is printed below
 
 with GO2Controller() as go2:
     go2.stand()

@@ -1,6 +1,6 @@
 """Drive the robot over ROS 2 with a class that knows nothing of this project, plain rclpy.
 
-Needs the extra [ros2] and the interfaces of docs/ros2.md. Starts the server, `go2-wbc ros2`, itself.
+Needs the extra [ros2] and the interfaces of docs/ros2.md. It starts the server, `go2-wbc ros2`.
 """
 
 import os
