@@ -30,7 +30,7 @@ from motions.keys import (
     LegTarget,
     Mark,
     PostureKey,
-    ShiftKey,
+    BalanceShift,
 )
 from motions.poses import POSES
 
@@ -42,8 +42,8 @@ FARTHEST = 2.0
 """A place farther away than this [m] is a mistake in units."""
 ANGLES = frozenset({"roll", "pitch", "yaw", "hip", "thigh", "calf"})
 
-AnyKey = BodyKey | PostureKey | LegKey | ShiftKey | Mark
-_KeyType = TypeVar("_KeyType", BodyKey, PostureKey, LegKey, ShiftKey, Mark)
+AnyKey = BodyKey | PostureKey | LegKey | BalanceShift | Mark
+_KeyType = TypeVar("_KeyType", BodyKey, PostureKey, LegKey, BalanceShift, Mark)
 
 
 def deg(angle: float) -> float:
@@ -179,7 +179,7 @@ class Timeline:
         """
         start, end = self._span(over)
         raised = self.raised | {_leg(leg)}
-        return self._longer([ShiftKey(start, end, Ease.MINIMUM_JERK, raised)], end)
+        return self._longer([BalanceShift(start, end, Ease.MINIMUM_JERK, raised)], end)
 
     def down(self, leg: Leg | str, *, over: float) -> Timeline:
         """Put a raised foot back where it stood."""
@@ -212,7 +212,7 @@ class Timeline:
             if line.body_value(channel) != 0.0
         ]
         if line.shifted_for:
-            keys.append(ShiftKey(start, end, Ease.MINIMUM_JERK, frozenset()))
+            keys.append(BalanceShift(start, end, Ease.MINIMUM_JERK, frozenset()))
         return line._longer(keys, end)
 
     def at(self, t: float) -> Timeline:
@@ -277,7 +277,7 @@ class Timeline:
     @property
     def shifted_for(self) -> frozenset[Leg]:
         """Legs for whose absence the trunk has moved over the other feet."""
-        shifts = self.in_order(ShiftKey)
+        shifts = self.in_order(BalanceShift)
         return shifts[-1].raised if shifts else frozenset()
 
     def body_value(self, channel: str) -> float:
@@ -305,7 +305,7 @@ class Timeline:
         if not self.balance or self.shifted_for == raised:
             return self
         end = self.cursor + self.shift_time
-        return self._longer([ShiftKey(self.cursor, end, Ease.MINIMUM_JERK, raised)], end)
+        return self._longer([BalanceShift(self.cursor, end, Ease.MINIMUM_JERK, raised)], end)
 
     def _longer(self, keys: Sequence[AnyKey], cursor: float) -> Timeline:
         return replace(

@@ -6,11 +6,13 @@ the four feet.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise, starmap
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from go2_wbc.curves import Ease
 from go2_wbc.legs import LEGS, Leg
@@ -45,27 +47,49 @@ class LegPath:
     miss: Float[np.ndarray, " n"]
 
 
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A way to a goal: when [s] it starts and ends, how, and the goal (k,)."""
+
+    start: float
+    end: float
+    ease: Ease
+    goal: Float[np.ndarray, " k"]
+
+
+def followed(
+    times: Times, first: Float[np.ndarray, " k"], moves: Sequence[Move]
+) -> Float[np.ndarray, "n k"]:
+    """Values (n, k) at ``times`` of what goes from ``first`` to one goal after the other.
+
+    Args:
+        times: increasing instants [s].
+        first: where it is before the first move.
+        moves: by their starts; none starts before the one before it has ended.
+    """
+    path = np.tile(first, (len(times), 1))
+    last = first
+    edges = np.searchsorted(times, [*(move.start for move in moves), np.inf])
+    for move, rows in zip(moves, starmap(slice, pairwise(edges.tolist())), strict=True):
+        share = eased(move.start, move.end, move.ease, times[rows])
+        path[rows] = last + share[:, None] * (move.goal - last)
+        last = move.goal
+    return path
+
+
 def body_path(
     timeline: Timeline, home: Mapping[Posture, Float[np.ndarray, "6"]], times: Times
 ) -> Poses:
     """Base position [m] and roll, pitch, yaw [rad] at ``times``, without the shift for balance."""
-    path = np.tile(home[timeline.entry], (len(times), 1))
-    last = home[timeline.entry]
-    for key in timeline.in_order(PostureKey):
-        path += progress(key, times)[:, None] * (home[key.stance] - last)
-        last = home[key.stance]
-    for column, channel in enumerate(BODY_CHANNELS):
-        value = 0.0
-        for key in timeline.in_order(BodyKey):
-            if key.channel == channel:
-                path[:, column] += progress(key, times) * (key.value - value)
-                value = key.value
-    return path
-
-
-def progress(key: BodyKey | PostureKey | LegKey, times: Times) -> Float[np.ndarray, " n"]:
-    """Share of the key's way that is done: 0 before it, 1 after it."""
-    return eased(key.start, key.end, key.ease, times)
+    moves: dict[str, list[Move]] = {channel: [] for channel in BODY_CHANNELS}
+    for key in timeline.in_order(BodyKey):
+        moves[key.channel].append(Move(key.start, key.end, key.ease, np.array([key.value])))
+    postures = [
+        Move(key.start, key.end, key.ease, home[key.posture])
+        for key in timeline.in_order(PostureKey)
+    ]
+    offsets = [followed(times, np.zeros(1), moves[channel]) for channel in BODY_CHANNELS]
+    return followed(times, home[timeline.entry], postures) + np.hstack(offsets)
 
 
 def eased(start: float, end: float, ease: Ease, times: Times) -> Float[np.ndarray, " n"]:
@@ -93,29 +117,47 @@ def flights(timeline: Timeline, leg: Leg) -> list[tuple[float, float]]:
 
 
 class LegTracks:
-    """Evaluates the tracks of the legs along a path of the trunk."""
+    """Evaluates the legs' tracks of a timeline along a path of the trunk.
 
-    def __init__(self, model: RobotModel, home: Float[np.ndarray, "6"]) -> None:
+    Attributes:
+        p_feet: (4, 3) where the feet stand [m].
+    """
+
+    def __init__(
+        self, timeline: Timeline, model: RobotModel, home: Float[np.ndarray, "6"]
+    ) -> None:
         """``home``: pose of the trunk in which the motion starts, on four feet."""
         self._geometry = {leg: LegGeometry.of(model, leg) for leg in LEGS}
-        self.p_feet = model.p_base_feet_nominal.copy()
-        self.p_feet[:, 2] = model.foot_radius
+        self._keys: dict[Leg, list[LegKey]] = {leg: [] for leg in LEGS}
+        for key in timeline.in_order(LegKey):
+            self._keys[key.leg].append(key)
+        self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
+        self.p_feet = standing_feet(model)
         self._p_base_feet_home = (self.p_feet - home[:3]) @ rotations(home[None, 3:])[0]
 
-    def path(self, timeline: Timeline, leg: Leg, times: Times, body: Poses) -> LegPath:
-        """Joint angles of ``leg`` while the trunk moves along ``body``."""
-        target, path = LegTarget.on_ground(), self._at(leg, LegTarget.on_ground(), body)
-        for key in timeline.in_order(LegKey):
-            if key.leg is leg:
-                during = times >= key.start
-                path = self._joined(path, self._move(key, target, times, body), during)
-                target = key.target
+    def path(self, leg: Leg, times: Times, body: Poses) -> LegPath:
+        """Joint angles of ``leg`` at increasing ``times``, at which the trunk is at ``body``.
+
+        From its start until the next one starts, a key alone says where the leg is.
+        """
+        keys, starts = self._keys[leg], self._starts[leg]
+        first = max(bisect_right(starts, times[0]) - 1, 0)
+        origin = keys[first - 1].target if first else LegTarget.on_ground()
+        path = self._at(leg, origin, body)
+        for index in range(first, bisect_right(starts, times[-1])):
+            key = keys[index]
+            following = starts[index + 1] if index + 1 < len(keys) else np.inf
+            until = max(np.searchsorted(times, following), np.searchsorted(times, key.end, "right"))
+            rows = slice(int(np.searchsorted(times, key.start)), int(until))
+            moved = self._move(key, origin, times[rows], body[rows])
+            path.q[rows], path.miss[rows] = moved.q, moved.miss
+            origin = key.target
         return path
 
     def _move(self, key: LegKey, origin: LegTarget, times: Times, body: Poses) -> LegPath:
-        share = progress(key, times)[:, None]
+        share = eased(key.start, key.end, key.ease, times)[:, None]
         goals = (origin, key.target)
-        span = (times >= key.start) & (times <= key.end)
+        span = times <= key.end
         if all(goal.frame is not Frame.JOINTS for goal in goals):
             places = [self._places(key.leg, goal, body) for goal in goals]
             hip = self._geometry[key.leg].p_base_hip[2]
@@ -141,11 +183,12 @@ class LegTracks:
             "nij,ni->nj", rotations(body[:, 3:]), self.p_feet[leg] + offset - body[:, :3]
         )
 
-    @staticmethod
-    def _joined(before: LegPath, after: LegPath, during: Bool[np.ndarray, " n"]) -> LegPath:
-        return LegPath(
-            np.where(during[:, None], after.q, before.q), np.where(during, after.miss, before.miss)
-        )
+
+def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
+    """Where the feet's centres stand [m]: below the hips, a foot's radius above the ground."""
+    p_feet = model.p_base_feet_nominal.copy()
+    p_feet[:, 2] = model.foot_radius
+    return p_feet
 
 
 def rotations(rpy: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
@@ -164,10 +207,9 @@ def configuration(
 def home_poses(model: RobotModel) -> dict[Posture, Float[np.ndarray, "6"]]:
     """Pose of the base in every resting posture, on four feet below the hips."""
     stand = STAND_POSE.copy()
-    tracks = LegTracks(model, STAND_POSE)
-    start, still = np.zeros(1), Timeline()
+    tracks = LegTracks(Timeline(), model, STAND_POSE)
     for _ in range(SETTLING_STEPS):
-        joints = [tracks.path(still, leg, start, stand[None]).q[0] for leg in LEGS]
+        joints = [tracks.path(leg, np.zeros(1), stand[None]).q[0] for leg in LEGS]
         com, _ = model.forward_kinematics(configuration(stand, np.concatenate(joints)))
         stand[:3] += STAND_POSE[:3] - com
     return {Posture.STAND: stand, Posture.SIT: SIT_POSE, Posture.LIE: LIE_POSE}

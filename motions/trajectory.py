@@ -20,6 +20,7 @@ from go2_wbc.reference import LegTask, MotionPlan, Reference, TrackedPoint
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import quaternion_from_rpy, rpy_from_rotation
+from motions.tracks import standing_feet
 
 SAMPLE_PERIOD = 0.01
 """Time [s] between the instants that are looked at."""
@@ -72,8 +73,7 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
             raise MotionError(f"the plan is not finite at t={t:.2f} s")
     R = np.array([reference.body.R_world_base for reference in references])
     rpy = np.unwrap(np.array([rpy_from_rotation(rotation) for rotation in R]), axis=0)
-    p_feet = model.p_base_feet_nominal.copy()
-    p_feet[:, 2] = model.foot_radius
+    p_feet = standing_feet(model)
     base, joints, miss = _posed(references, R, rpy, p_feet, model)
     p_com = np.array([_com(model, row) for row in zip(base, rpy, joints, strict=True)])
     q, v, a = _motion(times, base, rpy, R, joints)

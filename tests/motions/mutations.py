@@ -18,11 +18,11 @@ from go2_wbc.legs import LEGS
 from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, load_motion, motion_names
-from motions.keys import BodyKey, Frame, LegKey, LegTarget, ShiftKey
+from motions.keys import BodyKey, Frame, LegKey, LegTarget, BalanceShift
 from motions.timeline import AnyKey
 
 Mutator = Callable[[Timeline, np.random.Generator], Timeline | None]
-_KeyType = TypeVar("_KeyType", BodyKey, LegKey, ShiftKey)
+_KeyType = TypeVar("_KeyType", BodyKey, LegKey, BalanceShift)
 
 STEP = 0.004  # s, between the instants that the eye looks at
 JUMP = 0.6  # m/s or rad/s from one instant to the next: 150 m/s^2
@@ -94,9 +94,9 @@ def _hurried(line: Timeline, rng: np.random.Generator) -> Timeline | None:
 
 def _without_balance(line: Timeline, rng: np.random.Generator) -> Timeline | None:
     """Feet are raised, and the trunk stays where it is."""
-    if not line.in_order(ShiftKey):
+    if not line.in_order(BalanceShift):
         return None
-    return replace(line, keys=tuple(key for key in line.keys if not isinstance(key, ShiftKey)))
+    return replace(line, keys=tuple(key for key in line.keys if not isinstance(key, BalanceShift)))
 
 
 def _second_foot(line: Timeline, rng: np.random.Generator) -> Timeline | None:

@@ -17,7 +17,7 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, deg
 from motions.compiler import OutOfReach, contact_schedule
-from motions.keys import BodyKey, LegKey, ShiftKey
+from motions.keys import BodyKey, LegKey, BalanceShift
 from motions.timeline import SHIFT_TIME
 from motions.tracks import home_poses
 
@@ -88,7 +88,7 @@ def test_a_mirror_image_of_a_mirror_image_is_the_motion_itself() -> None:
 
 def test_a_raised_foot_is_a_swing_leg_and_the_trunk_moves_first() -> None:
     line = Timeline().foot("FL", z=0.1, over=0.6).hold(0.5).home(over=0.7)
-    (shift, back), (up, down) = line.in_order(ShiftKey), line.in_order(LegKey)
+    (shift, back), (up, down) = line.in_order(BalanceShift), line.in_order(LegKey)
     assert (shift.start, shift.end) == (0.0, SHIFT_TIME)
     assert shift.raised == {Leg.FL}
     assert up.start == SHIFT_TIME
