@@ -20,13 +20,13 @@ from go2_wbc.robot.inverse_kinematics import PoseTargets, solve_pose
 from go2_wbc.robot.model import RobotModel
 from motions.keys import BalanceShift
 from motions.timeline import SAME, Timeline
-from motions.tracks import LegTracks, Move, Poses, Times, configuration, followed
+from motions.tracks import LegTracks, Move, Poses, Times, configurations, followed
 
 MARGINS = (0.08, 0.065, 0.05, 0.035, 0.02)
 """Distances [m] of the CoM to the edges of the support polygon that are tried, best first.
 
-80 mm is about what the triangle of three feet, 0.39 m by 0.28 m apart, has in its middle; the least
-is the limit of the check (``FeasibilityLimits.support``) and a few millimetres for tracking.
+The largest circle in the triangle of three feet, 0.387 m by 0.284 m, has a radius of 95 mm. The
+last is the check's limit (``FeasibilityLimits.support``) with 5 mm to spare. Own choice.
 """
 JOINT_MARGIN = 0.02
 """Distance [rad] that the joints keep from their limits in a balanced pose: own choice."""
@@ -120,6 +120,7 @@ class Balancer:
             names = " and ".join(leg.name for leg in sorted(raised))
             raise IkError(f"{names} are raised at once: two feet cannot balance the trunk")
         (leg,) = raised
+        start = configurations(pose[None], joints[None])[0]
         best: IkError | None = None
         for margin in MARGINS:
             hip, thigh, calf = joints[leg.joints].tolist()
@@ -134,7 +135,7 @@ class Balancer:
                 joint_margin=JOINT_MARGIN,
             )
             try:
-                return solve_pose(self._model, targets, configuration(pose, joints)).q
+                return solve_pose(self._model, targets, start).q
             except IkError as error:
                 best = error
         raise IkError(f"no pose balances without foot {leg.name}: {best}")

@@ -26,7 +26,7 @@ from motions.balance import Balancer, Unbalanced
 from motions.keys import Mark
 from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, body_target
 from motions.timeline import Timeline
-from motions.tracks import LegTracks, body_path, configuration, flights, home_poses
+from motions.tracks import LegTracks, body_path, configurations, flights, home_poses
 
 SAMPLE_PERIOD = 0.01
 """Time [s] between the instants at which a timeline is sampled."""
@@ -117,9 +117,7 @@ def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
     body[:, :2] += balance.offsets
     paths = [tracks.path(leg, times, body) for leg in LEGS]
     joints = np.hstack([path.q for path in paths])
-    com = np.array(
-        [model.center_of_mass(configuration(*row)) for row in zip(body, joints, strict=True)]
-    )
+    com = np.array([model.center_of_mass(q) for q in configurations(body, joints)])
     problems: list[OutOfReach | Unbalanced] = list(balance.failures)
     for leg, path in zip(LEGS, paths, strict=True):
         worst = int(np.argmax(path.miss))

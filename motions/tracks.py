@@ -13,13 +13,13 @@ from itertools import pairwise, starmap
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from go2_wbc.curves import Ease
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import quaternion_from_rpy, rotation_from_rpy
 from motions.keys import BODY_CHANNELS, BodyKey, Frame, LegKey, LegTarget, PostureKey
 from motions.postures import LIE_POSE, SIT_POSE, STAND_POSE
 from motions.timeline import Timeline
@@ -28,7 +28,8 @@ LOW = 0.08
 """A foot that stays this far [m] below its hip's axis moves along straight lines; a higher one in
 joint space, since the way of a foot past its hip crosses a singularity of the leg."""
 SETTLING_STEPS = 10
-"""The CoM hangs a little off the base; finding its place converges by a factor of 8 a step."""
+"""Steps that find the place of the base below which the CoM stands; each leaves an eighth of the
+error (measured), since the legs, whose feet stay, follow the base only in part."""
 
 Times = Float[np.ndarray, " n"]
 Poses = Float[np.ndarray, "n 6"]
@@ -133,7 +134,7 @@ class LegTracks:
             self._keys[key.leg].append(key)
         self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
         self.p_feet = standing_feet(model)
-        self._p_base_feet_home = (self.p_feet - home[:3]) @ rotations(home[None, 3:])[0]
+        self._p_base_feet_home = (self.p_feet - home[:3]) @ attitudes(home[None, 3:]).as_matrix()[0]
 
     def path(self, leg: Leg, times: Times, body: Poses) -> LegPath:
         """Joint angles of ``leg`` at increasing ``times``, at which the trunk is at ``body``.
@@ -179,9 +180,7 @@ class LegTracks:
         offset = np.array(target.values)
         if target.frame is Frame.BODY:
             return np.tile(self._p_base_feet_home[leg] + offset, (len(body), 1))
-        return np.einsum(
-            "nij,ni->nj", rotations(body[:, 3:]), self.p_feet[leg] + offset - body[:, :3]
-        )
+        return attitudes(body[:, 3:]).apply(self.p_feet[leg] + offset - body[:, :3], inverse=True)
 
 
 def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
@@ -191,25 +190,24 @@ def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
     return p_feet
 
 
-def rotations(rpy: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
-    """Rz(yaw) Ry(pitch) Rx(roll) for every row."""
-    return np.array([rotation_from_rpy(*row) for row in rpy.tolist()])
+def attitudes(rpy: Float[np.ndarray, "n 3"]) -> Rotation:
+    """R_world_base = Rz(yaw) Ry(pitch) Rx(roll) of every row [rad]."""
+    return Rotation.from_euler("ZYX", rpy[:, ::-1])
 
 
-def configuration(
-    pose: Float[np.ndarray, "6"], joints: Float[np.ndarray, "12"]
-) -> Float[np.ndarray, "19"]:
-    """q of a trunk at ``pose`` (position, then roll, pitch, yaw) with these joint angles."""
-    roll, pitch, yaw = pose[3:].tolist()
-    return np.concatenate([pose[:3], quaternion_from_rpy(roll, pitch, yaw), joints])
+def configurations(poses: Poses, joints: Float[np.ndarray, "n 12"]) -> Float[np.ndarray, "n 19"]:
+    """q of a trunk at ``poses`` (position, then roll, pitch, yaw) with these joint angles."""
+    return np.hstack([poses[:, :3], attitudes(poses[:, 3:]).as_quat(), joints])
 
 
 def home_poses(model: RobotModel) -> dict[Posture, Float[np.ndarray, "6"]]:
-    """Pose of the base in every resting posture, on four feet below the hips."""
-    stand = STAND_POSE.copy()
+    """Pose of the base in every resting posture, on four feet below the hips.
+
+    Standing is given by its CoM c*; p <- p + (c* - c(p)) finds the place p of the base.
+    """
+    stand = STAND_POSE.copy()[None]
     tracks = LegTracks(Timeline(), model, STAND_POSE)
     for _ in range(SETTLING_STEPS):
-        joints = [tracks.path(leg, np.zeros(1), stand[None]).q[0] for leg in LEGS]
-        com, _ = model.forward_kinematics(configuration(stand, np.concatenate(joints)))
-        stand[:3] += STAND_POSE[:3] - com
-    return {Posture.STAND: stand, Posture.SIT: SIT_POSE, Posture.LIE: LIE_POSE}
+        joints = np.hstack([tracks.path(leg, np.zeros(1), stand).q for leg in LEGS])
+        stand[0, :3] += STAND_POSE[:3] - model.center_of_mass(configurations(stand, joints)[0])
+    return {Posture.STAND: stand[0], Posture.SIT: SIT_POSE, Posture.LIE: LIE_POSE}
