@@ -124,9 +124,7 @@ class LegTracks:
         p_feet: (4, 3) where the feet stand [m].
     """
 
-    def __init__(
-        self, timeline: Timeline, model: RobotModel, home: Float[np.ndarray, "6"]
-    ) -> None:
+    def __init__(self, timeline: Timeline, model: RobotModel, home: Float[np.ndarray, "6"]) -> None:
         """``home``: pose of the trunk in which the motion starts, on four feet."""
         self._geometry = {leg: LegGeometry.of(model, leg) for leg in LEGS}
         self._keys: dict[Leg, list[LegKey]] = {leg: [] for leg in LEGS}

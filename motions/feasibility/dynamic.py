@@ -47,7 +47,7 @@ PRESSED = 10.0
 """Normal force [N] from which on the friction of a foot matters; below, the quotient is noise and
 a slip moves nothing (own choice, 6 % of the weight)."""
 LEAST_WEIGHT = 1.0
-"""Least vertical force [N] by which moments are divided: keeps a jump's zero-moment point finite."""
+"""Least vertical force [N] by which moments are divided: the zero-moment point stays finite."""
 NO_SUPPORT = 1.0
 """How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
 TIGHT_TORQUE, TIGHT_LOAD, TIGHT_FRICTION, TIGHT_SUPPORT = 0.1, 10.0, 0.05, 0.01
@@ -166,9 +166,7 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
         value = values[:, column : column + 1]
         bound = np.full_like(value, least)
         series.append(
-            Series(
-                check, "m", (subject,), motion.times, value, bound, value - bound, TIGHT_SUPPORT
-            )
+            Series(check, "m", (subject,), motion.times, value, bound, value - bound, TIGHT_SUPPORT)
         )
     return series[0], series[1]
 

@@ -16,8 +16,12 @@ Playable = str | Motion | Timeline | MotionPlan | CheckedMotion
 timeline, a plan, or a motion that was checked before."""
 
 
-def compile_motion(motion: Playable, model: RobotModel) -> MotionPlan:
+def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
     """The plan of ``motion`` on the robot ``model``; what is compiled already is not done again.
+
+    Args:
+        motion: a ``Playable``; anything else is refused.
+        model: must not be that of a control loop that runs in another thread.
 
     Raises:
         CommandError: for an unknown name, or for what stands for no motion.

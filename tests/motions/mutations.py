@@ -18,7 +18,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, load_motion, motion_names
-from motions.keys import BodyKey, Frame, LegKey, LegTarget, BalanceShift
+from motions.keys import BalanceShift, BodyKey, Frame, LegKey, LegTarget
 from motions.timeline import AnyKey
 
 Mutator = Callable[[Timeline, np.random.Generator], Timeline | None]
