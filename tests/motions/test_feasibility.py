@@ -119,7 +119,7 @@ CAUSES = (
     ("joint speed", "landing speed", "continuity"),
     ("support of ZMP", "contact wrench", "foot load", "friction", "torque", "torque at speed"),
 )
-"""What cannot be reached; postures that are not allowed; balance; speed; forces."""
+"""Out of reach; postures the robot cannot take; places; balance; speed; forces."""
 
 
 def rank(check: str) -> int:
@@ -137,16 +137,16 @@ def test_causes_come_before_what_follows_from_them(
         assert len(set(ranks)) >= 2
         assert ranks == sorted(ranks)
         assert [rank(name) for name in report.margins] == sorted(map(rank, report.margins))
-        broken = [line.split("  ")[0] for line in report.table().splitlines() if " x  " in line]
+        broken = [line[:16].strip() for line in report.table().splitlines() if " x  " in line]
         assert broken == list(dict.fromkeys(finding.check for finding in report.failures))
         with pytest.raises(MotionInfeasible) as caught:
             report.raise_if_infeasible()
         assert str(report.failures[0]) == str(caught.value).splitlines()[1].strip()
-        for check in set(ranks):
+        for check in set(broken):
             times = [f.time for f in report.failures if f.check == check]
             assert times == sorted(times)
     # The jump of the trunk comes first, what is out of reach is the cause that is named first.
-    assert report.failures[0].check == "reach"
+    assert report.failures[0].check == "way of a foot"
     assert report.failures[0].time > 1.0 > min(finding.time for finding in report.failures)
 
 
@@ -196,7 +196,7 @@ def test_a_foot_that_moves_along_the_ground_is_found_and_one_that_rises_on_its_w
     back = Timeline().foot("FR", z=0.03, over=0.3).foot("FR", x=0.05, over=0.6).home(over=0.6)
     (finding,) = checker.check(back).failures
     assert finding.check == "dragging"
-    assert finding.value == pytest.approx(0.05, abs=1e-3)
+    assert finding.value == pytest.approx(0.05, abs=3e-3)  # and the last bit of the way down
 
 
 def test_legs_that_cross_are_found(checker: FeasibilityChecker) -> None:
@@ -213,7 +213,7 @@ def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: Feasibil
     with pytest.raises(CommandError, match="unknown motion 'bows'; valid: bow"):
         checker.check("bows")
     for ask in (FeasibilityChecker.check, FeasibilityChecker.evaluate, FeasibilityChecker.plan):
-        with pytest.raises(CommandError, match="motion must be a name of the library.* got 3"):
+        with pytest.raises(CommandError, match=r"motion must be a name of the library.* got 3"):
             inspect.unwrap(ask)(checker, 3)  # past the checks of types
 
 
