@@ -26,8 +26,9 @@ _Meaning = TypeVar("_Meaning", bound=Enum)
 
 def is_number(value: object) -> bool:
     """Whether it is a finite real number, and no truth value."""
-    is_real = isinstance(value, Real) and not isinstance(value, bool)
-    return is_real and math.isfinite(float(value))
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return False
+    return math.isfinite(float(value))
 
 
 def positive(name: str, value: float) -> float:
@@ -69,7 +70,7 @@ def word(kind: str, value: _Meaning | str, valid: Mapping[str, _Meaning]) -> _Me
     Raises:
         TimelineError: for an unknown word; lists the valid ones.
     """
-    meaning = valid.get(value) if isinstance(value, str) else value
-    if not any(meaning is item for item in valid.values()):  # a Leg equals its number
-        raise TimelineError(unknown_name(kind, str(value), valid))
-    return meaning
+    for name, meaning in valid.items():
+        if value is meaning or value == name:
+            return meaning
+    raise TimelineError(unknown_name(kind, str(value), valid))

@@ -156,7 +156,7 @@ class FeasibilityReport:
             if np.isfinite(finding.value):
                 value = 0.0 if abs(finding.value) < NOISE else finding.value
                 line += f"{value:>10.3g}{finding.limit:>9.3g}{finding.margin:>10.3g}"
-                lines.append(f"{line} {mark:<2} {finding.unit}")
+                lines.append(f"{line} {mark:<2} {finding.unit}".rstrip())
             else:
                 lines.append(f"{line}{'-':>10}{'-':>9}{'-':>10} {mark}")
         verdict = "can do it" if self.ok else f"cannot do it: {_count(len(self.failures), 'limit')}"
