@@ -355,7 +355,10 @@ def test_a_checked_motion_is_played_and_refused_without_compiling_or_checking_it
     checker = FeasibilityChecker()
     good = checker.evaluate("nod")
     bad = checker.evaluate(Timeline().body(z=0.18, over=1.0).home(over=1.0))
-    again = import_module("motions.feasibility.check"), import_module("motions.feasibility.playable")
+    again = (
+        import_module("motions.feasibility.check"),
+        import_module("motions.feasibility.playable"),
+    )
     for module, name in zip(again, ("trajectory_of", "compile_timeline"), strict=True):
         monkeypatch.setattr(module, name, lambda *_: pytest.fail("done twice"))
     assert standing.play(good)
