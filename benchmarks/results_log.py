@@ -11,8 +11,10 @@ import importlib.metadata
 import json
 import os
 import platform
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
+from typing import Any, NoReturn
 
 from benchmarks.scenario import Measurement
 from go2_wbc.config import Config
@@ -84,32 +86,31 @@ class ResultsLog:
     def _read(self, header: dict[str, str]) -> None:
         text = self._path.read_bytes()
         whole, _, damaged = text.rpartition(b"\n")
-        lines = whole.splitlines()
-        try:
-            found = json.loads(lines[0]) if lines else {}
-            results = [json.loads(line) for line in lines[1:]]
-            for result in results:
-                key = (result.pop("scenario"), result.pop("seed"))
-                self.finished[key] = Measurement(**result)
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
-            raise ConfigError(
-                f"{self._path} is damaged in the middle: {error}; run without --resume"
-            ) from error
+        rows = []
+        for number, line in enumerate(whole.splitlines(), 1):
+            try:
+                rows.append(dict(json.loads(line)))
+            except (ValueError, TypeError) as error:
+                self._refuse(f"line {number} is damaged", error)
+        found = rows[0] if rows else self._refuse("no results are in it")
         other = [
-            f"{name} {found.get(name)}, now {now}"
-            for name, now in header.items()
-            if found.get(name) != now
+            f"{key} {found.get(key)}, now {header[key]}"
+            for key in header
+            if found.get(key) != header[key]
         ]
         if other:
-            raise ConfigError(
-                f"{self._path} holds results under other settings ({'; '.join(other)}); run "
-                "without --resume to begin anew"
-            )
+            self._refuse(f"holds results under other settings ({'; '.join(other)})")
+        for row in rows[1:]:
+            key = (row.pop("scenario"), row.pop("seed"))
+            self.finished[key] = Measurement(**row)
         self.remark = f"{len(self.finished)} finished trials are taken from {self._path}"
         if damaged:
             self.remark += "; its damaged last line is ignored"
             os.truncate(self._path, len(text) - len(damaged))
 
+    def _refuse(self, why: str, cause: Exception | None = None) -> NoReturn:
+        raise ConfigError(f"{self._path}: {why}; run without --resume to begin anew") from cause
 
-def _line(values: dict[str, object]) -> bytes:
+
+def _line(values: Mapping[str, Any]) -> bytes:
     return (json.dumps(values) + "\n").encode()  # nan and infinity as Python writes and reads them

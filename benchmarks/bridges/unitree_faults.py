@@ -83,9 +83,13 @@ class Scene:
         self.client = client_of(self.observer.bus, SPORT_SERVICE)
         self._commands = self.observer.bus.writer("rt/lowcmd", idl.low_cmd())
 
+    def call(self, api: int, parameter: str = "{}") -> int:
+        """The code that a call of the sport service is answered with."""
+        return self.client.call(api, parameter, timeout=10.0).code
+
     def require_code(self, api: Api, code: Code = Code.OK) -> None:
         """Make sure that a call of the sport service is answered with ``code``."""
-        answered = self.client.call(api, "{}", timeout=10.0).code
+        answered = self.call(api)
         require(answered == code, f"{api.name} was answered {answered}")
 
     def stand_up(self) -> None:
