@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 from benchmarks.generated_motions import GeneratedMotion, generated_motion, near_limit_motion
@@ -79,20 +80,14 @@ def run(args: argparse.Namespace) -> int:
     return ExitCode.OK if matrix.ok else ExitCode.FAILED
 
 
-def measure(trial: Trial) -> Measurement:
-    """Check and play one clear motion, good or broken."""
-    return _check_and_play(generated_motion(trial.seed), trial)
+Make = Callable[[int], GeneratedMotion]
+"""Generates the motion of a seed."""
 
 
-def measure_near(trial: Trial) -> Measurement:
-    """Check and play one motion that may be close to a limit."""
-    return _check_and_play(near_limit_motion(trial.seed), trial)
-
-
-def _check_and_play(made: GeneratedMotion, trial: Trial) -> Measurement:
-    """The reasons of the check and of physics are kept as the metrics' failures."""
+def check_and_play(make: Make, trial: Trial) -> Measurement:
+    """One motion; the reasons of the check and of physics are kept as the metrics' failures."""
     model = RobotModel()
-    plan = made.plan(model)
+    plan = make(trial.seed).plan(model)
     report = FeasibilityChecker(model).check(plan)
     plant = MujocoPlant(
         friction=FRICTION, mass_scale=trial.mass_scale, seed=trial.seed, initial_yaw=trial.yaw
@@ -106,8 +101,9 @@ def _check_and_play(made: GeneratedMotion, trial: Trial) -> Measurement:
     return Measurement(values, {name: reason for name, reason in reasons.items() if reason})
 
 
-CLEAR_MOTIONS = Scenario("feasibility", (REFUSED, FAILED), measure)
-NEAR_LIMITS = Scenario("near limits", (REFUSED, FAILED), measure_near)
+METRICS = (REFUSED, FAILED)
+CLEAR_MOTIONS = Scenario("feasibility", METRICS, partial(check_and_play, generated_motion))
+NEAR_LIMITS = Scenario("near limits", METRICS, partial(check_and_play, near_limit_motion))
 
 
 def what_went_wrong(run: MotionMeasurement, plan: MotionPlan) -> list[str]:
@@ -160,19 +156,15 @@ class ConfusionMatrix:
     lost: dict[int, str]
 
     @staticmethod
-    def of(
-        measured: dict[int, Measurement], make: Callable[[int], GeneratedMotion]
-    ) -> ConfusionMatrix:
+    def of(measured: dict[int, Measurement], make: Make) -> ConfusionMatrix:
         """The matrix of the measurements of the motions that ``make`` generates, by seed."""
         found = {seed: one for seed, one in sorted(measured.items()) if one.values}
         cases = (
             Case(
                 seed,
                 make(seed).kind,
-                bool(one.values[REFUSED.name]),
-                bool(one.values[FAILED.name]),
-                one.failures.get(REFUSED.name, ""),
-                one.failures.get(FAILED.name, ""),
+                *(bool(one.values[metric.name]) for metric in METRICS),
+                *(one.failures.get(metric.name, "") for metric in METRICS),
             )
             for seed, one in found.items()
         )

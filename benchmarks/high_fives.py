@@ -69,7 +69,7 @@ def measure(trial: Trial) -> Measurement:
 def _measured(recorded: TruthRecording, leg: Leg) -> dict[str, float]:
     on_three_legs = recorded.part(longest_run(recorded.foot_forces[:, leg] == 0.0))
     ticks = round(HELD_TIME / float(recorded.time[-1] - recorded.time[-2]))
-    held = held_window(on_three_legs, leg, ticks)
+    held = on_three_legs.part(highest_window(on_three_legs.p_world_feet[:, leg, 2], ticks))
     support = [other for other in LEGS if other is not leg]
     model = RobotModel()
     return {
@@ -88,15 +88,6 @@ def _measured(recorded: TruthRecording, leg: Leg) -> dict[str, float]:
 def longest_run(flags: Bool[np.ndarray, " n"]) -> slice:
     """Where ``flags`` is true for the longest time; empty if nowhere."""
     return max(true_runs(flags), key=lambda run: run.stop - run.start, default=slice(0, 0))
-
-
-def held_window(recorded: TruthRecording, leg: Leg, ticks: int) -> TruthRecording:
-    """The consecutive ``ticks`` in which the least height of ``leg``'s paw is greatest.
-
-    Raises:
-        TrialFailed: if there are fewer.
-    """
-    return recorded.part(highest_window(recorded.p_world_feet[:, leg, 2], ticks))
 
 
 def highest_window(heights: Float[np.ndarray, " n"], length: int) -> slice:

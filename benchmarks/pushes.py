@@ -13,8 +13,6 @@ PUSH_TIME = 0.1
 """Duration [s] of a push."""
 IMPULSE_STEP = 2.0
 """N s between the impulses that are tried."""
-STEPS_ABOVE = 1
-"""Steps that are tried above the first impulse; what lies beyond is not looked for."""
 DIRECTIONS: dict[str, tuple[float, float, float]] = {
     "forward": (1.0, 0.0, 0.0),
     "backward": (-1.0, 0.0, 0.0),
@@ -24,6 +22,8 @@ DIRECTIONS: dict[str, tuple[float, float, float]] = {
     "down": (0.0, 0.0, -1.0),
 }
 """Unit vectors ahead, left, up of the robot."""
+FailureOf = Callable[[float, str], str | None]
+"""Pushes a robot with an impulse [N s] in a direction; says what went wrong, or None."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,13 +60,10 @@ def force_of(impulse: float, direction: str) -> np.ndarray:
     return np.array(DIRECTIONS[direction]) * impulse / PUSH_TIME
 
 
-def measure_impulses(
-    pushes: tuple[PushMetric, ...], failure_of: Callable[[float, str], str | None]
-) -> Measurement:
+def measure_impulses(pushes: tuple[PushMetric, ...], failure_of: FailureOf) -> Measurement:
     """Search the largest impulse of every metric.
 
-    ``failure_of(impulse, direction)`` pushes a robot and says what went wrong, or None. A metric
-    below its threshold counts as failed, with what went wrong at the least impulse.
+    A metric below its threshold counts as failed, with what went wrong at the least impulse.
     """
     values: dict[str, float] = {}
     failures: dict[str, str] = {}
@@ -78,7 +75,7 @@ def measure_impulses(
     return Measurement(values, failures)
 
 
-def _search(push: PushMetric, failure_of: Callable[[float, str], str | None]) -> tuple[float, str]:
+def _search(push: PushMetric, failure_of: FailureOf) -> tuple[float, str]:
     """The largest impulse [N s] that is survived, and why the least of the others is not."""
     failures: dict[float, str] = {}
 
@@ -97,17 +94,12 @@ def _search(push: PushMetric, failure_of: Callable[[float, str], str | None]) ->
 def largest_impulse(survives: Callable[[float], bool], first: float) -> float:
     """The largest impulse [N s] that is survived, beginning at ``first``.
 
-    From a survived first impulse it goes up until one is not survived, by ``STEPS_ABOVE`` steps at
-    most; from one that is not, down until one is. Zero if none is.
+    From a survived first impulse it goes one step up, and what lies beyond is not looked for; from
+    one that is not, down until one is. Zero if none is.
     """
     impulse = first
-    if not survives(impulse):
+    while impulse > 0.0 and not survives(impulse):
         impulse -= IMPULSE_STEP
-        while impulse > 0.0 and not survives(impulse):
-            impulse -= IMPULSE_STEP
-        return max(impulse, 0.0)
-    for _ in range(STEPS_ABOVE):
-        if not survives(impulse + IMPULSE_STEP):
-            break
-        impulse += IMPULSE_STEP
-    return impulse
+    if impulse == first and survives(first + IMPULSE_STEP):
+        return first + IMPULSE_STEP
+    return max(impulse, 0.0)

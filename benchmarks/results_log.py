@@ -13,7 +13,6 @@ import os
 import platform
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NoReturn
 
 from benchmarks.scenario import Measurement
@@ -64,24 +63,13 @@ class ResultsLog:
             self._read(header)
         else:
             write_atomically(self._path, _line(header))
-        self._file = os.open(self._path, os.O_WRONLY | os.O_APPEND)
 
     def append(self, scenario: str, seed: int, measurement: Measurement) -> None:
         """Keep a result; whoever kills the process leaves a whole line or a damaged last one."""
         values, failures = dict(measurement.values), dict(measurement.failures)
         result = {"values": values, "failures": failures, "reason": measurement.reason}
-        os.write(self._file, _line({"scenario": scenario, "seed": seed, **result}))
-
-    def __enter__(self) -> ResultsLog:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        os.close(self._file)
+        with self._path.open("ab", buffering=0) as file:
+            file.write(_line({"scenario": scenario, "seed": seed, **result}))
 
     def _read(self, header: dict[str, str]) -> None:
         text = self._path.read_bytes()

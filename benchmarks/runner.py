@@ -48,8 +48,11 @@ def run_tasks(tasks: Sequence[Task], jobs: int) -> Iterator[Done]:
                 yield scenario, seed, measurement
         except BrokenProcessPool:
             suspects, left = left[:jobs], left[jobs:]  # trials are started in their order
-            for task in suspects:
-                yield from _alone(task)
+            for task in suspects:  # again, each in a process of its own
+                try:
+                    yield from _in_one_pool([task], 1)
+                except BrokenProcessPool:
+                    yield *task, Measurement({}, reason="its process died twice")
 
 
 def run_trial(measure: Callable[[Trial], Measurement], seed: int) -> Measurement:
@@ -63,14 +66,6 @@ def run_trial(measure: Callable[[Trial], Measurement], seed: int) -> Measurement
         return Measurement({}, reason=reason)
     finally:
         gc.collect()  # robots hold tens of megabytes of records, in cycles
-
-
-def _alone(task: Task) -> Iterator[Done]:
-    """One trial again, in a process of its own; if that dies as well, the trial has failed."""
-    try:
-        yield from _in_one_pool([task], 1)
-    except BrokenProcessPool:
-        yield *task, Measurement({}, reason="its process died twice")
 
 
 def _in_one_pool(tasks: Sequence[Task], jobs: int) -> Iterator[Done]:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.goals import way_between
-from benchmarks.high_fives import held_window
+from benchmarks.high_fives import highest_window
 from benchmarks.postures import standing_failure
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial, TrialFailed, TrialRobot
@@ -127,9 +127,10 @@ def _turn(robot: TrialRobot, before: RobotState) -> str | None:
 
 
 def _high_five(robot: TrialRobot, _before: RobotState) -> str | None:
-    leg, ticks = Leg.FR, round(PAW_TIME / robot.plant.control_period)
+    recorded, leg = robot.truth.recording(), Leg.FR
+    ticks = round(PAW_TIME / robot.plant.control_period)
     try:
-        held = held_window(robot.truth.recording(), leg, ticks)
+        held = recorded.part(highest_window(recorded.p_world_feet[:, leg, 2], ticks))
     except TrialFailed as failed:
         return str(failed)
     height = float(held.p_world_feet[:, leg, 2].min())

@@ -13,7 +13,7 @@ from typing import Any
 from benchmarks.report import render, summarise, threshold_text
 from benchmarks.results_log import ResultsLog
 from benchmarks.runner import Results, Task, run_tasks
-from benchmarks.scenario import Measurement, Scenario
+from benchmarks.scenario import Scenario
 from controller.cli.common import ExitCode, print_json
 from controller.cli.progress import ProgressLine
 from go2_wbc.files import checked_output, write_atomically
@@ -68,25 +68,24 @@ def run_and_report(
 def measure_all(args: argparse.Namespace, tasks: Sequence[Task]) -> Results:
     """Run the tasks, tell of every result on standard error, and keep it on disk at once."""
     results: Results = {scenario.name: {} for scenario, _ in tasks}
-    with (
-        ResultsLog(LOG_FOLDER / f"{args.command}.jsonl", resume=args.resume) as log,
-        ProgressLine(sys.stderr) as line,
-    ):
-        if log.remark:
-            print(log.remark, file=sys.stderr)
-        left = []
-        for scenario, seed in tasks:
-            if (scenario.name, seed) in log.finished:
-                results[scenario.name][seed] = log.finished[scenario.name, seed]
-            else:
-                left.append((scenario, seed))
+    log = ResultsLog(LOG_FOLDER / f"{args.command}.jsonl", resume=args.resume)
+    if log.remark:
+        print(log.remark, file=sys.stderr)
+    left = []
+    for scenario, seed in tasks:
+        if measurement := log.finished.get((scenario.name, seed)):
+            results[scenario.name][seed] = measurement
+        else:
+            left.append((scenario, seed))
+    with ProgressLine(sys.stderr) as line:
         line.update(0.0, "starting")
         for scenario, seed, measurement in run_tasks(left, getattr(args, "jobs", 1)):
             log.append(scenario.name, seed, measurement)
             results[scenario.name][seed] = measurement
             done = sum(map(len, results.values()))
             place = f"{done}/{len(tasks)} {scenario.name}, seed {seed}"
-            line.done(f"{place}: {_failures(measurement) or 'ok'}")
+            failures = [f"{metric}: {why}" for metric, why in measurement.failures.items()]
+            line.done(f"{place}: {measurement.reason or '; '.join(failures) or 'ok'}")
             line.update(done / len(tasks), place)
     return results
 
@@ -106,11 +105,6 @@ def publish(
         print_json(values)
     else:
         print(table)
-
-
-def _failures(measurement: Measurement) -> str:
-    failures = (f"{metric}: {why}" for metric, why in measurement.failures.items())
-    return measurement.reason or "; ".join(failures)
 
 
 def _print_list(scenarios: Sequence[Scenario]) -> None:

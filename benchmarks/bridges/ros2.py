@@ -15,7 +15,6 @@ from benchmarks.bridges.ros2_processes import (
     probing,
     quiet_client,
     serving,
-    stay_on_this_machine,
 )
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial
@@ -56,7 +55,6 @@ def measure(_trial: Trial) -> Measurement:
         MissingDependency: if ROS 2 is not installed.
         BridgeError: if the server does not start or stops answering.
     """
-    stay_on_this_machine()
     from controller.bridges.ros2.demo import run_steps
 
     with joined(), serving(namespace=NAMESPACE):

@@ -24,7 +24,6 @@ from benchmarks.bridges.ros2_processes import (
     probing,
     quiet_client,
     serving,
-    stay_on_this_machine,
 )
 from benchmarks.scenario import Measurement, Scenario
 from benchmarks.trials import Trial, TrialFailed
@@ -358,7 +357,6 @@ def measure(_trial: Trial) -> Measurement:
     Raises:
         MissingDependency: if ROS 2 is not installed.
     """
-    stay_on_this_machine()
     with joined(), closing(Scene()) as scene:
         return run_all(FAULTS, scene.tilt_during)
 

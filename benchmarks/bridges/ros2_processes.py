@@ -41,14 +41,10 @@ ODOM_QUEUE: Final = 5
 """Messages of odometry that wait for a probe: more of them would be stale on a busy machine."""
 
 
-def stay_on_this_machine() -> None:
-    """Keep this process and its children on the loopback, unless a range was chosen."""
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-
-
 @contextmanager
 def joined() -> Iterator[None]:
-    """ROS in this process, as ``rclpy.init()`` makes it."""
+    """ROS in this process and its children, on the loopback unless a range was chosen."""
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     from controller.bridges.ros2 import imports as ros
 
     ros.rclpy.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)

@@ -132,7 +132,7 @@ class Observer:
 
     @property
     def tilt(self) -> float:
-        """Largest of roll and pitch [rad]."""
+        """Larger of roll and pitch [rad]."""
         return tilt_of(self.now())
 
     @property

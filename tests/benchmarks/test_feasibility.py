@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks import feasibility
 from benchmarks.__main__ import main
-from benchmarks.feasibility import ConfusionMatrix, render, what_went_wrong
+from benchmarks.feasibility import CLEAR_MOTIONS, ConfusionMatrix, render, what_went_wrong
 from benchmarks.generated_motions import BROKEN, GOOD, NEAR, generated_motion, near_limit_motion
 from benchmarks.runner import run_trial
 from benchmarks.scenario import Measurement
@@ -167,13 +167,13 @@ def test_a_robot_that_does_not_get_ready_is_a_lost_run_and_not_a_bug(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(GO2Controller, "stand", lambda _go2: False)
-    measured = run_trial(feasibility.measure, 0)
+    measured = run_trial(CLEAR_MOTIONS.measure, 0)
     assert (measured.values, measured.reason) == ({}, "lying, nothing asked yet")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(0, 2 * len(BROKEN), 3))
 def test_the_check_foresees_what_physics_does(seed: int) -> None:
-    measured = feasibility.measure(Trial(seed))
+    measured = CLEAR_MOTIONS.measure(Trial(seed))
     assert measured.values["feasibility.failed"] == float(generated_motion(seed).is_broken is True)
     assert measured.values["feasibility.refused"] == float(generated_motion(seed).is_broken is True)

@@ -39,9 +39,9 @@ class Interrupted:
 def file(tmp_path: Path) -> Path:
     """Two results of a run that has ended."""
     file = tmp_path / "results.jsonl"
-    with ResultsLog(file, resume=False) as log:
-        log.append("trot", 0, FIRST)
-        log.append("trot", 7, SECOND)
+    log = ResultsLog(file, resume=False)
+    log.append("trot", 0, FIRST)
+    log.append("trot", 7, SECOND)
     return file
 
 
@@ -84,10 +84,10 @@ def test_without_resume_everything_is_measured_again(only: Only) -> None:
 
 
 def test_results_come_back_to_the_last_digit(file: Path) -> None:
-    with ResultsLog(file, resume=True) as log:
-        assert set(log.finished) == {("trot", 0), ("trot", 7)}
-        assert log.finished["trot", 0] == FIRST
-        assert math.isnan(log.finished["trot", 7].values["a"])
+    log = ResultsLog(file, resume=True)
+    assert set(log.finished) == {("trot", 0), ("trot", 7)}
+    assert log.finished["trot", 0] == FIRST
+    assert math.isnan(log.finished["trot", 7].values["a"])
 
 
 def test_the_first_line_says_what_the_results_depend_on(file: Path) -> None:
@@ -99,13 +99,13 @@ def test_the_first_line_says_what_the_results_depend_on(file: Path) -> None:
 @pytest.mark.parametrize("cut", [1, 5, 30])
 def test_a_damaged_last_line_is_ignored_and_replaced(file: Path, cut: int) -> None:
     file.write_bytes(file.read_bytes()[:-cut])
-    with ResultsLog(file, resume=True) as log:
-        assert set(log.finished) == {("trot", 0)}
-        assert "its damaged last line is ignored" in log.remark
-        log.append("trot", 7, SECOND)
-    with ResultsLog(file, resume=True) as log:
-        assert set(log.finished) == {("trot", 0), ("trot", 7)}
-        assert "is ignored" not in log.remark
+    log = ResultsLog(file, resume=True)
+    assert set(log.finished) == {("trot", 0)}
+    assert "its damaged last line is ignored" in log.remark
+    log.append("trot", 7, SECOND)
+    again = ResultsLog(file, resume=True)
+    assert set(again.finished) == {("trot", 0), ("trot", 7)}
+    assert "is ignored" not in again.remark
 
 
 @pytest.mark.parametrize("line", [1, 2])
