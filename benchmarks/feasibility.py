@@ -163,8 +163,10 @@ class ConfusionMatrix:
             Case(
                 seed,
                 make(seed).kind,
-                *(bool(one.values[metric.name]) for metric in METRICS),
-                *(one.failures.get(metric.name, "") for metric in METRICS),
+                one.values[REFUSED.name] > 0.0,
+                one.values[FAILED.name] > 0.0,
+                one.failures.get(REFUSED.name, ""),
+                one.failures.get(FAILED.name, ""),
             )
             for seed, one in found.items()
         )
