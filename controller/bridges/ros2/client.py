@@ -1,4 +1,4 @@
-"""``GO2ControllerNode``: the seeds' controller as an ``rclpy`` node."""
+"""``GO2ControllerNode``: an ``rclpy`` node with the methods of ``GO2Controller``."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from controller.bridges.ros2.names import (
     ODOM,
     topic,
 )
-from controller.bridges.ros2.odometry import state_of
 from controller.bridges.ros2.repeater import Repeater
+from controller.bridges.ros2.states import state_of
 from controller.navigation import DriveStraight, Goal, TurnInPlace
 from go2_wbc.errors import BridgeError, MissingDependency
 from go2_wbc.planning.command import VelocityCommand
