@@ -14,7 +14,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Generic, Protocol, TypeVar, final
+from typing import Generic, Protocol, TypeVar, final, runtime_checkable
 
 from controller.procedures import Aborted, Figures, listed
 from go2_wbc.errors import Go2WbcError
@@ -23,6 +23,7 @@ from go2_wbc.robot.state import RobotState
 _log = logging.getLogger(__name__)
 
 
+@runtime_checkable
 class _Stoppable(Protocol):
     @property
     def state(self) -> RobotState: ...
