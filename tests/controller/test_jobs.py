@@ -378,14 +378,15 @@ def test_at_the_end_whoever_waits_is_told_once_and_nothing_is_accepted_any_more(
     assert queued.only("c") == Answer(False, "the server is ending", is_refused=True)
 
 
-def test_a_job_that_outlives_the_server_is_not_answered_again(
-    robot: Robot, threaded: Client
+def test_a_job_that_outlives_the_server_is_called_off_and_not_answered_again(
+    robot: Robot, threaded: Client, caplog: pytest.LogCaptureFixture
 ) -> None:
     has_begun = threading.Event()
 
-    def act(_job: Job) -> Figures:
+    def act(job: Job) -> Figures:
         has_begun.set()
         now(robot.is_limp)
+        assert job.is_cancelled
         return {}
 
     threaded.submit("dance", act)
@@ -394,6 +395,7 @@ def test_a_job_that_outlives_the_server_is_not_answered_again(
     robot.damp()
     threaded.jobs.abandon("the server is ending", HANG_GUARD)
     assert threaded.only("dance").message == "the server is ending"
+    assert "failed" not in caplog.text
 
 
 # --- many threads -------------------------------------------------------------------------------

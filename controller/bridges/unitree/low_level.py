@@ -17,13 +17,14 @@ from jaxtyping import Float, Shaped
 
 from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.checksum import is_intact, seal
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.layout import (
     FEET_TO_UNITREE,
     JOINTS_FROM_UNITREE,
     JOINTS_TO_UNITREE,
     MOTORS,
+    is_intact,
+    seal,
 )
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
+import signal
 import sys
 import threading
 import time
+from types import FrameType
 from typing import Final, final
 
 import numpy as np
 
 from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree.checksum import is_intact
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.extra import require_dds
 from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
-from controller.bridges.unitree.last_word import at_the_end, forget
-from controller.bridges.unitree.layout import LOW_CMD, LOW_STATE
+from controller.bridges.unitree.layout import LOW_CMD, LOW_STATE, is_intact
 from controller.bridges.unitree.low_client import low_cmd_message, sensor_reading
 from go2_wbc.errors import ClosedError, CommandError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
@@ -32,8 +33,8 @@ FIRST_STATE_LIMIT: Final = 5.0
 """Time [s] in which the robot must be found."""
 QUEUE: Final = 64
 """States that are kept while the controller is busy; the estimator takes in all of them."""
-FAREWELL, FAREWELL_PERIOD = 0.2, 0.005
-"""Time [s] for which damping is sent at the end, and between two of these commands."""
+EXIT_DAMPINGS, DAMPING_PERIOD = 40, 0.005
+"""How often damping is sent at the end, and the time [s] between two of these commands: 0.2 s."""
 WATCH: Final = 0.02
 """Time [s] between two looks whether the controller still sends commands."""
 STEP_TRIES, STEP_LIMIT, STEP_SILENCE = 5, 0.1, 0.02
@@ -126,7 +127,8 @@ class UnitreePlant(Plant):
     def _take_over(self) -> None:
         sys.setswitchinterval(min(sys.getswitchinterval(), SWITCH_INTERVAL))
         self._is_taken_over = True
-        at_the_end(self.close)
+        atexit.register(self.close)
+        _exit_on_signals()
         self._watchdog = threading.Thread(target=self._watch, name="unitree-watchdog", daemon=True)
         self._watchdog.start()
         self._fall_into_step()
@@ -183,11 +185,10 @@ class UnitreePlant(Plant):
         if self._is_closed:
             return
         self._is_closed = True
-        forget(self.close)
-        end = time.monotonic() + FAREWELL
-        while time.monotonic() < end:
+        atexit.unregister(self.close)
+        for _ in range(EXIT_DAMPINGS):
             self._damp_once()
-            time.sleep(FAREWELL_PERIOD)
+            time.sleep(DAMPING_PERIOD)
 
     def _check_open(self) -> None:
         if self._is_closed:
@@ -221,7 +222,7 @@ class UnitreePlant(Plant):
         lost, and what a robot does without any is not known.
         """
         while not self._is_closed:
-            time.sleep(WATCH if self._failure is None else FAREWELL_PERIOD)
+            time.sleep(WATCH if self._failure is None else DAMPING_PERIOD)
             with self._sending:
                 if self._is_closed:
                     return
@@ -317,3 +318,19 @@ class UnitreePlant(Plant):
                 f"the robot must lie on its belly at the start; its base is {height:.2f} m above "
                 f"its feet, tilted by {np.degrees(state.tilt):.0f} deg"
             )
+
+
+def _exit_on_signals() -> None:
+    """Let SIGTERM and SIGHUP end the interpreter as its exit handlers want it, which damp.
+
+    Signals that the program handles itself, and other threads' programs, are left alone.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, _exit)
+
+
+def _exit(number: int, frame: FrameType | None) -> None:
+    raise SystemExit(128 + number)
