@@ -16,7 +16,7 @@ RISE, HOLD, PERIOD = 2.0, 1.0, 0.002
 
 
 def main() -> None:
-    """Rise over two seconds, hold for one, then go limp."""
+    """Rise over two seconds of the robot's own time, hold for one, then go limp."""
     robot = unitree.UnitreeInterface.create_go2(sys.argv[1])
     deadline = time.monotonic() + 60.0
     while robot.read_low_state().imu.accel[2] < 1.0 and time.monotonic() < deadline:
@@ -26,8 +26,9 @@ def main() -> None:
     command = unitree.MotorCommand(12)
     command.kp, command.kd = [60.0] * 12, [5.0] * 12
     command.dq_target, command.tau_ff = [0.0] * 12, [0.0] * 12
-    began, sent = time.monotonic(), 0
-    while (now := time.monotonic() - began) < RISE + HOLD:
+    now, sent = 0.0, 0
+    while now < RISE + HOLD and time.monotonic() < deadline:
+        now = 0.001 * (robot.read_low_state().tick - first.tick)
         share = min(1.0, now / RISE)
         command.q_target = [a + share * (b - a) for a, b in zip(start, STANDING, strict=True)]
         robot.write_low_command(command)
