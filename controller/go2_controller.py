@@ -26,7 +26,14 @@ from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
-from motions import FeasibilityChecker, Motion, Timeline, compile_timeline, load_motion
+from motions import (
+    CompiledPlan,
+    FeasibilityChecker,
+    Motion,
+    Timeline,
+    compile_timeline,
+    load_motion,
+)
 from motions.library.high_five import HEIGHT as HIGH_FIVE_HEIGHT
 
 _log = logging.getLogger(__name__)
@@ -189,12 +196,16 @@ class GO2Controller:
 
     # --- motions --------------------------------------------------------------------------
 
-    def high_five(self, side: str = "right", hold: float = 2.0) -> bool:
+    def high_five(
+        self, side: str = "right", hold: float = 2.0, *, plan: CompiledPlan | None = None
+    ) -> bool:
         """Raise a front paw on three legs, hold it, tap, and come back to standing.
 
         Args:
             side: "right" or "left".
             hold: time [s] for which the paw is held up, 0.5 to 30.
+            plan: what ``load_motion("high_five", side=side, hold=hold)`` was compiled to before;
+                by default it is compiled now.
 
         Raises:
             CommandError: for another side or time.
@@ -202,10 +213,12 @@ class GO2Controller:
         leg, hold = front_leg(arguments.word("side", side)), arguments.finite("hold", hold)
         if not 0.5 <= hold <= 30.0:
             raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
-        timeline = load_motion("high_five", side=side, hold=hold, height=HIGH_FIVE_HEIGHT)
-        with self._planning:
-            plan = compile_timeline(timeline, self._checker.model)
-        return self._call("high_five", lambda: self._pilot.high_five(plan, leg, HIGH_FIVE_HEIGHT))
+        if plan is None:
+            timeline = load_motion("high_five", side=side, hold=hold, height=HIGH_FIVE_HEIGHT)
+            with self._planning:
+                plan = compile_timeline(timeline, self._checker.model)
+        ready = plan
+        return self._call("high_five", lambda: self._pilot.high_five(ready, leg, HIGH_FIVE_HEIGHT))
 
     def play(self, motion: str | Motion | Timeline | MotionPlan, *, check: bool = True) -> bool:
         """Play a motion: a name of the library, a timeline, or a compiled plan.

@@ -10,7 +10,14 @@ from controller.modes import Mode
 from controller.procedures import Aborted, Figures
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 from go2_wbc.reference import MotionPlan, Posture
-from motions import FeasibilityChecker, load_motion, motion_names
+from go2_wbc.robot.model import RobotModel
+from motions import (
+    CompiledPlan,
+    FeasibilityChecker,
+    compile_timeline,
+    load_motion,
+    motion_names,
+)
 from motions.authoring import Value
 
 HIGH_FIVE = "high_five"
@@ -84,19 +91,22 @@ def _measured(go2: GO2Controller, act: Callable[[GO2Controller], bool]) -> Figur
 
 def motion_job(motion: str, settings: Sequence[str], go2: GO2Controller, reply: Reply) -> Job:
     """The job that goes to where a motion starts and plays it."""
-    plans: list[MotionPlan] = []
+    plans: list[CompiledPlan] = []
+    values: dict[str, Value] = {}
 
     def prepare() -> None:
-        checked = FeasibilityChecker().evaluate(load_motion(motion, **parse_settings(settings)))
-        checked.report.raise_if_infeasible()
-        plans.append(checked.plan)
+        values.update(parse_settings(settings))
+        model = RobotModel()
+        plan = compile_timeline(load_motion(motion, **values), model)
+        FeasibilityChecker(model).check(plan).raise_if_infeasible()
+        plans.append(plan)
 
     def play(job: Job) -> bool:
-        values = parse_settings(settings)
+        (plan,) = plans
         if motion == HIGH_FIVE and values.keys() <= {"side", "hold"}:
             job.phase = "playing"
-            return go2.high_five(str(values.get("side", "right")), float(values.get("hold", 2.0)))
-        (plan,) = plans
+            side, hold = str(values.get("side", "right")), float(values.get("hold", 2.0))
+            return go2.high_five(side, hold, plan=plan)
         if not _take_entry(go2, plan) or job.is_cancelled:
             return False
         job.phase = "playing"

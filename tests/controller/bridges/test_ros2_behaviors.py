@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import logging
 import math
+import sys
 import threading
 import time
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
@@ -18,6 +21,8 @@ from controller.modes import Mode
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError, ModeError
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
+from motions.compiler import compile_timeline
+from motions.feasibility.report import FeasibilityReport
 from tests.controller.fake_go2 import FakeGo2
 from tests.controller.plants import PERIOD, WatchedPlant
 
@@ -122,6 +127,29 @@ def test_a_motion_is_prepared_beside_the_loop_and_played_from_lying() -> None:
         answer = played(go2, "nod", "times=1")
         assert answer.success, answer.message
         assert go2.mode is Mode.STANDING
+
+
+def test_a_high_five_is_compiled_and_checked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    # It was compiled for the check, and again by the robot's own high five, in the loop's thread.
+    done: list[str] = []
+
+    def counted(name: str, real: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*args: Any) -> Any:
+            done.append(f"{name} in {threading.current_thread().name}")
+            return real(*args)
+
+        return call
+
+    for module in [m for name, m in sys.modules.items() if name.startswith(("motions", "contro"))]:
+        if vars(module).get("compile_timeline") is compile_timeline:
+            monkeypatch.setattr(module, "compile_timeline", counted("compiled", compile_timeline))
+    report = counted("checked", FeasibilityReport.of)
+    monkeypatch.setattr(FeasibilityReport, "of", staticmethod(report))
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        answer = played(go2, "high_five", "hold=0.5", "side=left")
+    assert answer.success, answer.message
+    assert "mean paw height" in answer.message
+    assert done == ["compiled in prepare", "checked in prepare"]
 
 
 @pytest.mark.parametrize(
