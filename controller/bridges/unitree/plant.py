@@ -40,9 +40,10 @@ WATCH: Final = 0.02
 STEP_TRIES, STEP_LIMIT, STEP_SILENCE = 5, 0.1, 0.02
 """How often, and how long each time [s], the plant tries to fall into step with the robot, and the
 silence [s] that shows that it has."""
-REPEAT: Final = 0.01
-"""Silence [s] of the robot after which a command is sent again: it, or its answer, may be lost, and
-a simulator in lockstep waits for it."""
+REPEAT, REPEATS = 0.01, 10
+"""Silence [s] of the robot after which a command is sent again, and how often at most until the
+limit of stale states: it, or its answer, may be lost, and a simulator in lockstep waits for it. One
+that is only slow takes the repetition for the next command: where more is allowed, wait longer."""
 SWITCH_INTERVAL: Final = 0.0005
 """Time [s] for which another thread may keep Python to itself, so that the loop keeps its pace."""
 LOOPBACK: Final = "lo"
@@ -102,6 +103,7 @@ class UnitreePlant(Plant):
 
         model = RobotModel()
         self._config = guards or GuardConfig()
+        self._repeat = max(REPEAT, self._config.stale_limit / REPEATS)
         self._guards = Guards(model, self._config)
         self._estimator = StateEstimator(model, estimator)
         self._model = model
@@ -256,14 +258,14 @@ class UnitreePlant(Plant):
         )
 
     def _hears_a_state(self) -> bool:
-        """Take the next state; False if the robot is silent for ``REPEAT``."""
+        """Take the next state; False if the robot is silent for a while."""
         while (state := self._take()) is None:
             silence = time.monotonic() - self._heard
             left = self._config.stale_limit - silence
             if left < 0.0:
                 reason = f"no rt/lowstate for {1000 * silence:.0f} ms on {self._where}"
                 raise self._stop(PlantTimeout(reason))
-            if not self._states.wait(min(REPEAT, left + 0.001)):
+            if not self._states.wait(min(self._repeat, left + 0.001)):
                 return False
         self._state = state
         return True
