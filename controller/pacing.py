@@ -7,6 +7,9 @@ import time
 from collections.abc import Callable
 from typing import final
 
+SWITCH_INTERVAL = 0.0005
+"""Time [s] for which one thread may keep the interpreter to itself: a quarter of a control period
+instead of Python's two and a half, so that other work does not hold up the control loop."""
 NAP = 0.001
 """Longest sleep [s] between two calls of ``meanwhile``."""
 LOG_PERIOD = 5.0

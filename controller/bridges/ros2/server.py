@@ -39,7 +39,7 @@ from controller.bridges.ros2.states import StatePublisher
 from controller.bridges.ros2.velocity import VelocityInput
 from controller.go2_controller import GO2Controller
 from controller.jobs import Answer, JobServer
-from controller.pacing import LogThrottle, Pacer
+from controller.pacing import SWITCH_INTERVAL, LogThrottle, Pacer
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.viewer import open_viewer
@@ -48,8 +48,6 @@ _log = logging.getLogger(__name__)
 
 IDLE = 0.01
 """Robot time [s] that passes at a time while nothing is ordered."""
-SWITCH_INTERVAL = 0.0005
-"""Time [s] for which a thread may keep the interpreter from the control loop."""
 LATE = 0.25
 """Lag [s] behind the wall clock after which the pace is given up and taken up anew."""
 LINGER = 0.2

@@ -19,6 +19,7 @@ from controller.bridges.unitree.extra import require_dds
 from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
 from controller.bridges.unitree.layout import LOW_CMD, LOW_STATE, is_intact
 from controller.bridges.unitree.low_client import low_cmd_message, sensor_reading
+from controller.pacing import SWITCH_INTERVAL
 from go2_wbc.errors import ClosedError, CommandError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.estimator import EstimatorConfig, StateEstimator
@@ -44,8 +45,6 @@ REPEAT, REPEATS = 0.01, 10
 """Silence [s] of the robot after which a command is sent again, and how often at most until the
 limit of stale states: it, or its answer, may be lost, and a simulator in lockstep waits for it. One
 that is only slow takes the repetition for the next command: where more is allowed, wait longer."""
-SWITCH_INTERVAL: Final = 0.0005
-"""Time [s] for which another thread may keep Python to itself, so that the loop keeps its pace."""
 LOOPBACK: Final = "lo"
 """Where simulators live, which need not have a motion switcher; a robot has one."""
 CONSENT: Final = (

@@ -23,6 +23,7 @@ from controller.bridges.unitree.sport_api import (
 )
 from controller.bridges.unitree.sport_robot import SportRobot
 from controller.bridges.unitree.sport_service import SportService
+from controller.pacing import SWITCH_INTERVAL
 from go2_wbc.config import Config, load_config
 from go2_wbc.errors import BridgeError
 from go2_wbc.plant import MujocoPlant
@@ -35,9 +36,6 @@ SIMULATOR_DOMAIN: Final = 1
 LOOPBACK: Final = "lo"
 DISCOVERY: Final = 0.5
 """Time [s] that another robot gets to be heard; some hundredths on an idle machine."""
-SWITCH_INTERVAL: Final = 0.0005
-"""Time [s] for which one thread may keep Python to itself: a quarter of a control period, not two
-and a half, so that planning a motion does not hold up the control loop."""
 
 
 @dataclass(frozen=True, slots=True)
