@@ -100,15 +100,15 @@ def serve(
         ros.rclpy.init(args=[], context=context, signal_handler_options=ros.SignalHandlerOptions.NO)
         stack.callback(ros.rclpy.shutdown, context=context)
         stack.callback(NamespaceLock(namespace, context.get_domain_id()).close)
-        lookout = ros.Node(
-            f"go2_wbc_lookout_{os.getpid()}",
+        graph_node = ros.Node(
+            f"go2_wbc_graph_watch_{os.getpid()}",
             namespace=namespace,
             context=context,
             start_parameter_services=False,
             enable_rosout=False,
         )
-        stack.callback(lookout.destroy_node)
-        watch = GraphWatch(lookout, namespace)
+        stack.callback(graph_node.destroy_node)
+        watch = GraphWatch(graph_node, namespace)
         watch.check()
         has_clock = not (settings.realtime or watch.has_clock)
         plant = HookedPlant(MujocoPlant(visuals=settings.viewer))
@@ -207,7 +207,7 @@ class RobotNode:
         """One turn after a control period; called by the plant."""
         began = time.thread_time()
         self._ticks += 1
-        self._guarded(self._turn)
+        self._guarded(self._serve_once)
         if stop.is_set() and self._jobs.job is not None:
             self._guarded(self._jobs.damp)
         self._cpu += time.thread_time() - began
@@ -216,7 +216,7 @@ class RobotNode:
         if self._viewer is not None:
             self._viewer.show(self._go2.state.time)
 
-    def _turn(self) -> None:
+    def _serve_once(self) -> None:
         service, act = next(self._triggers)
         for call in service.take():
             act(call)

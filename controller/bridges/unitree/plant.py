@@ -38,8 +38,8 @@ EXIT_DAMPINGS, DAMPING_PERIOD = 40, 0.005
 """How often damping is sent at the end, and the time [s] between two of these commands: 0.2 s."""
 WATCH: Final = 0.02
 """Time [s] between two looks whether the controller still sends commands."""
-STEP_TRIES, STEP_LIMIT, STEP_SILENCE = 5, 0.1, 0.02
-"""How often, and how long each time [s], the plant tries to fall into step with the robot, and the
+SYNC_TRIES, SYNC_LIMIT, SYNC_SILENCE = 5, 0.1, 0.02
+"""How often, and how long each time [s], the plant tries to get into step with the robot, and the
 silence [s] that shows that it has."""
 REPEAT, REPEATS = 0.01, 10
 """Silence [s] of the robot after which a command is sent again, and how often at most until the
@@ -132,7 +132,7 @@ class UnitreePlant(Plant):
         _exit_on_signals()
         self._watchdog = threading.Thread(target=self._watch, name="unitree-watchdog", daemon=True)
         self._watchdog.start()
-        self._fall_into_step()
+        self._synchronise()
 
     @property
     def control_period(self) -> float:
@@ -269,21 +269,21 @@ class UnitreePlant(Plant):
         self._state = state
         return True
 
-    def _fall_into_step(self) -> None:
+    def _synchronise(self) -> None:
         """Take in what came before a command was heard: from then on a write is a period.
 
         A simulator in lockstep falls silent once it obeys. What lives by the clock never does.
         """
-        for _ in range(STEP_TRIES):
+        for _ in range(SYNC_TRIES):
             self._send(JointCommand.damping(DAMPING))
-            if self._hears_silence(STEP_LIMIT):
+            if self._hears_silence(SYNC_LIMIT):
                 break
         self._heard = time.monotonic()
 
     def _hears_silence(self, limit: float) -> bool:
         end = time.monotonic() + limit
         while time.monotonic() < end:
-            if not self._states.wait(STEP_SILENCE):
+            if not self._states.wait(SYNC_SILENCE):
                 return True
             self._state = self._take() or self._state
         return False
