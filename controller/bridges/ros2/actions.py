@@ -10,10 +10,9 @@ import threading
 from typing import Any
 
 from controller.bridges.ros2 import imports as ros
-from controller.bridges.ros2.behaviors import Jobs, check_motion_name, motion_job
+from controller.bridges.ros2.behaviors import Jobs, motion_job
 from controller.bridges.ros2.names import MOTION_ACTION, MOTION_NODE, Rates, topic
-from controller.jobs import Answer, Job, Reply
-from go2_wbc.errors import CommandError
+from controller.jobs import Answer, Job
 
 _log = logging.getLogger(__name__)
 
@@ -66,7 +65,8 @@ class MotionActions:
             answers.append(answer)
             answered.set()
 
-        self._submit(handle.request, reply)
+        goal = handle.request
+        self._jobs.submit(motion_job(goal.motion, list(goal.settings), self._jobs.robot, reply))
         while not answered.wait(self._period):
             if handle.is_cancel_requested:  # again and again: one that came early gets lost
                 self._jobs.cancel()
@@ -74,14 +74,6 @@ class MotionActions:
             if job is not None:
                 handle.publish_feedback(self._feedback(job))
         return self._conclude(handle, answers[0])
-
-    def _submit(self, goal: Any, reply: Reply) -> None:
-        try:
-            check_motion_name(goal.motion)
-        except CommandError as error:
-            reply(Answer(False, str(error)))
-            return
-        self._jobs.submit(motion_job(goal.motion, list(goal.settings), self._jobs.robot, reply))
 
     def _feedback(self, job: Job) -> Any:
         feedback, go2 = ros.PlayMotion.Feedback(), self._jobs.robot

@@ -11,13 +11,7 @@ from controller.procedures import Aborted, Figures
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.model import RobotModel
-from motions import (
-    CompiledPlan,
-    FeasibilityChecker,
-    compile_timeline,
-    load_motion,
-    motion_names,
-)
+from motions import CompiledPlan, FeasibilityChecker, compile_timeline, load_motion
 from motions.authoring import Value
 
 HIGH_FIVE = "high_five"
@@ -121,12 +115,6 @@ def _take_entry(go2: GO2Controller, plan: MotionPlan) -> bool:
     if plan.entry is Posture.SIT:
         return go2.sit()
     return go2.lie_down()
-
-
-def check_motion_name(motion: str) -> None:
-    """Raise CommandError for a motion that the library does not have; lists those it has."""
-    if motion not in motion_names():
-        raise CommandError(unknown_name("motion", motion, motion_names()))
 
 
 def parse_settings(settings: Sequence[str]) -> dict[str, Value]:

@@ -152,6 +152,12 @@ def test_a_high_five_is_compiled_and_checked_once(monkeypatch: pytest.MonkeyPatc
     assert done == ["compiled in prepare", "checked in prepare"]
 
 
+def test_a_motion_that_does_not_exist_is_answered_with_those_that_do() -> None:
+    answer = played(FakeGo2(), "moonwalk")
+    assert not answer.success
+    assert answer.message.startswith("unknown motion 'moonwalk'; valid: bow,")
+
+
 @pytest.mark.parametrize(
     ("settings", "complaint"),
     [(["times=99"], "times"), (["times"], "name=value"), (["size=1"], "size")],
