@@ -202,7 +202,8 @@ class GO2Controller:
         Args:
             side: "right" or "left".
             hold: time [s] for which the paw is held up, 0.5 to 30.
-            plan: the library's motion with this side and time, if it is compiled already.
+            plan: what ``load_motion("high_five", side=side, hold=hold)`` was compiled to before;
+                by default it is compiled now.
 
         Raises:
             CommandError: for another side or time.
