@@ -14,7 +14,9 @@ if TYPE_CHECKING:
         FeasibilityChecker,
         FeasibilityReport,
         Finding,
+        Playable,
         check,
+        compile_motion,
     )
     from motions.registry import find_motion, load_file, load_motion, motion_names
     from motions.timeline import Timeline, deg
@@ -27,9 +29,11 @@ __all__ = [
     "FeasibilityReport",
     "Finding",
     "Motion",
+    "Playable",
     "Range",
     "Timeline",
     "check",
+    "compile_motion",
     "compile_timeline",
     "deg",
     "find_motion",
@@ -49,7 +53,9 @@ __getattr__ = lazy_exports(
             "FeasibilityChecker",
             "FeasibilityReport",
             "Finding",
+            "Playable",
             "check",
+            "compile_motion",
         ),
         "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
         "timeline": ("Timeline", "deg"),

@@ -12,8 +12,7 @@ from typing import final
 
 import viz
 from controller.cli.common import ExitCode, print_json
-from controller.cli.motion_args import the_motion
-from controller.cli.motion_source import MotionSource
+from controller.cli.motion_args import MotionSource, the_motion
 from controller.cli.progress import ProgressLine
 from controller.report_view import planned
 from go2_wbc.errors import Go2WbcError

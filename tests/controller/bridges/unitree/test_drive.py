@@ -8,9 +8,10 @@ from collections.abc import Iterator
 
 import pytest
 
-from benchmarks.bridges.unitree import drive
+from benchmarks.bridges.unitree import measure_drive
 from benchmarks.bridges.unitree_faults import DAMPED, garbage, scene
 from benchmarks.bridges.unitree_processes import own_domain, simulator
+from benchmarks.trials import Trial
 from controller.bridges.unitree.guards import GuardConfig
 from go2_wbc.errors import CommandError, PlantTimeout
 from go2_wbc.plant.base import Plant
@@ -34,7 +35,8 @@ def test_encoding_and_decoding_take_little_cpu() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("sensors", ["ideal", "noisy"])
 def test_it_stands_trots_and_gives_a_high_five(sensors: str) -> None:
-    result = drive(["--lockstep", "--sensors", sensors], ["--stale-limit", "2.0"])
+    simulator_options = ["--lockstep", "--sensors", sensors]
+    result = measure_drive(Trial(0), simulator_options, ["--stale-limit", "2.0"])
     assert result.values.get("unitree.steps") == 0.0, result
     assert result.values["unitree.mae"] < MAE_BAR
 

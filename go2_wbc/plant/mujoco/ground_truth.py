@@ -1,4 +1,4 @@
-"""The truth: a plant that passes everything on, and writes down what MuJoCo says every tick."""
+"""Ground truth: a plant that passes everything on and records what MuJoCo says after every tick."""
 
 from __future__ import annotations
 
@@ -11,20 +11,22 @@ from typing import final
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.plant import MujocoPlant, Plant
+from go2_wbc.plant.base import Plant
+from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.robot.description import BASE_LINK
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, RobotState
 
 FALLEN_TILT = math.radians(60.0)
 """Tilt of the trunk from which on the robot has fallen, whatever the controller thinks."""
 TIMED_EVERY = 100
-"""Every hundredth tick's watching is timed."""
+"""Every hundredth tick's recording is timed."""
 TOUCH = 1.0
 """Force [N] between trunk and ground that counts as a touch."""
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class TruthRecording:
     """What MuJoCo said, one row per tick, at the end of that tick.
 
     Attributes:
@@ -56,11 +58,11 @@ class Track:
     limb_force: Float[np.ndarray, " n"]
     touches_itself: Bool[np.ndarray, " n"]
 
-    def part(self, rows: slice) -> Track:
+    def part(self, rows: slice) -> TruthRecording:
         """Some of the ticks."""
-        return Track(*(getattr(self, name)[rows] for name in Track.__slots__))
+        return TruthRecording(*(getattr(self, name)[rows] for name in TruthRecording.__slots__))
 
-    def since(self, time: float) -> Track:
+    def since(self, time: float) -> TruthRecording:
         """The ticks after ``time`` [s]."""
         return self.part(slice(int(np.searchsorted(self.time, time, side="right")), None))
 
@@ -76,19 +78,38 @@ class Track:
         x, y, z = v_world.T
         return np.column_stack([c * x + s * y, c * y - s * x, z])
 
+    def torque_shares(self, model: RobotModel) -> Float[np.ndarray, " n"]:
+        """Largest |tau| / limit of any joint, at every tick."""
+        return (np.abs(self.tau) / model.torque_limits).max(axis=1)
+
+    def peak_speed_share(self, model: RobotModel) -> float:
+        """Largest |joint velocity| / limit of any joint."""
+        return float((np.abs(self.v[:, 6:]) / model.speed_limits).max())
+
+    def joint_distance(self, model: RobotModel) -> float:
+        """Least distance [rad] of any joint to its limit; negative beyond it."""
+        q = self.q[:, 7:]
+        return float(np.minimum(q - model.q_lower, model.q_upper - q).min())
+
+
+def true_runs(flags: Bool[np.ndarray, " n"]) -> list[slice]:
+    """Where ``flags`` is true without a gap, in order."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
 
 @final
 class GroundTruth(Plant):
-    """Passes everything on to a ``MujocoPlant`` and keeps a track since the last ``clear``.
+    """Passes everything on to a ``MujocoPlant`` and records its state since the last ``clear``.
 
     Attributes:
         start: plant time [s] of the last ``clear``.
-        cpu_time: processor time [s] that watching has taken, from a sample of the ticks.
+        cpu_time: processor time [s] that recording has taken, from a sample of the ticks.
         on_tick: called after every tick, for events in the middle of a call; or None.
     """
 
     def __init__(self, plant: MujocoPlant) -> None:
-        """Stand between a controller and ``plant``."""
+        """Record what a controller does to ``plant``."""
         self._plant = plant
         self._base = plant.model.body(BASE_LINK).id
         self.on_tick: Callable[[], None] | None = None
@@ -105,9 +126,9 @@ class GroundTruth(Plant):
         return self._plant.read()
 
     def write(self, command: JointCommand) -> None:
-        """Apply ``command`` for one control period, and write down what came of it."""
+        """Apply ``command`` for one control period, and record what came of it."""
         self._plant.write(command)
-        self._note()
+        self._record()
         if self.on_tick is not None:
             self.on_tick()
 
@@ -116,10 +137,10 @@ class GroundTruth(Plant):
         self._plant.close()
 
     def clear(self) -> None:
-        """Forget the track; a new one begins with the present state."""
+        """Forget what was recorded; begin again with the present state."""
         self.start = self._plant.time
         self._rows: list[tuple[np.ndarray | float, ...]] = []
-        self._note()
+        self._record()
 
     def fall(self) -> str | None:
         """Why the robot counts as fallen at this moment, or None."""
@@ -135,21 +156,15 @@ class GroundTruth(Plant):
         """Centre of mass [m] now, by MuJoCo."""
         return self._plant.data.subtree_com[self._base].copy()
 
-    def track(self) -> Track:
+    def recording(self) -> TruthRecording:
         """Everything since the last ``clear``."""
         columns = [np.array(column) for column in zip(*self._rows, strict=True)]
         columns[3][:, 2] = np.unwrap(columns[3][:, 2])
-        return Track(*columns)
+        return TruthRecording(*columns)
 
-    def _note(self) -> None:
-        if len(self._rows) % TIMED_EVERY:
-            self._write_down()
-            return
-        began = time.thread_time()  # a slow call on some machines
-        self._write_down()
-        self.cpu_time += TIMED_EVERY * (time.thread_time() - began)
-
-    def _write_down(self) -> None:
+    def _record(self) -> None:
+        is_timed = len(self._rows) % TIMED_EVERY == 0  # asking is a slow call on some machines
+        began = time.thread_time() if is_timed else 0.0
         plant, state = self._plant, self._plant.read()
         contacts = plant.foot_contacts()
         self._rows.append(
@@ -169,3 +184,5 @@ class GroundTruth(Plant):
                 plant.touches_itself,
             )
         )
+        if is_timed:
+            self.cpu_time += TIMED_EVERY * (time.thread_time() - began)
