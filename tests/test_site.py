@@ -124,12 +124,7 @@ def test_the_picture_of_the_packages_is_that_of_their_imports() -> None:
     assert packages["motions"] == packages["viz"] == {"go2_wbc"}
     assert "errors" in graph.graph_of(modules, "go2_wbc")["robot"]
     drawn = graph.svg(packages, graph.sizes(modules, "packages"), "packages")
-    assert drawn == graph.svg(graph.graph_of(graph.read_modules(), "packages"), *_notes(graph))
     assert all(f">{name}</text>" in drawn for name in packages)
-
-
-def _notes(graph: ModuleType) -> tuple[dict[str, str], str]:
-    return graph.sizes(graph.read_modules(), "packages"), "packages"
 
 
 def test_a_docstring_keeps_its_bars_and_its_indented_blocks() -> None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
 from html import escape
 from pathlib import Path
 
@@ -38,7 +39,8 @@ class Module:
     tree: ast.Module
 
 
-def read_modules(root: Path = ROOT) -> dict[str, Module]:
+@cache
+def read_modules(root: Path = ROOT) -> Mapping[str, Module]:
     """All modules of the packages, by name, without importing them."""
     found = {}
     for file in (file for package in PACKAGES for file in sorted((root / package).rglob("*.py"))):
