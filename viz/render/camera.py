@@ -77,8 +77,10 @@ class Camera:
     def H_floor_picture(self) -> Float[np.ndarray, "3 3"]:
         """Homography from (column, row, 1) [px] to floor (x, y, 1) [m] up to scale.
 
-        The third component is positive where the pixel shows the floor, negative above the
-        horizon.
+        The ray of a pixel is d = M (column, row, 1), here ``ray`` @ it, and the eye e + s d meets
+        the floor z = 0 at s = -e_z / d_z: x = e_x - e_z d_x / d_z, so that x (-d_z) = e_z d_x -
+        e_x d_z, and likewise y. The third component, -d_z, is positive where the pixel shows the
+        floor, negative above the horizon.
         """
         focal = self.focal_length
         right, up, back = self.R_camera_world
