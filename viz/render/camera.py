@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -47,15 +47,7 @@ class Camera:
 
     def scaled(self, factor: int) -> Camera:
         """The same view on a picture ``factor`` times as large."""
-        size = (self.size[0] * factor, self.size[1] * factor)
-        return Camera(
-            self.p_world_target,
-            self.azimuth,
-            self.elevation,
-            self.distance,
-            size,
-            self.field_of_view,
-        )
+        return replace(self, size=(self.size[0] * factor, self.size[1] * factor))
 
     def project(self, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """World points [m] to column, row [px] and nearness [1/m].
