@@ -6,7 +6,7 @@ the air and kicks. The joints' rates follow from the feet's Jacobians, and nothi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -121,7 +121,9 @@ def test_place_and_speed_of_an_exactly_known_motion_are_found(
 
 def test_what_needs_no_estimate_is_passed_on(motion: Motion, model: RobotModel) -> None:
     reading = motion.readings[7]
-    state = StateEstimator(model).update(reading)
+    scaled = replace(reading, quaternion=1.01 * reading.quaternion)
+    state = StateEstimator(model).update(scaled)
+    assert state.q[3:7] == pytest.approx(reading.quaternion, abs=1e-12)
     assert state.time == reading.time
     assert state.tau.tolist() == reading.tau.tolist()
     assert state.foot_forces.tolist() == reading.foot_forces.tolist()
