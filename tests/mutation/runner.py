@@ -24,7 +24,7 @@ NOT_COPIED = shutil.ignore_patterns(
 LIBRARIES = ("pinocchio", "mujoco", "placo", "hypothesis", "qpsolvers", "scipy.interpolate")
 BUSY = 8.0  # real time against CPU time on a loaded machine; beyond, a test waits for ever
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (tests/.*?)(?: - .*)?$", re.MULTILINE)
-_PASSED_CODES = (0, 5)  # 5: no test was selected
+_BAD_CONFTEST, _NO_TESTS = 4, 5  # pytest's exit codes
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +62,7 @@ class Sandbox:
         """Run tests up to the first failure, for at most ``limit`` seconds of CPU time."""
         told = self.home.with_suffix(".txt")
         command = [*targets, "-q", "-m", marker, "-rfE", "-p", "no:cacheprovider"]
+        command += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # libraries are loaded
         command += ["-x", *(f"--deselect={name}" for name in excluded)]
         before = _used()
         process = multiprocessing.get_context("fork").Process(
@@ -74,8 +75,11 @@ class Sandbox:
             if process.is_alive():
                 os.killpg(process.pid or 0, signal.SIGKILL)
                 process.join()
-        passed = process.exitcode in _PASSED_CODES
-        failed = [*_FAILED.findall(told.read_text()), f"exit code {process.exitcode}"][0]
+        code, text = process.exitcode or 0, told.read_text()
+        failed = [*_FAILED.findall(text), f"exit code {code}"][0]
+        if failed.startswith("exit") and code > 0 and code not in (_BAD_CONFTEST, _NO_TESTS):
+            raise RuntimeError(f"the tests did not run: {text[-2000:]}")
+        passed = code in (0, _NO_TESTS)
         return Outcome(passed, "" if passed else failed, _used() - before)
 
 
