@@ -104,14 +104,15 @@ def _run_pytest(home: Path, told: Path, command: list[str], limit: int) -> None:
 
 
 def nearest_tests(root: Path, path: str) -> list[str]:
-    """A module's tests: those at its place and its folder's, then its package's that import it."""
+    """A module's tests: at its place or its folder's, and those of its package that import it."""
     place, package = Path("tests", path), path.split("/")[0]
     module = path.removesuffix(".py").replace("/", ".")
     named = sorted((root / place.parent).glob(f"test_{place.stem}*.py"))
     named += (root / place.parent.parent).glob(f"test_{place.parent.stem}.py")
     files = sorted((root / "tests" / package).rglob("test_*.py"))
     importing = [file for file in files if file not in named and module in file.read_text()]
-    return [str(file.relative_to(root)) for file in [*named, *importing]]
+    found = [*named, *importing] or sorted((root / place.parent).glob("test_*.py"))
+    return [str(file.relative_to(root)) for file in found]
 
 
 def _used() -> float:

@@ -67,6 +67,11 @@ class LeastSquares:
         self._rows.append(row.ravel() / sigma)
         self._values.append(value / sigma)
 
+    def begin(self, state: np.ndarray) -> None:
+        """What is assumed before the first reading."""
+        for row, value, sigma in zip(np.eye(6), state, DEVIATIONS, strict=True):
+            self.say(0, row, value, sigma)
+
     def push(self, tick: int, a: float) -> None:
         """Position and velocity follow from those before and the acceleration ``a``."""
         p, v = np.eye(6)[:2]
@@ -89,22 +94,20 @@ def most_likely(given: list[SensorReading], model: RobotModel) -> np.ndarray:
     begin = np.vstack([start, np.zeros(3), start + feet[0]])
     p, v, *f = np.eye(6)
     last = np.zeros((6, 3))
-    for axis in range(3):
-        told = LeastSquares()
-        for i, sigma in enumerate(DEVIATIONS):
-            told.say(0, np.eye(6)[i], begin[i, axis], sigma)
-        for tick, reading in enumerate(given):
-            for leg in range(4):
-                told.say(tick, f[leg] - p, feet[tick, leg, axis], CONFIG.place)
-                told.say(tick, v, 0.0, CONFIG.velocity / trust[leg])
-                if axis == 2:
-                    told.say(tick, f[leg], model.foot_radius, CONFIG.height / trust[leg])
-                if tick:
-                    told.say(tick, f[leg], 0.0, CONFIG.foot_drift / trust[leg] * STEP, -f[leg])
-            if not (reading.foot_forces > low).any():
-                told.say(tick, v, 0.0, CONFIG.rest)
+    for axis, told in enumerate([LeastSquares() for _ in range(3)]):
+        told.begin(begin[:, axis])
+        for tick, leg in np.ndindex(COUNT, 4):
+            told.say(tick, f[leg] - p, feet[tick, leg, axis], CONFIG.place)
+            told.say(tick, v, 0.0, CONFIG.velocity / trust[leg])
+            if axis == 2:
+                told.say(tick, f[leg], model.foot_radius, CONFIG.height / trust[leg])
             if tick:
-                told.push(tick, (reading.accelerometer - GRAVITY)[axis])
+                told.say(tick, f[leg], 0.0, CONFIG.foot_drift / trust[leg] * STEP, -f[leg])
+        if not (given[0].foot_forces > low).any():
+            for tick in range(COUNT):
+                told.say(tick, v, 0.0, CONFIG.rest)
+        for tick in range(1, COUNT):
+            told.push(tick, (given[tick].accelerometer - GRAVITY)[axis])
         last[:, axis] = told.last()
     return last
 
