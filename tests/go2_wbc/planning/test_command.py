@@ -95,6 +95,14 @@ def test_a_clipped_command_lies_inside(
     assert abs(clipped.angular_z) <= envelope.turning + ROUNDING
 
 
+@given(envelope=envelopes, command=commands)
+def test_what_was_clipped_is_inside_and_returned_as_it_is(
+    envelope: VelocityEnvelope, command: VelocityCommand
+) -> None:
+    clipped = envelope.clip(command)
+    assert envelope.clip(clipped) is clipped
+
+
 @given(envelopes, commands)
 def test_clipping_keeps_the_direction_and_uses_the_whole_envelope(
     envelope: VelocityEnvelope, command: VelocityCommand
