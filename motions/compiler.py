@@ -29,11 +29,15 @@ from motions.timeline import Timeline
 from motions.tracks import LegTracks, body_path, configurations, flights, home_poses
 
 SAMPLE_PERIOD = 0.01
-"""Time [s] between the instants at which a timeline is sampled."""
+"""Time [s] between the instants at which a timeline is sampled. A cubic spline through samples of f
+misses it by 5/384 h^4 max|d4f/dt4| at most (Hall & Meyer 1976): 0.2 um for a way L of 0.1 m by
+minimum jerk in T = 0.4 s, where the derivative is 360 L / T^4 at most."""
 REACH_TOLERANCE = 1e-3
-"""Distance [m] by which a place may be out of reach before it counts."""
+"""Distance [m] by which a place may be out of reach before it counts: own choice, less than what
+tracking adds."""
 UNLOAD_TIME = 0.3
-"""Time [s] over which a foot gives up its load before lift-off, if there is that much."""
+"""Time [s] over which a foot gives up its load before lift-off, if there is that much: own choice,
+so that the forces of the others change slowly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +103,15 @@ class CompiledPlan(MotionPlan):
 
 
 def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
-    """The plan of ``timeline``.
+    """The plan of ``timeline``, in the frame of the motion.
+
+    It tracks the CoM, which balance is about, and not the base. Clamped splines begin and end at
+    rest.
+
+    Args:
+        timeline: what to compile.
+        model: of the robot; compiling uses its data, so it must not be that of a control loop that
+            runs in another thread.
 
     Raises:
         TimelineError: if it is empty.
