@@ -50,7 +50,7 @@ class FeasibilityLimits:
     self_distance: float = 0.005
     clearance: float = 0.02
     swing_depth: float = 0.005
-    drag_height: float = 0.001
+    drag_height: float = 0.0005
     drag: float = 0.01
     landing: float = 0.01
     landing_speed: float = 0.6
