@@ -49,7 +49,7 @@ class Goal(ABC):
         """Whether the resting robot is at the goal."""
 
     @abstractmethod
-    def figures(self, state: RobotState) -> dict[str, float]:
+    def measurements(self, state: RobotState) -> dict[str, float]:
         """What was asked and achieved, by name with unit."""
 
 
@@ -116,7 +116,7 @@ class TurnInPlace(Goal):
         """Whether the heading is right to 1.5 deg."""
         return abs(self._angle - self._odometer.turned(state)) < HEADING_TOLERANCE
 
-    def figures(self, state: RobotState) -> dict[str, float]:
+    def measurements(self, state: RobotState) -> dict[str, float]:
         """Angle asked and turned."""
         return {
             "asked [deg]": math.degrees(self._angle),
@@ -168,7 +168,7 @@ class DriveStraight(Goal):
         miss = math.hypot(self._distance - ahead, left)
         return miss < DISTANCE_TOLERANCE and abs(self._odometer.turned(state)) < HEADING_TOLERANCE
 
-    def figures(self, state: RobotState) -> dict[str, float]:
+    def measurements(self, state: RobotState) -> dict[str, float]:
         """Distance asked and walked, and the heading error."""
         ahead, left = self._odometer.displacement(state)
         return {

@@ -60,7 +60,7 @@ class Deviation:
             and self.joints < JOINT_TOLERANCE
         )
 
-    def figures(self) -> dict[str, float]:
+    def measurements(self) -> dict[str, float]:
         """By name with unit."""
         return {
             "mean place off plan [m]": self.place,

@@ -105,8 +105,8 @@ def test_an_ideal_robot_turns_by_the_angle_and_stays_in_place(
     goal = TurnInPlace(angle)
     end = walk(goal, x, y, yaw)
     assert goal.is_within_tolerance(end)
-    assert goal.figures(end)["turned [deg]"] == pytest.approx(
-        goal.figures(end)["asked [deg]"], abs=0.5
+    assert goal.measurements(end)["turned [deg]"] == pytest.approx(
+        goal.measurements(end)["asked [deg]"], abs=0.5
     )
     assert end.q[:2] == pytest.approx([x, y], abs=0.01)
 
