@@ -228,7 +228,7 @@ class GO2Controller:
         Its call then returns False. A motion on three feet goes the way back, or on, that it knows.
         """
         self._check_open()
-        self._pilot.recall()
+        self._pilot.return_safely()
 
     @property
     def progress(self) -> float:

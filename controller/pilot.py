@@ -58,7 +58,7 @@ class Pilot:
         self._gait: Gait | None = None
         self._goal: Goal | None = None
         self.playing: PlayPlan | None = None
-        self._is_recalled = False
+        self._must_return = False
         self._mode = Mode.LYING if self.is_on_the_ground else Mode.DAMPED
 
     @property
@@ -79,7 +79,7 @@ class Pilot:
     def begin(self) -> None:
         """Begin a procedure: the mode is from now on what the last fault, if any, has made it."""
         self._mode = self.mode
-        self._is_recalled = False
+        self._must_return = False
         self._runner.begin()
 
     # --- postures -------------------------------------------------------------------------
@@ -240,7 +240,7 @@ class Pilot:
             StanceMismatch: if the plan starts from another stance.
         """
         self._meet_entry(plan)
-        if self._is_recalled:
+        if self._must_return:
             raise Aborted(
                 f"{plan.name} was cancelled before it began", self._procedures.measurements()
             )
@@ -256,7 +256,7 @@ class Pilot:
 
         try:
             self._procedures.until(finished, plan.duration + 1.0, plan.name)
-            if self._is_recalled:
+            if self._must_return:
                 raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
             self._procedures.settle(plan.name, _CHECK_OF_POSTURE[plan.exit])
         finally:
@@ -267,11 +267,11 @@ class Pilot:
             raise Aborted(f"{plan.name} went another way: {listed(measured)}", measured)
         return measured
 
-    def recall(self) -> None:
+    def return_safely(self) -> None:
         """Let the procedure that plays a motion leave it and stand; any thread may call it."""
-        self._is_recalled, playing = True, self.playing
+        self._must_return, playing = True, self.playing
         if playing is not None:
-            playing.recall()
+            playing.return_safely()
 
     def _meet_entry(self, plan: MotionPlan) -> None:
         mode = self.mode
@@ -318,8 +318,10 @@ class Pilot:
         if self.mode is not Mode.STANDING:
             self._ensure_standing()
         walking = self._start_walking("trot")
-        if not walking.square_up(self._loop.snapshot):
-            loop = self._loop
+        loop = self._loop
+        with self._runner.lock():  # the planner may be at work in another thread
+            is_square = walking.square_up(loop.snapshot)
+        if not is_square:
             self._mode = Mode.WALKING
             self._procedures.until(
                 lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "square the feet"

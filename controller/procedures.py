@@ -16,6 +16,8 @@ SETTLE_LIMIT = 3.0
 """Time [s] in which a posture must come to rest after its motion."""
 CALM_TIME = 0.1
 """Time [s] for which a posture must hold without a break."""
+ROUNDING = 1e-9
+"""Time [s] by which a sum of control periods may miss its end."""
 SINK_TIME = 1.0
 """Time [s] for which a robot that went limp on its feet is watched: it sinks, or it falls."""
 
@@ -85,7 +87,7 @@ class ProcedureRunner:
 
     def let_pass(self, seconds: float) -> None:
         """Let time pass, whatever happens in it."""
-        end = self.loop.state.time + seconds - 1e-9
+        end = self.loop.state.time + seconds - ROUNDING
         while self.loop.state.time < end:
             self._runner.advance_until(lambda: False, end - self.loop.state.time)
 
