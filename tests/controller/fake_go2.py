@@ -97,6 +97,10 @@ class FakeGo2(GO2Controller):
         return self._outcome
 
     @property
+    def telemetry(self) -> Telemetry:
+        return self._telemetry
+
+    @property
     def state(self) -> RobotState:
         zeros = np.zeros(4)
         q, v = np.zeros(19), np.zeros(18)

@@ -169,7 +169,9 @@ class GO2ControllerNode(ros.Node):
                 return self._conclude(goal.name, False, "odometry has ceased")
             state = newer
         state = self._come_to_rest(state)
-        figures = ", ".join(f"{name} {value:.3f}" for name, value in goal.figures(state).items())
+        figures = ", ".join(
+            f"{name} {value:.3f}" for name, value in goal.measurements(state).items()
+        )
         return self._conclude(goal.name, goal.is_within_tolerance(state), figures)
 
     def _come_to_rest(self, state: RobotState) -> RobotState:

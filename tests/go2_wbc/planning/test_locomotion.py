@@ -87,6 +87,13 @@ class IdealRobot:
 # --- standing and starting ------------------------------------------------------------------------
 
 
+def test_before_it_has_started_it_is_not_stepping_and_has_no_heading() -> None:
+    # It had no attribute to tell it by.
+    planner = LocomotionPlanner(MODEL, TROT, CONFIG)
+    assert not planner.is_stepping
+    assert planner.heading == 0.0
+
+
 def test_without_a_command_it_stands_and_holds_its_place() -> None:
     start = resting(yaw=0.4)
     planner = started(start)
