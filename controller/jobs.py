@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar, final, runtime_checkable
 
-from controller.procedures import Aborted, Figures, listed
+from controller.procedures import Aborted, Measurements, listed
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.robot.state import RobotState
 
@@ -76,7 +76,7 @@ class Job:
     """
 
     name: str
-    act: Callable[[Job], Figures]
+    act: Callable[[Job], Measurements]
     reply: Reply
     prepare: Callable[[], None] | None = None
     begin: Callable[[], str] = lambda: ""
@@ -227,7 +227,7 @@ class JobServer(Generic[Robot]):
         return True
 
     def _carry_out(self, job: Job) -> Answer:
-        figures: Figures = {}
+        measured: Measurements = {}
         error: Exception | None = None
         refusal = message = ""
         try:
@@ -236,7 +236,7 @@ class JobServer(Generic[Robot]):
                     raise job._error
                 refusal = f"{job.name} was cancelled" if job.is_cancelled else job.begin()
             if not refusal:
-                figures = job.act(job)
+                measured = job.act(job)
         except (Aborted, Go2WbcError) as failure:
             error, message = failure, str(failure) or f"{job.name} was cancelled"
         except Exception as failure:  # a bug must not leave its caller without an answer
@@ -248,8 +248,8 @@ class JobServer(Generic[Robot]):
             return Answer(False, message, duration, is_cancelled, error=error)
         if refusal:
             return Answer(False, refusal, duration, job.is_cancelled, is_refused=True)
-        measured = f": {listed(figures)}" if figures else ""
-        return Answer(True, f"done in {duration:.1f} s{measured}", duration)
+        told = f": {listed(measured)}" if measured else ""
+        return Answer(True, f"done in {duration:.1f} s{told}", duration)
 
     def _take_turn(self) -> None:
         """Let the next job have its turn; the lock is held."""
