@@ -243,6 +243,7 @@ def test_the_limits_in_the_table_are_those_of_the_checker() -> None:
         "friction": f"<= {limits.friction:g}",
         "self-collision": f">= {1000 * limits.self_distance:g} mm",
         "clearance": f">= {1000 * limits.clearance:g} mm; feet >= -{1000 * limits.swing_depth:g}",
+        "dragging": f"<= {1000 * limits.drag:g} mm",
         "landing place": f"<= {1000 * limits.landing:g} mm",
         "landing speed": f"<= {limits.landing_speed:g} m/s",
         "continuity": f"<= {limits.body_jump:g}, {limits.body_jump:g}, {limits.joint_jump:.1f}",

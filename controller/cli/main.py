@@ -118,6 +118,11 @@ def run_program(program: Program, argv: Sequence[str] | None = None) -> int:
     return code
 
 
+def high_five_demo() -> int:
+    """The console script of this name: ``go2-wbc demo``."""
+    return main(["demo", *sys.argv[1:]])
+
+
 def build_parser(
     program: Program, module: ModuleType | None, requested: str | None
 ) -> argparse.ArgumentParser:

@@ -16,7 +16,7 @@ import pytest
 from controller.cli import demo, demo_files, demo_run, main
 from controller.cli.common import ExitCode
 from controller.cli.demo_files import DemoFiles
-from controller.demo import main as high_five_demo
+from controller.cli.main import high_five_demo
 from controller.demo import run_demo
 from go2_wbc.errors import ConfigError, PlantTimeout
 from tests.controller.fake_go2 import FakeGo2
@@ -242,8 +242,11 @@ def test_a_value_out_of_range_is_a_usage_error(
     assert options[0] in capsys.readouterr().err
 
 
-def test_the_seed_codes_script_is_the_same_command(capsys: pytest.CaptureFixture[str]) -> None:
-    assert high_five_demo(["--help"]) == ExitCode.OK
+def test_the_script_of_the_course_is_the_same_command(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["high_five_demo", "--help"])
+    assert high_five_demo() == ExitCode.OK
     assert capsys.readouterr().out.startswith("usage: go2-wbc demo")
 
 
