@@ -22,7 +22,7 @@ from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial
 from controller.bridges.unitree import layout
 from controller.bridges.unitree.codec import codec_of
-from controller.bridges.unitree.low_client import low_cmd_message
+from controller.bridges.unitree.low_level import low_cmd_message
 from controller.bridges.unitree.sport_api import SPORT_SERVICE, Api
 from go2_wbc.robot.state import JointCommand
 

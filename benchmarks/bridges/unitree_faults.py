@@ -19,7 +19,7 @@ from benchmarks.scenario import Measurement, Scenario
 from benchmarks.trials import Trial
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.layout import LOW_CMD
-from controller.bridges.unitree.low_client import low_cmd_message
+from controller.bridges.unitree.low_level import low_cmd_message
 from controller.bridges.unitree.sport_api import (
     SPORT_SERVICE,
     SWITCHER_SERVICE,

@@ -8,11 +8,10 @@ from controller.go2_controller import GO2Controller
 from controller.jobs import Answer, Job, JobServer, Reply
 from controller.modes import Mode
 from controller.procedures import Aborted, Measurements
-from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
+from go2_wbc.errors import Go2WbcError, unknown_name
 from go2_wbc.reference import MotionPlan, Posture
-from go2_wbc.robot.model import RobotModel
-from motions import CompiledPlan, FeasibilityChecker, compile_timeline, load_motion
-from motions.authoring import Value
+from motions import CompiledPlan, FeasibilityChecker, load_motion
+from motions.authoring import Value, parse_values
 
 HIGH_FIVE = "high_five"
 STOP, DAMP = "stop", "damp"
@@ -85,19 +84,16 @@ def _measured(go2: GO2Controller, act: Callable[[GO2Controller], bool]) -> Measu
 
 def motion_job(motion: str, settings: Sequence[str], go2: GO2Controller, reply: Reply) -> Job:
     """The job that goes to where a motion starts and plays it."""
-    plans: list[CompiledPlan] = []
+    plans: list[MotionPlan] = []
     values: dict[str, Value] = {}
 
     def prepare() -> None:
-        values.update(parse_settings(settings))
-        model = RobotModel()
-        plan = compile_timeline(load_motion(motion, **values), model)
-        FeasibilityChecker(model).check(plan).raise_if_infeasible()
-        plans.append(plan)
+        values.update(parse_values(settings))
+        plans.append(FeasibilityChecker().plan(load_motion(motion, **values)))
 
     def play(job: Job) -> bool:
         (plan,) = plans
-        if motion == HIGH_FIVE and values.keys() <= {"side", "hold"}:
+        if motion == HIGH_FIVE and isinstance(plan, CompiledPlan) and "height" not in values:
             job.phase = "playing"
             side, hold = str(values.get("side", "right")), float(values.get("hold", 2.0))
             return go2.high_five(side, hold, plan=plan)
@@ -115,24 +111,3 @@ def _take_entry(go2: GO2Controller, plan: MotionPlan) -> bool:
     if plan.entry is Posture.SIT:
         return go2.sit()
     return go2.lie_down()
-
-
-def parse_settings(settings: Sequence[str]) -> dict[str, Value]:
-    """``["hold=2.0", "side=left"]`` as values.
-
-    Raises:
-        CommandError: for one that is not NAME=VALUE.
-    """
-    return dict(_setting(text) for text in settings)
-
-
-def _setting(text: str) -> tuple[str, Value]:
-    name, equals, value = (part.strip() for part in text.partition("="))
-    if not (name and equals and value):
-        raise CommandError(f"a setting must be name=value, got {text!r}")
-    for kind in (int, float):
-        try:
-            return name, kind(value)
-        except ValueError:
-            continue
-    return name, value

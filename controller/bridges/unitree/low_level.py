@@ -1,4 +1,4 @@
-"""The robot's side of low-level control: ``rt/lowstate`` out, ``rt/lowcmd`` in.
+"""Low-level control: ``rt/lowcmd`` and ``rt/lowstate`` as ours, both ways, and the robot's gate.
 
 Commands are checked before they reach a motor. One that is broken is refused, counted and reported;
 when no good one has come for a while, the robot is damped.
@@ -19,6 +19,7 @@ from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree import layout
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.layout import (
+    FEET_FROM_UNITREE,
     FEET_TO_UNITREE,
     JOINTS_FROM_UNITREE,
     JOINTS_TO_UNITREE,
@@ -29,6 +30,7 @@ from controller.bridges.unitree.layout import (
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError
 from go2_wbc.plant.sensors import ImuSample
+from go2_wbc.robot.estimator import SensorReading
 from go2_wbc.robot.state import JointCommand, RobotState
 
 _log = logging.getLogger(__name__)
@@ -104,6 +106,35 @@ def fill_imu(target: Shaped[np.ndarray, "1"], imu: ImuSample, state: RobotState)
     target["quaternion"] = imu.quaternion[[3, 0, 1, 2]]
     target["gyroscope"], target["accelerometer"] = imu.gyro, imu.accelerometer
     target["rpy"] = state.rpy
+
+
+def low_cmd_message(command: JointCommand) -> Shaped[np.ndarray, "1"]:
+    """``rt/lowcmd`` that asks for ``command``; motors that do not exist stay switched off."""
+    message = layout.new_message(layout.LOW_CMD)
+    message["head"], message["level_flag"] = layout.HEAD, layout.LOW_LEVEL
+    motors = message["motor_cmd"][0, :MOTORS]
+    motors["mode"] = layout.SERVO
+    motors["q"], motors["dq"] = command.q_des[JOINTS_TO_UNITREE], command.v_des[JOINTS_TO_UNITREE]
+    motors["kp"], motors["kd"] = command.kp[JOINTS_TO_UNITREE], command.kd[JOINTS_TO_UNITREE]
+    motors["tau"] = command.tau[JOINTS_TO_UNITREE]
+    seal(message)
+    return message
+
+
+def sensor_reading(message: Shaped[np.ndarray, "1"]) -> SensorReading:
+    """What a ``rt/lowstate`` message says, in our order of legs and joints."""
+    motors = message["motor_state"][0, :MOTORS][JOINTS_FROM_UNITREE]
+    imu = message["imu_state"][0]
+    return SensorReading(
+        time=0.001 * float(message["tick"][0]),
+        quaternion=imu["quaternion"].astype(float)[[1, 2, 3, 0]],
+        gyro=imu["gyroscope"].astype(float),
+        accelerometer=imu["accelerometer"].astype(float),
+        q_joints=motors["q"].astype(float),
+        v_joints=motors["dq"].astype(float),
+        tau=motors["tau_est"].astype(float),
+        foot_forces=message["foot_force"][0].astype(float)[FEET_FROM_UNITREE],
+    )
 
 
 @final

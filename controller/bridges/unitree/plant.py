@@ -18,7 +18,7 @@ from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.extra import require_dds
 from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
 from controller.bridges.unitree.layout import LOW_CMD, LOW_STATE, is_intact
-from controller.bridges.unitree.low_client import low_cmd_message, sensor_reading
+from controller.bridges.unitree.low_level import low_cmd_message, sensor_reading
 from controller.pacing import SWITCH_INTERVAL
 from go2_wbc.errors import ClosedError, CommandError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from controller.bridges.ros2.behaviors import COMMANDS, Jobs, motion_job, order, parse_settings
+from controller.bridges.ros2.behaviors import COMMANDS, Jobs, motion_job, order
 from controller.bridges.ros2.names import CMD_VEL_SILENCE
 from controller.bridges.ros2.velocity import VelocityInput
 from controller.go2_controller import GO2Controller
@@ -21,6 +21,7 @@ from controller.modes import Mode
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError, ModeError
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
+from motions.authoring import parse_values
 from motions.compiler import compile_timeline
 from motions.feasibility.report import FeasibilityReport
 from tests.controller.fake_go2 import FakeGo2
@@ -160,7 +161,7 @@ def test_a_motion_that_does_not_exist_is_answered_with_those_that_do() -> None:
 
 @pytest.mark.parametrize(
     ("settings", "complaint"),
-    [(["times=99"], "times"), (["times"], "name=value"), (["size=1"], "size")],
+    [(["times=99"], "times"), (["times"], "NAME=VALUE"), (["size=1"], "size")],
 )
 def test_wrong_settings_are_answered_with_the_reason(settings: list[str], complaint: str) -> None:
     go2 = FakeGo2()
@@ -171,10 +172,10 @@ def test_wrong_settings_are_answered_with_the_reason(settings: list[str], compla
 
 
 def test_settings_are_read_as_numbers_or_words() -> None:
-    read = parse_settings(["hold=2.5", "times = 3", "side=left"])
+    read = parse_values(["hold=2.5", "times = 3", "side=left"])
     assert read == {"hold": 2.5, "times": 3, "side": "left"}
     with pytest.raises(CommandError, match="'side='"):
-        parse_settings(["side="])
+        parse_values(["side="])
 
 
 # --- velocities ---------------------------------------------------------------------------------

@@ -18,8 +18,7 @@ from controller.bridges.unitree import layout
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.guards import GuardConfig
 from controller.bridges.unitree.layout import seal
-from controller.bridges.unitree.low_client import low_cmd_message
-from controller.bridges.unitree.low_level import low_state_message
+from controller.bridges.unitree.low_level import low_cmd_message, low_state_message
 from go2_wbc.errors import CommandError, ConfigError, PlantError, PlantTimeout
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.base import Plant

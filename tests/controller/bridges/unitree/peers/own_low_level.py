@@ -16,7 +16,7 @@ from controller.bridges.unitree import idl, layout
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.layout import is_intact, seal
-from controller.bridges.unitree.low_client import low_cmd_message
+from controller.bridges.unitree.low_level import low_cmd_message
 from go2_wbc.robot.state import JointCommand
 
 LIMIT, PERIOD = 60.0, 0.002
