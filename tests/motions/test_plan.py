@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from motions import Timeline, compile_timeline, deg
 from motions.postures import sit_down
 
 STEP = 1e-5  # s; of the differences
-EXACT = dict(rtol=1e-5, atol=1e-5)
+EXACT: dict[str, Any] = {"rtol": 1e-5, "atol": 1e-5}
 START = np.array([0.02, -0.01, 0.25, 0.15, -0.2, 0.4])
 
 
