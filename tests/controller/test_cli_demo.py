@@ -183,6 +183,7 @@ def test_options_reach_plant_controller_and_engine(
         return FakeGo2()
 
     monkeypatch.setattr(demo_run, "GO2Controller", start)
+    monkeypatch.setattr(demo_run, "_has_display", lambda: True)  # no reason to open a viewer
     file = tmp_path / "mine.toml"
     file.write_text("[locomotion]\nheight = 0.27\n", encoding="utf-8")
     options = "--seed 3 --friction 0.4 --mass-scale 1.2 --realtime --backend full --solver proxqp"

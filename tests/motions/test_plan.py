@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from motions import Timeline, compile_timeline, deg
 from motions.postures import sit_down
 
 STEP = 1e-5  # s; of the differences
-EXACT = 1e-5
+EXACT: dict[str, Any] = {"rtol": 1e-5, "atol": 1e-5}
 START = np.array([0.02, -0.01, 0.25, 0.15, -0.2, 0.4])
 
 
@@ -31,20 +33,10 @@ def test_velocities_and_accelerations_of_a_plan_are_derivatives(make) -> None:  
         b0, b, b1 = before.body, now.body, after.body
         two = 2.0 * STEP
         assert b.p_world.shape == (3,)
-        np.testing.assert_allclose(
-            b.v_world, (b1.p_world - b0.p_world) / two, rtol=EXACT, atol=EXACT
-        )
-        np.testing.assert_allclose(
-            b.a_world, (b1.v_world - b0.v_world) / two, rtol=EXACT, atol=EXACT
-        )
+        np.testing.assert_allclose(b.v_world, (b1.p_world - b0.p_world) / two, **EXACT)
+        np.testing.assert_allclose(b.a_world, (b1.v_world - b0.v_world) / two, **EXACT)
         turned = log_rotation(b1.R_world_base @ b0.R_world_base.T) / two
-        np.testing.assert_allclose(b.w_world, turned, rtol=EXACT, atol=EXACT)
-        np.testing.assert_allclose(
-            b.dw_world, (b1.w_world - b0.w_world) / two, rtol=EXACT, atol=EXACT
-        )
-        np.testing.assert_allclose(
-            now.v_joints, (after.q_joints - before.q_joints) / two, rtol=EXACT, atol=EXACT
-        )
-        np.testing.assert_allclose(
-            now.a_joints, (after.v_joints - before.v_joints) / two, rtol=EXACT, atol=EXACT
-        )
+        np.testing.assert_allclose(b.w_world, turned, **EXACT)
+        np.testing.assert_allclose(b.dw_world, (b1.w_world - b0.w_world) / two, **EXACT)
+        np.testing.assert_allclose(now.v_joints, (after.q_joints - before.q_joints) / two, **EXACT)
+        np.testing.assert_allclose(now.a_joints, (after.v_joints - before.v_joints) / two, **EXACT)

@@ -87,7 +87,7 @@ class LeastSquares:
 def most_likely(given: list[SensorReading], model: RobotModel) -> np.ndarray:
     """Position, velocity and feet (6, 3) of the last instant, from all readings at once."""
     low, high = CONFIG.contact_force, CONFIG.trusted_force
-    trust = np.clip((given[0].foot_forces - low) / (high - low), 1e-3, 1.0)
+    trust = np.clip((given[0].foot_forces - low) / (high - low), 1e-3, 1.0).tolist()
     feet = np.array([_feet(reading, model) for reading in given])
     start = P_BASE_IMU.copy()
     start[2] = model.foot_radius - feet[0][:, 2].min()

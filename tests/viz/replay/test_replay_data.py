@@ -28,6 +28,19 @@ def test_frames_are_even_and_cover_the_recording(recording: Recording, robot: Po
     np.testing.assert_allclose(np.abs(frames.q[-1]), np.abs(recording.q[-1]))
 
 
+@pytest.mark.parametrize("jitter", [0.0, 0.2])
+def test_a_frame_shows_the_sample_nearest_to_its_time(
+    recording: Recording, robot: PosedRobot, jitter: float
+) -> None:
+    count, period = len(recording.time), 0.01
+    late = jitter * period * np.random.default_rng(0).uniform(-1.0, 1.0, count)
+    q = recording.q.copy()
+    q[:, 0] = period * np.arange(count)
+    frames = replay_frames(replace(recording, q=q, time=q[:, 0] + late), robot)
+    shown = frames.q[:-1, 0]
+    assert shown == pytest.approx(np.arange(len(shown)) / frames.rate, abs=0.8 * period)
+
+
 def test_a_spike_between_two_frames_is_not_lost(recording: Recording, robot: PosedRobot) -> None:
     tau, forces, margin = (
         recording.tau.copy(),

@@ -1,0 +1,66 @@
+"""A posture is one at any height of the ground, still, and with every foot down where it must."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.checks import is_lying, is_sitting, is_standing, posture_figures
+from go2_wbc.legs import LEGS
+from go2_wbc.reference import Posture
+from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import rotation_from_rpy
+from go2_wbc.robot.snapshot import Snapshot
+from motions.tracks import configuration, home_poses
+from tests.engine_helpers import state_of
+
+MODEL = RobotModel()
+HOME = home_poses(MODEL)
+LYING = 0.085  # m; of the base over the ground, on its belly
+CHECKS: dict[Posture, Callable[[Snapshot, RobotModel], bool]] = {
+    Posture.STAND: is_standing,
+    Posture.SIT: is_sitting,
+    Posture.LIE: is_lying,
+}
+
+
+def at_rest(posture: Posture, ground: float = 0.0, speed: float = 0.0) -> Snapshot:
+    """In ``posture`` with the feet below the hips, the ground at a height, the base moving."""
+    pose = HOME[posture].copy()
+    pose[2] = LYING if posture is Posture.LIE else pose[2]
+    feet = MODEL.p_base_feet_nominal.copy()
+    feet[:, 2] = MODEL.foot_radius
+    p_base_feet = (feet - pose[:3]) @ rotation_from_rpy(*pose[3:])
+    joints = [leg_angles(LegGeometry.of(MODEL, leg), p_base_feet[leg][None]).q[0] for leg in LEGS]
+    pose[2] += ground
+    state = state_of(configuration(pose, np.concatenate(joints)), np.full(18, speed))
+    return MODEL.snapshot(replace(state, feet_in_contact=np.ones(4, dtype=bool)))
+
+
+@pytest.mark.parametrize("ground", [0.0, 0.4, -1.3])
+@pytest.mark.parametrize("posture", Posture)
+def test_a_posture_is_known_whatever_the_height_of_the_ground(
+    posture: Posture, ground: float
+) -> None:
+    snapshot = at_rest(posture, ground)
+    assert [name for name, check in CHECKS.items() if check(snapshot, MODEL)] == [posture]
+    level = posture_figures(at_rest(posture), MODEL)
+    assert posture_figures(snapshot, MODEL) == pytest.approx(level, abs=1e-9)
+
+
+@pytest.mark.parametrize("posture", Posture)
+def test_a_robot_that_still_moves_is_in_no_posture(posture: Posture) -> None:
+    moving = at_rest(posture, speed=0.06)
+    assert not any(check(moving, MODEL) for check in CHECKS.values())
+
+
+@pytest.mark.parametrize("posture", [Posture.STAND, Posture.SIT])
+def test_a_foot_in_the_air_is_no_posture_on_four_feet(posture: Posture) -> None:
+    snapshot = at_rest(posture)
+    touching = np.array([True, True, False, True])
+    raised = replace(snapshot, state=replace(snapshot.state, feet_in_contact=touching))
+    assert not CHECKS[posture](raised, MODEL)

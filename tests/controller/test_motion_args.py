@@ -1,0 +1,11 @@
+"""Which motions a command line means."""
+
+from __future__ import annotations
+
+from controller.cli.motion_args import timelines
+from motions import motion_names
+
+
+def test_without_a_word_the_whole_library_is_meant_and_with_one_that_motion() -> None:
+    assert [line.name for line in timelines([], [])] == list(motion_names())
+    assert [line.name for line in timelines(["bow"], [])] == ["bow"]
