@@ -4,7 +4,7 @@
 SHELL := bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-ros2 test-unitree gates format bench doctor clean
+.PHONY: help demo test test-ros2 test-unitree test-dist gates format docs bench doctor clean
 
 # A shell that has sourced another robot stack would put its own Pinocchio before ours.
 unexport PYTHONPATH
@@ -43,17 +43,24 @@ test-unitree: $(VENV)/.stamp-unitree ## the tests of Unitree's protocol, with it
 	GO2_WBC_CPP_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/cpp/bin/python \
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal tests/controller/bridges/unitree $(ARGS)
 
-gates: $(VENV)/.stamp-dev ## lint, formatting and types
+test-dist: $(VENV)/.stamp-dev ## build wheel and sdist, use each in an empty environment
+	tests/distribution.sh $(BIN)/python
+
+gates: $(VENV)/.stamp-dev ## lint, formatting, types, who imports whom
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports --no-cache
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
 format: $(VENV)/.stamp-dev ## fix what lint and formatting can fix
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-bench: $(VENV)/.stamp-run ## run the benchmarks
-	$(BIN)/go2-wbc bench $(ARGS)
+docs: $(VENV)/.stamp-dev ## build the documentation site in docs/_build/html
+	$(BIN)/python -m sphinx -W --keep-going -q docs docs/_build/html
+
+bench: $(VENV)/.stamp-run ## run a benchmark: make bench ARGS='behaviour --quick'
+	$(BIN)/python -m benchmarks $(ARGS)
 
 doctor: $(VENV)/.stamp-run ## say what is installed and what is missing
 	$(BIN)/go2-wbc doctor $(ARGS)

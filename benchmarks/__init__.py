@@ -1,12 +1,13 @@
-"""The behaviour bench: what the robot must show, measured over many seeds, against fixed bars.
+"""Benchmarks: what the robot must show, measured over many seeds, against fixed thresholds.
 
-Every module but the ones below measures one part and lists its rows. The truth comes from the
-simulator (``GroundTruth``), never from the controller's own verdict.
+``python -m benchmarks NAME`` runs one; they belong to the checkout and not to the wheel. Every
+scenario is a module that lists its metrics. Judged is what the simulator says (``GroundTruth``),
+never the controller's own verdict.
 
-    trials    what a seed varies, and how a robot is set up for one
-    truth   what MuJoCo says after every tick
-    rows      rows, families of rows, and what a trial gave
-    families  all families, in the order of the report
-    runner    many trials in parallel processes
-    report    means, worst seeds and verdicts; table and JSON
+    scenario     metrics, scenarios, and what one trial gave
+    trials       what a seed varies, and a robot under these conditions
+    runner       many trials in parallel processes
+    results_log  finished trials on disk, so that an interrupted run can be resumed
+    report       means, worst seeds and verdicts; table and JSON
+    session      what the commands share: options, progress, output
 """

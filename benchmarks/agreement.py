@@ -9,7 +9,6 @@ block by block where blocks have different units, so that a large block cannot h
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import mujoco
@@ -47,25 +46,16 @@ class DynamicsSample:
     tau: Float[np.ndarray, "18"]
 
 
-@dataclass(frozen=True, slots=True)
-class ModelDynamics:
-    """What one engine computes for a sample, in Pinocchio's conventions.
+Dynamics = dict[str, Float[np.ndarray, "..."]]
+"""What one engine computes for a sample, in Pinocchio's conventions.
 
-    Attributes:
-        mass: of the whole robot [kg].
-        com: centre of mass in the world [m].
-        composite_inertia: rotational inertia about the centre of mass, world axes [kg m^2].
-        mass_matrix: joint-space inertia.
-        inverse_dynamics: generalised force that yields the sample's acceleration.
-        forward_dynamics: acceleration that the sample's generalised force yields.
-    """
-
-    mass: float
-    com: Float[np.ndarray, "3"]
-    composite_inertia: Float[np.ndarray, "3 3"]
-    mass_matrix: Float[np.ndarray, "18 18"]
-    inverse_dynamics: Float[np.ndarray, "18"]
-    forward_dynamics: Float[np.ndarray, "18"]
+    mass: of the whole robot [kg].
+    com: centre of mass in the world [m].
+    composite_inertia: rotational inertia about the centre of mass, world axes [kg m^2].
+    mass_matrix: joint-space inertia, 18 x 18.
+    inverse_dynamics: generalised force that yields the sample's acceleration.
+    forward_dynamics: acceleration that the sample's generalised force yields.
+"""
 
 
 def model_agreement(
@@ -79,7 +69,7 @@ def model_agreement(
         description: the robot; ``None`` takes the installed one.
 
     Returns:
-        For each field of ``ModelDynamics`` the largest relative error.
+        For each quantity of ``Dynamics`` the largest relative error.
     """
     description = description or find_description()
     pinocchio_model = pin.buildModelFromUrdf(str(description.urdf_path), pin.JointModelFreeFlyer())
@@ -118,7 +108,7 @@ def random_sample(model: pin.Model, rng: np.random.Generator) -> DynamicsSample:
     )
 
 
-def pinocchio_dynamics(model: pin.Model, sample: DynamicsSample) -> ModelDynamics:
+def pinocchio_dynamics(model: pin.Model, sample: DynamicsSample) -> Dynamics:
     """Pinocchio's answer; its joints must be in the order of ``JOINT_NAMES``."""
     order = [model.joints[model.getJointId(name)].idx_v for name in JOINT_NAMES]
     if order != list(range(6, 18)):
@@ -127,17 +117,17 @@ def pinocchio_dynamics(model: pin.Model, sample: DynamicsSample) -> ModelDynamic
     pin.crba(model, data, sample.q, pin.Convention.WORLD)
     mass_matrix = np.triu(data.M) + np.triu(data.M, 1).T
     pin.ccrba(model, data, sample.q, sample.v)
-    return ModelDynamics(
-        mass=float(pin.computeTotalMass(model)),
-        com=pin.centerOfMass(model, data, sample.q).copy(),
-        composite_inertia=np.array(data.Ig.inertia),
-        mass_matrix=mass_matrix,
-        inverse_dynamics=pin.rnea(model, data, sample.q, sample.v, sample.a).copy(),
-        forward_dynamics=pin.aba(model, data, sample.q, sample.v, sample.tau).copy(),
-    )
+    return {
+        "mass": np.array(pin.computeTotalMass(model)),
+        "com": pin.centerOfMass(model, data, sample.q).copy(),
+        "composite_inertia": np.array(data.Ig.inertia),
+        "mass_matrix": mass_matrix,
+        "inverse_dynamics": pin.rnea(model, data, sample.q, sample.v, sample.a).copy(),
+        "forward_dynamics": pin.aba(model, data, sample.q, sample.v, sample.tau).copy(),
+    }
 
 
-def mujoco_dynamics(model: mujoco.MjModel, sample: DynamicsSample) -> ModelDynamics:
+def mujoco_dynamics(model: mujoco.MjModel, sample: DynamicsSample) -> Dynamics:
     """MuJoCo's answer, turned into Pinocchio's conventions.
 
     With ``T = diag(R_world_base, 1, 1)`` from Pinocchio's velocities to MuJoCo's:
@@ -159,44 +149,34 @@ def mujoco_dynamics(model: mujoco.MjModel, sample: DynamicsSample) -> ModelDynam
     mujoco.mj_inverse(model, data)
     dense = np.zeros((18, 18))
     mujoco.mj_fullM(model, data, dense)
-    return ModelDynamics(
-        mass=float(model.body_subtreemass[base]),
-        com=data.subtree_com[base].copy(),
-        composite_inertia=_composite_inertia(model, data),
-        mass_matrix=T.T @ dense @ T,
-        inverse_dynamics=T.T @ data.qfrc_inverse,
-        forward_dynamics=forward,
-    )
-
-
-def relative_errors(found: ModelDynamics, expected: ModelDynamics) -> dict[str, float]:
-    """Relative error of each field; see the module's docstring for the norm."""
-    generalised = {
-        "inverse_dynamics": (found.inverse_dynamics, expected.inverse_dynamics),
-        "forward_dynamics": (found.forward_dynamics, expected.forward_dynamics),
-    }
-    errors = {
-        "mass": abs(found.mass - expected.mass) / expected.mass,
-        "com": _relative(found.com, expected.com),
-        "composite_inertia": _relative(found.composite_inertia, expected.composite_inertia),
-        "mass_matrix": max(
-            _relative(found.mass_matrix[i, j], expected.mass_matrix[i, j])
-            for i in _BLOCKS
-            for j in _BLOCKS
-        ),
-    }
-    return errors | _block_errors(generalised)
-
-
-def _block_errors(pairs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict[str, float]:
     return {
-        name: max(_relative(found[block], expected[block]) for block in _BLOCKS)
-        for name, (found, expected) in pairs.items()
+        "mass": model.body_subtreemass[base],
+        "com": data.subtree_com[base].copy(),
+        "composite_inertia": _composite_inertia(model, data),
+        "mass_matrix": T.T @ dense @ T,
+        "inverse_dynamics": T.T @ data.qfrc_inverse,
+        "forward_dynamics": forward,
     }
 
 
-def _relative(found: np.ndarray, expected: np.ndarray) -> float:
-    return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
+def relative_errors(found: Dynamics, expected: Dynamics) -> dict[str, float]:
+    """Relative error of each quantity; see the module's docstring for the norm."""
+    return {
+        name: max(
+            float(np.linalg.norm(a - b) / np.linalg.norm(b))
+            for a, b in zip(_blocks(found[name]), _blocks(expected[name]), strict=True)
+        )
+        for name in expected
+    }
+
+
+def _blocks(value: np.ndarray) -> list[np.ndarray]:
+    """The parts of a generalised vector or matrix that have different units."""
+    if value.shape == (18,):
+        return [value[i] for i in _BLOCKS]
+    if value.shape == (18, 18):
+        return [value[i, j] for i in _BLOCKS for j in _BLOCKS]
+    return [np.asarray(value)]
 
 
 def _write_state(

@@ -1,34 +1,29 @@
-"""Fills the README's table of evidence from what ``go2-wbc bench behaviour --out`` wrote.
-
-python -m benchmarks.evidence README.md behaviour.json [MORE.json ...]
-"""
+"""``python -m benchmarks evidence``: fills the table of evidence from the results."""
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from controller.cli.common import ExitCode, Subparsers, add_parser
 from go2_wbc.errors import ConfigError
 
 BEGIN, END = "<!-- evidence:begin", "<!-- evidence:end -->"
 HEAD = "| what | n | mean | worst | closest peer |\n|---|---|---|---|---|"
+EXAMPLES = """
+python -m benchmarks evidence docs/evidence.md behaviour.json
+python -m benchmarks evidence docs/evidence.md behaviour.json more.json
+"""
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line of the table: the bench's row, what to call it, how to print it, the peer's figure.
+    """A line of the table: a metric, what to call it, how to print it, the closest peer's value."""
 
-    Attributes:
-        row: name of the bench's row.
-        what: what the reader reads.
-        shown: format of a value.
-        peer: the closest peer's figure.
-    """
-
-    row: str
+    metric: str
     what: str
     shown: str
     peer: str = ""
@@ -70,20 +65,43 @@ LINES: tuple[Line, ...] = (
 )
 
 
+def register(subparsers: Subparsers) -> None:
+    """Add the arguments of ``evidence``."""
+    parser = add_parser(
+        subparsers,
+        "evidence",
+        "Fill the README's table from what `behaviour --out` wrote; a metric that is in\n"
+        "several files is taken from the last.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument("readme", metavar="README", type=Path)
+    parser.add_argument("results", metavar="JSON", type=Path, nargs="+")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fill the file from the results."""
+    rows = {}
+    for file in args.results:
+        rows |= {row["name"]: row for row in json.loads(file.read_text())["rows"]}
+    text = filled(args.readme.read_text(encoding="utf-8"), rows)
+    args.readme.write_text(text, encoding="utf-8")
+    return ExitCode.OK
+
+
 def table(rows: Mapping[str, Mapping[str, float]]) -> str:
     """The table as Markdown.
 
     Args:
-        rows: results of the bench, by the name of the row.
+        rows: results of the benchmark, by metric.
 
     Raises:
-        ConfigError: if a row is missing or has no value.
+        ConfigError: if a metric is missing or has no value.
     """
     lines = [HEAD]
     for line in LINES:
-        found = rows.get(line.row)
+        found = rows.get(line.metric)
         if found is None or found["mean"] is None or found["worst"] is None:
-            raise ConfigError(f"the results have no value for {line.row}")
+            raise ConfigError(f"the results have no value for {line.metric}")
         mean, worst = (line.shown.format(found[key]) for key in ("mean", "worst"))
         lines.append(f"| {line.what} | {found['n']} | {mean} | {worst} | {line.peer} |")
     return "\n".join(lines)
@@ -93,7 +111,7 @@ def filled(text: str, rows: Mapping[str, Mapping[str, float]]) -> str:
     """``text`` with the table between its marks replaced.
 
     Raises:
-        ConfigError: if the marks are missing, or a row is.
+        ConfigError: if the marks are missing, or a metric is.
     """
     begin = text.find(BEGIN)
     end = text.find(END, begin)
@@ -101,16 +119,3 @@ def filled(text: str, rows: Mapping[str, Mapping[str, float]]) -> str:
         raise ConfigError(f"the text has no {BEGIN} ... {END}")
     start = text.index("\n", begin) + 1
     return f"{text[:start]}{table(rows)}\n{text[end:]}"
-
-
-def main(argv: Sequence[str]) -> None:
-    """Fill the file ``argv[0]`` from the JSON files that follow."""
-    readme = Path(argv[0])
-    rows = {}
-    for name in argv[1:]:
-        rows |= {row["name"]: row for row in json.loads(Path(name).read_text())["rows"]}
-    readme.write_text(filled(readme.read_text(encoding="utf-8"), rows), encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

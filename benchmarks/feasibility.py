@@ -1,4 +1,4 @@
-"""Does the feasibility check foresee what physics does? Motions by the dozen, checked and played.
+"""``python -m benchmarks feasibility``: does the feasibility check foresee what physics does?
 
 Each seed gives one motion. It is checked, then played on the whole-body controller in MuJoCo,
 whatever the check said, on the least friction that the check counts on.
@@ -6,22 +6,26 @@ whatever the check said, on the least friction that the check counts on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import argparse
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
-from benchmarks.generated_motions import GeneratedMotion, generated_motion, near_specimen
-from benchmarks.motion_runs import MotionRun, run_motion
-from benchmarks.rows import Family, Measurement, Row
-from benchmarks.runner import Results
-from benchmarks.trials import Subject, Trial
+from benchmarks.generated_motions import GeneratedMotion, generated_motion, near_limit_motion
+from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.session import add_options, checked_target, measure_all, positive, publish
+from benchmarks.trials import Trial, TrialRobot
+from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.motion_measurement import MotionMeasurement, measure_motion
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
-from motions import FeasibilityChecker, FeasibilityReport
+from motions import FeasibilityChecker
 from motions.compiler import OutOfReach
 
 FRICTION = 0.5
-"""Friction coefficient of the floor: the least of the bench's conditions."""
+"""Friction coefficient of the floor: the least of the trials' conditions."""
 SLIP = 0.010
 """Distance [m] that a standing foot may slide."""
 OFF_PLAN = 0.05
@@ -30,44 +34,79 @@ SATURATED = 0.010
 """Time [s] for which a motor may give all it has."""
 TOUCHED = 0.010
 """Time [s] for which links may touch each other, or the ground, that must not."""
-BAR = 0.95
+THRESHOLD = 0.95
 """Least precision and recall."""
-
-_REFUSED = Row("feasibility.refused", "verdict", "refused by the check", "", None)
-_FAILED = Row("feasibility.failed", "physics", "went wrong in MuJoCo", "", None)
-
-
-def measure(trial: Trial) -> Measurement:
-    """Check and play one clear motion, good or broken."""
-    return _judged(generated_motion(trial.seed), trial)
-
-
-def measure_near(trial: Trial) -> Measurement:
-    """Check and play one motion that may be close to a limit."""
-    return _judged(near_specimen(trial.seed), trial)
+MOTIONS, NEAR = 160, 64
+EXAMPLES = """
+python -m benchmarks feasibility              eight minutes on two cores
+python -m benchmarks feasibility --motions 40 --near 0
+python -m benchmarks feasibility --json --out feasibility.json
+"""
+REFUSED = Metric("feasibility.refused", "verdict", "refused by the check", "", None)
+FAILED = Metric("feasibility.failed", "physics", "went wrong in MuJoCo", "", None)
 
 
-def _judged(made: GeneratedMotion, trial: Trial) -> Measurement:
-    """The reasons of the check and of physics are kept as the rows' failures."""
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``feasibility``."""
+    parser = add_parser(
+        subparsers,
+        "feasibility",
+        "Does the feasibility check foresee what physics does? Generated motions, good\n"
+        "and broken ones, are checked and played in MuJoCo. Exit code 0 if precision\n"
+        "and recall meet their thresholds, 1 if not.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument(
+        "--motions", metavar="N", type=positive, default=MOTIONS, help="default %(default)s"
+    )
+    parser.add_argument(
+        "--near",
+        metavar="N",
+        type=int,
+        default=NEAR,
+        help="motions close to a limit, without threshold; default %(default)s",
+    )
+    add_options(parser, has_jobs=True)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Check and play the motions; report how often the check was right."""
+    target = checked_target(args)
+    tasks = [(CLEAR_MOTIONS, seed) for seed in range(args.motions)]
+    results = measure_all(args, [*tasks, *((NEAR_LIMITS, seed) for seed in range(args.near))])
+    matrix = ConfusionMatrix.of(results.get(CLEAR_MOTIONS.name, {}), generated_motion)
+    near = ConfusionMatrix.of(results.get(NEAR_LIMITS.name, {}), near_limit_motion)
+    publish(args, target, {**matrix.as_dict(), "near_limits": near.as_dict()}, render(matrix, near))
+    return ExitCode.OK if matrix.ok else ExitCode.FAILED
+
+
+Make = Callable[[int], GeneratedMotion]
+"""Generates the motion of a seed."""
+
+
+def check_and_play(make: Make, trial: Trial) -> Measurement:
+    """One motion; the reasons of the check and of physics are kept as the metrics' failures."""
     model = RobotModel()
-    plan = made.plan(model)
+    plan = make(trial.seed).plan(model)
     report = FeasibilityChecker(model).check(plan)
     plant = MujocoPlant(
         friction=FRICTION, mass_scale=trial.mass_scale, seed=trial.seed, initial_yaw=trial.yaw
     )
-    with Subject(plant) as robot:
+    with TrialRobot(plant) as robot:
         robot.require(robot.go2.stand())
-        harm = harms(run_motion(robot, plan, model), plan)
-    values = {_REFUSED.name: float(not report.ok), _FAILED.name: float(bool(harm))}
-    reasons = {_REFUSED.name: _refusal(report), _FAILED.name: "; ".join(harm)}
+        wrong = what_went_wrong(measure_motion(robot.go2, robot.truth, plan, model), plan)
+    checks = dict.fromkeys(finding.check for finding in report.failures)
+    values = {REFUSED.name: float(not report.ok), FAILED.name: float(bool(wrong))}
+    reasons = {REFUSED.name: ", ".join(checks), FAILED.name: "; ".join(wrong)}
     return Measurement(values, {name: reason for name, reason in reasons.items() if reason})
 
 
-FAMILY = Family("feasibility", (_REFUSED, _FAILED), measure)
-NEAR_FAMILY = Family("near limits", (_REFUSED, _FAILED), measure_near)
+METRICS = (REFUSED, FAILED)
+CLEAR_MOTIONS = Scenario("feasibility", METRICS, partial(check_and_play, generated_motion))
+NEAR_LIMITS = Scenario("near limits", METRICS, partial(check_and_play, near_limit_motion))
 
 
-def harms(run: MotionRun, plan: MotionPlan) -> list[str]:
+def what_went_wrong(run: MotionMeasurement, plan: MotionPlan) -> list[str]:
     """What went wrong while a motion was played, in words; empty if nothing did."""
     unreached = [p for p in getattr(plan, "problems", ()) if isinstance(p, OutOfReach)]
     missed = max((p.miss for p in unreached), default=0.0) - run.feet_off
@@ -84,18 +123,13 @@ def harms(run: MotionRun, plan: MotionPlan) -> list[str]:
     return [what for what, is_so in found.items() if is_so]
 
 
-def _refusal(report: FeasibilityReport) -> str:
-    checks = dict.fromkeys(finding.check for finding in report.failures)
-    return ", ".join(checks)
-
-
 @dataclass(frozen=True, slots=True)
 class Case:
     """One motion: what the check said, and what came of it.
 
     Attributes:
         seed: which motion.
-        kind: of what making.
+        kind: how it was generated.
         is_refused: by the check.
         has_failed: in physics.
         refusal, harm: why, in words.
@@ -108,18 +142,36 @@ class Case:
     refusal: str
     harm: str
 
-    @property
-    def is_right(self) -> bool:
-        """Whether the check said what came to pass."""
-        return self.is_refused is self.has_failed
-
 
 @dataclass(frozen=True, slots=True)
-class Verdicts:
-    """All motions, as a confusion matrix."""
+class ConfusionMatrix:
+    """All motions, by what the check said and what physics did.
+
+    Attributes:
+        cases: motions with a result.
+        lost: by seed, why a motion has none.
+    """
 
     cases: tuple[Case, ...]
     lost: dict[int, str]
+
+    @staticmethod
+    def of(measured: dict[int, Measurement], make: Make) -> ConfusionMatrix:
+        """The matrix of the measurements of the motions that ``make`` generates, by seed."""
+        found = {seed: one for seed, one in sorted(measured.items()) if one.values}
+        cases = (
+            Case(
+                seed,
+                make(seed).kind,
+                one.values[REFUSED.name] > 0.0,
+                one.values[FAILED.name] > 0.0,
+                one.failures.get(REFUSED.name, ""),
+                one.failures.get(FAILED.name, ""),
+            )
+            for seed, one in found.items()
+        )
+        lost = {seed: one.reason for seed, one in sorted(measured.items()) if seed not in found}
+        return ConfusionMatrix(tuple(cases), lost)
 
     def count(self, *, is_refused: bool, has_failed: bool) -> int:
         """How many motions were so judged and so ended."""
@@ -129,24 +181,25 @@ class Verdicts:
     @property
     def precision(self) -> float:
         """Share of the refused motions that really go wrong."""
-        right = self.count(is_refused=True, has_failed=True)
-        return _share(right, right + self.count(is_refused=True, has_failed=False))
+        return self._share_of_right([case for case in self.cases if case.is_refused])
 
     @property
     def recall(self) -> float:
         """Share of the motions that go wrong that are refused."""
-        right = self.count(is_refused=True, has_failed=True)
-        return _share(right, right + self.count(is_refused=False, has_failed=True))
+        return self._share_of_right([case for case in self.cases if case.has_failed])
+
+    def _share_of_right(self, cases: list[Case]) -> float:
+        return self.count(is_refused=True, has_failed=True) / len(cases) if cases else 1.0
 
     @property
     def ok(self) -> bool:
-        """Whether both reach the bar and no run was lost."""
-        return not self.lost and min(self.precision, self.recall) >= BAR
+        """Whether both reach the threshold and no run was lost."""
+        return not self.lost and min(self.precision, self.recall) >= THRESHOLD
 
     @property
-    def misses(self) -> list[Case]:
+    def wrong(self) -> list[Case]:
         """Motions on which the check and physics do not agree."""
-        return [case for case in self.cases if not case.is_right]
+        return [case for case in self.cases if case.is_refused is not case.has_failed]
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
@@ -154,72 +207,49 @@ class Verdicts:
             "passed": self.ok,
             "precision": self.precision,
             "recall": self.recall,
-            "bar": BAR,
+            "threshold": THRESHOLD,
             "matrix": {
                 f"{verdict}_{outcome}": self.count(is_refused=refused, has_failed=failed)
                 for verdict, refused in (("refused", True), ("accepted", False))
                 for outcome, failed in (("failed", True), ("done", False))
             },
-            "cases": [
-                {name: getattr(case, name) for name in Case.__slots__} for case in self.cases
-            ],
+            "cases": [asdict(case) for case in self.cases],
             "lost": {str(seed): reason for seed, reason in self.lost.items()},
         }
 
 
-def verdicts_of(results: Results, family: Family = FAMILY) -> Verdicts:
-    """The matrix of what ``run_families`` measured of a family."""
-    make = near_specimen if family.name == NEAR_FAMILY.name else generated_motion
-    cases, lost = [], {}
-    for seed, measured in sorted(results[family.name].items()):
-        if not measured.values:
-            lost[seed] = measured.reason
-            continue
-        cases.append(
-            Case(
-                seed,
-                make(seed).kind,
-                bool(measured.values[_REFUSED.name]),
-                bool(measured.values[_FAILED.name]),
-                measured.failures.get(_REFUSED.name, ""),
-                measured.failures.get(_FAILED.name, ""),
-            )
-        )
-    return Verdicts(tuple(cases), lost)
-
-
-def render(verdicts: Verdicts, near: Verdicts) -> str:
-    """Matrix, what came of each kind, and the misses; at most 80 columns wide."""
-    lines = ["Clear motions, good and broken", *_tables(verdicts), ""]
+def render(clear: ConfusionMatrix, near: ConfusionMatrix) -> str:
+    """Matrix, what came of each kind, and where the check was wrong; at most 80 columns wide."""
+    lines = ["Clear motions, good and broken", *_tables(clear), ""]
     if near.cases:
         lines += ["Motions from easy to impossible, many close to a limit", *_tables(near), ""]
         shares = f"precision {near.precision:.3f}, recall {near.recall:.3f}"
-        lines.append(f"{len(near.cases)} motions close to a limit: {shares}; no bar.")
+        lines.append(f"{len(near.cases)} motions close to a limit: {shares}; no threshold.")
     lines.append(
-        f"{len(verdicts.cases)} clear motions: precision {verdicts.precision:.3f}, recall "
-        f"{verdicts.recall:.3f}; the bar is {BAR} for both: {'ok' if verdicts.ok else 'NO'}."
+        f"{len(clear.cases)} clear motions: precision {clear.precision:.3f}, recall "
+        f"{clear.recall:.3f}; threshold {THRESHOLD}: {'ok' if clear.ok else 'NO'}."
     )
     return "\n".join(lines)
 
 
-def _tables(verdicts: Verdicts) -> list[str]:
+def _tables(matrix: ConfusionMatrix) -> list[str]:
     lines = [f"{'':<26}{'went wrong':>14}{'was done':>12}", "-" * 80]
     for what, refused in (("the check refuses it", True), ("the check lets it pass", False)):
-        counts = [verdicts.count(is_refused=refused, has_failed=failed) for failed in (True, False)]
+        counts = [matrix.count(is_refused=refused, has_failed=failed) for failed in (True, False)]
         lines.append(f"{what:<26}{counts[0]:>14}{counts[1]:>12}")
     lines += ["-" * 80, f"{'kind':<16}{'n':>3}{'refused':>9}{'wrong':>7}  most often, in physics"]
-    kinds = dict.fromkeys(case.kind for case in verdicts.cases)
-    lines += [_kind_line(kind, verdicts) for kind in kinds]
+    kinds = dict.fromkeys(case.kind for case in matrix.cases)
+    lines += [_kind_line(kind, matrix) for kind in kinds]
     lines.append("-" * 80)
-    for case in verdicts.misses:
+    for case in matrix.wrong:
         said = f"refused ({case.refusal})" if case.is_refused else "let pass"
         lines += [f"seed {case.seed}, {case.kind}: {said}; {case.harm or 'was done'}"[:80]]
-    lines += [f"seed {seed}: no result, {reason}"[:80] for seed, reason in verdicts.lost.items()]
+    lines += [f"seed {seed}: no result, {reason}"[:80] for seed, reason in matrix.lost.items()]
     return lines
 
 
-def _kind_line(kind: str, verdicts: Verdicts) -> str:
-    cases = [case for case in verdicts.cases if case.kind == kind]
+def _kind_line(kind: str, matrix: ConfusionMatrix) -> str:
+    cases = [case for case in matrix.cases if case.kind == kind]
     refused, failed = sum(c.is_refused for c in cases), sum(c.has_failed for c in cases)
     harm = [_without_numbers(part) for case in cases for part in case.harm.split("; ") if part]
     common = max(dict.fromkeys(harm), key=harm.count) if harm else ""
@@ -228,7 +258,3 @@ def _kind_line(kind: str, verdicts: Verdicts) -> str:
 
 def _without_numbers(text: str) -> str:
     return " ".join("..." if word.replace(".", "").isdigit() else word for word in text.split())
-
-
-def _share(part: int, whole: int) -> float:
-    return part / whole if whole else 1.0

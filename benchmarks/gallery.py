@@ -1,24 +1,21 @@
-"""The gallery of the library: every motion played in MuJoCo, and moments of it in a picture.
+"""``python -m benchmarks gallery``: every motion of the library, moments of it in a picture.
 
-    python -m benchmarks.gallery docs              the page and all pictures
-    python -m benchmarks.gallery docs bow wave     the page and these pictures
-
-writes ``docs/gallery.md`` and ``docs/images/gallery/NAME.webp``: the start, and the moments in
-which the robot, as measured, is farthest from it and from each other.
+Writes ``gallery.md`` and ``images/gallery/NAME.webp``: the start, and the moments in which the
+robot, as measured, is farthest from it and from each other.
 """
 
 from __future__ import annotations
 
+import argparse
 import io
-import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 from PIL import Image, ImageDraw, ImageFont
 
+from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.go2_controller import GO2Controller
 from go2_wbc.errors import MotionError
 from go2_wbc.files import checked_output, write_atomically
@@ -64,7 +61,7 @@ TRUNK_POINTS = np.array([[0.35, 0.0, 0.0], [-0.25, 0.0, 0.0], [0.0, 0.0, 0.15]])
 
 HEAD = """# Gallery
 
-<!-- written by `python -m benchmarks.gallery docs`, not by hand -->
+<!-- written by `python -m benchmarks gallery docs`, not by hand -->
 
 Every motion of the library. A picture shows the start and the most telling moments of one run in
 MuJoCo under `GO2Controller.play`, with the time since the start of the motion. An orange arrow is
@@ -72,6 +69,41 @@ the measured normal force of a foot, 2 mm a newton. `go2-wbc list` prints the pa
 `go2-wbc run NAME --html FILE` writes a run as a page that can be turned in 3D. How to write such a
 motion: the [tutorial](tutorial.md).
 """
+
+
+EXAMPLES = """
+python -m benchmarks gallery docs              the page and all pictures
+python -m benchmarks gallery docs bow wave     the page and these pictures
+"""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the arguments of ``gallery``."""
+    parser = add_parser(
+        subparsers,
+        "gallery",
+        "Play the motions of the library in MuJoCo; write a page with pictures of them.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument("folder", metavar="FOLDER", type=Path, help="of the page")
+    parser.add_argument("names", metavar="MOTION", nargs="*", help="default: all")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the page, and the pictures of the motions that were named."""
+    target = checked_output(args.folder / "gallery.md", (".md",))
+    timelines = [find_motion(name)() for name in args.names or motion_names()]
+    with GO2Controller(plant=MujocoPlant()) as robot:
+        robot.stand()
+        for line in timelines:
+            recording = played(line, robot)
+            name = args.folder / "images" / "gallery" / f"{line.name}.webp"
+            file = write_atomically(
+                checked_output(name, (".webp",)), picture(recording, telling_rows(recording))
+            )
+            print(f"{line.name:<14}{file.stat().st_size:>7} bytes")
+    write_atomically(target, page().encode())
+    return ExitCode.OK
 
 
 def page() -> str:
@@ -109,7 +141,7 @@ def played(motion: Timeline, robot: GO2Controller) -> Recording:
         raise MotionError(f"{motion.name} was not done: {robot.last_outcome.reason}")
     whole = robot.recording(rate=RATE)
     rows = np.flatnonzero(np.array(whole.labels) == motion.name)
-    return _part(whole, rows)
+    return whole.part(rows)
 
 
 def telling_rows(recording: Recording) -> list[int]:
@@ -154,34 +186,6 @@ def picture(recording: Recording, rows: Sequence[int]) -> bytes:
     return content
 
 
-def main(argv: Sequence[str]) -> None:
-    """Write the page into the folder ``argv[0]``, and the pictures of the motions that follow."""
-    folder = Path(argv[0])
-    target = checked_output(folder / "gallery.md", (".md",))
-    names = argv[1:] or motion_names()
-    timelines = [find_motion(name)() for name in names]
-    with GO2Controller(plant=MujocoPlant()) as robot:
-        robot.stand()
-        for line in timelines:
-            recording = played(line, robot)
-            rows = telling_rows(recording)
-            file = checked_output(folder / "images" / "gallery" / f"{line.name}.webp", (".webp",))
-            write_atomically(file, picture(recording, rows))
-            print(f"{line.name:<14}{file.stat().st_size:>7} bytes")
-    write_atomically(target, page().encode())
-
-
-def _part(recording: Recording, rows: np.ndarray) -> Recording:
-    arrays = {
-        name: getattr(recording, name)[rows] for name in Recording.__slots__ if name != "labels"
-    }
-    return replace(recording, **arrays, labels=tuple(recording.labels[row] for row in rows))
-
-
 def _points(q: Float[np.ndarray, "19"], robot: PosedRobot) -> Float[np.ndarray, " k"]:
     """Places [m] in the world that tell poses apart."""
     return np.vstack([robot.feet(q), robot.on_trunk(TRUNK_POINTS)]).ravel()
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

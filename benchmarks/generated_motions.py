@@ -1,4 +1,4 @@
-"""Motions made by the dozen from a seed: some that the Go2 can do, some that it cannot.
+"""Motions generated from a seed: some that the Go2 can do, some that it cannot.
 
 Every maker draws its numbers from a range. Those of ``GOOD`` stay well inside of what the robot can
 do; each of ``BROKEN`` goes wrong in the way that it is named after; those of ``NEAR`` range from
@@ -18,8 +18,6 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import MotionPlan, Posture, Reference
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, deg
-
-Maker = Callable[[np.random.Generator], Timeline]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,272 +61,272 @@ class LateStart(MotionPlan):
         return self.inner.at(max(t, 0.0) + self.start)
 
 
+class _Draw:
+    """The random numbers of one motion, in the order in which they are asked for."""
+
+    def __init__(self, seed: int) -> None:
+        self._rng = np.random.default_rng([seed, 7])
+
+    def between(self, low: float, high: float) -> float:
+        return float(self._rng.uniform(low, high))
+
+    def either(self, low: float, high: float) -> float:
+        return float(self._rng.choice([-1.0, 1.0])) * self.between(low, high)
+
+    def times(self, low: int, high: int) -> range:
+        return range(int(self._rng.integers(low, high + 1)))
+
+    def coin(self) -> bool:
+        return bool(self._rng.random() < 0.5)
+
+    def axis(self) -> str:
+        return "x" if self.coin() else "y"
+
+    def index(self, count: int) -> int:
+        return int(self._rng.integers(count))
+
+    def leg(self) -> Leg:
+        return LEGS[self.index(4)]
+
+    def front(self) -> Leg:
+        return LEGS[self.index(2)]
+
+
+Maker = Callable[[_Draw], Timeline]
+
+
+def _by_kind(*makers: Maker) -> dict[str, Maker]:
+    return {maker.__name__.strip("_").replace("_", " "): maker for maker in makers}
+
+
 def _move(
-    line: Timeline, way: Mapping[str, float], over: float, ease: Ease = Ease.MINIMUM_JERK
+    line: Timeline, channel: str, value: float, over: float, ease: Ease = Ease.MINIMUM_JERK
 ) -> Timeline:
-    return line.body(**way, over=over, ease=ease)
+    return line.body(**{channel: value}, over=over, ease=ease)
 
 
-def _leg(rng: np.random.Generator) -> Leg:
-    return LEGS[int(rng.integers(4))]
+def _to_and_fro(
+    line: Timeline, times: range, channel: str, ends: tuple[float, float], over: float
+) -> Timeline:
+    for _ in times:
+        line = _move(_move(line, channel, ends[0], over), channel, ends[1], over)
+    return line
 
 
-def _front(rng: np.random.Generator) -> Leg:
-    return LEGS[int(rng.integers(2))]
-
-
-def _sign(rng: np.random.Generator) -> float:
-    return float(rng.choice([-1.0, 1.0]))
+def _outward(leg: Leg) -> float:
+    """Sign of y on the leg's side."""
+    return 1.0 if leg in (Leg.FL, Leg.RL) else -1.0
 
 
 # --- what the robot can do --------------------------------------------------------------------
 
 
-def _crouch(rng: np.random.Generator) -> Timeline:
-    line, over = Timeline(), float(rng.uniform(0.6, 1.2))
-    for _ in range(int(rng.integers(1, 4))):
-        line = line.body(z=float(rng.uniform(-0.11, -0.03)), over=over).body(z=0.01, over=over)
+def _crouch(draw: _Draw) -> Timeline:
+    line, over = Timeline(), draw.between(0.6, 1.2)
+    for _ in draw.times(1, 3):
+        line = line.body(z=draw.between(-0.11, -0.03), over=over).body(z=0.01, over=over)
     return line.home(over=0.5)
 
 
-def _sway(rng: np.random.Generator) -> Timeline:
-    aside, over = float(rng.uniform(0.02, 0.06)), float(rng.uniform(0.7, 1.2))
-    way = {"x": aside} if rng.random() < 0.5 else {"y": aside}
-    back = {name: -value for name, value in way.items()}
-    return _move(_move(Timeline(), way, over), back, over).home(over=over)
+def _sway(draw: _Draw) -> Timeline:
+    aside, over, axis = draw.between(0.02, 0.06), draw.between(0.7, 1.2), draw.axis()
+    return _to_and_fro(Timeline(), range(1), axis, (aside, -aside), over).home(over=over)
 
 
-def _tilt(rng: np.random.Generator) -> Timeline:
-    line, over = Timeline(), float(rng.uniform(0.7, 1.2))
-    for _ in range(int(rng.integers(1, 4))):
-        channel = str(rng.choice(["roll", "pitch", "yaw"]))
-        line = _move(line, {channel: _sign(rng) * float(rng.uniform(0.08, 0.22))}, over)
+def _tilt(draw: _Draw) -> Timeline:
+    line, over = Timeline(), draw.between(0.7, 1.2)
+    for _ in draw.times(1, 3):
+        channel = ("roll", "pitch", "yaw")[draw.index(3)]
+        line = _move(line, channel, draw.either(0.08, 0.22), over)
     return line.home(over=over)
 
 
-def _bow(rng: np.random.Generator) -> Timeline:
-    pitch, z = deg(float(rng.uniform(5.0, 15.0))), float(rng.uniform(-0.07, -0.02))
-    line = Timeline().body(pitch=pitch, z=z, over=float(rng.uniform(0.7, 1.1)))
-    return line.hold(float(rng.uniform(0.2, 0.8))).home(over=0.9)
+def _bow(draw: _Draw) -> Timeline:
+    pitch, z = deg(draw.between(5.0, 15.0)), draw.between(-0.07, -0.02)
+    line = Timeline().body(pitch=pitch, z=z, over=draw.between(0.7, 1.1))
+    return line.hold(draw.between(0.2, 0.8)).home(over=0.9)
 
 
-def _raise(rng: np.random.Generator) -> Timeline:
-    leg, z = _leg(rng), float(rng.uniform(0.04, 0.12))
-    line = Timeline().foot(leg, z=z, over=float(rng.uniform(0.5, 0.9)))
-    return line.hold(float(rng.uniform(0.2, 0.8))).home(over=0.8)
+def _raise_a_foot(draw: _Draw) -> Timeline:
+    leg, z = draw.leg(), draw.between(0.04, 0.12)
+    line = Timeline().foot(leg, z=z, over=draw.between(0.5, 0.9))
+    return line.hold(draw.between(0.2, 0.8)).home(over=0.8)
 
 
-def _reach_out(rng: np.random.Generator) -> Timeline:
-    leg = _front(rng)
-    x, z = float(rng.uniform(0.02, 0.09)), float(rng.uniform(0.05, 0.12))
+def _reach_out(draw: _Draw) -> Timeline:
+    leg, x, z = draw.front(), draw.between(0.02, 0.09), draw.between(0.05, 0.12)
     line = Timeline().foot(leg, z=z, over=0.7)
-    line = line.foot(leg, x=x, z=z, over=float(rng.uniform(0.6, 1.0)))
-    return line.hold(0.3).home(over=0.9)
+    return line.foot(leg, x=x, z=z, over=draw.between(0.6, 1.0)).hold(0.3).home(over=0.9)
 
 
-def _tap(rng: np.random.Generator) -> Timeline:
-    leg, line = _leg(rng), Timeline()
-    for _ in range(int(rng.integers(1, 4))):
-        line = line.foot(leg, z=float(rng.uniform(0.03, 0.07)), over=float(rng.uniform(0.35, 0.6)))
-        line = line.down(leg, over=float(rng.uniform(0.35, 0.6)))
+def _tap(draw: _Draw) -> Timeline:
+    leg, line = draw.leg(), Timeline()
+    for _ in draw.times(1, 3):
+        line = line.foot(leg, z=draw.between(0.03, 0.07), over=draw.between(0.35, 0.6))
+        line = line.down(leg, over=draw.between(0.35, 0.6))
     return line.home(over=0.8)
 
 
-def _wave(rng: np.random.Generator) -> Timeline:
-    leg, thigh = _front(rng), float(rng.uniform(-0.9, -0.5))
-    outward = -1.0 if leg is Leg.FR else 1.0
+def _wave(draw: _Draw) -> Timeline:
+    leg, thigh = draw.front(), draw.between(-0.9, -0.5)
     line = Timeline().leg(leg, hip=0.0, thigh=thigh, calf=-1.3, over=1.2)
-    for _ in range(int(rng.integers(1, 4))):
-        aside = outward * float(rng.uniform(0.1, 0.35))
-        line = line.leg(leg, hip=aside, thigh=thigh, calf=-1.3, over=0.4)
-        line = line.leg(leg, hip=0.0, thigh=thigh, calf=-1.3, over=0.4)
+    for _ in draw.times(1, 3):
+        for hip in (_outward(leg) * draw.between(0.1, 0.35), 0.0):
+            line = line.leg(leg, hip=hip, thigh=thigh, calf=-1.3, over=0.4)
     return line.home(over=1.2)
 
 
-def _sit_down(rng: np.random.Generator) -> Timeline:
-    over = float(rng.uniform(1.2, 1.8))
-    line = Timeline().posture("sit", over=over).hold(float(rng.uniform(0.2, 0.8)))
-    return line.posture("stand", over=float(rng.uniform(1.2, 1.8)))
+def _sit_down(draw: _Draw) -> Timeline:
+    line = Timeline().posture("sit", over=draw.between(1.2, 1.8)).hold(draw.between(0.2, 0.8))
+    return line.posture("stand", over=draw.between(1.2, 1.8))
 
 
-def _raise_and_nod(rng: np.random.Generator) -> Timeline:
-    leg, pitch = _front(rng), _sign(rng) * float(rng.uniform(0.03, 0.1))
-    line = Timeline().foot(leg, z=float(rng.uniform(0.04, 0.10)), over=0.7)
-    return line.body(pitch=pitch, over=float(rng.uniform(0.6, 0.9))).home(over=0.9)
+def _raise_and_nod(draw: _Draw) -> Timeline:
+    leg, pitch = draw.front(), draw.either(0.03, 0.1)
+    line = Timeline().foot(leg, z=draw.between(0.04, 0.10), over=0.7)
+    return line.body(pitch=pitch, over=draw.between(0.6, 0.9)).home(over=0.9)
 
 
-GOOD: Mapping[str, Maker] = {
-    "crouch": _crouch,
-    "sway": _sway,
-    "tilt": _tilt,
-    "bow": _bow,
-    "raise a foot": _raise,
-    "reach out": _reach_out,
-    "tap": _tap,
-    "wave": _wave,
-    "sit down": _sit_down,
-    "raise and nod": _raise_and_nod,
-}
+GOOD = _by_kind(
+    _crouch, _sway, _tilt, _bow, _raise_a_foot, _reach_out, _tap, _wave, _sit_down, _raise_and_nod
+)
 
 # --- what it cannot do ------------------------------------------------------------------------
 
 
-def _too_high(rng: np.random.Generator) -> Timeline:
-    if rng.random() < 0.5:
-        return Timeline().body(z=float(rng.uniform(0.17, 0.3)), over=1.0).hold(0.3).home(over=1.0)
-    line = Timeline().foot(_front(rng), x=0.1, z=float(rng.uniform(0.9, 1.3)), over=1.5)
+def _too_high(draw: _Draw) -> Timeline:
+    if draw.coin():
+        return Timeline().body(z=draw.between(0.17, 0.3), over=1.0).hold(0.3).home(over=1.0)
+    line = Timeline().foot(draw.front(), x=0.1, z=draw.between(0.9, 1.3), over=1.5)
     return line.hold(0.3).home(over=1.5)
 
 
-def _too_far(rng: np.random.Generator) -> Timeline:
-    if rng.random() < 0.5:
-        aside = _sign(rng) * float(rng.uniform(0.28, 0.4))
-        way = {"x": aside} if rng.random() < 0.5 else {"y": aside}
-        return _move(Timeline(), way, 1.5).hold(0.3).home(over=1.5)
-    leg = _front(rng)
-    line = Timeline().foot(leg, z=0.08, over=0.8)
-    return line.foot(leg, x=float(rng.uniform(0.45, 0.7)), z=0.1, over=1.2).hold(0.3).home(over=1.5)
+def _too_far(draw: _Draw) -> Timeline:
+    if draw.coin():
+        aside = draw.either(0.28, 0.4)
+        line = _move(Timeline(), draw.axis(), aside, 1.5)
+    else:
+        leg = draw.front()
+        line = Timeline().foot(leg, z=0.08, over=0.8)
+        line = line.foot(leg, x=draw.between(0.45, 0.7), z=0.1, over=1.2)
+    return line.hold(0.3).home(over=1.5)
 
 
-def _too_fast(rng: np.random.Generator) -> Timeline:
-    over, line = float(rng.uniform(0.05, 0.09)), Timeline()
-    if rng.random() < 0.5:
-        angle = float(rng.uniform(0.25, 0.35))
-        for _ in range(3):
-            line = line.body(pitch=angle, over=over).body(pitch=-angle, over=over)
-        return line.home(over=over)
-    leg = _front(rng)
-    line = line.leg(leg, hip=0.0, thigh=0.9, calf=-1.8, over=0.8)
-    for _ in range(3):
-        line = line.leg(leg, hip=0.0, thigh=-0.9, calf=-1.8, over=over)
-        line = line.leg(leg, hip=0.0, thigh=0.9, calf=-1.8, over=over)
+def _too_fast(draw: _Draw) -> Timeline:
+    over = draw.between(0.05, 0.09)
+    if draw.coin():
+        angle = draw.between(0.25, 0.35)
+        return _to_and_fro(Timeline(), range(3), "pitch", (angle, -angle), over).home(over=over)
+    leg = draw.front()
+    line = Timeline().leg(leg, hip=0.0, thigh=0.9, calf=-1.8, over=0.8)
+    for thigh in 3 * (-0.9, 0.9):
+        line = line.leg(leg, hip=0.0, thigh=thigh, calf=-1.8, over=over)
     return line.home(over=1.0)
 
 
-def _off_balance(rng: np.random.Generator) -> Timeline:
-    leg = _leg(rng)
-    outward = 1.0 if leg in (Leg.FL, Leg.RL) else -1.0
-    line = Timeline(balance=False).body(y=outward * float(rng.uniform(0.03, 0.07)), over=0.8)
-    return line.foot(leg, z=float(rng.uniform(0.08, 0.15)), over=0.6).hold(1.0).home(over=0.8)
+def _off_balance(draw: _Draw) -> Timeline:
+    leg = draw.leg()
+    line = Timeline(balance=False).body(y=_outward(leg) * draw.between(0.03, 0.07), over=0.8)
+    return line.foot(leg, z=draw.between(0.08, 0.15), over=0.6).hold(1.0).home(over=0.8)
 
 
-def _feet_unloaded(rng: np.random.Generator) -> Timeline:
-    first, second = (Leg.FL, Leg.FR) if rng.random() < 0.5 else (Leg.FL, Leg.RL)
-    z, over = float(rng.uniform(0.06, 0.12)), float(rng.uniform(0.5, 0.8))
-    line = Timeline(balance=bool(rng.random() < 0.5)).foot(first, z=z, over=over)
+def _foot_unloaded(draw: _Draw) -> Timeline:
+    second = Leg.FR if draw.coin() else Leg.RL
+    z, over = draw.between(0.06, 0.12), draw.between(0.5, 0.8)
+    line = Timeline(balance=draw.coin()).foot(Leg.FL, z=z, over=over)
     return line.foot(second, z=z, over=over).hold(1.0).home(over=0.8)
 
 
-def _colliding(rng: np.random.Generator) -> Timeline:
-    leg = _front(rng)
-    inward = -1.0 if leg is Leg.FL else 1.0
-    y, z = inward * float(rng.uniform(0.28, 0.34)), float(rng.uniform(0.03, 0.06))
+def _colliding(draw: _Draw) -> Timeline:
+    leg = draw.front()
+    y, z = -_outward(leg) * draw.between(0.28, 0.34), draw.between(0.03, 0.06)
     line = Timeline().foot(leg, z=0.10, over=0.8).foot(leg, y=y, z=z, over=0.9)
     return line.hold(0.4).home(over=1.2)
 
 
-def _slipping(rng: np.random.Generator) -> Timeline:
-    aside, over = float(rng.uniform(0.06, 0.08)), float(rng.uniform(0.14, 0.18))
-    name = "x" if rng.random() < 0.5 else "y"
-    line = Timeline()
-    for _ in range(3):
-        line = _move(_move(line, {name: aside}, over), {name: -aside}, over)
-    return line.home(over=0.4)
+def _slipping(draw: _Draw) -> Timeline:
+    aside, over, axis = draw.between(0.06, 0.08), draw.between(0.14, 0.18), draw.axis()
+    return _to_and_fro(Timeline(), range(3), axis, (aside, -aside), over).home(over=0.4)
 
 
-def _discontinuous(rng: np.random.Generator) -> Timeline:
-    name, size = (("z", -0.13), ("y", 0.10), ("pitch", 0.4))[int(rng.integers(3))]
-    jump = size * float(rng.uniform(0.9, 1.2))
-    return _move(Timeline(), {name: jump}, 0.6, Ease.HOLD).hold(0.5).home(over=1.0)
+def _discontinuous(draw: _Draw) -> Timeline:
+    channel, size = (("z", -0.13), ("y", 0.10), ("pitch", 0.4))[draw.index(3)]
+    line = _move(Timeline(), channel, size * draw.between(0.9, 1.2), 0.6, Ease.HOLD)
+    return line.hold(0.5).home(over=1.0)
 
 
-def _torque_hungry(rng: np.random.Generator) -> Timeline:
-    depth, over = float(rng.uniform(0.11, 0.13)), float(rng.uniform(0.10, 0.14))
+def _torque_hungry(draw: _Draw) -> Timeline:
+    depth, over = draw.between(0.11, 0.13), draw.between(0.10, 0.14)
     line = Timeline().body(z=-depth, over=0.9)
-    for _ in range(int(rng.integers(2, 4))):
-        line = line.body(z=0.03, over=over).body(z=-depth, over=over)
-    return line.home(over=0.9)
+    return _to_and_fro(line, draw.times(2, 3), "z", (0.03, -depth), over).home(over=0.9)
 
 
-def _wrong_entry(rng: np.random.Generator) -> Timeline:
-    z, y = -float(rng.uniform(0.10, 0.13)), _sign(rng) * float(rng.uniform(0.05, 0.08))
+def _wrong_entry(draw: _Draw) -> Timeline:
+    z, y = -draw.between(0.10, 0.13), draw.either(0.05, 0.08)
     return Timeline().body(z=z, y=y, over=1.0).hold(0.5).home(over=1.0)
 
 
-BROKEN: Mapping[str, Maker] = {
-    "too high": _too_high,
-    "too far": _too_far,
-    "too fast": _too_fast,
-    "off balance": _off_balance,
-    "foot unloaded": _feet_unloaded,
-    "colliding": _colliding,
-    "slipping": _slipping,
-    "discontinuous": _discontinuous,
-    "wrong entry": _wrong_entry,
-    "torque-hungry": _torque_hungry,
-}
+BROKEN = _by_kind(
+    _too_high,
+    _too_far,
+    _too_fast,
+    _off_balance,
+    _foot_unloaded,
+    _colliding,
+    _slipping,
+    _discontinuous,
+    _wrong_entry,
+    _torque_hungry,
+)
 # --- from easy to impossible ------------------------------------------------------------------
 
 
-def _up(rng: np.random.Generator) -> Timeline:
-    return Timeline().body(z=float(rng.uniform(0.02, 0.16)), over=1.0).hold(0.3).home(over=1.0)
+def _up(draw: _Draw) -> Timeline:
+    return Timeline().body(z=draw.between(0.02, 0.16), over=1.0).hold(0.3).home(over=1.0)
 
 
-def _aside(rng: np.random.Generator) -> Timeline:
-    aside = _sign(rng) * float(rng.uniform(0.04, 0.26))
-    way = {"x": aside} if rng.random() < 0.5 else {"y": aside}
-    return _move(Timeline(), way, 1.2).hold(0.3).home(over=1.2)
+def _aside(draw: _Draw) -> Timeline:
+    aside = draw.either(0.04, 0.26)
+    return _move(Timeline(), draw.axis(), aside, 1.2).hold(0.3).home(over=1.2)
 
 
-def _faster_sway(rng: np.random.Generator) -> Timeline:
-    aside, over, line = float(rng.uniform(0.03, 0.06)), float(rng.uniform(0.16, 0.5)), Timeline()
-    for _ in range(3):
-        line = line.body(y=aside, over=over).body(y=-aside, over=over)
-    return line.home(over=0.5)
+def _faster_sway(draw: _Draw) -> Timeline:
+    aside, over = draw.between(0.03, 0.06), draw.between(0.16, 0.5)
+    return _to_and_fro(Timeline(), range(3), "y", (aside, -aside), over).home(over=0.5)
 
 
-def _higher_paw(rng: np.random.Generator) -> Timeline:
-    line = Timeline().foot(_front(rng), x=0.05, z=float(rng.uniform(0.1, 0.8)), over=1.2)
+def _higher_paw(draw: _Draw) -> Timeline:
+    line = Timeline().foot(draw.front(), x=0.05, z=draw.between(0.1, 0.8), over=1.2)
     return line.hold(0.3).home(over=1.2)
 
 
-def _farther_paw(rng: np.random.Generator) -> Timeline:
-    leg = _front(rng)
+def _farther_paw(draw: _Draw) -> Timeline:
+    leg = draw.front()
     line = Timeline().foot(leg, z=0.1, over=0.8)
-    return line.foot(leg, x=float(rng.uniform(0.05, 0.5)), z=0.1, over=1.0).home(over=1.2)
+    return line.foot(leg, x=draw.between(0.05, 0.5), z=0.1, over=1.0).home(over=1.2)
 
 
-def _closer_legs(rng: np.random.Generator) -> Timeline:
-    leg = _front(rng)
-    inward = (-1.0 if leg is Leg.FL else 1.0) * float(rng.uniform(0.12, 0.30))
-    line = Timeline().foot(leg, z=0.08, over=0.8).foot(leg, y=inward, z=0.05, over=0.9)
+def _closer_legs(draw: _Draw) -> Timeline:
+    leg = draw.front()
+    line = Timeline().foot(leg, z=0.08, over=0.8)
+    line = line.foot(leg, y=-_outward(leg) * draw.between(0.12, 0.30), z=0.05, over=0.9)
     return line.hold(0.3).home(over=1.2)
 
 
-def _leaning(rng: np.random.Generator) -> Timeline:
-    leg = _leg(rng)
-    inward = -1.0 if leg in (Leg.FL, Leg.RL) else 1.0
-    line = Timeline(balance=False).body(y=inward * float(rng.uniform(0.0, 0.08)), over=0.8)
+def _leaning(draw: _Draw) -> Timeline:
+    leg = draw.leg()
+    line = Timeline(balance=False).body(y=-_outward(leg) * draw.between(0.0, 0.08), over=0.8)
     return line.foot(leg, z=0.08, over=0.6).hold(0.8).home(over=0.8)
 
 
-def _harder_push(rng: np.random.Generator) -> Timeline:
-    over, line = float(rng.uniform(0.12, 0.5)), Timeline().body(z=-0.10, over=0.8)
-    for _ in range(2):
-        line = line.body(z=0.02, over=over).body(z=-0.10, over=over)
-    return line.home(over=0.8)
+def _harder_push_up(draw: _Draw) -> Timeline:
+    over, line = draw.between(0.12, 0.5), Timeline().body(z=-0.10, over=0.8)
+    return _to_and_fro(line, range(2), "z", (0.02, -0.10), over).home(over=0.8)
 
 
-NEAR: Mapping[str, Maker] = {
-    "up": _up,
-    "aside": _aside,
-    "faster sway": _faster_sway,
-    "higher paw": _higher_paw,
-    "farther paw": _farther_paw,
-    "closer legs": _closer_legs,
-    "leaning": _leaning,
-    "harder push-up": _harder_push,
-}
+NEAR = _by_kind(
+    _up, _aside, _faster_sway, _higher_paw, _farther_paw, _closer_legs, _leaning, _harder_push_up
+)
 LATE = 1.0
 """When [s] a motion with a wrong entry is entered: it is where its first move has led."""
 
@@ -339,7 +337,7 @@ def generated_motion(seed: int) -> GeneratedMotion:
     return _made(BROKEN if is_broken else GOOD, seed // 2, seed, is_broken=is_broken)
 
 
-def near_specimen(seed: int) -> GeneratedMotion:
+def near_limit_motion(seed: int) -> GeneratedMotion:
     """The motion of a seed among those from easy to impossible, each kind in turn."""
     return _made(NEAR, seed, seed, is_broken=None)
 
@@ -348,5 +346,5 @@ def _made(
     makers: Mapping[str, Maker], turn: int, seed: int, *, is_broken: bool | None
 ) -> GeneratedMotion:
     kind = list(makers)[turn % len(makers)]
-    line = replace(makers[kind](np.random.default_rng([seed, 7])), name=f"{kind} {seed}")
+    line = replace(makers[kind](_Draw(seed)), name=f"{kind} {seed}")
     return GeneratedMotion(kind, is_broken, line, LATE if kind == "wrong entry" else 0.0)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from benchmarks.ground_truth import Track
-from benchmarks.rows import Direction, Family, Measurement, Row
-from benchmarks.trials import Failed, Subject, Trial
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.geometry import support_margin
 from go2_wbc.legs import LEGS, SIDES, Leg
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording, true_runs
 from go2_wbc.robot.model import RobotModel
 
 HOLD = 2.0
@@ -21,16 +20,16 @@ HELD_TIME = 1.9
 """Length [s] of the window in which the paw's height is measured: the hold without its edges."""
 
 _ITEM = "high five, either side"
-ROWS = (
-    Row("five.height", _ITEM, "paw height held 2 s", "m", 0.60, Direction.AT_LEAST),
-    Row("five.margin", _ITEM, "least CoM margin, held", "cm", 6.0, Direction.AT_LEAST),
-    Row("five.margin_phase", _ITEM, "the same, on three legs", "cm", None, Direction.AT_LEAST),
-    Row("five.load", _ITEM, "least foot load, held", "N", 25.0, Direction.AT_LEAST),
-    Row("five.load_phase", _ITEM, "the same, on three legs", "N", None, Direction.AT_LEAST),
-    Row("five.slip", _ITEM, "support slip at contact", "mm", 2.0),
-    Row("five.torque", _ITEM, "peak torque / limit", "", 0.4),
-    Row("five.joints", _ITEM, "least joint distance, held", "rad", 0.03, Direction.AT_LEAST),
-    Row("five.joints_phase", _ITEM, "the same, on three legs", "rad", None, Direction.AT_LEAST),
+METRICS = (
+    Metric("five.height", _ITEM, "paw height held 2 s", "m", 0.60, Direction.AT_LEAST),
+    Metric("five.margin", _ITEM, "least CoM margin, held", "cm", 6.0, Direction.AT_LEAST),
+    Metric("five.margin_phase", _ITEM, "the same, on three legs", "cm", None, Direction.AT_LEAST),
+    Metric("five.load", _ITEM, "least foot load, held", "N", 25.0, Direction.AT_LEAST),
+    Metric("five.load_phase", _ITEM, "the same, on three legs", "N", None, Direction.AT_LEAST),
+    Metric("five.slip", _ITEM, "support slip at contact", "mm", 2.0),
+    Metric("five.torque", _ITEM, "peak torque / limit", "", 0.4),
+    Metric("five.joints", _ITEM, "least joint distance, held", "rad", 0.03, Direction.AT_LEAST),
+    Metric("five.joints_phase", _ITEM, "the same, on three legs", "rad", None, Direction.AT_LEAST),
 )
 
 
@@ -50,88 +49,72 @@ def measure(trial: Trial) -> Measurement:
     - joint distance: least distance of any joint to its limit, the tighter published one for hips.
     """
     worst: dict[str, float] = {}
-    with Subject(trial) as robot:
+    with TrialRobot(trial) as robot:
         try:
             robot.require(robot.go2.stand())
             for side, leg in SIDES.items():
                 robot.truth.clear()
                 robot.require(robot.go2.high_five(side, hold=HOLD))
-                figures = _figures(robot.truth.track(), leg)
-                worst = {row.name: _worse(row, figures, worst) for row in ROWS}
-        except Failed as failed:
+                measured = _measured(robot.truth.recording(), leg)
+                for metric in METRICS:
+                    value = measured[metric.name]
+                    values = {0: value, 1: worst.get(metric.name, value)}
+                    worst[metric.name] = values[metric.direction.worst(values)]
+        except TrialFailed as failed:
             reason = str(failed)
-            return Measurement(worst, {row.name: reason for row in ROWS}, reason)
+            return Measurement(worst, {metric.name: reason for metric in METRICS}, reason)
     return Measurement(worst)
 
 
-def _worse(row: Row, new: Mapping[str, float], old: Mapping[str, float]) -> float:
-    values = {i: found[row.name] for i, found in enumerate((new, old)) if row.name in found}
-    return values[row.direction.worst(values)]
-
-
-def _figures(track: Track, leg: Leg) -> dict[str, float]:
-    in_air = longest_run(track.foot_forces[:, leg] == 0.0)
-    phase = track.part(in_air)
-    held = phase.part(highest_window(phase.p_world_feet[:, leg, 2], _ticks(track, HELD_TIME)))
+def _measured(recorded: TruthRecording, leg: Leg) -> dict[str, float]:
+    on_three_legs = recorded.part(longest_run(recorded.foot_forces[:, leg] == 0.0))
+    ticks = round(HELD_TIME / float(recorded.time[-1] - recorded.time[-2]))
+    held = on_three_legs.part(highest_window(on_three_legs.p_world_feet[:, leg, 2], ticks))
     support = [other for other in LEGS if other is not leg]
     model = RobotModel()
     return {
         "five.height": float(held.p_world_feet[:, leg, 2].min()),
         "five.margin": 100.0 * least_margin(held, support),
-        "five.margin_phase": 100.0 * least_margin(phase, support),
+        "five.margin_phase": 100.0 * least_margin(on_three_legs, support),
         "five.load": float(held.foot_forces[:, support].min()),
-        "five.load_phase": float(phase.foot_forces[:, support].min()),
-        "five.slip": 1000.0 * largest_slip(phase, support),
-        "five.torque": float((np.abs(phase.tau) / model.torque_limits).max()),
-        "five.joints": _joint_distance(held, model),
-        "five.joints_phase": _joint_distance(phase, model),
+        "five.load_phase": float(on_three_legs.foot_forces[:, support].min()),
+        "five.slip": 1000.0 * largest_slip(on_three_legs, support),
+        "five.torque": float(on_three_legs.torque_shares(model).max()),
+        "five.joints": held.joint_distance(model),
+        "five.joints_phase": on_three_legs.joint_distance(model),
     }
-
-
-def _ticks(track: Track, seconds: float) -> int:
-    return round(seconds / float(track.time[-1] - track.time[-2]))
 
 
 def longest_run(flags: Bool[np.ndarray, " n"]) -> slice:
     """Where ``flags`` is true for the longest time; empty if nowhere."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    starts, ends = edges[::2], edges[1::2]
-    if len(starts) == 0:
-        return slice(0, 0)
-    longest = int(np.argmax(ends - starts))
-    return slice(int(starts[longest]), int(ends[longest]))
+    return max(true_runs(flags), key=lambda run: run.stop - run.start, default=slice(0, 0))
 
 
 def highest_window(heights: Float[np.ndarray, " n"], length: int) -> slice:
     """The ``length`` consecutive samples whose least height is greatest.
 
     Raises:
-        Failed: if there are fewer samples.
+        TrialFailed: if there are fewer samples.
     """
     if len(heights) < length:
-        raise Failed(f"the paw was in the air for {len(heights)} ticks, {length} were asked")
+        raise TrialFailed(f"the paw was in the air for {len(heights)} ticks, {length} were asked")
     least = np.lib.stride_tricks.sliding_window_view(heights, length).min(axis=1)
     start = int(np.argmax(least))
     return slice(start, start + length)
 
 
-def least_margin(track: Track, support: list[Leg]) -> float:
+def least_margin(recorded: TruthRecording, support: list[Leg]) -> float:
     """Least distance [m] of the CoM to the edges of the supporting contact points."""
-    feet, com = track.p_world_contacts[:, support, :2], track.p_world_com[:, :2]
+    feet, com = recorded.p_world_contacts[:, support, :2], recorded.p_world_com[:, :2]
     if not np.isfinite(feet).all():
         return -math.inf  # a supporting foot left the ground
     return min(support_margin(points, p) for points, p in zip(feet, com, strict=True))
 
 
-def largest_slip(track: Track, support: list[Leg]) -> float:
+def largest_slip(recorded: TruthRecording, support: list[Leg]) -> float:
     """Largest distance [m] that the material of a supporting foot slides at its contact point."""
-    steps = np.diff(track.time)[:, None, None] * track.v_world_contacts[1:, support]
+    steps = np.diff(recorded.time)[:, None, None] * recorded.v_world_contacts[1:, support]
     return float(np.linalg.norm(np.cumsum(steps, axis=0), axis=2).max())
 
 
-def _joint_distance(track: Track, model: RobotModel) -> float:
-    q = track.q[:, 7:]
-    return float(np.minimum(q - model.q_lower, model.q_upper - q).min())
-
-
-FAMILY = Family("high-five", ROWS, measure)
+SCENARIO = Scenario("high-five", METRICS, measure)

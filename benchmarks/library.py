@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from benchmarks.motion_runs import run_motion
-from benchmarks.rows import Direction, Family, Measurement, Row
-from benchmarks.trials import Failed, Subject, Trial
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.trials import Trial, TrialRobot
+from controller.motion_measurement import measure_motion
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion, motion_names
 
 _ITEM = "every motion of the library"
-DONE = Row("library.done", _ITEM, "share of motions done", "", 1.0, Direction.AT_LEAST)
-SLIP = Row("library.slip", _ITEM, "support slip, worst motion", "mm", 5.0)
-TORQUE = Row("library.torque", _ITEM, "peak torque / limit", "", 1.0)
-SPEED = Row("library.speed", _ITEM, "peak joint speed / limit", "", 1.0)
-TRACKING = Row("library.tracking", _ITEM, "CoM off its plan, worst", "mm", None)
-ROWS = (DONE, SLIP, TORQUE, SPEED, TRACKING)
+DONE = Metric("library.done", _ITEM, "share of motions done", "", 1.0, Direction.AT_LEAST)
+SLIP = Metric("library.slip", _ITEM, "support slip, worst motion", "mm", 5.0)
+TORQUE = Metric("library.torque", _ITEM, "peak torque / limit", "", 1.0)
+SPEED = Metric("library.speed", _ITEM, "peak joint speed / limit", "", 1.0)
+TRACKING = Metric("library.tracking", _ITEM, "CoM off its plan, worst", "mm", None)
+METRICS = (DONE, SLIP, TORQUE, SPEED, TRACKING)
 
 
 def measure(trial: Trial) -> Measurement:
@@ -25,31 +25,29 @@ def measure(trial: Trial) -> Measurement:
       after a touchdown to 0.1 s before a lift-off.
     """
     model = RobotModel()
-    values = {row.name: 0.0 for row in ROWS}
+    values = {metric.name: 0.0 for metric in METRICS}
     lost: dict[str, str] = {}
     remaining = list(motion_names())
     while remaining:
-        with Subject(trial) as robot:
-            try:
-                robot.require(robot.go2.stand())
-                while remaining:
-                    name = remaining.pop(0)
-                    run = run_motion(robot, compile_timeline(load_motion(name), model), model)
-                    for row, value in (
-                        (SLIP, 1000.0 * run.slip),
-                        (TORQUE, run.torque),
-                        (SPEED, run.speed),
-                        (TRACKING, 1000.0 * run.tracking),
-                    ):
-                        values[row.name] = max(values[row.name], value)
-                    if run.fall is not None or not run.said:
-                        lost[name] = run.fall or run.reason
-                        break
-            except Failed as failed:
-                return Measurement({}, reason=str(failed))
+        with TrialRobot(trial) as robot:
+            robot.require(robot.go2.stand())
+            while remaining:
+                name = remaining.pop(0)
+                plan = compile_timeline(load_motion(name), model)
+                run = measure_motion(robot.go2, robot.truth, plan, model)
+                for metric, value in (
+                    (SLIP, 1000.0 * run.slip),
+                    (TORQUE, run.torque),
+                    (SPEED, run.speed),
+                    (TRACKING, 1000.0 * run.tracking),
+                ):
+                    values[metric.name] = max(values[metric.name], value)
+                if not run.ok:
+                    lost[name] = run.fall or run.reason
+                    break
     values[DONE.name] = 1.0 - len(lost) / len(motion_names())
     reason = "; ".join(f"{name}: {why}" for name, why in lost.items())
     return Measurement(values, {DONE.name: reason} if lost else {})
 
 
-FAMILY = Family("library", ROWS, measure)
+SCENARIO = Scenario("library", METRICS, measure)

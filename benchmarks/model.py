@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from benchmarks.agreement import model_agreement
-from benchmarks.rows import Family, Measurement, Row
-from benchmarks.trials import Trial
+from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.trials import Trial, TrialFailed
 from controller.loop import ControlLoop
 from controller.pilot import Pilot
 from controller.procedures import Aborted
@@ -28,10 +28,10 @@ from motions.library.high_five import HEIGHT
 
 STATES = 200
 """Random states of a trial on which the two models are compared."""
-AGREEMENT_BAR = 1e-12
-MOTION_BAR = 1e-8
+AGREEMENT_LIMIT = 1e-12
+MOTION_LIMIT = 1e-8
 """N and N m; the robot weighs 158 N."""
-TORQUE_BAR = 1e-5
+TORQUE_LIMIT = 1e-5
 """N m"""
 ORACLE_PERIOD = 10
 """Ticks between those that the other back ends solve as well."""
@@ -51,17 +51,17 @@ _AGREEMENT_QUANTITIES = {
 _MODEL_ITEM = "Pinocchio against MuJoCo, relative"
 _SOLUTION_ITEM = "whole-body solutions"
 
-AGREEMENT_ROWS = tuple(
-    Row(f"model.{name}", _MODEL_ITEM, quantity, "", AGREEMENT_BAR)
+AGREEMENT_METRICS = tuple(
+    Metric(f"model.{name}", _MODEL_ITEM, quantity, "", AGREEMENT_LIMIT)
     for name, quantity in _AGREEMENT_QUANTITIES.items()
 )
-SOLUTION_ROWS = (
+SOLUTION_METRICS = (
     *(
-        Row(f"wbc.motion_{name}", _SOLUTION_ITEM, f"motion, {name}", "N, N m", MOTION_BAR)
+        Metric(f"wbc.motion_{name}", _SOLUTION_ITEM, f"motion, {name}", "N, N m", MOTION_LIMIT)
         for name in BACKENDS
     ),
-    Row("wbc.torque", _SOLUTION_ITEM, "torque between back ends", "N m", TORQUE_BAR),
-    Row("wbc.failures", _SOLUTION_ITEM, "QP failures", "", 0.0),
+    Metric("wbc.torque", _SOLUTION_ITEM, "torque between back ends", "N m", TORQUE_LIMIT),
+    Metric("wbc.failures", _SOLUTION_ITEM, "QP failures", "", 0.0),
 )
 
 
@@ -75,7 +75,7 @@ class AuditedController(WholeBodyController):
     """Checks every solution, and solves some ticks with the other back ends as well.
 
     Attributes:
-        worst: largest value so far, by row name; see ``measure_solutions``.
+        worst: largest value so far, by metric; see ``measure_solutions``.
     """
 
     def __init__(self, model: RobotModel, backend: str, config: WbcConfig) -> None:
@@ -99,11 +99,10 @@ class AuditedController(WholeBodyController):
         return solution
 
     def _audit(self, snapshot: Snapshot, solution: WbcSolution) -> None:
-        error = motion_error(self.model, snapshot, solution)
-        self._note(f"wbc.motion_{solution.backend}", error)
+        self._note(f"wbc.motion_{solution.backend}", motion_error(self.model, snapshot, solution))
 
-    def _note(self, row: str, value: float) -> None:
-        self.worst[row] = max(value, self.worst.get(row, 0.0))
+    def _note(self, metric: str, value: float) -> None:
+        self.worst[metric] = max(value, self.worst.get(metric, 0.0))
 
 
 def motion_error(model: RobotModel, snapshot: Snapshot, solution: WbcSolution) -> float:
@@ -135,7 +134,7 @@ def measure_solutions(trial: Trial) -> Measurement:
         try:
             _exercise(Pilot(Runner(loop, realtime=False, after_tick=lambda: None), config), plant)
         except Aborted as aborted:
-            return Measurement({}, reason=f"driven by {driver}: {aborted}")
+            raise TrialFailed(f"driven by {driver}: {aborted}") from aborted
         finally:
             plant.close()
         worst = {name: max(value, worst.get(name, 0.0)) for name, value in wbc.worst.items()}
@@ -157,5 +156,5 @@ def _exercise(pilot: Pilot, plant: MujocoPlant) -> None:
     pilot.sit()
 
 
-AGREEMENT = Family("model", AGREEMENT_ROWS, measure_agreement)
-SOLUTIONS = Family("solutions", SOLUTION_ROWS, measure_solutions)
+AGREEMENT = Scenario("model", AGREEMENT_METRICS, measure_agreement)
+SOLUTIONS = Scenario("solutions", SOLUTION_METRICS, measure_solutions)

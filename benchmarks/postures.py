@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from benchmarks.pushes import PUSH_TIME, Heading, force_of, measure_rungs, push_rows
-from benchmarks.rows import Family, Measurement, Row
-from benchmarks.trials import Failed, Subject, Trial
+from benchmarks.pushes import PUSH_TIME, force_of, measure_impulses, push_metrics
+from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.trials import Trial, TrialFailed, TrialRobot
 from controller.modes import Mode
 from go2_wbc.robot.model import RobotModel
 from motions.postures import STAND_HEIGHT
@@ -21,20 +21,19 @@ LOAD = 5.0
 """Force [N] on a foot that counts as loaded; a standing foot carries about 40 N."""
 
 _RISE = "lying -> standing"
-
-STAND_ROWS = (
-    Row("stand.time", _RISE, "time", "s", 3.0),
-    Row("stand.torque", _RISE, "peak torque / limit", "", 0.4),
-    Row("stand.height", _RISE, "final CoM height off", "mm", 5.0),
-    Row("stand.tilt", _RISE, "final tilt", "deg", None),
-)
 _PUSH = "standing, push 0.1 s without a step"
-PUSH_ROWS = push_rows("stand.push", _PUSH, lateral=14.0, forward=18.0)
-MOVED = Row("stand.push_moved", _PUSH, "a foot moved, up to the bar", "mm", None)
+STAND_METRICS = (
+    Metric("stand.time", _RISE, "time", "s", 3.0),
+    Metric("stand.torque", _RISE, "peak torque / limit", "", 0.4),
+    Metric("stand.height", _RISE, "final CoM height off", "mm", 5.0),
+    Metric("stand.tilt", _RISE, "final tilt", "deg", None),
+)
+PUSH_METRICS = push_metrics("stand.push", _PUSH, lateral=14.0, forward=18.0)
+MOVED = Metric("stand.push_moved", _PUSH, "a foot moved, to threshold", "mm", None)
 
 
-def standing_fault(robot: Subject) -> str | None:
-    """What the truth finds missing for standing, or None.
+def standing_failure(robot: TrialRobot) -> str | None:
+    """What is missing for standing in truth, or None.
 
     Standing is: CoM within 20 mm of its height, tilt below 6 deg, every foot loaded.
     """
@@ -55,52 +54,46 @@ def measure_stand(trial: Trial) -> Measurement:
     - final CoM height off: |height of MuJoCo's CoM over the floor - 0.29 m| when ``stand()``
       returns.
     """
-    with Subject(trial) as robot:
+    with TrialRobot(trial) as robot:
         start = robot.plant.time
-        try:
-            robot.require(robot.go2.stand())
-        except Failed as failed:
-            return Measurement({}, reason=str(failed))
-        track = robot.truth.track()
+        robot.require(robot.go2.stand())
+        recorded = robot.truth.recording()
         values = {
             "stand.time": robot.plant.time - start,
-            "stand.torque": float((np.abs(track.tau) / RobotModel().torque_limits).max()),
-            "stand.height": 1000.0 * abs(float(track.p_world_com[-1, 2]) - STAND_HEIGHT),
+            "stand.torque": float(recorded.torque_shares(RobotModel()).max()),
+            "stand.height": 1000.0 * abs(float(recorded.p_world_com[-1, 2]) - STAND_HEIGHT),
             "stand.tilt": math.degrees(robot.plant.read().tilt),
         }
-        fault = standing_fault(robot)
-    return Measurement(values, {} if fault is None else {"stand.height": fault})
+        failure = standing_failure(robot)
+    return Measurement(values, {} if failure is None else {"stand.height": failure})
 
 
 def measure_pushes(trial: Trial) -> Measurement:
-    """Largest impulse on the base, in the worst of the row's directions, that is survived.
+    """Largest impulse on the base, in the worst of a metric's directions, that is survived.
 
-    Survived is: 3 s later the robot stands (see ``standing_fault``), and never left standing mode,
-    in which no foot is ever swung. A pushed robot may rock onto two feet, and the other two come
-    down elsewhere: the last row says how far from where they were, for impulses up to the bars.
+    Survived is: 3 s later the robot stands (see ``standing_failure``), and never left standing
+    mode, in which no foot is ever swung. A pushed robot may rock onto two feet, and the other two
+    come down elsewhere: ``MOVED`` says how far, for impulses up to the thresholds.
     """
     trial = Trial(trial.seed, has_nominal_friction=True)
     moved = [0.0]
 
-    def fault_of(impulse: float, direction: Heading) -> str | None:
-        with Subject(trial) as robot:
+    def failure_of(impulse: float, direction: str) -> str | None:
+        with TrialRobot(trial) as robot:
             try:
-                distance, fault = _push_standing(robot, impulse, direction)
-            except Failed as failed:
+                distance, failure = _push_standing(robot, impulse, direction)
+            except TrialFailed as failed:
                 return str(failed)
-        if impulse <= _bar_towards(direction):
+        thresholds = [p.metric.threshold or 0.0 for p in PUSH_METRICS if direction in p.directions]
+        if impulse <= max(thresholds):
             moved.append(distance)
-        return fault
+        return failure
 
-    found = measure_rungs(PUSH_ROWS, fault_of)
+    found = measure_impulses(PUSH_METRICS, failure_of)
     return Measurement({**found.values, MOVED.name: 1000.0 * max(moved)}, found.failures)
 
 
-def _bar_towards(direction: Heading) -> float:
-    return max(item.row.bar or 0.0 for item in PUSH_ROWS if direction in item.directions)
-
-
-def _push_standing(robot: Subject, impulse: float, direction: Heading) -> tuple[float, str | None]:
+def _push_standing(robot: TrialRobot, impulse: float, direction: str) -> tuple[float, str | None]:
     """How far [m] a foot moved, and what was wrong in the end, if anything."""
     robot.require(robot.go2.stand())
     feet = robot.plant.p_world_feet
@@ -109,8 +102,8 @@ def _push_standing(robot: Subject, impulse: float, direction: Heading) -> tuple[
     distance = float(np.linalg.norm((robot.plant.p_world_feet - feet)[:, :2], axis=1).max())
     if robot.go2.mode is not Mode.STANDING:
         return distance, f"the robot is {robot.go2.mode.value}"
-    return distance, standing_fault(robot)
+    return distance, standing_failure(robot)
 
 
-STAND = Family("stand", STAND_ROWS, measure_stand)
-PUSHES = Family("stand-pushes", (*(item.row for item in PUSH_ROWS), MOVED), measure_pushes)
+STAND = Scenario("stand", STAND_METRICS, measure_stand)
+PUSHES = Scenario("stand-pushes", (*(p.metric for p in PUSH_METRICS), MOVED), measure_pushes)

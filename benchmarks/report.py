@@ -1,29 +1,29 @@
-"""Means, worst seeds and verdicts of the rows, as a table of at most 80 columns and as JSON."""
+"""Means, worst seeds and verdicts of the metrics, as a table of at most 80 columns and as JSON."""
 
 from __future__ import annotations
 
 import math
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import groupby
 from statistics import fmean
 
-from benchmarks.rows import Family, Measurement, Row
 from benchmarks.runner import Results
+from benchmarks.scenario import Measurement, Metric, Scenario
 
 WIDTH = 80
-_LINE = "  {quantity:<28}{bar:>13}{n:>4}{mean:>9}{worst:>9}{seed:>5}{falls:>5} {verdict}"
+_LINE = "  {quantity:<28}{threshold:>13}{n:>4}{mean:>9}{worst:>9}{seed:>5}{falls:>5} {verdict}"
 _NOTES = 3
-"""Failed seeds of a row whose reasons are printed; JSON has all."""
+"""Failed seeds of a metric whose reasons are printed; JSON has all."""
 
 
 @dataclass(frozen=True, slots=True)
-class RowResult:
-    """A row over all its seeds.
+class MetricResult:
+    """A metric over all its seeds.
 
     Attributes:
-        row: the row.
+        metric: which.
         n: number of seeds that were run.
         mean: over the seeds that gave a value; None if none did.
         worst: the worst value; None if a seed gave none, since nothing is worse than that.
@@ -32,7 +32,7 @@ class RowResult:
         failures: by seed, why the robot fell or did not do what it was asked.
     """
 
-    row: Row
+    metric: Metric
     n: int
     mean: float | None
     worst: float | None
@@ -47,23 +47,18 @@ class RowResult:
 
     @property
     def passed(self) -> bool | None:
-        """Whether the mean meets the bar and no seed failed; None for a row without a bar."""
-        if self.row.bar is None:
+        """Whether the mean meets the threshold and no seed failed; None without a threshold."""
+        if self.metric.threshold is None:
             return None
         if self.mean is None or self.falls or not self.n:
             return False
-        return self.row.direction.meets(self.mean, self.row.bar)
+        return self.metric.direction.meets(self.mean, self.metric.threshold)
 
     def as_dict(self) -> dict[str, object]:
         """Plain values for JSON; what is not finite or was not measured is None."""
-        row = self.row
         return {
-            "name": row.name,
-            "item": row.item,
-            "quantity": row.quantity,
-            "unit": row.unit,
-            "bar": row.bar,
-            "direction": row.direction.value,
+            **asdict(self.metric),
+            "direction": self.metric.direction.value,
             "n": self.n,
             "mean": _finite(self.mean),
             "worst": _finite(self.worst),
@@ -76,14 +71,14 @@ class RowResult:
 
 
 @dataclass(frozen=True, slots=True)
-class BenchReport:
-    """All rows."""
+class Report:
+    """All metrics, each a row of the table."""
 
-    rows: tuple[RowResult, ...]
+    rows: tuple[MetricResult, ...]
 
     @property
     def ok(self) -> bool:
-        """Whether every row with a bar passed; False without any row."""
+        """Whether every metric with a threshold passed; False without any metric."""
         return bool(self.rows) and all(row.passed is not False for row in self.rows)
 
     def as_dict(self) -> dict[str, object]:
@@ -91,28 +86,27 @@ class BenchReport:
         return {"passed": self.ok, "rows": [row.as_dict() for row in self.rows]}
 
 
-def summarise(families: Sequence[Family], results: Results) -> BenchReport:
+def summarise(scenarios: Sequence[Scenario], results: Results) -> Report:
     """The report of ``results``."""
-    return BenchReport(
-        tuple(
-            summarise_row(row, results[family.name]) for family in families for row in family.rows
-        )
+    return Report(
+        tuple(summarise_metric(m, results.get(s.name, {})) for s in scenarios for m in s.metrics)
     )
 
 
-def summarise_row(row: Row, trials: Mapping[int, Measurement]) -> RowResult:
-    """One row over the trials of its family, given by seed."""
-    seeds = sorted(trials)
-    values = {s: trials[s].values[row.name] for s in seeds if row.name in trials[s].values}
-    reasons = {s: trials[s].failure(row.name) for s in seeds}
+def summarise_metric(metric: Metric, trials: Mapping[int, Measurement]) -> MetricResult:
+    """One metric over the trials of its scenario, given by seed."""
+    found = {
+        s: trials[s].values[metric.name] for s in sorted(trials) if metric.name in trials[s].values
+    }
+    reasons = {s: trials[s].failure(metric.name) for s in sorted(trials)}
     failures = {s: reason for s, reason in reasons.items() if reason is not None}
-    failures |= {s: f"{v} was measured" for s, v in values.items() if math.isnan(v)}
-    values = {s: v for s, v in values.items() if not math.isnan(v)}
-    missing = [s for s in seeds if s not in values]
-    worst = row.direction.worst(values) if values else None
-    return RowResult(
-        row=row,
-        n=len(seeds),
+    failures |= {s: f"{v} was measured" for s, v in found.items() if math.isnan(v)}
+    values = {s: v for s, v in found.items() if not math.isnan(v)}
+    missing = [s for s in reasons if s not in values]
+    worst = metric.direction.worst(values) if values else None
+    return MetricResult(
+        metric=metric,
+        n=len(trials),
         mean=fmean(values.values()) if values else None,
         worst=None if missing or worst is None else values[worst],
         worst_seed=missing[0] if missing else worst,
@@ -121,35 +115,35 @@ def summarise_row(row: Row, trials: Mapping[int, Measurement]) -> RowResult:
     )
 
 
-def render(report: BenchReport) -> str:
+def render(report: Report) -> str:
     """The table, with the reasons of failed seeds below, and the verdict."""
-    titles = {"quantity": "", "bar": "bar", "n": "n", "mean": "mean", "worst": "worst"}
+    titles = {"quantity": "", "threshold": "threshold", "n": "n", "mean": "mean", "worst": "worst"}
     head = _LINE.format(**titles, seed="seed", falls="fell", verdict="")
     lines = [head.rstrip(), "-" * WIDTH]
-    for item, group in groupby(report.rows, key=lambda result: result.row.item):
+    for item, group in groupby(report.rows, key=lambda result: result.metric.item):
         lines.append(item)
         for result in group:
             lines.append(_line(result))
             lines += _notes(result)
     judged = [row for row in report.rows if row.passed is not None]
     passed = sum(bool(row.passed) for row in judged)
-    lines += ["-" * WIDTH, f"{passed} of {len(judged)} rows pass. The bar is for the mean, and no"]
-    lines += ["seed may fall or fail to do what it was asked (column fell)."]
+    lines += ["-" * WIDTH, f"{passed} of {len(judged)} rows pass. The threshold is for the"]
+    lines += ["mean, and no seed may fall or fail to do what it was asked (column fell)."]
     return "\n".join(lines)
 
 
-def bar_text(row: Row) -> str:
-    """The bar with its unit, as ``<= 1 %``; a dash for a row that only informs."""
-    if row.bar is None:
-        return f"- {row.unit}".rstrip()
-    return f"{row.direction.value} {row.bar:g} {row.unit}".rstrip()
+def threshold_text(metric: Metric) -> str:
+    """The threshold with its unit, as ``<= 1 %``; a dash for a metric that only informs."""
+    if metric.threshold is None:
+        return f"- {metric.unit}".rstrip()
+    return f"{metric.direction.value} {metric.threshold:g} {metric.unit}".rstrip()
 
 
-def _line(result: RowResult) -> str:
+def _line(result: MetricResult) -> str:
     verdict = {True: "ok", False: "NO", None: ""}[result.passed]
     return _LINE.format(
-        quantity=result.row.quantity,
-        bar=bar_text(result.row),
+        quantity=result.metric.quantity,
+        threshold=threshold_text(result.metric),
         n=result.n,
         mean=_number(result.mean),
         worst=_number(result.worst) if result.worst is not None or not result.falls else "fell",
@@ -159,7 +153,7 @@ def _line(result: RowResult) -> str:
     ).rstrip()
 
 
-def _notes(result: RowResult) -> Iterator[str]:
+def _notes(result: MetricResult) -> Iterator[str]:
     for seed in list(result.failures)[:_NOTES]:
         text = f"seed {seed}: {result.failures[seed]}"
         yield from textwrap.wrap(

@@ -8,13 +8,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from benchmarks.goals import way_between
 from benchmarks.high_fives import highest_window
-from benchmarks.postures import standing_fault
-from benchmarks.rows import Direction, Family, Measurement, Row
-from benchmarks.trials import Failed, Subject, Trial
+from benchmarks.postures import standing_failure
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.trials import Trial, TrialFailed, TrialRobot
 from controller.demo.run import DemoProgress, run_demo
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from go2_wbc.robot.rotations import wrap_angle
 from go2_wbc.robot.state import RobotState
 
 SIT_PITCH = math.radians(-25.0)
@@ -35,10 +36,10 @@ PAW_SUPPORT = 5.0
 """N on every other foot meanwhile."""
 
 _ITEM = "whole demo sequence"
-ROWS = (
-    Row("demo.done", _ITEM, "share of seeds done", "", 1.0, Direction.AT_LEAST),
-    Row("demo.untrue", _ITEM, "True not borne out", "", 0.0),
-    Row("demo.pace", "whole run headless", "real-time factor, CPU", "", 2.5, Direction.AT_LEAST),
+METRICS = (
+    Metric("demo.done", _ITEM, "share of seeds done", "", 1.0, Direction.AT_LEAST),
+    Metric("demo.untrue", _ITEM, "True that does not hold", "", 0.0),
+    Metric("demo.pace", "whole run headless", "real-time factor, CPU", "", 2.5, Direction.AT_LEAST),
 )
 
 
@@ -46,102 +47,91 @@ def measure(trial: Trial) -> Measurement:
     """Run the demo and check every step that it calls done against the simulator.
 
     - share of seeds done: 1 for a trial in which every step was done, 0 for any other;
-    - True not borne out: steps called done for which this module's own criteria, on MuJoCo's
+    - True that does not hold: steps called done for which this module's own criteria, on MuJoCo's
       state, are not met;
     - real-time factor: robot time over processor time of the process, from building the plant to
-      closing it, imports and the truth excluded.
+      closing it, imports and recording the truth excluded.
     """
     cpu_start = time.process_time()
-    with Subject(trial) as robot:
-        judge = Judge(robot)
-        report = run_demo(robot.go2, judge)
-        robot_time, watching = robot.plant.time, robot.truth.cpu_time
-    cpu_time = time.process_time() - cpu_start - watching
+    with TrialRobot(trial) as robot:
+        check = StepCheck(robot)
+        report = run_demo(robot.go2, check)
+        robot_time, recording_time = robot.plant.time, robot.truth.cpu_time
+    cpu_time = time.process_time() - cpu_start - recording_time
     values = {
         "demo.done": float(report.ok),
-        "demo.untrue": float(len(judge.untrue)),
+        "demo.untrue": float(len(check.untrue)),
         "demo.pace": robot_time / cpu_time,
     }
-    failures = {}
-    if not report.ok:
-        undone = [f"{step.name}: {step.reason}" for step in report.steps if not step.ok]
-        failures["demo.done"] = "; ".join(undone)
-    if judge.untrue:
-        failures["demo.untrue"] = "; ".join(judge.untrue)
-    return Measurement(values, failures)
+    undone = [f"{step.name}: {step.reason}" for step in report.steps if not step.ok]
+    failures = {"demo.done": "; ".join(undone), "demo.untrue": "; ".join(check.untrue)}
+    return Measurement(values, {name: why for name, why in failures.items() if why})
 
 
-class Judge:
-    """Looks at the robot when a step begins and ends, and at the track in between.
+class StepCheck:
+    """Reads the robot's state when a step begins and ends, and what was recorded in between.
 
     Attributes:
         untrue: steps that were called done although they were not, with the reason.
     """
 
-    def __init__(self, robot: Subject) -> None:
-        """Judge ``robot``'s demo."""
+    def __init__(self, robot: TrialRobot) -> None:
+        """Check ``robot``'s demo."""
         self._robot = robot
         self._before = robot.plant.read()
         self.untrue: list[str] = []
 
     def __call__(self, progress: DemoProgress) -> None:
-        """Take note of a step's begin, or judge its end."""
+        """Take note of a step's begin, or check its end."""
         if progress.result is None:
             self._before = self._robot.plant.read()
             self._robot.truth.clear()
-            return
-        name = progress.result.name
-        if progress.result.ok:
-            fault = self._robot.truth.fall() if "sit" not in name else None
-            fault = fault or FAULTS[name](self._robot, self._before)
-            if fault is not None:
-                self.untrue.append(f"{name}: {fault}")
+        elif progress.result.ok:
+            name = progress.result.name
+            failure = self._robot.truth.fall() if "sit" not in name else None
+            failure = failure or CRITERIA[name](self._robot, self._before)
+            if failure is not None:
+                self.untrue.append(f"{name}: {failure}")
 
 
-def _stand_fault(robot: Subject, _before: RobotState) -> str | None:
-    return standing_fault(robot)
+def _stand(robot: TrialRobot, _before: RobotState) -> str | None:
+    return standing_failure(robot)
 
 
-def _sit_fault(robot: Subject, _before: RobotState) -> str | None:
+def _sit(robot: TrialRobot, _before: RobotState) -> str | None:
     state = robot.plant.read()
-    pitch, rear = float(state.rpy[1]), _rear_height(state)
+    pitch, rear = float(state.rpy[1]), float(state.q[2] + REAR_END * state.R_world_base[2, 0])
     if pitch > SIT_PITCH:
         return f"pitch {math.degrees(pitch):.0f} deg"
     return f"rear end at {rear:.2f} m" if rear > SIT_REAR_HEIGHT else None
 
 
-def _rear_height(state: RobotState) -> float:
-    return float(state.q[2] + REAR_END * state.R_world_base[2, 0])
-
-
-def _forward_fault(robot: Subject, before: RobotState) -> str | None:
-    way = robot.plant.read().p_world_base - before.p_world_base
-    ahead, left, _ = yaw_rotation(float(before.rpy[2])).T @ way
+def _forward(robot: TrialRobot, before: RobotState) -> str | None:
+    ahead, left, _ = way_between(before, robot.plant.read())
     if not FORWARD_WAY[0] <= ahead <= FORWARD_WAY[1] or abs(left) > FORWARD_ASIDE:
         return f"went {ahead:.3f} m ahead and {left:.3f} m aside"
     return None
 
 
-def _stop_fault(robot: Subject, _before: RobotState) -> str | None:
-    last = robot.truth.track().com_velocity[-1]
-    speed = float(np.linalg.norm(last[:2]))
-    return f"moves at {speed:.2f} m/s" if speed > STOP_SPEED else standing_fault(robot)
+def _stop(robot: TrialRobot, _before: RobotState) -> str | None:
+    speed = float(np.linalg.norm(robot.truth.recording().com_velocity[-1, :2]))
+    return f"moves at {speed:.2f} m/s" if speed > STOP_SPEED else standing_failure(robot)
 
 
-def _turn_fault(robot: Subject, before: RobotState) -> str | None:
+def _turn(robot: TrialRobot, before: RobotState) -> str | None:
     asked, tolerance = TURN
-    turned = wrap_angle(float(robot.plant.read().rpy[2] - before.rpy[2]))
+    *_, turned = way_between(before, robot.plant.read())
     if abs(wrap_angle(turned - asked)) > tolerance:
         return f"turned {math.degrees(turned):.1f} deg"
     return None
 
 
-def _high_five_fault(robot: Subject, _before: RobotState) -> str | None:
-    track, leg = robot.truth.track(), Leg.FR
+def _high_five(robot: TrialRobot, _before: RobotState) -> str | None:
+    recorded, leg = robot.truth.recording(), Leg.FR
     ticks = round(PAW_TIME / robot.plant.control_period)
     try:
-        held = track.part(highest_window(track.p_world_feet[:, leg, 2], ticks))
-    except Failed as failed:
+        held = recorded.part(highest_window(recorded.p_world_feet[:, leg, 2], ticks))
+    except TrialFailed as failed:
         return str(failed)
     height = float(held.p_world_feet[:, leg, 2].min())
     if height < PAW_HEIGHT:
@@ -149,20 +139,20 @@ def _high_five_fault(robot: Subject, _before: RobotState) -> str | None:
     load = float(held.foot_forces[:, [other for other in LEGS if other is not leg]].min())
     if load < PAW_SUPPORT:
         return f"a supporting foot carried {load:.1f} N only"
-    return standing_fault(robot)
+    return standing_failure(robot)
 
 
-FAULTS: dict[str, Callable[[Subject, RobotState], str | None]] = {
-    "stand": _stand_fault,
-    "sit": _sit_fault,
-    "walk": _stand_fault,
-    "forward": _forward_fault,
-    "stop": _stop_fault,
-    "turn": _turn_fault,
-    "high_five": _high_five_fault,
-    "sit_again": _sit_fault,
+CRITERIA: dict[str, Callable[[TrialRobot, RobotState], str | None]] = {
+    "stand": _stand,
+    "sit": _sit,
+    "walk": _stand,
+    "forward": _forward,
+    "stop": _stop,
+    "turn": _turn,
+    "high_five": _high_five,
+    "sit_again": _sit,
 }
 """What is missing for a step to be true, by the step's name; every step must have one."""
 
 
-FAMILY = Family("sequence", ROWS, measure, seed_factor=5)
+SCENARIO = Scenario("sequence", METRICS, measure, seed_factor=5)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Callable
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.postures import standing_fault
-from benchmarks.rows import Direction, Family, Measurement, Row
-from benchmarks.trials import Failed, Subject, Trial
-from go2_wbc.legs import SIDES, Leg
+from benchmarks.postures import standing_failure
+from benchmarks.pushes import DIRECTIONS
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.trials import Trial, TrialFailed, TrialRobot
+from go2_wbc.legs import SIDES
 
 RAISED = 0.5
 """Height [m] of the paw from which on it counts as raised; it is held at 0.6 m."""
@@ -24,22 +25,13 @@ PAUSE = 0.3
 PLACE_TOLERANCE = 30.0
 """mm; a paw this near to its place is back in the pose. Dry friction in the joints keeps a part."""
 
-DIRECTIONS: dict[str, tuple[float, float, float]] = {
-    "forward": (1.0, 0.0, 0.0),
-    "backward": (-1.0, 0.0, 0.0),
-    "to the left": (0.0, 1.0, 0.0),
-    "to the right": (0.0, -1.0, 0.0),
-    "up": (0.0, 0.0, 1.0),
-    "down": (0.0, 0.0, -1.0),
-}
-
 
 @dataclass(frozen=True, slots=True)
 class Slap:
     """A force on the held paw.
 
     Attributes:
-        name: begins the names of its rows.
+        name: begins the names of its metrics.
         item: what the report calls it.
         force: [N].
         duration: [s].
@@ -56,14 +48,14 @@ class Slap:
         return self.duration + RETURN_TIME + PAUSE
 
     @property
-    def rows(self) -> tuple[Row, Row, Row]:
+    def metrics(self) -> tuple[Metric, Metric, Metric]:
         """Directions survived, how far the paw stays off its place, and what the call said."""
         count = float(len(DIRECTIONS))
         survived, off = "directions survived, of 6", "paw off its place after 2 s"
         return (
-            Row(f"{self.name}.survived", self.item, survived, "", count, Direction.AT_LEAST),
-            Row(f"{self.name}.off", self.item, off, "mm", PLACE_TOLERANCE),
-            Row(f"{self.name}.said", self.item, "high_five() said True", "", None),
+            Metric(f"{self.name}.survived", self.item, survived, "", count, Direction.AT_LEAST),
+            Metric(f"{self.name}.off", self.item, off, "mm", PLACE_TOLERANCE),
+            Metric(f"{self.name}.said", self.item, "high_five() said True", "", None),
         )
 
 
@@ -71,7 +63,6 @@ SLAPS = (
     Slap("slap", "slap on the held paw, 40 N, 0.1 s", 40.0, 0.1),
     Slap("lean", "leaning on the held paw, 15 N, 1 s", 15.0, 1.0),
 )
-ROWS = tuple(row for slap in SLAPS for row in slap.rows)
 
 
 def measure(trial: Trial) -> Measurement:
@@ -83,109 +74,85 @@ def measure(trial: Trial) -> Measurement:
     - paw off its place: distance, in the world, of the foot's centre 2 s after the end of the
       force from where it was before; worst direction.
     """
-    side = ("left", "right")[trial.seed % 2]
-    trial = Trial(trial.seed, has_nominal_friction=True)
     values: dict[str, float] = {}
     failures: dict[str, str] = {}
     for slap in SLAPS:
-        survived, off, said = slap.rows
-        found = _slap_all(trial, side, slap)
-        values[survived.name] = float(len(DIRECTIONS) - len(found.lost))
-        values[said.name] = found.said
-        if found.distances:
-            values[off.name] = max(found.distances.values())
-        if found.lost:
-            reason = "; ".join(f"{direction}: {why}" for direction, why in found.lost.items())
-            failures |= {survived.name: reason, off.name: reason}
+        survived, off, said = (metric.name for metric in slap.metrics)
+        distances, lost, values[said] = _slap_all(
+            Trial(trial.seed, has_nominal_friction=True), slap
+        )
+        values[survived] = float(len(DIRECTIONS) - len(lost))
+        if distances:
+            values[off] = max(distances.values())
+        if lost:
+            reason = "; ".join(f"{direction}: {why}" for direction, why in lost.items())
+            failures |= {survived: reason, off: reason}
     return Measurement(values, failures)
 
 
-@dataclass(frozen=True, slots=True)
-class _Slapped:
-    """What came of slaps, by direction: why it was lost, or the paw's distance [mm] afterwards.
+def _slap_all(trial: Trial, slap: Slap) -> tuple[dict[str, float], dict[str, str], float]:
+    """Slaps from all directions; after a fall a new robot goes on with the next one.
 
-    ``said`` is 1 if the last call of ``high_five`` said True.
+    Returns:
+        By direction the paw's distance [mm] from its place, or why it was lost; and 1 if the last
+        call of ``high_five`` said True.
     """
-
-    lost: dict[str, str]
-    distances: dict[str, float]
-    said: float
-
-
-def _slap_all(trial: Trial, side: str, slap: Slap) -> _Slapped:
-    """Slaps from all directions; after a fall a new robot goes on with the next one."""
-    lost: dict[str, str] = {}
+    side = ("left", "right")[trial.seed % 2]
     distances: dict[str, float] = {}
+    lost: dict[str, str] = {}
     remaining, said = list(DIRECTIONS), False
     while remaining:
-        with Subject(trial) as robot:
-            slapper = Slapper(robot, SIDES[side], slap, remaining)
-            robot.truth.on_tick = slapper
+        with TrialRobot(trial) as robot:
+            found: dict[str, float] = {}
+            robot.truth.on_tick = _Schedule(robot, _slaps(robot, side, slap, remaining, found))
             try:
                 robot.require(robot.go2.stand())
-                hold = SETTLE_TIME + slap.cycle * len(remaining)
-                said = robot.go2.high_five(side, hold=hold)
-                fault = robot.truth.fall() or standing_fault(robot)
-            except Failed as failed:
-                fault = str(failed)
-            distances |= slapper.distances
-            if fault is not None:
-                culprit = remaining[min(len(slapper.distances), len(remaining) - 1)]
-                lost[culprit] = f"{fault} ({robot.go2.last_outcome.reason})"
-                distances.pop(culprit, None)
+                said = robot.go2.high_five(side, hold=SETTLE_TIME + slap.cycle * len(remaining))
+                failure = robot.truth.fall() or standing_failure(robot)
+            except TrialFailed as failed:
+                failure = str(failed)
+            if failure is not None:
+                culprit = remaining[min(len(found), len(remaining) - 1)]
+                lost[culprit] = f"{failure} ({robot.go2.last_outcome.reason})"
+                found.pop(culprit, None)
+            distances |= found
         remaining = [d for d in remaining if d not in lost and d not in distances]
-    return _Slapped(lost, distances, float(said))
+    return distances, lost, float(said)
 
 
-class Slapper:
-    """Slaps the paw in the given directions, one after the other, once it is raised.
+class _Schedule:
+    """Called after every tick, goes on with ``events`` at the plant times [s] that they yield."""
 
-    A robot that has fallen, or whose paw is down, after a slap ends the call with ``Failed``.
-
-    Attributes:
-        distances: how far [mm] the paw was off its place afterwards, by direction.
-    """
-
-    def __init__(self, robot: Subject, leg: Leg, slap: Slap, directions: list[str]) -> None:
-        """Slap ``leg``'s paw of ``robot``; call the slapper after every tick."""
-        self._robot, self._leg, self._slap = robot, leg, slap
-        self._waiting = deque(directions)
-        self._events: deque[tuple[float, Callable[[], None]]] | None = None
-        self.distances: dict[str, float] = {}
+    def __init__(self, robot: TrialRobot, events: Iterator[float]) -> None:
+        self._robot, self._events, self._due = robot, events, 0.0
 
     def __call__(self) -> None:
-        """Do what is due at this tick."""
-        now = self._robot.plant.time
-        if self._events is None:
-            if self._paw[2] > RAISED:
-                self._events = deque(self._schedule(now + SETTLE_TIME))
-            return
-        while self._events and now >= self._events[0][0]:
-            self._events.popleft()[1]()
-
-    def _schedule(self, start: float) -> list[tuple[float, Callable[[], None]]]:
-        slap, events = self._slap, []
-        for index in range(len(self._waiting)):
-            begin = start + index * slap.cycle
-            events.append((begin, self._hit))
-            events.append((begin + slap.duration + RETURN_TIME, self._look))
-        return events
-
-    def _hit(self) -> None:
-        self._place = self._paw
-        direction = np.array(DIRECTIONS[self._waiting[0]])
-        self._robot.push(self._slap.force * direction, self._slap.duration, self._leg.foot)
-
-    def _look(self) -> None:
-        fall = self._robot.truth.fall()
-        if fall is not None or self._paw[2] < RAISED:
-            raise Failed(fall or f"the paw is at {self._paw[2]:.2f} m two seconds later")
-        distance = 1000.0 * float(np.linalg.norm(self._paw - self._place))
-        self.distances[self._waiting.popleft()] = distance
-
-    @property
-    def _paw(self) -> np.ndarray:
-        return self._robot.plant.p_world_feet[self._leg]
+        if self._robot.plant.time >= self._due:
+            self._due = next(self._events, math.inf)
 
 
-FAMILY = Family("slaps", ROWS, measure)
+def _slaps(
+    robot: TrialRobot, side: str, slap: Slap, directions: Sequence[str], found: dict[str, float]
+) -> Iterator[float]:
+    """Slap the paw from one direction after the other, once it is raised.
+
+    Yields the plant time [s] at which to go on; puts into ``found`` how far [mm] the paw was off
+    its place afterwards. A robot that has fallen, or whose paw is down, raises ``TrialFailed``.
+    """
+    leg = SIDES[side]
+    while robot.plant.p_world_feet[leg, 2] <= RAISED:
+        yield robot.plant.time
+    start = robot.plant.time + SETTLE_TIME
+    for index, direction in enumerate(directions):
+        begin = start + index * slap.cycle
+        yield begin
+        place = robot.plant.p_world_feet[leg]
+        robot.push(slap.force * np.array(DIRECTIONS[direction]), slap.duration, leg.foot)
+        yield begin + slap.duration + RETURN_TIME
+        paw, fall = robot.plant.p_world_feet[leg], robot.truth.fall()
+        if fall is not None or paw[2] < RAISED:
+            raise TrialFailed(fall or f"the paw is at {paw[2]:.2f} m two seconds later")
+        found[direction] = 1000.0 * float(np.linalg.norm(paw - place))
+
+
+SCENARIO = Scenario("slaps", tuple(metric for slap in SLAPS for metric in slap.metrics), measure)

@@ -1,4 +1,4 @@
-"""What a seed varies, and how a robot is set up for one."""
+"""What a seed varies, and a simulated robot under these conditions."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from benchmarks.ground_truth import GroundTruth
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.robot.rotations import yaw_rotation
 
 FRICTION_RANGE = (0.5, 1.0)
@@ -26,7 +26,7 @@ JOINT_NOISE = 0.05
 """Standard deviation [rad] of the joint angles from which the robot sinks to the ground."""
 
 
-class Failed(Exception):
+class TrialFailed(Exception):
     """The robot fell or did not do what it was asked; the message says why."""
 
 
@@ -57,11 +57,6 @@ class Trial:
         """Initial heading [rad]."""
         return self._draw(2, YAW_RANGE)
 
-    @property
-    def joint_noise(self) -> float:
-        """Standard deviation [rad] of the initial joint angles."""
-        return JOINT_NOISE
-
     def _draw(self, index: int, bounds: tuple[float, float]) -> float:
         share = np.random.default_rng(self.seed).random(3)[index]
         return float(bounds[0] + share * (bounds[1] - bounds[0]))
@@ -73,12 +68,12 @@ class Trial:
             mass_scale=self.mass_scale,
             seed=self.seed,
             initial_yaw=self.yaw,
-            initial_joint_noise=self.joint_noise,
+            initial_joint_noise=JOINT_NOISE,
         )
 
 
-class Subject:
-    """A robot on trial, lying on the ground at first: calls succeed, or ``Failed`` is raised.
+class TrialRobot:
+    """A robot on trial, lying at first: calls succeed, or ``TrialFailed`` is raised.
 
     Attributes:
         go2: the controller.
@@ -97,71 +92,55 @@ class Subject:
         self.go2.close()
         self.plant.close()
 
-    def __enter__(self) -> Subject:
+    def __enter__(self) -> TrialRobot:
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    @property
-    def heading(self) -> float:
-        """Yaw [rad] now."""
-        return float(self.plant.read().rpy[2])
-
     def require(self, ok: bool) -> None:
-        """Raise ``Failed`` unless a call said True and the robot is upright for the truth."""
-        if not ok:
-            raise Failed(self.go2.last_outcome.reason)
-        self._require_upright()
+        """Raise ``TrialFailed`` unless a call said True and the robot is upright in truth."""
+        reason = self.truth.fall() if ok else self.go2.last_outcome.reason
+        if reason is not None:
+            raise TrialFailed(reason)
 
     def wait(self, seconds: float) -> None:
         """Let time pass.
 
         Raises:
-            Failed: if the robot falls meanwhile, for the controller or for the truth.
+            TrialFailed: if the robot falls meanwhile, for the controller or in truth.
         """
         self.go2.wait(seconds)
-        if self.go2.mode in (Mode.FALLEN, Mode.DAMPED):
-            raise Failed(self.go2.last_outcome.reason)
-        self._require_upright()
+        self.require(self.go2.mode not in (Mode.FALLEN, Mode.DAMPED))
 
     def push(self, f_heading: Float[np.ndarray, "3"], duration: float, where: str = "base") -> None:
         """Push with a force [N] that points ahead, left, up of the robot, beginning now."""
-        self.plant.push(yaw_rotation(self.heading) @ f_heading, duration, where)
-
-    def _require_upright(self) -> None:
-        fall = self.truth.fall()
-        if fall is not None:
-            raise Failed(fall)
+        yaw = float(self.plant.read().rpy[2])
+        self.plant.push(yaw_rotation(yaw) @ f_heading, duration, where)
 
 
-class Supply:
-    """One robot at a time, made ready; after ``drop`` the next use gets a new one."""
+class ReusedRobot:
+    """One robot for many attempts, made ready; after a failed attempt the next gets a new one."""
 
-    def __init__(self, trial: Trial, prepare: Callable[[Subject], None]) -> None:
-        """Make robots for ``trial``; ``prepare`` makes one ready and may raise ``Failed``."""
+    def __init__(self, trial: Trial, prepare: Callable[[TrialRobot], None]) -> None:
+        """Make robots for ``trial``; ``prepare`` makes one ready and may raise ``TrialFailed``."""
         self._trial, self._prepare = trial, prepare
-        self._robot: Subject | None = None
+        self._robot: TrialRobot | None = None
 
-    def robot(self) -> Subject:
-        """The present robot, or a new one made ready.
+    def failure_of(self, attempt: Callable[[TrialRobot], None]) -> str | None:
+        """Why an attempt failed, or None; it raises ``TrialFailed`` then."""
+        try:
+            if self._robot is None:
+                self._robot = TrialRobot(self._trial)
+                self._prepare(self._robot)
+            attempt(self._robot)
+        except TrialFailed as failed:
+            self.close()
+            return str(failed)
+        return None
 
-        Raises:
-            Failed: if a new robot cannot be made ready.
-        """
-        if self._robot is None:
-            self._robot = Subject(self._trial)
-            self._prepare(self._robot)
-        return self._robot
-
-    def drop(self) -> None:
+    def close(self) -> None:
         """End the present robot, if there is one."""
         if self._robot is not None:
             self._robot.close()
             self._robot = None
-
-    def __enter__(self) -> Supply:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.drop()

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from contextlib import closing
 
 import numpy as np
 
-from benchmarks.ground_truth import Track
-from benchmarks.pushes import PUSH_TIME, Heading, force_of, measure_rungs, push_rows
-from benchmarks.rows import Family, Measurement, Row
-from benchmarks.trials import Failed, Subject, Supply, Trial
+from benchmarks.pushes import PUSH_TIME, force_of, measure_impulses, push_metrics
+from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.trials import ReusedRobot, Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.robot.model import RobotModel
 
 START_TIME = 1.5
@@ -27,31 +27,37 @@ RECOVERY_TIME = 2.0
 """Time [s] after a push within which the robot must be trotting again."""
 SPEED_TOLERANCE = 0.15
 """Error [m/s] of the mean over the last two strides that still counts as trotting again."""
-
-FORWARD: dict[str, tuple[float, float]] = {
-    "0.3": (0.3, 0.01),
-    "0.5": (0.5, 0.015),
-    "1.0": (1.0, 0.025),
+FORWARD = {"0.3": 0.01, "0.5": 0.015, "1.0": 0.025}
+"""By forward speed [m/s]: threshold of its mean absolute error [m/s]."""
+COMMANDS = {
+    **{speed: VelocityCommand(float(speed)) for speed in FORWARD},
+    "lateral": VelocityCommand(0.0, 0.5),
+    "yaw": VelocityCommand(0.0, 0.0, 1.0),
 }
-"""By name: forward speed [m/s] and bar of its mean absolute error [m/s]."""
-
-
-def _forward_rows(name: str, speed: float, error_bar: float) -> tuple[Row, ...]:
-    item = f"trot {speed:.1f} m/s, 20 s"
-    return (
-        Row(f"trot.mean_{name}", item, "mean velocity error", "%", 1.0),
-        Row(f"trot.mae_{name}", item, "mean absolute error", "m/s", error_bar),
-    )
-
-
-TROT_ROWS = (
-    *(row for name, (v, bar) in FORWARD.items() for row in _forward_rows(name, v, bar)),
-    Row("trot.torque", "trot 1.0 m/s, limits", "peak torque / limit", "", 1.0),
-    Row("trot.joint_speed", "trot 1.0 m/s, limits", "peak joint speed / limit", "", 1.0),
-    Row("trot.mean_lateral", "trot sideways 0.5 m/s, 20 s", "mean velocity error", "%", 2.0),
-    Row("trot.mean_yaw", "trot turning 1 rad/s, 20 s", "mean yaw rate error", "%", 2.0),
+LIMITS = (
+    Metric("trot.torque", "trot 1.0 m/s, limits", "peak torque / limit", "", 1.0),
+    Metric("trot.joint_speed", "trot 1.0 m/s, limits", "peak joint speed / limit", "", 1.0),
 )
-PUSH_ROWS = push_rows("trot.push", "trot 0.5 m/s, push 0.1 s, 8 phases", lateral=18.0, forward=24.0)
+TROT_METRICS = (
+    *(
+        metric
+        for speed, most in FORWARD.items()
+        for metric in (
+            Metric(
+                f"trot.mean_{speed}", f"trot {speed} m/s, 20 s", "mean velocity error", "%", 1.0
+            ),
+            Metric(
+                f"trot.mae_{speed}", f"trot {speed} m/s, 20 s", "mean absolute error", "m/s", most
+            ),
+        )
+    ),
+    *LIMITS,
+    Metric("trot.mean_lateral", "trot sideways 0.5 m/s, 20 s", "mean velocity error", "%", 2.0),
+    Metric("trot.mean_yaw", "trot turning 1 rad/s, 20 s", "mean yaw rate error", "%", 2.0),
+)
+PUSH_METRICS = push_metrics(
+    "trot.push", "trot 0.5 m/s, push 0.1 s, 8 phases", lateral=18.0, forward=24.0
+)
 
 
 def measure_trot(trial: Trial) -> Measurement:
@@ -67,39 +73,32 @@ def measure_trot(trial: Trial) -> Measurement:
     """
     values: dict[str, float] = {}
     failures: dict[str, str] = {}
-    commands = {name: VelocityCommand(speed) for name, (speed, _) in FORWARD.items()}
-    commands |= {"lateral": VelocityCommand(0.0, 0.5), "yaw": VelocityCommand(0.0, 0.0, 1.0)}
-    for name, command in commands.items():
+    for name in COMMANDS:
         try:
-            track = _trot(trial, command)
-        except Failed as failed:
-            failures |= {row: str(failed) for row in _rows_of(name)}
-        else:
-            values |= _figures(name, command, track)
+            values |= _measured(name, _trot(trial, COMMANDS[name]))
+        except TrialFailed as failed:
+            metrics = [metric for metric in TROT_METRICS if metric.name.endswith(f"_{name}")]
+            metrics += LIMITS if name == "1.0" else ()
+            failures |= {metric.name: str(failed) for metric in metrics}
     return Measurement(values, failures)
 
 
-def _trot(trial: Trial, command: VelocityCommand) -> Track:
-    with Subject(trial) as robot:
+def _trot(trial: Trial, command: VelocityCommand) -> TruthRecording:
+    with TrialRobot(trial) as robot:
         _start(robot, command)
         robot.truth.clear()
         robot.wait(START_TIME + WINDOW)
-        return robot.truth.track()
+        return robot.truth.recording()
 
 
-def _start(robot: Subject, command: VelocityCommand) -> None:
+def _start(robot: TrialRobot, command: VelocityCommand) -> None:
     robot.require(robot.go2.stand())
     robot.require(robot.go2.walk())
     robot.go2.move(command.linear_x, command.angular_z, linear_y=command.linear_y)
 
 
-def _rows_of(name: str) -> list[str]:
-    rows = [row.name for row in TROT_ROWS if row.name.endswith(f"_{name}")]
-    return [*rows, "trot.torque", "trot.joint_speed"] if name == "1.0" else rows
-
-
-def _figures(name: str, command: VelocityCommand, track: Track) -> Mapping[str, float]:
-    window = track.since(track.time[0] + START_TIME)
+def _measured(name: str, recorded: TruthRecording) -> dict[str, float]:
+    window, command = recorded.since(recorded.time[0] + START_TIME), COMMANDS[name]
     if name == "yaw":
         rate = (window.rpy[-1, 2] - window.rpy[0, 2]) / (window.time[-1] - window.time[0])
         return {"trot.mean_yaw": 100.0 * abs(rate - command.angular_z) / command.angular_z}
@@ -110,53 +109,52 @@ def _figures(name: str, command: VelocityCommand, track: Track) -> Mapping[str, 
         values[f"trot.mae_{name}"] = float(np.abs(error).mean())
     if name == "1.0":
         model = RobotModel()
-        values["trot.torque"] = float((np.abs(track.tau) / model.torque_limits).max())
-        values["trot.joint_speed"] = float((np.abs(track.v[:, 6:]) / model.speed_limits).max())
+        values["trot.torque"] = float(recorded.torque_shares(model).max())
+        values["trot.joint_speed"] = recorded.peak_speed_share(model)
     return values
 
 
 def measure_pushes(trial: Trial) -> Measurement:
-    """Largest impulse on the base that is survived at every phase, in the row's directions.
+    """Largest impulse on the base that is survived at every phase, in a metric's directions.
 
     The phases are eight instants of the stride, evenly spread. Survived is: 2 s later the robot is
     upright, and its mean velocity over the last two strides is within 0.15 m/s of the command.
     """
     trial = Trial(trial.seed, has_nominal_friction=True)
-    with Supply(trial, _start_pushed) as supply:
+    with closing(ReusedRobot(trial, _start_pushed)) as reused:
 
-        def fault_of(impulse: float, direction: Heading) -> str | None:
-            lost = []
-            for phase in range(PHASES):
-                try:
-                    _push_trotting(supply.robot(), force_of(impulse, direction), phase)
-                except Failed as failed:
-                    lost.append(f"phase {phase}: {failed}")
-                    supply.drop()
+        def failure_of(impulse: float, direction: str) -> str | None:
+            force = force_of(impulse, direction)
+            failures = {
+                phase: reused.failure_of(lambda robot, phase=phase: _push(robot, force, phase))
+                for phase in range(PHASES)
+            }
+            lost = [f"phase {phase}: {why}" for phase, why in failures.items() if why is not None]
             return "; ".join(lost) or None
 
-        return measure_rungs(PUSH_ROWS, fault_of)
+        return measure_impulses(PUSH_METRICS, failure_of)
 
 
-def _start_pushed(robot: Subject) -> None:
+def _start_pushed(robot: TrialRobot) -> None:
     _start(robot, VelocityCommand(PUSHED_SPEED))
     robot.truth.clear()
     robot.wait(START_TIME)
 
 
-def _push_trotting(robot: Subject, force: np.ndarray, phase: int) -> None:
+def _push(robot: TrialRobot, force: np.ndarray, phase: int) -> None:
     period = GAITS["trot"].period
-    # The gait's clock started with the command, when the track was cleared.
+    # The gait's clock started with the command, when the truth was cleared.
     elapsed = robot.plant.time - robot.truth.start
     phase_time = phase * period / PHASES
     target = phase_time + math.ceil((elapsed - phase_time) / period) * period
     robot.wait(max(target - elapsed, 0.0))
     robot.push(force, PUSH_TIME)
     robot.wait(RECOVERY_TIME)
-    track = robot.truth.track().since(robot.plant.time - 2.0 * period)
-    speed = float(track.com_velocity[:, 0].mean())
+    strides = robot.truth.recording().since(robot.plant.time - 2.0 * period)
+    speed = float(strides.com_velocity[:, 0].mean())
     if abs(speed - PUSHED_SPEED) > SPEED_TOLERANCE:
-        raise Failed(f"walks at {speed:.2f} m/s two seconds after the push")
+        raise TrialFailed(f"walks at {speed:.2f} m/s two seconds after the push")
 
 
-TROT = Family("trot", TROT_ROWS, measure_trot)
-PUSHES = Family("trot-pushes", tuple(item.row for item in PUSH_ROWS), measure_pushes)
+TROT = Scenario("trot", TROT_METRICS, measure_trot)
+PUSHES = Scenario("trot-pushes", tuple(push.metric for push in PUSH_METRICS), measure_pushes)

@@ -1,8 +1,10 @@
-"""The pilot: ``GO2Controller`` and everything behind it."""
+"""``GO2Controller`` and everything behind it."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
+
+from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from controller.go2_controller import GO2Controller
@@ -11,14 +13,6 @@ if TYPE_CHECKING:
 __all__ = ["GO2Controller", "Mode", "Outcome"]
 
 
-def __getattr__(name: str) -> object:
-    """Import the heavy parts when they are first asked for: the command line starts fast."""
-    if name == "GO2Controller":
-        from controller.go2_controller import GO2Controller
-
-        return GO2Controller
-    if name in ("Mode", "Outcome"):
-        from controller import modes
-
-        return getattr(modes, name)
-    raise AttributeError(f"module 'controller' has no attribute {name!r}")
+__getattr__ = lazy_exports(
+    __name__, {"go2_controller": ("GO2Controller",), "modes": ("Mode", "Outcome")}
+)

@@ -42,20 +42,6 @@ def word(name: str, value: str) -> str:
     return value
 
 
-def motion_name(value: str) -> str:
-    """``value``.
-
-    Raises:
-        CommandError: if it is not a string; says what else ``play`` takes.
-    """
-    if not isinstance(value, str):
-        raise CommandError(
-            "motion must be a name of the library, a function with @motion before it, a Timeline "
-            f"or a plan, got {value!r}"
-        )
-    return value
-
-
 def flag(name: str, value: bool) -> bool:
     """``value``.
 

@@ -22,11 +22,16 @@ from go2_wbc.legs import front_leg
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.recording import Recording
-from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
-from motions import FeasibilityChecker, Motion, Timeline, compile_timeline, load_motion
+from motions import (
+    CompiledPlan,
+    FeasibilityChecker,
+    Playable,
+    compile_timeline,
+    load_motion,
+)
 from motions.library.high_five import HEIGHT as HIGH_FIVE_HEIGHT
 
 _log = logging.getLogger(__name__)
@@ -189,12 +194,16 @@ class GO2Controller:
 
     # --- motions --------------------------------------------------------------------------
 
-    def high_five(self, side: str = "right", hold: float = 2.0) -> bool:
+    def high_five(
+        self, side: str = "right", hold: float = 2.0, *, plan: CompiledPlan | None = None
+    ) -> bool:
         """Raise a front paw on three legs, hold it, tap, and come back to standing.
 
         Args:
             side: "right" or "left".
             hold: time [s] for which the paw is held up, 0.5 to 30.
+            plan: what ``load_motion("high_five", side=side, hold=hold)`` was compiled to before;
+                by default it is compiled now.
 
         Raises:
             CommandError: for another side or time.
@@ -202,24 +211,27 @@ class GO2Controller:
         leg, hold = front_leg(arguments.word("side", side)), arguments.finite("hold", hold)
         if not 0.5 <= hold <= 30.0:
             raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
-        timeline = load_motion("high_five", side=side, hold=hold, height=HIGH_FIVE_HEIGHT)
-        with self._planning:
-            plan = compile_timeline(timeline, self._checker.model)
+        if plan is None:
+            timeline = load_motion("high_five", side=side, hold=hold, height=HIGH_FIVE_HEIGHT)
+            with self._planning:
+                plan = compile_timeline(timeline, self._checker.model)
         return self._call("high_five", lambda: self._pilot.high_five(plan, leg, HIGH_FIVE_HEIGHT))
 
-    def play(self, motion: str | Motion | Timeline | MotionPlan, *, check: bool = True) -> bool:
-        """Play a motion: a name of the library, a timeline, or a compiled plan.
+    def play(self, motion: Playable, *, check: bool = True) -> bool:
+        """Play a motion: a name of the library, a timeline, a compiled plan, or a checked motion.
 
-        With ``check=False`` also one that the robot cannot do, to see what happens.
+        With ``check=False`` also one that the robot cannot do, to see what happens. What
+        ``FeasibilityChecker.evaluate`` returned is neither compiled nor checked again.
 
         Raises:
-            CommandError: for an unknown name; lists the valid ones.
+            CommandError: for an unknown name; lists the valid ones. Also for what is no motion.
             TimelineError: for an empty timeline.
             StanceMismatch: if the motion starts from another stance.
             MotionInfeasible: if the motion breaks a limit of the robot; carries the findings.
         """
         self._check_open()
-        plan = self._plan(motion, check=check)
+        with self._planning:  # one thread at a time
+            plan = self._checker.plan(motion, check=check)
         return self._call("play", lambda: self._pilot.play(plan))
 
     def cancel(self) -> None:
@@ -240,18 +252,6 @@ class GO2Controller:
     def _checker(self) -> FeasibilityChecker:
         """Plans on a model of its own: the control loop's belongs to the thread that ticks."""
         return FeasibilityChecker(RobotModel(self._assembly.description))
-
-    def _plan(self, motion: str | Motion | Timeline | MotionPlan, *, check: bool) -> MotionPlan:
-        if isinstance(motion, Motion):
-            motion = motion()
-        if not isinstance(motion, Timeline | MotionPlan):
-            motion = load_motion(arguments.motion_name(motion))
-        with self._planning:  # one thread at a time
-            if isinstance(motion, Timeline):
-                motion = compile_timeline(motion, self._checker.model)
-            if check:
-                self._checker.check(motion).raise_if_infeasible()
-        return motion
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""

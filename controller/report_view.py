@@ -1,4 +1,4 @@
-"""Between the check and the eyes: a rehearsed motion, and a run of it, as what the viewers show."""
+"""A checked motion, and a run of it, as what ``viz`` shows."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
 
 
 def verdict_of(report: FeasibilityReport) -> Verdict:
-    """The report as the viewers want it."""
+    """The report as what ``viz`` shows of it."""
     broken, tight = len(report.failures), len(report.warnings)
     text = "feasible" if report.ok else _count(broken, "limit") + " broken"
     if tight:
@@ -183,19 +183,9 @@ def _part(run: Recording, name: str) -> Recording:
     if len(rows) < _LEAST_SAMPLES:
         raise PlantError(f"the run holds no motion {name!r}")
     until = run.time[rows[-1]] + _AFTERWARDS
-    part = slice(int(rows[0]), int(np.searchsorted(run.time, until, side="right")))
-    return replace(
-        run,
-        time=run.time[part] - run.time[rows[0]],
-        q=run.q[part],
-        v=run.v[part],
-        tau=run.tau[part],
-        foot_forces=run.foot_forces[part],
-        stance=run.stance[part],
-        p_world_com=run.p_world_com[part],
-        support_margin=run.support_margin[part],
-        labels=run.labels[part],
-    )
+    end = int(np.searchsorted(run.time, until, side="right"))
+    part = run.part(slice(int(rows[0]), end))
+    return replace(part, time=part.time - part.time[0])
 
 
 def _label_at(plan: Recording, time: float) -> str:

@@ -1,1 +1,93 @@
-"""The engine: whole-body control of the Unitree Go2."""
+"""The engine: whole-body control of the Unitree Go2.
+
+Its public names, each imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from go2_wbc.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from go2_wbc.config import Config, load_config
+    from go2_wbc.contacts import GAITS, ContactSchedule, Gait
+    from go2_wbc.errors import Go2WbcError, MotionInfeasible, QpInfeasible
+    from go2_wbc.legs import LEGS, Leg
+    from go2_wbc.planning.command import VelocityCommand
+    from go2_wbc.planning.locomotion import LocomotionPlanner
+    from go2_wbc.plant import MujocoPlant, Plant
+    from go2_wbc.recording import Recording
+    from go2_wbc.reference import JointReference, MotionPlan, Posture, Reference, Stance
+    from go2_wbc.robot.model import RobotModel
+    from go2_wbc.robot.snapshot import Snapshot
+    from go2_wbc.robot.state import JointCommand, RobotState
+    from go2_wbc.wbc.config import WbcConfig
+    from go2_wbc.wbc.controller import WholeBodyController
+    from go2_wbc.wbc.solution import WbcSolution
+    from go2_wbc.wbc.tasks import Task
+
+__all__ = [
+    "GAITS",
+    "LEGS",
+    "Config",
+    "ContactSchedule",
+    "Gait",
+    "Go2WbcError",
+    "JointCommand",
+    "JointReference",
+    "Leg",
+    "LocomotionPlanner",
+    "MotionInfeasible",
+    "MotionPlan",
+    "MujocoPlant",
+    "Plant",
+    "Posture",
+    "QpInfeasible",
+    "Recording",
+    "Reference",
+    "RobotModel",
+    "RobotState",
+    "Snapshot",
+    "Stance",
+    "Task",
+    "VelocityCommand",
+    "WbcConfig",
+    "WbcSolution",
+    "WholeBodyController",
+    "__version__",
+    "load_config",
+]
+
+__version__: str
+
+_public = lazy_exports(
+    __name__,
+    {
+        "config": ("Config", "load_config"),
+        "contacts": ("GAITS", "ContactSchedule", "Gait"),
+        "errors": ("Go2WbcError", "MotionInfeasible", "QpInfeasible"),
+        "legs": ("LEGS", "Leg"),
+        "planning.command": ("VelocityCommand",),
+        "planning.locomotion": ("LocomotionPlanner",),
+        "plant": ("MujocoPlant", "Plant"),
+        "recording": ("Recording",),
+        "reference": ("JointReference", "MotionPlan", "Posture", "Reference", "Stance"),
+        "robot.model": ("RobotModel",),
+        "robot.snapshot": ("Snapshot",),
+        "robot.state": ("JointCommand", "RobotState"),
+        "wbc.config": ("WbcConfig",),
+        "wbc.controller": ("WholeBodyController",),
+        "wbc.solution": ("WbcSolution",),
+        "wbc.tasks": ("Task",),
+    },
+)
+
+
+def __getattr__(name: str) -> object:
+    """A public name, or the version of the installed distribution."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("go2-wbc")
+    return _public(name)

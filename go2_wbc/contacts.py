@@ -7,6 +7,7 @@ count as the event. A periodic schedule (a gait) repeats; any other holds its fi
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -91,7 +92,7 @@ class ContactSchedule:
         if self.period is not None:
             t = (t + TIE) % self.period
             t = max(t - TIE, 0.0)
-        index = max(int(np.searchsorted(self.times, t + TIE, side="right")) - 1, 0)
+        index = max(bisect_right(self.times, t + TIE) - 1, 0)
         elapsed = np.full(4, np.inf)
         remaining = np.full(4, np.inf)
         for leg in LEGS:

@@ -27,6 +27,7 @@ class CurvePoint:
 
 
 def _minimum_jerk(s: float) -> tuple[float, float, float]:
+    """10 s^3 - 15 s^4 + 6 s^5: least integral of jerk^2 from rest to rest (Flash & Hogan 1985)."""
     return (
         s**3 * (10 - 15 * s + 6 * s * s),
         30 * s * s * (1 - s) ** 2,
@@ -35,6 +36,7 @@ def _minimum_jerk(s: float) -> tuple[float, float, float]:
 
 
 def _cubic(s: float) -> tuple[float, float, float]:
+    """3 s^2 - 2 s^3: least integral of acceleration^2 from rest to rest (Hermite's cubic)."""
     return s * s * (3 - 2 * s), 6 * s * (1 - s), 6 - 12 * s
 
 
@@ -43,10 +45,12 @@ def _linear(s: float) -> tuple[float, float, float]:
 
 
 def _in(s: float) -> tuple[float, float, float]:
+    """2 s^3 - s^4: from rest, with the acceleration 0 at both ends."""
     return s**3 * (2 - s), s * s * (6 - 4 * s), 12 * s * (1 - s)
 
 
 def _out(s: float) -> tuple[float, float, float]:
+    """1 - in(1 - s), so the acceleration alone changes its sign."""
     value, rate, acceleration = _in(1 - s)
     return 1 - value, rate, -acceleration
 
@@ -106,6 +110,7 @@ class Segment:
             return _at_rest(self.start)
         if t >= self.duration:
             return _at_rest(self.end)
+        # with s = t / T: dx/dt = (dx/ds) / T, d2x/dt2 = (d2x/ds2) / T^2
         value, rate, acceleration = self.ease.progress(t / self.duration)
         delta = self.end - self.start
         return CurvePoint(

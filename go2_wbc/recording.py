@@ -5,10 +5,24 @@ The loop's telemetry fills it, the viewers replay it, the benchmarks measure it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A stretch of time with one label.
+
+    Attributes:
+        start, end: seconds after the start of the recording.
+        label: what the robot was doing.
+    """
+
+    start: float
+    end: float
+    label: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,3 +56,22 @@ class Recording:
     def duration(self) -> float:
         """Seconds between the first and the last sample."""
         return float(self.time[-1] - self.time[0]) if len(self.time) else 0.0
+
+    def part(self, rows: slice | Int[np.ndarray, " k"]) -> Recording:
+        """Some of the samples, with their times unchanged.
+
+        Args:
+            rows: of the samples to keep, in increasing order.
+        """
+        labels = np.array(self.labels, dtype=object)[rows]
+        arrays = (getattr(self, field.name)[rows] for field in fields(self)[:-1])
+        return Recording(*arrays, labels=tuple(labels))
+
+    def spans(self) -> tuple[Span, ...]:
+        """Stretches of equal labels, in order; each ends where the next begins."""
+        labels, time = self.labels, self.time - self.time[0]
+        starts = [0] + [k for k in range(1, len(labels)) if labels[k] != labels[k - 1]]
+        ends = [*(float(time[k]) for k in starts[1:]), float(time[-1])]
+        return tuple(
+            Span(float(time[k]), end, labels[k]) for k, end in zip(starts, ends, strict=True)
+        )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from motions.authoring import Choice, Motion, Range, motion
@@ -13,7 +14,9 @@ if TYPE_CHECKING:
         FeasibilityChecker,
         FeasibilityReport,
         Finding,
+        Playable,
         check,
+        compile_motion,
     )
     from motions.registry import find_motion, load_file, load_motion, motion_names
     from motions.timeline import Timeline, deg
@@ -26,9 +29,11 @@ __all__ = [
     "FeasibilityReport",
     "Finding",
     "Motion",
+    "Playable",
     "Range",
     "Timeline",
     "check",
+    "compile_motion",
     "compile_timeline",
     "deg",
     "find_motion",
@@ -38,19 +43,21 @@ __all__ = [
     "motion_names",
 ]
 
-_HOMES = {
-    "authoring": ("Choice", "Motion", "Range", "motion"),
-    "compiler": ("CompiledPlan", "compile_timeline"),
-    "feasibility": ("FeasibilityChecker", "FeasibilityReport", "Finding", "CheckedMotion", "check"),
-    "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
-    "timeline": ("Timeline", "deg"),
-}
-"""The module of every public name."""
-
-
-def __getattr__(name: str) -> object:
-    """Import the heavy parts when first asked for: the pytest plugin lies in this package."""
-    for home, names in _HOMES.items():
-        if name in names:
-            return getattr(import_module(f"motions.{home}"), name)
-    raise AttributeError(f"module 'motions' has no attribute {name!r}")
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "authoring": ("Choice", "Motion", "Range", "motion"),
+        "compiler": ("CompiledPlan", "compile_timeline"),
+        "feasibility": (
+            "CheckedMotion",
+            "FeasibilityChecker",
+            "FeasibilityReport",
+            "Finding",
+            "Playable",
+            "check",
+            "compile_motion",
+        ),
+        "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
+        "timeline": ("Timeline", "deg"),
+    },
+)

@@ -10,18 +10,38 @@ A parameter's annotation says which values are valid, its default what is taken 
 from __future__ import annotations
 
 import inspect
-import math
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from go2_wbc.errors import TimelineError, unknown_name
+from go2_wbc.errors import CommandError, TimelineError, unknown_name
+from motions.arguments import is_number
 from motions.timeline import Timeline
 
 Value = float | int | str | bool
+
+
+def parse_values(texts: Sequence[str]) -> dict[str, Value]:
+    """``["hold=2.0", "side=left"]`` as parameters of a motion.
+
+    Raises:
+        CommandError: for one that is not NAME=VALUE.
+    """
+    return dict(_parse_value(text) for text in texts)
+
+
+def _parse_value(text: str) -> tuple[str, Value]:
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (name and equals and value):
+        raise CommandError(f"a parameter is set by NAME=VALUE, got {text!r}")
+    for kind in (int, float):
+        try:
+            return name, kind(value)
+        except ValueError:
+            continue
+    return name, value
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +90,7 @@ class Parameter:
             if value not in self.valid.words:
                 raise TimelineError(unknown_name(self.name, str(value), self.valid.words))
             return value
-        is_number = isinstance(value, Real) and not isinstance(value, bool)
-        if not (is_number and math.isfinite(float(value)) and self._is_inside(float(value))):
+        if not (is_number(value) and self._is_inside(float(value))):
             raise TimelineError(f"{self.name} must be {self.valid}, got {value!r}")
         if not isinstance(self.default, int):
             return float(value)

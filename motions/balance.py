@@ -7,6 +7,7 @@ written. Between those instants the trunk moves smoothly.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,14 +18,18 @@ from go2_wbc.errors import IkError
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.inverse_kinematics import PoseTargets, solve_pose
 from go2_wbc.robot.model import RobotModel
-from motions.keys import ShiftKey
+from motions.keys import BalanceShift
 from motions.timeline import SAME, Timeline
-from motions.tracks import LegTracks, Poses, Times, configuration, eased
+from motions.tracks import LegTracks, Move, Poses, Times, configurations, followed
 
 MARGINS = (0.08, 0.065, 0.05, 0.035, 0.02)
-"""Distances [m] of the CoM to the edges of the support polygon that are tried, best first."""
+"""Distances [m] of the CoM to the edges of the support polygon that are tried, best first.
+
+The largest circle in the triangle of three feet, 0.387 m by 0.284 m, has a radius of 95 mm. The
+last is the check's limit (``FeasibilityLimits.support``) with 5 mm to spare. Own choice.
+"""
 JOINT_MARGIN = 0.02
-"""Distance [rad] that the joints keep from their limits in a balanced pose."""
+"""Distance [rad] that the joints keep from their limits in a balanced pose: own choice."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +45,7 @@ class Balance:
     """Shift of the trunk.
 
     Attributes:
-        offsets: (n, 2) to add to the trunk's place [m].
+        offsets: (n, 2) to add to the trunk's place [m], in the frame of the motion.
         failures: moments without a balanced pose.
     """
 
@@ -55,34 +60,34 @@ class Balancer:
         self, timeline: Timeline, tracks: LegTracks, model: RobotModel, times: Times, body: Poses
     ) -> None:
         """``body``: the path of the trunk at ``times``, without any shift."""
-        self._timeline, self._tracks, self._model = timeline, tracks, model
+        self._tracks, self._model = tracks, model
         self._times, self._body = times, body
+        self._shifts, self._end = timeline.in_order(BalanceShift), timeline.end
+        self._key_ends = sorted(key.end for key in timeline.keys)
 
     def balance(self) -> Balance:
         """The shifts, moment by moment."""
-        offsets, last = np.zeros((len(self._times), 2)), np.zeros(2)
+        moves, last = [], np.zeros(2)
         failures: list[Unbalanced] = []
-        shifts = self._timeline.in_order(ShiftKey)
-        starts = [*(shift.start for shift in shifts), self._timeline.end]
-        for shift, end in zip(shifts, starts[1:], strict=True):
+        starts = [*(shift.start for shift in self._shifts), self._end]
+        for shift, end in zip(self._shifts, starts[1:], strict=True):
             start = shift.start
             for knot in self._knots(shift, end):
                 try:
-                    goal = self._offset(knot, shift.raised, last)
+                    last = self._offset(knot, shift.raised, last)
                 except IkError as error:
                     failures.append(Unbalanced(knot, str(error)))
-                    goal = last
-                share = eased(start, knot, Ease.MINIMUM_JERK, self._times)
-                offsets += share[:, None] * (goal - last)
-                start, last = knot, goal
-        return Balance(offsets, tuple(failures))
+                moves.append(Move(start, knot, Ease.MINIMUM_JERK, last))
+                start = knot
+        return Balance(followed(self._times, np.zeros(2), moves), tuple(failures))
 
-    def _knots(self, shift: ShiftKey, end: float) -> list[float]:
+    def _knots(self, shift: BalanceShift, end: float) -> list[float]:
         """The end of the shift, and every later end of a key while it lasts."""
         knots = [shift.end]
         if shift.raised:
-            for t in sorted(key.end for key in self._timeline.keys):
-                if knots[-1] + SAME < t < end - SAME:
+            first = bisect_right(self._key_ends, shift.end + SAME)
+            for t in self._key_ends[first : bisect_left(self._key_ends, end - SAME)]:
+                if t > knots[-1] + SAME:
                     knots.append(t)
         return knots
 
@@ -91,13 +96,14 @@ class Balancer:
     ) -> Float[np.ndarray, "2"]:
         if not raised:
             return np.zeros(2)
-        index = int(np.argmin(np.abs(self._times - t)))
+        after = min(int(np.searchsorted(self._times, t)), len(self._times) - 1)
+        before = max(after - 1, 0)
+        index = min(before, after, key=lambda row: abs(self._times[row] - t))
         pose = self._body[index].copy()
         pose[:2] += guess
         instant = self._times[index : index + 1]
-        paths = [self._tracks.path(self._timeline, leg, instant, pose[None]) for leg in LEGS]
-        joints = np.concatenate([path.q[0] for path in paths])
-        return self._solve(raised, pose, joints)[:2] - self._body[index, :2]
+        joints = [self._tracks.path(leg, instant, pose[None]).q[0] for leg in LEGS]
+        return self._solve(raised, pose, np.concatenate(joints))[:2] - self._body[index, :2]
 
     def _solve(
         self,
@@ -105,10 +111,16 @@ class Balancer:
         pose: Float[np.ndarray, "6"],
         joints: Float[np.ndarray, "12"],
     ) -> Float[np.ndarray, "19"]:
+        """The balanced configuration nearest to ``pose`` that keeps the greatest margin.
+
+        Standing still, the CoM above the support polygon is all that balance asks for (McGhee &
+        Frank 1968, static stability margin); the check adds what accelerations need.
+        """
         if len(raised) > 1:
             names = " and ".join(leg.name for leg in sorted(raised))
             raise IkError(f"{names} are raised at once: two feet cannot balance the trunk")
         (leg,) = raised
+        start = configurations(pose[None], joints[None])[0]
         best: IkError | None = None
         for margin in MARGINS:
             hip, thigh, calf = joints[leg.joints].tolist()
@@ -123,7 +135,7 @@ class Balancer:
                 joint_margin=JOINT_MARGIN,
             )
             try:
-                return solve_pose(self._model, targets, configuration(pose, joints)).q
+                return solve_pose(self._model, targets, start).q
             except IkError as error:
                 best = error
         raise IkError(f"no pose balances without foot {leg.name}: {best}")

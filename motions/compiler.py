@@ -8,6 +8,7 @@ kept in ``problems``, which the feasibility check reports.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -19,20 +20,24 @@ from go2_wbc.contacts import ContactSchedule
 from go2_wbc.curves import CurvePoint
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS
-from go2_wbc.reference import LegTask, MotionPlan, Posture, Reference, TrackedPoint
+from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from motions.balance import Balancer, Unbalanced
 from motions.keys import Mark
-from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, body_target
+from motions.plan import body_target, reference
 from motions.timeline import Timeline
-from motions.tracks import LegTracks, body_path, configuration, flights, home_poses
+from motions.tracks import LegTracks, body_path, configurations, flights, home_poses
 
 SAMPLE_PERIOD = 0.01
-"""Time [s] between the instants at which a timeline is sampled."""
+"""Time [s] between the instants at which a timeline is sampled. A cubic spline through samples of f
+misses it by 5/384 h^4 max|d4f/dt4| at most (Hall & Meyer 1976): 0.2 um for a way L of 0.1 m by
+minimum jerk in T = 0.4 s, where the derivative is 360 L / T^4 at most."""
 REACH_TOLERANCE = 1e-3
-"""Distance [m] by which a place may be out of reach before it counts."""
+"""Distance [m] by which a place may be out of reach before it counts: own choice, less than what
+tracking adds."""
 UNLOAD_TIME = 0.3
-"""Time [s] over which a foot gives up its load before lift-off, if there is that much."""
+"""Time [s] over which a foot gives up its load before lift-off, if there is that much: own choice,
+so that the forces of the others change slowly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,21 +78,10 @@ class CompiledPlan(MotionPlan):
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""
-        value, rate, acceleration = self._curves_at(t)
-        phase = self.contacts.at(t)
-        load, zeros = phase.load_share(self.ramp), np.zeros((4, 3))
-        return Reference(
-            body=body_target(TrackedPoint.COM, CurvePoint(value[:6], rate[:6], acceleration[:6])),
-            legs=tuple(LegTask.STANCE if s else LegTask.JOINTS for s in phase.stance),
-            normal_force_min=NORMAL_FORCE_MIN * load,
-            normal_force_max=NORMAL_FORCE_MAX * load,
-            p_world_feet=zeros,
-            v_world_feet=zeros,
-            a_world_feet=zeros,
-            q_joints=value[6:],
-            v_joints=rate[6:],
-            a_joints=acceleration[6:],
-        )
+        curves = self._curves_at(t)
+        body = body_target(TrackedPoint.COM, CurvePoint(*(curve[:6] for curve in curves)))
+        joints = CurvePoint(*(curve[6:] for curve in curves))
+        return reference(body, joints, self.contacts.at(t), self.ramp)
 
     def _curves_at(self, t: float) -> tuple[Float[np.ndarray, "18"], ...]:
         inside = min(max(t, 0.0), self.duration)
@@ -98,7 +92,15 @@ class CompiledPlan(MotionPlan):
 
 
 def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
-    """The plan of ``timeline``.
+    """The plan of ``timeline``, in the frame of the motion.
+
+    It tracks the CoM, which balance is about, and not the base. Clamped splines begin and end at
+    rest.
+
+    Args:
+        timeline: what to compile.
+        model: of the robot; compiling uses its data, so it must not be that of a control loop that
+            runs in another thread.
 
     Raises:
         TimelineError: if it is empty.
@@ -110,29 +112,26 @@ def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
         )
     times = np.linspace(0.0, end, max(round(end / SAMPLE_PERIOD), 2) + 1)
     home = home_poses(model)
-    tracks = LegTracks(model, home[timeline.entry])
+    tracks = LegTracks(timeline, model, home[timeline.entry])
     body = body_path(timeline, home, times)
     balance = Balancer(timeline, tracks, model, times, body).balance()
     body[:, :2] += balance.offsets
-    paths = [tracks.path(timeline, leg, times, body) for leg in LEGS]
+    paths = [tracks.path(leg, times, body) for leg in LEGS]
     joints = np.hstack([path.q for path in paths])
-    com = np.array(
-        [model.center_of_mass(configuration(*row)) for row in zip(body, joints, strict=True)]
-    )
+    com = np.array([model.center_of_mass(q) for q in configurations(body, joints)])
     problems: list[OutOfReach | Unbalanced] = list(balance.failures)
     for leg, path in zip(LEGS, paths, strict=True):
         worst = int(np.argmax(path.miss))
         if path.miss[worst] > REACH_TOLERANCE:
             problems.append(OutOfReach(float(times[worst]), leg.name, float(path.miss[worst])))
-    contacts = contact_schedule(timeline)
     samples = np.hstack([com, body[:, 3:], joints])
     return CompiledPlan(
         name=timeline.name,
         entry=timeline.entry,
         exit=timeline.exit,
         curves=CubicSpline(times, samples, bc_type="clamped"),
-        contacts=contacts,
-        ramp=_ramp(contacts),
+        contacts=contact_schedule(timeline),
+        ramp=_ramp(timeline),
         problems=tuple(problems),
         spans={mark.name: (mark.start, mark.end) for mark in timeline.in_order(Mark)},
     )
@@ -144,24 +143,23 @@ def contact_schedule(timeline: Timeline) -> ContactSchedule:
     changes = {t for legs in spans.values() for span in legs for t in span if np.isfinite(t)}
     times = sorted({0.0, *changes})
     modes = np.ones((len(times), 4), dtype=bool)
-    for row, t in enumerate(times):
-        for leg, flown in spans.items():
-            modes[row, leg] = not any(start <= t < end for start, end in flown)
+    for leg, flown in spans.items():
+        for lift_off, touchdown in flown:
+            modes[bisect_left(times, lift_off) : bisect_left(times, touchdown), leg] = False
     return ContactSchedule(tuple(times), modes)
 
 
-def _ramp(contacts: ContactSchedule) -> float:
-    """Half of the shortest time on the ground between two flights, at most ``UNLOAD_TIME``."""
+def _ramp(timeline: Timeline) -> float:
+    """Half of the shortest time on the ground between two flights, at most ``UNLOAD_TIME``.
+
+    Before the first flight the foot may use all the time that there is.
+    """
     longest = UNLOAD_TIME
     for leg in LEGS:
-        column = contacts.modes[:, leg]
-        for index in range(1, len(column) - 1):
-            if column[index] and not column[index - 1]:
-                later = np.flatnonzero(~column[index:])
-                if len(later):
-                    span = contacts.times[index + int(later[0])] - contacts.times[index]
-                    longest = min(longest, span / 2)
-        lifts = np.flatnonzero(~column)
-        if len(lifts) and lifts[0] > 0:
-            longest = min(longest, contacts.times[int(lifts[0])])
+        touchdown = None
+        for lift_off, next_touchdown in flights(timeline, leg):
+            stood = lift_off if touchdown is None else (lift_off - touchdown) / 2
+            if stood > 0.0:
+                longest = min(longest, stood)
+            touchdown = next_touchdown
     return longest

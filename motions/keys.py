@@ -103,7 +103,7 @@ class BodyKey(Key):
 class PostureKey(Key):
     """The trunk moves to another resting posture, from which offsets count from then on."""
 
-    stance: Posture
+    posture: Posture
 
     @property
     def track(self) -> str:
@@ -152,7 +152,7 @@ class Mark(Key):
 
 
 @dataclass(frozen=True, slots=True)
-class ShiftKey(Key):
+class BalanceShift(Key):
     """The trunk moves over the feet that stay when ``raised`` legs are in the air."""
 
     raised: frozenset[Leg]
@@ -163,6 +163,6 @@ class ShiftKey(Key):
         return "balance"
 
     @property
-    def mirrored(self) -> ShiftKey:
+    def mirrored(self) -> BalanceShift:
         """Left and right exchanged."""
         return replace(self, raised=frozenset(leg.mirror for leg in self.raised))

@@ -15,22 +15,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from numbers import Real
 from typing import TypeVar
 
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Posture
+from motions.arguments import is_number, positive, quantity, word
 from motions.keys import (
     BODY_CHANNELS,
+    BalanceShift,
     BodyKey,
     Frame,
     LegKey,
     LegTarget,
     Mark,
     PostureKey,
-    ShiftKey,
 )
 from motions.poses import POSES
 
@@ -38,12 +38,12 @@ SHIFT_TIME = 0.9
 """Time [s] in which the body moves over the feet that stay, before another one is raised."""
 SAME = 1e-9
 """Times this close [s] are the same: absorbs rounding of sums."""
-FARTHEST = 2.0
-"""A place farther away than this [m] is a mistake in units."""
-ANGLES = frozenset({"roll", "pitch", "yaw", "hip", "thigh", "calf"})
+_EASES = {ease.value: ease for ease in Ease}
+_FRAMES = {frame.value: frame for frame in (Frame.GROUND, Frame.BODY)}
+_POSTURES = {posture.value: posture for posture in Posture}
 
-AnyKey = BodyKey | PostureKey | LegKey | ShiftKey | Mark
-_KeyType = TypeVar("_KeyType", BodyKey, PostureKey, LegKey, ShiftKey, Mark)
+AnyKey = BodyKey | PostureKey | LegKey | BalanceShift | Mark
+_KeyType = TypeVar("_KeyType", BodyKey, PostureKey, LegKey, BalanceShift, Mark)
 
 
 def deg(angle: float) -> float:
@@ -60,7 +60,8 @@ class Timeline:
         exit: posture in which it ends.
         name: what to call it.
         balance: whether the body moves over the standing feet before one is raised.
-        shift_time: how long [s] that takes.
+        shift_time: how long [s] that takes, before a tempo is set.
+        shift_beats: how many beats it takes with a tempo; 0 without one.
         keys: what was written so far.
         cursor: when [s] the next call starts.
         beat: seconds that one unit of ``over`` lasts.
@@ -76,16 +77,17 @@ class Timeline:
     keys: tuple[AnyKey, ...] = field(default=(), kw_only=True)
     cursor: float = field(default=0.0, kw_only=True)
     beat: float = field(default=1.0, kw_only=True)
+    shift_beats: float = field(default=0.0, kw_only=True)
     last_start: float = field(default=0.0, kw_only=True)
     floor: float = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
-        """Raise TimelineError for stances that are none, or a track that moves twice at once."""
+        """Raise TimelineError for postures that are none, or a track that moves twice at once."""
         for name in ("entry", "exit"):
             if not isinstance(getattr(self, name), Posture):
-                valid = ", ".join(f"Posture.{stance.name}" for stance in Posture)
+                valid = ", ".join(f"Posture.{posture.name}" for posture in Posture)
                 raise TimelineError(f"{name} must be one of {valid}, got {getattr(self, name)!r}")
-        _positive("shift_time", self.shift_time)
+        positive("shift_time", self.shift_time)
         _require_no_overlap(self.keys)
 
     # --- what the body does ---------------------------------------------------------------
@@ -112,18 +114,15 @@ class Timeline:
         if not given:
             raise TimelineError(f"body() needs one of {', '.join(BODY_CHANNELS)}")
         start, end = self._span(over)
-        curve = _ease(ease)
+        curve = word("ease", ease, _EASES)
         keys = [
-            BodyKey(start, end, curve, name, _checked(name, value)) for name, value in given.items()
+            BodyKey(start, end, curve, name, quantity(name, value)) for name, value in given.items()
         ]
         return self._longer(keys, end)
 
     def posture(self, stance: Posture | str, *, over: float) -> Timeline:
         """Move the trunk to another resting posture, on four feet; offsets count from there."""
-        known = {item.value: item for item in Posture}
-        which = stance if isinstance(stance, Posture) else known.get(stance)
-        if which is None:
-            raise TimelineError(unknown_name("posture", str(stance), known))
+        which = word("posture", stance, _POSTURES)
         start, end = self._span(over)
         return self._longer([PostureKey(start, end, Ease.MINIMUM_JERK, which)], end)
 
@@ -150,12 +149,12 @@ class Timeline:
 
         It is on the ground again when x, y and z are 0 in the frame of the ground.
         """
-        place = (_checked("x", x), _checked("y", y), _checked("z", z))
-        in_frame = _frame(frame)
+        place = (quantity("x", x), quantity("y", y), quantity("z", z))
+        in_frame = word("frame", frame, _FRAMES)
         if in_frame is Frame.GROUND and place[2] < 0.0:
             raise TimelineError(f"foot() cannot go below the ground: z is {z}")
         target = LegTarget(in_frame, place)
-        return self._move_leg(_leg(leg), target, over, ease)
+        return self._move_leg(word("foot", leg, Leg.__members__), target, over, ease)
 
     def leg(
         self,
@@ -168,9 +167,9 @@ class Timeline:
         ease: Ease | str = Ease.MINIMUM_JERK,
     ) -> Timeline:
         """Move the joints of a raised leg to these angles [rad]."""
-        angles = (_checked("hip", hip), _checked("thigh", thigh), _checked("calf", calf))
+        angles = (quantity("hip", hip), quantity("thigh", thigh), quantity("calf", calf))
         target = LegTarget(Frame.JOINTS, angles)
-        return self._move_leg(_leg(leg), target, over, ease)
+        return self._move_leg(word("foot", leg, Leg.__members__), target, over, ease)
 
     def unweight(self, leg: Leg | str, *, over: float) -> Timeline:
         """Move the trunk over the other feet, so that this one can be raised.
@@ -178,12 +177,12 @@ class Timeline:
         ``foot`` and ``leg`` do so by themselves; this is for choosing when, and how fast.
         """
         start, end = self._span(over)
-        raised = self.raised | {_leg(leg)}
-        return self._longer([ShiftKey(start, end, Ease.MINIMUM_JERK, raised)], end)
+        raised = self.raised | {word("foot", leg, Leg.__members__)}
+        return self._longer([BalanceShift(start, end, Ease.MINIMUM_JERK, raised)], end)
 
     def down(self, leg: Leg | str, *, over: float) -> Timeline:
         """Put a raised foot back where it stood."""
-        which = _leg(leg)
+        which = word("foot", leg, Leg.__members__)
         if which not in self.raised:
             raise TimelineError(f"down(): foot {which.name} is not raised")
         return self._move_leg(which, LegTarget.on_ground(), over, Ease.MINIMUM_JERK)
@@ -212,18 +211,25 @@ class Timeline:
             if line.body_value(channel) != 0.0
         ]
         if line.shifted_for:
-            keys.append(ShiftKey(start, end, Ease.MINIMUM_JERK, frozenset()))
+            keys.append(BalanceShift(start, end, Ease.MINIMUM_JERK, frozenset()))
         return line._longer(keys, end)
 
     def at(self, t: float) -> Timeline:
         """Put the cursor ``t`` seconds (beats) after the start of the motion."""
-        if not (_is_number(t) and t >= 0.0):
+        if not (is_number(t) and t >= 0.0):
             raise TimelineError(f"at() needs a time of 0 s or later, got {t!r}")
         return replace(self, cursor=t * self.beat)
 
-    def bpm(self, beats_per_minute: float) -> Timeline:
-        """Count ``over``, ``hold`` and ``at`` in beats from here on."""
-        return replace(self, beat=60.0 / _positive("bpm", beats_per_minute))
+    def bpm(self, beats_per_minute: float, *, shift_time: float | None = None) -> Timeline:
+        """Count ``over``, ``hold`` and ``at`` in beats from here on.
+
+        Before a foot is raised the trunk then moves aside in ``shift_time`` beats; by default in
+        the fewest whole beats that are no shorter than the timeline's ``shift_time``.
+        """
+        beat = 60.0 / positive("bpm", beats_per_minute)
+        if shift_time is None:
+            return replace(self, beat=beat, shift_beats=math.ceil(self.shift_time / beat - SAME))
+        return replace(self, beat=beat, shift_beats=positive("shift_time", shift_time))
 
     # --- putting motions together ---------------------------------------------------------
 
@@ -277,7 +283,7 @@ class Timeline:
     @property
     def shifted_for(self) -> frozenset[Leg]:
         """Legs for whose absence the trunk has moved over the other feet."""
-        shifts = self.in_order(ShiftKey)
+        shifts = self.in_order(BalanceShift)
         return shifts[-1].raised if shifts else frozenset()
 
     def body_value(self, channel: str) -> float:
@@ -299,13 +305,13 @@ class Timeline:
         if not is_raised:
             line = self._shifted(self.raised | {leg})
         start, end = line._span(over)
-        return line._longer([LegKey(start, end, _ease(ease), leg, target)], end)
+        return line._longer([LegKey(start, end, word("ease", ease, _EASES), leg, target)], end)
 
     def _shifted(self, raised: frozenset[Leg]) -> Timeline:
         if not self.balance or self.shifted_for == raised:
             return self
-        end = self.cursor + self.shift_time
-        return self._longer([ShiftKey(self.cursor, end, Ease.MINIMUM_JERK, raised)], end)
+        end = self.cursor + (self.shift_beats * self.beat or self.shift_time)
+        return self._longer([BalanceShift(self.cursor, end, Ease.MINIMUM_JERK, raised)], end)
 
     def _longer(self, keys: Sequence[AnyKey], cursor: float) -> Timeline:
         return replace(
@@ -328,7 +334,7 @@ class Timeline:
             raise TimelineError(f"{what} needs motions that end at home(); away: {', '.join(away)}")
 
     def _span(self, over: float) -> tuple[float, float]:
-        return self.cursor, self.cursor + _positive("over", over) * self.beat
+        return self.cursor, self.cursor + positive("over", over) * self.beat
 
 
 def _require_no_overlap(keys: Sequence[AnyKey]) -> None:
@@ -341,50 +347,3 @@ def _require_no_overlap(keys: Sequence[AnyKey]) -> None:
                 f"{key.start:.2f} to {key.end:.2f} s"
             )
         last[key.track] = key
-
-
-def _is_number(value: object) -> bool:
-    if isinstance(value, bool) or not isinstance(value, Real):
-        return False
-    return math.isfinite(float(value))
-
-
-def _positive(name: str, value: float) -> float:
-    if not (_is_number(value) and value > 0.0):
-        raise TimelineError(f"{name} must be a number above 0, got {value!r}")
-    return float(value)
-
-
-def _checked(name: str, value: float) -> float:
-    if not _is_number(value):
-        raise TimelineError(f"{name} must be a finite number, got {value!r}")
-    if name in ANGLES and abs(value) > math.pi:
-        raise TimelineError(f"{name} of {value:g} rad looks like degrees: write deg({value:g})")
-    if name not in ANGLES and abs(value) > FARTHEST:
-        raise TimelineError(f"{name} is {value:g} m, more than {FARTHEST:g} m: in millimetres?")
-    return float(value)
-
-
-def _leg(leg: Leg | str) -> Leg:
-    if isinstance(leg, Leg):
-        return leg
-    if leg not in Leg.__members__:
-        raise TimelineError(unknown_name("foot", str(leg), Leg.__members__))
-    return Leg[leg]
-
-
-def _ease(ease: Ease | str) -> Ease:
-    known = {item.value: item for item in Ease}
-    if isinstance(ease, Ease):
-        return ease
-    if ease not in known:
-        raise TimelineError(unknown_name("ease", str(ease), known))
-    return known[ease]
-
-
-def _frame(frame: Frame | str) -> Frame:
-    known = {Frame.GROUND.value: Frame.GROUND, Frame.BODY.value: Frame.BODY}
-    which = known.get(frame) if isinstance(frame, str) else frame
-    if which is None or which is Frame.JOINTS:
-        raise TimelineError(unknown_name("frame", str(frame), known))
-    return which

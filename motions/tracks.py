@@ -6,18 +6,20 @@ the four feet.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise, starmap
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from go2_wbc.curves import Ease
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import quaternion_from_rpy, rotation_from_rpy
 from motions.keys import BODY_CHANNELS, BodyKey, Frame, LegKey, LegTarget, PostureKey
 from motions.postures import LIE_POSE, SIT_POSE, STAND_POSE
 from motions.timeline import Timeline
@@ -26,7 +28,8 @@ LOW = 0.08
 """A foot that stays this far [m] below its hip's axis moves along straight lines; a higher one in
 joint space, since the way of a foot past its hip crosses a singularity of the leg."""
 SETTLING_STEPS = 10
-"""The CoM hangs a little off the base; finding its place converges by a factor of 8 a step."""
+"""Steps that find the place of the base below which the CoM stands; each leaves an eighth of the
+error (measured), since the legs, whose feet stay, follow the base only in part."""
 
 Times = Float[np.ndarray, " n"]
 Poses = Float[np.ndarray, "n 6"]
@@ -45,27 +48,49 @@ class LegPath:
     miss: Float[np.ndarray, " n"]
 
 
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A way to a goal: when [s] it starts and ends, how, and the goal (k,)."""
+
+    start: float
+    end: float
+    ease: Ease
+    goal: Float[np.ndarray, " k"]
+
+
+def followed(
+    times: Times, first: Float[np.ndarray, " k"], moves: Sequence[Move]
+) -> Float[np.ndarray, "n k"]:
+    """Values (n, k) at ``times`` of what goes from ``first`` to one goal after the other.
+
+    Args:
+        times: increasing instants [s].
+        first: where it is before the first move.
+        moves: by their starts; none starts before the one before it has ended.
+    """
+    path = np.tile(first, (len(times), 1))
+    last = first
+    edges = np.searchsorted(times, [*(move.start for move in moves), np.inf])
+    for move, rows in zip(moves, starmap(slice, pairwise(edges.tolist())), strict=True):
+        share = eased(move.start, move.end, move.ease, times[rows])
+        path[rows] = last + share[:, None] * (move.goal - last)
+        last = move.goal
+    return path
+
+
 def body_path(
     timeline: Timeline, home: Mapping[Posture, Float[np.ndarray, "6"]], times: Times
 ) -> Poses:
     """Base position [m] and roll, pitch, yaw [rad] at ``times``, without the shift for balance."""
-    path = np.tile(home[timeline.entry], (len(times), 1))
-    last = home[timeline.entry]
-    for key in timeline.in_order(PostureKey):
-        path += progress(key, times)[:, None] * (home[key.stance] - last)
-        last = home[key.stance]
-    for column, channel in enumerate(BODY_CHANNELS):
-        value = 0.0
-        for key in timeline.in_order(BodyKey):
-            if key.channel == channel:
-                path[:, column] += progress(key, times) * (key.value - value)
-                value = key.value
-    return path
-
-
-def progress(key: BodyKey | PostureKey | LegKey, times: Times) -> Float[np.ndarray, " n"]:
-    """Share of the key's way that is done: 0 before it, 1 after it."""
-    return eased(key.start, key.end, key.ease, times)
+    moves: dict[str, list[Move]] = {channel: [] for channel in BODY_CHANNELS}
+    for key in timeline.in_order(BodyKey):
+        moves[key.channel].append(Move(key.start, key.end, key.ease, np.array([key.value])))
+    postures = [
+        Move(key.start, key.end, key.ease, home[key.posture])
+        for key in timeline.in_order(PostureKey)
+    ]
+    offsets = [followed(times, np.zeros(1), moves[channel]) for channel in BODY_CHANNELS]
+    return followed(times, home[timeline.entry], postures) + np.hstack(offsets)
 
 
 def eased(start: float, end: float, ease: Ease, times: Times) -> Float[np.ndarray, " n"]:
@@ -93,29 +118,45 @@ def flights(timeline: Timeline, leg: Leg) -> list[tuple[float, float]]:
 
 
 class LegTracks:
-    """Evaluates the tracks of the legs along a path of the trunk."""
+    """Evaluates the legs' tracks of a timeline along a path of the trunk.
 
-    def __init__(self, model: RobotModel, home: Float[np.ndarray, "6"]) -> None:
+    Attributes:
+        p_feet: (4, 3) where the feet stand [m].
+    """
+
+    def __init__(self, timeline: Timeline, model: RobotModel, home: Float[np.ndarray, "6"]) -> None:
         """``home``: pose of the trunk in which the motion starts, on four feet."""
         self._geometry = {leg: LegGeometry.of(model, leg) for leg in LEGS}
-        self.p_feet = model.p_base_feet_nominal.copy()
-        self.p_feet[:, 2] = model.foot_radius
-        self._p_base_feet_home = (self.p_feet - home[:3]) @ rotations(home[None, 3:])[0]
-
-    def path(self, timeline: Timeline, leg: Leg, times: Times, body: Poses) -> LegPath:
-        """Joint angles of ``leg`` while the trunk moves along ``body``."""
-        target, path = LegTarget.on_ground(), self._at(leg, LegTarget.on_ground(), body)
+        self._keys: dict[Leg, list[LegKey]] = {leg: [] for leg in LEGS}
         for key in timeline.in_order(LegKey):
-            if key.leg is leg:
-                during = times >= key.start
-                path = self._joined(path, self._move(key, target, times, body), during)
-                target = key.target
+            self._keys[key.leg].append(key)
+        self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
+        self.p_feet = standing_feet(model)
+        self._p_base_feet_home = (self.p_feet - home[:3]) @ attitudes(home[None, 3:]).as_matrix()[0]
+
+    def path(self, leg: Leg, times: Times, body: Poses) -> LegPath:
+        """Joint angles of ``leg`` at increasing ``times``, at which the trunk is at ``body``.
+
+        From its start until the next one starts, a key alone says where the leg is.
+        """
+        keys, starts = self._keys[leg], self._starts[leg]
+        first = max(bisect_right(starts, times[0]) - 1, 0)
+        origin = keys[first - 1].target if first else LegTarget.on_ground()
+        path = self._at(leg, origin, body)
+        for index in range(first, bisect_right(starts, times[-1])):
+            key = keys[index]
+            following = starts[index + 1] if index + 1 < len(keys) else np.inf
+            until = max(np.searchsorted(times, following), np.searchsorted(times, key.end, "right"))
+            rows = slice(int(np.searchsorted(times, key.start)), int(until))
+            moved = self._move(key, origin, times[rows], body[rows])
+            path.q[rows], path.miss[rows] = moved.q, moved.miss
+            origin = key.target
         return path
 
     def _move(self, key: LegKey, origin: LegTarget, times: Times, body: Poses) -> LegPath:
-        share = progress(key, times)[:, None]
+        share = eased(key.start, key.end, key.ease, times)[:, None]
         goals = (origin, key.target)
-        span = (times >= key.start) & (times <= key.end)
+        span = times <= key.end
         if all(goal.frame is not Frame.JOINTS for goal in goals):
             places = [self._places(key.leg, goal, body) for goal in goals]
             hip = self._geometry[key.leg].p_base_hip[2]
@@ -137,37 +178,34 @@ class LegTracks:
         offset = np.array(target.values)
         if target.frame is Frame.BODY:
             return np.tile(self._p_base_feet_home[leg] + offset, (len(body), 1))
-        return np.einsum(
-            "nij,ni->nj", rotations(body[:, 3:]), self.p_feet[leg] + offset - body[:, :3]
-        )
-
-    @staticmethod
-    def _joined(before: LegPath, after: LegPath, during: Bool[np.ndarray, " n"]) -> LegPath:
-        return LegPath(
-            np.where(during[:, None], after.q, before.q), np.where(during, after.miss, before.miss)
-        )
+        return attitudes(body[:, 3:]).apply(self.p_feet[leg] + offset - body[:, :3], inverse=True)
 
 
-def rotations(rpy: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
-    """Rz(yaw) Ry(pitch) Rx(roll) for every row."""
-    return np.array([rotation_from_rpy(*row) for row in rpy.tolist()])
+def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
+    """Where the feet's centres stand [m]: below the hips, a foot's radius above the ground."""
+    p_feet = model.p_base_feet_nominal.copy()
+    p_feet[:, 2] = model.foot_radius
+    return p_feet
 
 
-def configuration(
-    pose: Float[np.ndarray, "6"], joints: Float[np.ndarray, "12"]
-) -> Float[np.ndarray, "19"]:
-    """q of a trunk at ``pose`` (position, then roll, pitch, yaw) with these joint angles."""
-    roll, pitch, yaw = pose[3:].tolist()
-    return np.concatenate([pose[:3], quaternion_from_rpy(roll, pitch, yaw), joints])
+def attitudes(rpy: Float[np.ndarray, "n 3"]) -> Rotation:
+    """R_world_base = Rz(yaw) Ry(pitch) Rx(roll) of every row [rad]."""
+    return Rotation.from_euler("ZYX", rpy[:, ::-1])
+
+
+def configurations(poses: Poses, joints: Float[np.ndarray, "n 12"]) -> Float[np.ndarray, "n 19"]:
+    """q of a trunk at ``poses`` (position, then roll, pitch, yaw) with these joint angles."""
+    return np.hstack([poses[:, :3], attitudes(poses[:, 3:]).as_quat(), joints])
 
 
 def home_poses(model: RobotModel) -> dict[Posture, Float[np.ndarray, "6"]]:
-    """Pose of the base in every resting posture, on four feet below the hips."""
-    stand = STAND_POSE.copy()
-    tracks = LegTracks(model, STAND_POSE)
-    start, still = np.zeros(1), Timeline()
+    """Pose of the base in every resting posture, on four feet below the hips.
+
+    Standing is given by its CoM c*; p <- p + (c* - c(p)) finds the place p of the base.
+    """
+    stand = STAND_POSE.copy()[None]
+    tracks = LegTracks(Timeline(), model, STAND_POSE)
     for _ in range(SETTLING_STEPS):
-        joints = [tracks.path(still, leg, start, stand[None]).q[0] for leg in LEGS]
-        com, _ = model.forward_kinematics(configuration(stand, np.concatenate(joints)))
-        stand[:3] += STAND_POSE[:3] - com
-    return {Posture.STAND: stand, Posture.SIT: SIT_POSE, Posture.LIE: LIE_POSE}
+        joints = np.hstack([tracks.path(leg, np.zeros(1), stand).q for leg in LEGS])
+        stand[0, :3] += STAND_POSE[:3] - model.center_of_mass(configurations(stand, joints)[0])
+    return {Posture.STAND: stand[0], Posture.SIT: SIT_POSE, Posture.LIE: LIE_POSE}

@@ -13,18 +13,20 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
 from go2_wbc.errors import MotionError
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import LegTask, MotionPlan, Reference, TrackedPoint
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import quaternion_from_rpy, rpy_from_rotation
+from go2_wbc.robot.rotations import rpy_from_rotation
+from motions.tracks import attitudes, standing_feet
 
 SAMPLE_PERIOD = 0.01
 """Time [s] between the instants that are looked at."""
 CENTRING_STEPS = 5
-"""Steps that put the CoM in its place; the error shrinks by a factor of 8 in each.
+"""Steps that put the CoM in its place; each leaves an eighth of the error (measured).
 
 The legs are solved once more after the last one, so that the feet are exactly in theirs."""
 
@@ -56,6 +58,10 @@ class Trajectory:
     p_feet: Float[np.ndarray, "4 3"]
     miss: Float[np.ndarray, "n 4"]
 
+    def placed(self, p_base: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        """Points of the base [m], one an instant, in the frame of the motion."""
+        return self.q[:, :3] + attitudes(self.rpy).apply(p_base)
+
 
 def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     """The trajectory of ``plan``; the feet stand below the hips, and land where they stood.
@@ -70,13 +76,11 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
         parts = (reference.body.p_world, reference.body.R_world_base.ravel(), reference.q_joints)
         if not np.isfinite(np.concatenate(parts)).all():
             raise MotionError(f"the plan is not finite at t={t:.2f} s")
-    R = np.array([reference.body.R_world_base for reference in references])
+    R = [reference.body.R_world_base for reference in references]
     rpy = np.unwrap(np.array([rpy_from_rotation(rotation) for rotation in R]), axis=0)
-    p_feet = model.p_base_feet_nominal.copy()
-    p_feet[:, 2] = model.foot_radius
-    base, joints, miss = _posed(references, R, rpy, p_feet, model)
-    p_com = np.array([_com(model, row) for row in zip(base, rpy, joints, strict=True)])
-    q, v, a = _motion(times, base, rpy, R, joints)
+    attitude, p_feet = attitudes(rpy), standing_feet(model)
+    q, miss = _configurations(references, attitude, p_feet, model)
+    v, a = _rates(times, q, rpy, attitude)
     greatest = np.array([reference.normal_force_max for reference in references])
     return Trajectory(
         times=times,
@@ -84,7 +88,7 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
         v=v,
         a=a,
         rpy=rpy,
-        p_com=p_com,
+        p_com=np.array([model.center_of_mass(row) for row in q]),
         stance=np.array([reference.stance for reference in references]),
         load_share=greatest / max(float(greatest.max()), 1e-9),
         p_feet=p_feet,
@@ -92,64 +96,62 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     )
 
 
-def _posed(
+def _configurations(
     references: list[Reference],
-    R: Float[np.ndarray, "n 3 3"],
-    rpy: Float[np.ndarray, "n 3"],
+    attitude: Rotation,
     p_feet: Float[np.ndarray, "4 3"],
     model: RobotModel,
-) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 12"], Float[np.ndarray, "n 4"]]:
-    """Base places, joint angles and what standing legs miss, such that the CoM is as asked."""
+) -> tuple[Float[np.ndarray, "n 19"], Float[np.ndarray, "n 4"]]:
+    """Configurations whose CoM is as asked, and what standing legs miss [m].
+
+    With the feet in their places and the attitude given, the CoM c is a function of the base's
+    place p alone; p <- p + (c* - c(p)) converges, since the legs follow the base only in part.
+    """
     wanted = np.array([reference.body.p_world for reference in references])
-    is_com = np.array([r.body.point is TrackedPoint.COM for r in references])
+    is_com = np.array([[r.body.point is TrackedPoint.COM] for r in references])
     raised = np.array([[task is LegTask.JOINTS for task in r.legs] for r in references])
-    base, joints = wanted.copy(), np.array([r.q_joints for r in references])
+    q = np.hstack([wanted, attitude.as_quat(), np.array([r.q_joints for r in references])])
+    base, joints = q[:, :3], q[:, 7:]  # views: q follows them
     miss = np.zeros((len(references), 4))
     for step in range(CENTRING_STEPS + 1):
         for leg in LEGS:
-            places = np.einsum("nij,ni->nj", R, p_feet[leg] - base)
+            places = attitude.apply(p_feet[leg] - base, inverse=True)
             found = leg_angles(LegGeometry.of(model, leg), places)
             stands = ~raised[:, leg]
             joints[stands, leg.joints] = found.q[stands]
             miss[:, leg] = np.where(stands, found.miss, 0.0)
-        if step == CENTRING_STEPS:
-            break
-        com = np.array([_com(model, row) for row in zip(base, rpy, joints, strict=True)])
-        base = base + np.where(is_com[:, None], wanted - com, 0.0)
-    return base, joints, miss
+        if step < CENTRING_STEPS:
+            com = np.array([model.center_of_mass(row) for row in q])
+            base += np.where(is_com, wanted - com, 0.0)
+    return q, miss
 
 
-def _com(model: RobotModel, pose: tuple[np.ndarray, np.ndarray, np.ndarray]) -> np.ndarray:
-    base, rpy, joints = pose
-    roll, pitch, yaw = rpy.tolist()
-    q = np.concatenate([base, quaternion_from_rpy(roll, pitch, yaw), joints])
-    return model.center_of_mass(q)
-
-
-def _motion(
+def _rates(
     times: Float[np.ndarray, " n"],
-    base: Float[np.ndarray, "n 3"],
+    q: Float[np.ndarray, "n 19"],
     rpy: Float[np.ndarray, "n 3"],
-    R: Float[np.ndarray, "n 3 3"],
-    joints: Float[np.ndarray, "n 12"],
-) -> tuple[Float[np.ndarray, "n 19"], Float[np.ndarray, "n 18"], Float[np.ndarray, "n 18"]]:
-    spline = CubicSpline(times, np.hstack([base, rpy, joints]), bc_type="clamped")
+    attitude: Rotation,
+) -> tuple[Float[np.ndarray, "n 18"], Float[np.ndarray, "n 18"]]:
+    """Velocity and acceleration (n, 18) as Pinocchio counts them: the base's in its own frame.
+
+    With v_b = R' v_w, the acceleration is the derivative of these very components,
+    dv_b/dt = R' a_w - w_b x v_b (Featherstone 2008, ch. 2: spatial, not classical).
+    """
+    spline = CubicSpline(times, np.hstack([q[:, :3], rpy, q[:, 7:]]), bc_type="clamped")
     rate, acceleration = spline(times, 1), spline(times, 2)
-    quaternions = np.array([quaternion_from_rpy(*row) for row in rpy.tolist()])
     w, dw = _body_rates(rpy, rate[:, 3:6], acceleration[:, 3:6])
-    v_base = np.einsum("nij,ni->nj", R, rate[:, :3])
-    a_base = np.einsum("nij,ni->nj", R, acceleration[:, :3]) - np.cross(w, v_base)
-    return (
-        np.hstack([base, quaternions, joints]),
-        np.hstack([v_base, w, rate[:, 6:]]),
-        np.hstack([a_base, dw, acceleration[:, 6:]]),
-    )
+    v_base = attitude.apply(rate[:, :3], inverse=True)
+    a_base = attitude.apply(acceleration[:, :3], inverse=True) - np.cross(w, v_base)
+    return np.hstack([v_base, w, rate[:, 6:]]), np.hstack([a_base, dw, acceleration[:, 6:]])
 
 
 def _body_rates(
     rpy: Float[np.ndarray, "n 3"], rate: Float[np.ndarray, "n 3"], second: Float[np.ndarray, "n 3"]
 ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
-    """Angular velocity and its derivative in the base frame (Diebel 2006, eq. 67 and 74)."""
+    """Angular velocity and its derivative in the base frame (Diebel 2006, eq. 67 and 74).
+
+    w_b = E(roll, pitch) d(rpy)/dt, and dw_b = E d2(rpy)/dt2 + dE/dt d(rpy)/dt, written out by row.
+    """
     (roll, pitch, _), (d_roll, d_pitch, d_yaw) = rpy.T, rate.T
     sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
     w = np.column_stack(

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import pytest
 from jaxtyping import install_import_hook
 
 from tests import typechecker
@@ -45,15 +44,3 @@ def checked_modules() -> list[str]:
 
 if IS_CHECKING:
     install_import_hook(checked_modules(), f"{typechecker.__name__}.checked")
-
-
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say so when there was no browser for the tests that need one."""
-    from tests.viz.chromium import BROWSER_VARIABLE, find_chromium
-
-    if find_chromium() is None:
-        terminalreporter.write_line(
-            "browser tests NOT RUN: no Chromium on this machine "
-            f"(apt-get install chromium, or set {BROWSER_VARIABLE})",
-            yellow=True,
-        )

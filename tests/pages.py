@@ -22,8 +22,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCS = tuple(f"docs/{name}.md" for name in ("tutorial", "motions", "feasibility", "gallery"))
 BRIDGES = tuple(f"docs/{name}.md" for name in ("ros2", "unitree", "real_robot"))
+MADE = ("docs/reference/api/", "docs/_build/")
+"""What the build of the documentation writes."""
+DOCS = tuple(
+    name
+    for file in sorted(ROOT.glob("docs/**/*.md"))
+    if not (name := file.relative_to(ROOT).as_posix()).startswith(MADE) and name not in BRIDGES
+)
 PAGES = ("README.md", "CONTRIBUTING.md", *DOCS, *BRIDGES)
 FENCE = re.compile(r"^(?:<!-- ([^>]*) -->\n)?```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 NOT_RUN = "# not run by the tests"
@@ -69,6 +75,16 @@ def blocks(name: str, language: str | None = None) -> list[Block]:
         for match in FENCE.finditer(text)
     )
     return [block for block in found if language in (None, block.language)]
+
+
+def table_rows(text: str, first: str) -> list[list[str]]:
+    """The cells of the table whose head's first cell starts with ``first``, without the head."""
+    cells = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in text[text.index(f"| {first}") :].split("\n\n")[0].splitlines()
+        if line.startswith("|")
+    ]
+    return cells[2:]
 
 
 def name_of(block: Block) -> str:

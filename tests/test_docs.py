@@ -1,4 +1,4 @@
-"""What the pages of ``docs/`` show is so: their blocks run, and they leave out nothing.
+"""What the pages of ``docs/`` show works: their blocks run, and they leave out nothing.
 
 How a block is taken is said in ``tests/pages.py``.
 """
@@ -13,26 +13,48 @@ from pathlib import Path
 import pytest
 
 import motions
+from controller import GO2Controller
+from controller.cli.main import COMMANDS
+from go2_wbc.config import Config, load_config
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.reference import Posture
+from go2_wbc.wbc.tasks import Gains
 from motions import FeasibilityChecker, Timeline, check, compile_timeline, load_motion
 from motions.feasibility import FeasibilityLimits
 from motions.keys import BODY_CHANNELS, Frame
 from motions.poses import POSES
 from tests.motions.doctored import DoctoredPlan
-from tests.pages import Block, blocks, difference, name_of, page, run_command, run_python, words_of
+from tests.pages import (
+    DOCS,
+    NOT_RUN,
+    Block,
+    blocks,
+    difference,
+    name_of,
+    page,
+    run_command,
+    run_python,
+    table_rows,
+    words_of,
+)
 
 TUTORIAL, LANGUAGE, FEASIBILITY = (
     f"docs/{name}.md" for name in ("tutorial", "motions", "feasibility")
 )
 EASE_SIGNS = 5
 """Columns of the table of easing, besides the name."""
-OWN = [
+CONTROLLER, COMMAND_LINE, CONFIGURATION = (
+    f"docs/reference/{name}.md" for name in ("controller", "command-line", "configuration")
+)
+PYTHON = [
     pytest.param(block, id=f"{Path(name).stem} {name_of(block)}")
-    for name in (LANGUAGE, FEASIBILITY)
+    for name in DOCS
+    if name != TUTORIAL
     for block in blocks(name, "python")
+    if block.text != blocks("README.md", "python")[0].text
 ]
+RUNNING = [param for param in PYTHON if not param.values[0].text.startswith(NOT_RUN)]
 
 
 # --- blocks -----------------------------------------------------------------------------------
@@ -66,9 +88,20 @@ def _output(block: Block, folder: Path, where: str) -> str:
     return printed
 
 
+def test_the_pages_have_blocks_to_test() -> None:
+    assert len(RUNNING) >= 14
+    left_out = [param.id.split()[0] for param in PYTHON if param not in RUNNING]
+    assert left_out == ["real-time", "worlds"]
+
+
+@pytest.mark.parametrize("block", PYTHON)
+def test_a_python_block_compiles(block: Block) -> None:
+    compile(block.text, "<block>", "exec")
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("block", OWN)
-def test_a_python_block_of_the_reference_runs_alone(block: Block, tmp_path: Path) -> None:
+@pytest.mark.parametrize("block", RUNNING)
+def test_a_python_block_runs_alone_and_says_nothing_bad(block: Block, tmp_path: Path) -> None:
     done = run_python(block.text, tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -152,8 +185,8 @@ def test_the_reference_names_every_frame_and_posture() -> None:
     text = page(LANGUAGE)
     for frame in (Frame.GROUND, Frame.BODY):
         assert f'frame="{frame.value}"' in text
-    for stance in Posture:
-        assert f'"{stance.value}"' in text
+    for posture in Posture:
+        assert f'"{posture.value}"' in text
 
 
 _ERROR = re.compile(r"^\| `(\S.*?)` \| (.+) \|$", re.MULTILINE)
@@ -222,6 +255,46 @@ def test_the_limits_in_the_table_are_those_of_the_checker() -> None:
         assert limit in row[0], check_name
 
 
-def test_the_page_has_a_place_for_the_table_of_the_bench() -> None:
+def test_the_page_has_a_place_for_the_table_of_the_benchmark() -> None:
     text = page(FEASIBILITY)
     assert 0 < text.index("<!-- feasibility:begin") < text.index("<!-- feasibility:end -->")
+
+
+# --- the controller, the command line, the configuration --------------------------------------
+
+
+def test_the_table_of_methods_names_every_public_member_and_no_other() -> None:
+    cells = [row[0] for row in table_rows(page(CONTROLLER), "call")]
+    named = {name for cell in cells for name in re.findall(r"`(\w+)", cell)}
+    assert named == {name for name in dir(GO2Controller) if not name.startswith("_")}
+
+
+def test_every_command_has_its_section_with_its_help() -> None:
+    sections = re.findall(r"^## (.+)\n\n```{cli-help} (.+)\n```$", page(COMMAND_LINE), re.MULTILINE)
+    assert all(title == name for title, name in sections)
+    assert {name for _, name in sections} == {command.name for command in COMMANDS}
+
+
+def test_the_configuration_example_loads_and_changes_what_it_names(tmp_path: Path) -> None:
+    (block,) = [block for name in DOCS for block in blocks(name, "toml")]
+    file = tmp_path / "mine.toml"
+    file.write_text(block.text, encoding="utf-8")
+    config = load_config(file)
+    assert config.locomotion.height == 0.27
+    assert config.wbc.swing_foot.kp == (400.0, 400.0, 400.0)
+    assert config.safety.qp_patience == 5
+    assert config != Config()
+
+
+def test_every_table_of_the_configuration_is_shown() -> None:
+    shown = set(re.findall(r"```{config-table} (\S+)", page(CONFIGURATION)))
+    assert _parts(Config()) <= shown
+
+
+def _parts(config: object) -> set[str]:
+    """The classes below a configuration, but for the gains, which are written in one line."""
+    values = [getattr(config, field.name) for field in dataclasses.fields(config)]  # type: ignore[arg-type]
+    found: set[str] = set()
+    for part in (v for v in values if dataclasses.is_dataclass(v) and not isinstance(v, Gains)):
+        found |= {f"{type(part).__module__}.{type(part).__name__}"} | _parts(part)
+    return found

@@ -1,12 +1,16 @@
-"""The eyes: live preview, offline 3D page, rendered animation, stills and plots."""
+"""Drawing and pages: live preview, offline 3D page, rendered animation, stills and plots."""
 
 from __future__ import annotations
 
-from viz.content import Annotation, MarginCurve, ReplayContent, Verdict
-from viz.render.animation import ANIMATION_SUFFIXES, export_animation
-from viz.render.margin_plot import PLOT_SUFFIXES, export_plot
-from viz.render.still import export_filmstrip
-from viz.replay.html_page import HTML_SUFFIXES, export_html
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from viz.content import Annotation, MarginCurve, ReplayContent, Verdict
+    from viz.render.animation import ANIMATION_SUFFIXES, export_animation
+    from viz.render.margin_plot import PLOT_SUFFIXES, export_plot, margin_figure
+    from viz.render.still import export_filmstrip
+    from viz.replay.html_page import HTML_SUFFIXES, export_html
 
 __all__ = [
     "ANIMATION_SUFFIXES",
@@ -20,4 +24,22 @@ __all__ = [
     "export_filmstrip",
     "export_html",
     "export_plot",
+    "margin_figure",
 ]
+
+_HOMES = {
+    "content": ("Annotation", "MarginCurve", "ReplayContent", "Verdict"),
+    "render.animation": ("ANIMATION_SUFFIXES", "export_animation"),
+    "render.margin_plot": ("PLOT_SUFFIXES", "export_plot", "margin_figure"),
+    "render.still": ("export_filmstrip",),
+    "replay.html_page": ("HTML_SUFFIXES", "export_html"),
+}
+"""The module of every public name."""
+
+
+def __getattr__(name: str) -> object:
+    """Import the module of a name when it is first asked for: a page needs no matplotlib."""
+    for home, names in _HOMES.items():
+        if name in names:
+            return getattr(import_module(f"viz.{home}"), name)
+    raise AttributeError(f"module 'viz' has no attribute {name!r}")

@@ -1,17 +1,19 @@
-"""What a bench and a test share of faults: something breaks on purpose, the robot must not fall."""
+"""What benchmarks and tests share of faults: something breaks, the robot must not fall."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
-from benchmarks.rows import Measurement, Row
-from benchmarks.trials import Failed
+from benchmarks.scenario import Measurement, Metric
+from benchmarks.trials import TrialFailed
 from go2_wbc.errors import Go2WbcError
 
-TILT_BAR: Final = 30.0
+TILT_LIMIT: Final = 30.0
 """Tilt [deg] that a fault may cause at most: a robot that goes limp sinks, it does not tip over."""
+Play = Callable[[Any], None]
+"""Makes something break among the processes of a scene and makes sure of what must follow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,35 +21,49 @@ class Fault:
     """Something that breaks.
 
     Attributes:
-        name: unique; the row is called after it.
+        name: unique; its metric is called after it.
         what: what happens, in a few words.
-        run: makes it happen to real processes and makes sure of what must follow; returns the
-            largest tilt [deg] of the robot meanwhile, or raises ``Failed``.
+        play: makes it happen; raises ``TrialFailed`` if what must follow does not.
+        options: of the simulator with which it is played.
     """
 
     name: str
     what: str
-    run: Callable[[], float]
+    play: Play
+    options: tuple[str, ...] = ()
 
 
-def rows_of(faults: Sequence[Fault], item: str) -> tuple[Row, ...]:
-    """A row of the bench for each fault."""
-    return tuple(Row(fault.name, item, fault.what, "deg", TILT_BAR) for fault in faults)
+def fault(faults: list[Fault], name: str, what: str, *options: str) -> Callable[[Play], Play]:
+    """Decorates what makes a fault happen: adds it to ``faults``."""
+
+    def add(play: Play) -> Play:
+        faults.append(Fault(name, what, play, options))
+        return play
+
+    return add
 
 
-def run_all(faults: Sequence[Fault]) -> Measurement:
-    """Every fault in turn; one that went wrong does not keep the others from being tried."""
+def metrics_of(faults: Sequence[Fault], item: str) -> tuple[Metric, ...]:
+    """The largest tilt of the robot during each fault."""
+    return tuple(Metric(fault.name, item, fault.what, "deg", TILT_LIMIT) for fault in faults)
+
+
+def run_all(faults: Sequence[Fault], tilt_during: Callable[[Fault], float]) -> Measurement:
+    """Every fault in turn; one that went wrong does not keep the others from being tried.
+
+    ``tilt_during`` plays a fault and returns the largest tilt [deg] of the robot meanwhile.
+    """
     values: dict[str, float] = {}
     failures: dict[str, str] = {}
-    for fault in faults:
+    for one in faults:
         try:
-            values[fault.name] = fault.run()
-        except (Failed, Go2WbcError) as error:
-            failures[fault.name] = str(error)
+            values[one.name] = tilt_during(one)
+        except (TrialFailed, Go2WbcError) as error:
+            failures[one.name] = str(error)
     return Measurement(values, failures)
 
 
 def require(is_so: bool, why_not: str) -> None:
-    """Raise ``Failed`` with ``why_not`` unless it is so."""
+    """Raise ``TrialFailed`` with ``why_not`` unless it is so."""
     if not is_so:
-        raise Failed(why_not)
+        raise TrialFailed(why_not)

@@ -40,17 +40,22 @@ class Process:
         command: Sequence[str],
         environment: Mapping[str, str] | None = None,
         *,
+        says: str = "",
         has_priority: bool = True,
+        is_stopped: bool = False,
     ) -> None:
         """Start ``command``.
 
         Args:
             command: the program and its arguments.
             environment: its variables; None takes those of this process.
+            says: what it says when it is ready; the ``with`` block begins then.
             has_priority: give it real-time priority, where that is allowed. Not for what never
                 sleeps: it would leave nothing to the others.
+            is_stopped: end it politely after a block without an error.
         """
         self.lines: list[str] = []
+        self._says, self._is_stopped = says, is_stopped
         self._process = subprocess.Popen(
             [*(realtime_prefix() if has_priority else ()), *command],
             env=environment,
@@ -63,12 +68,8 @@ class Process:
         self._reader.start()
 
     def _read(self) -> None:
-        stream = self._process.stdout
-        if stream is None:
-            return
-        with stream:
-            for line in stream:
-                self.lines.append(line.rstrip())
+        for line in self._process.stdout or ():
+            self.lines.append(line.rstrip())
 
     @property
     def text(self) -> str:
@@ -113,6 +114,16 @@ class Process:
         return self.text
 
     def __enter__(self) -> Process:
+        """Wait until it is ready.
+
+        Raises:
+            BridgeError: if it does not say so.
+        """
+        try:
+            self.wait_for(self._says)
+        except BridgeError:
+            self.__exit__(BridgeError, None, None)
+            raise
         return self
 
     def __exit__(
@@ -121,24 +132,13 @@ class Process:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self.code is None:
+        if self._is_stopped and kind is None:
+            self.stop()
+        elif self.code is None:
             self.kill()
         self._reader.join(5.0)
-
-
-def program(*arguments: str, says: str) -> Process:
-    """``go2-wbc`` with these arguments, once it has said ``says``.
-
-    Raises:
-        BridgeError: if it does not say so.
-    """
-    process = Process([*PROGRAM, *arguments])
-    try:
-        process.wait_for(says)
-    except BridgeError:
-        process.kill()
-        raise
-    return process
+        if self._process.stdout is not None:
+            self._process.stdout.close()
 
 
 def wait_until(is_so: Callable[[], bool], limit: float) -> bool:

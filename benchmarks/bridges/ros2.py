@@ -2,26 +2,49 @@
 
 from __future__ import annotations
 
+import math
+import time
 from typing import Final
 
-from benchmarks.bridges.ros2_processes import serving, stay_on_this_machine
-from benchmarks.rows import Direction, Family, Measurement, Row
+import numpy as np
+
+from benchmarks.bridges.ros2_processes import (
+    COMMAND_PERIOD,
+    Probe,
+    joined,
+    probing,
+    quiet_client,
+    serving,
+)
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial
-from go2_wbc.errors import MissingDependency
+from go2_wbc.errors import BridgeError, MissingDependency
 
 NAMESPACE: Final = "bench"
+CALLS: Final = 300
+CALL_LIMIT: Final = 5.0
+"""Time [s] after which a call counts as lost."""
+UNKNOWN: Final = "no_such_behaviour"
+"""A command that moves nothing: what is left is the way there and back."""
+SPEED: Final = 0.3
+"""Forward speed [m/s] that is commanded."""
+DRIVE_TIME, SETTLE_TIME = 20.0, 2.0
+"""Time [s] of the drive, and of its start that does not count for the speed."""
+ROS_CPU: Final = ("ros_cpu_in_loop", "cpu_of_other_threads")
+"""What of the server's statistics is processor time of the ROS side."""
+
 _TRIP = "ROS 2: service call without motion, 300 calls"
 _DRIVE = "ROS 2: cmd_vel, 50 Hz, 20 s"
 _DEMO = "ROS 2: the course's demo"
-ROWS: Final = (
-    Row("ros2.round_trip_p50", _TRIP, "round trip, median", "ms", 3.0),
-    Row("ros2.round_trip_p99", _TRIP, "round trip, 99 %", "ms", 10.0),
-    Row("ros2.calls_lost", _TRIP, "calls lost", "", 0.0),
-    Row("ros2.commands_lost", _DRIVE, "commands lost", "", 0.0),
-    Row("ros2.speed_error", _DRIVE, "0.3 m/s: mean speed error", "%", 2.0),
-    Row("ros2.pace", _DRIVE, "robot time per wall time", "", None, Direction.AT_LEAST),
-    Row("ros2.cpu", _DRIVE, "CPU of the ROS side", "%", 10.0),
-    Row("ros2.demo", _DEMO, "steps not borne out, of 8", "", 0.0),
+METRICS: Final = (
+    Metric("ros2.round_trip_p50", _TRIP, "round trip, median", "ms", 3.0),
+    Metric("ros2.round_trip_p99", _TRIP, "round trip, 99 %", "ms", 10.0),
+    Metric("ros2.calls_lost", _TRIP, "calls lost", "", 0.0),
+    Metric("ros2.commands_lost", _DRIVE, "commands lost", "", 0.0),
+    Metric("ros2.speed_error", _DRIVE, "0.3 m/s: mean speed error", "%", 2.0),
+    Metric("ros2.pace", _DRIVE, "robot time per wall time", "", None, Direction.AT_LEAST),
+    Metric("ros2.cpu", _DRIVE, "CPU of the ROS side", "%", 10.0),
+    Metric("ros2.demo", _DEMO, "steps not confirmed, of 8", "", 0.0),
 )
 
 
@@ -32,24 +55,60 @@ def measure(_trial: Trial) -> Measurement:
         MissingDependency: if ROS 2 is not installed.
         BridgeError: if the server does not start or stops answering.
     """
-    stay_on_this_machine()
-    from benchmarks.bridges.ros2_measure import SPEED, metering
     from controller.bridges.ros2.demo import run_steps
 
-    with serving(namespace=NAMESPACE), metering(NAMESPACE) as meter:
-        trips, drive, steps = meter.round_trips(), meter.drive(), run_steps(meter.go2)
-    undone = [f"{step.label}: {step.reason}" for step in steps if not step.ok]
-    values = {
-        "ros2.round_trip_p50": trips.percentile(50),
-        "ros2.round_trip_p99": trips.percentile(99),
-        "ros2.calls_lost": float(trips.lost),
-        "ros2.commands_lost": float(drive.sent - drive.received),
-        "ros2.speed_error": 100.0 * abs(drive.speed / SPEED - 1.0),
-        "ros2.pace": drive.pace,
-        "ros2.cpu": 100.0 * drive.cpu_share,
-        "ros2.demo": float(len(undone)),
-    }
+    with joined(), serving(namespace=NAMESPACE):
+        with probing(NAMESPACE) as probe:
+            values = _round_trips(probe) | _drive(probe)
+        with quiet_client(NAMESPACE) as go2:
+            undone = [f"{step.label}: {step.reason}" for step in run_steps(go2) if not step.ok]
+    values["ros2.demo"] = float(len(undone))
     return Measurement(values, {"ros2.demo": "; ".join(undone)} if undone else {})
+
+
+def _round_trips(probe: Probe) -> dict[str, float]:
+    """Call a behaviour that does not exist, one call after the other."""
+    times: list[float] = []
+    for _ in range(CALLS):
+        began = time.perf_counter()
+        try:
+            answer = probe.result(probe.send(UNKNOWN), CALL_LIMIT)
+        except BridgeError:
+            continue
+        if not answer.success:
+            times.append(1000.0 * (time.perf_counter() - began))
+    return {
+        "ros2.round_trip_p50": float(np.percentile(times, 50)) if times else math.nan,
+        "ros2.round_trip_p99": float(np.percentile(times, 99)) if times else math.nan,
+        "ros2.calls_lost": float(CALLS - len(times)),
+    }
+
+
+def _drive(probe: Probe) -> dict[str, float]:
+    """Walk straight ahead with 50 commands a second; the speed is in the robot's own time."""
+    answer = probe.call("walk")
+    if not answer.success:
+        raise BridgeError(f"the robot does not walk: {answer.message}")
+    before, began = probe.statistics(), time.monotonic()
+    sent, start = 0, before
+    while time.monotonic() - began < DRIVE_TIME:
+        probe.move(SPEED)
+        sent += 1
+        time.sleep(max(sent * COMMAND_PERIOD - (time.monotonic() - began), 0.0))
+        if start is before and time.monotonic() - began > SETTLE_TIME:
+            start = probe.statistics()
+    after = probe.statistics()
+    probe.move(0.0)
+    way = math.dist(after["position"][:2], start["position"][:2])
+    speed = way / (after["robot_time"] - start["robot_time"])
+    wall_time = after["wall_time"] - before["wall_time"]
+    received = after["cmd_vel"]["received"] - before["cmd_vel"]["received"]
+    return {
+        "ros2.commands_lost": float(sent - received),
+        "ros2.speed_error": 100.0 * abs(speed / SPEED - 1.0),
+        "ros2.pace": (after["robot_time"] - before["robot_time"]) / wall_time,
+        "ros2.cpu": 100.0 * sum(after[name] - before[name] for name in ROS_CPU) / wall_time,
+    }
 
 
 def require() -> None:
@@ -65,4 +124,4 @@ def require() -> None:
         raise MissingDependency(f"{', '.join(missing)} not installed: {imports.BUILD}")
 
 
-FAMILY: Final = Family("ros2-calls", ROWS, measure)
+SCENARIO: Final = Scenario("ros2-calls", METRICS, measure, group="ros2")

@@ -1,45 +1,32 @@
 """What must not make a robot fall: ends of clients and servers at the worst moment, and garbage.
 
-Every scenario runs real processes. It fails, with a reason, if the robot did not stop, stand or
-recover, or if nobody was told; else it gives the largest tilt that odometry has shown meanwhile.
+Every fault is played with real processes. It fails, with a reason, if the robot did not stop, stand
+or recover, or if nobody was told; else it gives the largest tilt that odometry has shown meanwhile.
 """
 
 from __future__ import annotations
 
 import math
 import signal
+import sys
 import time
-from contextlib import closing
-from functools import partial
-from typing import Final
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, closing, contextmanager
+from typing import Any, Final, final
 
-from benchmarks.bridges.faults import Fault, require, rows_of, run_all
-from benchmarks.bridges.processes import wait_until
+from benchmarks.bridges.faults import Fault, fault, metrics_of, require, run_all
+from benchmarks.bridges.processes import Process, wait_until
 from benchmarks.bridges.ros2_processes import (
     ANSWER,
     DISCOVERY,
-    READY,
+    Probe,
     joined,
-    start_server,
-    stay_on_this_machine,
-)
-from benchmarks.bridges.ros2_stage import (
-    FLOODER,
-    RAISER,
-    REST_TIME,
-    WALKER,
-    Stage,
+    probing,
     quiet_client,
-    require_done,
-    require_mode,
-    require_more,
-    require_refused,
-    require_rest,
-    require_said,
-    script,
+    serving,
 )
-from benchmarks.rows import Family, Measurement
-from benchmarks.trials import Trial
+from benchmarks.scenario import Measurement, Scenario
+from benchmarks.trials import Trial, TrialFailed
 
 STANDING: Final = 0.29
 """Height [m] of the base above which the robot stands; 0.31 when it has come to rest."""
@@ -47,20 +34,171 @@ NOTICE_LIMIT: Final = 15.0
 """Wall time [s] in which a client must hear that its server has gone; five on an idle machine."""
 BRAKING_WAY: Final = 0.5
 """Way [m] within which a robot stops that walked 0.3 m/s: half a second of silence, and strides."""
+REST_TIME, REST_WAY = 0.5, 0.01
+"""A robot rests if it moves by less than this [m] in this time [s]."""
 FLOOD_RATE: Final = 1500.0
 """Commands per second below which a flood was none."""
-NAMESPACE: Final = "bench_faults"
+REFUSED: Final = 3
+"""Exit code of a server that cannot serve."""
 GARBAGE: Final = (math.nan, math.inf, -math.inf)
 HUGE: Final = 1e300
+CLIENT: Final = """
+import sys, time, rclpy
+from controller.bridges.ros2 import GO2ControllerNode
+rclpy.init()
+go2 = GO2ControllerNode(sys.argv[1])
+"""
+WALKER: Final = f"""{CLIENT}
+if not go2.walk():
+    sys.exit(go2.last_message)
+go2.move(linear_x=0.3)
+print("walking", flush=True)
+time.sleep(120)
+"""
+RAISER: Final = f"""{CLIENT}
+go2.play("high_five", {{"hold": 1.0}}, lambda share: share > 0.3 and print("raised", flush=True))
+"""
+FLOODER: Final = """
+import sys, time, rclpy
+from geometry_msgs.msg import Twist
+rclpy.init()
+node = rclpy.create_node("flooder")
+publisher = node.create_publisher(Twist, f"/{sys.argv[1]}/cmd_vel", 10)
+while not publisher.get_subscription_count():
+    time.sleep(0.05)
+message, sent, began = Twist(), 0, time.monotonic()
+message.linear.x = 0.2
+while (passed := time.monotonic() - began) < 3.0:
+    if sent < 5000.0 * passed:
+        publisher.publish(message)
+        sent += 1
+print(f"rate {sent / passed:.0f}", flush=True)
+"""
+FAULTS: Final[list[Fault]] = []
 
 
-# --- clients that die -----------------------------------------------------------------------------
+@final
+class Scene:
+    """One robot that the faults share, and others that end with theirs.
+
+    Attributes:
+        namespace: of the shared robot; those of the others begin with it.
+    """
+
+    def __init__(self, namespace: str = "bench_faults") -> None:
+        """Start nothing yet; ``rclpy.init()`` must have been called."""
+        self.namespace = namespace
+        self._shared: tuple[Process, Probe] | None = None
+        self._exits = ExitStack()
+        self._tilts: list[float] = []
+
+    def tilt_during(self, fault: Fault) -> float:
+        """The largest tilt [deg] while a fault is played; a failure ends the shared robot.
+
+        Raises:
+            TrialFailed: if the robot, or somebody who should have been told, did not do as
+                expected.
+            BridgeError: if a process did not start, or nobody answered.
+        """
+        self._tilts.clear()
+        if self._shared is not None:
+            self._shared[1].largest_tilt = None
+        try:
+            fault.play(self)
+            if self._shared is not None:
+                self._note(self._shared[1])
+        except BaseException:
+            self.close()
+            raise
+        if not self._tilts:
+            raise TrialFailed("no odometry was heard")
+        return math.degrees(max(self._tilts))
+
+    def _note(self, probe: Probe) -> None:
+        if probe.largest_tilt is not None:
+            self._tilts.append(probe.largest_tilt)
+
+    def robot(self) -> tuple[Process, Probe]:
+        """The shared robot, standing or walking: its server and a probe."""
+        if self._shared is None:
+            self._shared = self._exits.enter_context(self.another_robot())
+            require_done(self._shared[1].call("up"))
+        return self._shared
+
+    @contextmanager
+    def another_robot(self, suffix: str = "") -> Iterator[tuple[Process, Probe]]:
+        """A robot of one's own."""
+        namespace = self.namespace + suffix
+        with serving(namespace=namespace) as server, self.watched(namespace) as probe:
+            yield server, probe
+
+    @contextmanager
+    def watched(self, namespace: str) -> Iterator[Probe]:
+        """A probe whose tilts count."""
+        with probing(namespace) as probe:
+            yield probe
+            self._note(probe)
+
+    def close(self) -> None:
+        """End the shared robot; the next fault gets a new one."""
+        self._shared = None
+        self._exits.close()
 
 
-def client_killed_walking(stage: Stage) -> None:
+def script(code: str, namespace: str) -> Process:
+    """A client in a process of its own; without priority, since a flood never sleeps."""
+    return Process([sys.executable, "-c", code, namespace], has_priority=False)
+
+
+# --- what is required: each raises TrialFailed ----------------------------------------------------
+
+
+def require_done(answer: Any) -> None:
+    """That an order was carried out."""
+    require(answer.success, f"an order was not carried out: {answer.message}")
+
+
+def require_said(text: str, said: str) -> None:
+    """That ``text`` is part of what was said."""
+    require(text in said, f"{text!r} was not said, but: {said}")
+
+
+def require_mode(probe: Probe, mode: str) -> None:
+    """That the robot is standing, walking, ..."""
+    found = probe.statistics()["mode"]
+    require(found == mode, f"the robot is {found}, not {mode}")
+
+
+def require_rest(probe: Probe) -> None:
+    """That the robot does not move along."""
+    start = probe.place()
+    probe.let_pass(REST_TIME)
+    way = probe.place().way_from(start)
+    require(way < REST_WAY, f"it still walks: {way:.3f} m in {REST_TIME} s")
+
+
+def require_more(count: str, before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
+    """That more velocity commands count as followed, not finite, ..."""
+    require(after["cmd_vel"][count] > before["cmd_vel"][count], f"no command counts as {count}")
+
+
+def require_refused(server: Process, namespace: str) -> None:
+    """That a server ends because its namespace is served, and says so."""
+    said = server.finish(ANSWER)
+    require(server.code == REFUSED, f"the second server's exit code is {server.code}: {said}")
+    require_said(f"/{namespace} is already served", said)
+    require_said("--namespace", said)
+    require("Traceback" not in said, said)
+
+
+# --- the faults -----------------------------------------------------------------------------------
+
+
+@fault(FAULTS, "ros2.client_killed_walking", "client killed: walking")
+def client_killed_walking(at: Scene) -> None:
     """The robot stops where it is, within a stride or two, and goes on obeying."""
-    _, probe = stage.robot()
-    with script(WALKER, stage.namespace) as client:
+    _, probe = at.robot()
+    with script(WALKER, at.namespace) as client:
         client.wait_for("walking")
         start = probe.place()
         probe.let_pass(1.5)
@@ -75,11 +213,12 @@ def client_killed_walking(stage: Stage) -> None:
     require_done(probe.call("up"))
 
 
-def client_killed_high_five(stage: Stage) -> None:
+@fault(FAULTS, "ros2.client_killed_high_five", "client killed: high five")
+def client_killed_high_five(at: Scene) -> None:
     """The motion is finished, nobody else may disturb it, and the robot stands."""
-    _, probe = stage.robot()
+    _, probe = at.robot()
     require_done(probe.call("up"))
-    with script(RAISER, stage.namespace) as client:
+    with script(RAISER, at.namespace) as client:
         client.wait_for("raised")
         client.kill()
     refused = probe.call("up").message
@@ -90,91 +229,13 @@ def client_killed_high_five(stage: Stage) -> None:
     require_done(probe.call("walk"))
 
 
-# --- servers that die, come late, or come twice ---------------------------------------------------
-
-
-def server_killed(stage: Stage) -> None:
-    """The client hears of it in the middle of a motion, and finds the next server by itself."""
-    killed_at: list[float] = []
-
-    with stage.aside("_k") as (server, _), quiet_client(stage.namespace + "_k") as go2:
-
-        def kill(share: float) -> None:
-            if share > 0.3 and not killed_at:
-                server.kill()
-                killed_at.append(time.monotonic())
-
-        require(go2.stand(), f"stand: {go2.last_message}")
-        require(not go2.play("high_five", {}, kill), "a motion without a robot was called done")
-        require(bool(killed_at), f"the motion ended before the server: {go2.last_message}")
-        took = time.monotonic() - killed_at[0]
-        require(took < NOTICE_LIMIT, f"the client heard of it after {took:.0f} s")
-        require_said("no server of", go2.last_message)
-        with stage.aside("_k") as (_, probe):
-            require(go2.stand(), f"stand, with a new server: {go2.last_message}")
-            require(probe.height() > STANDING, "the robot of the new server does not stand")
-
-
-def server_second(stage: Stage) -> None:
-    """A client that was there first finds the server when it comes."""
-    namespace = stage.namespace + "_s"
-    with start_server(namespace=namespace) as server, stage.watching("_s") as probe:
-        require(READY not in server.text, "the server was there first")
-        with quiet_client(namespace) as go2:
-            wait_until(go2._behavior_client.service_is_ready, DISCOVERY)
-            require(go2.stand(), f"stand: {go2.last_message}")
-        require(probe.height() > STANDING, "the robot does not stand")
-        server.stop()
-
-
-def two_servers(stage: Stage) -> None:
-    """The second one of a namespace ends and says why; the first goes on."""
-    _, probe = stage.robot()
-    with start_server(namespace=stage.namespace) as second:
-        require_refused(second, second.finish(ANSWER), stage.namespace)
-    require_done(probe.call("walk"))
-    require_done(probe.call("up"))
-
-
-def two_servers_at_once(stage: Stage) -> None:
-    """Of two servers of one namespace that are started together exactly one serves."""
-    namespace = stage.namespace + "_t"
-    with (
-        start_server(namespace=namespace) as one,
-        start_server(namespace=namespace) as other,
-        stage.watching("_t") as probe,
-    ):
-        wait_until(lambda: one.code is not None or other.code is not None, DISCOVERY)
-        loser, winner = (one, other) if one.code is not None else (other, one)
-        require(loser.code is not None, "both servers live")
-        require_refused(loser, loser.finish(ANSWER), namespace)
-        require_done(probe.call("up"))
-        require(winner.code is None, f"the other one ended too: {winner.text}")
-        winner.stop()
-
-
-def interrupt(stage: Stage) -> None:
-    """Ctrl-C at a server: who waits for an answer gets one, and the robot goes limp."""
-    with stage.aside("_i") as (server, probe):
-        waiting = probe.send("up")
-        probe.let_pass(1.0)
-        require(not waiting.done(), "the behaviour was over before the interrupt")
-        server.stop(signal.SIGINT)
-        require(server.code == 0, f"the server ended with exit code {server.code}")
-        answer = probe.result(waiting, 10.0)
-        require(not answer.success, "a behaviour that was cut short was called done")
-        require_said("damped", answer.message)
-
-
-# --- commands -------------------------------------------------------------------------------------
-
-
-def flood(stage: Stage) -> None:
+@fault(FAULTS, "ros2.flood", "commands at 5 kHz")
+def flood(at: Scene) -> None:
     """Commands at 5 kHz: the robot walks by them, stays in one piece, and stops after them."""
-    _, probe = stage.robot()
+    _, probe = at.robot()
     require_done(probe.call("walk"))
     before, start = probe.statistics(), probe.place()
-    with script(FLOODER, stage.namespace) as flooder:
+    with script(FLOODER, at.namespace) as flooder:
         said = flooder.finish(ANSWER)
     after, way = probe.statistics(), probe.place().way_from(start)
     require_said("rate ", said)
@@ -189,9 +250,10 @@ def flood(stage: Stage) -> None:
     require_done(probe.call("up"))
 
 
-def garbage(stage: Stage) -> None:
+@fault(FAULTS, "ros2.garbage", "garbage on cmd_vel")
+def garbage(at: Scene) -> None:
     """What is not finite moves nothing, what is huge is clipped; both are told."""
-    server, probe = stage.robot()
+    server, probe = at.robot()
     require_done(probe.call("walk"))
     before, start = probe.statistics(), probe.place()
     for value in GARBAGE:
@@ -213,27 +275,80 @@ def garbage(stage: Stage) -> None:
     require_done(probe.call("up"))
 
 
-# --- all of them ----------------------------------------------------------------------------------
+@fault(FAULTS, "ros2.two_servers", "a second server")
+def two_servers(at: Scene) -> None:
+    """The second one of a namespace ends and says why; the first goes on."""
+    _, probe = at.robot()
+    with serving(namespace=at.namespace, says="") as second:
+        require_refused(second, at.namespace)
+    require_done(probe.call("walk"))
+    require_done(probe.call("up"))
 
 
-ACTS: Final = (
-    (client_killed_walking, "client killed: walking"),
-    (client_killed_high_five, "client killed: high five"),
-    (flood, "commands at 5 kHz"),
-    (garbage, "garbage on cmd_vel"),
-    (two_servers, "a second server"),
-    (two_servers_at_once, "two servers at once"),
-    (server_killed, "server killed: high five"),
-    (server_second, "server after its client"),
-    (interrupt, "Ctrl-C in a behaviour"),
-)
+@fault(FAULTS, "ros2.two_servers_at_once", "two servers at once")
+def two_servers_at_once(at: Scene) -> None:
+    """Of two servers of one namespace that are started together exactly one serves."""
+    namespace = at.namespace + "_t"
+    with (
+        serving(namespace=namespace, says="") as one,
+        serving(namespace=namespace, says="") as other,
+        at.watched(namespace) as probe,
+    ):
+        wait_until(lambda: one.code is not None or other.code is not None, DISCOVERY)
+        loser, winner = (one, other) if one.code is not None else (other, one)
+        require(loser.code is not None, "both servers live")
+        require_refused(loser, namespace)
+        require_done(probe.call("up"))
+        require(winner.code is None, f"the other one ended too: {winner.text}")
 
 
-def faults_on(stage: Stage) -> tuple[Fault, ...]:
-    """All of them, to be played on one stage."""
-    return tuple(
-        Fault(f"ros2.{act.__name__}", what, partial(stage.play, act)) for act, what in ACTS
-    )
+@fault(FAULTS, "ros2.server_killed", "server killed: high five")
+def server_killed(at: Scene) -> None:
+    """The client hears of it in the middle of a motion, and finds the next server by itself."""
+    killed_at: list[float] = []
+
+    with at.another_robot("_k") as (server, _), quiet_client(at.namespace + "_k") as go2:
+
+        def kill(share: float) -> None:
+            if share > 0.3 and not killed_at:
+                server.kill()
+                killed_at.append(time.monotonic())
+
+        require(go2.stand(), f"stand: {go2.last_message}")
+        require(not go2.play("high_five", {}, kill), "a motion without a robot was called done")
+        require(bool(killed_at), f"the motion ended before the server: {go2.last_message}")
+        took = time.monotonic() - killed_at[0]
+        require(took < NOTICE_LIMIT, f"the client heard of it after {took:.0f} s")
+        require_said("no server of", go2.last_message)
+        with at.another_robot("_k") as (_, probe):
+            require(go2.stand(), f"stand, with a new server: {go2.last_message}")
+            require(probe.height() > STANDING, "the robot of the new server does not stand")
+
+
+@fault(FAULTS, "ros2.server_second", "server after its client")
+def server_second(at: Scene) -> None:
+    """A client that was there first finds the server when it comes."""
+    namespace = at.namespace + "_s"
+    with serving(namespace=namespace, says="") as server, at.watched(namespace) as probe:
+        require("serving /" not in server.text, "the server was there first")
+        with quiet_client(namespace) as go2:
+            wait_until(go2._behavior_client.service_is_ready, DISCOVERY)
+            require(go2.stand(), f"stand: {go2.last_message}")
+        require(probe.height() > STANDING, "the robot does not stand")
+
+
+@fault(FAULTS, "ros2.interrupt", "Ctrl-C in a behaviour")
+def interrupt(at: Scene) -> None:
+    """Ctrl-C at a server: who waits for an answer gets one, and the robot goes limp."""
+    with at.another_robot("_i") as (server, probe):
+        waiting = probe.send("up")
+        probe.let_pass(1.0)
+        require(not waiting.done(), "the behaviour was over before the interrupt")
+        server.stop(signal.SIGINT)
+        require(server.code == 0, f"the server ended with exit code {server.code}")
+        answer = probe.result(waiting, 10.0)
+        require(not answer.success, "a behaviour that was cut short was called done")
+        require_said("damped", answer.message)
 
 
 def measure(_trial: Trial) -> Measurement:
@@ -242,10 +357,9 @@ def measure(_trial: Trial) -> Measurement:
     Raises:
         MissingDependency: if ROS 2 is not installed.
     """
-    stay_on_this_machine()
-    with joined(), closing(Stage(NAMESPACE)) as stage:
-        return run_all(faults_on(stage))
+    with joined(), closing(Scene()) as scene:
+        return run_all(FAULTS, scene.tilt_during)
 
 
-ROWS: Final = rows_of(faults_on(Stage(NAMESPACE)), "ROS 2: faults, largest tilt of the robot")
-FAMILY: Final = Family("ros2-faults", ROWS, measure)
+METRICS: Final = metrics_of(FAULTS, "ROS 2: faults, largest tilt of the robot")
+SCENARIO: Final = Scenario("ros2-faults", METRICS, measure, group="ros2")

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, final
+from typing import TYPE_CHECKING, Any, Final, final
 
 from benchmarks.bridges.processes import PROGRAM, Process, wait_until
 from controller.bridges.ros2.names import (
@@ -24,9 +24,11 @@ from controller.bridges.ros2.names import (
     STATISTICS_SERVICE,
     topic,
 )
-from controller.bridges.ros2.odometry import state_of
 from go2_wbc.errors import BridgeError
 from go2_wbc.robot.state import RobotState
+
+if TYPE_CHECKING:
+    from controller.bridges.ros2 import GO2ControllerNode
 
 DISCOVERY: Final = 20.0
 """Time [s] in which processes must find each other; half a second on an idle machine."""
@@ -36,17 +38,12 @@ COMMAND_PERIOD: Final = 0.02
 """Time [s] between two velocity commands of a drive."""
 ODOM_QUEUE: Final = 5
 """Messages of odometry that wait for a probe: more of them would be stale on a busy machine."""
-READY: Final = "serving /"
-
-
-def stay_on_this_machine() -> None:
-    """Keep this process and its children on the loopback, unless a range was chosen."""
-    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
 
 
 @contextmanager
 def joined() -> Iterator[None]:
-    """ROS in this process, as ``rclpy.init()`` makes it."""
+    """ROS in this process and its children, on the loopback unless a range was chosen."""
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     from controller.bridges.ros2 import imports as ros
 
     ros.rclpy.init(args=[], signal_handler_options=ros.SignalHandlerOptions.NO)
@@ -56,13 +53,14 @@ def joined() -> Iterator[None]:
         ros.rclpy.try_shutdown()
 
 
-def start_server(
+def serving(
     *options: str,
     namespace: str,
     realtime: bool = True,
     environment: Mapping[str, str] | None = None,
+    says: str = "serving /",
 ) -> Process:
-    """A ``go2-wbc ros2`` that has been started, but need not serve yet.
+    """A ``go2-wbc ros2``; the ``with`` block begins when it serves and ends it politely.
 
     Args:
         options: further ones.
@@ -70,31 +68,16 @@ def start_server(
         realtime: at the pace of the wall clock. A server that runs freely gets no real-time
             priority, since it would take a whole core from everybody else.
         environment: variables beside those of this process.
+        says: what it says when the block begins; empty does not wait.
     """
-    arguments = [*PROGRAM, "ros2", "--namespace", namespace, *options]
-    variables = {**os.environ, "PYTHONUNBUFFERED": "1", **(environment or {})}
-    if realtime:
-        arguments.append("--realtime")
-    return Process(arguments, variables, has_priority=realtime)
-
-
-@contextmanager
-def serving(
-    *options: str,
-    namespace: str,
-    realtime: bool = True,
-    environment: Mapping[str, str] | None = None,
-) -> Iterator[Process]:
-    """A ``go2-wbc ros2`` that serves, and is ended politely; see ``start_server``.
-
-    Raises:
-        BridgeError: if it does not start.
-    """
-    server = start_server(*options, namespace=namespace, realtime=realtime, environment=environment)
-    with server:
-        server.wait_for(READY)
-        yield server
-        server.stop()
+    command = [*PROGRAM, "ros2", "--namespace", namespace, *options]
+    return Process(
+        [*command, "--realtime"] if realtime else command,
+        {**os.environ, "PYTHONUNBUFFERED": "1", **(environment or {})},
+        says=says,
+        has_priority=realtime,
+        is_stopped=True,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +137,8 @@ class Probe:
             self._executor.spin_once(timeout_sec=0.1)
 
     def _note(self, message: Any) -> None:
+        from controller.bridges.ros2.states import state_of
+
         self._newest = state = state_of(message)
         self.largest_tilt = max(self.largest_tilt or 0.0, state.tilt)
 
@@ -258,6 +243,30 @@ class Probe:
         self._thread.join(5.0)
         self._executor.shutdown()
         self.node.destroy_node()
+
+
+@contextmanager
+def probing(namespace: str) -> Iterator[Probe]:
+    """A probe that is closed afterwards."""
+    probe = Probe(namespace)
+    try:
+        yield probe
+    finally:
+        probe.close()
+
+
+@contextmanager
+def quiet_client(namespace: str) -> Iterator[GO2ControllerNode]:
+    """A client in this process; its complaints are not shown."""
+    from controller.bridges.ros2 import imports as ros
+    from controller.bridges.ros2.client import GO2ControllerNode
+
+    client = GO2ControllerNode(namespace, node_name=f"client_of_{namespace}")
+    client.get_logger().set_level(ros.LoggingSeverity.FATAL)
+    try:
+        yield client
+    finally:
+        client.destroy_node()
 
 
 def without(folder: Path, *packages: str) -> dict[str, str]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from benchmarks.bridges.faults import require
 from benchmarks.bridges.unitree_processes import (
     Observer,
     client_of,
@@ -17,10 +18,9 @@ from benchmarks.bridges.unitree_processes import (
     own_domain,
     simulator,
 )
-from benchmarks.rows import Direction, Family, Measurement, Row
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.checksum import is_intact
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.low_client import low_cmd_message
 from controller.bridges.unitree.sport_api import SPORT_SERVICE, Api
@@ -42,22 +42,22 @@ DRIVE_LIMIT: Final = 120.0
 
 _SPORT, _STREAM = "Unitree: sport service", "Unitree: lowstate and lowcmd, 500 Hz, 10 s"
 _DRIVE = "Unitree: our controller through UnitreePlant"
-SPORT_ROWS: Final = (
-    Row("unitree.codes", _SPORT, "calls not answered 0", "", 0.0),
-    Row("unitree.move", _SPORT, "Move 0.5: mean speed error", "m/s", 0.04),
-    Row("unitree.latency", _SPORT, "round trip, median", "ms", 10.0),
-    Row("unitree.latency_p99", _SPORT, "round trip, 99 %", "ms", None),
+SPORT_METRICS: Final = (
+    Metric("unitree.codes", _SPORT, "calls not answered 0", "", 0.0),
+    Metric("unitree.move", _SPORT, "Move 0.5: mean speed error", "m/s", 0.04),
+    Metric("unitree.latency", _SPORT, "round trip, median", "ms", 10.0),
+    Metric("unitree.latency_p99", _SPORT, "round trip, 99 %", "ms", None),
 )
-STREAM_ROWS: Final = (
-    Row("unitree.lost_states", _STREAM, "lowstate lost", "%", 0.5),
-    Row("unitree.lost_commands", _STREAM, "lowcmd lost or refused", "%", 0.5),
-    Row("unitree.bad_crc", _STREAM, "bad checksums", "", 0.0),
-    Row("unitree.rate", _STREAM, "lowstate rate", "Hz", None, Direction.AT_LEAST),
-    Row("unitree.codec", _STREAM, "CPU encode + decode", "us", 50.0),
+STREAM_METRICS: Final = (
+    Metric("unitree.lost_states", _STREAM, "lowstate lost", "%", 0.5),
+    Metric("unitree.lost_commands", _STREAM, "lowcmd lost or refused", "%", 0.5),
+    Metric("unitree.bad_crc", _STREAM, "bad checksums", "", 0.0),
+    Metric("unitree.rate", _STREAM, "lowstate rate", "Hz", None, Direction.AT_LEAST),
+    Metric("unitree.codec", _STREAM, "CPU encode + decode", "us", 50.0),
 )
-DRIVE_ROWS: Final = (
-    Row("unitree.steps", _DRIVE, "steps not done, of 4", "", 0.0),
-    Row("unitree.mae", _DRIVE, "trot 0.5, MAE of true speed", "m/s", 0.04),
+DRIVE_METRICS: Final = (
+    Metric("unitree.steps", _DRIVE, "steps not done, of 4", "", 0.0),
+    Metric("unitree.mae", _DRIVE, "trot 0.5, MAE of true speed", "m/s", 0.04),
 )
 
 
@@ -66,15 +66,20 @@ def measure_sport(_trial: Trial) -> Measurement:
     with own_domain() as domain, simulator(domain):
         observer = Observer(domain)
         client = client_of(observer.bus, SPORT_SERVICE)
-        codes = [_act(client, observer, Api.STAND_UP), _act(client, observer, Api.BALANCE_STAND)]
+
+        def code_of(api: Api, parameter: str = "{}") -> int:
+            code = client.call(api, parameter, timeout=5.0).code
+            observer.wait_for_rest()
+            return code
+
+        codes = [code_of(Api.STAND_UP), code_of(Api.BALANCE_STAND)]
         speed = _move(client, observer)
-        codes.append(_act(client, observer, Api.STOP_MOVE))
-        trips = _round_trips(client)
-        codes.append(_act(client, observer, Api.HELLO))
-        codes.append(_act(client, observer, Api.EULER, {"x": 0.1, "y": 0.1, "z": 0.1}))
-        codes.append(_act(client, observer, Api.STAND_DOWN))
-        if observer.height > 0.12:
-            return Measurement({}, reason=f"StandDown left the base at {observer.height:.2f} m")
+        codes.append(code_of(Api.STOP_MOVE))
+        trips = [_round_trip(client) for _ in range(ROUND_TRIPS)]
+        codes.append(code_of(Api.HELLO))
+        codes.append(code_of(Api.EULER, '{"x": 0.1, "y": 0.1, "z": 0.1}'))
+        codes.append(code_of(Api.STAND_DOWN))
+        require(observer.height <= 0.12, f"StandDown left the base at {observer.height:.2f} m")
     return Measurement(
         {
             "unitree.codes": float(sum(code != 0 for code in codes)),
@@ -83,14 +88,6 @@ def measure_sport(_trial: Trial) -> Measurement:
             "unitree.latency_p99": float(np.percentile(trips, 99)),
         }
     )
-
-
-def _act(
-    client: Client, observer: Observer, api: Api, values: Mapping[str, float] | None = None
-) -> int:
-    code = client.call(api, json.dumps(values or {}), timeout=5.0).code
-    observer.wait_for_rest()
-    return code
 
 
 def _move(client: Client, observer: Observer) -> float:
@@ -107,14 +104,11 @@ def _move(client: Client, observer: Observer) -> float:
     return float(np.mean(speeds)) if speeds else 0.0
 
 
-def _round_trips(client: Client) -> list[float]:
-    """Times [ms] of calls that are answered at once."""
-    times = []
-    for _ in range(ROUND_TRIPS):
-        start = time.perf_counter()
-        client.call(Api.STOP_MOVE)
-        times.append(1000 * (time.perf_counter() - start))
-    return times
+def _round_trip(client: Client) -> float:
+    """Time [ms] of a call that is answered at once."""
+    start = time.perf_counter()
+    client.call(Api.STOP_MOVE)
+    return 1000 * (time.perf_counter() - start)
 
 
 def measure_stream(_trial: Trial) -> Measurement:
@@ -134,7 +128,7 @@ def measure_stream(_trial: Trial) -> Measurement:
             states.wait(0.1)
             for data in states.take():
                 message = decode(data)
-                bad += not is_intact(message)
+                bad += not layout.is_intact(message)
                 ticks.append(int(message["tick"][0]))
                 commands.write(encode(low_cmd_message(DAMPED)))
                 sent += 1
@@ -160,17 +154,17 @@ def codec_time() -> float:
     start = time.process_time()
     for _ in range(CODINGS):
         encode(low_cmd_message(DAMPED))
-        is_intact(codec.decode(data))
+        layout.is_intact(codec.decode(data))
     return 1e6 * (time.process_time() - start) / CODINGS
 
 
-def measure_drive(_trial: Trial) -> Measurement:
-    """Our controller in one process drives the simulator in another through ``UnitreePlant``."""
-    return drive([], [])
+def measure_drive(
+    _trial: Trial, simulator_options: Sequence[str] = (), driver_options: Sequence[str] = ()
+) -> Measurement:
+    """Our controller in one process drives the simulator in another through ``UnitreePlant``.
 
-
-def drive(simulator_options: list[str], driver_options: list[str]) -> Measurement:
-    """Stand, trot, high five, lie down; the speed is the simulator's truth."""
+    Stand, trot, high five, lie down; the speed is the simulator's truth.
+    """
     with own_domain() as domain, simulator(domain, *simulator_options) as process:
         observer = Observer(domain)
         with driver(domain, *driver_options) as peer:
@@ -204,8 +198,8 @@ def _true_speeds(observer: Observer, lines: list[str], deadline: float) -> list[
     return [speed for moment, speed in samples if start <= moment <= end]
 
 
-FAMILIES: Final = (
-    Family("unitree-sport", SPORT_ROWS, measure_sport),
-    Family("unitree-stream", STREAM_ROWS, measure_stream),
-    Family("unitree-drive", DRIVE_ROWS, measure_drive),
+SCENARIOS: Final = (
+    Scenario("unitree-sport", SPORT_METRICS, measure_sport, group="unitree"),
+    Scenario("unitree-stream", STREAM_METRICS, measure_stream, group="unitree"),
+    Scenario("unitree-drive", DRIVE_METRICS, measure_drive, group="unitree"),
 )

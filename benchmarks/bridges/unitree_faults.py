@@ -12,16 +12,10 @@ from typing import Final, final
 
 import numpy as np
 
-from benchmarks.bridges.faults import Fault, require, rows_of, run_all
+from benchmarks.bridges.faults import Fault, fault, metrics_of, require, run_all
 from benchmarks.bridges.processes import PROGRAM, Process, wait_until
-from benchmarks.bridges.unitree_processes import (
-    Observer,
-    client_of,
-    driver,
-    own_domain,
-    simulator,
-)
-from benchmarks.rows import Family, Measurement
+from benchmarks.bridges.unitree_processes import Observer, client_of, driver, own_domain, simulator
+from benchmarks.scenario import Measurement, Scenario
 from benchmarks.trials import Trial
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.layout import LOW_CMD
@@ -63,6 +57,7 @@ while True:
     time.sleep(0.05)
 """
 """A program that asks for ``Move`` until it is killed."""
+FAULTS: Final[list[Fault]] = []
 _encode = codec_of(LOW_CMD).encode
 DAMPED: Final = _encode(low_cmd_message(JointCommand.damping(3.0)))
 """A good ``rt/lowcmd``."""
@@ -92,10 +87,14 @@ class Scene:
         """The code that a call of the sport service is answered with."""
         return self.client.call(api, parameter, timeout=10.0).code
 
+    def require_code(self, api: Api, code: Code = Code.OK) -> None:
+        """Make sure that a call of the sport service is answered with ``code``."""
+        answered = self.call(api)
+        require(answered == code, f"{api.name} was answered {answered}")
+
     def stand_up(self) -> None:
         """Make the robot stand."""
-        code = self.call(Api.RECOVERY_STAND)
-        require(code == Code.OK, f"RecoveryStand was answered {code}")
+        self.require_code(Api.RECOVERY_STAND)
         self.observer.wait_for_rest()
         self.require_standing()
 
@@ -134,6 +133,13 @@ class Scene:
         flood(lambda count: self._commands.write(samples[count % len(samples)]), seconds)
 
 
+def require_end(peer: Process, code: ExitCode, *texts: str) -> None:
+    """Make sure that a process ends with an exit code and says why."""
+    said = peer.finish(LIMIT)
+    require(peer.code == code, f"it ended with {peer.code}: {said}")
+    require(all(text in said for text in texts), f"it does not say {texts}: {said}")
+
+
 def flood(write: Callable[[int], None], seconds: float) -> None:
     """Call ``write`` with 0, 1, ..., 5000 times a second."""
     start, count = time.monotonic(), 0
@@ -163,146 +169,119 @@ def garbage() -> list[bytes]:
     ]
 
 
-def garbage_while_standing() -> float:
+@fault(FAULTS, "unitree.garbage", "garbage on lowcmd, standing")
+def garbage_while_standing(at: Scene) -> None:
     """Garbage, then good commands that nobody has asked for, reach a standing robot."""
-    with scene() as at:
-        at.stand_up()
-        at.flood(garbage(), 3.0)
-        at.require_standing()
-        at.flood([DAMPED], 2.0)
-        at.require_standing()
-        reasons = ("tau is not finite", "q out of limits", "wrong checksum", "lie down or Damp")
-        at.require_said(*reasons)
-        code = at.call(Api.STAND_DOWN)
-        require(code == Code.OK, f"StandDown was answered {code}")
-        return at.observer.largest_tilt
+    at.stand_up()
+    at.flood(garbage(), 3.0)
+    at.require_standing()
+    at.flood([DAMPED], 2.0)
+    at.require_standing()
+    at.require_said("tau is not finite", "q out of limits", "wrong checksum", "lie down or Damp")
+    at.require_code(Api.STAND_DOWN)
 
 
-def garbage_beside_a_controller() -> float:
+@fault(FAULTS, "unitree.garbage_beside", "garbage beside a controller", "--lockstep")
+def garbage_beside_a_controller(at: Scene) -> None:
     """A controller trots the robot; somebody else sends garbage to the same motors."""
-    with scene("--lockstep") as at:
-        steps = ("--steps", "stand", "trot", "lie_down", "--seconds", "4")
-        with driver(at.domain, *PATIENT, *steps) as peer:
-            at.require_walking(peer)
-            at.flood(garbage(), 2.0)
-            text = peer.finish(LIMIT)
-            require(peer.code == ExitCode.OK, f"the controller did not go on: {text}")
-        at.require_said("wrong checksum")
-        at.require_lying()
-        return at.observer.largest_tilt
+    steps = ("--steps", "stand", "trot", "lie_down", "--seconds", "4")
+    with driver(at.domain, *PATIENT, *steps) as peer:
+        at.require_walking(peer)
+        at.flood(garbage(), 2.0)
+        require_end(peer, ExitCode.OK)
+    at.require_said("wrong checksum")
+    at.require_lying()
 
 
-def flood_of_moves() -> float:
+@fault(FAULTS, "unitree.flood", "Move and rubbish at 5 kHz")
+def flood_of_moves(at: Scene) -> None:
     """``Move`` comes 5000 times a second, most of it with broken parameters."""
-    with scene() as at:
-        at.stand_up()
-        flood(
-            lambda count: at.client.send(Api.MOVE, BAD_MOVES[count % 4] if count % 5 else MOVE), 3.0
-        )
-        at.require_standing()
-        code = at.call(Api.STOP_MOVE)
-        require(code == Code.OK, f"StopMove was answered {code}")
-        at.observer.wait_for_rest()
-        at.require_standing()
-        return at.observer.largest_tilt
+    at.stand_up()
+    flood(lambda count: at.client.send(Api.MOVE, BAD_MOVES[count % 4] if count % 5 else MOVE), 3.0)
+    at.require_standing()
+    at.require_code(Api.STOP_MOVE)
+    at.observer.wait_for_rest()
+    at.require_standing()
 
 
-def move_client_killed() -> float:
+@fault(FAULTS, "unitree.client_killed", "kill -9 of the Move client")
+def move_client_killed(at: Scene) -> None:
     """The program that asks for ``Move`` is killed with kill -9."""
-    with scene() as at:
-        at.stand_up()
-        with Process([sys.executable, "-c", MOVER, str(at.domain)]) as peer:
-            at.require_walking(peer)
-            require(at.observer.mode == SportMode.LOCOMOTION, "the mode is not locomotion")
-            peer.kill()
-        stops = wait_until(lambda: at.observer.speed < 0.1, 5.0)
-        require(stops, "the robot walks on without its client")
-        at.require_standing()
-        return at.observer.largest_tilt
+    at.stand_up()
+    with Process([sys.executable, "-c", MOVER, str(at.domain)]) as peer:
+        at.require_walking(peer)
+        require(at.observer.mode == SportMode.LOCOMOTION, "the mode is not locomotion")
+        peer.kill()
+    stops = wait_until(lambda: at.observer.speed < 0.1, 5.0)
+    require(stops, "the robot walks on without its client")
+    at.require_standing()
 
 
-def controller_killed() -> float:
+@fault(FAULTS, "unitree.controller_killed", "kill -9 of the controller", "--lockstep")
+def controller_killed(at: Scene) -> None:
     """The controller behind ``UnitreePlant`` is killed with kill -9 in the middle of a trot."""
-    with scene("--lockstep") as at:
-        with driver(at.domain, *ENDLESS_TROT) as peer:
-            at.require_walking(peer)
-            peer.kill()
-        at.require_lying()
-        at.require_said("no good lowcmd")
-        code = at.call(Api.STAND_UP)  # the controller had released the sport service
-        require(code == Code.NOT_READY, f"StandUp was answered {code} before the robot was back")
-        at.take_back()
-        at.stand_up()
-        return at.observer.largest_tilt
+    with driver(at.domain, *ENDLESS_TROT) as peer:
+        at.require_walking(peer)
+        peer.kill()
+    at.require_lying()
+    at.require_said("no good lowcmd")
+    at.require_code(Api.STAND_UP, Code.NOT_READY)  # the controller had released the sport service
+    at.take_back()
+    at.stand_up()
 
 
-def controller_told_to_end() -> float:
+@fault(FAULTS, "unitree.controller_ended", "SIGTERM at the controller", "--lockstep")
+def controller_told_to_end(at: Scene) -> None:
     """The controller gets SIGTERM in the middle of a trot."""
-    with scene("--lockstep") as at:
-        with driver(at.domain, *ENDLESS_TROT) as peer:
-            at.require_walking(peer)
-            peer.stop()
-        at.require_lying()
-        return at.observer.largest_tilt
+    with driver(at.domain, *ENDLESS_TROT) as peer:
+        at.require_walking(peer)
+        peer.stop()
+    at.require_lying()
 
 
-def simulator_killed() -> float:
+@fault(FAULTS, "unitree.robot_killed", "kill -9 of the simulator", "--lockstep")
+def simulator_killed(at: Scene) -> None:
     """The robot is gone in the middle of a trot; the controller ends, a new one is served."""
-    with scene("--lockstep") as at, driver(at.domain, *ENDLESS_TROT) as peer:
+    with driver(at.domain, *ENDLESS_TROT) as peer:
         at.require_walking(peer)
         at.process.kill()
-        text = peer.finish(LIMIT)
-        require(peer.code == ExitCode.FAILED, f"the controller ended with {peer.code}: {text}")
-        require("no rt/lowstate for" in text, f"the controller does not say why: {text}")
-        tilt = at.observer.largest_tilt
-        with simulator(at.domain) as process:
-            second = Scene(process, at.domain)
-            second.stand_up()
-            return max(tilt, second.observer.largest_tilt)
+        require_end(peer, ExitCode.FAILED, "no rt/lowstate for")
+    with simulator(at.domain) as process:
+        second = Scene(process, at.domain)
+        second.stand_up()
+        tilts = (at.observer.largest_tilt, second.observer.largest_tilt)
+        at.observer.largest_tilt = max(tilts)
 
 
-def standing_robot_claimed() -> float:
+@fault(FAULTS, "unitree.robot_claimed", "a standing robot is claimed")
+def standing_robot_claimed(at: Scene) -> None:
     """A controller wants a robot that stands under its sport service."""
-    with scene() as at:
-        at.stand_up()
-        with driver(at.domain) as peer:
-            text = peer.finish(LIMIT)
-            require(peer.code == ExitCode.RUNTIME, f"it ended with {peer.code}: {text}")
-        require("must lie on its belly" in text, f"it does not say why: {text}")
-        at.require_standing()
-        return at.observer.largest_tilt
+    at.stand_up()
+    with driver(at.domain) as peer:
+        require_end(peer, ExitCode.RUNTIME, "must lie on its belly")
+    at.require_standing()
 
 
-def second_simulator() -> float:
+@fault(FAULTS, "unitree.second", "a second simulator")
+def second_simulator(at: Scene) -> None:
     """A second simulator is started on the domain of one that serves."""
-    with scene() as at:
-        at.stand_up()
-        with Process([*PROGRAM, "unitree-sim", "--domain", str(at.domain)]) as second:
-            text = second.finish(LIMIT)
-            require(second.code == ExitCode.RUNTIME, f"it ended with {second.code}: {text}")
-        require("already" in text and "--domain" in text, f"it does not say why: {text}")
-        at.require_standing()
+    at.stand_up()
+    with Process([*PROGRAM, "unitree-sim", "--domain", str(at.domain)]) as second:
+        require_end(second, ExitCode.RUNTIME, "already", "--domain")
+    at.require_standing()
+
+
+def tilt_during(fault: Fault) -> float:
+    """Largest tilt [deg] of a robot of its own while the fault is played."""
+    with scene(*fault.options) as at:
+        fault.play(at)
         return at.observer.largest_tilt
-
-
-FAULTS: Final = (
-    Fault("unitree.garbage", "garbage on lowcmd, standing", garbage_while_standing),
-    Fault("unitree.garbage_beside", "garbage beside a controller", garbage_beside_a_controller),
-    Fault("unitree.flood", "Move and rubbish at 5 kHz", flood_of_moves),
-    Fault("unitree.client_killed", "kill -9 of the Move client", move_client_killed),
-    Fault("unitree.controller_killed", "kill -9 of the controller", controller_killed),
-    Fault("unitree.controller_ended", "SIGTERM at the controller", controller_told_to_end),
-    Fault("unitree.robot_killed", "kill -9 of the simulator", simulator_killed),
-    Fault("unitree.robot_claimed", "a standing robot is claimed", standing_robot_claimed),
-    Fault("unitree.second", "a second simulator", second_simulator),
-)
 
 
 def measure(_trial: Trial) -> Measurement:
     """All faults, one after the other."""
-    return run_all(FAULTS)
+    return run_all(FAULTS, tilt_during)
 
 
-FAMILY: Final = Family(
-    "unitree-faults", rows_of(FAULTS, "Unitree: faults, largest tilt of the robot"), measure
-)
+METRICS: Final = metrics_of(FAULTS, "Unitree: faults, largest tilt of the robot")
+SCENARIO: Final = Scenario("unitree-faults", METRICS, measure, group="unitree")

@@ -14,13 +14,7 @@ from typing import TYPE_CHECKING, Final, final
 import numpy as np
 from jaxtyping import Shaped
 
-from benchmarks.bridges.processes import (
-    PROGRAM,
-    START_LIMIT,
-    Process,
-    program,
-    wait_until,
-)
+from benchmarks.bridges.processes import PROGRAM, START_LIMIT, Process, wait_until
 from controller.bridges.unitree.extra import require_dds
 from controller.bridges.unitree.sport_api import Api, Code
 from go2_wbc.errors import BridgeError, PlantTimeout
@@ -32,7 +26,7 @@ if TYPE_CHECKING:
 LOOPBACK: Final = "lo"
 DOMAINS: Final = range(100, 230)
 """DDS domains of which each scene takes one."""
-_CLAIM_PORT: Final = 27000
+_LOCK_PORT: Final = 27000
 """TCP port on the loopback that stands for domain 0: who has bound it has the domain."""
 _tries = itertools.count(os.getpid())
 
@@ -46,9 +40,9 @@ def own_domain() -> Iterator[int]:
     """
     for _ in DOMAINS:
         domain = DOMAINS[next(_tries) % len(DOMAINS)]
-        with socket.socket() as claim:
+        with socket.socket() as lock:
             try:
-                claim.bind(("127.0.0.1", _CLAIM_PORT + domain))
+                lock.bind(("127.0.0.1", _LOCK_PORT + domain))
             except OSError:
                 continue
             yield domain
@@ -57,12 +51,9 @@ def own_domain() -> Iterator[int]:
 
 
 def simulator(domain: int, *options: str) -> Process:
-    """A ``go2-wbc unitree-sim`` that serves.
-
-    Raises:
-        BridgeError: if it does not start.
-    """
-    return program("unitree-sim", "--domain", str(domain), *options, says="serving on")
+    """A ``go2-wbc unitree-sim``; the ``with`` block begins when it serves."""
+    command = [*PROGRAM, "unitree-sim", "--domain", str(domain), *options]
+    return Process(command, says="serving on")
 
 
 def driver(domain: int, *options: str) -> Process:
@@ -141,7 +132,7 @@ class Observer:
 
     @property
     def tilt(self) -> float:
-        """Largest of roll and pitch [rad]."""
+        """Larger of roll and pitch [rad]."""
         return tilt_of(self.now())
 
     @property

@@ -2,7 +2,8 @@
 
 A subcommand is a module with ``register(subparsers)`` and ``run(args) -> int``, and a line in
 ``COMMANDS``. Only the module that was asked for is imported: help is quick, and a broken library
-cannot keep ``doctor`` from starting.
+cannot keep ``doctor`` from starting. ``run_program`` does the same for a program with other
+subcommands.
 """
 
 from __future__ import annotations
@@ -42,7 +43,6 @@ class Command:
 
 
 COMMANDS: tuple[Command, ...] = (
-    Command("bench", "controller.cli.bench", "measure the behaviour over many seeds"),
     Command("check", "controller.cli.motion_check", "can the robot do this motion?"),
     Command("demo", "controller.cli.demo", "stand, sit, walk, turn, high five; measured, in 3D"),
     Command("doctor", "controller.cli.doctor", "check this installation, say what is missing"),
@@ -78,20 +78,38 @@ EXIT_CODES: tuple[tuple[type[Go2WbcError], ExitCode], ...] = (
 )
 """The exit code of an error; the first class that fits counts."""
 
-_OURS = frozenset({"go2_wbc", "controller", "motions", "viz"})
+_OURS = frozenset({"go2_wbc", "controller", "motions", "viz", "benchmarks"})
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """A command line: how it is called, what it does, its subcommands and examples."""
+
+    name: str
+    description: str
+    commands: Sequence[Command]
+    examples: str
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line.
+    """Run ``go2-wbc``; see ``run_program``."""
+    return run_program(
+        Program(PROGRAM, "Whole-body control of the Unitree Go2.", COMMANDS, EXAMPLES), argv
+    )
+
+
+def run_program(program: Program, argv: Sequence[str] | None = None) -> int:
+    """Run a command line.
 
     Args:
+        program: which.
         argv: arguments without the program's name; by default those of the process.
 
     Returns:
         0 fine, 1 infeasible or failed, 2 usage, 3 runtime error, 130 interrupted.
     """
     try:
-        code = _run_reporting_errors(list(sys.argv[1:] if argv is None else argv))
+        code = _run_reporting_errors(program, list(sys.argv[1:] if argv is None else argv))
         sys.stdout.flush()
     except BrokenPipeError:
         # The reader has gone. Python flushes once more at exit: let that go nowhere.
@@ -100,17 +118,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code
 
 
-def build_parser(module: ModuleType | None, requested: str | None) -> argparse.ArgumentParser:
+def build_parser(
+    program: Program, module: ModuleType | None, requested: str | None
+) -> argparse.ArgumentParser:
     """The parser of the whole command line.
 
     Args:
+        program: whose.
         module: the module of the requested subcommand, which registers its own options.
         requested: that subcommand's name; the others are listed by name and summary only.
     """
     parser = argparse.ArgumentParser(
-        prog=PROGRAM,
-        description="Whole-body control of the Unitree Go2.",
-        epilog=examples_epilog(EXAMPLES),
+        prog=program.name,
+        description=program.description,
+        epilog=examples_epilog(program.examples),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {_version()}")
@@ -120,7 +141,7 @@ def build_parser(module: ModuleType | None, requested: str | None) -> argparse.A
     subparsers: Subparsers = parser.add_subparsers(
         title="commands", dest="command", metavar="COMMAND"
     )
-    for command in COMMANDS:
+    for command in program.commands:
         if module is not None and command.name == requested:
             module.register(subparsers)
         else:
@@ -128,25 +149,25 @@ def build_parser(module: ModuleType | None, requested: str | None) -> argparse.A
     return parser
 
 
-def _run_reporting_errors(argv: list[str]) -> int:
+def _run_reporting_errors(program: Program, argv: list[str]) -> int:
     try:
-        return _run(argv)
+        return _run(program, argv)
     except BrokenPipeError:
         raise
     except KeyboardInterrupt:
-        return _complain("interrupted", ExitCode.INTERRUPTED)
+        return _complain(program, "interrupted", ExitCode.INTERRUPTED)
     except Go2WbcError as error:
         code = next(code for kind, code in EXIT_CODES if isinstance(error, kind))
-        return _complain(str(error), code)
+        return _complain(program, str(error), code)
     except Exception as error:
-        return _complain_about_foreign(error)
+        return _complain_about_foreign(program, error)
 
 
-def _run(argv: list[str]) -> int:
+def _run(program: Program, argv: list[str]) -> int:
     requested = next((word for word in argv if not word.startswith("-")), None)
-    modules = {command.name: command.module for command in COMMANDS}
+    modules = {command.name: command.module for command in program.commands}
     module = importlib.import_module(modules[requested]) if requested in modules else None
-    parser = build_parser(module, requested)
+    parser = build_parser(program, module, requested)
     try:
         args = parser.parse_args(argv)
     except SystemExit as stop:  # argparse has printed its help, version or complaint
@@ -161,21 +182,24 @@ def _run(argv: list[str]) -> int:
     return module.run(args)
 
 
-def _complain_about_foreign(error: Exception) -> int:
+def _complain_about_foreign(program: Program, error: Exception) -> int:
     """Report an error that is not of our tree: a missing library, a file, or a bug."""
     if isinstance(error, ImportError) and (error.name or "").split(".")[0] not in _OURS:
         return _complain(
+            program,
             f"{error}; `{PROGRAM} doctor` says what is missing and how to get it",
             ExitCode.RUNTIME,
         )
     if isinstance(error, OSError) and error.filename is not None:
-        return _complain(f"{error.filename}: {error.strerror}", ExitCode.RUNTIME)
+        return _complain(program, f"{error.filename}: {error.strerror}", ExitCode.RUNTIME)
     traceback.print_exception(error)
-    return _complain("this is a bug in the program; the lines above say where", ExitCode.RUNTIME)
+    return _complain(
+        program, "this is a bug in the program; the lines above say where", ExitCode.RUNTIME
+    )
 
 
-def _complain(message: str, code: ExitCode) -> int:
-    print(f"{PROGRAM}: {message}", file=sys.stderr)
+def _complain(program: Program, message: str, code: ExitCode) -> int:
+    print(f"{program.name}: {message}", file=sys.stderr)
     return code
 
 

@@ -1,15 +1,15 @@
-"""What the motion commands share: which motions are meant, with which parameters."""
+"""What the motion commands share: which motions are meant, with which parameters, in which file."""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from go2_wbc.errors import CommandError, unknown_name
 
 if TYPE_CHECKING:
     from motions import Motion, Timeline
-    from motions.authoring import Value
 
 MOTION_HELP = "a name of the library, FILE.py, or FILE.py:NAME"
 
@@ -38,10 +38,10 @@ def timelines(words: list[str], settings: list[str]) -> list[Timeline]:
         TimelineError: for a file that cannot be used or a parameter out of range.
     """
     from motions import motion_names
+    from motions.authoring import parse_values
 
-    values = dict(_setting(text) for text in settings)
-    found = [motion for word in words or motion_names() for motion in _motions(word)]
-    return [motion(**values) for motion in found]
+    values = parse_values(settings)
+    return [motion(**values) for word in words or motion_names() for motion in motions_of(word)]
 
 
 def the_motion(word: str, settings: list[str]) -> Timeline:
@@ -58,7 +58,13 @@ def the_motion(word: str, settings: list[str]) -> Timeline:
     return found[0]
 
 
-def _motions(word: str) -> list[Motion]:
+def motions_of(word: str) -> list[Motion]:
+    """The motion of the library with that name, or those of a file: FILE.py or FILE.py:NAME.
+
+    Raises:
+        CommandError: for an unknown name.
+        TimelineError: for a file that cannot be used.
+    """
     from motions import find_motion, load_file
 
     path, _, name = word.partition(":")
@@ -72,13 +78,59 @@ def _motions(word: str) -> list[Motion]:
     return [own[name]]
 
 
-def _setting(text: str) -> tuple[str, Value]:
-    name, equals, value = text.partition("=")
-    if not (name and equals and value):
-        raise CommandError(f"--set needs NAME=VALUE, got {text!r}")
-    for kind in (int, float):
+class MotionSource:
+    """Makes a motion's timeline anew whenever its file was saved.
+
+    Attributes:
+        path: the file.
+        name: of the motion.
+    """
+
+    def __init__(self, word: str, settings: list[str]) -> None:
+        """Find the motion.
+
+        Args:
+            word: a name of the library, ``FILE.py`` or ``FILE.py:NAME``.
+            settings: parameters as ``NAME=VALUE``.
+
+        Raises:
+            CommandError: for an unknown name, or a file with several motions.
+            TimelineError: for a file that cannot be used.
+        """
+        self._word, self._settings = word, settings
+        own, _, _ = word.partition(":")
+        if not own.endswith(".py"):  # of the library: read its file too, as if it were one's own
+            (motion,) = motions_of(word)
+            own = motion.source.rpartition(":")[0]
+            self._word = f"{own}:{word}"
+        self.path = Path(own)
+        self._seen = self._last = self._signature()
+        self.name = self.timeline().name
+
+    def timeline(self) -> Timeline:
+        """The motion as its file says now.
+
+        Raises:
+            CommandError: if the file has no such motion, or several and none was chosen.
+            TimelineError: for a file that cannot be used or a parameter that is not valid.
+        """
+        return the_motion(self._word, self._settings)
+
+    def has_changed(self) -> bool:
+        """Whether the file was saved, and has rested since the call before.
+
+        A save takes a moment, in which the file may be empty, cut short or away.
+        """
+        now = self._signature()
+        has_rested, self._last = now == self._last, now
+        if now is None or now == self._seen or not has_rested:
+            return False
+        self._seen = now
+        return True
+
+    def _signature(self) -> tuple[int, int, int] | None:
         try:
-            return name, kind(value)
-        except ValueError:
-            continue
-    return name, value
+            status = self.path.stat()
+        except OSError:
+            return None
+        return status.st_mtime_ns, status.st_size, status.st_ino

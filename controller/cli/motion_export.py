@@ -6,13 +6,16 @@ import argparse
 import csv
 import io
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
-from controller.cli.motion_args import add_motion, timelines
-from go2_wbc.errors import CommandError
+from controller.cli.motion_args import add_motion, the_motion
 from go2_wbc.legs import JOINT_NAMES, LEGS
+
+if TYPE_CHECKING:
+    from motions.trajectory import Trajectory
 
 EXAMPLES = """
 go2-wbc export wave --out wave.csv
@@ -47,14 +50,11 @@ def run(args: argparse.Namespace) -> int:
     from go2_wbc.files import checked_output, write_atomically
     from go2_wbc.robot.model import RobotModel
     from motions import compile_timeline
-    from motions.trajectory import Trajectory, trajectory_of
+    from motions.trajectory import trajectory_of
 
     target = checked_output(args.out, [".csv", ".npz"])
-    lines = timelines([args.motion], args.values)
-    if len(lines) > 1:
-        raise CommandError(f"{args.motion} has more than one motion: choose FILE.py:NAME")
-    model = RobotModel()
-    path: Trajectory = trajectory_of(compile_timeline(lines[0], model), model)
+    line, model = the_motion(args.motion, args.values), RobotModel()
+    path = trajectory_of(compile_timeline(line, model), model)
     if target.suffix == ".npz":
         stream = io.BytesIO()
         np.savez_compressed(
@@ -69,9 +69,9 @@ def run(args: argparse.Namespace) -> int:
         )
         content = stream.getvalue()
     else:
-        content = _csv(path.times, path.q, path.v, path.rpy, path.p_com, path.stance).encode()
+        content = _csv(path).encode()
     write_atomically(target, content)
-    rows, name = len(path.times), lines[0].name
+    rows, name = len(path.times), line.name
     if args.json:
         print_json({"motion": name, "file": str(target), "rows": rows})
     else:
@@ -79,16 +79,16 @@ def run(args: argparse.Namespace) -> int:
     return ExitCode.OK
 
 
-def _csv(*parts: np.ndarray) -> str:
-    times, q, v, rpy, com, stance = parts
+def _csv(path: Trajectory) -> str:
     joints = [name.removesuffix("_joint") for name in JOINT_NAMES]
     header = ["time", "x", "y", "z", "roll", "pitch", "yaw", *joints]
     header += [f"{joint}_speed" for joint in joints]
     header += ["com_x", "com_y", "com_z", *(f"{leg.name}_stance" for leg in LEGS)]
-    table = np.column_stack([times, q[:, :3], rpy, q[:, 7:], v[:, 6:], com])
+    q, v = path.q, path.v
+    table = np.column_stack([path.times, q[:, :3], path.rpy, q[:, 7:], v[:, 6:], path.p_com])
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(header)
-    for row, feet in zip(table, stance.astype(int), strict=True):
+    for row, feet in zip(table, path.stance.astype(int), strict=True):
         writer.writerow([*(f"{value:.6f}" for value in row), *feet])
     return stream.getvalue()

@@ -38,7 +38,7 @@ def register(subparsers: Subparsers) -> None:
     )
     files.add_argument("--video", metavar="FILE", type=Path, help="ends in .webp or .gif")
     files.add_argument(
-        "--plot", metavar="FILE", type=Path, help="the margins; ends in .svg or .png"
+        "--plot", metavar="FILE", type=Path, help="the margins; ends in .svg, .png or .pdf"
     )
     live = parser.add_argument_group("live page")
     live.add_argument(

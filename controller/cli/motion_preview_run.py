@@ -10,43 +10,32 @@ import webbrowser
 from pathlib import Path
 from typing import final
 
+import viz
 from controller.cli.common import ExitCode, print_json
-from controller.cli.motion_args import the_motion
-from controller.cli.motion_source import MotionSource
+from controller.cli.motion_args import MotionSource, the_motion
 from controller.cli.progress import ProgressLine
 from controller.report_view import planned
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.files import checked_output
 from go2_wbc.plant.mujoco.viewer import display_problem
 from motions import CheckedMotion, FeasibilityChecker, FeasibilityReport
-from viz import (
-    ANIMATION_SUFFIXES,
-    HTML_SUFFIXES,
-    PLOT_SUFFIXES,
-    export_animation,
-    export_html,
-    export_plot,
-)
 from viz.replay.preview_server import PreviewServer
 
 POLL_PERIOD = 0.05
 """Time [s] between two looks at the file."""
 VIDEO_RATE = 12.5
-"""Pictures per second; 80 ms each, a number that GIF can say."""
+"""Pictures per second: 80 ms each, which GIF can store."""
 
 
 def write_files(args: argparse.Namespace) -> int:
     """Check the motion and write what was asked for."""
-    wanted = {
-        "html": (args.html, HTML_SUFFIXES),
-        "video": (args.video, ANIMATION_SUFFIXES),
-        "plot": (args.plot, PLOT_SUFFIXES),
-    }
-    targets = {
-        kind: checked_output(path, suffixes)
-        for kind, (path, suffixes) in wanted.items()
-        if path is not None
-    }
+    targets: dict[str, Path] = {}
+    if args.html is not None:
+        targets["html"] = checked_output(args.html, viz.HTML_SUFFIXES)
+    if args.plot is not None:
+        targets["plot"] = checked_output(args.plot, viz.PLOT_SUFFIXES)
+    if args.video is not None:
+        targets["video"] = checked_output(args.video, viz.ANIMATION_SUFFIXES)
     checked = FeasibilityChecker().evaluate(the_motion(args.motion, args.values))
     written = _written(checked, targets)
     report = checked.report
@@ -66,12 +55,12 @@ def _written(checked: CheckedMotion, targets: dict[str, Path]) -> dict[str, Path
     with ProgressLine(sys.stderr) as line:
         if "html" in targets:
             line.update(0.0, f"writing {targets['html'].name}")
-            written["html"] = export_html(content, targets["html"], title=title)
+            written["html"] = viz.export_html(content, targets["html"], title=title)
         if "plot" in targets and content.verdict is not None:
-            written["plot"] = export_plot(content.verdict, targets["plot"], title=title)
+            written["plot"] = viz.export_plot(content.verdict, targets["plot"], title=title)
         if "video" in targets:
             video = targets["video"]
-            written["video"] = export_animation(
+            written["video"] = viz.export_animation(
                 content,
                 video,
                 speed=1.0,
@@ -89,7 +78,7 @@ def serve(args: argparse.Namespace) -> int:
     with PreviewServer(planned(checked), source.name, args.port) as server:
         live = _Live(source, checker, server, is_json=args.json)
         try:
-            live.greet(checked.report)
+            live.announce(checked.report)
             if not args.no_open and display_problem() is None:
                 webbrowser.open(server.url)
             while True:
@@ -119,14 +108,14 @@ class _Live:
         self._is_json = is_json
         self.code = ExitCode.OK
 
-    def greet(self, report: FeasibilityReport) -> None:
+    def announce(self, report: FeasibilityReport) -> None:
         """Say where the page is, and the first verdict."""
         if self._is_json:
             self._print_line({"url": self._server.url, "file": str(self._source.path)})
         else:
             where = _short(self._source.path)
             print(f"{self._source.name}: {self._server.url}   (follows {where}; Ctrl-C ends)")
-        self._tell(report)
+        self._report(report)
 
     def update(self) -> None:
         """Look at the file; if it was saved, check and show what it says now."""
@@ -136,18 +125,18 @@ class _Live:
             checked = self._checker.evaluate(self._source.timeline())
             self._server.publish(planned(checked))
         except (Go2WbcError, OSError) as error:
-            self._complain(str(error))
+            self._report_error(str(error))
         else:
-            self._tell(checked.report)
+            self._report(checked.report)
 
-    def _tell(self, report: FeasibilityReport) -> None:
+    def _report(self, report: FeasibilityReport) -> None:
         self.code = _code(report)
         if self._is_json:
             self._print_line(report.as_dict())
         else:
             _print_verdict(report)
 
-    def _complain(self, message: str) -> None:
+    def _report_error(self, message: str) -> None:
         self.code = ExitCode.FAILED
         self._server.publish_error(message)
         if self._is_json:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +15,7 @@ from controller.cli.progress import ProgressLine
 from go2_wbc.errors import PlantError, StanceMismatch
 
 if TYPE_CHECKING:
-    from benchmarks.motion_runs import MotionRun
-    from benchmarks.trials import Subject
+    from controller.motion_measurement import MotionMeasurement
 
 TELL_EVERY = 50
 """Ticks between two looks at the progress line."""
@@ -50,11 +50,12 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check, play, measure, print."""
-    from benchmarks.motion_runs import run_motion
-    from benchmarks.trials import Failed, Subject
+    from controller.go2_controller import GO2Controller
+    from controller.motion_measurement import measure_motion
     from controller.report_view import performed
     from go2_wbc.files import checked_output
     from go2_wbc.plant import MujocoPlant
+    from go2_wbc.plant.mujoco.ground_truth import GroundTruth
     from go2_wbc.reference import Posture
     from motions import FeasibilityChecker
     from viz import HTML_SUFFIXES, export_html
@@ -68,18 +69,18 @@ def run(args: argparse.Namespace) -> int:
         report.raise_if_infeasible()
     with (
         ProgressLine(sys.stderr) as line,
-        Subject(MujocoPlant(friction=args.friction)) as robot,
+        closing(GroundTruth(MujocoPlant(friction=args.friction))) as truth,
+        GO2Controller(plant=truth) as go2,
     ):
-        robot.truth.on_tick = _teller(line, robot, plan.name, plan.duration)
-        starts = {Posture.STAND: robot.go2.stand, Posture.SIT: robot.go2.sit}
+        truth.on_tick = _teller(line, truth.control_period, plan.name, plan.duration)
+        starts = {Posture.STAND: go2.stand, Posture.SIT: go2.sit}
         if plan.entry not in starts:
             raise StanceMismatch(f"{plan.name} starts from {plan.entry.value}: cannot be run")
-        try:
-            robot.require(starts[plan.entry]())
-        except Failed as failed:
-            raise PlantError(f"the robot did not get ready: {failed}") from failed
-        result = run_motion(robot, plan, checker.model)
-        recording = robot.go2.recording()
+        if not starts[plan.entry]() or truth.fall():
+            reason = truth.fall() or go2.last_outcome.reason
+            raise PlantError(f"the robot did not get ready: {reason}")
+        result = measure_motion(go2, truth, plan, checker.model)
+        recording = go2.recording()
     if args.json:
         print_json({"motion": plan.name, "feasible": report.ok, **result.as_dict()})
     else:
@@ -91,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     return ExitCode.OK if result.ok else ExitCode.FAILED
 
 
-def _teller(line: ProgressLine, robot: Subject, name: str, duration: float) -> Callable[[], None]:
+def _teller(line: ProgressLine, period: float, name: str, duration: float) -> Callable[[], None]:
     """Shows after every so many ticks how far the robot has come."""
     ticks = 0
 
@@ -99,16 +100,16 @@ def _teller(line: ProgressLine, robot: Subject, name: str, duration: float) -> C
         nonlocal ticks
         ticks += 1
         if ticks % TELL_EVERY == 0:
-            time = ticks * robot.plant.control_period
+            time = ticks * period
             line.update(min(time / (GETTING_READY + duration), 1.0), f"{name}, {time:.1f} s")
 
     return tell
 
 
-def _print(name: str, duration: float, result: MotionRun) -> None:
+def _print(name: str, duration: float, result: MotionMeasurement) -> None:
     print(f"{name}, {duration:.1f} s in MuJoCo")
     print("-" * 80)
-    for label, value, unit in result.figures():
+    for label, value, unit in result.lines():
         print(f"  {label:<38}{value:>10} {unit}")
     print("-" * 80)
     print("done" if result.ok else f"NOT done: {result.fall or result.reason}")

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
-import re
 import signal
 import subprocess
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
 
 PROJECT = "go2-wbc"
 IMPORT_TIME_LIMIT = 60.0
@@ -101,41 +103,15 @@ def requirements_of(distribution: str) -> Mapping[str, str]:
 
 
 def parse_requirements(rows: Iterable[str]) -> dict[str, str]:
-    """``["placo<0.11,>=0.10.2", ...]`` as ``{"placo": "<0.11,>=0.10.2", ...}``."""
-    found = {}
-    for row in rows:
-        requirement, _, marker = row.partition(";")
-        match = re.match(r"\s*([A-Za-z0-9._-]+)(?:\[[^\]]*\])?\s*\(?([^)]*)\)?", requirement)
-        if match and "extra" not in marker:
-            found[match[1]] = match[2].replace(" ", "")
-    return found
+    """``["placo<0.11,>=0.10.2", ...]`` as ``{"placo": "<0.11,>=0.10.2", ...}``, without extras."""
+    found = [Requirement(row) for row in rows]
+    return {
+        item.name: str(item.specifier)
+        for item in found
+        if item.marker is None or item.marker.evaluate({"extra": ""})
+    }
 
 
 def satisfies(version: str, bounds: str) -> bool:
-    """Whether ``version`` lies within ``bounds`` (comma-separated, of ``>=``, ``<``, ``==`` ...).
-
-    Compares the numeric release only, as this project's bounds need.
-    """
-    comparisons = {
-        ">=": lambda a, b: a >= b,
-        "<=": lambda a, b: a <= b,
-        "==": lambda a, b: a == b,
-        "!=": lambda a, b: a != b,
-        ">": lambda a, b: a > b,
-        "<": lambda a, b: a < b,
-    }
-    for bound in filter(None, bounds.split(",")):
-        operator = re.match(r"[<>=!]=|[<>]", bound)
-        if operator is None:
-            continue
-        if not comparisons[operator[0]](_release(version), _release(bound[operator.end() :])):
-            return False
-    return True
-
-
-def _release(version: str) -> tuple[int, ...]:
-    match = re.match(r"\d+(?:\.\d+)*", version)
-    parts = [int(part) for part in match[0].split(".")] if match else [0]
-    while parts and parts[-1] == 0:
-        parts.pop()
-    return tuple(parts)
+    """Whether ``version``, pre-releases included, lies within ``bounds`` (PEP 440)."""
+    return SpecifierSet(bounds).contains(version, prereleases=True)

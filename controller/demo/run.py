@@ -141,15 +141,4 @@ def _failure(go2: GO2Controller, answer: bool | None, figures: Sequence[Measurem
 def _window(recording: Recording, start: float, end: float) -> Recording:
     """The samples from the last one at or before ``start`` up to ``end`` [s]."""
     first, last = np.searchsorted(recording.time, (start + 1e-9, end + 1e-9))
-    rows = slice(max(int(first) - 1, 0), int(last))
-    return Recording(
-        time=recording.time[rows],
-        q=recording.q[rows],
-        v=recording.v[rows],
-        tau=recording.tau[rows],
-        foot_forces=recording.foot_forces[rows],
-        stance=recording.stance[rows],
-        p_world_com=recording.p_world_com[rows],
-        support_margin=recording.support_margin[rows],
-        labels=recording.labels[rows],
-    )
+    return recording.part(slice(max(int(first) - 1, 0), int(last)))

@@ -14,7 +14,14 @@ that rolls: its centre moves with w_i x (r n), w_i being the calf's angular velo
 upward normal. Taken for a fixed point, as in the papers, it would make a walking robot seem slower.
 
 With the orientation given, the three axes of the world share no uncertainty: the filter is three
-small ones of six states each, computed side by side.
+small ones of six states each, x = (p, v, f_1 .. f_4), computed side by side (Kalman, J. Basic Eng.
+82, 1960). P is an axis's covariance, a the acceleration of the IMU in the world, dt the step:
+
+    predict     p += v dt + a dt^2 / 2,   v += a dt,   f_i += w_i x (r n) dt
+                P  = F P F' + Q,          F = identity but for dp/dv = dt
+    correct     K  = P H' (H P H' + V)^-1,   x += K (y - H x),   P -= K H P
+
+y are the measurements above with the variances V, H says what they would be.
 """
 
 from __future__ import annotations
@@ -33,8 +40,15 @@ from go2_wbc.robot.state import RobotState
 from go2_wbc.validation import require_positive
 
 IMU_FRAME = "imu"
-_VELOCITY, _FEET = 1, slice(2, 6)
+_POSITION, _VELOCITY, _FEET = 0, 1, slice(2, 6)
+_PLACES, _VELOCITIES, _HEIGHTS, _REST = slice(0, 4), slice(4, 8), slice(8, 12), 12
 _LEAST_TRUST = 1e-3
+"""Trust in a foot in the air: its variances are a million times those of a standing one."""
+_UNKNOWN = 1e6
+"""Variance [m^2, m^2/s^2] of what was not measured."""
+_START_DEVIATIONS = np.array([0.001, 0.1, 0.01, 0.01, 0.01, 0.01])
+"""Of position [m], velocity [m/s] and feet [m] when the filter begins (own choice); the position is
+the origin by definition."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,10 +129,10 @@ class StateEstimator:
         self._x = np.zeros((6, 3))
         self._P = np.zeros((3, 6, 6))
         self._H = np.zeros((13, 6))
-        self._H[0:4, 0], self._H[0:4, _FEET] = -1.0, np.eye(4)  # places
-        self._H[4:8, _VELOCITY] = 1.0  # velocities
-        self._H[8:12, _FEET] = np.eye(4)  # heights
-        self._H[12, _VELOCITY] = 1.0  # rest
+        self._H[_PLACES, _POSITION], self._H[_PLACES, _FEET] = -1.0, np.eye(4)  # f_i - p
+        self._H[_VELOCITIES, _VELOCITY] = 1.0
+        self._H[_HEIGHTS, _FEET] = np.eye(4)
+        self._H[_REST, _VELOCITY] = 1.0
 
     def _find_imu(self) -> Float[np.ndarray, "3"]:
         if not self._pin_model.existFrame(IMU_FRAME):
@@ -135,11 +149,13 @@ class StateEstimator:
         trust = self._trust(reading.foot_forces)
         step = 0.0 if self._time is None else reading.time - self._time
         if self._time is None:
-            self._x[0] = R @ self._p_base_imu
+            self._x[_POSITION] = R @ self._p_base_imu
         if self._time is None or not 0.0 <= step <= self._config.longest_step:
             self._begin(p_feet)
         else:
-            acceleration = R @ reading.accelerometer
+            acceleration = (
+                R @ reading.accelerometer
+            )  # specific force: what moves the IMU but gravity
             acceleration[2] -= self._gravity
             self._predict(step, acceleration, rolling, trust)
         self._correct(p_feet, rolling - v_feet, trust)
@@ -162,10 +178,11 @@ class StateEstimator:
             p[leg] = pin.updateFramePlacement(model, data, frame).translation
             velocity = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
             u[leg], w[leg] = velocity.linear, velocity.angular
+        # the base stands still but for turning here, so the IMU moves with w x r
         p -= self._p_base_imu
         u -= cross(reading.gyro, self._p_base_imu)
         w_world = w @ R.T
-        rolling = np.zeros((4, 3))
+        rolling = np.zeros((4, 3))  # w x (0, 0, r)
         rolling[:, 0], rolling[:, 1] = self._radius * w_world[:, 1], -self._radius * w_world[:, 0]
         return p @ R.T, u @ R.T, rolling
 
@@ -176,11 +193,10 @@ class StateEstimator:
 
     def _begin(self, p_feet: Float[np.ndarray, "4 3"]) -> None:
         """At rest above the last known spot, the lowest foot on the ground."""
-        p = self._x[0].copy()
+        p = self._x[_POSITION].copy()
         p[2] = self._radius - p_feet[:, 2].min()
-        self._x[0], self._x[_VELOCITY], self._x[_FEET] = p, 0.0, p + p_feet
-        deviations = np.array([0.001, 0.1, 0.01, 0.01, 0.01, 0.01])
-        self._P[:] = np.diag(deviations**2)
+        self._x[_POSITION], self._x[_VELOCITY], self._x[_FEET] = p, 0.0, p + p_feet
+        self._P[:] = np.diag(_START_DEVIATIONS**2)
 
     def _predict(
         self,
@@ -190,13 +206,14 @@ class StateEstimator:
         trust: Float[np.ndarray, "4"],
     ) -> None:
         x, config = self._x, self._config
-        x[0] += step * x[_VELOCITY] + 0.5 * step**2 * acceleration
+        x[_POSITION] += step * x[_VELOCITY] + 0.5 * step**2 * acceleration
         x[_VELOCITY] += step * acceleration
         x[_FEET] += step * rolling
         F = np.eye(6)
-        F[0, _VELOCITY] = step
+        F[_POSITION, _VELOCITY] = step
         drift = config.foot_drift / trust  # a swinging foot goes where the encoders say
         speed = config.acceleration * step
+        # deviations of p, v, f_i from that of a, constant over the step, and the drift
         noise = np.array([0.5 * speed * step, speed, *(drift * step)]) ** 2
         self._P = F @ self._P @ F.T + np.diag(noise)
 
@@ -208,14 +225,15 @@ class StateEstimator:
     ) -> None:
         config, H = self._config, self._H
         measured = np.zeros((13, 3))
-        measured[0:4], measured[4:8], measured[8:12, 2] = p_feet, v_imu, self._radius
+        measured[_PLACES], measured[_VELOCITIES] = p_feet, v_imu
+        measured[_HEIGHTS, 2] = self._radius
         variance = np.empty((3, 13))
-        variance[:, 0:4] = config.place**2
-        variance[:, 4:8] = (config.velocity / trust) ** 2
-        variance[:, 8:12] = 1e6  # the ground says nothing of x and y
-        variance[2, 8:12] = (config.height / trust) ** 2
+        variance[:, _PLACES] = config.place**2
+        variance[:, _VELOCITIES] = (config.velocity / trust) ** 2
+        variance[:, _HEIGHTS] = _UNKNOWN  # the ground says nothing of x and y
+        variance[2, _HEIGHTS] = (config.height / trust) ** 2
         is_carried = trust.max() > _LEAST_TRUST
-        variance[:, 12] = 1e6 if is_carried else config.rest**2
+        variance[:, _REST] = _UNKNOWN if is_carried else config.rest**2
         PHt = self._P @ H.T
         S = H @ PHt
         S[:, range(13), range(13)] += variance
@@ -223,6 +241,7 @@ class StateEstimator:
         innovation = (measured - H @ self._x).T
         self._x += np.einsum("aij,aj->ia", gain, innovation)
         self._P -= gain @ PHt.transpose(0, 2, 1)
+        # rounding would make it asymmetric, and then indefinite
         self._P = 0.5 * (self._P + self._P.transpose(0, 2, 1))
 
     def _state(
@@ -231,7 +250,8 @@ class StateEstimator:
         quaternion: Float[np.ndarray, "4"],
         R: Float[np.ndarray, "3 3"],
     ) -> RobotState:
-        p_world_base = self._x[0] - R @ self._p_base_imu
+        # from the IMU to the base: p - R r_imu, R' v - w x r_imu
+        p_world_base = self._x[_POSITION] - R @ self._p_base_imu
         v_base = R.T @ self._x[_VELOCITY] - cross(reading.gyro, self._p_base_imu)
         return RobotState(
             time=reading.time,

@@ -4,6 +4,17 @@ A leg is a hip that turns about x, and a thigh and a calf that turn about y, at 
 plane of the hip's axis; see Spong, Hutchinson & Vidyasagar (2006, sec. 3.3.3) for the same arm
 upside down. Two branches exist for the side on which the foot lies: below the hip's axis, as in
 standing, or above it, as for a raised paw. The knee always points backwards, as the limits demand.
+
+With the angles q1, q2, q3 (hip, thigh, calf), lengths w, l2, l3, and (x, y, z) from the hip's axis
+to the foot's centre in the base frame (x ahead, y left, z up):
+
+    down = l2 cos q2 + l3 cos(q2 + q3)           from the thigh's axis, along the leg's plane
+    x = -l2 sin q2 - l3 sin(q2 + q3)
+    y = w cos q1 + down sin q1
+    z = w sin q1 - down cos q1
+
+Seen along x, y^2 + z^2 = w^2 + down^2 gives down; (y, z) is (w, -down) turned by q1. In the leg's
+plane, the law of cosines on l2, l3 and the reach sqrt(x^2 + down^2) gives q3, and then q2.
 """
 
 from __future__ import annotations
@@ -62,11 +73,14 @@ def leg_angles(geometry: LegGeometry, p_base_foot: Float[np.ndarray, "n 3"]) -> 
     width, thigh, calf = geometry.width, geometry.thigh, geometry.calf
     across = y * y + z * z - width * width
     down = np.where(z > 0.0, -1.0, 1.0) * np.sqrt(np.maximum(across, 0.0))
+    # angle of (y, z) minus that of (w, -down)
     hip = _wrapped(np.arctan2(z, y) + np.arctan2(down, width))
     reach = np.hypot(x, down)
     cosine = (reach**2 - thigh**2 - calf**2) / (2.0 * thigh * calf)
     knee = -np.arccos(np.clip(cosine, -1.0, 1.0))
+    # direction of the foot minus that of the leg with q2 = 0: (l2 + l3 cos q3, l3 sin q3)
     swing = np.arctan2(-x, down) - np.arctan2(calf * np.sin(knee), thigh + calf * np.cos(knee))
+    # nearer to the hip's axis than the leg's plane, and outside the ring |l2 - l3| .. l2 + l3 in it
     too_near = np.sqrt(np.maximum(-across, 0.0))
     too_far = np.maximum(np.maximum(reach - thigh - calf, abs(thigh - calf) - reach), 0.0)
     return LegAngles(np.column_stack([hip, _wrapped(swing), knee]), np.hypot(too_near, too_far))

@@ -1,14 +1,24 @@
 """Our two ways to solve the assembled ``Problem``: condensed, and in full.
 
-Condensed: given the force of every stance foot and the joint accelerations of every other leg
-(three unknowns a leg, 12 in all), the equalities determine everything else:
+The equalities are the base's rows of the equations of motion (6), and for each stance leg l that
+its contact point rolls (3); see ``constraints``. With the blocks of M, h and J by base b and leg,
 
-    stance leg   J_b a_b + J_l a_l = c               ->  a_l = J_l^-1 (c - J_b a_b)
-    base         M_b a_b + sum M_bl a_l + h = sum J_b' f   ->  a_b
+    base         M_b a_b + sum_l M_bl a_l - sum_stance J_bl' f_l = -h_b             (1)
+    stance leg   J_bl a_b + J_l a_l = c_l                                           (2)
 
-so z = Z u + z0 and the QP in u has no equalities and the same optimum. A stance leg near a
-singularity (straight, or with the foot under the hip's axis) has no such inverse; the full QP in
-(a, f) takes over for that tick.
+where a_b (6,) is the base's acceleration in the base frame, a_l (3,) that of leg l's joints, f_l
+(3,) its contact force in the world frame. J_l is square, so (2) can be solved for a_l and put into
+(1): elimination of variables (Nocedal & Wright, *Numerical Optimization*, 2006, sec. 15.3).
+
+    stance leg   a_l = J_l^-1 (c_l - J_bl a_b)                                      (3)
+    base         (M_b - sum_stance M_bl J_l^-1 J_bl) a_b
+                   = sum_stance J_bl' f_l - sum_swing M_bl a_l - h_b - sum_stance M_bl J_l^-1 c_l
+                                                                                    (4)
+
+Three unknowns a leg are left: u (12,) holds f_l of a stance leg and a_l of another. (4) and (3)
+make z = Z u + z0, and the QP in u has no equalities, 12 unknowns instead of up to 30, and the same
+optimum. A stance leg near a singularity (straight, or with the foot under the hip's axis) has no
+J_l^-1; the full QP in (a, f) takes over for that tick.
 """
 
 from __future__ import annotations
@@ -23,8 +33,10 @@ from go2_wbc.wbc.problem import FORCES, SIZE, Problem
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 
 SINGULAR_DETERMINANT = 2e-4
-"""|det J_leg| [m^3] below which a leg counts as singular; 2e-2 when standing (own measurement)."""
+"""|det J_l| [m^3] below which a leg counts as singular; 1.5e-2 in standing (own measurement).
 
+For a point foot it is thigh * calf * |sin(knee)| * depth of the foot below the hip's axis.
+"""
 
 _LEG_COLUMNS = np.arange(12).reshape(4, 3)
 _UNKNOWN_OF_LEG = np.eye(12, 13).reshape(4, 3, 13)
@@ -78,8 +90,9 @@ def dense_qp(
 ) -> DenseQp:
     """The QP in u for z = Z u + z0.
 
-    With equalities, |E u - e|^2 joins the cost: it is zero at every feasible point, so the optimum
-    stays, and the Hessian becomes positive definite, which quadprog needs.
+    The tasks' cost |W^(1/2) (A z - b)|^2 has the Hessian 2 Z'A'W A Z; the 2 is left out of both
+    terms. With equalities, |E u - e|^2 joins the cost: it is zero at every feasible point, so the
+    optimum stays, and the Hessian becomes positive definite, which quadprog needs.
     """
     root = np.sqrt(problem.weights)
     A = root[:, None] * (problem.tasks.A @ Z)
@@ -110,8 +123,9 @@ def eliminate_equalities(
     J_legs = feet[np.arange(len(stance))[:, None], :, 6 + _LEG_COLUMNS[stance]].transpose(0, 2, 1)
     if len(stance) and np.abs(np.linalg.det(J_legs)).min() < SINGULAR_DETERMINANT:
         return None
-    # a_leg = legs_map @ (a_base, 1) for every stance leg
+    # (3): a_l = legs_map @ (a_b, 1) for every stance leg
     legs_map = np.linalg.inv(J_legs) @ np.concatenate([-feet[:, :, :6], e[6:].reshape(-1, 3, 1)], 2)
+    # (4): base_map is its right side, which is linear in (u, 1), divided by its left
     M_legs = by_leg[:, stance].reshape(6, -1)
     folded = M_legs @ legs_map.reshape(-1, 7)
     right = np.empty((6, 13))
@@ -127,6 +141,7 @@ def _back_substitute(
     stance: Int[np.ndarray, " k"],
     swing: Int[np.ndarray, " s"],
 ) -> tuple[Float[np.ndarray, "30 12"], Float[np.ndarray, "30"]]:
+    """Z and z0 from the base's acceleration in (u, 1), by (3) and u's own entries."""
     affine = np.zeros((SIZE, 13))
     affine[:6] = base_map
     joints = affine[6:18].reshape(4, 3, 13)
@@ -147,5 +162,6 @@ def _embed(
     try:
         return Z @ solve_dense_qp(qp, solver).x + z0
     except QpInfeasible as error:
+        # H u = -g: the optimum without bounds, which tells best what asked for too much
         best = Z @ np.linalg.lstsq(qp.H, -qp.g, rcond=None)[0] + z0
         raise QpInfeasible(error.solver, error.status, problem.residuals(best)) from error

@@ -62,6 +62,10 @@ class FloatingBaseDynamics(Equality):
 class StanceFeetStill(Equality):
     """Stance feet roll without sliding: their contact points do not accelerate.
 
+    J a + dJ/dt v = -damping J v in the world frame. With 0 on the right, what integration leaves of
+    a velocity would stay for ever; so it decays as exp(-damping t) (Baumgarte, Comp. Meth. Appl.
+    Mech. Eng. 1, 1972). There is no term of position: a foot may stand anywhere.
+
     Attributes:
         damping: rate [1/s] at which a remaining velocity of the contact point is taken out.
     """
@@ -126,10 +130,16 @@ class JointLimits(Inequality):
     """Joint position and speed limits as acceleration bounds (Del Prete 2018, sec. III).
 
     A state is viable if braking still stops the joint at its limit. With the speed going evenly
-    from v to v' within ``horizon`` h, that is v'^2 <= 2 b (q_max - q - h (v + v') / 2), b being
-    ``braking``; so the acceleration is bounded by that of the greatest such v'. Beyond a limit
-    the joint has to come back. No bound asks for more than ``braking``; whether the legs can brake
-    that hard, at the torque limits and with their feet on the ground, is for the QP to tell.
+    from v to v' within ``horizon`` h, the joint then is h (v + v') / 2 further, and stops within
+    v'^2 / (2 b), b being ``braking``, so
+
+        v'^2 <= 2 b (d - h (v + v') / 2),    d = q_max - q                        (1)
+
+    whose greatest solution is v' = -b h / 2 + sqrt((b h / 2)^2 - b h v + 2 b d), and the bound is
+    (v' - v) / h. Towards the lower limit q and v change their signs. Beyond a limit, where (1) has
+    no solution, the root counts as 0: the joint has to come back. No bound asks for more than
+    ``braking``; whether the legs can brake that hard, at the torque limits and with their feet on
+    the ground, is for the QP to tell.
 
     Attributes:
         q_lower, q_upper: position limits [rad].
@@ -158,7 +168,7 @@ class JointLimits(Inequality):
     def _viable_speed(
         self, distance: Float[np.ndarray, "12"], speed: Float[np.ndarray, "12"]
     ) -> Float[np.ndarray, "12"]:
-        """v': the greatest speed after the horizon that is viable, ``distance`` from the limit."""
+        """v' of (1): the greatest speed after the horizon that is viable, d = ``distance``."""
         half = self.braking * self.horizon / 2
         radicand = half * half - 2 * half * speed + 2 * self.braking * distance
         return np.sqrt(np.maximum(radicand, 0.0)) - half
@@ -167,7 +177,10 @@ class JointLimits(Inequality):
 def torque_map(
     snapshot: Snapshot,
 ) -> tuple[Float[np.ndarray, "12 30"], Float[np.ndarray, "12"]]:
-    """(A, offset) such that the joint torques are A z + offset [N m]."""
+    """(A, offset) such that the joint torques are A z + offset [N m].
+
+    tau = M_j a + h_j - J_j' f, the rows of the joints j in M a + h = S' tau + J' f.
+    """
     A = np.empty((12, SIZE))
     A[:, :18] = snapshot.mass_matrix[6:]
     A[:, FORCES] = -snapshot.J_contacts[:, :, 6:].reshape(12, 12).T
@@ -175,6 +188,7 @@ def torque_map(
 
 
 def _pyramid(mu: float) -> Float[np.ndarray, "5 3"]:
+    """Rows of +-f_x - mu f_z, +-f_y - mu f_z (at most 0) and f_z, on level ground."""
     return np.array(
         [[1.0, 0.0, -mu], [-1.0, 0.0, -mu], [0.0, 1.0, -mu], [0.0, -1.0, -mu], [0.0, 0.0, 1.0]]
     )

@@ -4,6 +4,10 @@
     subject to  E z = e                              (dynamics of the base, stance feet still)
                 lower <= C z <= upper                (friction, normal force, torque, joint limits)
 
+This is inverse dynamics as one weighted QP (Abe, da Silva & Popovic, SCA 2007; de Lasa, Mordatch &
+Hertzmann, SIGGRAPH 2010). Torques are no unknowns: they follow from z by the joint rows of the
+equations of motion (Herzog et al., Auton. Robots 40, 2016); see ``constraints.torque_map``.
+
 The decision vector z (30,) holds the generalised acceleration (18,: Pinocchio's spatial base
 acceleration in the base frame, then the joints) and the contact force of each foot in the world
 frame (4 x 3). The force of a foot in swing is no unknown: back ends leave its columns out.
@@ -22,7 +26,9 @@ from go2_wbc.reference import Reference
 from go2_wbc.robot.snapshot import Snapshot
 
 ACCELERATION = slice(0, 18)
+"""a in z: m/s^2 and rad/s^2 of the base in its own frame, then rad/s^2 of the joints."""
 FORCES = slice(18, 30)
+"""f in z: N in the world frame, foot by foot."""
 SIZE = 30
 
 

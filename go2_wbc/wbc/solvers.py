@@ -1,5 +1,9 @@
 """Dense QP solvers by name, through qpsolvers, all started fresh.
 
+daqp: dual active set (Arnström, Bemporad & Axehill, IEEE Trans. Autom. Control 67(8), 2022);
+quadprog: dual active set (Goldfarb & Idnani, Math. Programming 27, 1983); proxqp: proximal
+augmented Lagrangian (Bambade et al., RSS 2022).
+
 ProxQP is never warm-started: its warm start reports feasible problems as infeasible when the
 contacts change. Tolerances are set so that torques agree to 1e-5 N m across solvers.
 """
@@ -38,12 +42,12 @@ class DenseQp:
 
 @dataclass(frozen=True, slots=True)
 class QpSolution:
-    """Minimiser and multipliers of a ``DenseQp``.
+    """Minimiser and multipliers of a ``DenseQp``: H x + g + G'z + E'y = 0, z >= 0, z'(G x - h) = 0.
 
     Attributes:
         x: the minimiser.
-        inequality_multipliers: >= 0, one per row of ``one_sided()``.
-        equality_multipliers: one per equality row.
+        inequality_multipliers: z, one per row of ``one_sided()``.
+        equality_multipliers: y, one per equality row.
     """
 
     x: Float[np.ndarray, " n"]
@@ -61,8 +65,11 @@ SOLVERS: tuple[str, ...] = ("daqp", "proxqp", "quadprog")
 """Valid solver names."""
 
 PROXQP_EPS = 1e-9
+"""Greatest residual of the optimality conditions, absolute, in the units of the rows."""
 PROXQP_EPS_INFEASIBLE = 1e-12
+"""Residual of a certificate of infeasibility; the default is 1e-4."""
 PROXQP_INFINITY = 1e20
+"""What ProxQP takes for an open side."""
 PROXQP_MAX_ITERATIONS = 50
 """Outer, and inner per outer. 3 000 solvable problems needed at most 12 outer and 38 inner in all,
 solved again and again, except twice, not repeatable: 322 inner, and no solution after 1903.
@@ -132,7 +139,7 @@ def _solve_proxqp(qp: DenseQp) -> QpSolution | None:
     solver.solve()
     if solver.results.info.status != proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED:
         return None
-    z = np.asarray(solver.results.z)
+    z = np.asarray(solver.results.z)  # of lower <= C x <= upper: positive at upper
     up, low = np.isfinite(qp.upper), np.isfinite(qp.lower)
     multipliers = np.concatenate([np.maximum(z, 0.0)[up], np.maximum(-z, 0.0)[low]])
     return QpSolution(np.array(solver.results.x), multipliers, np.array(solver.results.y))

@@ -3,6 +3,7 @@
 from motions.feasibility.check import FeasibilityChecker, check
 from motions.feasibility.checked_motion import CheckedMotion
 from motions.feasibility.limits import FeasibilityLimits
+from motions.feasibility.playable import Playable, compile_motion
 from motions.feasibility.report import FeasibilityReport, Finding, Series
 
 __all__ = [
@@ -11,6 +12,8 @@ __all__ = [
     "FeasibilityLimits",
     "FeasibilityReport",
     "Finding",
+    "Playable",
     "Series",
     "check",
+    "compile_motion",
 ]

@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.errors import MotionError, TimelineError
+from go2_wbc.errors import MotionError
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
-from motions.authoring import Motion
-from motions.balance import Unbalanced
-from motions.compiler import CompiledPlan, OutOfReach, compile_timeline
+from motions.compiler import CompiledPlan, OutOfReach
 from motions.feasibility import dynamic, kinematic
 from motions.feasibility.checked_motion import CheckedMotion
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.limits import FeasibilityLimits
+from motions.feasibility.playable import Playable, compile_motion
 from motions.feasibility.report import FeasibilityReport, Series
-from motions.registry import load_motion
-from motions.timeline import Timeline
 from motions.trajectory import trajectory_of
 
 
 class FeasibilityChecker:
     """Checks motions on one robot; loads what it needs once.
+
+    It works with ``model``, and a ``RobotModel`` is for one thread at a time: never check on the
+    model of a control loop that runs.
 
     Attributes:
         model: the robot.
@@ -35,85 +35,104 @@ class FeasibilityChecker:
         self._limits = limits or FeasibilityLimits()
         self._collision = SelfCollision(self.model)
 
-    def check(self, motion: str | Motion | Timeline | MotionPlan) -> FeasibilityReport:
-        """The report on ``motion``.
+    def plan(self, motion: Playable, *, check: bool = True) -> MotionPlan:
+        """The plan of ``motion``, compiled and checked no more often than needed.
 
         Args:
-            motion: a name of the library, a motion with its default parameters, a timeline, or a
-                plan.
+            motion: as for ``check``; of a checked one nothing is done again.
+            check: whether it must be feasible.
 
         Raises:
-            CommandError: for an unknown name.
-            TimelineError: if the timeline is empty, or this is no motion.
+            CommandError: for an unknown name, or for what stands for no motion.
+            TimelineError: if the timeline is empty or its parameters are not valid.
+            MotionInfeasible: if the motion breaks a limit; carries the findings.
         """
-        plan = self._plan(motion)
+        plan = compile_motion(motion, self.model)
+        if check:
+            known = motion if isinstance(motion, CheckedMotion) else plan
+            self.check(known).raise_if_infeasible()
+        return plan
+
+    def check(self, motion: Playable) -> FeasibilityReport:
+        """The report on ``motion``; one that was checked before keeps its report.
+
+        Args:
+            motion: a name of the library, a motion with its default parameters, a timeline, a plan,
+                or a checked motion.
+
+        Raises:
+            CommandError: for an unknown name, or for what stands for no motion.
+            TimelineError: if the timeline is empty or its parameters are not valid.
+        """
+        if isinstance(motion, CheckedMotion):
+            return motion.report
+        plan = compile_motion(motion, self.model)
         try:
-            return self._rehearsed(plan).report
+            return self.evaluate(plan).report
         except MotionError as error:
             unknown = _failed("numbers", "plan", 0.0, np.nan, str(error))
             return FeasibilityReport.of(plan.name, plan.duration, [unknown])
 
-    def evaluate(self, motion: str | Motion | Timeline | MotionPlan) -> CheckedMotion:
-        """The report on ``motion`` with the movement and the forces that it judges.
+    def evaluate(self, motion: Playable) -> CheckedMotion:
+        """Compile and check ``motion``, once: its plan, the report, the movement and the forces.
+
+        The result stands for the motion wherever one is asked for: ``GO2Controller.play`` plays its
+        plan without compiling or checking it again.
 
         Args:
-            motion: as for ``check``.
+            motion: as for ``check``; one that was checked before is returned as it is.
 
         Raises:
-            CommandError: for an unknown name.
-            TimelineError: if the timeline is empty, or this is no motion.
-            MotionError: if the plan is not finite: then there is no movement.
+            CommandError: for an unknown name, or for what stands for no motion.
+            TimelineError: if the timeline is empty or its parameters are not valid.
+            MotionError: if the plan is not finite: then there is no movement to judge.
         """
-        return self._rehearsed(self._plan(motion))
-
-    def _plan(self, motion: object) -> MotionPlan:
-        if isinstance(motion, str):
-            motion = load_motion(motion)
-        if isinstance(motion, Motion):
-            motion = motion()
-        if not isinstance(motion, Timeline | MotionPlan):
-            raise TimelineError(f"a motion is a name, a Timeline or a plan, not {motion!r}")
-        is_plan = isinstance(motion, MotionPlan)
-        return motion if is_plan else compile_timeline(motion, self.model)
-
-    def _rehearsed(self, plan: MotionPlan) -> CheckedMotion:
-        model, limits = self.model, self._limits
+        if isinstance(motion, CheckedMotion):
+            return motion
+        plan, model, limits = compile_motion(motion, self.model), self.model, self._limits
         path = trajectory_of(plan, model)
         forces = dynamic.forces_of(path, model)
-        series = [
-            *_as_written(plan),
+        unreachable, unbalanced = _as_written(plan)
+        com, zero_moment_point = dynamic.support(path, forces, limits)
+        landing_place, landing_speed = kinematic.landing(path, model, limits)
+        in_order_of_causes = [
+            *unreachable,
             kinematic.reach(path, limits),
             kinematic.joint_position(path, model),
-            kinematic.joint_speed(path, model),
-            *dynamic.torque(path, forces, model, limits),
-            *dynamic.support(path, forces, limits),
-            *dynamic.contacts(path, forces, limits),
             self_distance(path, self._collision, limits),
             kinematic.clearance(path, model, limits),
-            *kinematic.landing(path, model, limits),
-            kinematic.smoothness(path, limits),
+            kinematic.dragging(path, model, limits),
+            landing_place,
             kinematic.ends(plan, path, model, limits),
+            *unbalanced,
+            com,
+            kinematic.joint_speed(path, model),
+            landing_speed,
+            kinematic.smoothness(path, limits),
+            zero_moment_point,
+            *dynamic.contacts(path, forces, limits),
+            *dynamic.torque(path, forces, model, limits),
         ]
-        report = FeasibilityReport.of(plan.name, plan.duration, series)
+        report = FeasibilityReport.of(plan.name, plan.duration, in_order_of_causes)
         return CheckedMotion(plan, report, path, forces)
 
 
-def check(motion: str | Motion | Timeline | MotionPlan) -> FeasibilityReport:
+def check(motion: Playable) -> FeasibilityReport:
     """Whether the installed Go2 can do ``motion``; see ``FeasibilityChecker``."""
     return FeasibilityChecker().check(motion)
 
 
-def _as_written(plan: MotionPlan) -> list[Series]:
-    """What the compiler could not do as it was written."""
-    if not isinstance(plan, CompiledPlan):
-        return []
-    series = []
-    for problem in plan.problems:
+def _as_written(plan: MotionPlan) -> tuple[list[Series], list[Series]]:
+    """What the compiler could not do as it was written: places of feet, and balance."""
+    unreachable, unbalanced = [], []
+    for problem in plan.problems if isinstance(plan, CompiledPlan) else ():
         if isinstance(problem, OutOfReach):
-            series.append(_failed("way of a foot", problem.leg, problem.time, problem.miss, ""))
-        elif isinstance(problem, Unbalanced):
-            series.append(_failed("balance", "trunk", problem.time, np.nan, problem.reason))
-    return series
+            what = (problem.leg, problem.time, problem.miss, "")
+            unreachable.append(_failed("way of a foot", *what))
+        else:
+            what = ("trunk", problem.time, np.nan, problem.reason)
+            unbalanced.append(_failed("balance", *what))
+    return unreachable, unbalanced
 
 
 def _failed(what: str, subject: str, time: float, value: float, note: str) -> Series:

@@ -1,4 +1,9 @@
-"""Distances between links that must not touch, on the convex hulls of their collision meshes."""
+"""Distances between links that must not touch, on the convex hulls of their collision meshes.
+
+The distance of two convex bodies is found by GJK, the depth of an overlap by EPA (Gilbert, Johnson
+& Keerthi 1988; van den Bergen 2001), both in Coal. A hull contains its mesh, so a distance is never
+overrated.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +21,7 @@ from motions.feasibility.report import Series
 from motions.trajectory import Trajectory
 
 STRIDE = 4
-"""Every fourth sample is looked at: 25 a second."""
+"""Every fourth sample is looked at, 25 a second: at 1 m/s a link moves 4 cm between two of them."""
 
 
 class SelfCollision:

@@ -1,9 +1,15 @@
 """Checks of forces: can the feet carry the motion, and can the motors?
 
-At every instant the contact forces are those of least deviation from an even share of the weight
-that give the trunk the wrench it needs (Newton-Euler; Pinocchio's mass matrix and bias), within the
-friction pyramid of the whole-body controller. Torques follow from the joint rows of the equations
-of motion: tau = M a + h - J' f.
+The equations of motion, M a + h = S' tau + J' f (Wieber, Tedrake & Kuindersma 2016), split into
+six rows of the base, in which no motor acts, and twelve of the joints:
+
+    w = M_b a + h_b = J_b' f               the wrench that the trunk needs (Newton-Euler)
+    tau = M_j a + h_j - J_j' f             what is left for the motors
+
+M and h are Pinocchio's, with rotor inertia, v and a as in ``Trajectory`` (the base's in its own
+frame, so w too), f the forces of the ground on the rolling contact points in the frame of the
+motion. Of the f that give the trunk its wrench within the friction pyramid, the one that deviates
+least from an even share of the weight is taken; see ``_share``.
 """
 
 from __future__ import annotations
@@ -19,24 +25,34 @@ from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
+from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from motions.feasibility.kinematic import FEET, JOINTS
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
+from motions.plan import NORMAL_FORCE_MAX
+from motions.tracks import attitudes
 from motions.trajectory import Trajectory
 
 ARM = 0.2
-"""Length [m] by which moments are made comparable to forces: half the robot's track."""
+"""Length [m] that makes moments comparable to forces: half the distance of front and rear feet."""
 EVENNESS = 1e-4
-"""Weight of an even share of the load, against the wrench that the trunk needs."""
-PYRAMID = 0.6
-"""Friction coefficient of the whole-body controller's pyramid."""
-GREATEST_FORCE = 400.0
-"""Greatest normal force [N] of a fully loaded foot; see ``motions.plan``."""
+"""Weight of an even share of the load, against 1 of the wrench: decides only between forces that
+give the same wrench, and takes less than 0.01 N off that."""
+PYRAMID = WbcConfig().friction
+"""Friction coefficient of the whole-body controller's pyramid: it would ask for no other forces."""
 LOADED = 0.999
-"""Share of its load from which on a foot counts as standing fully."""
+"""Share of its load from which on a foot counts as standing fully: 1, less rounding."""
 PRESSED = 10.0
-"""Normal force [N] from which on the friction of a foot matters."""
+"""Normal force [N] from which on the friction of a foot matters; below, the quotient is noise and
+a slip moves nothing (own choice, 6 % of the weight)."""
+LEAST_WEIGHT = 1.0
+"""Least vertical force [N] by which moments are divided: the zero-moment point stays finite."""
+NO_SUPPORT = 1.0
+"""How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
+TIGHT_TORQUE, TIGHT_LOAD, TIGHT_FRICTION, TIGHT_SUPPORT = 0.1, 10.0, 0.05, 0.01
+"""Margins below which a warning is due: share of the smallest torque limit, N, 1 and m; own choice,
+about what separates a plan from its run in simulation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,21 +76,26 @@ def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     """Contact forces and torques along ``motion``."""
     count = len(motion.times)
     contact, tau = np.zeros((count, 4, 3)), np.zeros((count, 12))
-    missing, zmp = np.zeros((count, 2)), np.zeros((count, 2))
+    missing, wrench = np.zeros((count, 2)), np.zeros((count, 6))
     for row in range(count):
         snapshot = model.snapshot(_state(motion, row))
         needed = snapshot.mass_matrix @ motion.a[row] + snapshot.bias
+        wrench[row] = needed[:6]
         contact[row], missing[row] = _share(snapshot, needed[:6], motion.load_share[row], model)
         J = snapshot.J_contacts.reshape(12, 18)
         tau[row] = needed[6:] - J[:, 6:].T @ contact[row].ravel()
-        zmp[row] = _zero_moment_point(snapshot, needed[:6])
-    return Forces(contact, tau, missing, zmp)
+    return Forces(contact, tau, missing, _zero_moment_points(motion, wrench))
 
 
 def torque(
     motion: Trajectory, forces: Forces, model: RobotModel, limits: FeasibilityLimits
 ) -> tuple[Series, Series]:
-    """Torques against the motors' limits, and against what they give at that speed."""
+    """Torques against the motors' limits, and against what they give at that speed.
+
+    At its greatest voltage a DC motor's torque falls linearly with its speed and is gone at the
+    greatest one, tau <= tau_max (1 - |v| / v_max) / (1 - knee); below the knee the current is the
+    limit, tau_max. Only a driving motor, tau v > 0, meets that line; one that brakes is helped.
+    """
     asked = np.abs(forces.tau)
     bounds = np.tile(limits.torque_share * model.torque_limits, (len(asked), 1))
     share = np.abs(motion.v[:, 6:]) / model.speed_limits
@@ -82,7 +103,7 @@ def torque(
     at_speed = fade * model.torque_limits
     drives = forces.tau * motion.v[:, 6:] > 0.0
     left = np.where(drives, at_speed - asked, np.nan)
-    tight = 0.1 * float(model.torque_limits.min())
+    tight = TIGHT_TORQUE * float(model.torque_limits.min())
     return (
         Series("torque", "N m", JOINTS, motion.times, asked, bounds, bounds - asked, tight),
         Series("torque at speed", "N m", JOINTS, motion.times, asked, at_speed, left, tight),
@@ -92,7 +113,10 @@ def torque(
 def contacts(
     motion: Trajectory, forces: Forces, limits: FeasibilityLimits
 ) -> tuple[Series, Series, Series]:
-    """What the feet cannot give, the least load of three standing ones, and the friction needed."""
+    """What the feet cannot give, the least load of three standing ones, and the friction needed.
+
+    Friction is max(|f_x|, |f_y|) / f_z, in the axes of the pyramid that the controller keeps.
+    """
     bounds = np.tile([limits.wrench, limits.wrench * ARM], (len(motion.times), 1))
     short = Series(
         "contact wrench",
@@ -115,14 +139,19 @@ def contacts(
     left = np.where(is_pressed, grip - needed, np.nan)
     return (
         short,
-        Series("foot load", "N", FEET, motion.times, normal, floor, load, tight=10.0),
-        Series("friction", "", FEET, motion.times, needed, grip, left, tight=0.05),
+        Series("foot load", "N", FEET, motion.times, normal, floor, load, tight=TIGHT_LOAD),
+        Series("friction", "", FEET, motion.times, needed, grip, left, tight=TIGHT_FRICTION),
     )
 
 
 def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tuple[Series, Series]:
-    """Distance of the CoM and of the zero-moment point to the edges of the support polygon."""
-    values = np.full((len(motion.times), 2), -1.0)
+    """Distance of the CoM and of the zero-moment point to the edges of the support polygon.
+
+    At rest the CoM must lie above it (McGhee & Frank 1968); in motion the zero-moment point must
+    lie in it, or the feet would have to pull (Vukobratovic & Borovac 2004). Negative outside; less
+    than three feet have no inside, none at all count as 1 m outside.
+    """
+    values = np.full((len(motion.times), 2), -NO_SUPPORT)
     for stands in np.unique(motion.stance, axis=0):
         if not stands.any():
             continue
@@ -137,7 +166,7 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
         value = values[:, column : column + 1]
         bound = np.full_like(value, least)
         series.append(
-            Series(check, "m", (subject,), motion.times, value, bound, value - bound, tight=0.01)
+            Series(check, "m", (subject,), motion.times, value, bound, value - bound, TIGHT_SUPPORT)
         )
     return series[0], series[1]
 
@@ -159,22 +188,27 @@ def _share(
     load_share: Float[np.ndarray, "4"],
     model: RobotModel,
 ) -> tuple[Float[np.ndarray, "4 3"], Float[np.ndarray, "2"]]:
-    """Contact forces (4, 3) [N], and what force [N] and moment [N m] they leave over."""
+    """Contact forces (4, 3) [N], and what force [N] and moment [N m] they leave over.
+
+    Minimises |S (A f - w)|^2 + e |f - f_even|^2 over the forces f of the loaded feet, with A the
+    base columns of their Jacobians, transposed, S = diag(1, 1, 1, 1/ARM, 1/ARM, 1/ARM), subject to
+    |f_x|, |f_y| <= mu f_z and 0 <= f_z <= f_max s, where s is a foot's share of its load. As a QP,
+    1/2 f' H f + g' f, with H = (S A)' (S A) + e 1 and g = -(S A)' S w - e f_even.
+    """
     forces = np.zeros((4, 3))
     legs = [leg for leg in LEGS if load_share[leg] > 0.0]
-    scale = np.repeat([1.0, 1.0 / ARM], 3)
     if legs:
         A = snapshot.J_contacts[legs, :, :6].reshape(-1, 6).T
         even = np.zeros((len(legs), 3))
         shares = load_share[legs]
         even[:, 2] = model.mass * model.gravity * shares / shares.sum()
-        weighted = scale[:, None] * A
+        weighted = _SCALE[:, None] * A
         H = weighted.T @ weighted + EVENNESS * np.eye(3 * len(legs))
-        g = -weighted.T @ (scale * wrench) - EVENNESS * even.ravel()
+        g = -weighted.T @ (_SCALE * wrench) - EVENNESS * even.ravel()
         C = _PYRAMIDS[len(legs) - 1]
         lower = np.tile([-np.inf] * 4 + [0.0], len(legs))
         upper = np.zeros((len(legs), 5))
-        upper[:, 4] = GREATEST_FORCE * shares
+        upper[:, 4] = NORMAL_FORCE_MAX * shares
         try:
             x = solve_dense_qp(DenseQp(H, g, C, lower, upper.ravel()), "daqp").x
         except QpInfeasible:
@@ -184,17 +218,23 @@ def _share(
     return forces, np.array([np.linalg.norm(wrench[:3]), np.linalg.norm(wrench[3:])])
 
 
-def _zero_moment_point(
-    snapshot: Snapshot, wrench: Float[np.ndarray, "6"]
-) -> Float[np.ndarray, "2"]:
-    """Where the ground's forces act together (Vukobratovic & Borovac 2004, eq. 3)."""
-    R, base = snapshot.R_world_base, snapshot.state.q[:3]
-    force = R @ wrench[:3]
-    moment = R @ wrench[3:] + np.cross(base, force)
-    vertical = max(float(force[2]), 1.0)
-    return np.array([-moment[1] / vertical, moment[0] / vertical])
+def _zero_moment_points(
+    motion: Trajectory, wrench: Float[np.ndarray, "n 6"]
+) -> Float[np.ndarray, "n 2"]:
+    """Where the ground's forces act together (Vukobratovic & Borovac 2004, eq. 3).
+
+    ``wrench``: what the trunk needs, about the base in its frame. Moved to the origin on the
+    ground, F = R F_b and N = R N_b + p x F; there is no moment about the level axes at the point
+    x = -N_y / F_z, y = N_x / F_z. Where the feet hardly press, F_z counts as ``LEAST_WEIGHT``.
+    """
+    attitude = attitudes(motion.rpy)
+    force = attitude.apply(wrench[:, :3])
+    moment = attitude.apply(wrench[:, 3:]) + np.cross(motion.q[:, :3], force)
+    vertical = np.maximum(force[:, 2], LEAST_WEIGHT)
+    return np.column_stack([-moment[:, 1], moment[:, 0]]) / vertical[:, None]
 
 
+_SCALE = np.repeat([1.0, 1.0 / ARM], 3)
 _PYRAMID_ROWS = np.array(
     [
         [1.0, 0.0, -PYRAMID],
@@ -204,4 +244,6 @@ _PYRAMID_ROWS = np.array(
         [0.0, 0.0, 1.0],
     ]
 )
+"""Of one foot: f_x, -f_x, f_y, -f_y <= mu f_z, and the row of f_z itself."""
 _PYRAMIDS = tuple(np.kron(np.eye(feet), _PYRAMID_ROWS) for feet in (1, 2, 3, 4))
+"""The same for one to four feet."""

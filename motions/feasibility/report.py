@@ -104,8 +104,11 @@ class FeasibilityReport:
     Attributes:
         motion: its name.
         duration: its length [s].
-        series: every check over the whole motion.
-        failures: broken limits, the earliest first.
+        series: every check over the whole motion, causes before what follows from them: what no
+            joint angles can do, then what the joints and the ground forbid, then balance, then
+            speed, then the forces.
+        failures: broken limits in the order of ``series``, so the first is the one to mend first;
+            of one check the earliest first.
         warnings: limits that are met by little.
         margins: worst finding of every check.
     """
@@ -119,18 +122,18 @@ class FeasibilityReport:
 
     @staticmethod
     def of(motion: str, duration: float, series: Sequence[Series]) -> FeasibilityReport:
-        """Draw the conclusions from ``series``."""
+        """Draw the conclusions from ``series``, which has causes before their consequences."""
         failures, warnings, margins = [], [], {}
         for item in series:
             found = item.findings()
             if not found:
                 continue
             margins[item.check] = min(found, key=lambda finding: finding.margin)
-            failures += [finding for finding in found if not finding.margin >= 0.0]
+            broken = [finding for finding in found if not finding.margin >= 0.0]
+            failures += sorted(broken, key=lambda finding: finding.time)
             warnings += [finding for finding in found if 0.0 <= finding.margin < item.tight]
-        by_time = sorted(failures, key=lambda finding: finding.time)
         return FeasibilityReport(
-            motion, duration, tuple(series), tuple(by_time), tuple(warnings), margins
+            motion, duration, tuple(series), tuple(failures), tuple(warnings), margins
         )
 
     @property
@@ -144,7 +147,7 @@ class FeasibilityReport:
             raise MotionInfeasible(self.motion, self.failures)
 
     def table(self) -> str:
-        """The worst finding of every check, at most 80 columns wide."""
+        """The worst finding of every check in the order of ``series``, at most 80 columns wide."""
         head = f"{'check':<16}{'worst':<17}{'at':>8}{'value':>10}{'limit':>9}{'margin':>10}"
         lines = [head, "-" * 80]
         for check, finding in self.margins.items():
@@ -153,7 +156,7 @@ class FeasibilityReport:
             if np.isfinite(finding.value):
                 value = 0.0 if abs(finding.value) < NOISE else finding.value
                 line += f"{value:>10.3g}{finding.limit:>9.3g}{finding.margin:>10.3g}"
-                lines.append(f"{line} {mark:<2} {finding.unit}")
+                lines.append(f"{line} {mark:<2} {finding.unit}".rstrip())
             else:
                 lines.append(f"{line}{'-':>10}{'-':>9}{'-':>10} {mark}")
         verdict = "can do it" if self.ok else f"cannot do it: {_count(len(self.failures), 'limit')}"

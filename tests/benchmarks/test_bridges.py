@@ -1,63 +1,61 @@
-"""Which benches of the bridges a name stands for, and what is said when one cannot run."""
+"""Which benchmarks of the bridges a name stands for, and what is said when one cannot run."""
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import pytest
 
-from benchmarks.bridges import DOORS, find_doors
-from benchmarks.rows import Family
-from controller.cli import main as cli
+from benchmarks.__main__ import main
+from benchmarks.bridges.command import SCENARIOS
+from benchmarks.scenario import Scenario, chosen_scenarios
 from controller.cli.common import ExitCode
 from go2_wbc.errors import CommandError
 
-FAMILIES = [family for door in DOORS for family in door.families]
-
-
-def chosen(*names: str) -> list[Family]:
-    return [family for door in find_doors(names) for family in door.families]
-
 
 def test_no_name_stands_for_everything() -> None:
-    assert chosen() == FAMILIES
+    assert chosen_scenarios(SCENARIOS, []) == SCENARIOS
 
 
-def test_a_door_stands_for_its_families() -> None:
-    assert chosen("unitree") == list(DOORS[1].families)
+@pytest.mark.parametrize("group", ["ros2", "unitree"])
+def test_a_group_stands_for_its_scenarios(group: str) -> None:
+    expected = tuple(scenario for scenario in SCENARIOS if scenario.name.startswith(group))
+    assert chosen_scenarios(SCENARIOS, [group]) == expected
 
 
-@pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.name)
-def test_a_family_stands_for_itself(family: Family) -> None:
-    assert chosen(family.name) == [family]
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.name)
+def test_a_scenario_stands_for_itself(scenario: Scenario) -> None:
+    assert chosen_scenarios(SCENARIOS, [scenario.name]) == (scenario,)
 
 
 def test_an_unknown_name_is_answered_with_the_valid_ones() -> None:
     with pytest.raises(CommandError, match=r"ros3.*ros2.*unitree-drive"):
-        find_doors(["ros3"])
+        chosen_scenarios(SCENARIOS, ["ros3"])
 
 
-def test_the_rows_are_listed_without_the_extras(
+def test_the_metrics_are_listed_without_the_extras(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(sys.modules, "cyclonedds.core", None)
     monkeypatch.setitem(sys.modules, "rclpy", None)
-    assert cli.main(["bench", "bridges", "--list"]) == ExitCode.OK
+    assert main(["bridges", "--list"]) == ExitCode.OK
     lines = capsys.readouterr().out.splitlines()
-    assert {family.name for family in FAMILIES} <= set(lines)
+    assert {scenario.name for scenario in SCENARIOS} <= set(lines)
     assert max(map(len, lines)) <= 80
 
 
-def test_row_names_are_unique() -> None:
-    names = [row.name for family in FAMILIES for row in family.rows]
+def test_metric_names_are_unique() -> None:
+    names = [metric.name for scenario in SCENARIOS for metric in scenario.metrics]
     assert len(names) == len(set(names))
 
 
-def test_without_the_extra_the_bench_names_the_line_that_installs_it(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+def test_without_the_extra_the_line_that_installs_it_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
 ) -> None:
     monkeypatch.setitem(sys.modules, "cyclonedds.core", None)
-    assert cli.main(["bench", "bridges", "unitree"]) == ExitCode.RUNTIME
+    assert main(["bridges", "unitree"]) == ExitCode.RUNTIME
     complaint = capsys.readouterr().err
     assert 'pip install -e ".[unitree]"' in complaint
     assert "Traceback" not in complaint
+    assert not results_folder.exists()

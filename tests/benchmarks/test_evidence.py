@@ -1,22 +1,25 @@
-"""The README's evidence comes from the bench, whole."""
+"""The evidence of the documentation comes from the benchmark, whole."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
+from benchmarks.__main__ import main
+from benchmarks.behaviour import SCENARIOS
 from benchmarks.evidence import BEGIN, END, LINES, filled, table
-from benchmarks.families import FAMILIES
+from controller.cli.common import ExitCode
 from go2_wbc.errors import ConfigError
 
-README = Path(__file__).resolve().parents[2] / "README.md"
-ROWS = {line.row: {"n": 20, "mean": 0.5, "worst": 0.25} for line in LINES}
+PAGE = Path(__file__).resolve().parents[2] / "docs/evidence.md"
+ROWS = {line.metric: {"n": 20, "mean": 0.5, "worst": 0.25} for line in LINES}
 
 
-def test_every_line_is_a_row_of_the_bench() -> None:
-    names = {row.name for family in FAMILIES for row in family.rows}
-    assert {line.row for line in LINES} <= names
+def test_every_line_is_a_metric_of_the_benchmark() -> None:
+    names = {metric.name for scenario in SCENARIOS for metric in scenario.metrics}
+    assert {line.metric for line in LINES} <= names
 
 
 def test_the_table_is_put_between_the_marks_and_nothing_else_changes() -> None:
@@ -24,7 +27,19 @@ def test_the_table_is_put_between_the_marks_and_nothing_else_changes() -> None:
     assert filled(text, ROWS) == f"before\n{BEGIN}: x -->\n{table(ROWS)}\n{END}\nafter\n"
 
 
-def test_a_missing_row_or_mark_is_named() -> None:
+def test_the_command_fills_a_file_from_several_results(tmp_path: Path) -> None:
+    readme, results = tmp_path / "PAGE.md", []
+    readme.write_text(f"before\n{BEGIN}: x -->\nold\n{END}\n")
+    rows = [{"name": name, **row} for name, row in ROWS.items()]
+    for index, part in enumerate((rows, [{**rows[0], "n": 7}])):
+        results.append(tmp_path / f"{index}.json")
+        results[-1].write_text(json.dumps({"rows": part}))
+    assert main(["evidence", str(readme), *map(str, results)]) == ExitCode.OK
+    expected = table({**ROWS, LINES[0].metric: {**ROWS[LINES[0].metric], "n": 7}})
+    assert readme.read_text() == f"before\n{BEGIN}: x -->\n{expected}\n{END}\n"
+
+
+def test_a_missing_metric_or_mark_is_named() -> None:
     short = {name: row for name, row in ROWS.items() if name != "five.load"}
     with pytest.raises(ConfigError, match=r"no value for five\.load"):
         table(short)
@@ -32,8 +47,8 @@ def test_a_missing_row_or_mark_is_named() -> None:
         filled("nothing here", ROWS)
 
 
-def test_no_figure_of_the_readme_is_blank() -> None:
-    text = README.read_text(encoding="utf-8")
+def test_no_figure_of_the_page_is_blank() -> None:
+    text = PAGE.read_text(encoding="utf-8")
     block = text[text.index(BEGIN) : text.index(END)]
     lines = [line for line in block.splitlines() if line.startswith("|")][2:]
     assert len(lines) == len(LINES)

@@ -1,4 +1,4 @@
-"""The bench of the feasibility check: its motions, its reading of physics, its matrix."""
+"""The benchmark of the feasibility check: its motions, its reading of physics, its matrix."""
 
 from __future__ import annotations
 
@@ -9,18 +9,20 @@ from pathlib import Path
 import pytest
 
 from benchmarks import feasibility
-from benchmarks.feasibility import FAMILY, Verdicts, harms, render, verdicts_of
-from benchmarks.generated_motions import BROKEN, GOOD, NEAR, generated_motion, near_specimen
-from benchmarks.motion_runs import MotionRun
-from benchmarks.rows import Family, Measurement
+from benchmarks.__main__ import main
+from benchmarks.feasibility import CLEAR_MOTIONS, ConfusionMatrix, render, what_went_wrong
+from benchmarks.generated_motions import BROKEN, GOOD, NEAR, generated_motion, near_limit_motion
+from benchmarks.runner import run_trial
+from benchmarks.scenario import Measurement
 from benchmarks.trials import Trial
-from controller.cli import main as cli
 from controller.cli.common import ExitCode
+from controller.go2_controller import GO2Controller
+from controller.motion_measurement import MotionMeasurement
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
 
 COUNT = 160
-CLEAN = MotionRun(
+CLEAN = MotionMeasurement(
     fall=None,
     said=True,
     reason="done",
@@ -55,7 +57,7 @@ def test_a_seed_gives_the_same_motion_every_time_and_another_seed_another_one() 
 
 
 def test_near_the_limits_there_are_motions_of_every_kind() -> None:
-    assert {near_specimen(seed).kind for seed in range(len(NEAR))} == set(NEAR)
+    assert {near_limit_motion(seed).kind for seed in range(len(NEAR))} == set(NEAR)
 
 
 def test_a_wrong_entry_begins_where_the_robot_is_not(model: RobotModel) -> None:
@@ -67,7 +69,7 @@ def test_a_wrong_entry_begins_where_the_robot_is_not(model: RobotModel) -> None:
 
 
 def test_nothing_is_held_against_a_clean_run(model: RobotModel) -> None:
-    assert harms(CLEAN, generated_motion(0).plan(model)) == []
+    assert what_went_wrong(CLEAN, generated_motion(0).plan(model)) == []
 
 
 @pytest.mark.parametrize(
@@ -84,14 +86,16 @@ def test_nothing_is_held_against_a_clean_run(model: RobotModel) -> None:
         (replace(CLEAN, touched=0.1), "touched itself"),
     ],
 )
-def test_what_physics_shows_is_said_in_words(model: RobotModel, run: MotionRun, word: str) -> None:
-    (harm,) = harms(run, generated_motion(0).plan(model))
+def test_what_physics_shows_is_said_in_words(
+    model: RobotModel, run: MotionMeasurement, word: str
+) -> None:
+    (harm,) = what_went_wrong(run, generated_motion(0).plan(model))
     assert word in harm
 
 
 def test_a_place_out_of_reach_counts_although_the_leg_follows_its_plan(model: RobotModel) -> None:
     line = Timeline(name="too high").foot("FR", x=0.1, z=1.0, over=1.5).home(over=1.5)
-    (harm,) = harms(CLEAN, compile_timeline(line, model))
+    (harm,) = what_went_wrong(CLEAN, compile_timeline(line, model))
     assert "cm off what was written" in harm
 
 
@@ -102,19 +106,19 @@ def result(refused: float, failed: float) -> Measurement:
     )
 
 
-NONE = Verdicts((), {})
+NONE = ConfusionMatrix((), {})
 
 
-def matrix(*pairs: tuple[float, float]) -> Verdicts:
+def matrix(*pairs: tuple[float, float]) -> ConfusionMatrix:
     measured = {seed: result(*pair) for seed, pair in enumerate(pairs)}
-    return verdicts_of({FAMILY.name: measured})
+    return ConfusionMatrix.of(measured, generated_motion)
 
 
 def test_precision_and_recall_are_shares_of_the_refused_and_of_the_failed() -> None:
     found = matrix((1, 1), (1, 1), (1, 1), (1, 0), (0, 1), (0, 1), (0, 0))
     assert found.precision == pytest.approx(3 / 4)
     assert found.recall == pytest.approx(3 / 5)
-    assert [case.seed for case in found.misses] == [3, 4, 5]
+    assert [case.seed for case in found.wrong] == [3, 4, 5]
     assert not found.ok
     assert "precision 0.750, recall 0.600" in render(found, NONE)
     assert max(map(len, render(found, NONE).splitlines())) <= 80
@@ -122,7 +126,8 @@ def test_precision_and_recall_are_shares_of_the_refused_and_of_the_failed() -> N
 
 def test_all_right_is_ok_and_a_lost_run_is_not() -> None:
     assert matrix((1, 1), (0, 0)).ok
-    lost = verdicts_of({FAMILY.name: {0: result(1, 1), 1: Measurement({}, reason="fell")}})
+    trials = {0: result(1, 1), 1: Measurement({}, reason="fell")}
+    lost = ConfusionMatrix.of(trials, generated_motion)
     assert not lost.ok
     assert "seed 1: no result, fell" in render(lost, NONE)
 
@@ -132,15 +137,16 @@ def fake(trial: Trial) -> Measurement:
 
 
 def test_the_command_reports_and_writes_the_matrix(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    results_folder: Path,
 ) -> None:
-    for name in ("FAMILY", "NEAR_FAMILY"):
-        family = getattr(feasibility, name)
-        monkeypatch.setattr(feasibility, name, Family(family.name, family.rows, fake))
+    for name in ("CLEAR_MOTIONS", "NEAR_LIMITS"):
+        monkeypatch.setattr(feasibility, name, replace(getattr(feasibility, name), measure=fake))
     file = tmp_path / "matrix.json"
-    arguments = ["bench", "feasibility", "--motions", "6", "--near", "4", "--jobs", "1"]
-    arguments.append("--json")
-    assert cli.main([*arguments, "--out", str(file)]) == ExitCode.OK
+    arguments = ["feasibility", "--motions", "6", "--near", "4", "--jobs", "1", "--json"]
+    assert main([*arguments, "--out", str(file)]) == ExitCode.OK
     printed = json.loads(capsys.readouterr().out)
     assert printed == json.loads(file.read_text())
     assert printed["matrix"] == {
@@ -150,11 +156,24 @@ def test_the_command_reports_and_writes_the_matrix(
         "accepted_done": 3,
     }
     assert len(printed["near_limits"]["cases"]) == 4
+    capsys.readouterr()
+    assert main([*arguments, "--resume"]) == ExitCode.OK
+    again = capsys.readouterr()
+    assert json.loads(again.out) == printed
+    assert "10 finished trials are taken" in again.err
+
+
+def test_a_robot_that_does_not_get_ready_is_a_lost_run_and_not_a_bug(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(GO2Controller, "stand", lambda _go2: False)
+    measured = run_trial(CLEAR_MOTIONS.measure, 0)
+    assert (measured.values, measured.reason) == ({}, "lying, nothing asked yet")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(0, 2 * len(BROKEN), 3))
 def test_the_check_foresees_what_physics_does(seed: int) -> None:
-    measured = feasibility.measure(Trial(seed))
+    measured = CLEAR_MOTIONS.measure(Trial(seed))
     assert measured.values["feasibility.failed"] == float(generated_motion(seed).is_broken is True)
     assert measured.values["feasibility.refused"] == float(generated_motion(seed).is_broken is True)

@@ -1,30 +1,29 @@
-"""The bench's trials draw what they say, and its measures measure what they say."""
+"""Trials draw what they say, and the scenarios' measures measure what they say."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from benchmarks.ground_truth import Track
 from benchmarks.high_fives import highest_window, largest_slip, longest_run
-from benchmarks.pushes import CLIMB, RUNG, highest_rung
-from benchmarks.sequence import FAULTS, Judge
+from benchmarks.pushes import IMPULSE_STEP, largest_impulse
+from benchmarks.sequence import CRITERIA, StepCheck
 from benchmarks.trials import (
     FRICTION_RANGE,
     MASS_RANGE,
     NOMINAL_FRICTION,
     YAW_RANGE,
-    Failed,
-    Subject,
     Trial,
+    TrialFailed,
+    TrialRobot,
 )
 from controller.demo.report import StepResult
 from controller.demo.run import DemoProgress
 from controller.demo.steps import DEMO_STEPS
 from go2_wbc.legs import LEGS, Leg
+from tests.go2_wbc.plant.helpers import empty_recording
 
 # --- trials -------------------------------------------------------------------------------------
 
@@ -69,16 +68,16 @@ def test_the_plant_of_a_trial_is_what_the_trial_says() -> None:
     [
         (14.0, 14.0, 14.0),
         (15.0, 14.0, 14.0),
-        (100.0, 14.0, 14.0 + CLIMB * RUNG),
+        (100.0, 14.0, 14.0 + IMPULSE_STEP),
         (13.0, 14.0, 12.0),
         (0.0, 14.0, 0.0),
         (1.0, 3.0, 1.0),
     ],
 )
-def test_the_ladder_ends_below_the_first_impulse_that_is_not_survived(
+def test_the_search_ends_below_the_first_impulse_that_is_not_survived(
     greatest: float, first: float, found: float
 ) -> None:
-    assert highest_rung(lambda impulse: impulse <= greatest, first) == found
+    assert largest_impulse(lambda impulse: impulse <= greatest, first) == found
 
 
 def test_the_longest_run_is_found() -> None:
@@ -90,64 +89,38 @@ def test_the_longest_run_is_found() -> None:
 def test_the_held_height_is_the_best_that_was_kept_for_the_whole_time() -> None:
     heights = np.array([0.0, 0.9, 0.59, 0.61, 0.62, 0.6, 0.0])
     assert highest_window(heights, 3) == slice(3, 6)
-    with pytest.raises(Failed):
+    with pytest.raises(TrialFailed):
         highest_window(heights, 8)
 
 
 def test_slip_is_the_largest_excursion_and_not_the_final_one() -> None:
     v = np.zeros((201, 4, 3))
     v[1:101, Leg.RL, 0], v[101:, Leg.RL, 0] = 0.02, -0.02  # 4 mm there and back
-    track = empty_track(201, v)
-    assert largest_slip(track, list(LEGS)) == pytest.approx(0.004)
-    assert largest_slip(track, [Leg.FL]) == 0.0
+    recorded = empty_recording(201, v)
+    assert largest_slip(recorded, list(LEGS)) == pytest.approx(0.004)
+    assert largest_slip(recorded, [Leg.FL]) == 0.0
 
 
-def test_a_track_gives_the_velocity_in_the_frame_of_the_heading() -> None:
-    track = empty_track(11, np.zeros((11, 4, 3)))
-    track.rpy[:, 2] = math.pi / 2
-    track.p_world_com[:, :2] = track.time[:, None] * [0.2, 0.5]  # world y is ahead, -x is left
-    assert track.com_velocity == pytest.approx(np.tile([0.5, -0.2, 0.0], (10, 1)))
-
-
-def test_every_step_of_the_demo_has_a_criterion_of_the_bench() -> None:
-    assert {step.name for step in DEMO_STEPS} <= set(FAULTS)
+def test_every_step_of_the_demo_has_a_criterion_of_the_benchmark() -> None:
+    assert {step.name for step in DEMO_STEPS} <= set(CRITERIA)
 
 
 def test_no_step_of_the_demo_is_true_of_a_robot_that_lies_there() -> None:
-    with Subject(Trial(0)) as robot:
+    with TrialRobot(Trial(0)) as robot:
         before = robot.plant.read()
         robot.go2.wait(0.01)
-        faults = {name: fault_of(robot, before) for name, fault_of in FAULTS.items()}
-    assert [name for name, fault in faults.items() if fault is None] == []
-    assert "went" in str(faults["forward"])
-    assert "turned" in str(faults["turn"])
+        failures = {name: failure_of(robot, before) for name, failure_of in CRITERIA.items()}
+    assert [name for name, failure in failures.items() if failure is None] == []
+    assert "went" in str(failures["forward"])
+    assert "turned" in str(failures["turn"])
 
 
-def test_a_true_that_the_simulator_does_not_bear_out_is_noted() -> None:
+def test_a_true_that_the_simulator_contradicts_is_noted() -> None:
     result = StepResult("sit", "sit", ok=True, reason="done", start=0.0, duration=0.0)
-    with Subject(Trial(0)) as robot:
-        judge = Judge(robot)
-        judge(DemoProgress(0, 1, "sit"))
-        judge(DemoProgress(0, 1, "sit", result))
-        judge(DemoProgress(0, 1, "sit", replace(result, ok=False, reason="fell")))
-    assert len(judge.untrue) == 1
-    assert judge.untrue[0].startswith("sit: pitch ")
-
-
-def empty_track(n: int, v_contacts: np.ndarray) -> Track:
-    three, twelve = np.zeros((n, 3)), np.zeros((n, 12))
-    return Track(
-        time=0.002 * np.arange(n),
-        q=np.zeros((n, 19)),
-        v=np.zeros((n, 18)),
-        rpy=three.copy(),
-        tau=twelve,
-        foot_forces=np.zeros((n, 4)),
-        p_world_com=three.copy(),
-        p_world_feet=np.zeros((n, 4, 3)),
-        p_world_contacts=np.zeros((n, 4, 3)),
-        v_world_contacts=v_contacts,
-        trunk_force=np.zeros(n),
-        limb_force=np.zeros(n),
-        touches_itself=np.zeros(n, dtype=bool),
-    )
+    with TrialRobot(Trial(0)) as robot:
+        check = StepCheck(robot)
+        check(DemoProgress(0, 1, "sit"))
+        check(DemoProgress(0, 1, "sit", result))
+        check(DemoProgress(0, 1, "sit", replace(result, ok=False, reason="fell")))
+    assert len(check.untrue) == 1
+    assert check.untrue[0].startswith("sit: pitch ")

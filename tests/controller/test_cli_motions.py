@@ -81,7 +81,7 @@ def test_check_gives_json_with_every_margin(capsys: pytest.CaptureFixture[str]) 
         (["check", "moonwalk"], ExitCode.USAGE, "unknown motion 'moonwalk'; valid: bow"),
         (["check", "nowhere.py"], ExitCode.FAILED, "there is no file nowhere.py"),
         (["check", "wave", "--set", "times=99"], ExitCode.FAILED, "times must be 1 to 8, got 99"),
-        (["check", "wave", "--set", "times"], ExitCode.USAGE, "--set needs NAME=VALUE"),
+        (["check", "wave", "--set", "times"], ExitCode.USAGE, "set by NAME=VALUE, got 'times'"),
         (["check", "wave", "--set", "x=1"], ExitCode.FAILED, "unknown parameter 'x'"),
         (["new", "two words"], ExitCode.USAGE, "must be a Python name"),
         (["export", "wave", "--out", "wave.txt"], ExitCode.USAGE, "valid: .csv, .npz"),

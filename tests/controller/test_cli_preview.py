@@ -13,7 +13,7 @@ from PIL import Image
 from controller.cli import motion_preview_run
 from controller.cli.common import ExitCode
 from controller.cli.main import main
-from controller.cli.motion_source import MotionSource
+from controller.cli.motion_args import MotionSource
 from go2_wbc.errors import CommandError
 from tests.live_preview import BROKEN, GOOD, TOO_HIGH, LivePreview
 from tests.viz.page_reader import read_data

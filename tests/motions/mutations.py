@@ -1,6 +1,6 @@
-"""Faults, put by seed into the library's motions, and an eye of their own for limits they break.
+"""Faults, put by seed into the library's motions, and an oracle for the limits they break.
 
-The eye reads the compiled plan with Pinocchio and plane geometry. It shares no code with the
+The oracle reads the compiled plan with Pinocchio and plane geometry. It shares no code with the
 feasibility check, so that the two can be set against each other.
 """
 
@@ -18,13 +18,13 @@ from go2_wbc.legs import LEGS
 from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, load_motion, motion_names
-from motions.keys import BodyKey, Frame, LegKey, LegTarget, ShiftKey
+from motions.keys import BalanceShift, BodyKey, Frame, LegKey, LegTarget
 from motions.timeline import AnyKey
 
 Mutator = Callable[[Timeline, np.random.Generator], Timeline | None]
-_KeyType = TypeVar("_KeyType", BodyKey, LegKey, ShiftKey)
+_KeyType = TypeVar("_KeyType", BodyKey, LegKey, BalanceShift)
 
-STEP = 0.004  # s, between the instants that the eye looks at
+STEP = 0.004  # s, between the instants that the oracle looks at
 JUMP = 0.6  # m/s or rad/s from one instant to the next: 150 m/s^2
 AWAY = 0.035  # m or rad off a posture at the end
 OUTSIDE = -0.005  # m; a CoM this near to the edge of its feet cannot be held up
@@ -38,7 +38,7 @@ class Fault:
     Attributes:
         mutator: what was done to it.
         line: the result.
-        broken: what the eye sees, in words.
+        broken: what the oracle sees, in words.
     """
 
     mutator: str
@@ -94,9 +94,9 @@ def _hurried(line: Timeline, rng: np.random.Generator) -> Timeline | None:
 
 def _without_balance(line: Timeline, rng: np.random.Generator) -> Timeline | None:
     """Feet are raised, and the trunk stays where it is."""
-    if not line.in_order(ShiftKey):
+    if not line.in_order(BalanceShift):
         return None
-    return replace(line, keys=tuple(key for key in line.keys if not isinstance(key, ShiftKey)))
+    return replace(line, keys=tuple(key for key in line.keys if not isinstance(key, BalanceShift)))
 
 
 def _second_foot(line: Timeline, rng: np.random.Generator) -> Timeline | None:
@@ -146,7 +146,7 @@ def _jumping(line: Timeline, rng: np.random.Generator) -> Timeline | None:
 
 def _mislabelled(line: Timeline, rng: np.random.Generator) -> Timeline | None:
     """It says that it starts or ends in another posture."""
-    others = [stance for stance in Posture if stance is not line.exit]
+    others = [posture for posture in Posture if posture is not line.exit]
     return replace(line, exit=others[int(rng.integers(len(others)))])
 
 
@@ -193,7 +193,7 @@ def _without(line: Timeline, old: AnyKey) -> Timeline:
     return replace(line, keys=tuple(key for key in line.keys if key is not old), cursor=line.end)
 
 
-# --- the eye ----------------------------------------------------------------------------------
+# --- the oracle -------------------------------------------------------------------------------
 
 
 def limit_broken(line: Timeline, model: RobotModel) -> str:

@@ -7,7 +7,7 @@ import inspect
 import numpy as np
 import pytest
 
-from go2_wbc.errors import CommandError, MotionInfeasible, TimelineError
+from go2_wbc.errors import CommandError, MotionInfeasible
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
@@ -105,12 +105,49 @@ def test_a_com_off_the_triangle_is_found_only_while_a_paw_is_up(
     assert "foot load" in failed(report) or "contact wrench" in failed(report)
 
 
-def test_findings_come_in_the_order_of_their_time(
+CAUSES = (
+    ("numbers", "way of a foot", "reach"),
+    (
+        "joint position",
+        "self-collision",
+        "clearance",
+        "dragging",
+        "landing place",
+        "entry and exit",
+    ),
+    ("balance", "support"),
+    ("joint speed", "landing speed", "continuity"),
+    ("support of ZMP", "contact wrench", "foot load", "friction", "torque", "torque at speed"),
+)
+"""Out of reach; postures the robot cannot take; places; balance; speed; forces."""
+
+
+def rank(check: str) -> int:
+    return next(place for place, checks in enumerate(CAUSES) if check in checks)
+
+
+def test_causes_come_before_what_follows_from_them(
     good: CompiledPlan, checker: FeasibilityChecker
 ) -> None:
-    times = [f.time for f in checker.check(with_body_aside(good, 0.3)).failures]
-    assert len(times) >= 2
-    assert times == sorted(times)
+    late = Timeline().body(z=-0.02, over=0.1, ease="hold").home(over=1.0).hold(1.0)
+    late = late.body(z=0.18, over=1.0).home(over=1.0)
+    for motion in (with_body_aside(good, 0.3), with_joint_too_fast(good), late):
+        report = checker.check(motion)
+        ranks = [rank(finding.check) for finding in report.failures]
+        assert len(set(ranks)) >= 2
+        assert ranks == sorted(ranks)
+        assert [rank(name) for name in report.margins] == sorted(map(rank, report.margins))
+        broken = [line[:16].strip() for line in report.table().splitlines() if line[70:72] == " x"]
+        assert broken == list(dict.fromkeys(finding.check for finding in report.failures))
+        with pytest.raises(MotionInfeasible) as caught:
+            report.raise_if_infeasible()
+        assert str(report.failures[0]) == str(caught.value).splitlines()[1].strip()
+        for check in set(broken):
+            times = [f.time for f in report.failures if f.check == check]
+            assert times == sorted(times)
+    # The jump of the trunk comes first, what is out of reach is the cause that is named first.
+    assert report.failures[0].check == "way of a foot"
+    assert report.failures[0].time > 1.0 > min(finding.time for finding in report.failures)
 
 
 def test_a_plan_that_is_not_a_number_is_infeasible(
@@ -129,6 +166,7 @@ AWAY = {
     "friction": Timeline().body(y=0.06, over=0.2).body(y=-0.06, over=0.2).home(over=0.2),
     "support": Timeline(balance=False).foot("FR", z=0.1, over=0.8).home(over=0.8),
     "landing speed": Timeline().foot("FR", z=0.15, over=0.6).foot("FR", over=0.1, ease="linear"),
+    "dragging": Timeline().foot("FR", x=0.05, z=0.0, over=0.6).home(over=0.6),
     "clearance": Timeline().body(pitch=deg(35), z=-0.2, over=1.0).home(over=1.0),
     "entry and exit": Timeline().body(z=-0.08, over=1.0),
     "balance": Timeline().foot("FR", z=0.1, over=0.8).foot("RL", z=0.1, over=0.8),
@@ -141,6 +179,24 @@ def test_what_the_robot_cannot_do_is_found_under_its_name(
 ) -> None:
     report = checker.check(AWAY[check])
     assert check in failed(report), report.table()
+
+
+def test_a_foot_that_moves_along_the_ground_is_found_and_one_that_rises_on_its_way_is_not(
+    checker: FeasibilityChecker,
+) -> None:
+    (finding,) = checker.check(AWAY["dragging"]).failures
+    assert (finding.check, finding.subject, finding.unit) == ("dragging", "FR", "m")
+    assert finding.value == pytest.approx(0.1, abs=1e-3)  # there, and back with home()
+    assert finding.limit == 0.01
+    for line in (
+        Timeline().foot("FR", z=0.03, over=0.3).foot("FR", x=0.05, z=0.0, over=0.6),
+        Timeline().foot("FR", x=0.1, z=0.03, over=0.6).foot("FR", x=0.1, z=0.05, over=0.6),
+    ):
+        assert "dragging" not in failed(checker.check(line))
+    back = Timeline().foot("FR", z=0.03, over=0.3).foot("FR", x=0.05, over=0.6).home(over=0.6)
+    (finding,) = checker.check(back).failures
+    assert finding.check == "dragging"
+    assert finding.value == pytest.approx(0.05, abs=3e-3)  # and the last bit of the way down
 
 
 def test_legs_that_cross_are_found(checker: FeasibilityChecker) -> None:
@@ -156,8 +212,9 @@ def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: Feasibil
     assert checker.check("bow").motion == "bow"
     with pytest.raises(CommandError, match="unknown motion 'bows'; valid: bow"):
         checker.check("bows")
-    with pytest.raises(TimelineError, match="a motion is a name, a Timeline or a plan, not 3"):
-        inspect.unwrap(FeasibilityChecker.check)(checker, 3)  # past the checks of types
+    for ask in (FeasibilityChecker.check, FeasibilityChecker.evaluate, FeasibilityChecker.plan):
+        with pytest.raises(CommandError, match=r"motion must be a name of the library.* got 3"):
+            inspect.unwrap(ask)(checker, 3)  # past the checks of types
 
 
 def test_a_moment_without_balance_is_told_without_a_number(checker: FeasibilityChecker) -> None:

@@ -35,5 +35,5 @@ def test_the_faults_are_of_every_kind_and_on_many_motions(broken: list[Fault]) -
 
 
 @pytest.mark.parametrize("name", motion_names())
-def test_the_eye_has_nothing_against_the_library(model: RobotModel, name: str) -> None:
+def test_the_oracle_finds_nothing_wrong_with_the_library(model: RobotModel, name: str) -> None:
     assert limit_broken(load_motion(name), model) == ""

@@ -17,7 +17,7 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, deg
 from motions.compiler import OutOfReach, contact_schedule
-from motions.keys import BodyKey, LegKey, ShiftKey
+from motions.keys import BalanceShift, BodyKey, LegKey
 from motions.timeline import SHIFT_TIME
 from motions.tracks import home_poses
 
@@ -51,6 +51,28 @@ def test_at_puts_the_cursor_anywhere_and_also_at_the_start_of_the_last_move() ->
 def test_beats_are_seconds_of_sixty_per_minute() -> None:
     line = Timeline().bpm(120.0).body(z=-0.05, over=2.0).hold(1.0).at(4.0).home(over=1.0)
     assert [(key.start, key.end) for key in line.keys] == [(0.0, 1.0), (2.0, 2.5)]
+
+
+@pytest.mark.parametrize(
+    ("tempo", "beats"), [(60.0, 1.0), (120.0, 2.0), (200.0, 3.0), (240.0, 4.0), (40.0, 1.0)]
+)
+def test_with_a_tempo_the_shift_before_a_raise_ends_on_a_beat(tempo: float, beats: float) -> None:
+    line = Timeline().bpm(tempo).hold(1.0).foot("FR", z=0.05, over=1.0)
+    (shift,), (up,) = line.in_order(BalanceShift), line.in_order(LegKey)
+    beat = 60.0 / tempo
+    assert shift.end - shift.start == pytest.approx(beats * beat)
+    assert beats * beat + EXACT >= SHIFT_TIME > (beats - 1.0) * beat
+    assert up.start == pytest.approx((1.0 + beats) * beat)
+
+
+def test_the_shift_before_a_raise_may_be_given_in_beats() -> None:
+    line = Timeline(shift_time=0.5).foot("FR", z=0.05, over=0.5).home(over=0.5)
+    slow = line.bpm(120.0, shift_time=3.0).foot("FL", z=0.05, over=1.0)
+    first, _, second = slow.in_order(BalanceShift)
+    assert first.end - first.start == 0.5
+    assert second.end - second.start == pytest.approx(1.5)
+    again = slow.home(over=1.0).bpm(100.0).foot("FR", z=0.05, over=1.0).in_order(BalanceShift)[-1]
+    assert again.end - again.start == pytest.approx(0.6)  # a beat: the first that is 0.5 s or more
 
 
 # --- joining --------------------------------------------------------------------------------------
@@ -88,7 +110,7 @@ def test_a_mirror_image_of_a_mirror_image_is_the_motion_itself() -> None:
 
 def test_a_raised_foot_is_a_swing_leg_and_the_trunk_moves_first() -> None:
     line = Timeline().foot("FL", z=0.1, over=0.6).hold(0.5).home(over=0.7)
-    (shift, back), (up, down) = line.in_order(ShiftKey), line.in_order(LegKey)
+    (shift, back), (up, down) = line.in_order(BalanceShift), line.in_order(LegKey)
     assert (shift.start, shift.end) == (0.0, SHIFT_TIME)
     assert shift.raised == {Leg.FL}
     assert up.start == SHIFT_TIME
@@ -159,7 +181,15 @@ NOD = Timeline().body(pitch=0.1, over=0.5)
     ("write", "message"),
     [
         (lambda: Timeline().body(pitch=15.0, over=1.0), r"looks like degrees: write deg\(15\)"),
+        (lambda: Timeline().body(roll=3, over=1.0), r"write deg\(3\); 3 rad is 172 deg.* 90 at"),
+        (lambda: Timeline().body(yaw=-2, over=1.0), r"yaw of -2 rad .*: write deg\(-2\)"),
+        (lambda: Timeline().leg("FR", hip=2, thigh=1, calf=-2, over=1.0), r"hip of 2 .*deg\(2\)"),
+        (lambda: Timeline().leg("FR", hip=0, thigh=60, calf=-2, over=1.0), r"write deg\(60\)"),
+        (lambda: Timeline().leg("FR", hip=0, thigh=1, calf=-95, over=1.0), r"write deg\(-95\)"),
         (lambda: Timeline().body(z=80.0, over=1.0), "in millimetres"),
+        (lambda: Timeline().body(z=-5.0, over=1.0), "in millimetres or centimetres.* or -0.05"),
+        (lambda: Timeline().foot("FR", z=1.6, over=1.0), "z is 1.6 m, more than 1.5 m"),
+        (lambda: Timeline().bpm(60.0, shift_time=0.0), "shift_time must be a number above 0"),
         (lambda: Timeline().body(over=1.0), "body.. needs one of x, y, z, roll, pitch, yaw"),
         (lambda: Timeline().body(z=float("nan"), over=1.0), "z must be a finite number, got nan"),
         (lambda: Timeline().body(z=0.1, over=0.0), "over must be a number above 0, got 0.0"),

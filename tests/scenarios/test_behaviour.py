@@ -1,18 +1,17 @@
-"""What the robot must show, in MuJoCo: every bar of the behaviour bench, on a few seeds.
+"""What the robot must show, in MuJoCo: every threshold of the behaviour benchmark.
 
 The trials run in spawned processes, without the run-time checks of array shapes: three times as
-fast. The full numbers, over 20 and 100 seeds, come from ``go2-wbc bench behaviour``.
+fast. The full numbers, over 20 and 100 seeds, come from ``python -m benchmarks behaviour``.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
-from benchmarks.families import FAMILIES, find_families
+from benchmarks.behaviour import SCENARIOS
 from benchmarks.report import render, summarise
-from benchmarks.runner import run_families
+from benchmarks.runner import run_tasks
+from benchmarks.scenario import Scenario
 
 SEEDS = {
     "model": 3,
@@ -27,19 +26,20 @@ SEEDS = {
     "sequence": 2,
     "library": 1,
 }
-"""How many seeds of each family fit into a few minutes."""
+"""How many seeds of each scenario fit into a few minutes."""
 NOT_JUDGED = frozenset({"demo.pace"})
 """Processor time on a machine that runs tests at the same time says nothing."""
 
 
-def test_every_family_has_its_scenario() -> None:
-    assert {family.name for family in FAMILIES} == set(SEEDS)
+def test_every_scenario_has_its_seeds() -> None:
+    assert {scenario.name for scenario in SCENARIOS} == set(SEEDS)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "seeds"), SEEDS.items(), ids=list(SEEDS))
-def test_the_robot_meets_every_bar_and_never_falls(name: str, seeds: int) -> None:
-    families = [replace(family, seed_factor=1) for family in find_families([name])]
-    report = summarise(families, run_families(families, seeds, jobs=1))
-    failed = {result.row.name for result in report.rows if result.passed is False}
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.name)
+def test_the_robot_meets_every_threshold_and_never_falls(scenario: Scenario) -> None:
+    tasks = [(scenario, seed) for seed in range(SEEDS[scenario.name])]
+    trials = {seed: measurement for _, seed, measurement in run_tasks(tasks, jobs=1)}
+    report = summarise([scenario], {scenario.name: trials})
+    failed = {result.metric.name for result in report.rows if result.passed is False}
     assert failed - NOT_JUDGED == set(), render(report)

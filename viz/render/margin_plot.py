@@ -1,28 +1,41 @@
-"""The margins of a motion as one picture: a small curve for every limit, the limit as zero."""
+"""The margins of a motion as one picture: a small curve for every limit, the limit as zero.
+
+Draws on a ``Figure`` of its own, without pyplot: no window system, and no state that others share.
+"""
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
+from typing import Any
 
+import matplotlib
 import numpy as np
-from jaxtyping import Bool
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from viz.content import MarginCurve, Verdict
-from viz.palette import ACCENT, INK, MUTED
-from viz.render.sheets import PngSheet, Point, Sheet, SvgSheet
+from viz.palette import ACCENT, ALARM, BROKEN_FILL, GOOD, INK, MUTED, TIGHT, TRACK
 
-PLOT_SUFFIXES = (".svg", ".png")
+PLOT_SUFFIXES = (".svg", ".png", ".pdf")
 _COLUMNS = 3
-_WIDTH, _HEIGHT = 290.0, 118.0  # of one curve with its words
-_MARGIN, _GAP, _HEAD = 24.0, 22.0, 64.0
-_WORDS = 32.0  # height of the words over a curve
-_TICK = 14.0  # height of the time axis under a curve
+_PANEL = (3.6, 1.75)  # [inch] width and height of one curve with its words
+_HEAD, _FOOT = 1.05, 0.45  # [inch] above and below the curves
 _ZERO_SHARE = 0.22  # least share of a curve's height below the limit, so that it shows
-_BROKEN, _TIGHT, _FINE = "#dc2626", "#b45309", ACCENT
-_PANEL, _BELOW, _FILL = "#f6f8fc", "#fdeeee", "#f3a7a7"
-_GOOD = "#15803d"
+_ABOVE, _BELOW = "#f6f8fc", "#fdeeee"
+_STYLE: dict[Any, Any] = {
+    "font.family": "sans-serif",
+    "font.size": 8.0,
+    "svg.fonttype": "none",  # words stay words: they can be searched and copied
+    "svg.hashsalt": "go2_wbc",  # the same verdict gives the same file
+    "axes.edgecolor": TRACK,
+    "axes.labelcolor": MUTED,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+}
+_UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {"Software": None}}
 
 
 def export_plot(verdict: Verdict, path: Path, *, title: str) -> Path:
@@ -30,7 +43,7 @@ def export_plot(verdict: Verdict, path: Path, *, title: str) -> Path:
 
     Args:
         verdict: what a check says.
-        path: file to write, ``.svg`` or ``.png``.
+        path: file to write, ``.svg``, ``.png`` or ``.pdf``.
         title: name of the motion.
 
     Returns:
@@ -40,98 +53,84 @@ def export_plot(verdict: Verdict, path: Path, *, title: str) -> Path:
         ConfigError: for a path that cannot be written, or a verdict without a curve.
     """
     target = checked_output(path, PLOT_SUFFIXES)
+    figure = margin_figure(verdict, title=title)
+    kind, stream = target.suffix[1:].lower(), io.BytesIO()
+    with matplotlib.rc_context(_STYLE):
+        figure.savefig(stream, format=kind, dpi=160, metadata=_UNDATED[kind])
+    return write_atomically(target, stream.getvalue())
+
+
+def margin_figure(verdict: Verdict, *, title: str) -> Figure:
+    """The same as a matplotlib figure, to be changed or shown in a notebook.
+
+    Raises:
+        ConfigError: for a verdict without a curve.
+    """
     curves = verdict.ranked()
     if not curves:
         raise ConfigError("there is no margin to plot: the check could not judge the motion")
     rows = -(-len(curves) // _COLUMNS)
-    width = 2 * _MARGIN + _COLUMNS * _WIDTH + (_COLUMNS - 1) * _GAP
-    height = _HEAD + rows * _HEIGHT + (rows - 1) * _GAP + _MARGIN
-    kind = SvgSheet if target.suffix.lower() == ".svg" else PngSheet
-    sheet = kind(width, height)
-    _draw_head(sheet, verdict, title, width)
+    width, height = _COLUMNS * _PANEL[0], _HEAD + rows * _PANEL[1] + _FOOT
     end = max(float(curve.time[-1]) for curve in curves)
-    for k, curve in enumerate(curves):
-        row, column = divmod(k, _COLUMNS)
-        corner = (_MARGIN + column * (_WIDTH + _GAP), _HEAD + row * (_HEIGHT + _GAP))
-        _Panel(sheet, curve, corner, end).draw()
-    return write_atomically(target, sheet.content())
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(width, height))
+        grid = figure.add_gridspec(rows, _COLUMNS, wspace=0.24, hspace=0.72)
+        grid.update(left=0.6 / width, right=1 - 0.25 / width)
+        grid.update(bottom=_FOOT / height, top=1 - _HEAD / height)
+        _write_head(figure, verdict, title)
+        for k, curve in enumerate(curves):
+            axes = figure.add_subplot(grid[divmod(k, _COLUMNS)])
+            axes.set_xlim(0.0, max(end, 1e-9))
+            _draw(axes, curve)
+            if k + _COLUMNS >= len(curves):
+                axes.set_xlabel("time [s]")
+    return figure
 
 
-def _draw_head(sheet: Sheet, verdict: Verdict, title: str, width: float) -> None:
-    sheet.text((_MARGIN, 34), title, INK, 18, "l")
-    sheet.text((width - _MARGIN, 34), verdict.text, _GOOD if verdict.ok else _BROKEN, 14, "r")
-    note = "distance to every limit over time [s]; below the dashed line it is broken"
-    sheet.text((_MARGIN, 52), note, MUTED, 11, "l")
+def _write_head(figure: Figure, verdict: Verdict, title: str) -> None:
+    width, height = figure.get_size_inches()
+    left, right, top = 0.15 / width, 1 - 0.25 / width, 1 - 0.3 / height
+    note = "what is left to every limit over time; below the dashed line it is broken"
+    color = GOOD if verdict.ok else ALARM
+    figure.text(left, top, title, size=14, weight="bold", color=INK, parse_math=False)
+    figure.text(right, top, verdict.text, size=11, color=color, ha="right", parse_math=False)
+    figure.text(left, top - 0.18 / height, note, color=MUTED)
 
 
-class _Panel:
-    """One curve with its words and axis."""
-
-    def __init__(self, sheet: Sheet, curve: MarginCurve, corner: Point, end: float) -> None:
-        self._sheet, self._curve = sheet, curve
-        self._left, self._top = corner[0], corner[1] + _WORDS
-        self._bottom = corner[1] + _HEIGHT - _TICK
-        finite = curve.margin[np.isfinite(curve.margin)]
-        high = max(float(finite.max(initial=0.0)), 1e-9)
-        low = min(float(finite.min(initial=0.0)), 0.0)
-        room = 0.08 * (high - low)
-        self._high = high + room
-        self._low = min(low - room, -_ZERO_SHARE / (1 - _ZERO_SHARE) * self._high)
-        self._end = max(end, 1e-9)
-
-    def draw(self) -> None:
-        sheet, curve = self._sheet, self._curve
-        is_tight = curve.least < curve.tight
-        color = _BROKEN if curve.is_broken else _TIGHT if is_tight else _FINE
-        right, zero = self._left + _WIDTH, self._y(0.0)
-        sheet.area(_box(self._left, self._top, right, zero), _PANEL)
-        sheet.area(_box(self._left, zero, right, self._bottom), _BELOW)
-        sheet.text((self._left, self._top - 20), curve.name, INK, 13, "l")
-        sheet.text((self._left, self._top - 6), self._least_words(), color, 11, "l")
-        sheet.line([(self._left, zero), (right, zero)], _BROKEN, 1.0, dashed=True)
-        for run in _runs(np.isfinite(curve.margin) & (len(curve.time) > 2)):
-            self._draw_run(run, zero, color)
-        if len(curve.time) <= 2:
-            for time, margin in zip(curve.time, curve.margin, strict=True):
-                if np.isfinite(margin):
-                    sheet.dot((self._x(time), self._y(margin)), 3.0, color)
-        for time, anchor in ((0.0, "l"), (self._end, "r")):
-            place = (self._x(time), self._bottom + 11)
-            sheet.text(place, f"{time:g}" if time == 0.0 else f"{time:.2f}", MUTED, 10, anchor)
-
-    def _draw_run(self, run: slice, zero: float, color: str) -> None:
-        time, margin = self._curve.time[run], self._curve.margin[run]
-        points = [(self._x(t), self._y(m)) for t, m in zip(time, margin, strict=True)]
-        if len(points) == 1:
-            self._sheet.dot(points[0], 2.5, color)
-            return
-        if margin.min() < 0.0:
-            below = [(x, max(y, zero)) for x, y in points]
-            self._sheet.area([(points[0][0], zero), *below, (points[-1][0], zero)], _FILL)
-        self._sheet.line(points, color, 1.4, dashed=False)
-
-    def _least_words(self) -> str:
-        curve = self._curve
-        known = np.where(np.isnan(curve.margin), np.inf, curve.margin)
-        row = int(known.argmin())
-        subject = curve.subjects[int(curve.worst[row])].replace("_", " ")
-        if not np.isfinite(curve.margin[row]):
-            return f"{subject}: not possible"
-        value = f"{float(curve.margin[row]):+.3g} {curve.unit}".strip()
-        return f"least {value}: {subject} at {float(curve.time[row]):.2f} s"
-
-    def _x(self, time: float) -> float:
-        return self._left + _WIDTH * float(time) / self._end
-
-    def _y(self, margin: float) -> float:
-        share = (self._high - float(margin)) / (self._high - self._low)
-        return self._top + (self._bottom - self._top) * share
+def _draw(axes: Axes, curve: MarginCurve) -> None:
+    time, margin = curve.time, np.where(np.isfinite(curve.margin), curve.margin, np.nan)
+    high = 1.08 * max(float(np.nanmax(margin, initial=0.0)), 1e-9)
+    low = min(1.08 * float(np.nanmin(margin, initial=0.0)), -_ZERO_SHARE / (1 - _ZERO_SHARE) * high)
+    color = ALARM if curve.is_broken else TIGHT if curve.least < curve.tight else ACCENT
+    axes.set_ylim(low, high)
+    axes.axhspan(0.0, high, color=_ABOVE, zorder=0, lw=0)
+    axes.axhspan(low, 0.0, color=_BELOW, zorder=0, lw=0)
+    axes.axhline(0.0, color=ALARM, lw=0.9, ls=(0, (4, 3)))
+    axes.fill_between(time, np.minimum(margin, 0.0), 0.0, color=BROKEN_FILL, lw=0)
+    # Two samples are two instants; and one between two that are not known has no line.
+    known = np.pad(~np.isnan(margin), 1)
+    alone = known[1:-1] & ((~known[:-2] & ~known[2:]) | (len(time) <= 2))
+    axes.plot(time, np.where(alone, np.nan, margin), color=color, lw=1.3)
+    axes.plot(time[alone], margin[alone], "o", color=color, ms=4, clip_on=False)
+    axes.set_ylabel(f"margin [{curve.unit}]" if curve.unit else "margin")
+    axes.yaxis.set_label_coords(-0.125, 0.5)
+    if known.any():
+        axes.locator_params(axis="y", nbins=4)
+    else:
+        axes.set_yticks([0.0])
+    axes.tick_params(length=2.5, pad=2, labelsize=7)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.set_title(curve.name, loc="left", size=9.5, weight="bold", color=INK, pad=17)
+    axes.annotate(
+        _least_words(curve), (0, 1), (0, 6), "axes fraction", "offset points", color=color
+    )
 
 
-def _box(left: float, top: float, right: float, bottom: float) -> list[Point]:
-    return [(left, top), (right, top), (right, bottom), (left, bottom)]
-
-
-def _runs(flags: Bool[np.ndarray, " n"]) -> list[slice]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+def _least_words(curve: MarginCurve) -> str:
+    known = np.where(np.isnan(curve.margin), np.inf, curve.margin)
+    row = int(known.argmin())
+    subject = curve.subjects[int(curve.worst[row])].replace("_", " ")
+    if not np.isfinite(curve.margin[row]):
+        return f"{subject}: not possible"
+    value = f"{float(curve.margin[row]):+.3g} {curve.unit}".strip()
+    return f"least {value}: {subject} at {float(curve.time[row]):.2f} s"

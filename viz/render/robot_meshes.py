@@ -16,8 +16,8 @@ from go2_wbc.errors import DescriptionError
 from go2_wbc.robot.description import find_description
 from viz.render.mesh import SurfaceMesh, simplify, smooth_surface
 
-_CREASE = np.deg2rad(40.0)  # the exporter's smoothing is lost in the files; 40 deg looks like it
-_COARSE_CREASE = np.deg2rad(55.0)  # a coarse surface has larger angles between its faces
+_CREASE = np.deg2rad(22.0)  # the files have lost their smoothing; 22 deg looks like it
+_COARSE_CREASE = np.deg2rad(32.0)  # a coarse surface has larger angles between its faces
 _BLACK_LIFT = 34  # least 8-bit value of a colour: pure black would show no shape
 
 _UNPAINTED = (171, 177, 197)  # a part without a material gets the trunk's grey

@@ -11,16 +11,15 @@ from PIL import Image, ImageDraw
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
-from go2_wbc.recording import Recording
+from go2_wbc.recording import Recording, Span
 from go2_wbc.robot.model import FOOT_RADIUS
-from viz.checks import check_recording
+from viz.content import check_recording
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.framing import nearest_rows
 from viz.render.overlay import draw_caption
 from viz.render.posed_robot import PosedRobot
 from viz.render.renderer import RenderStyle
 from viz.render.robot_meshes import load_robot_visuals
-from viz.replay.replay_data import Span, label_spans
 
 FILMSTRIP_SUFFIXES = (".png",)
 _MOST_PANELS = 6
@@ -74,7 +73,7 @@ def export_filmstrip(
 
 def telling_times(recording: Recording) -> list[float]:
     """One moment for each behaviour, in order: where a foot is highest, or the pose settled."""
-    spans = _interesting_spans(label_spans(recording))
+    spans = _interesting_spans(recording.spans())
     robot = PosedRobot(load_robot_visuals())
     return [_telling_time(recording, robot, span) for span in spans]
 

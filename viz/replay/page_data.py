@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import numpy as np
 
 from go2_wbc.legs import LEGS
-from go2_wbc.recording import Recording
 from go2_wbc.robot.model import FOOT_RADIUS
-from viz.content import Annotation, ReplayContent, Verdict
+from viz.content import ReplayContent, Verdict
 from viz.palette import LEG_COLORS
 from viz.render.posed_robot import PosedRobot
 from viz.render.robot_meshes import load_robot_visuals
 from viz.replay.meshcat_scene import robot_scene
 from viz.replay.packing import Pack
-from viz.replay.replay_data import ReplayFrames, label_spans, reduced, replay_frames
+from viz.replay.replay_data import ReplayFrames, reduced, replay_frames
 
 _FORCE_PERCENTILE = 99.5  # a touchdown spike beyond it may be cut off in the contact strip
 _LEAST_FORCE_SCALE = 50.0  # [N] a full row of the contact strip is at least this much
@@ -42,7 +43,7 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         "is_plan": content.is_plan,
         "rate": frames.rate,
         "frames": len(frames.q),
-        "labels": [[s.start, s.end, s.label] for s in label_spans(content.recording)],
+        "labels": [[s.start, s.end, s.label] for s in content.recording.spans()],
         "force_scale": _force_scale(frames),
         "verdict": None,
         "ghost": None,
@@ -51,14 +52,10 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
     if content.verdict is not None:
         header["verdict"] = _add_verdict(pack, content.verdict)
     if content.ghost is not None:
-        header["ghost"] = _add_ghost(pack, content.ghost, robot)
+        ghost = replay_frames(content.ghost, robot)
+        header["ghost"] = {"rate": ghost.rate, "frames": len(ghost.q)}
+        _add_frames(pack, "ghost.", ghost)
     return pack.packed(header)
-
-
-def _add_ghost(pack: Pack, recording: Recording, robot: PosedRobot) -> dict[str, object]:
-    frames = replay_frames(recording, robot)
-    _add_frames(pack, "ghost.", frames)
-    return {"rate": frames.rate, "frames": len(frames.q)}
 
 
 def _force_scale(frames: ReplayFrames) -> float:
@@ -94,18 +91,6 @@ def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
     return {
         "ok": verdict.ok,
         "text": verdict.text,
-        "annotations": [_plain(annotation) for annotation in verdict.annotations],
+        "annotations": [asdict(annotation) for annotation in verdict.annotations],
         "curves": curves,
-    }
-
-
-def _plain(annotation: Annotation) -> dict[str, object]:
-    return {
-        "limit": annotation.limit,
-        "subject": annotation.subject,
-        "time": annotation.time,
-        "text": annotation.text,
-        "is_broken": annotation.is_broken,
-        "spans": [list(span) for span in annotation.spans],
-        "parts": list(annotation.parts),
     }

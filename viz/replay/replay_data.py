@@ -5,32 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
 from viz.content import MarginCurve
+from viz.render.framing import smoothed
 from viz.render.posed_robot import PosedRobot
-from viz.render.smoothing import smoothed
 
 _FRAME_RATE = 50.0  # [Hz] finer is not seen at 60 Hz screens, swings stay smooth
 _MOST_FRAMES = 6000  # keeps the page of a long recording small; the rate drops instead
 _MOST_MARGINS = 3000  # samples of a margin curve; the least of each step is kept
 _CAMERA_SMOOTHING = 0.7  # [s]
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """A stretch of time with one label.
-
-    Attributes:
-        start, end: seconds after the start of the recording.
-        label: what the robot was doing.
-    """
-
-    start: float
-    end: float
-    label: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,10 +78,10 @@ def replay_frames(recording: Recording, robot: PosedRobot) -> ReplayFrames:
         p_world_feet=np.array([robot.feet(row).ravel() for row in q]),
         p_world_com=recording.p_world_com[rows],
         p_world_camera_target=base[rows],
-        foot_forces=_extreme(np.maximum, recording.foot_forces, rows),
+        foot_forces=np.maximum.reduceat(recording.foot_forces, rows),
         stance=recording.stance[rows],
-        support_margin=_extreme(np.fmin, recording.support_margin, rows),
-        torque_ratio=_extreme(np.maximum, ratio, rows),
+        support_margin=np.fmin.reduceat(recording.support_margin, rows),
+        torque_ratio=np.maximum.reduceat(ratio, rows),
     )
 
 
@@ -108,21 +94,6 @@ def reduced(curve: MarginCurve) -> MarginCurve:
     edges = range(0, len(known), step)
     rows = np.array([start + int(known[start : start + step].argmin()) for start in edges])
     return replace(curve, time=curve.time[rows], margin=curve.margin[rows], worst=curve.worst[rows])
-
-
-def label_spans(recording: Recording) -> tuple[Span, ...]:
-    """Stretches of equal labels, in order; each ends where the next begins."""
-    labels, time = recording.labels, recording.time - recording.time[0]
-    starts = [0] + [k for k in range(1, len(labels)) if labels[k] != labels[k - 1]]
-    ends = [*(float(time[k]) for k in starts[1:]), float(time[-1])]
-    return tuple(Span(float(time[k]), end, labels[k]) for k, end in zip(starts, ends, strict=True))
-
-
-def _extreme(
-    function: np.ufunc, values: Float[np.ndarray, "m ..."], rows: Int[np.ndarray, " n"]
-) -> Float[np.ndarray, "n ..."]:
-    """Extreme of the samples from each row up to the next one."""
-    return function.reduceat(values, rows, axis=0)
 
 
 def _continuous(q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 19"]:

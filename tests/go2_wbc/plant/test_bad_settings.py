@@ -13,7 +13,7 @@ import pytest
 from go2_wbc.errors import DescriptionError
 from go2_wbc.robot.description import find_description
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 WRONG = """
 from go2_wbc.errors import ConfigError

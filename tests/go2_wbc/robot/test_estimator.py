@@ -158,3 +158,22 @@ def test_numbers_must_be_positive() -> None:
 def test_a_foot_is_trusted_above_the_force_at_which_it_touches() -> None:
     with pytest.raises(ConfigError, match="trusted_force must be above contact_force"):
         EstimatorConfig(contact_force=30.0)
+
+
+def test_the_estimate_does_not_depend_on_when_the_clock_began() -> None:
+    def speed(begin: float) -> float:
+        estimator = StateEstimator(RobotModel())
+        states = [
+            estimator.update(
+                replace(
+                    reading(begin + 0.002 * tick),
+                    accelerometer=np.array([1.0, 0.0, 9.81]),
+                    foot_forces=np.zeros(4),
+                )
+            )
+            for tick in range(50)
+        ]
+        return float(states[-1].v[0])
+
+    assert speed(0.0) > 0.01
+    assert speed(1000.0) == pytest.approx(speed(0.0), rel=1e-6)

@@ -1,0 +1,42 @@
+"""``python -m benchmarks NAME``: runs one benchmark."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from controller.cli.common import ExitCode
+from controller.cli.main import Command, Program, run_program
+
+COMMANDS: tuple[Command, ...] = (
+    Command("behaviour", "benchmarks.behaviour", "what the robot does in MuJoCo, over many seeds"),
+    Command("feasibility", "benchmarks.feasibility", "the feasibility check against physics"),
+    Command("bridges", "benchmarks.bridges.command", "ROS 2 and Unitree's protocol, by processes"),
+    Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
+    Command("evidence", "benchmarks.evidence", "fill the README's table from the results"),
+)
+EXAMPLES = """
+python -m benchmarks --list                     these benchmarks
+python -m benchmarks behaviour --list           the metrics of one, and their thresholds
+python -m benchmarks behaviour --quick          three seeds
+python -m benchmarks behaviour --resume         go on after an interruption
+python -m benchmarks feasibility --json
+python -m benchmarks bridges ros2 --runs 5
+python -m benchmarks NAME --help                the options of one, with examples
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the benchmark that the arguments name; see ``run_program`` for the exit codes."""
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    if arguments == ["--list"]:
+        for command in COMMANDS:
+            print(f"{command.name:<14}{command.summary}")
+        return ExitCode.OK
+    description = "Measure over many seeds, against fixed thresholds. --list names the benchmarks."
+    program = Program("python -m benchmarks", description, COMMANDS, EXAMPLES)
+    return run_program(program, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

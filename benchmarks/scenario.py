@@ -1,0 +1,100 @@
+"""The benchmarks' vocabulary: metrics with their thresholds, scenarios, what one trial gave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+
+from benchmarks.trials import Trial
+from go2_wbc.errors import CommandError, unknown_name
+
+
+class Direction(Enum):
+    """On which side of its threshold a value is good."""
+
+    AT_MOST = "<="
+    AT_LEAST = ">="
+
+    def meets(self, value: float, threshold: float) -> bool:
+        """Whether ``value`` is on the good side; a nan never is."""
+        return value <= threshold if self is Direction.AT_MOST else value >= threshold
+
+    def worst(self, values: Mapping[int, float]) -> int:
+        """The key of the worst value; ``values`` must not be empty."""
+        pick = max if self is Direction.AT_MOST else min
+        return pick(values, key=lambda key: values[key])
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """One row of the report: a quantity of which every trial gives one value.
+
+    Attributes:
+        name: unique among all metrics.
+        item: what the robot does; metrics of one item stand together.
+        quantity: what is measured.
+        unit: of the value; empty for a ratio or a count.
+        threshold: what the mean over the seeds must reach; ``None`` for one that only informs.
+        direction: on which side of the threshold is good.
+    """
+
+    name: str
+    item: str
+    quantity: str
+    unit: str
+    threshold: float | None
+    direction: Direction = Direction.AT_MOST
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """What one trial of a scenario gave.
+
+    Attributes:
+        values: by metric. One without a value counts as failed.
+        failures: by metric, why the robot did not do it although there may be a value.
+        reason: why metrics without a value have none; empty if all have one.
+    """
+
+    values: Mapping[str, float]
+    failures: Mapping[str, str] = field(default_factory=dict)
+    reason: str = ""
+
+    def failure(self, metric: str) -> str | None:
+        """Why this trial counts as failed for ``metric``, or None."""
+        if metric in self.failures:
+            return self.failures[metric]
+        return None if metric in self.values else self.reason or "no value was measured"
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """Metrics that are measured together, in one trial.
+
+    Attributes:
+        name: what the command line takes.
+        metrics: in the order of the report.
+        measure: runs one trial; must be a function of a module, so that a process can import it.
+        seed_factor: how many times the usual number of seeds it runs.
+        group: what the command line takes for all scenarios of the same kind; may be empty.
+    """
+
+    name: str
+    metrics: tuple[Metric, ...]
+    measure: Callable[[Trial], Measurement]
+    seed_factor: int = 1
+    group: str = ""
+
+
+def chosen_scenarios(scenarios: Sequence[Scenario], names: Sequence[str]) -> tuple[Scenario, ...]:
+    """The scenarios that are named, by themselves or by their group; all if there is no name.
+
+    Raises:
+        CommandError: for an unknown name; lists the valid ones.
+    """
+    valid = dict.fromkeys(name for s in scenarios for name in (s.group, s.name) if name)
+    for name in names:
+        if name not in valid:
+            raise CommandError(unknown_name("scenario", name, valid))
+    return tuple(s for s in scenarios if not names or s.name in names or s.group in names)

@@ -1,0 +1,163 @@
+"""One motion played in MuJoCo, and what was measured: slip, loads, distance from its plan."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from controller.go2_controller import GO2Controller
+from go2_wbc.legs import LEGS
+from go2_wbc.plant.mujoco.ground_truth import TOUCH, GroundTruth, TruthRecording, true_runs
+from go2_wbc.reference import Anchor, LegTask, MotionPlan, TrackedPoint
+from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
+
+TRACKING_STRIDE = 5
+"""Every fifth tick is compared with the plan."""
+HALF_LENGTH = 0.2
+"""Distance [m] from the trunk's middle to its ends: what a wrong attitude moves."""
+FULL = 0.999
+"""Share of a torque limit from which on a motor gives all it has."""
+SETTLED_CONTACT = 0.1
+"""Time [s] after a touchdown, and before a lift-off, in which an unloaded foot may skid."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotionMeasurement:
+    """What was measured while a motion was played.
+
+    Attributes:
+        fall: why the robot fell, or None.
+        said: what ``play`` said.
+        reason: in its words.
+        slip: largest distance [m] that the material of a standing foot slid at its contact point.
+        torque, speed: largest share of a joint's torque and speed limit.
+        saturated: time [s] in which some motor gave all it has.
+        tracking: largest distance [m] of the CoM from its plan.
+        ends_off: largest distance [m] of the trunk's ends from their plan, seen from its middle.
+        feet_off: largest distance [m] of a raised foot from its plan, seen from the trunk.
+        joint_distance: least distance [rad] of a joint to its limit.
+        touched: time [s] in which a knee or the trunk touched the ground, or a link another.
+    """
+
+    fall: str | None
+    said: bool
+    reason: str
+    slip: float
+    torque: float
+    speed: float
+    saturated: float
+    tracking: float
+    ends_off: float
+    feet_off: float
+    joint_distance: float
+    touched: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether it was done, and the robot is on its feet."""
+        return self.said and self.fall is None
+
+    def lines(self) -> list[tuple[str, str, str]]:
+        """What was measured: name, value and unit, for a person."""
+        return [
+            ("CoM off its plan, at most", f"{1000 * self.tracking:.1f}", "mm"),
+            ("slip of a standing foot, at most", f"{1000 * self.slip:.1f}", "mm"),
+            ("peak joint torque, of its limit", f"{100 * self.torque:.0f}", "%"),
+            ("peak joint speed, of its limit", f"{100 * self.speed:.0f}", "%"),
+            ("least distance of a joint to its limit", f"{self.joint_distance:.3f}", "rad"),
+        ]
+
+    def as_dict(self) -> dict[str, float | bool | str | None]:
+        """Plain values, for JSON."""
+        return {"ok": self.ok, **asdict(self)}
+
+
+def measure_motion(
+    go2: GO2Controller, truth: GroundTruth, plan: MotionPlan, model: RobotModel
+) -> MotionMeasurement:
+    """Play ``plan``, unchecked, on a robot that is in its entry posture.
+
+    Args:
+        go2: the controller, whose plant is ``truth``.
+        truth: cleared before the motion.
+        plan: the motion.
+        model: of the robot, for its limits.
+    """
+    truth.clear()
+    said = go2.play(plan, check=False)
+    fall, dt = truth.fall(), truth.control_period
+    recorded = _during_motion(go2, truth, plan.name)
+    shares = recorded.torque_shares(model)
+    force = np.maximum(recorded.trunk_force, recorded.limb_force)
+    com, attitude, feet = _off_plan(recorded, plan, model)
+    return MotionMeasurement(
+        fall=fall,
+        said=said,
+        reason=go2.last_outcome.reason,
+        slip=_slip(recorded, plan, dt),
+        torque=float(shares.max()),
+        speed=recorded.peak_speed_share(model),
+        saturated=dt * float((shares >= FULL).sum()),
+        tracking=com,
+        ends_off=HALF_LENGTH * attitude,
+        feet_off=feet,
+        joint_distance=recorded.joint_distance(model),
+        touched=dt * float((recorded.touches_itself | (force > TOUCH)).sum()),
+    )
+
+
+def _during_motion(go2: GO2Controller, truth: GroundTruth, name: str) -> TruthRecording:
+    """The ticks in which the plan was played."""
+    telemetry, recorded = go2.recording(rate=1.0 / truth.control_period), truth.recording()
+    times = telemetry.time[np.array(telemetry.labels) == name]
+    times = times[times >= truth.start]
+    if len(times) == 0:
+        return recorded
+    first, last = np.searchsorted(recorded.time, [times[0], times[-1] + 1e-9])
+    return recorded.part(slice(int(first), max(int(last), int(first) + 2)))
+
+
+def _slip(recorded: TruthRecording, plan: MotionPlan, dt: float) -> float:
+    """Largest distance [m] slid in a stance phase, less its edges inside of the motion."""
+    start, n = float(recorded.time[0]), len(recorded.time)
+    stance = np.array([plan.at(float(t) - start).stance for t in recorded.time])
+    margin, worst = round(SETTLED_CONTACT / dt), 0.0
+    for leg in LEGS:
+        for phase in true_runs(stance[:, leg]):
+            first = phase.start + (margin if phase.start > 0 else 0)
+            last = phase.stop - (margin if phase.stop < n else 0)
+            path = np.cumsum(dt * recorded.v_world_contacts[first : max(first, last), leg], axis=0)
+            worst = max(worst, float(np.linalg.norm(path, axis=1).max(initial=0.0)))
+    return worst
+
+
+def _off_plan(
+    recorded: TruthRecording, plan: MotionPlan, model: RobotModel
+) -> tuple[float, float, float]:
+    """Largest deviations from the plan: CoM [m], attitude [rad], raised feet [m]."""
+    anchor = Anchor.of_feet(recorded.p_world_feet[0].copy(), model.foot_radius)
+    start, worst = float(recorded.time[0]), np.zeros(3)
+    legs = [LegGeometry.of(model, leg) for leg in LEGS]
+    for row in range(0, len(recorded.time), TRACKING_STRIDE):
+        reference = plan.at(float(recorded.time[row]) - start).placed(anchor)
+        body, q = reference.body, recorded.q[row]
+        R = rotation_from_rpy(*recorded.rpy[row].tolist())
+        point = recorded.p_world_com[row] if body.point is TrackedPoint.COM else q[:3]
+        joints = np.vstack([q[7:], reference.q_joints])
+        feet = [
+            _distance(*foot_places(legs[leg], joints[:, leg.joints]))
+            for leg in LEGS
+            if reference.legs[leg] is LegTask.JOINTS
+        ]
+        turned = float(np.linalg.norm(log_rotation(body.R_world_base @ R.T)))
+        off = [_distance(point, body.p_world), turned, max(feet, default=0.0)]
+        worst = np.maximum(worst, off)
+    return float(worst[0]), float(worst[1]), float(worst[2])
+
+
+def _distance(a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"]) -> float:
+    return float(np.linalg.norm(a - b))

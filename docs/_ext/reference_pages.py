@@ -1,0 +1,178 @@
+"""The parts of the reference that the code itself says.
+
+- Before a build, a page for every room of the packages, from its docstrings, in ``reference/api``.
+- ``{cli-help} NAME``: what ``go2-wbc NAME --help`` prints.
+- ``{config-table} MODULE.CLASS``: the fields of a configuration with default and meaning.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import dataclasses
+import inspect
+import os
+import re
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from unittest import mock
+
+from docutils import nodes
+from docutils.statemachine import StringList
+from plain_docstrings import as_markup
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+
+from controller.cli.main import COMMANDS, PROGRAM
+from go2_wbc.wbc.tasks import Gains
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGES = ("go2_wbc", "motions", "viz", "controller")
+LEFT_OUT = ("controller/cli", "controller/bridges", "motions/library")
+"""Described on other pages: the command line, ROS 2 and Unitree, the gallery."""
+_FIELD = re.compile(r"^    ([a-z]\w*(?:, [a-z]\w*)*): (.*(?:\n {5,}.*)*)", re.MULTILINE)
+
+
+def rooms(root: Path = ROOT) -> dict[str, list[str]]:
+    """The modules of every page of the API reference: one page a sub-package, one the rest."""
+    found: dict[str, list[str]] = {}
+    for package in PACKAGES:
+        for file in sorted((root / package).rglob("*.py")):
+            path = file.relative_to(root)
+            if path.as_posix().startswith(LEFT_OUT) or not file.read_text().strip():
+                continue
+            parts = path.with_suffix("").parts
+            page = ".".join(parts[: max(1, len(parts) - 1)][:2])
+            name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+            found.setdefault(page, []).append(name)
+    return {page: _important_first(page, modules, root) for page, modules in found.items()}
+
+
+def _important_first(page: str, modules: list[str], root: Path) -> list[str]:
+    """The package itself, the modules whose names it or its parent passes on, and the others."""
+    packages = {page, page.split(".")[0]}
+    homes = {home for name in packages for home in exports_of(name, root).values()}
+    return sorted(modules, key=lambda name: (name != page, name not in homes))
+
+
+def api_page(room: str, modules: list[str], root: Path = ROOT) -> str:
+    """A page of the API reference in MyST."""
+    lines = [f"# {room}", ""]
+    for name in modules:
+        if (root / name.replace(".", "/")).is_dir():
+            lines += [*([f"## {name}", ""] * (name != room)), *_package(name, root)]
+        else:
+            lines += [f"## {name}", "", "```{eval-rst}", f".. automodule:: {name}", "   :members:"]
+            lines += ["```", ""]
+    return "\n".join(lines)
+
+
+def exports_of(package: str, root: Path = ROOT) -> dict[str, str]:
+    """The public names that a package passes on, and the module that each is defined in."""
+    init = root / package.replace(".", "/") / "__init__.py"
+    if not init.is_file():
+        return {}
+    found: dict[str, str] = {}
+    for node in ast.walk(ast.parse(init.read_text(encoding="utf-8"))):
+        home = node.module or "" if isinstance(node, ast.ImportFrom) else ""
+        if isinstance(node, ast.ImportFrom) and home.startswith(f"{package}."):
+            for name in (alias.name for alias in node.names):
+                found[name] = exports_of(home, root).get(name, home)
+    return dict(sorted(found.items()))
+
+
+def _package(name: str, root: Path) -> Iterator[str]:
+    """What a package is and which names it passes on; they are described where they live."""
+    init = root / name.replace(".", "/") / "__init__.py"
+    about = ast.get_docstring(ast.parse(init.read_text(encoding="utf-8"))) or ""
+    links = [f":py:obj:`{key} <{home}.{key}>`" for key, home in exports_of(name, root).items()]
+    yield from ("```{eval-rst}", *as_markup(about.splitlines()), "")
+    if links:
+        yield f"``from {name} import``: {', '.join(links)}."
+    yield from ("```", "")
+
+
+def write_api_pages(app: Sphinx) -> None:
+    """Write the pages that have changed, and remove those without a room."""
+    folder = Path(app.srcdir, "reference", "api")
+    folder.mkdir(exist_ok=True)
+    pages = {f"{room}.md": api_page(room, modules) for room, modules in rooms().items()}
+    for file in folder.glob("*.md"):
+        if file.name not in pages:
+            file.unlink()
+    for name, text in pages.items():
+        file = folder / name
+        if not file.is_file() or file.read_text(encoding="utf-8") != text:
+            file.write_text(text, encoding="utf-8")
+
+
+def help_of(name: str) -> str:
+    """The help of a subcommand of ``go2-wbc``, 80 columns wide."""
+    module = import_module({command.name: command.module for command in COMMANDS}[name])
+    subparsers = argparse.ArgumentParser(PROGRAM).add_subparsers()
+    module.register(subparsers)
+    with mock.patch.dict(os.environ, {"COLUMNS": "80"}):
+        return subparsers.choices[name].format_help()
+
+
+def config_rows(kind: type) -> Iterator[tuple[str, str, str]]:
+    """Name, default and meaning of every field, from the class and its docstring."""
+    described = inspect.getdoc(kind) or ""
+    meanings = {
+        name: " ".join(match[2].split())
+        for match in _FIELD.finditer(described.partition("Attributes:")[2])
+        for name in match[1].split(", ")
+    }
+    example = kind()
+    for item in dataclasses.fields(kind):
+        value = getattr(example, item.name)
+        is_table = dataclasses.is_dataclass(value) and not isinstance(value, Gains)
+        yield item.name, "" if is_table else _shown(value), meanings[item.name]
+
+
+def _shown(value: object) -> str:
+    if dataclasses.is_dataclass(value):
+        fields = (f"{f.name} = {_shown(getattr(value, f.name))}" for f in dataclasses.fields(value))
+        return f"{{ {', '.join(fields)} }}"
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_shown, value))}]"
+    if isinstance(value, str):
+        return f'"{value}"'
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+class CliHelp(SphinxDirective):
+    """The directive ``cli-help``."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Show the help as it is printed."""
+        text = help_of(self.arguments[0])
+        return [nodes.literal_block(text, text, language="none")]
+
+
+class ConfigTable(SphinxDirective):
+    """The directive ``config-table``."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Make a table of the class that is named."""
+        module, _, name = self.arguments[0].rpartition(".")
+        lines = ["| key | default | what it is |", "|---|---|---|"]
+        for key, default, meaning in config_rows(getattr(import_module(module), name)):
+            shown = f"`{default}`" if default else ""
+            lines.append(f"| `{key}` | {shown} | {meaning.replace('|', chr(92) + '|')} |")
+        parent = nodes.container()
+        self.state.nested_parse(StringList(lines, self.arguments[0]), 0, parent)
+        return parent.children
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Register pages and directives."""
+    app.connect("builder-inited", write_api_pages)
+    app.add_directive("cli-help", CliHelp)
+    app.add_directive("config-table", ConfigTable)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,188 @@
+"""Ground truth: a plant that passes everything on and records what MuJoCo says after every tick."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from go2_wbc.plant.base import Plant
+from go2_wbc.plant.mujoco.plant import MujocoPlant
+from go2_wbc.robot.description import BASE_LINK
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.state import JointCommand, RobotState
+
+FALLEN_TILT = math.radians(60.0)
+"""Tilt of the trunk from which on the robot has fallen, whatever the controller thinks."""
+TIMED_EVERY = 100
+"""Every hundredth tick's recording is timed."""
+TOUCH = 1.0
+"""Force [N] between trunk and ground that counts as a touch."""
+
+
+@dataclass(frozen=True, slots=True)
+class TruthRecording:
+    """What MuJoCo said, one row per tick, at the end of that tick.
+
+    Attributes:
+        time: plant time [s].
+        q, v: configuration and velocity as in ``RobotState``.
+        rpy: attitude of the base [rad], yaw unwrapped.
+        tau: joint torques [N m] that acted.
+        foot_forces: normal forces [N] on the feet.
+        p_world_com: centre of mass [m], by MuJoCo.
+        p_world_feet: centres of the feet [m].
+        p_world_contacts: contact points of the feet [m], nan in the air.
+        v_world_contacts: tangential velocity [m/s] of the feet's material there, 0 in the air.
+        trunk_force: normal force [N] between the trunk and the ground.
+        limb_force: the same for the legs without their feet.
+        touches_itself: whether two links touch that must not.
+    """
+
+    time: Float[np.ndarray, " n"]
+    q: Float[np.ndarray, "n 19"]
+    v: Float[np.ndarray, "n 18"]
+    rpy: Float[np.ndarray, "n 3"]
+    tau: Float[np.ndarray, "n 12"]
+    foot_forces: Float[np.ndarray, "n 4"]
+    p_world_com: Float[np.ndarray, "n 3"]
+    p_world_feet: Float[np.ndarray, "n 4 3"]
+    p_world_contacts: Float[np.ndarray, "n 4 3"]
+    v_world_contacts: Float[np.ndarray, "n 4 3"]
+    trunk_force: Float[np.ndarray, " n"]
+    limb_force: Float[np.ndarray, " n"]
+    touches_itself: Bool[np.ndarray, " n"]
+
+    def part(self, rows: slice) -> TruthRecording:
+        """Some of the ticks."""
+        return TruthRecording(*(getattr(self, name)[rows] for name in TruthRecording.__slots__))
+
+    def since(self, time: float) -> TruthRecording:
+        """The ticks after ``time`` [s]."""
+        return self.part(slice(int(np.searchsorted(self.time, time, side="right")), None))
+
+    @property
+    def com_velocity(self) -> Float[np.ndarray, "m 3"]:
+        """Velocity of the centre of mass [m/s] ahead, left, up of the heading; m = n - 1 ticks.
+
+        The difference of MuJoCo's positions over each control period: exact in the mean.
+        """
+        v_world = np.diff(self.p_world_com, axis=0) / np.diff(self.time)[:, None]
+        yaw = 0.5 * (self.rpy[1:, 2] + self.rpy[:-1, 2])
+        c, s = np.cos(yaw), np.sin(yaw)
+        x, y, z = v_world.T
+        return np.column_stack([c * x + s * y, c * y - s * x, z])
+
+    def torque_shares(self, model: RobotModel) -> Float[np.ndarray, " n"]:
+        """Largest |tau| / limit of any joint, at every tick."""
+        return (np.abs(self.tau) / model.torque_limits).max(axis=1)
+
+    def peak_speed_share(self, model: RobotModel) -> float:
+        """Largest |joint velocity| / limit of any joint."""
+        return float((np.abs(self.v[:, 6:]) / model.speed_limits).max())
+
+    def joint_distance(self, model: RobotModel) -> float:
+        """Least distance [rad] of any joint to its limit; negative beyond it."""
+        q = self.q[:, 7:]
+        return float(np.minimum(q - model.q_lower, model.q_upper - q).min())
+
+
+def true_runs(flags: Bool[np.ndarray, " n"]) -> list[slice]:
+    """Where ``flags`` is true without a gap, in order."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+@final
+class GroundTruth(Plant):
+    """Passes everything on to a ``MujocoPlant`` and records its state since the last ``clear``.
+
+    Attributes:
+        start: plant time [s] of the last ``clear``.
+        cpu_time: processor time [s] that recording has taken, from a sample of the ticks.
+        on_tick: called after every tick, for events in the middle of a call; or None.
+    """
+
+    def __init__(self, plant: MujocoPlant) -> None:
+        """Record what a controller does to ``plant``."""
+        self._plant = plant
+        self._base = plant.model.body(BASE_LINK).id
+        self.on_tick: Callable[[], None] | None = None
+        self.cpu_time = 0.0
+        self.clear()
+
+    @property
+    def control_period(self) -> float:
+        """Seconds that pass in one ``write``."""
+        return self._plant.control_period
+
+    def read(self) -> RobotState:
+        """The measured state."""
+        return self._plant.read()
+
+    def write(self, command: JointCommand) -> None:
+        """Apply ``command`` for one control period, and record what came of it."""
+        self._plant.write(command)
+        self._record()
+        if self.on_tick is not None:
+            self.on_tick()
+
+    def close(self) -> None:
+        """End the plant."""
+        self._plant.close()
+
+    def clear(self) -> None:
+        """Forget what was recorded; begin again with the present state."""
+        self.start = self._plant.time
+        self._rows: list[tuple[np.ndarray | float, ...]] = []
+        self._record()
+
+    def fall(self) -> str | None:
+        """Why the robot counts as fallen at this moment, or None."""
+        state = self._plant.read()
+        if not np.isfinite(state.q).all() or state.tilt > FALLEN_TILT:
+            return f"fell by t={state.time:.2f} s: tilt {math.degrees(state.tilt):.0f} deg"
+        if self._plant.base_contact_force > TOUCH:
+            return f"the trunk is on the ground at t={state.time:.2f} s"
+        return None
+
+    @property
+    def p_world_com(self) -> Float[np.ndarray, "3"]:
+        """Centre of mass [m] now, by MuJoCo."""
+        return self._plant.data.subtree_com[self._base].copy()
+
+    def recording(self) -> TruthRecording:
+        """Everything since the last ``clear``."""
+        columns = [np.array(column) for column in zip(*self._rows, strict=True)]
+        columns[3][:, 2] = np.unwrap(columns[3][:, 2])
+        return TruthRecording(*columns)
+
+    def _record(self) -> None:
+        is_timed = len(self._rows) % TIMED_EVERY == 0  # asking is a slow call on some machines
+        began = time.thread_time() if is_timed else 0.0
+        plant, state = self._plant, self._plant.read()
+        contacts = plant.foot_contacts()
+        self._rows.append(
+            (
+                state.time,
+                state.q,
+                state.v,
+                state.rpy,
+                state.tau,
+                state.foot_forces,
+                self.p_world_com,
+                plant.p_world_feet,
+                contacts.p_world_contact,
+                contacts.v_world_contact,
+                plant.base_contact_force,
+                plant.limb_contact_force,
+                plant.touches_itself,
+            )
+        )
+        if is_timed:
+            self.cpu_time += TIMED_EVERY * (time.thread_time() - began)

@@ -1,0 +1,143 @@
+"""``python -m benchmarks``: what is run, what is printed and written, which exit code."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from benchmarks.__main__ import COMMANDS, main
+from benchmarks.behaviour import SCENARIOS
+from benchmarks.report import WIDTH
+from benchmarks.scenario import Measurement, chosen_scenarios
+from benchmarks.trials import Trial
+from controller.cli.common import ExitCode
+from controller.cli.main import Command
+from go2_wbc.errors import CommandError
+from tests.benchmarks.conftest import Only
+from tests.benchmarks.support import fake, fall_on_seed_1, have_a_bug, measure_badly, measure_well
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = ["README.md", "CONTRIBUTING.md", *(f"docs/{p.name}" for p in (ROOT / "docs").glob("*.md"))]
+
+
+def test_it_runs_from_the_root_of_a_checkout() -> None:
+    command = [sys.executable, "-m", "benchmarks", "--list"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    names = [line.split()[0] for line in done.stdout.splitlines()]
+    assert names == [command.name for command in COMMANDS]
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
+def test_every_benchmark_has_a_help_with_examples(
+    command: Command, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(WIDTH))
+    assert main([command.name, "--help"]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert out.startswith(f"usage: python -m benchmarks {command.name}")
+    assert "examples:" in out
+    assert max(map(len, out.splitlines())) <= WIDTH
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_every_command_line_of_the_documents_is_understood(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    for line in re.findall(r"^python -m benchmarks ([^#\n]*)", text, re.MULTILINE):
+        words = line.split()
+        module = importlib.import_module({c.name: c.module for c in COMMANDS}[words[0]])
+        monkeypatch.setattr(module, "run", lambda _args: ExitCode.OK)
+        assert main(words) == ExitCode.OK, line
+
+
+@pytest.mark.parametrize("argv", [[], ["gallop"], ["behaviour", "--nonsense"], ["--nonsense"]])
+def test_wrong_usage_exits_with_2(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(argv) == ExitCode.USAGE
+    assert "usage: python -m benchmarks" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("measure", "code"),
+    [
+        (measure_well, ExitCode.OK),
+        (measure_badly, ExitCode.FAILED),
+        (fall_on_seed_1, ExitCode.FAILED),
+        (have_a_bug, ExitCode.RUNTIME),
+    ],
+)
+def test_the_exit_code_says_whether_every_metric_passes(
+    only: Only,
+    capsys: pytest.CaptureFixture[str],
+    measure: Callable[[Trial], Measurement],
+    code: ExitCode,
+) -> None:
+    only(fake(measure))
+    assert main(["behaviour", "--seeds", "2"]) == code
+    assert ("rows pass" in capsys.readouterr().out) == (code != ExitCode.RUNTIME)
+
+
+def test_every_result_is_told_with_what_has_failed(
+    only: Only, capsys: pytest.CaptureFixture[str]
+) -> None:
+    only(fake(fall_on_seed_1))
+    main(["behaviour", "--seeds", "2"])
+    told = capsys.readouterr().err.splitlines()
+    assert told == ["1/2 fake, seed 0: ok", "2/2 fake, seed 1: fell at t=3.20 s: roll 71 deg"]
+
+
+def test_json_goes_to_stdout_and_to_the_file_alike(
+    only: Only, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    only(fake())
+    file = tmp_path / "out" / "results.json"
+    file.parent.mkdir()
+    file.write_text("old")
+    assert main(["behaviour", "--quick", "--json", "--out", str(file)]) == ExitCode.OK
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == json.loads(file.read_text())
+    assert printed["rows"][0]["n"] == 3
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_an_interrupt_leaves_the_old_report(only: Only, tmp_path: Path) -> None:
+    def interrupt(trial: Trial) -> Measurement:
+        raise KeyboardInterrupt
+
+    only(fake(interrupt))
+    file = tmp_path / "results.json"
+    file.write_text("old")
+    assert main(["behaviour", "--out", str(file)]) == ExitCode.INTERRUPTED
+    assert file.read_text() == "old"
+
+
+def test_a_file_that_cannot_be_written_is_told_before_anything_runs(
+    only: Only, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    only(fake(have_a_bug))
+    in_the_way = tmp_path / "file"
+    in_the_way.write_text("")
+    for out, reason in ((in_the_way / "results.json", "choose a folder"), (tmp_path, "no suffix")):
+        assert main(["behaviour", "--out", str(out)]) == ExitCode.USAGE
+        assert reason in capsys.readouterr().err
+
+
+def test_list_names_every_scenario_and_threshold(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["behaviour", "--list"]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert all(scenario.name in out.splitlines() for scenario in SCENARIOS)
+    assert "<= 0.025 m/s" in out
+    assert max(map(len, out.splitlines())) <= WIDTH
+
+
+def test_an_unknown_scenario_is_a_usage_error_that_lists_the_valid_ones() -> None:
+    with pytest.raises(CommandError, match=r"unknown scenario 'gallop'.*high-five.*trot"):
+        chosen_scenarios(SCENARIOS, ["gallop"])
+    assert main(["behaviour", "--rows", "gallop"]) == ExitCode.USAGE

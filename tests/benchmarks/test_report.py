@@ -1,0 +1,107 @@
+"""The report counts honestly: means, worst seeds, falls."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+
+from benchmarks.behaviour import SCENARIOS
+from benchmarks.report import WIDTH, render, summarise, summarise_metric, threshold_text
+from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.trials import Trial
+from tests.benchmarks.support import ERROR, NOTE, SPEED, fake, measure_well, measured
+
+NEEDED = {
+    *("name", "item", "quantity", "unit", "threshold", "direction", "n", "mean", "worst"),
+    *("worst_seed", "falls", "passed", "values", "failures"),
+}
+"""Keys of a row in the JSON that programs rely on."""
+
+
+# --- arithmetic of a metric ---------------------------------------------------------------------
+
+
+def test_mean_and_worst_of_a_metric_that_wants_much() -> None:
+    result = summarise_metric(SPEED, measured(3.0, 0.5, 1.0))
+    assert (result.n, result.mean, result.worst, result.worst_seed) == (3, 1.5, 0.5, 1)
+    assert result.passed  # the threshold is for the mean
+
+
+def test_mean_and_worst_of_a_metric_that_wants_little() -> None:
+    result = summarise_metric(ERROR, measured(3.0, 0.5, 4.0, metric="fake.error"))
+    assert (result.mean, result.worst, result.worst_seed) == (2.5, 4.0, 2)
+    assert result.passed is False
+
+
+@pytest.mark.parametrize(("metric", "mean"), [(SPEED, 1.0), (ERROR, 2.0)])
+def test_a_mean_on_the_threshold_passes(metric: Metric, mean: float) -> None:
+    assert summarise_metric(metric, measured(mean, metric=metric.name)).passed
+
+
+def test_a_fall_is_never_a_pass_however_good_the_other_seeds() -> None:
+    trials = {0: Measurement({"fake.speed": 100.0}), 7: Measurement({}, reason="fell")}
+    result = summarise_metric(SPEED, trials)
+    assert result.passed is False
+    assert (result.falls, result.failures) == (1, {7: "fell"})
+    assert (result.n, result.mean, result.worst, result.worst_seed) == (2, 100.0, None, 7)
+
+
+def test_a_failure_with_a_good_value_is_no_pass_either() -> None:
+    trials = {0: Measurement({"fake.speed": 100.0}, {"fake.speed": "said False"})}
+    result = summarise_metric(SPEED, trials)
+    assert result.passed is False
+    assert (result.falls, result.worst) == (1, 100.0)
+
+
+def test_a_nan_is_a_failure() -> None:
+    result = summarise_metric(SPEED, measured(2.0, math.nan))
+    assert result.passed is False
+    assert (result.mean, result.worst_seed, set(result.failures)) == (2.0, 1, {1})
+
+
+def test_a_metric_without_any_seed_does_not_pass() -> None:
+    assert summarise_metric(SPEED, {}).passed is False
+
+
+def test_a_metric_without_a_threshold_is_not_judged() -> None:
+    result = summarise_metric(NOTE, measured(5.0, metric="fake.note"))
+    assert result.passed is None
+    assert summarise(
+        [Scenario("fake", (NOTE,), measure_well)], {"fake": {0: measure_well(Trial(0))}}
+    ).ok
+
+
+# --- report -------------------------------------------------------------------------------------
+
+
+def test_the_table_fits_80_columns_and_names_the_fallen_seed() -> None:
+    long_reason = "fell at t=3.20 s: " + "roll 71 deg, pitch -3 deg, " * 20
+    trials = {s: Measurement({}, reason=long_reason) for s in range(9)}
+    widest = {s: Measurement({row: -1.23456e-123}) for s in range(999) for row in ("fake.speed",)}
+    for results in (trials, widest, measured(1.0)):
+        text = render(summarise([fake()], {"fake": results}))
+        assert max(map(len, text.splitlines())) <= WIDTH
+    assert "seed 2: fell at t=3.20 s" in render(summarise([fake()], {"fake": trials}))
+
+
+def test_every_real_metric_fits_the_table_and_has_its_own_name() -> None:
+    rows = [row for scenario in SCENARIOS for row in scenario.metrics]
+    assert len({row.name for row in rows}) == len(rows)
+    assert [row.quantity for row in rows if len(row.quantity) > 28] == []
+    assert [row.item for row in rows if len(row.item) > WIDTH] == []
+    assert [threshold_text(row) for row in rows if len(threshold_text(row)) > 15] == []
+    results = {s.name: {0: Measurement({m.name: -1.2e-12 for m in s.metrics})} for s in SCENARIOS}
+    text = render(summarise(SCENARIOS, results))
+    assert max(map(len, text.splitlines())) <= WIDTH
+
+
+def test_the_json_has_every_key_and_no_nan() -> None:
+    results = {"fake": {0: measure_well(Trial(0)), 1: Measurement({"fake.speed": math.inf})}}
+    value = summarise([fake()], results).as_dict()
+    text = json.dumps(value, allow_nan=False)
+    rows = json.loads(text)["rows"]
+    assert all(set(row) == NEEDED for row in rows)
+    assert [row["name"] for row in rows] == ["fake.speed", "fake.error", "fake.note"]
+    assert value["passed"] is False

@@ -1,0 +1,217 @@
+"""What can be ordered over ROS 2, carried out by a job server. No ROS is needed."""
+
+from __future__ import annotations
+
+import logging
+import math
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from controller.bridges.ros2.behaviors import COMMANDS, Jobs, motion_job, order, parse_settings
+from controller.bridges.ros2.names import CMD_VEL_SILENCE
+from controller.bridges.ros2.velocity import VelocityInput
+from controller.go2_controller import GO2Controller
+from controller.jobs import Answer, JobServer
+from controller.modes import Mode
+from controller.pacing import LogThrottle
+from go2_wbc.errors import CommandError, ModeError
+from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
+from motions.compiler import compile_timeline
+from motions.feasibility.report import FeasibilityReport
+from tests.controller.fake_go2 import FakeGo2
+from tests.controller.plants import PERIOD, WatchedPlant
+
+HANG_GUARD = 30.0
+
+
+def jobs_of(go2: GO2Controller) -> Jobs:
+    return JobServer(go2)
+
+
+def ordered(jobs: Jobs, command: str) -> list[Answer]:
+    """The answers to an order, after the server has worked."""
+    answers: list[Answer] = []
+    order(jobs, command, answers.append)
+    jobs.work()
+    return answers
+
+
+@pytest.mark.parametrize(
+    ("command", "call"), [("up", "stand"), ("stand", "stand"), (" SIT ", "sit"), ("Walk", "walk")]
+)
+def test_an_order_is_answered_after_it_has_happened(command: str, call: str) -> None:
+    go2 = FakeGo2()
+    jobs, answers = jobs_of(go2), []
+    order(jobs, command, answers.append)
+    assert answers == []
+    assert jobs.work()
+    assert go2.calls == [call]
+    assert [answer.success for answer in answers] == [True]
+    assert "done in" in answers[0].message
+
+
+def test_an_unknown_order_is_refused_with_the_valid_names() -> None:
+    (answer,) = ordered(jobs_of(FakeGo2()), "moonwalk")
+    assert not answer.success
+    assert "'moonwalk'" in answer.message
+    assert all(name in answer.message for name in COMMANDS)
+
+
+def test_what_did_not_happen_is_answered_with_the_reason() -> None:
+    (answer,) = ordered(jobs_of(FakeGo2(refusals={"sit": "sit not done within 3.0 s"})), "sit")
+    assert (answer.success, answer.message) == (False, "sit not done within 3.0 s")
+    (answer,) = ordered(jobs_of(FakeGo2(errors={"walk": ModeError("fallen: recover")})), "walk")
+    assert (answer.success, answer.message) == (False, "fallen: recover")
+
+
+def test_a_second_order_is_refused_at_once_and_the_first_goes_on() -> None:
+    go2 = FakeGo2()
+    jobs, first, second = jobs_of(go2), [], []
+    order(jobs, "sit", first.append)
+    order(jobs, "up", second.append)
+    assert "busy with 'sit'" in second[0].message
+    jobs.work()
+    assert first[0].success
+    assert go2.calls == ["sit"]
+    assert ordered(jobs, "up")[0].success
+
+
+def test_stop_in_a_motion_leaves_it_and_is_answered_when_the_robot_stands() -> None:
+    plant = WatchedPlant()
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        jobs, answers = jobs_of(go2), {}
+        job = motion_job("nod", [], go2, lambda answer: answers.setdefault("nod", answer))
+        assert jobs.submit(job)
+        stop = lambda: order(jobs, "stop", lambda answer: answers.setdefault("stop", answer))  # noqa: E731
+        plant.once_at(go2.state.time + 2.0, stop)
+        while not jobs.work():
+            time.sleep(0.01)
+        assert not answers["nod"].success
+        assert "cancelled" in answers["nod"].message
+        assert answers["stop"].success
+        assert go2.mode is Mode.STANDING
+
+
+def test_damp_in_a_posture_ends_it() -> None:
+    plant = WatchedPlant()
+    with GO2Controller(plant=plant) as go2:
+        jobs, answers = jobs_of(go2), {}
+        order(jobs, "up", lambda answer: answers.setdefault("up", answer))
+        damp = lambda: order(jobs, "damp", lambda answer: answers.setdefault("damp", answer))  # noqa: E731
+        plant.once_at(1.2, damp)
+        jobs.work()
+        assert not answers["up"].success
+        assert answers["damp"].success
+        assert go2.mode is Mode.DAMPED
+
+
+# --- motions ------------------------------------------------------------------------------------
+
+
+def played(go2: GO2Controller, motion: str, *settings: str) -> Answer:
+    jobs, answers, answered = jobs_of(go2), [], threading.Event()
+    assert jobs.submit(motion_job(motion, settings, go2, answers.append))
+    while not jobs.work():
+        answered.wait(0.01)
+    return answers[0]
+
+
+def test_a_motion_is_prepared_beside_the_loop_and_played_from_lying() -> None:
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        answer = played(go2, "nod", "times=1")
+        assert answer.success, answer.message
+        assert go2.mode is Mode.STANDING
+
+
+def test_a_high_five_is_compiled_and_checked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    # It was compiled for the check, and again by the robot's own high five, in the loop's thread.
+    done: list[str] = []
+
+    def counted(name: str, real: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*args: Any) -> Any:
+            done.append(f"{name} in {threading.current_thread().name}")
+            return real(*args)
+
+        return call
+
+    for module in [m for name, m in sys.modules.items() if name.startswith(("motions", "contro"))]:
+        if vars(module).get("compile_timeline") is compile_timeline:
+            monkeypatch.setattr(module, "compile_timeline", counted("compiled", compile_timeline))
+    report = counted("checked", FeasibilityReport.of)
+    monkeypatch.setattr(FeasibilityReport, "of", staticmethod(report))
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        answer = played(go2, "high_five", "hold=0.5", "side=left")
+    assert answer.success, answer.message
+    assert "mean paw height" in answer.message
+    assert done == ["compiled in prepare", "checked in prepare"]
+
+
+def test_a_motion_that_does_not_exist_is_answered_with_those_that_do() -> None:
+    answer = played(FakeGo2(), "moonwalk")
+    assert not answer.success
+    assert answer.message.startswith("unknown motion 'moonwalk'; valid: bow,")
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [(["times=99"], "times"), (["times"], "name=value"), (["size=1"], "size")],
+)
+def test_wrong_settings_are_answered_with_the_reason(settings: list[str], complaint: str) -> None:
+    go2 = FakeGo2()
+    answer = played(go2, "nod", *settings)
+    assert not answer.success
+    assert complaint in answer.message
+    assert go2.calls == []
+
+
+def test_settings_are_read_as_numbers_or_words() -> None:
+    read = parse_settings(["hold=2.5", "times = 3", "side=left"])
+    assert read == {"hold": 2.5, "times": 3, "side": "left"}
+    with pytest.raises(CommandError, match="'side='"):
+        parse_settings(["side="])
+
+
+# --- velocities ---------------------------------------------------------------------------------
+
+
+def test_a_velocity_lasts_half_a_second() -> None:
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        velocity = VelocityInput(go2, VelocityEnvelope())
+        assert go2.walk()
+        velocity.accept(0.3, 0.1, 0.2, is_busy=False)
+        assert go2.command == VelocityCommand(0.3, 0.1, 0.2)
+        go2.wait(CMD_VEL_SILENCE - 2 * PERIOD)
+        velocity.expire()
+        assert not go2.command.is_zero
+        go2.wait(3 * PERIOD)
+        velocity.expire()
+        assert go2.command.is_zero
+        assert velocity.counts.silences == 1
+
+
+def test_velocities_that_cannot_be_followed_are_counted_and_warned_of_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        velocity = VelocityInput(go2, VelocityEnvelope())
+        velocity._throttle = LogThrottle(logging.getLogger("cmd_vel"), math.inf)
+        for _ in range(5):
+            velocity.accept(0.3, 0.0, 0.0, is_busy=False)
+            velocity.accept(math.nan, 0.0, 0.0, is_busy=False)
+        assert go2.walk()
+        velocity.accept(0.3, 0.0, math.inf, is_busy=False)
+        velocity.accept(0.3, 0.0, 0.0, is_busy=True)
+        assert go2.command.is_zero
+        velocity.accept(9.0, 0.0, 0.0, is_busy=False)
+        assert go2.command.linear_x == pytest.approx(VelocityEnvelope().forward)
+    counts = velocity.counts
+    assert (counts.received, counts.followed) == (13, 1)
+    assert (counts.not_finite, counts.out_of_mode) == (6, 6)
+    warnings = [record.message for record in caplog.records if "cmd_vel" in record.message]
+    assert len(warnings) == 3

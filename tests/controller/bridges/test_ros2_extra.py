@@ -1,0 +1,70 @@
+"""Without the extra the bridge says what is missing, and everything else goes on."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import controller.bridges.ros2 as bridge
+from controller.behaviours.joints import DAMPING
+from controller.bridges.ros2.hooked_plant import HookedPlant
+from controller.cli.common import ExitCode
+from go2_wbc.robot.state import JointCommand
+from tests.controller.plants import StillPlant, is_limp
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def without_ros(code: str) -> subprocess.CompletedProcess[str]:
+    """Run ``code`` in a fresh Python in which there is no rclpy."""
+    return subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.modules['rclpy'] = None; {code}"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_without_the_extra_the_command_names_the_line_that_installs_it() -> None:
+    run = without_ros("from controller.cli.main import main; sys.exit(main(['ros2']))")
+    assert run.returncode == ExitCode.RUNTIME
+    assert 'pip install -e ".[ros2]"' in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+def test_without_the_extra_the_client_is_an_error_of_ours() -> None:
+    run = without_ros("import controller.bridges.ros2 as bridge; bridge.GO2ControllerNode")
+    assert "MissingDependency: ROS 2 is not here" in run.stderr.splitlines()[-1]
+
+
+def test_a_name_that_the_bridge_does_not_have_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = bridge.nothing
+
+
+def test_importing_the_bridge_imports_no_ros() -> None:
+    code = "import sys, controller.bridges.ros2; sys.exit('rclpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+
+
+def test_the_hook_follows_every_write_but_not_its_own() -> None:
+    inner = StillPlant()
+    plant, turns = HookedPlant(inner), []
+
+    def turn() -> None:
+        turns.append(inner.read().time)
+        plant.write(JointCommand.damping(DAMPING))
+
+    plant.after_write = turn
+    for _ in range(3):
+        plant.write(JointCommand.damping(DAMPING))
+    assert len(turns) == 3
+    assert len(inner.commands) == 6
+    assert all(map(is_limp, inner.commands))
+    plant.silence()
+    plant.write(JointCommand.damping(DAMPING))
+    assert len(turns) == 3

@@ -1,0 +1,53 @@
+"""A recording can be cut, and tells what was done when."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from go2_wbc.recording import Recording
+
+
+@pytest.fixture
+def recording() -> Recording:
+    """Five samples that all differ, from t = 2 s."""
+    rng = np.random.default_rng(5)
+    return Recording(
+        time=2.0 + 0.1 * np.arange(5),
+        q=rng.normal(size=(5, 19)),
+        v=rng.normal(size=(5, 18)),
+        tau=rng.normal(size=(5, 12)),
+        foot_forces=rng.normal(size=(5, 4)),
+        stance=rng.integers(0, 2, size=(5, 4)).astype(bool),
+        p_world_com=rng.normal(size=(5, 3)),
+        support_margin=rng.normal(size=5),
+        labels=("stand", "stand", "bow", "bow", "stand"),
+    )
+
+
+@pytest.mark.parametrize("rows", [slice(1, 4), np.array([1, 2, 3])], ids=["slice", "rows"])
+def test_a_part_has_these_samples_of_every_field(
+    recording: Recording, rows: slice | np.ndarray
+) -> None:
+    part = recording.part(rows)
+    for field in fields(Recording):
+        whole, kept = getattr(recording, field.name), getattr(part, field.name)
+        assert type(kept) is type(whole)
+        np.testing.assert_array_equal(np.array(kept), np.array(whole)[1:4])
+    assert part.duration == pytest.approx(0.2)
+
+
+def test_a_part_without_a_sample_is_empty(recording: Recording) -> None:
+    part = recording.part(slice(5, None))
+    assert len(part.time) == 0
+    assert part.labels == ()
+    assert part.duration == 0.0
+
+
+def test_equal_labels_become_one_span_and_spans_leave_no_gap(recording: Recording) -> None:
+    spans = recording.spans()
+    assert [span.label for span in spans] == ["stand", "bow", "stand"]
+    assert [span.start for span in spans] == pytest.approx([0.0, 0.2, 0.4])
+    assert [span.end for span in spans] == pytest.approx([0.2, 0.4, 0.4])

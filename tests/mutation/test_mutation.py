@@ -1,0 +1,63 @@
+"""The mutation run finds what is planted: a change that a test notices, and one that none does."""
+
+from __future__ import annotations
+
+import ast
+import json
+from pathlib import Path
+
+from tests.mutation.__main__ import ALIVE, NEAR, ROOT, main, package_mutants
+from tests.mutation.operators import draw, mutants_of
+
+CODE = """
+def add(a, b) -> int:
+    return a + b
+
+
+def is_above(a, b) -> bool:
+    return a > b
+"""
+TEST = """
+from small.sums import add, is_above
+
+def test_sums():
+    assert add(1, 2) == 3
+    assert is_above(2, 1)
+"""
+QUIET = """
+def speak(n: Literal[1], size: int = 2) -> str | None:
+    _log.info("no %d", n + 1)
+    if not n:
+        raise ValueError(n + 1)
+    return f"{n + 1}"
+"""
+
+
+def test_a_planted_survivor_is_told_and_a_planted_kill_too(tmp_path: Path) -> None:
+    root, out = tmp_path / "root", tmp_path / "out.jsonl"
+    for name, text in (("small/sums.py", CODE), ("tests/small/test_sums.py", TEST)):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text)
+    arguments = ["--package", "small", "--n", "9", "--out", str(out)]
+    assert main(arguments, root) == 1
+    found = [json.loads(line) for line in out.read_text().splitlines()]
+    assert {record["mutant"]: record["stage"] for record in found} == {
+        "small/sums.py add: a + b -> (a - b)": NEAR,
+        "small/sums.py is_above: a > b -> (a >= b)": ALIVE,
+    }
+    assert (root / "small/sums.py").read_text() == CODE
+    assert main([*arguments, "--resume"], root) == 1
+    assert len(out.read_text().splitlines()) == len(found)  # nothing was tried again
+
+
+def test_annotations_errors_and_log_lines_are_left_alone() -> None:
+    names = {mutant.name.partition(": ")[2] for mutant in mutants_of(QUIET.encode(), "a.py")}
+    assert names == {"2 -> (3)", "not n -> (n)", 'return f"{n + 1}" -> return None'}
+
+
+def test_every_mutant_is_python_and_none_is_drawn_twice() -> None:
+    drawn = draw(package_mutants(ROOT, "go2_wbc"), 300, seed=0)
+    assert len({mutant.name for mutant in drawn}) == 300
+    for mutant in drawn:
+        source = (ROOT / mutant.path).read_bytes()
+        assert ast.dump(ast.parse(mutant.applied(source))) != ast.dump(ast.parse(source))

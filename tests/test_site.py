@@ -1,0 +1,164 @@
+"""The documentation builds without a warning and without network, and its links lead somewhere."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from tests.html_links import problems
+from tests.pages import BRIDGES, DOCS, ROOT
+
+NEEDED = ("sphinx", "furo", "math_core", "myst_nb", "sphinx_copybutton")
+MISSING = [name for name in NEEDED if find_spec(name) is None]
+IS_REQUIRED = os.environ.get("GO2_WBC_REQUIRE_DOCS") == "1"
+GRAPH = {
+    "cli": {"loop", "robot", "errors"},
+    "loop": {"robot", "errors"},
+    "robot": {"errors"},
+    "errors": set(),
+}
+CIRCLE = {"a": {"b", "low"}, "b": {"a", "low"}, "low": set()}
+
+
+@pytest.fixture(autouse=True)
+def tools() -> None:
+    """Skip without Sphinx, or fail where it is required."""
+    if MISSING and IS_REQUIRED:
+        pytest.fail(f"GO2_WBC_REQUIRE_DOCS=1, but these are not installed: {MISSING}")
+    if MISSING:
+        pytest.skip(f"needs the packages of the extra [docs]: {', '.join(MISSING)}")
+
+
+def extension(name: str) -> ModuleType:
+    folder = str(ROOT / "docs/_ext")
+    if folder not in sys.path:
+        sys.path.append(folder)
+    return import_module(name)
+
+
+# --- the site ---------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning_and_its_links_lead_somewhere(tmp_path: Path) -> None:
+    """The command of ``make docs``, with nothing left from an earlier build."""
+    target = tmp_path / "html"
+    options = ["-W", "--keep-going", "-q", "-E"]
+    done = subprocess.run(
+        [sys.executable, "-m", "sphinx", *options, "docs", str(target)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert problems(target) == []
+    pages = [file.relative_to(target) for file in target.rglob("*.html")]
+    made = {file.with_suffix(".md").as_posix() for file in pages}
+    assert {name.removeprefix("docs/") for name in (*DOCS, *BRIDGES)} <= made
+    api = (target / "reference/api/controller.html").read_text(encoding="utf-8")
+    assert 'id="controller.go2_controller.GO2Controller.high_five"' in api
+    works = (target / "explanation/how-it-works.html").read_text(encoding="utf-8")
+    assert works.count("<math") > 20
+    drawn = (target / "explanation/architecture.html").read_text(encoding="utf-8")
+    assert drawn.count('<svg class="import-graph"') == 5
+
+
+@pytest.mark.parametrize(
+    ("body", "expected"),
+    [
+        ('<a href="b.html#there">x</a><img src="p.png"><a id="here" href="#here">x</a>', []),
+        ('<a href="https://example.org/">x</a>', []),
+        ('<a href="c.html">x</a>', ["a.html: no c.html"]),
+        ('<a href="b.html#nowhere">x</a>', ["a.html: no b.html#nowhere"]),
+        ('<a href="#nowhere">x</a>', ["a.html: no #nowhere"]),
+        ('<img src="q.png">', ["a.html: no q.png"]),
+        (
+            '<script src="https://cdn.example.org/m.js">',
+            ["a.html: loads https://cdn.example.org/m.js"],
+        ),
+        ('<link rel="stylesheet" href="//f.org/x.css">', ["a.html: loads //f.org/x.css"]),
+    ],
+)
+def test_a_link_that_leads_nowhere_and_a_page_that_needs_a_network_are_seen(
+    tmp_path: Path, body: str, expected: list[str]
+) -> None:
+    (tmp_path / "a.html").write_text(f"<html>{body}</html>", encoding="utf-8")
+    (tmp_path / "b.html").write_text('<p id="there">', encoding="utf-8")
+    (tmp_path / "p.png").write_bytes(b"")
+    assert problems(tmp_path) == expected
+
+
+# --- what the build makes from the code -------------------------------------------------------
+
+
+def test_a_box_lies_above_all_that_it_imports() -> None:
+    graph = extension("import_graph")
+    assert graph.rows_of(GRAPH) == [["cli"], ["loop"], ["robot"], ["errors"]]
+    assert graph.rows_of(CIRCLE) == [["a", "b"], ["low"]]
+
+
+def test_an_arrow_that_follows_from_two_others_is_left_out_but_not_in_a_circle() -> None:
+    graph = extension("import_graph")
+    assert graph.reduced(GRAPH) == {
+        "cli": {"loop"},
+        "loop": {"robot"},
+        "robot": {"errors"},
+        "errors": set(),
+    }
+    assert graph.reduced(CIRCLE) == CIRCLE
+
+
+def test_the_picture_of_the_packages_is_that_of_their_imports() -> None:
+    graph = extension("import_graph")
+    modules = graph.read_modules()
+    packages = graph.graph_of(modules, "packages")
+    assert packages["go2_wbc"] == set()
+    assert packages["motions"] == packages["viz"] == {"go2_wbc"}
+    assert "errors" in graph.graph_of(modules, "go2_wbc")["robot"]
+    drawn = graph.svg(packages, graph.sizes(modules, "packages"), "packages")
+    assert all(f">{name}</text>" in drawn for name in packages)
+
+
+def test_a_docstring_keeps_its_bars_and_its_indented_blocks() -> None:
+    plain = extension("plain_docstrings")
+    lines = ["Norm |x| and ``a | b``.", "", "    minimise |x|", "", "Args:", "    x: any.", ""]
+    assert plain.as_markup(lines) == [
+        r"Norm \|x\| and ``a | b``.",
+        "",
+        "::",
+        "",
+        "    minimise |x|",
+        "",
+        "Args:",
+        "    x: any.",
+        "",
+    ]
+
+
+def test_every_public_module_has_its_place_in_the_reference() -> None:
+    rooms = extension("reference_pages").rooms()
+    listed = [module for modules in rooms.values() for module in modules]
+    assert len(listed) == len(set(listed)) > 80
+    assert rooms["controller"][:2] == ["controller", "controller.go2_controller"]
+    assert not any("bridges" in name or ".cli" in name for name in listed)
+
+
+def test_every_key_of_the_configuration_has_a_meaning_and_a_default() -> None:
+    from go2_wbc.wbc.config import WbcConfig
+
+    rows = {key: (default, meaning) for key, default, meaning in _rows(WbcConfig)}
+    assert rows["friction"] == ("0.6", "mu of the friction pyramid.")
+    assert rows["swing_foot"][0] == "{ kp = [500, 500, 500], kd = [40, 40, 40] }"
+    assert rows["posture_weight"][1] == "task weights."
+
+
+def _rows(kind: type) -> list[tuple[str, str, str]]:
+    return list(extension("reference_pages").config_rows(kind))

@@ -1,0 +1,138 @@
+"""The replay page in a real Chromium, from a file, offline."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import viz
+from go2_wbc.recording import Recording
+from tests.viz.replay.browsing import DRAWN, Tab
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+_FRAME_TRAVEL = 0.006  # [m] the robot moves this far in half a frame
+
+
+@pytest.fixture(scope="module")
+def browser(
+    recording: Recording, chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Tab]:
+    file = tmp_path_factory.mktemp("browser") / "demo.html"
+    page = viz.export_html(recording, file, title="A walk")
+    with Tab(chromium_browser) as tab:
+        tab.open(page.as_uri())
+        tab.evaluate("replay.play(false)")
+        yield tab
+
+
+def test_it_opens_without_a_request_or_an_error(browser: Tab) -> None:
+    (url,) = browser.requested
+    assert url.startswith("file:")
+    assert browser.complaints == []
+
+
+def test_the_robot_is_drawn(browser: Tab) -> None:
+    browser.evaluate("replay.seek(0.2)")
+    stage = browser.stage()
+    dark = (stage.max(axis=2) < 90).mean()
+    assert 0.002 < dark < 0.2
+    assert stage.std() > 10
+
+
+def test_scrubbing_changes_the_picture_and_comes_back_to_the_same(browser: Tab) -> None:
+    pictures = []
+    for time in (0.2, 2.0, 0.2):
+        browser.evaluate(f"replay.scrub({time}); replay.scene.setView('side')")
+        pictures.append(browser.stage())
+    assert np.abs(pictures[1] - pictures[0]).mean() > 2.0
+    assert np.abs(pictures[2] - pictures[0]).mean() < 0.5
+
+
+def test_a_click_on_the_timeline_goes_to_that_time(browser: Tab) -> None:
+    box = browser.evaluate(
+        "(({left, right, top}) => [left, right, top])"
+        "(document.getElementById('timeline').getBoundingClientRect())"
+    )
+    browser.page.mouse.click(0.5 * (box[0] + 34 + box[1] - 6), box[2] + 60)
+    half = browser.evaluate("replay.data.duration / 2")
+    assert browser.evaluate("replay.time") == pytest.approx(half, abs=0.05)
+
+
+def test_space_plays_and_pauses_and_arrows_step_by_one_frame(browser: Tab) -> None:
+    browser.evaluate("replay.scrub(0.5)")
+    frame = browser.evaluate("replay.data.frameAt(replay.time)")
+    browser.page.keyboard.press("ArrowRight")
+    assert browser.evaluate("replay.data.frameAt(replay.time)") == frame + 1
+    browser.page.keyboard.press("ArrowLeft")
+    assert browser.evaluate("replay.data.frameAt(replay.time)") == frame
+    browser.page.keyboard.press("Space")
+    browser.wait_for("replay.time > 0.7")
+    browser.page.keyboard.press("Space")
+    stopped = browser.evaluate("replay.time")
+    browser.evaluate(DRAWN)
+    assert browser.evaluate("replay.time") == stopped
+    assert browser.evaluate("replay.isPlaying") is False
+
+
+def test_the_readouts_follow_the_time(browser: Tab) -> None:
+    browser.evaluate("replay.scrub(2.0)")
+    text = "document.getElementById('{}').textContent"
+    assert browser.evaluate(text.format("behaviour")) == "High five"
+    assert browser.evaluate(text.format("now")) == "2.00"
+    shown = browser.evaluate("document.querySelector('[data-curve=height] output').textContent")
+    height = browser.evaluate("replay.data.q[19 * replay.data.frameAt(2.0) + 2]")
+    assert float(shown.split()[0]) == pytest.approx(100 * height, abs=0.06)
+
+
+def test_what_lies_on_the_floor_is_drawn_above_it_although_feet_press_into_it(
+    browser: Tab,
+) -> None:
+    lower = "replay.data.feet = replay.data.feet.map((value, i) => i % 3 === 2 ? value {} : value);"
+    corners = "replay.scene.polygon.geometry.attributes.position"
+    try:
+        browser.evaluate(lower.format("- 0.004") + "replay.seek(0.2)")
+        heights = browser.evaluate(f"[0, 1, 2].map((i) => {corners}.getZ(i))")
+    finally:
+        browser.evaluate(lower.format("+ 0.004") + "replay.seek(0.2)")
+    assert min(heights) > 0.001
+
+
+def test_hiding_the_forces_changes_the_picture(browser: Tab) -> None:
+    browser.evaluate("replay.scrub(0.1); replay.scene.setView('side')")
+    shown = browser.stage()
+    browser.evaluate("document.querySelector('[data-toggle=forces]').click()")
+    hidden = browser.stage()
+    browser.evaluate("document.querySelector('[data-toggle=forces]').click()")
+    orange = (shown[:, :, 0] > 220) & (shown[:, :, 1] < 170) & (shown[:, :, 2] < 90)
+    assert orange.sum() > 100
+    assert np.abs(shown - hidden)[orange].mean() > 30
+
+
+def test_the_camera_follows_the_robot(browser: Tab) -> None:
+    ask = (
+        "[replay.scene.viewer.controls.target.x, replay.data.target[2 * replay.data.frameAt({t})]]"
+    )
+    browser.evaluate("replay.scrub(0); replay.scene.setView('corner')")
+    before = browser.evaluate(ask.format(t=0))
+    browser.evaluate("replay.scrub(1.4)")
+    after = browser.evaluate(ask.format(t=1.4))
+    assert after[0] - before[0] == pytest.approx(after[1] - before[1], abs=_FRAME_TRAVEL)
+    assert after[0] - before[0] > 0.1
+
+
+def test_the_page_fits_a_narrow_window(browser: Tab) -> None:
+    browser.resize(640, 860)
+    app = "document.getElementById('app')"
+    overflow = f"{app}.scrollWidth > innerWidth || {app}.scrollHeight > innerHeight"
+    assert browser.evaluate(overflow) is False
+    pane = browser.evaluate(
+        "(({width, height}) => [width, height])"
+        "(document.querySelector('#pane canvas').getBoundingClientRect())"
+    )
+    assert pane[0] == pytest.approx(626, abs=6)
+    assert pane[1] > 250

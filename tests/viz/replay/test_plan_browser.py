@@ -1,0 +1,229 @@
+"""A page with verdict and ghost in a real Chromium: findings in red, jumps, margins, the ghost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import viz
+from go2_wbc.recording import Recording
+from tests.viz.replay.browsing import DRAWN, Tab
+from tests.viz.verdicts import made_up_verdict
+from viz.content import ReplayContent
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+_BROKEN, _FINE = 1.7, 2.8
+"""Times [s] at which the made-up verdict has a calf over its limit, and nothing broken."""
+
+
+@pytest.fixture(scope="module")
+def browser(
+    recording: Recording, chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Tab]:
+    verdict = made_up_verdict(recording.duration)
+    lower = recording.q.copy()
+    lower[:, 2] += 0.03
+    content = ReplayContent(recording, verdict=verdict, ghost=replace(recording, q=lower))
+    file = tmp_path_factory.mktemp("browser") / "plan.html"
+    page = viz.export_html(content, file, title="A plan")
+    with Tab(chromium_browser, offline=True) as tab:
+        tab.open(page.as_uri())
+        tab.evaluate("replay.play(false)")
+        yield tab
+
+
+def _red(picture: np.ndarray) -> int:
+    red, green, blue = np.moveaxis(picture, 2, 0)
+    return int(((red > 120) & (green < 0.42 * red) & (blue < 0.42 * red)).sum())
+
+
+def test_it_opens_offline_without_a_request_or_an_error(browser: Tab) -> None:
+    assert browser.complaints == []
+    (url,) = browser.requested
+    assert url.startswith("file:")
+
+
+def test_scrubbing_changes_the_picture(browser: Tab) -> None:
+    pictures = []
+    for time in (0.2, _FINE, 0.2):
+        browser.evaluate(f"replay.scrub({time}); replay.scene.setView('side')")
+        pictures.append(browser.stage())
+    assert pictures[0].std() > 10
+    assert np.abs(pictures[1] - pictures[0]).mean() > 2.0
+    assert np.abs(pictures[2] - pictures[0]).mean() < 0.5
+
+
+def test_a_broken_limit_is_red_where_and_when_it_is_broken(browser: Tab) -> None:
+    browser.evaluate("replay.scene.setView('corner')")
+    browser.evaluate(f"replay.scrub({_FINE})")
+    fine = _red(browser.stage())
+    browser.evaluate(f"replay.scrub({_BROKEN}); replay.scene.flags.box.style.display = 'none'")
+    broken = _red(browser.stage())
+    browser.evaluate("replay.scene.flags.box.style.display = ''")
+    assert broken > fine + 300
+    assert browser.text(".note b") == "joint position: FR calf"
+    assert browser.text(".note span") == "1.2, limit 1 <b>"
+    painted = (
+        "[...replay.scene.flags.{}].filter(([, meshes]) => "
+        "meshes[0].material.color.getHex() === FLAG_COLOR).map(([name]) => name)"
+    )
+    assert browser.evaluate(painted.format("ghostParts")) == ["FR_calf"]
+    assert browser.evaluate(painted.format("parts")) == []
+    button = "document.querySelector('[data-ghost]')"
+    browser.evaluate(f"{button}.click(); {button}.click()")
+    assert browser.evaluate(painted.format("parts")) == ["FR_calf"]
+    assert browser.evaluate(painted.format("ghostParts")) == []
+    assert _red(browser.stage()) > fine + 300
+    browser.evaluate(f"{button}.click()")
+
+
+def test_a_note_points_at_its_part(browser: Tab) -> None:
+    browser.evaluate(f"replay.scrub({_FINE}); replay.scene.setView('corner')")
+    browser.evaluate(DRAWN)
+    browser.evaluate(f"replay.scrub({_BROKEN})")
+    path = browser.evaluate("document.querySelector('#notes path').getAttribute('d')")
+    x, y = (float(value) for value in path.split("L")[1].split("m")[0].split())
+    browser.evaluate(DRAWN)
+    seen = browser.evaluate(
+        "(() => { const {x, y} = replay.scene.flags.placeOf('FR_calf')"
+        ".project(replay.scene.viewer.camera); const pane = replay.scene.pane;"
+        " return [(x + 1) / 2 * pane.clientWidth, (1 - y) / 2 * pane.clientHeight]; })()"
+    )
+    assert (x, y) == pytest.approx(tuple(seen), abs=0.5)
+    assert 0 < x < 955
+    foot = browser.evaluate(
+        "(() => { const f = replay.data.feet, i = 12 * replay.data.frameAt(replay.time) + 3;"
+        " const p = replay.scene.flags.placeOf('FR_calf');"
+        " const [, aside] = replay.scene.ghost.shift;"
+        " return Math.hypot(p.x - f[i], -p.z - f[i + 1] - aside, p.y - f[i + 2]); })()"
+    )
+    assert foot < 0.22
+
+
+def test_an_instant_is_shown_too(browser: Tab) -> None:
+    time = browser.evaluate("replay.data.annotations[0].time")
+    browser.evaluate(f"replay.scrub({time})")
+    assert browser.text(".note b") == "support: CoM"
+    ball = "replay.scene.node('com/ball').scale.x"
+    assert browser.evaluate(ball) > 1
+    browser.evaluate(f"replay.scrub({_FINE})")
+    assert browser.evaluate(ball) == 1
+    assert browser.evaluate("document.querySelector('.note')") is None
+
+
+def test_a_finding_in_the_list_jumps_to_its_time_and_shows_its_margin(browser: Tab) -> None:
+    browser.evaluate("replay.scrub(0)")
+    browser.page.locator(".annotation").nth(1).click()
+    time = browser.evaluate("replay.data.annotations[1].time")
+    assert browser.evaluate("replay.time") == pytest.approx(time)
+    assert browser.text("#chosen h2") == "joint position"
+    assert browser.text("#chosen output") == "FR calf: 0.2 rad over"
+    assert browser.evaluate("document.querySelectorAll('.annotation')[1].classList.contains('now')")
+    browser.evaluate(f"replay.scrub({_FINE})")
+    assert browser.text("#chosen output") == "FR calf: 0.5 rad left"
+
+
+def test_the_key_n_goes_from_finding_to_finding(browser: Tab) -> None:
+    times = sorted(browser.evaluate("replay.data.annotations.map(annotation => annotation.time)"))
+    browser.evaluate("replay.scrub(replay.data.duration)")
+    seen = []
+    for _ in times:
+        browser.page.keyboard.press("n")
+        seen.append(browser.evaluate("replay.time"))
+    assert seen == pytest.approx(times)
+
+
+def test_a_margin_that_is_clicked_is_shown_large(browser: Tab) -> None:
+    browser.evaluate("document.querySelectorAll('.margin button')[4].click()")
+    assert browser.text("#chosen h2") == "torque"
+    assert browser.evaluate("document.querySelectorAll('.margin')[4].className") == "margin fine on"
+    assert browser.evaluate("document.querySelector('.margin').className") == "margin broken"
+
+
+def test_the_numbers_of_a_scale_are_not_cut_off_at_its_ends(browser: Tab) -> None:
+    written = browser.evaluate(
+        "(() => { const seen = [], paint = replay.verdict.large.picture.getContext('2d');"
+        " const ownText = paint.fillText; paint.fillText = (text, x, y) => seen.push([text, y]);"
+        " drawGrid(paint, {low: 0, high: 50, height: 80, width: 200, left: 40, right: 2,"
+        " yAt: (value) => 80 * (1 - value / 50)}); paint.fillText = ownText; return seen; })()"
+    )
+    assert (written[0][0], written[-1][0]) == ("0", "50")
+    assert all(5 <= y <= 75 for _, y in written)
+
+
+def test_the_timeline_is_red_where_a_limit_is_broken(browser: Tab) -> None:
+    browser.evaluate("replay.scrub(0)")
+    browser.evaluate(DRAWN)
+    color = (
+        "(t => { const c = replay.charts[0]; const r = c.canvas.width / c.width;"
+        " return [...c.canvas.getContext('2d')"
+        ".getImageData(c.xAt(t) * r, 31 * r, 1, 1).data].slice(0, 3); })"
+    )
+    assert browser.evaluate(f"{color}({_BROKEN})") == [220, 38, 38]
+    assert browser.evaluate(f"{color}({_FINE})") == [243, 245, 249]
+
+
+def test_the_support_polygon_has_the_standing_feet_as_corners(browser: Tab) -> None:
+    browser.evaluate("replay.scrub(2.0)")
+    corners = browser.evaluate(
+        "[...replay.scene.polygon.geometry.attributes.position.array].slice(0, 9)"
+    )
+    drawn = browser.evaluate("replay.scene.polygon.geometry.drawRange.count")
+    assert drawn == 3
+    frame = browser.evaluate("replay.data.frameAt(2.0)")
+    feet = np.array(
+        browser.evaluate(f"[...replay.data.feet].slice({12 * frame}, {12 * frame + 12})")
+    )
+    standing = feet.reshape(4, 3)[[0, 2, 3], :2]
+    found = np.array(corners).reshape(3, 3)[:, :2]
+    assert sorted(map(tuple, found.round(4))) == sorted(map(tuple, standing.round(4)))
+
+
+def test_the_ghost_follows_the_plan_beside_the_robot(browser: Tab) -> None:
+    browser.evaluate("replay.scrub(2.0); replay.scene.setView('corner')")
+    place = browser.evaluate("(({x, y, z}) => [x, y, z])(replay.scene.ghost.body.base.position)")
+    robot = browser.evaluate("(({x, y, z}) => [x, y, z])(replay.scene.body.base.position)")
+    assert np.subtract(place, robot) == pytest.approx([0.0, 0.0, 0.03], abs=1e-3)
+    shift = "(({x, y}) => [x, y])(replay.scene.ghost.body.root.position)"
+    button = "document.querySelector('[data-ghost]')"
+    pictures = [browser.stage()]
+    assert browser.evaluate(shift) == [0, 0.62]
+    browser.evaluate(f"{button}.click()")
+    pictures.append(browser.stage())
+    assert browser.evaluate(shift) == [0, 0]
+    browser.evaluate(f"{button}.click()")
+    pictures.append(browser.stage())
+    assert browser.evaluate(f"{button}.textContent") == "Ghost: off"
+    browser.evaluate(f"{button}.click()")
+    pictures.append(browser.stage())
+    beside, overlaid, alone, again = pictures
+    assert (np.abs(beside - alone).max(axis=2) > 20).sum() > 5000
+    assert (np.abs(overlaid - alone).max(axis=2) > 20).sum() > 1000
+    assert np.abs(beside - again).mean() < 0.5
+
+
+def test_the_legend_tells_measured_from_planned(browser: Tab) -> None:
+    assert browser.text("#force-key") == "measured force"
+    shown = "getComputedStyle(document.querySelector('{}')).display !== 'none'"
+    assert browser.evaluate(shown.format(".ghost-key"))
+    assert browser.evaluate(shown.format("#who"))
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (640, 860), (420, 800)])
+def test_the_page_fits_its_window(browser: Tab, width: int, height: int) -> None:
+    browser.resize(width, height)
+    app = "document.getElementById('app')"
+    overflow = f"{app}.scrollWidth > innerWidth || {app}.scrollHeight > innerHeight"
+    for tab in ("curves", "check"):
+        browser.evaluate(f"replay.openTab('{tab}')")
+        browser.evaluate(DRAWN)
+        assert browser.evaluate(overflow) is False
+    pane = browser.evaluate("replay.scene.pane.clientHeight")
+    assert pane > 200
+    assert browser.complaints == []

@@ -1,0 +1,129 @@
+"""The live page's server: only for this machine, only three answers."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import socket
+import sys
+from collections.abc import Iterator
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+
+from go2_wbc.errors import ConfigError
+from go2_wbc.recording import Recording
+from tests.viz.page_reader import packed_parts, read_data, read_pack
+from tests.viz.verdicts import made_up_verdict
+from viz.content import ReplayContent
+from viz.replay.preview_server import PreviewServer
+
+
+@pytest.fixture
+def server(recording: Recording) -> Iterator[PreviewServer]:
+    with PreviewServer(ReplayContent(recording), "A <plan>", 0) as opened:
+        yield opened
+
+
+def _port(server: PreviewServer) -> int:
+    return urlsplit(server.url).port or 0
+
+
+def _get(server: PreviewServer, path: str, host: str | None = None) -> tuple[int, str]:
+    connection = http.client.HTTPConnection("127.0.0.1", _port(server), timeout=30)
+    connection.request("GET", path, headers={} if host is None else {"Host": host})
+    answer = connection.getresponse()
+    text = answer.read().decode()
+    connection.close()
+    return answer.status, text
+
+
+def test_it_answers_with_the_page_and_its_data(server: PreviewServer) -> None:
+    status, page = _get(server, "/")
+    assert status == 200
+    assert "<title>A &lt;plan&gt;</title>" in page
+    assert "EventSource" in page
+    status, data = _get(server, "/data")
+    assert status == 200
+    assert data in page
+    assert _get(server, "/etc/passwd")[0] == 404
+    assert _get(server, "/../pyproject.toml")[0] == 404
+
+
+@pytest.mark.parametrize(
+    "host", ["evil.example", "evil.example:{}", "127.0.0.1.evil.example:{}", "10.0.0.1:{}", ""]
+)
+def test_other_names_of_this_machine_are_refused(server: PreviewServer, host: str) -> None:
+    for path in ("/", "/data", "/events"):
+        status, text = _get(server, path, host.format(_port(server)))
+        assert status == 403
+        assert text == "only for this machine\n"
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1:{}", "localhost:{}", "[::1]:{}"])
+def test_the_loopbacks_own_names_are_accepted(server: PreviewServer, host: str) -> None:
+    assert _get(server, "/data", host.format(_port(server)))[0] == 200
+
+
+def test_nothing_but_get_is_answered(server: PreviewServer) -> None:
+    connection = http.client.HTTPConnection("127.0.0.1", _port(server), timeout=30)
+    connection.request("POST", "/data", body=b"x")
+    assert connection.getresponse().status == 501
+    connection.close()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere 127.0.0.2 is no address")
+def test_it_listens_on_the_loopback_only(server: PreviewServer) -> None:
+    with socket.socket() as other:
+        # Another address of the loopback network: free if, and only if, 127.0.0.1 alone is bound.
+        other.bind(("127.0.0.2", _port(server)))
+    assert server.url.startswith("http://127.0.0.1:")
+
+
+def test_what_is_published_is_told_and_served(server: PreviewServer, recording: Recording) -> None:
+    first = json.loads(server.next_state(None) or "")
+    assert first["error"] is None
+    server.publish_error("line 3: oops")
+    second = json.loads(server.next_state(json.dumps(first)) or "")
+    assert second == {"version": first["version"], "error": "line 3: oops"}
+    server.publish(ReplayContent(recording, verdict=made_up_verdict(recording.duration)))
+    third = json.loads(server.next_state(json.dumps(second)) or "")
+    assert third["version"] != first["version"]
+    assert third["error"] is None
+    header, _ = read_pack(_unpacked(_get(server, "/data")[1]))
+    assert header["version"] == third["version"]
+    assert header["verdict"]["ok"] is False
+    page_header, arrays = read_data(_get(server, "/")[1])
+    assert page_header["version"] == third["version"]
+    assert np.isfinite(arrays["q"]).all()
+
+
+def test_pages_hear_at_once_and_hear_the_end(recording: Recording) -> None:
+    with PreviewServer(ReplayContent(recording), "t", 0) as server:
+        connection = http.client.HTTPConnection("127.0.0.1", _port(server), timeout=30)
+        connection.request("GET", "/events")
+        stream = connection.getresponse()
+        assert stream.getheader("Content-Type") == "text/event-stream; charset=utf-8"
+        assert json.loads(stream.readline()[len("data: ") :])["error"] is None
+        assert stream.readline() == b"\n"
+        server.publish_error("broken")
+        assert json.loads(stream.readline()[len("data: ") :])["error"] == "broken"
+    assert stream.read() == b"\n"
+    connection.close()
+
+
+def test_a_port_in_use_is_named(server: PreviewServer, recording: Recording) -> None:
+    port = _port(server)
+    with pytest.raises(ConfigError, match=f"cannot listen on port {port} of 127.0.0.1"):
+        PreviewServer(ReplayContent(recording), "t", port)
+
+
+def test_a_port_out_of_range_is_refused(recording: Recording) -> None:
+    with pytest.raises(ConfigError, match="port 70000 is not valid"):
+        PreviewServer(ReplayContent(recording), "t", 70_000)
+
+
+def _unpacked(text: str) -> bytes:
+    block = f'<script type="text/plain" id="replay-data">{text}</script>'
+    return packed_parts(block)["replay-data"]
