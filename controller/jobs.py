@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar, final, runtime_checkable
 
-from controller.procedures import Aborted, Figures, listed
+from controller.procedures import Aborted, Measurements, listed
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.robot.state import RobotState
 
@@ -76,7 +76,7 @@ class Job:
     """
 
     name: str
-    act: Callable[[Job], Figures]
+    act: Callable[[Job], Measurements]
     reply: Reply
     prepare: Callable[[], None] | None = None
     begin: Callable[[], str] = lambda: ""
@@ -227,7 +227,7 @@ class JobServer(Generic[Robot]):
         return True
 
     def _carry_out(self, job: Job) -> Answer:
-        figures: Figures = {}
+        figures: Measurements = {}
         error: Exception | None = None
         refusal = message = ""
         try:

@@ -12,7 +12,7 @@ from typing import final
 
 from controller.go2_controller import GO2Controller
 from controller.jobs import Answer, Job, JobServer
-from controller.procedures import Aborted, Figures
+from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import ClosedError, Go2WbcError
 from go2_wbc.planning.command import VelocityCommand
 
@@ -127,7 +127,7 @@ class Teleop:
             return
         self._doing = label
 
-        def perform(_job: Job) -> Figures:
+        def perform(_job: Job) -> Measurements:
             if not act(self._go2):
                 raise Aborted(self._go2.last_outcome.reason)
             return {}

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from controller.jobs import Answer, Job, JobServer
-from controller.procedures import Figures
+from controller.procedures import Measurements
 from go2_wbc.robot.state import RobotState
 from tests.controller.plants import HANG_GUARD, lying_state
 
@@ -51,7 +51,7 @@ class Client:
     def submit(
         self,
         name: str,
-        act: Callable[[Job], Figures] = lambda _job: {},
+        act: Callable[[Job], Measurements] = lambda _job: {},
         prepare: Callable[[], None] | None = None,
         begin: Callable[[], str] = lambda: "",
     ) -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from controller.jobs import Answer, Job, JobServer
-from controller.procedures import Aborted, Figures
+from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import ModeError
 from tests.controller.job_clients import Client, Clock, Robot, failing, now
 from tests.controller.plants import HANG_GUARD, in_thread
@@ -54,7 +54,7 @@ def threaded(robot: Robot) -> Iterator[Client]:
 def test_a_job_is_answered_after_it_was_carried_out_with_what_was_measured(
     robot: Robot, client: Client
 ) -> None:
-    def act(_job: Job) -> Figures:
+    def act(_job: Job) -> Measurements:
         robot.time += 1.5
         assert client.answers == []
         return {"height [m]": 0.31}
@@ -137,7 +137,7 @@ def test_queued_jobs_have_their_turns_in_order_and_one_too_many_is_refused(queue
 def test_after_the_patience_what_runs_has_begun_and_what_waits_is_refused(
     queued: Client, clock: Clock
 ) -> None:
-    def act(_job: Job) -> Figures:
+    def act(_job: Job) -> Measurements:
         clock.now += PATIENCE
         queued.jobs.expire()
         assert queued.answers == []
@@ -221,7 +221,7 @@ def worked_off(client: Client) -> None:
 def test_a_job_that_is_called_off_says_so_and_then_whoever_wants_to_know_is_told(
     robot: Robot, client: Client
 ) -> None:
-    def act(job: Job) -> Figures:
+    def act(job: Job) -> Measurements:
         assert client.jobs.cancel(lambda: robot.calls.append("told"))
         assert (job.phase, job.is_cancelled) == ("returning", True)
         assert robot.calls == ["cancel"]
@@ -241,7 +241,7 @@ def test_without_a_job_there_is_nothing_to_call_off(robot: Robot, client: Client
 
 
 def test_a_job_that_was_done_although_it_was_called_off_is_done(client: Client) -> None:
-    def act(_job: Job) -> Figures:
+    def act(_job: Job) -> Measurements:
         client.jobs.cancel()
         return {}
 
@@ -253,7 +253,7 @@ def test_a_job_that_was_done_although_it_was_called_off_is_done(client: Client) 
 def test_going_limp_ends_what_runs_and_refuses_what_waits(robot: Robot, threaded: Client) -> None:
     has_begun = threading.Event()
 
-    def act(_job: Job) -> Figures:
+    def act(_job: Job) -> Measurements:
         has_begun.set()
         now(robot.is_limp)
         raise Aborted("damped")
@@ -277,7 +277,7 @@ def test_a_robot_goes_limp_before_an_action_begins_or_after_never_in_between(
         robot.calls.append("begin")
         return ""
 
-    def act(_job: Job) -> Figures:
+    def act(_job: Job) -> Measurements:
         now(robot.is_limp)
         raise Aborted("damped")
 
@@ -309,7 +309,7 @@ def test_a_job_that_outlives_the_server_is_called_off_and_not_answered_again(
 ) -> None:
     has_begun = threading.Event()
 
-    def act(job: Job) -> Figures:
+    def act(job: Job) -> Measurements:
         has_begun.set()
         now(robot.is_limp)
         assert job.is_cancelled
@@ -332,7 +332,7 @@ def test_many_threads_get_one_answer_for_each_job_and_one_job_runs_at_a_time(
 ) -> None:
     threads, each, running, most = 6, 40, [], []
 
-    def act(job: Job) -> Figures:
+    def act(job: Job) -> Measurements:
         running.append(job.name)
         most.append(len(running))
         running.remove(job.name)

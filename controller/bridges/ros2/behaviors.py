@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from controller.go2_controller import GO2Controller
 from controller.jobs import Answer, Job, JobServer, Reply
 from controller.modes import Mode
-from controller.procedures import Aborted, Figures
+from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.model import RobotModel
@@ -73,7 +73,7 @@ def _come_to_rest(go2: GO2Controller) -> bool:
     return go2.last_outcome.ok
 
 
-def _measured(go2: GO2Controller, act: Callable[[GO2Controller], bool]) -> Figures:
+def _measured(go2: GO2Controller, act: Callable[[GO2Controller], bool]) -> Measurements:
     """What a call of the robot has measured; raises Aborted, with the reason, if it did nothing."""
     before = go2.last_outcome
     done, outcome = act(go2), go2.last_outcome

@@ -158,7 +158,7 @@ class SportRobot:
 
     def cancel(self) -> None:
         """Leave the motion that plays, safely, and stand."""
-        self.pilot.recall()
+        self.pilot.return_safely()
 
     def close(self) -> None:
         """Go limp and stop."""

@@ -19,7 +19,7 @@ from controller.bridges.unitree.sport_api import Api, Code, SportMode
 from controller.bridges.unitree.sport_robot import MOTIONS, POSE, SportRobot
 from controller.jobs import Answer, Job, JobServer
 from controller.modes import Mode
-from controller.procedures import Aborted, Figures
+from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 
@@ -137,7 +137,7 @@ class SportService:
         reply(Code.OK, "")
 
     def _submit(self, api: Api, perform: Callable[[], None], reply: Reply) -> None:
-        def act(_job: Job) -> Figures:
+        def act(_job: Job) -> Measurements:
             perform()
             return {}
 
