@@ -227,7 +227,7 @@ class JobServer(Generic[Robot]):
         return True
 
     def _carry_out(self, job: Job) -> Answer:
-        figures: Measurements = {}
+        measured: Measurements = {}
         error: Exception | None = None
         refusal = message = ""
         try:
@@ -236,7 +236,7 @@ class JobServer(Generic[Robot]):
                     raise job._error
                 refusal = f"{job.name} was cancelled" if job.is_cancelled else job.begin()
             if not refusal:
-                figures = job.act(job)
+                measured = job.act(job)
         except (Aborted, Go2WbcError) as failure:
             error, message = failure, str(failure) or f"{job.name} was cancelled"
         except Exception as failure:  # a bug must not leave its caller without an answer
@@ -248,8 +248,8 @@ class JobServer(Generic[Robot]):
             return Answer(False, message, duration, is_cancelled, error=error)
         if refusal:
             return Answer(False, refusal, duration, job.is_cancelled, is_refused=True)
-        measured = f": {listed(figures)}" if figures else ""
-        return Answer(True, f"done in {duration:.1f} s{measured}", duration)
+        told = f": {listed(measured)}" if measured else ""
+        return Answer(True, f"done in {duration:.1f} s{told}", duration)
 
     def _take_turn(self) -> None:
         """Let the next job have its turn; the lock is held."""

@@ -25,6 +25,7 @@ FENCES: dict[str, tuple[str, ...]] = {
         "benchmarks/agreement.py",
     ),
     "meshcat": ("viz/*",),
+    "matplotlib": ("viz/*",),
     "placo": ("go2_wbc/wbc/placo_backend.py", "go2_wbc/robot/inverse_kinematics.py"),
     "rclpy": ("controller/bridges/*",),
     "cyclonedds": ("controller/bridges/*",),

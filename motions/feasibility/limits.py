@@ -29,8 +29,8 @@ class FeasibilityLimits:
         swing_depth: how deep [m] the lowest point of a foot in the air may be below the ground.
         drag_height: height [m] of a foot's lowest point below which it is on the ground; planned
             heights are exact, so this only absorbs rounding.
-        drag: longest way [m] of a foot that counts as raised along the ground: as far as one may
-            land beside its place.
+        drag: longest way [m] of a foot that counts as raised along the ground: twice the 9 mm that
+            generated waves need, whose paw comes down at a slant.
         landing: distance [m] by which a foot may land beside its place.
         landing_speed: greatest speed [m/s] of a foot at touchdown.
         joint_jump: greatest change [rad/s] of a joint's speed between samples of 10 ms.
@@ -51,7 +51,7 @@ class FeasibilityLimits:
     clearance: float = 0.02
     swing_depth: float = 0.005
     drag_height: float = 0.0005
-    drag: float = 0.01
+    drag: float = 0.02
     landing: float = 0.01
     landing_speed: float = 0.6
     joint_jump: float = 4.0

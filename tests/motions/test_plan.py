@@ -12,7 +12,7 @@ from motions import Timeline, compile_timeline, deg
 from motions.postures import sit_down
 
 STEP = 1e-5  # s; of the differences
-EXACT = dict(rtol=1e-5, atol=1e-5)
+EXACT = {"rtol": 1e-5, "atol": 1e-5}
 START = np.array([0.02, -0.01, 0.25, 0.15, -0.2, 0.4])
 
 

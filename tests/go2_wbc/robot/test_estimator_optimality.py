@@ -98,11 +98,11 @@ def most_likely(given: list[SensorReading], model: RobotModel) -> np.ndarray:
         told.begin(begin[:, axis])
         for tick, leg in np.ndindex(COUNT, 4):
             told.say(tick, f[leg] - p, feet[tick, leg, axis], CONFIG.place)
-            told.say(tick, v, 0.0, CONFIG.velocity / trust[leg])
+            told.say(tick, v, 0.0, CONFIG.velocity / float(trust[leg]))
             if axis == 2:
-                told.say(tick, f[leg], model.foot_radius, CONFIG.height / trust[leg])
+                told.say(tick, f[leg], model.foot_radius, CONFIG.height / float(trust[leg]))
             if tick:
-                told.say(tick, f[leg], 0.0, CONFIG.foot_drift / trust[leg] * STEP, -f[leg])
+                told.say(tick, f[leg], 0.0, CONFIG.foot_drift / float(trust[leg]) * STEP, -f[leg])
         if not (given[0].foot_forces > low).any():
             for tick in range(COUNT):
                 told.say(tick, v, 0.0, CONFIG.rest)
