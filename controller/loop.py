@@ -112,7 +112,7 @@ class ControlLoop:
         _log.warning("%s", fault.reason)
 
     def go_limp(self) -> None:
-        """Send the safe command once, even to a plant that fails: the last word before silence."""
+        """Send the safe command once, even to a plant that fails."""
         with suppress(Exception):
             self.plant.write(JointCommand.damping(DAMPING))
 

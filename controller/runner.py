@@ -21,9 +21,9 @@ from go2_wbc.plant.base import Plant
 
 _log = logging.getLogger(__name__)
 
-LATE = 0.1
+GREATEST_LAG = 0.1
 """Lag [s] behind the wall clock after which the pace is given up and taken up anew."""
-BREATH = 1e-4
+LEAST_PAUSE = 1e-4
 """Least pause [s] between two ticks, in which waiting calls get hold of the lock."""
 POLL = 0.05
 """Time [s] after which a waiting thread looks again, should it have missed a notice."""
@@ -38,7 +38,7 @@ class Runner:
 
     Whoever ticks the loop, or reads more of it than one attribute, holds ``lock``. Without
     ``realtime`` a waiting call holds it until it ends, so other threads never wait for the lock to
-    end a call: ``interrupt`` and ``close`` leave a note that is read before every tick. Should the
+    end a call: ``interrupt`` and ``close`` set a flag that is read before every tick. Should the
     plant block in the background, calls end with ``PlantTimeout`` instead of waiting with it.
     """
 
@@ -117,7 +117,7 @@ class Runner:
             ClosedError: if the controller is closed meanwhile.
         """
         with self.lock():
-            self._heed()
+            self._obey()
             fault = self.loop.fault
             if fault is not None and fault is not self._known_fault:
                 return fault
@@ -137,7 +137,7 @@ class Runner:
                 raise self._hanging()
             if self._lock.acquire(timeout=POLL):
                 try:
-                    self._heed_interruption()
+                    self._obey_interruption()
                     if not self.is_realtime:
                         self.loop.go_limp()
                 finally:
@@ -161,7 +161,7 @@ class Runner:
 
     def _advance(self, is_done: Callable[[], bool], behaviour: Behaviour, end: float) -> bool:
         while self.loop.state.time < end:
-            self._heed()
+            self._obey()
             self.loop.tick()
             self._after_tick()
             if self._is_ended(behaviour):
@@ -178,7 +178,7 @@ class Runner:
             if not news:
                 raise self._hanging()
             with self.lock():
-                self._heed()
+                self._obey()
                 if self._failure is not None:
                     raise self._failure
                 seen = self._ticks
@@ -198,26 +198,26 @@ class Runner:
     def _hanging(self) -> PlantTimeout:
         return PlantTimeout(f"the plant has kept the loop waiting for more than {HANG_LIMIT:g} s")
 
-    def _heed(self) -> None:
+    def _obey(self) -> None:
         if self._stopping:
             raise ClosedError("the controller was closed during a call")
-        self._heed_interruption()
+        self._obey_interruption()
 
-    def _heed_interruption(self) -> None:
+    def _obey_interruption(self) -> None:
         reason, self._interruption = self._interruption, None
         if reason is not None:
             fault = self.loop.fault
             self.loop.abandon(Fault(reason, is_fall=fault is not None and fault.is_fall))
 
     def _keep_pace(self) -> None:
-        pacer = Pacer(self.loop.plant.control_period, LATE, BREATH)
+        pacer = Pacer(self.loop.plant.control_period, GREATEST_LAG, LEAST_PAUSE)
         while True:
             with self._lock:
                 if self._stopping:
-                    self.loop.go_limp()  # the last word, should ``close`` not have waited for it
+                    self.loop.go_limp()  # ``close`` may have given up waiting for this
                     return
                 try:
-                    self._heed_interruption()
+                    self._obey_interruption()
                     self.loop.tick()
                     self._after_tick()
                 except Exception as error:  # whatever it is, a waiting call must end with it

@@ -16,8 +16,8 @@ from controller.modes import Mode
 from go2_wbc.errors import ClosedError, Go2WbcError, PlantError
 from go2_wbc.recording import Recording
 
-FIGURE_RATE = 100.0
-"""Samples a second from which the figures of a step are taken."""
+MEASUREMENT_RATE = 100.0
+"""Samples a second from which the measurements of a step are taken."""
 TOTALS_RATE = 500.0
 """Samples a second for the least margins and loads: short dips count."""
 
@@ -105,7 +105,7 @@ def _run_step(go2: GO2Controller, step: DemoStep) -> tuple[StepResult, float]:
     except Go2WbcError as error:
         answer, refusal = False, str(error).splitlines()[0]
     cpu_time = time.process_time() - cpu_start
-    recording = _window(go2.recording(FIGURE_RATE), start, go2.state.time)
+    recording = _window(go2.recording(MEASUREMENT_RATE), start, go2.state.time)
     figures = () if refusal else _measured(go2, step, recording)
     reason = refusal or _failure(go2, answer, figures)
     result = StepResult(

@@ -35,11 +35,11 @@ class SafetyConfig:
         tilt_limit: tilt [rad] of the trunk beyond which a balancing robot counts as fallen.
         height_limit: height [m] of the base over the centre of the lowest foot below which a
             balancing robot counts as collapsed; on its belly it is 0.063.
-        touch_limit: time [s] for which the trunk of a balancing robot may touch the ground; after
-            a stumble it was below 0.08.
-        sink_limit: depth [m] below where it shall be, beyond which a trunk sinks; it was below
-            0.01 in every motion, 0.07 with a payload of 8 kg.
-        sink_limit_time: time [s] for which it may; after pushes that a trot withstood, 0.16.
+        touch_limit: time [s] for which the trunk of a balancing robot may touch the ground; of the
+            robots that withstood a push in simulation none touched it.
+        sink_limit: depth [m] of the trunk below where it shall be, beyond which it has sunk; in
+            simulation 0.01 at most in every motion, 0.07 with a payload of 8 kg.
+        sink_limit_time: time [s] for which it may; after pushes that a trot withstood 0.16 at most.
         stale_limit: time [s] without news from the plant after which it counts as silent.
         qp_patience: QP failures in a row after which the robot is damped for good.
     """
