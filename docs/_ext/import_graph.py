@@ -22,7 +22,7 @@ from sphinx.util.docutils import SphinxDirective
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("benchmarks", "controller", "viz", "motions", "go2_wbc")
-WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN = 124, 42, 24, 34, 6
+WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN = 136, 42, 12, 34, 2
 """Size of a box and the space around it [px]."""
 MOST_PER_ROW = 5
 
