@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
-from motions.postures import SIT_POSE, STAND_HEIGHT
+from motions.postures import SIT_POSE, STAND_HEIGHT, TUCKED_JOINTS
 
 STILL_SPEED = 0.05
 """Speed [m/s] of the base below which it counts as still."""
@@ -20,6 +21,14 @@ LYING_HEIGHT = 0.13
 """Height [m] of the base above the lowest foot below which the robot is down."""
 BELLY_HEIGHT = 0.095
 """Height [m] of the base above the lowest foot below which the belly is down: 0.085 at rest."""
+FOLD_TOLERANCE = 0.5
+"""Angle [rad] from the tucked legs' joints that still counts as folded."""
+
+
+def unfolded_legs(snapshot: Snapshot) -> list[Leg]:
+    """The legs that are not folded below the trunk, so that the robot must not rise on them."""
+    off = np.abs(snapshot.state.joint_positions - TUCKED_JOINTS)
+    return [leg for leg in LEGS if off[leg.joints].max() > FOLD_TOLERANCE]
 
 
 def ground_height(snapshot: Snapshot, model: RobotModel) -> float:
@@ -64,7 +73,7 @@ def is_lying(snapshot: Snapshot, model: RobotModel) -> bool:
     return bool(height < BELLY_HEIGHT and snapshot.state.tilt < 0.5 and is_still(snapshot))
 
 
-def posture_figures(snapshot: Snapshot, model: RobotModel) -> dict[str, float]:
+def posture_measurements(snapshot: Snapshot, model: RobotModel) -> dict[str, float]:
     """The measured quantities behind the verdicts above, by name with unit."""
     roll, pitch, yaw = np.degrees(snapshot.state.rpy)
     ground = ground_height(snapshot, model)

@@ -13,7 +13,7 @@ from types import TracebackType
 from controller import arguments
 from controller.assembly import PilotSettings, build_pilot
 from controller.modes import Mode, Outcome
-from controller.procedures import Aborted, Figures
+from controller.procedures import Aborted, Measurements
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
@@ -202,7 +202,8 @@ class GO2Controller:
         Args:
             side: "right" or "left".
             hold: time [s] for which the paw is held up, 0.5 to 30.
-            plan: the library's motion with this side and time, if it is compiled already.
+            plan: what ``load_motion("high_five", side=side, hold=hold)`` was compiled to before;
+                by default it is compiled now.
 
         Raises:
             CommandError: for another side or time.
@@ -239,7 +240,7 @@ class GO2Controller:
         Its call then returns False. A motion on three feet goes the way back, or on, that it knows.
         """
         self._check_open()
-        self._pilot.recall()
+        self._pilot.return_safely()
 
     @property
     def progress(self) -> float:
@@ -330,7 +331,7 @@ class GO2Controller:
     # --- how calls are made ---------------------------------------------------------------
 
     def _call(
-        self, name: str, procedure: Callable[[], Figures], *, allow_fallen: bool = False
+        self, name: str, procedure: Callable[[], Measurements], *, allow_fallen: bool = False
     ) -> bool:
         self._check_open()
         if self._pilot.mode is Mode.FALLEN and not allow_fallen:
@@ -339,10 +340,10 @@ class GO2Controller:
             self._pilot.begin()
             start = self.state.time
             try:
-                figures = procedure()
+                measured = procedure()
                 ok, reason = True, "done"
             except Aborted as aborted:
-                figures, ok, reason = aborted.figures, False, str(aborted)
+                measured, ok, reason = aborted.measured, False, str(aborted)
             except Go2WbcError as error:
                 self._note(False, str(error), start)
                 raise
@@ -351,12 +352,14 @@ class GO2Controller:
                 self._pilot.collapse(reason)
                 self._note(False, f"{reason}, damped", start)
                 raise
-            self._note(ok, reason, start, figures)
+            self._note(ok, reason, start, measured)
         return ok
 
-    def _note(self, ok: bool, reason: str, start: float, figures: Figures | None = None) -> None:
+    def _note(
+        self, ok: bool, reason: str, start: float, measured: Measurements | None = None
+    ) -> None:
         duration = self.state.time - start
-        self._last_outcome = Outcome(ok, reason, duration, dict(figures or {}))
+        self._last_outcome = Outcome(ok, reason, duration, dict(measured or {}))
         fault = self._runner.loop.fault
         is_known = fault is not None and fault.reason in reason  # the loop has logged it
         if not (ok or is_known):

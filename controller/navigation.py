@@ -17,7 +17,7 @@ TURN_RATE = 1.0
 WALK_SPEED = 0.4
 """Greatest speed [m/s] of a goal."""
 APPROACH = 2.0
-"""Speed per remaining way [1/s]: the goal slows down before its goal."""
+"""Speed per remaining way [1/s]: the robot slows down before its goal."""
 HEADING_TOLERANCE = math.radians(1.5)
 DISTANCE_TOLERANCE = 0.02
 GREATEST_TURN = 20 * math.pi
@@ -32,12 +32,17 @@ class Goal(ABC):
     name: str
     time_limit: float
 
-    @abstractmethod
     def begin(self, state: RobotState) -> None:
         """Note where it starts."""
+        self._odometer = Odometer(state)
+
+    def command(self, state: RobotState) -> VelocityCommand:
+        """The velocity that leads to the goal; ask at least twice in every turn of the robot."""
+        self._odometer.update(state)
+        return self._command(state)
 
     @abstractmethod
-    def command(self, state: RobotState) -> VelocityCommand:
+    def _command(self, state: RobotState) -> VelocityCommand:
         """The velocity that leads to the goal."""
 
     @abstractmethod
@@ -49,7 +54,7 @@ class Goal(ABC):
         """Whether the resting robot is at the goal."""
 
     @abstractmethod
-    def figures(self, state: RobotState) -> dict[str, float]:
+    def measurements(self, state: RobotState) -> dict[str, float]:
         """What was asked and achieved, by name with unit."""
 
 
@@ -62,12 +67,13 @@ class Odometer:
         self._yaw_start = self._yaw_last = state.yaw
         self._turned = 0.0
 
+    def update(self, state: RobotState) -> None:
+        """Count the angle turned since the last update, which must be less than half a turn."""
+        self._turned, self._yaw_last = self.turned(state), state.yaw
+
     def turned(self, state: RobotState) -> float:
         """Angle [rad] turned to the left since the start, unwrapped."""
-        yaw = state.yaw
-        self._turned += wrap_angle(yaw - self._yaw_last)
-        self._yaw_last = yaw
-        return self._turned
+        return self._turned + wrap_angle(state.yaw - self._yaw_last)
 
     def displacement(self, state: RobotState) -> tuple[float, float]:
         """Way ahead and to the left [m] in the frame of the start."""
@@ -91,16 +97,12 @@ class TurnInPlace(Goal):
         self._angle = angle
         self.time_limit = 3.0 * abs(angle) / TURN_RATE + 8.0
 
-    def begin(self, state: RobotState) -> None:
-        """Note the heading."""
-        self._odometer = Odometer(state)
-
-    def command(self, state: RobotState) -> VelocityCommand:
+    def _command(self, state: RobotState) -> VelocityCommand:
         """Turn towards the goal, slower as it comes near, and hold the place."""
-        remaining = self._angle - self._odometer.turned(state)
+        turned = self._odometer.turned(state)
+        remaining = self._angle - turned
         ahead, left = self._odometer.displacement(state)
-        yaw = self._odometer.turned(state)
-        c, s = math.cos(yaw), math.sin(yaw)
+        c, s = math.cos(turned), math.sin(turned)
         return VelocityCommand(
             float(np.clip(-0.5 * (c * ahead + s * left), -0.1, 0.1)),
             float(np.clip(-0.5 * (-s * ahead + c * left), -0.1, 0.1)),
@@ -116,7 +118,7 @@ class TurnInPlace(Goal):
         """Whether the heading is right to 1.5 deg."""
         return abs(self._angle - self._odometer.turned(state)) < HEADING_TOLERANCE
 
-    def figures(self, state: RobotState) -> dict[str, float]:
+    def measurements(self, state: RobotState) -> dict[str, float]:
         """Angle asked and turned."""
         return {
             "asked [deg]": math.degrees(self._angle),
@@ -140,11 +142,7 @@ class DriveStraight(Goal):
         self._distance = distance
         self.time_limit = 3.0 * abs(distance) / WALK_SPEED + 8.0
 
-    def begin(self, state: RobotState) -> None:
-        """Note the place and heading."""
-        self._odometer = Odometer(state)
-
-    def command(self, state: RobotState) -> VelocityCommand:
+    def _command(self, state: RobotState) -> VelocityCommand:
         """Walk towards the goal, slower as it comes near, and hold the line and the heading."""
         ahead, left = self._odometer.displacement(state)
         turned = self._odometer.turned(state)
@@ -168,7 +166,7 @@ class DriveStraight(Goal):
         miss = math.hypot(self._distance - ahead, left)
         return miss < DISTANCE_TOLERANCE and abs(self._odometer.turned(state)) < HEADING_TOLERANCE
 
-    def figures(self, state: RobotState) -> dict[str, float]:
+    def measurements(self, state: RobotState) -> dict[str, float]:
         """Distance asked and walked, and the heading error."""
         ahead, left = self._odometer.displacement(state)
         return {

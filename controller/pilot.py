@@ -1,8 +1,8 @@
 """The pilot: sequences behaviours into what a user asks for, and measures what came of it.
 
-Every public method is a procedure that either ends with the measured figures, or raises ``Aborted``
-with the reason in plain words. It knows nothing of users, locks or outcomes: ``GO2Controller`` is
-the face that turns procedures into calls.
+Every public method is a procedure that returns what it measured, or raises ``Aborted`` with the
+reason in plain words. It knows nothing of users, locks or outcomes: ``GO2Controller`` turns
+procedures into calls.
 """
 
 from __future__ import annotations
@@ -13,15 +13,13 @@ from statistics import fmean
 
 import numpy as np
 
-from controller.behaviours.joints import Damped, ServoJoints
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.walking import Walking
 from controller.checks import LYING_HEIGHT, ground_height, is_lying, is_sitting, is_standing
-from controller.loop import Fault
 from controller.modes import Mode
 from controller.navigation import DriveStraight, Goal, TurnInPlace
-from controller.procedures import Aborted, Figures, ProcedureRunner, listed
-from controller.recovery import roll_over
+from controller.procedures import Aborted, Measurements, ProcedureRunner, listed
+from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait, find_gait
@@ -31,18 +29,12 @@ from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionPlanner
 from go2_wbc.reference import MotionPlan, Posture, TrackedPoint
 from motions.compiler import CompiledPlan
-from motions.postures import SPLAYED_JOINTS, TUCKED_JOINTS, lie_down, rise, sit_down
+from motions.postures import lie_down, rise, sit_down
 
 READY_TIME = 0.2
 """Time [s] that a robot is given to stand ready in walking mode."""
 STOP_LIMIT = 4.0
 """Time [s] in which a walking robot must come to rest after ``stop``."""
-TUCK_TIME = 0.9
-"""Time [s] of drawing the feet under the hips while lying."""
-SPLAY_TIME = 0.5
-"""Time [s] of spreading the folded legs until the belly is on the ground."""
-LIMP_TIME = 0.6
-"""Time [s] for which the robot is left to sink before it counts as lying."""
 PAW_TOLERANCE = 0.03
 """Distance [m] that the paw, on the average of the hold, may be below its planned height."""
 
@@ -66,7 +58,7 @@ class Pilot:
         self._gait: Gait | None = None
         self._goal: Goal | None = None
         self.playing: PlayPlan | None = None
-        self._is_recalled = False
+        self._must_return = False
         self._mode = Mode.LYING if self.is_on_the_ground else Mode.DAMPED
 
     @property
@@ -87,77 +79,59 @@ class Pilot:
     def begin(self) -> None:
         """Begin a procedure: the mode is from now on what the last fault, if any, has made it."""
         self._mode = self.mode
-        self._is_recalled = False
+        self._must_return = False
         self._runner.begin()
 
     # --- postures -------------------------------------------------------------------------
 
-    def stand(self) -> Figures:
+    def stand(self) -> Measurements:
         """Stand, from any mode but fallen."""
         mode = self.mode
         if mode is Mode.WALKING:
             self.rest()
         if mode in (Mode.LYING, Mode.DAMPED) or self.is_on_the_ground:
-            self._tuck()
+            self._mode = Mode.MOVING
+            tuck(self._procedures)
         entry = {Mode.SITTING: Posture.SIT, Mode.LYING: Posture.LIE}.get(mode, Posture.STAND)
         duration = 0.4 if mode in (Mode.STANDING, Mode.WALKING) else 1.2
         self._take_posture("stand", lambda pose: rise(pose, entry, duration), TrackedPoint.COM)
         self._procedures.settle("stand", is_standing)
         self._mode = Mode.STANDING
-        return self._procedures.figures()
+        return self._procedures.measurements()
 
-    def sit(self) -> Figures:
+    def sit(self) -> Measurements:
         """Sit like a dog, from any mode but fallen."""
         if self.mode is Mode.SITTING:
             self._procedures.settle("sit", is_sitting)
-            return self._procedures.figures()
+            return self._procedures.measurements()
         self._ensure_standing()
         self._take_posture("sit", sit_down, TrackedPoint.BASE)
         self._procedures.settle("sit", is_sitting)
         self._mode = Mode.SITTING
-        return self._procedures.figures()
+        return self._procedures.measurements()
 
-    def lie_down(self) -> Figures:
+    def lie_down(self) -> Measurements:
         """Lie down and go limp."""
         if self.mode in (Mode.LYING, Mode.DAMPED) or self.is_on_the_ground:
-            self._go_limp()
-            return self._procedures.figures()
+            return self._go_limp()
         if self.mode is not Mode.MOVING:  # a stand that failed need not succeed to lie down
             self._ensure_standing()
         self._take_posture("lie down", lie_down, TrackedPoint.BASE)
-        self._go_limp()
-        return self._procedures.figures()
+        return self._go_limp()
 
-    def recover(self) -> Figures:
+    def recover(self) -> Measurements:
         """Get up after a fall onto the belly, a side or the back."""
         if self.mode.is_upright:
             return self.stand()
         self._mode = Mode.DAMPED
-        self._procedures.run(Damped("recover", LIMP_TIME), LIMP_TIME + 1.0)
-        for step in roll_over(self._loop):
-            self._procedures.run(step, 4.0)
-        if self._loop.state.tilt > 0.6:
-            reason = f"could not roll onto the belly: {self._attitude()}"
-            with self._runner.lock():
-                self._loop.abandon(Fault(reason, is_fall=True))
-            raise Aborted(reason)
+        get_onto_belly(self._procedures)
         self._mode = Mode.LYING
         return self.stand()
 
-    def _tuck(self) -> None:
-        if self._loop.state.tilt > 0.6:
-            raise Aborted(f"cannot stand up from {self._attitude()}; call recover()")
-        self._mode = Mode.MOVING
-        self._procedures.run(ServoJoints("tuck", ((TUCK_TIME, TUCKED_JOINTS),)), TUCK_TIME + 0.5)
-
-    def _go_limp(self) -> None:
-        if self._loop.state.tilt < 0.6:  # or it would rest on folded legs, belly in the air
-            self._procedures.run(
-                ServoJoints("splay", ((SPLAY_TIME, SPLAYED_JOINTS),)), SPLAY_TIME + 0.5
-            )
-        self._procedures.run(Damped("lie", LIMP_TIME), LIMP_TIME + 0.5)
-        self._procedures.settle("lie down", is_lying)
+    def _go_limp(self) -> Measurements:
+        lie_limp(self._procedures)
         self._mode = Mode.LYING
+        return self._procedures.measurements()
 
     def _ensure_standing(self) -> None:
         if self.mode is not Mode.STANDING:
@@ -165,7 +139,7 @@ class Pilot:
 
     # --- walking --------------------------------------------------------------------------
 
-    def walk(self, gait: str | Gait) -> Figures:
+    def walk(self, gait: str | Gait) -> Measurements:
         """Enter walking mode, ready for commands; one that walks with this gait just goes on."""
         wanted = find_gait(gait)
         if self.mode is not Mode.WALKING:
@@ -176,7 +150,7 @@ class Pilot:
             self._start_walking(wanted)
         self.wait(READY_TIME)
         self._mode = Mode.WALKING
-        return self._procedures.figures()
+        return self._procedures.measurements()
 
     def set_command(self, command: VelocityCommand) -> VelocityCommand:
         """Follow ``command``, clipped to the envelope; returns what is followed.
@@ -191,7 +165,7 @@ class Pilot:
         self._walking.command = self._config.envelope.clip(command)
         return self._walking.command
 
-    def rest(self) -> Figures:
+    def rest(self) -> Measurements:
         """Zero the command and let the walking robot come to rest."""
         walking = self._walking
         if self.mode is Mode.WALKING and walking is not None:
@@ -200,9 +174,9 @@ class Pilot:
             self._procedures.until(
                 lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "come to rest"
             )
-        return self._procedures.figures()
+        return self._procedures.measurements()
 
-    def run_goal(self, goal: Goal) -> Figures:
+    def run_goal(self, goal: Goal) -> Measurements:
         """Walk a goal to its measured end and come to rest."""
         self._goal, loop = goal, self._loop
         try:
@@ -225,12 +199,12 @@ class Pilot:
             self._goal = None
             if self._walking is not None:
                 self._walking.command = ZERO_COMMAND
-        figures = goal.figures(loop.state)
+        measured = goal.measurements(loop.state)
         if was_halted:
-            raise Aborted(f"{goal.name} ended by stop()", figures)
+            raise Aborted(f"{goal.name} ended by stop()", measured)
         if not goal.is_within_tolerance(loop.state):
-            raise Aborted(f"{goal.name} missed: {listed(figures)}", figures)
-        return figures
+            raise Aborted(f"{goal.name} missed: {listed(measured)}", measured)
+        return measured
 
     def halt(self) -> bool:
         """Zero the command, from any thread; returns whether that ends a goal.
@@ -242,11 +216,11 @@ class Pilot:
             self._walking.command = ZERO_COMMAND
         return had_goal
 
-    def turn(self, angle: float) -> Figures:
+    def turn(self, angle: float) -> Measurements:
         """Turn left by ``angle`` [rad]."""
         return self.run_goal(TurnInPlace(angle))
 
-    def drive(self, distance: float) -> Figures:
+    def drive(self, distance: float) -> Measurements:
         """Walk ``distance`` [m] straight ahead; negative is backward."""
         return self.run_goal(DriveStraight(distance))
 
@@ -259,15 +233,17 @@ class Pilot:
 
     # --- motions --------------------------------------------------------------------------
 
-    def play(self, plan: MotionPlan, watch: Callable[[float], None] | None = None) -> Figures:
+    def play(self, plan: MotionPlan, watch: Callable[[float], None] | None = None) -> Measurements:
         """Play ``plan``; ``watch(t)`` is called after every tick, t seconds into it.
 
         Raises:
             StanceMismatch: if the plan starts from another stance.
         """
         self._meet_entry(plan)
-        if self._is_recalled:
-            raise Aborted(f"{plan.name} was cancelled before it began", self._procedures.figures())
+        if self._must_return:
+            raise Aborted(
+                f"{plan.name} was cancelled before it began", self._procedures.measurements()
+            )
         self._mode = Mode.MOVING
         behaviour = PlayPlan(plan, self._model.foot_radius)
         self._procedures.engage(behaviour)
@@ -280,22 +256,22 @@ class Pilot:
 
         try:
             self._procedures.until(finished, plan.duration + 1.0, plan.name)
-            if self._is_recalled:
+            if self._must_return:
                 raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
             self._procedures.settle(plan.name, _CHECK_OF_POSTURE[plan.exit])
         finally:
             self.playing = None
         self._mode = _MODE_OF_POSTURE[plan.exit]
-        figures = {**self._procedures.figures(), **behaviour.deviation.figures()}
+        measured = {**self._procedures.measurements(), **behaviour.deviation.measurements()}
         if not behaviour.deviation.is_small:
-            raise Aborted(f"{plan.name} went another way: {listed(figures)}", figures)
-        return figures
+            raise Aborted(f"{plan.name} went another way: {listed(measured)}", measured)
+        return measured
 
-    def recall(self) -> None:
+    def return_safely(self) -> None:
         """Let the procedure that plays a motion leave it and stand; any thread may call it."""
-        self._is_recalled, playing = True, self.playing
+        self._must_return, playing = True, self.playing
         if playing is not None:
-            playing.recall()
+            playing.return_safely()
 
     def _meet_entry(self, plan: MotionPlan) -> None:
         mode = self.mode
@@ -309,7 +285,7 @@ class Pilot:
         if plan.entry is Posture.STAND:
             self.square_up()
 
-    def high_five(self, plan: CompiledPlan, leg: Leg, height: float) -> Figures:
+    def high_five(self, plan: CompiledPlan, leg: Leg, height: float) -> Measurements:
         """Give a high five, from any mode but fallen, and measure how high the paw was held.
 
         Args:
@@ -326,24 +302,26 @@ class Pilot:
                 ground = ground_height(loop.snapshot, self._model)
                 heights.append(float(loop.snapshot.p_world_feet[leg, 2]) - ground)
 
-        figures = self.play(plan, watch)
-        figures = {
-            **figures,
+        measured = self.play(plan, watch)
+        measured = {
+            **measured,
             "planned paw height [m]": height,
             "least paw height [m]": min(heights),
             "mean paw height [m]": fmean(heights),
         }
         if fmean(heights) < height - PAW_TOLERANCE:
-            raise Aborted(f"the paw was not held at its height: {listed(figures)}", figures)
-        return figures
+            raise Aborted(f"the paw was not held at its height: {listed(measured)}", measured)
+        return measured
 
     def square_up(self) -> None:
         """Stand with the feet below the hips, stepping in place if need be."""
         if self.mode is not Mode.STANDING:
             self._ensure_standing()
         walking = self._start_walking("trot")
-        if not walking.square_up(self._loop.snapshot):
-            loop = self._loop
+        loop = self._loop
+        with self._runner.lock():  # the planner may be at work in another thread
+            is_square = walking.square_up(loop.snapshot)
+        if not is_square:
             self._mode = Mode.WALKING
             self._procedures.until(
                 lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "square the feet"
@@ -357,14 +335,14 @@ class Pilot:
         """Go limp at once; ends the procedure that runs. Any thread may call it."""
         self._runner.interrupt(reason)
 
-    def wait(self, seconds: float) -> Figures:
+    def wait(self, seconds: float) -> Measurements:
         """Let time pass, whatever happens in it; a fault ends up in ``mode``."""
         known_fault = self._loop.fault
         self._procedures.let_pass(seconds)
         fault = self._loop.fault
         if fault is not None and fault is not known_fault:
-            raise Aborted(fault.reason, self._procedures.figures())
-        return self._procedures.figures()
+            raise Aborted(fault.reason, self._procedures.measurements())
+        return self._procedures.measurements()
 
     def _take_posture(
         self,
@@ -375,10 +353,6 @@ class Pilot:
         behaviour = ChangePosture(label, make_plan, point, self._model.foot_radius)
         self._mode = Mode.MOVING
         self._procedures.run(behaviour, 5.0)
-
-    def _attitude(self) -> str:
-        roll, pitch, _ = np.degrees(self._loop.state.rpy)
-        return f"roll {roll:.0f} deg, pitch {pitch:.0f} deg"
 
     @property
     def is_on_the_ground(self) -> bool:

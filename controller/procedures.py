@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import NoReturn
 
 from controller.behaviours.base import Behaviour
-from controller.checks import posture_figures
+from controller.checks import posture_measurements
+from controller.loop import Fault
 from controller.runner import Runner
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -14,31 +16,36 @@ SETTLE_LIMIT = 3.0
 """Time [s] in which a posture must come to rest after its motion."""
 CALM_TIME = 0.1
 """Time [s] for which a posture must hold without a break."""
+ROUNDING = 1e-9
+"""Time [s] by which a sum of control periods may miss its end."""
 SINK_TIME = 1.0
 """Time [s] for which a robot that went limp on its feet is watched: it sinks, or it falls."""
 
-Figures = Mapping[str, float]
+Measurements = Mapping[str, float]
 """Measured quantities by name with unit."""
 
 
 class Aborted(Exception):
-    """A procedure did not reach its end; the message says why, ``figures`` what was measured."""
+    """A procedure did not reach its end; the message says why, ``measured`` what was measured."""
 
-    def __init__(self, reason: str, figures: Figures | None = None) -> None:
+    def __init__(self, reason: str, measured: Measurements | None = None) -> None:
         super().__init__(reason)
-        self.figures = dict(figures or {})
+        self.measured = dict(measured or {})
 
 
 class ProcedureRunner:
     """Lets time pass on a runner until something is measured.
 
-    Every method but ``figures`` and ``let_pass`` raises ``Aborted`` if it cannot do its work.
+    Attributes:
+        loop: what it lets run; hold the runner's lock to change it.
+
+    Every method but ``measurements`` and ``let_pass`` raises ``Aborted`` if it cannot do its work.
     """
 
     def __init__(self, runner: Runner) -> None:
         """Run on ``runner``."""
         self._runner = runner
-        self._loop = runner.loop
+        self.loop = runner.loop
         self._model = runner.loop.model
 
     def engage(self, behaviour: Behaviour) -> None:
@@ -50,11 +57,11 @@ class ProcedureRunner:
     def run(self, behaviour: Behaviour, limit: float) -> None:
         """Switch to ``behaviour`` and let it finish, within ``limit`` seconds."""
         self.engage(behaviour)
-        self.until(lambda: behaviour.is_finished(self._loop.snapshot), limit, behaviour.label)
+        self.until(lambda: behaviour.is_finished(self.loop.snapshot), limit, behaviour.label)
 
     def settle(self, what: str, check: Callable[[Snapshot, RobotModel], bool]) -> None:
         """Let time pass until ``check`` has held for a while."""
-        loop, model = self._loop, self._model
+        loop, model = self.loop, self._model
         calm_since: list[float] = []
 
         def calm() -> bool:
@@ -70,28 +77,34 @@ class ProcedureRunner:
         """Let time pass until ``is_done()``, for ``limit`` seconds at most."""
         if self._runner.advance_until(is_done, limit):
             return
-        fault = self._loop.fault
+        fault = self.loop.fault
         if fault is not None and fault.may_fall:
             self.let_pass(SINK_TIME)
-            fault = self._loop.fault or fault
+            fault = self.loop.fault or fault
         if fault is not None:
             raise self._aborted(fault.reason)
-        raise self._aborted(f"{what} not done within {limit:.1f} s: {listed(self.figures())}")
+        raise self._aborted(f"{what} not done within {limit:.1f} s: {listed(self.measurements())}")
 
     def let_pass(self, seconds: float) -> None:
         """Let time pass, whatever happens in it."""
-        end = self._loop.state.time + seconds - 1e-9
-        while self._loop.state.time < end:
-            self._runner.advance_until(lambda: False, end - self._loop.state.time)
+        end = self.loop.state.time + seconds - ROUNDING
+        while self.loop.state.time < end:
+            self._runner.advance_until(lambda: False, end - self.loop.state.time)
 
-    def figures(self) -> Figures:
+    def give_up(self, reason: str) -> NoReturn:
+        """Go limp; the robot counts as fallen."""
+        with self._runner.lock():
+            self.loop.abandon(Fault(reason, is_fall=True))
+        raise self._aborted(reason)
+
+    def measurements(self) -> Measurements:
         """What is measured now."""
-        return posture_figures(self._loop.snapshot, self._model)
+        return posture_measurements(self.loop.snapshot, self._model)
 
     def _aborted(self, reason: str) -> Aborted:
-        return Aborted(reason, self.figures())
+        return Aborted(reason, self.measurements())
 
 
-def listed(figures: Figures) -> str:
-    """``figures`` in one line."""
-    return ", ".join(f"{name} {value:.3g}" for name, value in figures.items())
+def listed(measured: Measurements) -> str:
+    """``measured`` in one line."""
+    return ", ".join(f"{name} {value:.3g}" for name, value in measured.items())

@@ -1,8 +1,9 @@
-"""Getting onto the belly after a fall, by joint servos alone.
+"""What a robot on the ground does by joint servos alone: fold its legs, go limp, roll over.
 
 The trunk is round: with its legs folded the robot comes to rest on its belly or on its back. The
 thighs turn far enough to point past the back, so from there the legs of one side push against the
-ground and roll the robot over to the other side, onto its belly.
+ground and roll the robot over to the other side, onto its belly. A leg that a fall has left beside
+the trunk is jammed there; it comes free if its hip turns outwards first.
 """
 
 from __future__ import annotations
@@ -13,36 +14,117 @@ import numpy as np
 from jaxtyping import Float
 
 from controller.behaviours.base import Behaviour
-from controller.behaviours.joints import ServoJoints
+from controller.behaviours.joints import Damped, ServoJoints
+from controller.checks import is_lying, unfolded_legs
 from controller.loop import ControlLoop
-from go2_wbc.legs import LEGS
-from motions.postures import TUCKED_JOINTS
+from controller.procedures import Aborted, ProcedureRunner
+from go2_wbc.legs import LEGS, Leg
+from motions.postures import SPLAYED_JOINTS, TUCKED_JOINTS
 
 ON_BELLY = 0.6
 """Tilt [rad] below which the robot lies on its belly."""
-TRIES = 4
-"""How often it rolls before it gives up."""
+TUCK_TIME = 0.9
+"""Time [s] of drawing the feet under the hips while lying."""
+SPLAY_TIME = 0.5
+"""Time [s] of spreading the folded legs until the belly is on the ground."""
+LIMP_TIME = 0.6
+"""Time [s] for which the robot is left to sink before it counts as lying."""
+STEP_LIMIT = 4.0
+"""Time [s] in which one step of rolling over must end."""
+GRACE = 0.5
+"""Time [s] by which a servo may end later than planned."""
+TRIES = 6
+"""How often it rolls, or frees a leg, before it gives up."""
 REACHED_BACK = (-0.3, 3.4, -2.66)
 """Joint angles [rad] of a left leg folded past the back, and inwards."""
 PUSHING = (0.8, 3.4, -0.9)
 """Joint angles [rad] of a left leg stretched past the back and outwards: it lifts its side."""
+OUTWARDS = 0.7
+"""Hip angle [rad] at which a left leg swings past the trunk without touching it."""
+
+
+def tuck(procedures: ProcedureRunner) -> None:
+    """Fold the legs below the trunk, ready to rise.
+
+    Raises:
+        Aborted: if the robot does not lie on its belly, or a leg does not fold.
+    """
+    loop = procedures.loop
+    if loop.state.tilt > ON_BELLY:
+        raise Aborted(f"cannot stand up from {_attitude(loop)}; call recover()")
+    procedures.run(ServoJoints("tuck", ((TUCK_TIME, TUCKED_JOINTS),)), TUCK_TIME + GRACE)
+    jammed = unfolded_legs(loop.snapshot)
+    if jammed:
+        raise Aborted(f"cannot stand up: {_names(jammed)} not below the trunk; call recover()")
+
+
+def lie_limp(procedures: ProcedureRunner) -> None:
+    """Spread the folded legs, go limp and wait until the robot lies still."""
+    if procedures.loop.state.tilt < ON_BELLY:  # or it would rest on folded legs, belly in the air
+        splay = ServoJoints("splay", ((SPLAY_TIME, SPLAYED_JOINTS),))
+        procedures.run(splay, SPLAY_TIME + GRACE)
+    procedures.run(Damped("lie", LIMP_TIME), LIMP_TIME + GRACE)
+    procedures.settle("lie down", is_lying)
+
+
+def get_onto_belly(procedures: ProcedureRunner) -> None:
+    """Roll a robot that has fallen onto its belly, with folded legs.
+
+    Raises:
+        Aborted: if it still lies otherwise in the end; it then counts as fallen.
+    """
+    loop = procedures.loop
+    procedures.run(Damped("recover", LIMP_TIME), LIMP_TIME + 1.0)
+    for step in roll_over(loop):
+        procedures.run(step, STEP_LIMIT)
+    if loop.state.tilt > ON_BELLY:
+        procedures.give_up(f"could not roll onto the belly: {_attitude(loop)}")
+    jammed = unfolded_legs(loop.snapshot)
+    if jammed:
+        procedures.give_up(f"could not fold {_names(jammed)} below the trunk")
+
+
+def _names(legs: list[Leg]) -> str:
+    return " and ".join(leg.name for leg in legs)
+
+
+def _attitude(loop: ControlLoop) -> str:
+    roll, pitch, _ = np.degrees(loop.state.rpy)
+    return f"roll {roll:.0f} deg, pitch {pitch:.0f} deg"
 
 
 def roll_over(loop: ControlLoop) -> Iterator[Behaviour]:
-    """Behaviours that bring the robot onto its belly, one after the other, looking in between."""
+    """Behaviours that bring the robot onto its belly, one after the other, looking in between.
+
+    At the end it lies on its belly with folded legs, or it has not succeeded.
+    """
     yield _fold()
     for _ in range(TRIES):
-        if loop.state.tilt < ON_BELLY:
+        jammed = unfolded_legs(loop.snapshot)
+        if jammed:
+            yield _freed(loop.state.joint_positions, jammed)
+        elif loop.state.tilt < ON_BELLY:
             return
-        side = 1 if loop.state.rpy[0] >= 0 else -1
-        reach, push = _one_side(side, REACHED_BACK), _one_side(side, PUSHING)
-        yield ServoJoints("reach back", ((0.5, reach), (0.1, reach)), kp=80.0)
-        yield ServoJoints("push over", ((0.24, push), (0.4, push)), kp=80.0)
-        yield _fold()
+        else:
+            side = 1 if loop.state.rpy[0] >= 0 else -1
+            reach, push = _one_side(side, REACHED_BACK), _one_side(side, PUSHING)
+            yield ServoJoints("reach back", ((0.5, reach), (0.1, reach)), kp=80.0)
+            yield ServoJoints("push over", ((0.24, push), (0.4, push)), kp=80.0)
+            yield _fold()
 
 
 def _fold() -> ServoJoints:
     return ServoJoints("fold legs", ((0.6, TUCKED_JOINTS), (0.3, TUCKED_JOINTS)), kp=60.0)
+
+
+def _freed(measured: Float[np.ndarray, "12"], jammed: list[Leg]) -> ServoJoints:
+    """Turn the hips of ``jammed`` legs outwards, fold them out there, and draw them in."""
+    out, folded = measured.copy(), TUCKED_JOINTS.copy()
+    for leg in jammed:
+        hip = leg.joints.start
+        out[hip] = folded[hip] = leg.side * OUTWARDS
+    targets = ((0.3, out), (0.1, out), (0.8, folded), (0.4, TUCKED_JOINTS), (0.2, TUCKED_JOINTS))
+    return ServoJoints("free legs", targets, kp=60.0)
 
 
 def _one_side(side: int, joints: tuple[float, float, float]) -> Float[np.ndarray, "12"]:

@@ -1,4 +1,4 @@
-"""Between the check and the eyes: a rehearsed motion, and a run of it, as what the viewers show."""
+"""A checked motion, and a run of it, as what ``viz`` shows."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
 
 
 def verdict_of(report: FeasibilityReport) -> Verdict:
-    """The report as the viewers want it."""
+    """The report as what ``viz`` shows of it."""
     broken, tight = len(report.failures), len(report.warnings)
     text = "feasible" if report.ok else _count(broken, "limit") + " broken"
     if tight:

@@ -15,6 +15,7 @@ from weakref import WeakValueDictionary
 
 from controller.behaviours.base import Behaviour
 from controller.loop import ControlLoop, Fault
+from controller.pacing import Pacer
 from go2_wbc.errors import ClosedError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
 
@@ -209,7 +210,7 @@ class Runner:
             self.loop.abandon(Fault(reason, is_fall=fault is not None and fault.is_fall))
 
     def _keep_pace(self) -> None:
-        due = time.monotonic()
+        pacer = Pacer(self.loop.plant.control_period, LATE, BREATH)
         while True:
             with self._lock:
                 if self._stopping:
@@ -224,12 +225,9 @@ class Runner:
                     return
                 finally:
                     self._announce()
-            due += self.loop.plant.control_period
-            lag = time.monotonic() - due
-            if lag > LATE:
+            lag = pacer.wait()
+            if lag:
                 _log.warning("the loop is %.0f ms behind the wall clock", 1000 * lag)
-                due = time.monotonic()
-            time.sleep(max(-lag, BREATH))
 
     def close(self) -> None:
         """Go limp and stop: no tick after this, and a call that runs ends; idempotent."""

@@ -1,4 +1,4 @@
-"""Drives a robot by keys: short commands at once, long ones in a thread of their own.
+"""Drives a robot by keys: short commands at once, long ones as jobs in another thread.
 
 Knows nothing of terminals: ``press`` takes a key, ``status`` tells what is going on, ``news`` what
 has come of it.
@@ -6,12 +6,13 @@ has come of it.
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping
 from queue import SimpleQueue
 from typing import final
 
 from controller.go2_controller import GO2Controller
+from controller.jobs import Answer, Job, JobServer
+from controller.procedures import Aborted, Figures
 from go2_wbc.errors import ClosedError, Go2WbcError
 from go2_wbc.planning.command import VelocityCommand
 
@@ -62,14 +63,15 @@ class Teleop:
     def __init__(self, go2: GO2Controller) -> None:
         """Drive ``go2``."""
         self._go2 = go2
-        self._worker: threading.Thread | None = None
+        self._jobs = JobServer(go2)
+        self._jobs.start("teleop")
         self._doing = ""
         self._news: SimpleQueue[str] = SimpleQueue()
 
     @property
     def is_busy(self) -> bool:
         """Whether a long call is running."""
-        return self._worker is not None and self._worker.is_alive()
+        return bool(self._doing)
 
     def press(self, key: str) -> bool:
         """Do what ``key`` means; False if it means to end."""
@@ -97,9 +99,8 @@ class Teleop:
 
     def close(self) -> None:
         """Go limp, and wait for a running call to notice."""
-        self._go2.damp()
-        if self._worker is not None:
-            self._worker.join(JOIN_TIME)
+        self._jobs.damp()
+        self._jobs.abandon("the robot is let go", JOIN_TIME)
 
     def _obey(self, key: str) -> None:
         if key in STEPS:
@@ -109,7 +110,7 @@ class Teleop:
         elif key == STOP:
             self._go2.stop()
         elif key == DAMP:
-            self._go2.damp()
+            self._jobs.damp()
             self._news.put("limp")
 
     def _change(self, step: VelocityCommand) -> None:
@@ -125,14 +126,15 @@ class Teleop:
             self._news.put(f"{self._doing} is still running: k ends it")
             return
         self._doing = label
-        self._worker = threading.Thread(target=self._do, args=(label, act), daemon=True)
-        self._worker.start()
 
-    def _do(self, label: str, act: Callable[[GO2Controller], bool]) -> None:
-        try:
-            ok = act(self._go2)
-            self._news.put(f"{label}: {'done' if ok else self._go2.last_outcome.reason}")
-        except ClosedError:
-            pass
-        except Go2WbcError as error:
-            self._news.put(f"{label}: {error}")
+        def perform(_job: Job) -> Figures:
+            if not act(self._go2):
+                raise Aborted(self._go2.last_outcome.reason)
+            return {}
+
+        def tell(answer: Answer) -> None:
+            if not isinstance(answer.error, ClosedError):
+                self._news.put(f"{label}: {'done' if answer.success else answer.message}")
+            self._doing = ""
+
+        self._jobs.submit(Job(label, perform, tell))

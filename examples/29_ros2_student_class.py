@@ -31,9 +31,10 @@ class Student(Node):
     def behave(self, command: str) -> bool:
         """Ask for ``command``; the answer comes when it is done."""
         future = self._client.call_async(RobotBehaviorCommand.Request(command=command))
-        rclpy.spin_until_future_complete(self, future, timeout_sec=60.0)
-        print(f"{command}: {future.result().success}, {future.result().message}")
-        return future.result().success
+        rclpy.spin_until_future_complete(self, future, timeout_sec=300.0)
+        answer = future.result() or RobotBehaviorCommand.Response(message="no answer")
+        print(f"{command}: {answer.success}, {answer.message}")
+        return answer.success
 
     def move(self, speed: float) -> None:
         """Walk at ``speed`` [m/s] for two seconds; half a second of silence would end it."""
@@ -45,11 +46,10 @@ class Student(Node):
 
 
 os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
-command = [sys.executable, "-m", "controller.cli.main", "ros2", "--namespace", "student"]
-server = subprocess.Popen(command)
+server = subprocess.Popen([sys.executable, "-m", "controller.cli.main", "ros2"])  # serves robot1
 try:
     rclpy.init()
-    student = Student("student")
+    student = Student("robot1")
     done = student.behave("up") and student.behave("walk")
     student.move(0.2)
     done = done and student.behave("high_five") and student.behave("sit")

@@ -10,8 +10,9 @@ from typing import TypeVar
 
 from go2_wbc.errors import TimelineError, unknown_name
 
-FARTHEST = 1.0
-"""A place farther away than this [m] is a mistake in units: a stretched leg is 0.45 m long."""
+FARTHEST = 1.5
+"""A place farther away than this [m] is a mistake in units: a stretched leg is 0.45 m long, and what
+is merely out of reach is for the check to say."""
 QUARTER, HALF = math.pi / 2, math.pi
 LARGEST_ANGLES: Mapping[str, float] = {
     **dict.fromkeys(("roll", "pitch", "yaw", "hip"), QUARTER),

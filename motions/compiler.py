@@ -20,20 +20,24 @@ from go2_wbc.contacts import ContactSchedule
 from go2_wbc.curves import CurvePoint
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS
-from go2_wbc.reference import LegTask, MotionPlan, Posture, Reference, TrackedPoint
+from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from motions.balance import Balancer, Unbalanced
 from motions.keys import Mark
-from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, body_target
+from motions.plan import body_target, reference
 from motions.timeline import Timeline
 from motions.tracks import LegTracks, body_path, configurations, flights, home_poses
 
 SAMPLE_PERIOD = 0.01
-"""Time [s] between the instants at which a timeline is sampled."""
+"""Time [s] between the instants at which a timeline is sampled. A cubic spline through samples of f
+misses it by 5/384 h^4 max|d4f/dt4| at most (Hall & Meyer 1976): 0.2 um for a way L of 0.1 m by
+minimum jerk in T = 0.4 s, where the derivative is 360 L / T^4 at most."""
 REACH_TOLERANCE = 1e-3
-"""Distance [m] by which a place may be out of reach before it counts."""
+"""Distance [m] by which a place may be out of reach before it counts: own choice, less than what
+tracking adds."""
 UNLOAD_TIME = 0.3
-"""Time [s] over which a foot gives up its load before lift-off, if there is that much."""
+"""Time [s] over which a foot gives up its load before lift-off, if there is that much: own choice,
+so that the forces of the others change slowly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,21 +78,10 @@ class CompiledPlan(MotionPlan):
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""
-        value, rate, acceleration = self._curves_at(t)
-        phase = self.contacts.at(t)
-        load, zeros = phase.load_share(self.ramp), np.zeros((4, 3))
-        return Reference(
-            body=body_target(TrackedPoint.COM, CurvePoint(value[:6], rate[:6], acceleration[:6])),
-            legs=tuple(LegTask.STANCE if s else LegTask.JOINTS for s in phase.stance),
-            normal_force_min=NORMAL_FORCE_MIN * load,
-            normal_force_max=NORMAL_FORCE_MAX * load,
-            p_world_feet=zeros,
-            v_world_feet=zeros,
-            a_world_feet=zeros,
-            q_joints=value[6:],
-            v_joints=rate[6:],
-            a_joints=acceleration[6:],
-        )
+        curves = self._curves_at(t)
+        body = body_target(TrackedPoint.COM, CurvePoint(*(curve[:6] for curve in curves)))
+        joints = CurvePoint(*(curve[6:] for curve in curves))
+        return reference(body, joints, self.contacts.at(t), self.ramp)
 
     def _curves_at(self, t: float) -> tuple[Float[np.ndarray, "18"], ...]:
         inside = min(max(t, 0.0), self.duration)
@@ -99,7 +92,15 @@ class CompiledPlan(MotionPlan):
 
 
 def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
-    """The plan of ``timeline``.
+    """The plan of ``timeline``, in the frame of the motion.
+
+    It tracks the CoM, which balance is about, and not the base. Clamped splines begin and end at
+    rest.
+
+    Args:
+        timeline: what to compile.
+        model: of the robot; compiling uses its data, so it must not be that of a control loop that
+            runs in another thread.
 
     Raises:
         TimelineError: if it is empty.

@@ -53,22 +53,32 @@ class KeyframePlan(MotionPlan):
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""
-        phase = self.contacts.at(t)
-        joints = self.joints.at(t)
-        share = phase.load_share(self.ramp)
-        zeros = np.zeros((4, 3))
-        return Reference(
-            body=body_target(self.point, self.body.at(t)),
-            legs=_leg_tasks(phase),
-            normal_force_min=NORMAL_FORCE_MIN * share,
-            normal_force_max=NORMAL_FORCE_MAX * share,
-            p_world_feet=zeros,
-            v_world_feet=zeros,
-            a_world_feet=zeros,
-            q_joints=joints.value,
-            v_joints=joints.rate,
-            a_joints=joints.acceleration,
-        )
+        body = body_target(self.point, self.body.at(t))
+        return reference(body, self.joints.at(t), self.contacts.at(t), self.ramp)
+
+
+def reference(body: BodyTarget, joints: CurvePoint, phase: ContactPhase, ramp: float) -> Reference:
+    """The reference of feet that stand and of raised legs that follow their joints.
+
+    Args:
+        body: what the trunk does.
+        joints: angles [rad] (12,) with their derivatives.
+        phase: who stands, and for how long.
+        ramp: time [s] over which a foot is unloaded before lift-off and loaded after touchdown.
+    """
+    share, zeros = phase.load_share(ramp), np.zeros((4, 3))
+    return Reference(
+        body=body,
+        legs=tuple(LegTask.STANCE if s else LegTask.JOINTS for s in phase.stance),
+        normal_force_min=NORMAL_FORCE_MIN * share,
+        normal_force_max=NORMAL_FORCE_MAX * share,
+        p_world_feet=zeros,
+        v_world_feet=zeros,
+        a_world_feet=zeros,
+        q_joints=joints.value,
+        v_joints=joints.rate,
+        a_joints=joints.acceleration,
+    )
 
 
 def body_target(point: TrackedPoint, body: CurvePoint) -> BodyTarget:
@@ -84,7 +94,3 @@ def body_target(point: TrackedPoint, body: CurvePoint) -> BodyTarget:
         w_world=w,
         dw_world=dw,
     )
-
-
-def _leg_tasks(phase: ContactPhase) -> tuple[LegTask, ...]:
-    return tuple(LegTask.STANCE if s else LegTask.JOINTS for s in phase.stance)

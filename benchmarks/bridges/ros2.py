@@ -44,7 +44,7 @@ METRICS: Final = (
     Metric("ros2.speed_error", _DRIVE, "0.3 m/s: mean speed error", "%", 2.0),
     Metric("ros2.pace", _DRIVE, "robot time per wall time", "", None, Direction.AT_LEAST),
     Metric("ros2.cpu", _DRIVE, "CPU of the ROS side", "%", 10.0),
-    Metric("ros2.demo", _DEMO, "steps not borne out, of 8", "", 0.0),
+    Metric("ros2.demo", _DEMO, "steps not confirmed, of 8", "", 0.0),
 )
 
 

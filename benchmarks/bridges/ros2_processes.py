@@ -24,7 +24,6 @@ from controller.bridges.ros2.names import (
     STATISTICS_SERVICE,
     topic,
 )
-from controller.bridges.ros2.odometry import state_of
 from go2_wbc.errors import BridgeError
 from go2_wbc.robot.state import RobotState
 
@@ -138,6 +137,8 @@ class Probe:
             self._executor.spin_once(timeout_sec=0.1)
 
     def _note(self, message: Any) -> None:
+        from controller.bridges.ros2.states import state_of
+
         self._newest = state = state_of(message)
         self.largest_tilt = max(self.largest_tilt or 0.0, state.tilt)
 

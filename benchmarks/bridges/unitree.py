@@ -21,7 +21,6 @@ from benchmarks.bridges.unitree_processes import (
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.checksum import is_intact
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.low_client import low_cmd_message
 from controller.bridges.unitree.sport_api import SPORT_SERVICE, Api
@@ -129,7 +128,7 @@ def measure_stream(_trial: Trial) -> Measurement:
             states.wait(0.1)
             for data in states.take():
                 message = decode(data)
-                bad += not is_intact(message)
+                bad += not layout.is_intact(message)
                 ticks.append(int(message["tick"][0]))
                 commands.write(encode(low_cmd_message(DAMPED)))
                 sent += 1
@@ -155,7 +154,7 @@ def codec_time() -> float:
     start = time.process_time()
     for _ in range(CODINGS):
         encode(low_cmd_message(DAMPED))
-        is_intact(codec.decode(data))
+        layout.is_intact(codec.decode(data))
     return 1e6 * (time.process_time() - start) / CODINGS
 
 

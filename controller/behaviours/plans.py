@@ -60,7 +60,7 @@ class Deviation:
             and self.joints < JOINT_TOLERANCE
         )
 
-    def figures(self) -> dict[str, float]:
+    def measurements(self) -> dict[str, float]:
         """By name with unit."""
         return {
             "mean place off plan [m]": self.place,
@@ -80,24 +80,29 @@ class PlayPlan(Behaviour):
         """Play ``plan``; ``foot_radius`` [m] tells where the ground is."""
         self.label = plan.name
         self.plan = plan
+        self.deviation = Deviation()
         self._foot_radius = foot_radius
+        self._start = self._last = 0.0
+        self._anchor = Anchor(np.zeros(3), 0.0)
+        self._correction = SteadyStateCorrection()
+        self._must_return = False
+        self._return: SafeReturn | None = None
 
     def start(self, snapshot: Snapshot) -> None:
         """Anchor the plan at the feet."""
         self._start = self._last = snapshot.state.time
-        self._recall: SafeReturn | None = None
-        self._is_recalled = False
+        self._must_return, self._return = False, None
         self._correction = SteadyStateCorrection()
         self.deviation = Deviation()
         self._anchor = Anchor.of_feet(snapshot.p_world_feet, self._foot_radius)
 
-    def recall(self) -> None:
+    def return_safely(self) -> None:
         """Leave the plan: go to its nearest instant on four loaded feet; any thread may call."""
-        self._is_recalled = True
+        self._must_return = True
 
     @property
     def progress(self) -> float:
-        """Share of the plan that has been played, 0 to 1."""
+        """Share of the plan that has been played, 0 to 1; 0 before ``start``."""
         return min(1.0, (self._last - self._start) / self.plan.duration)
 
     def update(self, snapshot: Snapshot) -> Reference:
@@ -110,16 +115,16 @@ class PlayPlan(Behaviour):
         return replace(reference, body=body)
 
     def _planned(self, now: float) -> Reference:
-        if self._is_recalled and self._recall is None:
-            self._recall = SafeReturn(self.plan, self._last - self._start)
-        if self._recall is not None:
-            return self._recall.advance(now - self._last)
+        if self._must_return and self._return is None:
+            self._return = SafeReturn(self.plan, self._last - self._start)
+        if self._return is not None:
+            return self._return.advance(now - self._last)
         return self.plan.at(now - self._start)
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the plan is over, or the way back from it."""
-        if self._recall is not None:
-            return self._recall.is_over
+        if self._return is not None:
+            return self._return.is_over
         return snapshot.state.time - self._start >= self.plan.duration
 
 
@@ -134,10 +139,10 @@ class ChangePosture(PlayPlan):
         foot_radius: float,
     ) -> None:
         """Args: make_plan: from the pose (6,) of ``point`` in the feet's frame to the plan."""
+        super().__init__(make_plan(np.zeros(6)), foot_radius)  # until ``start`` has measured
         self.label = label
         self._make_plan = make_plan
         self._point = point
-        self._foot_radius = foot_radius
 
     def start(self, snapshot: Snapshot) -> None:
         """Make the plan from the measured pose."""

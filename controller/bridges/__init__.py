@@ -1,1 +1,1 @@
-"""Doors to other middleware: optional, each behind an extra of its own."""
+"""Bridges to other middleware: optional, each with an extra of its own."""

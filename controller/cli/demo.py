@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
-from controller.cli.common import Subparsers, add_parser
+from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 
 EXAMPLES = """
 go2-wbc demo                         headless; table, replay page, animation
@@ -66,12 +67,35 @@ def register(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run the demo, print the report, write the files."""
     if args.ros2:
-        from controller.cli.demo_ros2 import run_ros_demo_command
-
-        return run_ros_demo_command(args)
+        return _run_over_ros(args)
     from controller.cli.demo_run import run_demo_command
 
     return run_demo_command(args)
+
+
+def _run_over_ros(args: argparse.Namespace) -> int:
+    """Run the demo on a robot that another process serves, print the steps."""
+    from controller.bridges.ros2.demo import STEPS, run_ros_demo
+    from controller.cli.demo_table import render_steps
+    from controller.cli.progress import ProgressLine
+    from controller.demo.report import DemoReport, StepResult
+
+    with ProgressLine(sys.stderr) as line:
+        done: list[StepResult] = []
+
+        def show(result: StepResult) -> None:
+            done.append(result)
+            verdict = "ok" if result.ok else f"NOT DONE: {result.reason}"
+            line.done(f"{len(done)}/{len(STEPS)} {result.label}: {verdict}")
+
+        results = run_ros_demo(args.namespace, show)
+    ok = all(step.ok for step in results)
+    if args.json:
+        print_json({"ok": ok, "steps": DemoReport.steps_as_dicts(results)})
+    else:
+        print(render_steps(results, sys.stdout.encoding))
+        print(f"{sum(step.ok for step in results)} of {len(results)} steps borne out by odometry.")
+    return ExitCode.OK if ok else ExitCode.FAILED
 
 
 def _whole(text: str) -> int:

@@ -6,7 +6,7 @@ import math
 import textwrap
 from collections.abc import Iterator, Sequence
 
-from controller.demo.report import DemoReport, DemoTotals, Figure, StepResult
+from controller.demo.report import DemoReport, DemoTotals, Measurement, StepResult
 
 WIDTH = 80
 _ROW = "{mark:>4} {label:<21}{time:>7}  {name:<23}{asked:>9}{measured:>9} {unit}"
@@ -69,7 +69,7 @@ def _step_rows(step: StepResult, mark: str) -> Iterator[str]:
         )
 
 
-def _cells(figure: Figure) -> tuple[str, str, str, str]:
+def _cells(figure: Measurement) -> tuple[str, str, str, str]:
     decimals = _DECIMALS.get(figure.unit, 3)
     asked = "" if figure.asked is None else f"{figure.asked:.{decimals}f}"
     measured = f"{figure.measured:.{decimals}f}" if math.isfinite(figure.measured) else "-"

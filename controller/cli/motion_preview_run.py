@@ -24,7 +24,7 @@ from viz.replay.preview_server import PreviewServer
 POLL_PERIOD = 0.05
 """Time [s] between two looks at the file."""
 VIDEO_RATE = 12.5
-"""Pictures per second; 80 ms each, a number that GIF can say."""
+"""Pictures per second: 80 ms each, which GIF can store."""
 
 
 def write_files(args: argparse.Namespace) -> int:
@@ -78,7 +78,7 @@ def serve(args: argparse.Namespace) -> int:
     with PreviewServer(planned(checked), source.name, args.port) as server:
         live = _Live(source, checker, server, is_json=args.json)
         try:
-            live.greet(checked.report)
+            live.announce(checked.report)
             if not args.no_open and display_problem() is None:
                 webbrowser.open(server.url)
             while True:
@@ -108,14 +108,14 @@ class _Live:
         self._is_json = is_json
         self.code = ExitCode.OK
 
-    def greet(self, report: FeasibilityReport) -> None:
+    def announce(self, report: FeasibilityReport) -> None:
         """Say where the page is, and the first verdict."""
         if self._is_json:
             self._print_line({"url": self._server.url, "file": str(self._source.path)})
         else:
             where = _short(self._source.path)
             print(f"{self._source.name}: {self._server.url}   (follows {where}; Ctrl-C ends)")
-        self._tell(report)
+        self._report(report)
 
     def update(self) -> None:
         """Look at the file; if it was saved, check and show what it says now."""
@@ -125,18 +125,18 @@ class _Live:
             checked = self._checker.evaluate(self._source.timeline())
             self._server.publish(planned(checked))
         except (Go2WbcError, OSError) as error:
-            self._complain(str(error))
+            self._report_error(str(error))
         else:
-            self._tell(checked.report)
+            self._report(checked.report)
 
-    def _tell(self, report: FeasibilityReport) -> None:
+    def _report(self, report: FeasibilityReport) -> None:
         self.code = _code(report)
         if self._is_json:
             self._print_line(report.as_dict())
         else:
             _print_verdict(report)
 
-    def _complain(self, message: str) -> None:
+    def _report_error(self, message: str) -> None:
         self.code = ExitCode.FAILED
         self._server.publish_error(message)
         if self._is_json:

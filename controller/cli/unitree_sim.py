@@ -7,6 +7,7 @@ import logging
 import signal
 import threading
 from contextlib import closing
+from dataclasses import fields
 from pathlib import Path
 
 from controller.cli.common import ExitCode, Subparsers, add_parser
@@ -57,15 +58,7 @@ def run(args: argparse.Namespace) -> int:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     settings = SimulatorSettings(
-        domain=args.domain,
-        interface=args.interface,
-        mjcf=args.mjcf,
-        friction=args.friction,
-        payload=args.payload,
-        sensors=args.sensors,
-        seed=args.seed,
-        config=args.config,
-        lockstep=args.lockstep,
+        **{f.name: getattr(args, f.name) for f in fields(SimulatorSettings)}
     )
     with closing(UnitreeSimulator(settings)) as simulator:
         print(f"serving on DDS domain {args.domain}, interface {args.interface}", flush=True)

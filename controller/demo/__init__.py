@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from controller.demo.report import DemoReport, DemoTotals, Figure, StepResult
+    from controller.demo.report import DemoReport, DemoTotals, Measurement, StepResult
     from controller.demo.run import DemoProgress, run_demo
     from controller.demo.steps import DEMO_STEPS, DemoStep
 
@@ -21,7 +21,7 @@ __all__ = [
     "DemoReport",
     "DemoStep",
     "DemoTotals",
-    "Figure",
+    "Measurement",
     "StepResult",
     "main",
     "run_demo",
@@ -33,7 +33,7 @@ _HOMES = {
     "DemoReport": "report",
     "DemoStep": "steps",
     "DemoTotals": "report",
-    "Figure": "report",
+    "Measurement": "report",
     "StepResult": "report",
     "run_demo": "run",
 }

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class Measurement:
     """One measured quantity.
 
     Attributes:
@@ -61,7 +61,7 @@ class StepResult:
     reason: str
     start: float
     duration: float
-    figures: tuple[Figure, ...] = ()
+    figures: tuple[Measurement, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

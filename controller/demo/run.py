@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller.demo.report import DemoReport, DemoTotals, Figure, StepResult
+from controller.demo.report import DemoReport, DemoTotals, Measurement, StepResult
 from controller.demo.steps import DEMO_STEPS, DemoStep, StepRun
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
@@ -120,13 +120,13 @@ def _run_step(go2: GO2Controller, step: DemoStep) -> tuple[StepResult, float]:
     return result, cpu_time
 
 
-def _measured(go2: GO2Controller, step: DemoStep, recording: Recording) -> tuple[Figure, ...]:
+def _measured(go2: GO2Controller, step: DemoStep, recording: Recording) -> tuple[Measurement, ...]:
     if len(recording.time) == 0:
         return ()
     return step.measure(StepRun(go2.last_outcome, recording))
 
 
-def _failure(go2: GO2Controller, answer: bool | None, figures: Sequence[Figure]) -> str:
+def _failure(go2: GO2Controller, answer: bool | None, figures: Sequence[Measurement]) -> str:
     """Why a step does not count as done; empty if it does."""
     if answer is False or not go2.last_outcome.ok:
         return go2.last_outcome.reason

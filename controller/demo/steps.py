@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from controller.checks import ANGLE_TOLERANCE, HEIGHT_TOLERANCE, STILL_SPEED
-from controller.demo.report import Figure
+from controller.demo.report import Measurement
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode, Outcome
 from controller.navigation import HEADING_TOLERANCE
@@ -62,7 +62,7 @@ class DemoStep:
     name: str
     label: str
     act: Callable[[GO2Controller], bool | None]
-    measure: Callable[[StepRun], tuple[Figure, ...]]
+    measure: Callable[[StepRun], tuple[Measurement, ...]]
 
 
 def yaw_angles(recording: Recording) -> Float[np.ndarray, " n"]:
@@ -79,21 +79,21 @@ def displacement(recording: Recording, start: int = 0) -> Float[np.ndarray, "2"]
     return np.array([c * dx + s * dy, -s * dx + c * dy])
 
 
-def _standing(run: StepRun) -> tuple[Figure, ...]:
+def _standing(run: StepRun) -> tuple[Measurement, ...]:
     height = _of(run, "CoM height [m]")
-    return (Figure("CoM height", height, "m", STAND_HEIGHT, HEIGHT_TOLERANCE),)
+    return (Measurement("CoM height", height, "m", STAND_HEIGHT, HEIGHT_TOLERANCE),)
 
 
-def _sitting(run: StepRun) -> tuple[Figure, ...]:
+def _sitting(run: StepRun) -> tuple[Measurement, ...]:
     height, pitch = float(SIT_POSE[2]), math.degrees(SIT_POSE[4])
     tolerance = math.degrees(ANGLE_TOLERANCE)
     return (
-        Figure("base height", _of(run, "base height [m]"), "m", height, HEIGHT_TOLERANCE),
-        Figure("trunk pitch", _of(run, "pitch [deg]"), "deg", pitch, tolerance),
+        Measurement("base height", _of(run, "base height [m]"), "m", height, HEIGHT_TOLERANCE),
+        Measurement("trunk pitch", _of(run, "pitch [deg]"), "deg", pitch, tolerance),
     )
 
 
-def _forward(run: StepRun) -> tuple[Figure, ...]:
+def _forward(run: StepRun) -> tuple[Measurement, ...]:
     recording = run.recording
     since = recording.time - recording.time[0]
     steady = min(int(np.searchsorted(since, SPEED_UP_TIME)), len(since) - 1)
@@ -101,35 +101,35 @@ def _forward(run: StepRun) -> tuple[Figure, ...]:
     speed = float(displacement(recording, steady)[0]) / time if time > 0.0 else math.nan
     ahead, aside = displacement(recording)
     return (
-        Figure("mean speed", speed, "m/s", FORWARD_SPEED, SPEED_TOLERANCE),
-        Figure("way ahead", float(ahead), "m", FORWARD_SPEED * FORWARD_TIME),
-        Figure("way aside", float(aside), "m", 0.0),
+        Measurement("mean speed", speed, "m/s", FORWARD_SPEED, SPEED_TOLERANCE),
+        Measurement("way ahead", float(ahead), "m", FORWARD_SPEED * FORWARD_TIME),
+        Measurement("way aside", float(aside), "m", 0.0),
     )
 
 
-def _stopping(run: StepRun) -> tuple[Figure, ...]:
+def _stopping(run: StepRun) -> tuple[Measurement, ...]:
     speed = float(np.linalg.norm(run.recording.v[-1, :2]))
     way = float(displacement(run.recording)[0])
     return (
-        Figure("speed at the end", speed, "m/s", 0.0, STILL_SPEED),
-        Figure("way to rest", way, "m"),
+        Measurement("speed at the end", speed, "m/s", 0.0, STILL_SPEED),
+        Measurement("way to rest", way, "m"),
     )
 
 
-def _turning(run: StepRun) -> tuple[Figure, ...]:
+def _turning(run: StepRun) -> tuple[Measurement, ...]:
     yaw = yaw_angles(run.recording)
     turned, asked = math.degrees(yaw[-1] - yaw[0]), math.degrees(TURN_ANGLE)
     drift = float(np.linalg.norm(displacement(run.recording)))
     return (
-        Figure("turned left", turned, "deg", asked, math.degrees(HEADING_TOLERANCE)),
-        Figure("moved from the place", drift, "m", 0.0),
+        Measurement("turned left", turned, "deg", asked, math.degrees(HEADING_TOLERANCE)),
+        Measurement("moved from the place", drift, "m", 0.0),
     )
 
 
-def _raising_paw(run: StepRun) -> tuple[Figure, ...]:
+def _raising_paw(run: StepRun) -> tuple[Measurement, ...]:
     return (
-        Figure("paw held, least height", _of(run, "least paw height [m]"), "m"),
-        Figure("paw held, mean height", _of(run, "mean paw height [m]"), "m"),
+        Measurement("paw held, least height", _of(run, "least paw height [m]"), "m"),
+        Measurement("paw held, mean height", _of(run, "mean paw height [m]"), "m"),
     )
 
 

@@ -1,8 +1,15 @@
 """Slow integral action on the body's reference.
 
-A proportional law sags under an unknown payload and stands off by joint friction. The correction
-adds the integral of the error to the reference, bounded, so that the measured body settles where it
-was asked to be.
+A task of the whole-body QP is a proportional-derivative law: under an unknown payload or dry joint
+friction its error settles at a value that is not zero. The correction adds the integral of the
+error to the reference,
+
+    o' = rate * e  where |e| < window, else 0;   |o| <= limit,
+
+per axis in the world, so that the measured body settles where it was asked to be. The window is an
+anti-windup (conditional integration: Astrom & Hagglund, PID Controllers, 1995, sec. 3.5): while the
+body is on its way the error is no steady-state error. The limit bounds what a contact that gives
+way can store up.
 """
 
 from __future__ import annotations

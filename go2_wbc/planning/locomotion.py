@@ -1,8 +1,17 @@
 """Velocity command -> Reference: footholds, swing feet and the body's path of a gait.
 
-Footholds follow Raibert (1986, ch. 2) with half the stance travel ahead of the hip and a
-correction for the velocity error. The body follows a reference integrated from the command, which
-takes out the steady error that a pure velocity loop keeps; it is held within reach of the robot.
+Every quantity is in the world frame unless its name says otherwise; commands are in the heading
+frame (z up, x along the reference's yaw).
+
+- Footholds: Raibert (Legged Robots That Balance, 1986, ch. 2). A foot that is put down
+  ``v T / 2`` ahead of its hip is below it in the middle of the stance time ``T``, so it neither
+  speeds the trunk up nor slows it down; ``k (v - v_ref)`` more takes out the velocity error.
+- Body: the command is integrated to a pose. A body that only followed a velocity would keep a
+  steady error of place and heading. The pose is held within reach (a leash) of the measured one,
+  so that a robot that is held does not store up a way to jump afterwards.
+- Stepping without a command: the capture point (Pratt et al., Capture Point, Humanoids 2006),
+  ``p + v / omega`` with ``omega = sqrt(g / h)``, is where an inverted pendulum of height ``h``
+  would come to rest above its foot; too far from the feet's middle, they must be moved there.
 """
 
 from __future__ import annotations
@@ -30,6 +39,8 @@ LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34
 """CoM heights [m] between which the legs can step."""
 GROUND_SHARE = 0.3
 """Share of a landing foot's height that goes into the estimate of the ground's height."""
+_TINY = 1e-9
+"""Length [m] that stands in for zero where one divides by it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +109,8 @@ class LocomotionPlanner:
         self._gait = gait
         self._config = config
         self._gait_schedule = gait.schedule()
+        self._is_stepping = False
+        self._yaw = 0.0
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state, standing."""
@@ -115,12 +128,12 @@ class LocomotionPlanner:
 
     @property
     def is_stepping(self) -> bool:
-        """Whether the gait is running."""
+        """Whether the gait is running; not before ``start``."""
         return self._is_stepping
 
     @property
     def heading(self) -> float:
-        """Yaw [rad] of the reference."""
+        """Yaw [rad] of the reference; 0 before ``start``."""
         return self._yaw
 
     def square_up(self, snapshot: Snapshot) -> bool:
@@ -175,6 +188,7 @@ class LocomotionPlanner:
         return bool(slow and self._is_settled() and self._is_square(snapshot))
 
     def _is_square(self, snapshot: Snapshot) -> bool:
+        """Whether the feet form the nominal rectangle; their mean may be off: the body moves."""
         offsets = snapshot.p_world_feet[:, :2] - self._nominal_feet(snapshot)
         offsets -= offsets.mean(axis=0)
         return bool(np.linalg.norm(offsets, axis=1).max() < self._config.square_tolerance)
@@ -183,12 +197,17 @@ class LocomotionPlanner:
         return bool(np.abs(self._velocity).max() < SETTLED_COMMAND)
 
     def _must_step(self, snapshot: Snapshot) -> bool:
+        """Whether the capture point ``p + v / sqrt(g / h)`` is too far from the feet's middle."""
         omega = np.sqrt(self._model.gravity / self._config.height)
         capture = snapshot.p_world_com[:2] + snapshot.v_world_com[:2] / omega
         middle = snapshot.p_world_feet[:, :2].mean(axis=0)
         return bool(np.linalg.norm(capture - middle) > self._config.capture_margin)
 
     def _integrate(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> None:
+        """Ramp the velocity towards ``command``, integrate it to the pose, and apply the leash.
+
+        The velocity is in the heading frame; the heading is integrated first and turns it.
+        """
         config = self._config
         wanted = np.array([command.linear_x, command.linear_y, command.angular_z])
         rate = np.array([config.linear_acceleration] * 2 + [config.angular_acceleration])
@@ -203,6 +222,7 @@ class LocomotionPlanner:
             self._position = snapshot.p_world_com[:2] + offset * (config.position_leash / distance)
 
     def _correct_height(self, snapshot: Snapshot, dt: float) -> None:
+        """Integrate the CoM's height error: a payload makes the robot sag for good."""
         sag = self._ground + self._config.height - snapshot.p_world_com[2]
         error = np.array([0.0, 0.0, sag, 0.0, 0.0, 0.0])
         self._height_offset = float(self._correction.update(error, dt)[2])
@@ -223,6 +243,7 @@ class LocomotionPlanner:
         )
 
     def _note_liftoffs(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"]) -> None:
+        """Remember where feet leave the ground; low-pass the ground's height where they land."""
         lifted = self._was_stance & ~stance
         self._liftoff[lifted] = snapshot.p_world_feet[lifted]
         landed = ~self._was_stance & stance
@@ -232,6 +253,7 @@ class LocomotionPlanner:
         self._was_stance = stance.copy()
 
     def _nominal_feet(self, snapshot: Snapshot) -> Float[np.ndarray, "4 2"]:
+        """Points [m] on the ground below the hips of a level trunk with the measured heading."""
         R = yaw_rotation(snapshot.state.yaw)
         feet = self._model.p_base_feet_nominal @ R.T
         return snapshot.state.p_world_base[:2] + feet[:, :2]
@@ -239,7 +261,12 @@ class LocomotionPlanner:
     def _footholds(
         self, snapshot: Snapshot, remaining: Float[np.ndarray, "4"]
     ) -> Float[np.ndarray, "4 2"]:
-        """Touchdown points [m]: below the hip at touchdown, plus half the stance travel."""
+        """Touchdown points [m]: ``p_hip + v t + v T / 2 + k (v - v_ref)``.
+
+        ``t`` is the ``remaining`` time [s] of the swing, in which the hip moves on, ``T`` the
+        stance time. ``v`` is the velocity of each hip: the CoM's and ``w x r`` of the turn about
+        the base. The last two terms together are clipped to ``foothold_reach``.
+        """
         config = self._config
         v = snapshot.v_world_com[:2]
         v_ref = self._world_velocity()[:2]
@@ -250,7 +277,7 @@ class LocomotionPlanner:
         travel = velocity * self._gait.stance_time / 2 + config.velocity_feedback * (v - v_ref)
         length = np.linalg.norm(travel, axis=1, keepdims=True)
         reach = config.foothold_reach
-        travel *= np.minimum(1.0, reach / np.maximum(length, 1e-9))
+        travel *= np.minimum(1.0, reach / np.maximum(length, _TINY))
         return hips + travel + velocity * remaining[:, None]
 
     def _feet(

@@ -1,4 +1,9 @@
-"""Swing foot curves: from lift-off over an apex to a touchdown that may still move."""
+"""Swing foot curves: from lift-off over an apex to a touchdown that may still move.
+
+With the share ``u`` of a span of ``T`` seconds and the ease ``s(u) = 3 u^2 - 2 u^3``, a coordinate
+goes from ``a`` to ``b`` as ``p = a + s (b - a)``; so ``v = s' (b - a) / T`` and
+``a = s'' (b - a) / T^2``. Horizontally the span is the swing, vertically each half of it.
+"""
 
 from __future__ import annotations
 
@@ -39,8 +44,8 @@ def swing_foot(
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
     """Position, velocity, acceleration of the foot centre in the world.
 
-    Horizontally a cubic (it follows late changes of the goal better than minimum jerk), vertically
-    two cubics that meet at the apex.
+    Horizontally one cubic: it follows late changes of the goal better than minimum jerk, whose
+    speed is gone sooner. Vertically two that meet, at rest, at the apex.
 
     Args:
         start: where the foot left the ground [m].
@@ -56,10 +61,10 @@ def swing_foot(
     v[:2] = ds / duration * delta
     a[:2] = dds / duration**2 * delta
     apex = max(start[2], goal[2]) + config.apex
-    low, high = (start[2], apex) if progress < 0.5 else (apex, goal[2] - config.touchdown_depth)
-    half = 2.0 * progress if progress < 0.5 else 2.0 * progress - 1.0
-    s, ds, dds = Ease.CUBIC.progress(half)
-    p[2] = low + s * (high - low)
-    v[2] = ds * (high - low) * 2.0 / duration
-    a[2] = dds * (high - low) * 4.0 / duration**2
+    is_rising = progress < 0.5
+    begin, end = (start[2], apex) if is_rising else (apex, goal[2] - config.touchdown_depth)
+    s, ds, dds = Ease.CUBIC.progress(2.0 * progress - (0.0 if is_rising else 1.0))
+    p[2] = begin + s * (end - begin)
+    v[2] = ds * (end - begin) * 2.0 / duration
+    a[2] = dds * (end - begin) * 4.0 / duration**2
     return p, v, a

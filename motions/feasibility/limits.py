@@ -12,16 +12,18 @@ class FeasibilityLimits:
     """What a motion must keep. Own choice, set by comparing verdicts with simulated runs.
 
     Attributes:
-        reach: distance [m] by which a foot's place may be out of the leg's reach.
-        torque_share: share of the torque limit that a plan may use; the rest is for feedback.
+        reach: distance [m] by which a foot's place may be out of the leg's reach: what rounding of
+            the trunk's place makes of one at the end of the reach.
+        torque_share: share of the torque limit that a plan may use; 15 % are for feedback.
         knee_speed_share: share of a joint's greatest speed above which its torque falls linearly
             to nothing at the greatest speed, as in a DC motor at its greatest voltage.
-        friction: friction coefficient that the ground is counted on for.
-        foot_load: least normal force [N] of a foot that stands.
+        friction: friction coefficient that the ground is counted on for; the floor of the
+            benchmark, on which verdicts were compared, has 0.5.
+        foot_load: least normal force [N] of a foot that stands: 6 % of the weight.
         support: least distance [m] of the CoM to the edges of the support polygon.
         zero_moment: the same for the zero-moment point.
-        wrench: greatest part [N] of the force, and a fifth of it [N m] of the moment, that no
-            contact forces can give.
+        wrench: greatest part [N] of the force that no contact forces can give, 3 % of the weight;
+            of the moment as much on an arm of 0.2 m.
         self_distance: least distance [m] between links that must not touch.
         clearance: least height [m] of knees and trunk.
         swing_depth: how deep [m] the lowest point of a foot in the air may be below the ground.
@@ -31,8 +33,8 @@ class FeasibilityLimits:
             land beside its place.
         landing: distance [m] by which a foot may land beside its place.
         landing_speed: greatest speed [m/s] of a foot at touchdown.
-        joint_jump: greatest change [rad/s] of a joint's speed between samples.
-        body_jump: greatest change [m/s, rad/s] of the trunk's speed between samples.
+        joint_jump: greatest change [rad/s] of a joint's speed between samples of 10 ms.
+        body_jump: the same of the trunk's speed [m/s, rad/s]: 4 times gravity.
         stance_position, stance_angle: how far [m, rad] the ends may be from their postures.
         end_speed: greatest speed [m/s, rad/s] of trunk and joints at the ends.
     """
@@ -48,7 +50,7 @@ class FeasibilityLimits:
     self_distance: float = 0.005
     clearance: float = 0.02
     swing_depth: float = 0.005
-    drag_height: float = 0.001
+    drag_height: float = 0.0005
     drag: float = 0.01
     landing: float = 0.01
     landing_speed: float = 0.6

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -24,7 +23,7 @@ from controller.demo.report import StepResult
 from controller.demo.run import DemoProgress
 from controller.demo.steps import DEMO_STEPS
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from tests.go2_wbc.plant.helpers import empty_recording
 
 # --- trials -------------------------------------------------------------------------------------
 
@@ -97,19 +96,9 @@ def test_the_held_height_is_the_best_that_was_kept_for_the_whole_time() -> None:
 def test_slip_is_the_largest_excursion_and_not_the_final_one() -> None:
     v = np.zeros((201, 4, 3))
     v[1:101, Leg.RL, 0], v[101:, Leg.RL, 0] = 0.02, -0.02  # 4 mm there and back
-    recorded = empty_recorded(201, v)
+    recorded = empty_recording(201, v)
     assert largest_slip(recorded, list(LEGS)) == pytest.approx(0.004)
     assert largest_slip(recorded, [Leg.FL]) == 0.0
-
-
-def test_a_recording_gives_the_velocity_in_the_frame_of_the_heading() -> None:
-    recorded = empty_recorded(11, np.zeros((11, 4, 3)))
-    recorded.rpy[:, 2] = math.pi / 2
-    recorded.p_world_com[:, :2] = recorded.time[:, None] * [
-        0.2,
-        0.5,
-    ]  # world y is ahead, -x is left
-    assert recorded.com_velocity == pytest.approx(np.tile([0.5, -0.2, 0.0], (10, 1)))
 
 
 def test_every_step_of_the_demo_has_a_criterion_of_the_benchmark() -> None:
@@ -135,22 +124,3 @@ def test_a_true_that_the_simulator_contradicts_is_noted() -> None:
         check(DemoProgress(0, 1, "sit", replace(result, ok=False, reason="fell")))
     assert len(check.untrue) == 1
     assert check.untrue[0].startswith("sit: pitch ")
-
-
-def empty_recorded(n: int, v_contacts: np.ndarray) -> TruthRecording:
-    three, twelve = np.zeros((n, 3)), np.zeros((n, 12))
-    return TruthRecording(
-        time=0.002 * np.arange(n),
-        q=np.zeros((n, 19)),
-        v=np.zeros((n, 18)),
-        rpy=three.copy(),
-        tau=twelve,
-        foot_forces=np.zeros((n, 4)),
-        p_world_com=three.copy(),
-        p_world_feet=np.zeros((n, 4, 3)),
-        p_world_contacts=np.zeros((n, 4, 3)),
-        v_world_contacts=v_contacts,
-        trunk_force=np.zeros(n),
-        limb_force=np.zeros(n),
-        touches_itself=np.zeros(n, dtype=bool),
-    )

@@ -15,6 +15,7 @@ from go2_wbc.errors import Go2WbcError
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
+from motions import CompiledPlan
 from motions.postures import SIT_POSE, STAND_HEIGHT
 
 PERIOD = 0.01
@@ -81,7 +82,9 @@ class FakeGo2(GO2Controller):
             self._pass(PERIOD)
         return self._do("turn_left", Mode.WALKING, {"turned [deg]": math.degrees(angle)})
 
-    def high_five(self, side: str = "right", hold: float = 2.0) -> bool:
+    def high_five(
+        self, side: str = "right", hold: float = 2.0, *, plan: CompiledPlan | None = None
+    ) -> bool:
         self._pass(0.5, is_raised=True)
         return self._do("high_five", Mode.STANDING, RAISED)
 
@@ -92,6 +95,10 @@ class FakeGo2(GO2Controller):
     @property
     def last_outcome(self) -> Outcome:
         return self._outcome
+
+    @property
+    def telemetry(self) -> Telemetry:
+        return self._telemetry
 
     @property
     def state(self) -> RobotState:

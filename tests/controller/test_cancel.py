@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from controller.behaviours.plans import PlayPlan
 from controller.behaviours.safe_return import SafeReturn, nearest_safe_instant, retimed
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
-from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
 from motions import compile_timeline, load_motion
 from motions.compiler import CompiledPlan
 from tests.controller.plants import WatchedPlant
@@ -49,6 +50,14 @@ def test_a_motion_that_is_cancelled_before_it_begins_is_not_played() -> None:
         assert go2.progress == 0.0
 
 
+def test_a_plan_that_has_not_begun_has_made_no_progress(plan: CompiledPlan) -> None:
+    # It had no attribute to tell it by.
+    playing = PlayPlan(plan, FOOT_RADIUS)
+    assert playing.progress == 0.0
+    playing.return_safely()
+    assert playing.progress == 0.0
+
+
 def test_progress_grows_from_nothing_to_all_while_a_motion_plays() -> None:
     plant, seen = WatchedPlant(), []
     with GO2Controller(plant=plant) as go2:
@@ -73,9 +82,9 @@ def test_the_safe_instant_has_four_fully_loaded_feet_and_is_the_nearer_one(
 
 
 def test_the_way_back_is_smooth_and_its_rates_are_the_derivatives(plan: CompiledPlan) -> None:
-    recall = SafeReturn(plan, 3.0)
-    steps = [recall.advance(TICK) for _ in range(2500)]
-    assert recall.is_over
+    way_back = SafeReturn(plan, 3.0)
+    steps = [way_back.advance(TICK) for _ in range(2500)]
+    assert way_back.is_over
     q = np.array([step.q_joints for step in steps])
     v = np.array([step.v_joints for step in steps])
     a = np.array([step.a_joints for step in steps])

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller.demo import DEMO_STEPS, DemoProgress, Figure, StepResult, run_demo
+from controller.demo import DEMO_STEPS, DemoProgress, Measurement, StepResult, run_demo
 from controller.demo.run import three_leg_minima
 from controller.modes import Mode
 from go2_wbc.errors import IkError, PlantTimeout
@@ -26,7 +26,7 @@ def step_of(go2: FakeGo2, name: str) -> StepResult:
     return next(step for step in run_demo(go2).steps if step.name == name)
 
 
-def figure_of(step: StepResult, name: str) -> Figure:
+def figure_of(step: StepResult, name: str) -> Measurement:
     return next(figure for figure in step.figures if figure.name == name)
 
 
@@ -176,7 +176,7 @@ def test_the_report_is_strict_json_even_with_what_could_not_be_measured() -> Non
 def test_a_figure_is_met_within_its_tolerance(
     measured: float, asked: float | None, tolerance: float | None, met: bool
 ) -> None:
-    assert Figure("x", measured, "m", asked, tolerance).is_met is met
+    assert Measurement("x", measured, "m", asked, tolerance).is_met is met
 
 
 def test_the_module_of_the_console_script_imports_no_library() -> None:

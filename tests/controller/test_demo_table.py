@@ -9,7 +9,7 @@ import pytest
 
 from controller.cli import demo_table
 from controller.cli.progress import ProgressLine, progress_bar
-from controller.demo import DemoReport, DemoTotals, Figure, StepResult, run_demo
+from controller.demo import DemoReport, DemoTotals, Measurement, StepResult, run_demo
 from tests.controller.fake_go2 import FakeGo2
 
 COLUMNS = 80
@@ -25,7 +25,7 @@ def report_of(*steps: StepResult) -> DemoReport:
 
 
 def test_the_table_fits_80_columns_whatever_happens() -> None:
-    figure = Figure("moved from the place", -123.456, "m/s", -12.0, 0.1)
+    figure = Measurement("moved from the place", -123.456, "m/s", -12.0, 0.1)
     bad = StepResult("stand", "forward 0.2 m/s, 2 s", False, LONG_REASON, 0.0, 123.45, (figure,))
     for report in (report_of(bad), run_demo(FakeGo2())):
         for encoding in ("utf-8", "ascii"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, pi, radians, sin
+from math import cos, degrees, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -64,17 +64,34 @@ def walk(goal: Goal, x: float, y: float, yaw: float) -> RobotState:
 def test_displacement_is_measured_in_the_frame_of_the_start(
     x: float, y: float, yaw: float, ahead: float, left: float
 ) -> None:
-    course = Odometer(pose(x, y, yaw))
+    odometer = Odometer(pose(x, y, yaw))
     end = pose(x + ahead * cos(yaw) - left * sin(yaw), y + ahead * sin(yaw) + left * cos(yaw))
-    assert course.displacement(end) == pytest.approx((ahead, left), abs=EXACT)
+    assert odometer.displacement(end) == pytest.approx((ahead, left), abs=EXACT)
 
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_the_angle_turned_is_counted_over_several_turns(direction: int) -> None:
-    course = Odometer(pose(yaw=3.0))
+    odometer = Odometer(pose(yaw=3.0))
     for step in range(1, 200):
-        turned = course.turned(pose(yaw=3.0 + direction * 0.1 * step))
-        assert turned == pytest.approx(direction * 0.1 * step, abs=EXACT)
+        state = pose(yaw=3.0 + direction * 0.1 * step)
+        assert odometer.turned(state) == pytest.approx(direction * 0.1 * step, abs=EXACT)
+        odometer.update(state)
+        assert odometer.turned(state) == pytest.approx(direction * 0.1 * step, abs=EXACT)
+
+
+def test_asking_for_the_angle_turned_changes_nothing() -> None:
+    # Whoever asked for a state out of turn moved the count: -2 rad, asked last, made a turn of it.
+    odometer = Odometer(pose())
+    for yaw in (2.0, -2.0, 2.0):
+        assert odometer.turned(pose(yaw=yaw)) == pytest.approx(yaw)
+
+
+def test_whether_a_turn_is_done_may_be_asked_as_often_as_one_likes() -> None:
+    goal = begun(TurnInPlace(2.0), pose())
+    for yaw in (2.0, -2.0, 2.0):
+        assert goal.is_done(pose(yaw=yaw)) is (yaw == 2.0)
+        assert goal.is_within_tolerance(pose(yaw=yaw)) is (yaw == 2.0)
+        assert goal.measurements(pose(yaw=yaw))["turned [deg]"] == pytest.approx(degrees(yaw))
 
 
 @pytest.mark.parametrize(
@@ -86,7 +103,7 @@ def test_the_angle_turned_is_counted_over_several_turns(direction: int) -> None:
         (lambda: DriveStraight(-1.0), -1),
     ],
 )
-def test_an_goal_starts_towards_its_goal_at_its_full_speed(
+def test_a_goal_starts_towards_its_goal_at_its_full_speed(
     goal: Callable[[], Goal], sign: int
 ) -> None:
     made = goal()
@@ -105,8 +122,8 @@ def test_an_ideal_robot_turns_by_the_angle_and_stays_in_place(
     goal = TurnInPlace(angle)
     end = walk(goal, x, y, yaw)
     assert goal.is_within_tolerance(end)
-    assert goal.figures(end)["turned [deg]"] == pytest.approx(
-        goal.figures(end)["asked [deg]"], abs=0.5
+    assert goal.measurements(end)["turned [deg]"] == pytest.approx(
+        goal.measurements(end)["asked [deg]"], abs=0.5
     )
     assert end.q[:2] == pytest.approx([x, y], abs=0.01)
 
@@ -180,7 +197,7 @@ def test_the_time_limit_leaves_three_times_the_time_at_full_speed() -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_an_goal_beyond_the_limits_is_refused(sign: float) -> None:
+def test_a_goal_beyond_the_limits_is_refused(sign: float) -> None:
     TurnInPlace(sign * GREATEST_TURN)
     DriveStraight(sign * GREATEST_DISTANCE)
     with pytest.raises(CommandError, match=r"angle must be within \+-62\.8 rad"):

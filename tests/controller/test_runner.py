@@ -55,6 +55,11 @@ def close(runner: Runner) -> None:
     in_thread(runner.close).result(HANG_GUARD)
 
 
+def loop_threads() -> set[threading.Thread]:
+    """The threads in which loops run, those of other tests included."""
+    return {thread for thread in threading.enumerate() if thread.name == "go2-loop"}
+
+
 def wait_for(event: threading.Event) -> None:
     assert event.wait(HANG_GUARD)
 
@@ -248,8 +253,9 @@ def test_in_realtime_an_interruption_ends_a_waiting_call(
 def test_in_realtime_closing_ends_a_waiting_call_and_the_thread(
     make_runner: MakeRunner, plant: StillPlant
 ) -> None:
-    before = threading.active_count()
+    before = loop_threads()
     runner = make_runner(realtime=True)
+    assert len(loop_threads() - before) == 1
     under_way = threading.Event()
     call = in_thread(lambda: runner.advance_until(lambda: bool(under_way.set()), FOREVER))
     wait_for(under_way)
@@ -258,7 +264,7 @@ def test_in_realtime_closing_ends_a_waiting_call_and_the_thread(
         call.result(HANG_GUARD)
     assert is_limp(plant.commands[-1])
     close(runner)
-    assert threading.active_count() <= before + 1  # the thread of the call may still be ending
+    assert loop_threads() == before
 
 
 def test_closing_a_runner_whose_plant_has_died_does_not_raise(

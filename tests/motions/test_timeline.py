@@ -188,7 +188,7 @@ NOD = Timeline().body(pitch=0.1, over=0.5)
         (lambda: Timeline().leg("FR", hip=0, thigh=1, calf=-95, over=1.0), r"write deg\(-95\)"),
         (lambda: Timeline().body(z=80.0, over=1.0), "in millimetres"),
         (lambda: Timeline().body(z=-5.0, over=1.0), "in millimetres or centimetres.* or -0.05"),
-        (lambda: Timeline().foot("FR", z=1.5, over=1.0), "z is 1.5 m, more than 1 m"),
+        (lambda: Timeline().foot("FR", z=1.6, over=1.0), "z is 1.6 m, more than 1.5 m"),
         (lambda: Timeline().bpm(60.0, shift_time=0.0), "shift_time must be a number above 0"),
         (lambda: Timeline().body(over=1.0), "body.. needs one of x, y, z, roll, pitch, yaw"),
         (lambda: Timeline().body(z=float("nan"), over=1.0), "z must be a finite number, got nan"),

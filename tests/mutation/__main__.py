@@ -21,9 +21,10 @@ LEFT_OUT = ("controller/bridges", "controller/cli/ros2", "controller/cli/unitree
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 # Fast tests that take long or need a browser; they run with the whole suite only.
 LATE = ("test_seeded_faults.py", "test_pytest_plugin.py", "test_*browser.py")
-# A mutant hangs when it takes this many times the good code's CPU time, and the time to start [s].
-PATIENCE, START_UP = 3.0, 20.0
-NEAR, PACKAGE, SUITE, ALIVE = "own tests", "package's", "whole suite", "alive"
+STAGES = NEAR, PACKAGE, SUITE = "module", "package", "suite"
+ALIVE = "alive"
+# CPU time [s] after which a mutant hangs: some times what the good code takes.
+LIMITS = {NEAR: 90.0, PACKAGE: 600.0, SUITE: 3600.0}
 
 
 def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
@@ -35,7 +36,7 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "mutation" / "results.jsonl")
     parser.add_argument("--resume", action="store_true", help="skip what the file already lists")
     parser.add_argument("--again", action="store_true", help="try the survivors of the file again")
-    parser.add_argument("--whole", action="store_true", help="survivors against the whole suite")
+    parser.add_argument("--until", choices=STAGES, default=PACKAGE, help="last tests to try")
     options = parser.parse_args(arguments)
     packages = options.package or list(PACKAGES)
     results = Results(options.out, keep=options.resume or options.again)
@@ -46,7 +47,7 @@ def main(arguments: Sequence[str] | None = None, root: Path = ROOT) -> int:
         mutants = draw(mutants, options.n, options.seed)
     mutants.sort(key=lambda mutant: packages.index(mutant.path.split("/")[0]))
     with tempfile.TemporaryDirectory(prefix="mutation_") as folder:
-        judge = Judge(Sandbox(root, Path(folder, "tree")), whole=options.whole)
+        judge = Judge(Sandbox(root, Path(folder, "tree")), last=options.until)
         for mutant in mutants:
             if options.again or mutant.name not in results.latest:
                 results.add(mutant, *judge.judge(mutant))
@@ -64,46 +65,43 @@ def package_mutants(root: Path, package: str) -> list[Mutant]:
 class Judge:
     """Tests a mutant: by its module's own tests, its package's fast ones, then the whole suite."""
 
-    def __init__(self, sandbox: Sandbox, *, whole: bool) -> None:
-        self._sandbox, self._whole = sandbox, whole
-        self._limits: dict[tuple[str, str], float] = {}
-        self._failing: set[str] = set()
+    def __init__(self, sandbox: Sandbox, *, last: str) -> None:
+        self._sandbox, self._last = sandbox, last
+        self._passing: dict[str, bool] = {}  # without any mutant
         tests = sandbox.home / "tests"
         late = (file for pattern in LATE for file in tests.rglob(pattern))
         self._late = {str(file.relative_to(sandbox.home)) for file in late}
 
     def judge(self, mutant: Mutant) -> tuple[str, Outcome]:
         """Which tests noticed it, and what they said."""
-        sandbox, fast = self._sandbox, f"tests/{mutant.path.split('/')[0]}"
-        near = [n for n in nearest_tests(sandbox.home, mutant.path) if n not in self._late]
-        stages = [(NEAR, near, fast, "not slow")] if near else []
-        stages += [(PACKAGE, [fast], fast, "not slow")]
-        if self._whole:
-            stages += [(SUITE, ["tests"], "tests", mark) for mark in ("not slow", "slow")]
-        source = (sandbox.home / mutant.path).read_bytes()
-        outcome = Outcome(True, (), 0.0)
-        if not self._limits:
-            sandbox.require_import(mutant.path)
-        for stage, targets, baseline, marker in stages:
-            limit = self._limit(baseline, marker)
-            excluded = self._failing | (self._late if stage != SUITE else set())
-            excluded |= set(near) if stage == PACKAGE else set()  # they have passed
-            sandbox.write(mutant.path, mutant.applied(source))
-            outcome = sandbox.test(targets, marker, sorted(excluded), limit)
-            sandbox.write(mutant.path, source)
-            if not outcome.passed:
-                return stage, outcome
+        near = [n for n in nearest_tests(self._sandbox.home, mutant.path) if n not in self._late]
+        stages = [
+            (NEAR, near, self._late, "not slow"),
+            (PACKAGE, [f"tests/{mutant.path.split('/')[0]}"], self._late | {*near}, "not slow"),
+            *((SUITE, ["tests"], set[str](), marker) for marker in ("not slow", "slow")),
+        ]
+        outcome = Outcome(True, "", 0.0)
+        for stage, targets, excluded, marker in stages:
+            if targets and STAGES.index(stage) <= STAGES.index(self._last):
+                outcome = self._test(mutant, targets, excluded, marker, LIMITS[stage])
+                if not outcome.passed:
+                    return stage, outcome
         return ALIVE, outcome
 
-    def _limit(self, target: str, marker: str) -> float:
-        """CPU time [s] for a mutant; tests that fail without any are left out from here on."""
-        if (target, marker) not in self._limits:
-            late = self._late if target != "tests" else set()
-            good = self._sandbox.test([target], marker, sorted(self._failing | late), limit=0.0)
-            self._failing |= set(good.failed)
-            self._limits[target, marker] = START_UP + PATIENCE * good.seconds
-            sys.stderr.write(f"{target}, {marker}: {good.seconds:.0f} s, failing: {good.failed}\n")
-        return self._limits[target, marker]
+    def _test(
+        self, mutant: Mutant, targets: list[str], excluded: set[str], marker: str, limit: float
+    ) -> Outcome:
+        sandbox, failing = self._sandbox, {name for name, ok in self._passing.items() if not ok}
+        source = (sandbox.home / mutant.path).read_bytes()
+        sandbox.write(mutant.path, mutant.applied(source))
+        outcome = sandbox.test(targets, marker, sorted(excluded | failing), limit)
+        sandbox.write(mutant.path, source)
+        name = outcome.failed
+        if name.startswith("tests/") and name not in self._passing:
+            self._passing[name] = sandbox.test([name], marker, (), limit).passed
+            if not self._passing[name]:  # it fails anyway: try again without it
+                return self._test(mutant, targets, excluded, marker, limit)
+        return outcome
 
 
 class Results:
@@ -120,7 +118,7 @@ class Results:
 
     def add(self, mutant: Mutant, stage: str, outcome: Outcome) -> None:
         """Append a result."""
-        told = {"failed": outcome.failed[:1], "seconds": round(outcome.seconds, 1)}
+        told = {"failed": outcome.failed, "seconds": round(outcome.seconds, 1)}
         self.latest[mutant.name] = {"mutant": mutant.name, "stage": stage, **told}
         with self._file.open("a") as stream:
             stream.write(json.dumps(self.latest[mutant.name]) + "\n")

@@ -141,11 +141,16 @@ def _other_meanings(
             yield _with(node, func=ast.Name(OPPOSITE[name]))
         case ast.Call(func=ast.Attribute(attr=name)) if name in OPPOSITE:
             yield _with(node, func=_with(node.func, attr=OPPOSITE[name]))
-        case ast.Return(value=ast.expr() as value) if ast.unparse(value) != "None":
-            if "None" in ast.unparse(function.returns or node):  # else a check of types notices
-                yield ast.Return(ast.Constant(None))
+        case ast.Return(value=ast.expr() as value) if _may_be_none(value, function):
+            yield ast.Return(ast.Constant(None))
         case ast.Break() | ast.Continue():
             yield SWAPPED[type(node)]()  # type: ignore[misc]
+
+
+def _may_be_none(value: ast.expr, function: ast.FunctionDef) -> bool:
+    """Whether only a test, and no check of types, can tell this value from None."""
+    returns = ast.unparse(function.returns) if function.returns else "None"
+    return "None" in returns and ast.unparse(value) != "None"
 
 
 def _is_text(node: ast.AST) -> bool:

@@ -10,11 +10,11 @@ from tests.mutation.__main__ import ALIVE, NEAR, ROOT, main, package_mutants
 from tests.mutation.operators import draw, mutants_of
 
 CODE = """
-def add(a, b):
+def add(a, b) -> int:
     return a + b
 
 
-def is_above(a, b):
+def is_above(a, b) -> bool:
     return a > b
 """
 TEST = """

@@ -8,6 +8,7 @@ import pytest
 from controller import GO2Controller
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.state import JointCommand
+from tests.scenarios.random_drops import recovered
 
 DROP_HEIGHT = 0.25
 """Base height [m] from which the robot is dropped in its attitude."""
@@ -42,3 +43,10 @@ def test_a_robot_that_lies_on_its_back_says_that_it_cannot_stand() -> None:
         assert go2.state.R_world_base[2, 2] < -0.9
         assert not go2.stand()
         assert "recover()" in go2.last_outcome.reason
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(500, 508))
+def test_a_robot_that_was_dropped_at_random_gets_up(seed: int) -> None:
+    drop = recovered(seed)
+    assert drop.ok, str(drop)

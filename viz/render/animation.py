@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +12,7 @@ from PIL import Image
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording
-from viz.checks import checked_content
-from viz.content import ReplayContent
+from viz.content import ReplayContent, checked_content
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
 
 ANIMATION_SUFFIXES = (".webp", ".gif")
@@ -21,7 +20,8 @@ SIZE_LIMIT = 3_000_000
 """Largest animated WebP [bytes]; the quality is chosen to stay below."""
 GIF_SIZE_LIMIT = 24_000_000
 """Largest GIF [bytes], of the same pictures; the number of colours is chosen to stay below."""
-_QUALITIES = (90, 82, 74, 66, 58, 50, 40, 30, 20)
+_QUALITIES = (90, 82, 74, 66, 58, 50, 45, 40, 30, 20)
+_EFFORT = 4  # of WebP, 0 to 6: more takes longer and gives a smaller file
 _COLORS = (256, 128, 64, 32)
 _PROBES = 8  # frames that are encoded at each quality to foresee the size of the file
 _HEADROOM = 0.9  # share of the limit that the forecast may reach
@@ -74,14 +74,9 @@ def export_animation(
         report(_RENDER_SHARE * (k + 1) / len(times))
     is_gif = target.suffix.lower() == ".gif"
     limit = GIF_SIZE_LIMIT if is_gif else SIZE_LIMIT
-    content = (_gif if is_gif else _webp)(frames, round(1000 / fps))
-    if len(content) > limit:
-        raise ConfigError(
-            f"the animation would have {len(content)} bytes, limit {limit}; "
-            f"{len(frames)} frames of {size}: raise speed, or lower fps or size"
-        )
+    encoded = (encoded_gif if is_gif else encoded_webp)(frames, round(1000 / fps), limit)
     report(1.0)
-    return write_atomically(target, content)
+    return write_atomically(target, encoded)
 
 
 def frame_times(recording: Recording, *, speed: float | int, fps: float | int) -> list[float]:
@@ -90,44 +85,66 @@ def frame_times(recording: Recording, *, speed: float | int, fps: float | int) -
     return [float(time) for time in np.linspace(0.0, recording.duration, count)]
 
 
-def _webp(frames: list[Image.Image], milliseconds: int) -> bytes:
+def encoded_webp(
+    frames: Sequence[Image.Image], milliseconds: int, limit: int = SIZE_LIMIT
+) -> bytes:
+    """The pictures as one looping WebP, in the best quality that is small enough.
+
+    Args:
+        frames: two or more, of one size.
+        milliseconds: from one to the next.
+        limit: largest size [bytes].
+
+    Raises:
+        ConfigError: if the file is too large in every quality.
+    """
     probes = frames[:: max(1, len(frames) // _PROBES)]
     quality = _QUALITIES[-1]
     for candidate in _QUALITIES:
         mean = np.mean([len(_still_webp(frame, candidate)) for frame in probes])
-        if mean * len(frames) <= _HEADROOM * SIZE_LIMIT:
+        if mean * len(frames) <= _HEADROOM * limit:
             quality = candidate
             break
-    stream = io.BytesIO()
-    frames[0].save(
-        stream,
-        "WEBP",
-        save_all=True,
-        append_images=frames[1:],
-        duration=milliseconds,
-        loop=0,
-        quality=quality,
-        method=2,
-        kmax=1,  # every frame whole: frames that repair others leave ghosts where all moves
-    )
-    return stream.getvalue()
+    # Every frame whole: frames that repair others leave ghosts where all moves.
+    settings = {"quality": quality, "method": _EFFORT, "kmax": 1}
+    return _within(limit, frames, _film(frames, "WEBP", milliseconds, settings))
 
 
-def _gif(frames: list[Image.Image], milliseconds: int) -> bytes:
+def encoded_gif(
+    frames: Sequence[Image.Image], milliseconds: int, limit: int = GIF_SIZE_LIMIT
+) -> bytes:
+    """The pictures as one looping GIF, in the most colours that are small enough.
+
+    Args: and Raises: as of ``encoded_webp``.
+    """
     content = b""
     for colors in _COLORS:
         few = [frame.quantize(colors, dither=Image.Dither.NONE) for frame in frames]
-        stream = io.BytesIO()
-        few[0].save(
-            stream, "GIF", save_all=True, append_images=few[1:], duration=milliseconds, loop=0
-        )
-        content = stream.getvalue()
-        if len(content) <= GIF_SIZE_LIMIT:
+        content = _film(few, "GIF", milliseconds, {})
+        if len(content) <= limit:
             break
+    return _within(limit, frames, content)
+
+
+def _film(
+    frames: Sequence[Image.Image], kind: str, milliseconds: int, settings: Mapping[str, int]
+) -> bytes:
+    stream = io.BytesIO()
+    more = {"append_images": frames[1:], "duration": milliseconds, "loop": 0, **settings}
+    frames[0].save(stream, kind, save_all=True, **more)
+    return stream.getvalue()
+
+
+def _within(limit: int, frames: Sequence[Image.Image], content: bytes) -> bytes:
+    if len(content) > limit:
+        raise ConfigError(
+            f"the animation would have {len(content)} bytes, limit {limit}; {len(frames)} frames "
+            f"of {frames[0].size}: raise speed, or lower fps or size"
+        )
     return content
 
 
 def _still_webp(frame: Image.Image, quality: int) -> bytes:
     stream = io.BytesIO()
-    frame.save(stream, "WEBP", quality=quality, method=2)
+    frame.save(stream, "WEBP", quality=quality, method=_EFFORT)
     return stream.getvalue()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -47,15 +47,7 @@ class Camera:
 
     def scaled(self, factor: int) -> Camera:
         """The same view on a picture ``factor`` times as large."""
-        size = (self.size[0] * factor, self.size[1] * factor)
-        return Camera(
-            self.p_world_target,
-            self.azimuth,
-            self.elevation,
-            self.distance,
-            size,
-            self.field_of_view,
-        )
+        return replace(self, size=(self.size[0] * factor, self.size[1] * factor))
 
     def project(self, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """World points [m] to column, row [px] and nearness [1/m].
@@ -77,8 +69,10 @@ class Camera:
     def H_floor_picture(self) -> Float[np.ndarray, "3 3"]:
         """Homography from (column, row, 1) [px] to floor (x, y, 1) [m] up to scale.
 
-        The third component is positive where the pixel shows the floor, negative above the
-        horizon.
+        The ray of a pixel is d = M (column, row, 1), here ``ray`` @ it, and the eye e + s d meets
+        the floor z = 0 at s = -e_z / d_z: x = e_x - e_z d_x / d_z, so that x (-d_z) = e_z d_x -
+        e_x d_z, and likewise y. The third component, -d_z, is positive where the pixel shows the
+        floor, negative above the horizon.
         """
         focal = self.focal_length
         right, up, back = self.R_camera_world

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.ndimage import gaussian_filter1d
 
 from go2_wbc.recording import Recording
 from viz.render.posed_robot import PosedRobot
-from viz.render.smoothing import smoothed
 
 _STEP = 0.08  # [s] between the poses that are looked at; the camera is slower than that
 _TRUNK_ENDS = np.array([[0.33, 0.0, 0.08], [-0.25, 0.0, 0.08]])  # [m] nose and tail, base frame
+_STEPS_PER_DEVIATION = 8  # of the even grid on which paths are smoothed
 _HEADROOM = 0.04  # [m] the middle of the picture lies this much above the middle of the robot
 
 
@@ -48,6 +49,23 @@ def heading_path(recording: Recording, *, smoothing: float) -> Float[np.ndarray,
     x, y, z, w = recording.q[:, 3:7].T
     yaw = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
     return smoothed(recording.time, yaw[:, None], smoothing)[:, 0]
+
+
+def smoothed(
+    time: Float[np.ndarray, " n"], values: Float[np.ndarray, "n k"], deviation: float
+) -> Float[np.ndarray, "n k"]:
+    """Gaussian low-pass, without delay, of samples that may be uneven; the ends are held.
+
+    Args:
+        time: increasing [s].
+        values: one column per quantity.
+        deviation: standard deviation of the filter [s].
+    """
+    step = deviation / _STEPS_PER_DEVIATION
+    grid = np.arange(time[0] - deviation, time[-1] + deviation + step, step)
+    even = np.column_stack([np.interp(grid, time, column) for column in values.T])
+    calm = gaussian_filter1d(even, _STEPS_PER_DEVIATION, axis=0, mode="nearest")
+    return np.column_stack([np.interp(time, grid, column) for column in calm.T])
 
 
 def _middle(q: Float[np.ndarray, "19"], robot: PosedRobot) -> Float[np.ndarray, "3"]:

@@ -122,7 +122,10 @@ def _cone_band(
     *,
     color: tuple[float, float, float],
 ) -> WorldTriangles:
-    """The surface between two rings (radius, height) around the vertical through ``start``."""
+    """The surface between two rings (radius, height) around the vertical through ``start``.
+
+    Its normal is the profile's way (d_radius, d_height) after a right turn: (d_height, -d_radius).
+    """
     angles = np.arange(_ARROW_SIDES) * 2 * np.pi / _ARROW_SIDES
     circle = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(_ARROW_SIDES)])
     rings = [start + radius * circle + [0.0, 0.0, height] for radius, height in (low, high)]

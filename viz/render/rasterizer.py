@@ -1,7 +1,8 @@
 """A z-buffer rasteriser in numpy: triangles in, per-pixel winners out. No GPU, no system library.
 
-All triangles of a picture are scan-converted at once: first to rows, then to pixels, each as one
-flat array, so the cost is that of the pixels and not of a Python loop.
+All triangles of a picture are scan-converted at once (Foley et al., "Computer Graphics", 2nd ed.,
+section 3.6): first to rows, then to pixels, each as one flat array, so the cost is that of the
+pixels and not of a Python loop. The nearest triangle wins (z-buffer: Catmull 1974).
 """
 
 from __future__ import annotations
@@ -48,7 +49,8 @@ def rasterize(
     """Find the triangle that is in front at each sample.
 
     A sample lies at the centre of its pixel. Of two triangles the one with the larger third
-    coordinate is in front; give 1 / distance, which is linear in the picture.
+    coordinate is in front; give 1 / distance, which is linear in the picture where distance is
+    not (Blinn, "Hyperbolic interpolation", 1992).
 
     Args:
         points: x (right) and y (down) in pixels, and nearness (> 0, larger is closer).
@@ -80,7 +82,11 @@ def rasterize(
 def doubled_area(
     x: Float[np.ndarray, "3 m"], y: Float[np.ndarray, "3 m"]
 ) -> Float[np.ndarray, " m"]:
-    """Twice the area of each triangle [px^2], positive if counter-clockwise (with y up)."""
+    """Twice the area of each triangle [px^2], positive if counter-clockwise (with y up).
+
+    The edge function of the side 0-1 at corner 2 (Pineda, "A parallel algorithm for polygon
+    rasterization", 1988): its sign says on which side of an edge a point lies.
+    """
     return (x[2] - x[0]) * (y[1] - y[0]) - (x[1] - x[0]) * (y[2] - y[0])
 
 
@@ -91,6 +97,9 @@ def plane_coefficients(
     value: Float[np.ndarray, "3 m"],
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
     """Slopes along x and y, and value at the origin, of the plane through three corner values.
+
+    From value[k] - value[0] = slope_x (x[k] - x[0]) + slope_y (y[k] - y[0]) for k = 1, 2 by
+    Cramer's rule, whose determinant is ``area``.
 
     Args:
         x: columns of the three corners [px].
@@ -110,7 +119,11 @@ def _scan(
     area: Float[np.ndarray, " m"],
     size: tuple[int, int],
 ) -> _Rows:
-    """Cut every triangle into its rows of covered samples, clipped to the picture."""
+    """Cut every triangle into its rows of covered samples, clipped to the picture.
+
+    At the height y an edge a-b is crossed at x = x_a + (y - y_a) (x_b - x_a) / (y_b - y_a). Edges
+    that rise bound a row of a triangle on one side, those that fall on the other.
+    """
     width, height = size
     top = np.ceil(np.minimum(np.minimum(y[0], y[1]), y[2]) - 0.5)
     bottom = np.floor(np.maximum(np.maximum(y[0], y[1]), y[2]) - 0.5)

@@ -13,7 +13,7 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording, Span
 from go2_wbc.robot.model import FOOT_RADIUS
-from viz.checks import check_recording
+from viz.content import check_recording
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.framing import nearest_rows
 from viz.render.overlay import draw_caption

@@ -11,8 +11,7 @@ import meshcat
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.recording import Recording
-from viz.checks import checked_content
-from viz.content import ReplayContent
+from viz.content import ReplayContent, checked_content
 from viz.replay.packing import compressed_text
 from viz.replay.page_data import content_text, scene_text
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import numpy as np
 
 from go2_wbc.legs import LEGS
-from go2_wbc.recording import Recording
 from go2_wbc.robot.model import FOOT_RADIUS
-from viz.content import Annotation, ReplayContent, Verdict
+from viz.content import ReplayContent, Verdict
 from viz.palette import LEG_COLORS
 from viz.render.posed_robot import PosedRobot
 from viz.render.robot_meshes import load_robot_visuals
@@ -51,14 +52,10 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
     if content.verdict is not None:
         header["verdict"] = _add_verdict(pack, content.verdict)
     if content.ghost is not None:
-        header["ghost"] = _add_ghost(pack, content.ghost, robot)
+        ghost = replay_frames(content.ghost, robot)
+        header["ghost"] = {"rate": ghost.rate, "frames": len(ghost.q)}
+        _add_frames(pack, "ghost.", ghost)
     return pack.packed(header)
-
-
-def _add_ghost(pack: Pack, recording: Recording, robot: PosedRobot) -> dict[str, object]:
-    frames = replay_frames(recording, robot)
-    _add_frames(pack, "ghost.", frames)
-    return {"rate": frames.rate, "frames": len(frames.q)}
 
 
 def _force_scale(frames: ReplayFrames) -> float:
@@ -94,18 +91,6 @@ def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
     return {
         "ok": verdict.ok,
         "text": verdict.text,
-        "annotations": [_plain(annotation) for annotation in verdict.annotations],
+        "annotations": [asdict(annotation) for annotation in verdict.annotations],
         "curves": curves,
-    }
-
-
-def _plain(annotation: Annotation) -> dict[str, object]:
-    return {
-        "limit": annotation.limit,
-        "subject": annotation.subject,
-        "time": annotation.time,
-        "text": annotation.text,
-        "is_broken": annotation.is_broken,
-        "spans": [list(span) for span in annotation.spans],
-        "parts": list(annotation.parts),
     }

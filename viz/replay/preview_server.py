@@ -19,8 +19,7 @@ from types import TracebackType
 from typing import final
 
 from go2_wbc.errors import ConfigError
-from viz.checks import checked_content
-from viz.content import ReplayContent
+from viz.content import ReplayContent, checked_content
 from viz.replay.html_page import page_text
 from viz.replay.page_data import content_text, scene_text
 
@@ -120,20 +119,22 @@ class PreviewServer:
         """What the page shows now, packed."""
         return self._state.data
 
-    def news(self, seen: str | None) -> str | None:
-        """Wait until there is other news than ``seen``; "" if there is none for long.
+    def next_state(self, seen: str | None) -> str | None:
+        """Wait for another state than ``seen``; "" if there is none for long.
 
         Returns:
             Version and error as JSON; ``None`` once the server ends.
         """
         with self._changed:
-            self._changed.wait_for(lambda: not self._is_open or self._told() != seen, _HEARTBEAT)
+            self._changed.wait_for(
+                lambda: not self._is_open or self._state_text() != seen, _HEARTBEAT
+            )
             if not self._is_open:
                 return None
-            told = self._told()
-        return "" if told == seen else told
+            state = self._state_text()
+        return "" if state == seen else state
 
-    def _told(self) -> str:
+    def _state_text(self) -> str:
         return json.dumps({"version": self._state.version, "error": self._state.error})
 
     def _packed(self, content: ReplayContent) -> _State:
@@ -189,7 +190,7 @@ class _Handler(BaseHTTPRequestHandler):
         elif self.path == "/data":
             self._answer(source.data(), "text/plain")
         elif self.path == "/events":
-            self._tell(source)
+            self._stream(source)
         else:
             self._answer("not here\n", "text/plain", HTTPStatus.NOT_FOUND)
 
@@ -198,14 +199,14 @@ class _Handler(BaseHTTPRequestHandler):
         self._begin(status, kind, {"Content-Length": str(len(content))})
         self.wfile.write(content)
 
-    def _tell(self, source: PreviewServer) -> None:
+    def _stream(self, source: PreviewServer) -> None:
         """Server-sent events until the page or the server ends."""
         self._begin(HTTPStatus.OK, "text/event-stream", {})
         seen: str | None = None
         try:
-            while (told := source.news(seen)) is not None:
-                self.wfile.write(f"data: {told}\n\n".encode() if told else b":\n\n")
-                seen = told or seen
+            while (state := source.next_state(seen)) is not None:
+                self.wfile.write(f"data: {state}\n\n".encode() if state else b":\n\n")
+                seen = state or seen
         except OSError:
             return  # the page was closed
 
@@ -216,7 +217,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.end_headers()
 
     def log_message(self, format: str, *args: object) -> None:
-        """Say nothing: the terminal belongs to the verdicts."""
+        """Log nothing: the terminal shows the verdicts."""
 
 
 def _is_loopback(host: str, port: int) -> bool:

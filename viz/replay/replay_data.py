@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
 from viz.content import MarginCurve
+from viz.render.framing import smoothed
 from viz.render.posed_robot import PosedRobot
-from viz.render.smoothing import smoothed
 
 _FRAME_RATE = 50.0  # [Hz] finer is not seen at 60 Hz screens, swings stay smooth
 _MOST_FRAMES = 6000  # keeps the page of a long recording small; the rate drops instead
@@ -78,10 +78,10 @@ def replay_frames(recording: Recording, robot: PosedRobot) -> ReplayFrames:
         p_world_feet=np.array([robot.feet(row).ravel() for row in q]),
         p_world_com=recording.p_world_com[rows],
         p_world_camera_target=base[rows],
-        foot_forces=_extreme(np.maximum, recording.foot_forces, rows),
+        foot_forces=np.maximum.reduceat(recording.foot_forces, rows),
         stance=recording.stance[rows],
-        support_margin=_extreme(np.fmin, recording.support_margin, rows),
-        torque_ratio=_extreme(np.maximum, ratio, rows),
+        support_margin=np.fmin.reduceat(recording.support_margin, rows),
+        torque_ratio=np.maximum.reduceat(ratio, rows),
     )
 
 
@@ -94,13 +94,6 @@ def reduced(curve: MarginCurve) -> MarginCurve:
     edges = range(0, len(known), step)
     rows = np.array([start + int(known[start : start + step].argmin()) for start in edges])
     return replace(curve, time=curve.time[rows], margin=curve.margin[rows], worst=curve.worst[rows])
-
-
-def _extreme(
-    function: np.ufunc, values: Float[np.ndarray, "m ..."], rows: Int[np.ndarray, " n"]
-) -> Float[np.ndarray, "n ..."]:
-    """Extreme of the samples from each row up to the next one."""
-    return function.reduceat(values, rows, axis=0)
 
 
 def _continuous(q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 19"]:

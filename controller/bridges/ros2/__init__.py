@@ -1,4 +1,4 @@
-"""ROS 2: the robot as a node (``serve``), and a client with the seeds' face.
+"""ROS 2: the robot as a node (``serve``), and a client with ``GO2Controller``'s methods.
 
 Nothing of ROS is imported until one of these names is asked for; without the extra ``[ros2]`` that
 raises ``MissingDependency``, which names the line that installs it.

@@ -10,10 +10,9 @@ import threading
 from typing import Any
 
 from controller.bridges.ros2 import imports as ros
-from controller.bridges.ros2.behaviors import check_motion_name, motion_job
-from controller.bridges.ros2.desk import Answer, Desk, Job
+from controller.bridges.ros2.behaviors import Jobs, motion_job
 from controller.bridges.ros2.names import MOTION_ACTION, MOTION_NODE, Rates, topic
-from go2_wbc.errors import CommandError
+from controller.jobs import Answer, Job
 
 _log = logging.getLogger(__name__)
 
@@ -22,11 +21,11 @@ THREADS = 3
 
 
 class MotionActions:
-    """Offers ``play_motion`` on a desk."""
+    """Offers ``play_motion`` of a job server's robot."""
 
-    def __init__(self, context: Any, namespace: str, desk: Desk, rates: Rates) -> None:
+    def __init__(self, context: Any, namespace: str, jobs: Jobs, rates: Rates) -> None:
         """Offer the action of the robot ``namespace`` in ``context``."""
-        self._desk, self._period = desk, 1.0 / rates.feedback
+        self._jobs, self._period = jobs, 1.0 / rates.feedback
         self._node = ros.Node(
             MOTION_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
@@ -52,7 +51,7 @@ class MotionActions:
             _log.error("the action %s has ended: %s", MOTION_ACTION, error)
 
     def _judge(self, goal: Any) -> Any:
-        refusal = self._desk.refusal()
+        refusal = self._jobs.refusal()
         if not refusal:
             return ros.GoalResponse.ACCEPT
         _log.warning("motion %r refused: %s", goal.motion, refusal)
@@ -66,26 +65,18 @@ class MotionActions:
             answers.append(answer)
             answered.set()
 
-        refusal = self._submit(handle.request, reply)
-        if refusal:
-            reply(Answer(False, refusal))
+        goal = handle.request
+        self._jobs.submit(motion_job(goal.motion, list(goal.settings), self._jobs.robot, reply))
         while not answered.wait(self._period):
             if handle.is_cancel_requested:  # again and again: one that came early gets lost
-                self._desk.cancel(handle.request.motion)
-            job = self._desk.job
+                self._jobs.cancel()
+            job = self._jobs.job
             if job is not None:
                 handle.publish_feedback(self._feedback(job))
         return self._conclude(handle, answers[0])
 
-    def _submit(self, goal: Any, reply: Any) -> str:
-        try:
-            check_motion_name(goal.motion)
-        except CommandError as error:
-            return str(error)
-        return self._desk.submit(motion_job(goal.motion, list(goal.settings), reply))
-
     def _feedback(self, job: Job) -> Any:
-        feedback, go2 = ros.PlayMotion.Feedback(), self._desk.go2
+        feedback, go2 = ros.PlayMotion.Feedback(), self._jobs.robot
         feedback.phase, feedback.progress = job.phase, float(go2.progress)
         feedback.elapsed = float(go2.state.time - job.start)
         return feedback
@@ -102,7 +93,7 @@ class MotionActions:
         )
 
     def close(self) -> None:
-        """Stop spinning and release the node; the desk must have answered before."""
+        """Stop spinning and release the node; the jobs must have been answered before."""
         self._end.set_result(None)  # an executor that is shut down while it spins fails at times
         self._thread.join(2.0)
         self._executor.shutdown(timeout_sec=2.0)

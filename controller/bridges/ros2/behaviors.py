@@ -1,16 +1,17 @@
-"""What can be ordered by name, and as a motion; both end in jobs of the desk. No ROS here."""
+"""What can be ordered by name, and as a motion; both end in jobs of the job server. No ROS here."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from controller.bridges.ros2.desk import Answer, Desk, Job, Reply
 from controller.go2_controller import GO2Controller
+from controller.jobs import Answer, Job, JobServer, Reply
 from controller.modes import Mode
-from go2_wbc.errors import CommandError, unknown_name
+from controller.procedures import Aborted, Figures
+from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.model import RobotModel
-from motions import FeasibilityChecker, compile_timeline, load_motion, motion_names
+from motions import CompiledPlan, FeasibilityChecker, compile_timeline, load_motion
 from motions.authoring import Value
 
 HIGH_FIVE = "high_five"
@@ -26,31 +27,43 @@ ORDERS: Mapping[str, Callable[[GO2Controller], bool]] = {
 }
 """What happens for a name; ``up`` and ``stand`` are the same."""
 COMMANDS = (*ORDERS, STOP, DAMP)
-"""All names, the seeds' own three first."""
+"""All names, those of the course package's interface first."""
+Jobs = JobServer[GO2Controller]
+"""The job server of a robot that ROS 2 drives."""
 
 
-def order(desk: Desk, command: str, reply: Reply) -> None:
+def order(jobs: Jobs, command: str, reply: Reply) -> None:
     """Carry out ``command`` (any case); ``reply`` is called once, when it has happened."""
     name = command.strip().lower()
     if name == DAMP:
-        reply(desk.damp())
+        reply(_damp(jobs))
     elif name == STOP:
-        _stop(desk, reply)
+        _stop(jobs, reply)
     elif name in ORDERS:
         act = ORDERS[name]
-        refusal = desk.submit(Job(name, lambda go2, _job: act(go2), reply))
-        if refusal:
-            reply(Answer(False, refusal))
+        jobs.submit(Job(name, lambda _job: _measured(jobs.robot, act), reply))
     else:
         reply(Answer(False, unknown_name("command", command, COMMANDS)))
 
 
-def _stop(desk: Desk, reply: Reply) -> None:
-    if desk.cancel(STOP, reply):
-        return
-    refusal = desk.submit(Job(STOP, lambda go2, _job: _come_to_rest(go2), reply))
-    if refusal:
-        reply(Answer(False, refusal))
+def _damp(jobs: Jobs) -> Answer:
+    try:
+        jobs.damp()
+    except Go2WbcError as error:
+        return Answer(False, str(error))
+    return Answer(True, f"limp; the robot is {jobs.robot.mode.value}")
+
+
+def _stop(jobs: Jobs, reply: Reply) -> None:
+    job, go2 = jobs.job, jobs.robot
+
+    def ended() -> None:
+        upright = go2.mode in (Mode.STANDING, Mode.SITTING, Mode.WALKING, Mode.LYING)
+        name = job.name if job is not None else ""
+        reply(Answer(upright, f"{STOP}: {name} has ended; the robot is {go2.mode.value}"))
+
+    if not jobs.cancel(ended):
+        jobs.submit(Job(STOP, lambda _job: _measured(go2, _come_to_rest), reply))
 
 
 def _come_to_rest(go2: GO2Controller) -> bool:
@@ -60,29 +73,40 @@ def _come_to_rest(go2: GO2Controller) -> bool:
     return go2.last_outcome.ok
 
 
-def motion_job(motion: str, settings: Sequence[str], reply: Reply) -> Job:
+def _measured(go2: GO2Controller, act: Callable[[GO2Controller], bool]) -> Figures:
+    """What a call of the robot has measured; raises Aborted, with the reason, if it did nothing."""
+    before = go2.last_outcome
+    done, outcome = act(go2), go2.last_outcome
+    is_new = outcome is not before
+    if not done:
+        raise Aborted(outcome.reason if is_new and not outcome.ok else "")
+    return outcome.measured if is_new else {}
+
+
+def motion_job(motion: str, settings: Sequence[str], go2: GO2Controller, reply: Reply) -> Job:
     """The job that goes to where a motion starts and plays it."""
-    plans: list[MotionPlan] = []
+    plans: list[CompiledPlan] = []
+    values: dict[str, Value] = {}
 
     def prepare() -> None:
-        values = parse_settings(settings)
-        timeline, model = load_motion(motion, **values), RobotModel()
-        plan = compile_timeline(timeline, model)
+        values.update(parse_settings(settings))
+        model = RobotModel()
+        plan = compile_timeline(load_motion(motion, **values), model)
         FeasibilityChecker(model).check(plan).raise_if_infeasible()
         plans.append(plan)
 
-    def act(go2: GO2Controller, job: Job) -> bool:
-        values = parse_settings(settings)
+    def play(job: Job) -> bool:
+        (plan,) = plans
         if motion == HIGH_FIVE and values.keys() <= {"side", "hold"}:
             job.phase = "playing"
-            return go2.high_five(str(values.get("side", "right")), float(values.get("hold", 2.0)))
-        (plan,) = plans
+            side, hold = str(values.get("side", "right")), float(values.get("hold", 2.0))
+            return go2.high_five(side, hold, plan=plan)
         if not _take_entry(go2, plan) or job.is_cancelled:
             return False
         job.phase = "playing"
         return go2.play(plan, check=False)
 
-    return Job(motion, act, reply, prepare)
+    return Job(motion, lambda job: _measured(go2, lambda _go2: play(job)), reply, prepare)
 
 
 def _take_entry(go2: GO2Controller, plan: MotionPlan) -> bool:
@@ -91,12 +115,6 @@ def _take_entry(go2: GO2Controller, plan: MotionPlan) -> bool:
     if plan.entry is Posture.SIT:
         return go2.sit()
     return go2.lie_down()
-
-
-def check_motion_name(motion: str) -> None:
-    """Raise CommandError for a motion that the library does not have; lists those it has."""
-    if motion not in motion_names():
-        raise CommandError(unknown_name("motion", motion, motion_names()))
 
 
 def parse_settings(settings: Sequence[str]) -> dict[str, Value]:

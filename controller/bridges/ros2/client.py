@@ -1,4 +1,4 @@
-"""``GO2ControllerNode``: the seeds' controller as an ``rclpy`` node."""
+"""``GO2ControllerNode``: an ``rclpy`` node with the methods of ``GO2Controller``."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from controller.bridges.ros2.names import (
     ODOM,
     topic,
 )
-from controller.bridges.ros2.odometry import state_of
 from controller.bridges.ros2.repeater import Repeater
+from controller.bridges.ros2.states import state_of
 from controller.navigation import DriveStraight, Goal, TurnInPlace
 from go2_wbc.errors import BridgeError, MissingDependency
 from go2_wbc.planning.command import VelocityCommand
@@ -169,7 +169,9 @@ class GO2ControllerNode(ros.Node):
                 return self._conclude(goal.name, False, "odometry has ceased")
             state = newer
         state = self._come_to_rest(state)
-        figures = ", ".join(f"{name} {value:.3f}" for name, value in goal.figures(state).items())
+        figures = ", ".join(
+            f"{name} {value:.3f}" for name, value in goal.measurements(state).items()
+        )
         return self._conclude(goal.name, goal.is_within_tolerance(state), figures)
 
     def _come_to_rest(self, state: RobotState) -> RobotState:
@@ -265,7 +267,7 @@ class GO2ControllerNode(ros.Node):
         while self._state is before:
             if time.monotonic() > end:
                 return None
-            self._turn_over(SLICE)
+            self._spin_for(SLICE)
         return self._state
 
     # --- talking to the server ------------------------------------------------------------
@@ -295,7 +297,7 @@ class GO2ControllerNode(ros.Node):
         """What ``future`` comes to; None if the server goes, or says nothing for ``limit`` s."""
         end = time.monotonic() + limit
         while not future.done() and time.monotonic() < end:
-            self._turn_over(SLICE, future)
+            self._spin_for(SLICE, future)
             if not future.done() and not self._behavior_client.service_is_ready():
                 break
         if not future.done():
@@ -303,7 +305,7 @@ class GO2ControllerNode(ros.Node):
             return None
         return future.result()
 
-    def _turn_over(self, seconds: float, future: Any = None) -> None:
+    def _spin_for(self, seconds: float, future: Any = None) -> None:
         """Let messages in, or wait if somebody else spins this node."""
         other = self.executor
         if other is not None and other is not self._spinner and self in other.get_nodes():

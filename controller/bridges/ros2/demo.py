@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.client import GO2ControllerNode
 from controller.checks import HEIGHT_TOLERANCE
-from controller.demo.report import Figure, StepResult
+from controller.demo.report import Measurement as Figure
+from controller.demo.report import StepResult
 from controller.demo.steps import FORWARD_SPEED, FORWARD_TIME, HOLD_TIME, STOP_TIME, TURN_ANGLE
 from controller.navigation import HEADING_TOLERANCE
 from go2_wbc.robot.state import RobotState

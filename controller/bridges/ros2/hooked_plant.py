@@ -1,4 +1,4 @@
-"""A plant with an ear: something happens after every control period, in the loop's own thread."""
+"""A plant with a hook: something happens after every control period, in the loop's own thread."""
 
 from __future__ import annotations
 

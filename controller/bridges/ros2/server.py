@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import logging
+import os
 import sys
 import threading
 import time
@@ -23,8 +24,6 @@ from controller import arguments
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.actions import MotionActions
 from controller.bridges.ros2.behaviors import COMMANDS, order
-from controller.bridges.ros2.claim import Claim
-from controller.bridges.ros2.desk import Answer, Desk
 from controller.bridges.ros2.hooked_plant import HookedPlant
 from controller.bridges.ros2.names import (
     BEHAVIOR_SERVICE,
@@ -34,13 +33,13 @@ from controller.bridges.ros2.names import (
     Rates,
     topic,
 )
-from controller.bridges.ros2.neighbours import Neighbours
-from controller.bridges.ros2.pacing import Pacer
+from controller.bridges.ros2.namespace_lock import GraphWatch, NamespaceLock
 from controller.bridges.ros2.polling import Call, PolledService, PolledSubscription
 from controller.bridges.ros2.states import StatePublisher
-from controller.bridges.ros2.throttle import Throttle
 from controller.bridges.ros2.velocity import VelocityInput
 from controller.go2_controller import GO2Controller
+from controller.jobs import Answer, JobServer
+from controller.pacing import SWITCH_INTERVAL, LogThrottle, Pacer
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.viewer import open_viewer
@@ -49,8 +48,8 @@ _log = logging.getLogger(__name__)
 
 IDLE = 0.01
 """Robot time [s] that passes at a time while nothing is ordered."""
-SWITCH_INTERVAL = 0.0005
-"""Time [s] for which a thread may keep the interpreter from the control loop."""
+LATE = 0.25
+"""Lag [s] behind the wall clock after which the pace is given up and taken up anew."""
 LINGER = 0.2
 """Time [s] in which the last answers reach their callers before the node goes."""
 
@@ -100,24 +99,31 @@ def serve(
         context = ros.Context()
         ros.rclpy.init(args=[], context=context, signal_handler_options=ros.SignalHandlerOptions.NO)
         stack.callback(ros.rclpy.shutdown, context=context)
-        stack.callback(Claim(namespace, context.get_domain_id()).close)
-        neighbours = Neighbours(context, namespace)
-        stack.callback(neighbours.close)
-        neighbours.check()
-        has_clock = not (settings.realtime or neighbours.have_clock)
+        stack.callback(NamespaceLock(namespace, context.get_domain_id()).close)
+        graph_node = ros.Node(
+            f"go2_wbc_graph_watch_{os.getpid()}",
+            namespace=namespace,
+            context=context,
+            start_parameter_services=False,
+            enable_rosout=False,
+        )
+        stack.callback(graph_node.destroy_node)
+        watch = GraphWatch(graph_node, namespace)
+        watch.check()
+        has_clock = not (settings.realtime or watch.has_clock)
         plant = HookedPlant(MujocoPlant(visuals=settings.viewer))
         stack.callback(plant.close)
         go2 = stack.enter_context(GO2Controller(namespace, plant=plant, config=config))
-        door = Door(context, go2, plant, settings, config, has_clock=has_clock)
-        stack.callback(door.close)
+        node = RobotNode(context, go2, plant, settings, config, has_clock=has_clock)
+        stack.callback(node.close)
         stack.callback(plant.silence)
-        plant.after_write = lambda: door.serve(stop)
-        on_ready(door.offer)
-        door.run(stop, neighbours)
+        plant.after_write = lambda: node.serve(stop)
+        on_ready(node.offer)
+        node.run(stop, watch)
         _log.info("ending: the robot goes limp")
 
 
-class Door:
+class RobotNode:
     """Everything that one robot offers, and the loop that serves it."""
 
     def __init__(
@@ -135,7 +141,7 @@ class Door:
         self._node = ros.Node(
             SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
-        self._desk = Desk(go2)
+        self._jobs = JobServer(go2)
         self._velocity = VelocityInput(go2, config.envelope)
         self._cmd_vel = PolledSubscription(self._node, ros.Twist, topic(namespace, CMD_VEL))
         self._command = self._offer_command()
@@ -149,13 +155,13 @@ class Door:
             realtime=settings.realtime,
         )
         self._actions = (
-            MotionActions(context, namespace, self._desk, settings.rates)
+            MotionActions(context, namespace, self._jobs, settings.rates)
             if ros.PlayMotion is not None
             else None
         )
         self._viewer = open_viewer(plant.inner) if settings.viewer else None
-        self._pacer = Pacer(plant.control_period) if settings.realtime else None
-        self._throttle, self._errors = Throttle(_log), 0
+        self._pacer = Pacer(plant.control_period, LATE) if settings.realtime else None
+        self._throttle, self._errors = LogThrottle(_log), 0
         self._cpu, self._ticks, self._began = 0.0, 0, time.monotonic()
 
     def _offer_command(self) -> PolledService | None:
@@ -190,27 +196,27 @@ class Door:
 
     # --- the loop -------------------------------------------------------------------------
 
-    def run(self, stop: threading.Event, neighbours: Neighbours) -> None:
+    def run(self, stop: threading.Event, watch: GraphWatch) -> None:
         """Carry out orders, or wait for them, until ``stop`` is set."""
         while not stop.is_set():
-            if not self._desk.work():
+            if not self._jobs.work():
                 self._go2.wait(IDLE)
-            neighbours.look()
+            watch.look()
 
     def serve(self, stop: threading.Event) -> None:
         """One turn after a control period; called by the plant."""
         began = time.thread_time()
         self._ticks += 1
-        self._guarded(self._turn)
-        if stop.is_set() and self._desk.job is not None:
-            self._guarded(lambda: self._desk.damp())
+        self._guarded(self._serve_once)
+        if stop.is_set() and self._jobs.job is not None:
+            self._guarded(self._jobs.damp)
         self._cpu += time.thread_time() - began
         if self._pacer is not None and not stop.is_set():
             self._pacer.wait(self._listen)
         if self._viewer is not None:
             self._viewer.show(self._go2.state.time)
 
-    def _turn(self) -> None:
+    def _serve_once(self) -> None:
         service, act = next(self._triggers)
         for call in service.take():
             act(call)
@@ -237,7 +243,7 @@ class Door:
                 self._order(call.request.command, call)
 
     def _take_velocities(self) -> None:
-        is_busy = self._desk.job is not None
+        is_busy = self._jobs.job is not None
         for twist in self._cmd_vel.take():
             linear, turn = twist.linear, twist.angular.z
             self._velocity.accept(linear.x, linear.y, turn, is_busy=is_busy)
@@ -248,15 +254,15 @@ class Door:
         def reply(answer: Answer) -> None:
             self._guarded(lambda: call.answer(success=answer.success, message=answer.message))
 
-        order(self._desk, command, reply)
-        if self._desk.job is not None:
+        order(self._jobs, command, reply)
+        if self._jobs.job is not None:
             self._velocity.end()
 
     def _take_statistics(self, call: Call) -> None:
         call.answer(success=True, message=json.dumps(self.statistics()))
 
     def statistics(self) -> dict[str, Any]:
-        """Counts and times since the start, for benches and the curious."""
+        """Counts and times since the start."""
         own, state = time.thread_time(), self._go2.state
         return {
             "mode": self._go2.mode.value,
@@ -276,7 +282,7 @@ class Door:
 
     def close(self) -> None:
         """Answer whoever waits and release everything."""
-        self._desk.abandon("the server is ending: the robot goes limp")
+        self._jobs.abandon("the server is ending: the robot goes limp")
         if self._actions is not None:
             self._actions.close()
         if self._viewer is not None:

@@ -1,4 +1,4 @@
-"""Publishes what the robot measures: each topic at its own rate of robot time."""
+"""What the robot measures, as messages: each topic at its own rate of robot time."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from array import array
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.names import ODOM, QUEUE, Rates, topic
@@ -163,6 +165,19 @@ class StatePublisher:
             publish(ros.Clock(clock=stamp))
 
         return send
+
+
+def state_of(message: Any) -> RobotState:
+    """Base pose and velocity of a ``nav_msgs/Odometry``; joints, torques and feet are zero."""
+    stamp, pose, twist = message.header.stamp, message.pose.pose, message.twist.twist
+    q, v = np.zeros(19), np.zeros(18)
+    q[:3] = pose.position.x, pose.position.y, pose.position.z
+    at = pose.orientation
+    q[3:7] = at.x, at.y, at.z, at.w
+    v[:3] = twist.linear.x, twist.linear.y, twist.linear.z
+    v[3:6] = twist.angular.x, twist.angular.y, twist.angular.z
+    zeros = np.zeros(4)
+    return RobotState(stamp.sec + 1e-9 * stamp.nanosec, q, v, np.zeros(12), zeros, zeros > 0)
 
 
 def _stamp(seconds: float) -> Any:

@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 
 from controller.bridges.ros2.names import CMD_VEL_SILENCE
-from controller.bridges.ros2.throttle import Throttle
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
+from controller.pacing import LogThrottle
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
 
 _log = logging.getLogger(__name__)
@@ -36,7 +36,7 @@ class VelocityInput:
     def __init__(self, go2: GO2Controller, envelope: VelocityEnvelope) -> None:
         """Drive ``go2`` within ``envelope``."""
         self._go2, self._envelope = go2, envelope
-        self._throttle = Throttle(_log)
+        self._throttle = LogThrottle(_log)
         self._last: float | None = None
         self.counts = VelocityCounts()
 

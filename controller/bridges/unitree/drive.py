@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from statistics import fmean
-from typing import Any, Final
+from typing import Final
 
 from controller.bridges.unitree.plant import UnitreePlant
 from controller.go2_controller import GO2Controller
@@ -41,10 +41,6 @@ class Step:
     ok: bool
     reason: str
     speed_error: float | None = None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values for JSON."""
-        return asdict(self)
 
 
 def check_steps(names: list[str]) -> None:

@@ -1,12 +1,13 @@
 """Unitree's messages as they lie in memory: structured arrays with the layout of the C structs.
 
-The checksum runs over exactly these bytes. Legs stand in Unitree's order FR, FL, RR, RL; the first
+Legs stand in Unitree's order FR, FL, RR, RL; the first
 twelve of the twenty motors are the legs', hip, thigh, calf. Field names are Unitree's (unitree_go
 IDL of unitree_sdk2), so that their documentation applies.
 """
 
 from __future__ import annotations
 
+import zlib
 from typing import Final
 
 import numpy as np
@@ -151,3 +152,29 @@ SPORT_STATE: Final = _struct(
 def new_message(layout: np.dtype[np.void]) -> Shaped[np.ndarray, "1"]:
     """One message, all zero."""
     return np.zeros(1, layout)
+
+
+_MIRRORED: Final = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))
+
+
+def checksum(message: Shaped[np.ndarray, "1"]) -> int:
+    """What the field ``crc`` of a low-level message must be.
+
+    CRC-32 over the 32-bit words of the C struct, the last one excepted: polynomial 0x04C11DB7,
+    initial value 0xFFFFFFFF, most significant bit first, no final inversion (``crc32_core`` of
+    unitree_sdk2). ``zlib`` has the same polynomial with all bits reversed, so the words are fed to
+    it mirrored: a hundred times faster than the loop, and bit by bit the same.
+    """
+    words = message.view("<u4")[:-1].byteswap().tobytes()
+    mirrored = zlib.crc32(words.translate(_MIRRORED)) ^ 0xFFFFFFFF
+    return int.from_bytes(mirrored.to_bytes(4, "little").translate(_MIRRORED), "big")
+
+
+def seal(message: Shaped[np.ndarray, "1"]) -> None:
+    """Write the checksum into a message."""
+    message["crc"] = checksum(message)
+
+
+def is_intact(message: Shaped[np.ndarray, "1"]) -> bool:
+    """Whether a message carries the checksum of its content."""
+    return int(message["crc"][0]) == checksum(message)

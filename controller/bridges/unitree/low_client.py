@@ -6,12 +6,12 @@ import numpy as np
 from jaxtyping import Shaped
 
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.checksum import seal
 from controller.bridges.unitree.layout import (
     FEET_FROM_UNITREE,
     JOINTS_FROM_UNITREE,
     JOINTS_TO_UNITREE,
     MOTORS,
+    seal,
 )
 from go2_wbc.robot.estimator import SensorReading
 from go2_wbc.robot.state import JointCommand

@@ -17,14 +17,16 @@ from jaxtyping import Float, Shaped
 
 from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.checksum import is_intact, seal
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.layout import (
     FEET_TO_UNITREE,
     JOINTS_FROM_UNITREE,
     JOINTS_TO_UNITREE,
     MOTORS,
+    is_intact,
+    seal,
 )
+from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError
 from go2_wbc.plant.sensors import ImuSample
 from go2_wbc.robot.state import JointCommand, RobotState
@@ -129,7 +131,7 @@ class CommandGate:
         self._last: JointCommand | None = None
         self._heard = -np.inf
         self._is_damping = False
-        self._reported: dict[str, float] = {}
+        self._throttle = LogThrottle(_log, REPORT_PERIOD, clock)
 
     @property
     def is_active(self) -> bool:
@@ -160,7 +162,9 @@ class CommandGate:
 
     def _offer(self, command: JointCommand) -> None:
         if not (self.is_open or self.is_active):
-            self._report("lowcmd ignored: the sport service has the robot; lie down or Damp first")
+            self._throttle.warn(
+                "ignored", "lowcmd ignored: the sport service has the robot; lie down or Damp first"
+            )
             return
         if self._last is None:
             _log.info("low-level commands have the robot")
@@ -178,11 +182,5 @@ class CommandGate:
             except CommandError as error:
                 kind = str(error).split(":")[0]
                 self.refused[kind] += 1
-                self._report(f"lowcmd refused, {self.refused[kind]} so far: {kind}", str(error))
+                self._throttle.warn(kind, f"lowcmd refused, {self.refused[kind]} so far: {error}")
         return found
-
-    def _report(self, line: str, detail: str = "") -> None:
-        kind, now = line.split(":")[-1], self._clock()
-        if now - self._reported.get(kind, -np.inf) >= REPORT_PERIOD:
-            self._reported[kind] = now
-            _log.warning("%s%s", line, f" ({detail})" if detail else "")

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
+import signal
 import sys
 import threading
 import time
+from types import FrameType
 from typing import Final, final
 
 import numpy as np
 
 from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree.checksum import is_intact
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.extra import require_dds
 from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
-from controller.bridges.unitree.last_word import at_the_end, forget
-from controller.bridges.unitree.layout import LOW_CMD, LOW_STATE
+from controller.bridges.unitree.layout import LOW_CMD, LOW_STATE, is_intact
 from controller.bridges.unitree.low_client import low_cmd_message, sensor_reading
+from controller.pacing import SWITCH_INTERVAL
 from go2_wbc.errors import ClosedError, CommandError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.estimator import EstimatorConfig, StateEstimator
@@ -32,18 +34,17 @@ FIRST_STATE_LIMIT: Final = 5.0
 """Time [s] in which the robot must be found."""
 QUEUE: Final = 64
 """States that are kept while the controller is busy; the estimator takes in all of them."""
-FAREWELL, FAREWELL_PERIOD = 0.2, 0.005
-"""Time [s] for which damping is sent at the end, and between two of these commands."""
+EXIT_DAMPINGS, DAMPING_PERIOD = 40, 0.005
+"""How often damping is sent at the end, and the time [s] between two of these commands: 0.2 s."""
 WATCH: Final = 0.02
 """Time [s] between two looks whether the controller still sends commands."""
-STEP_TRIES, STEP_LIMIT, STEP_SILENCE = 5, 0.1, 0.02
-"""How often, and how long each time [s], the plant tries to fall into step with the robot, and the
+SYNC_TRIES, SYNC_LIMIT, SYNC_SILENCE = 5, 0.1, 0.02
+"""How often, and how long each time [s], the plant tries to get into step with the robot, and the
 silence [s] that shows that it has."""
-REPEAT: Final = 0.01
-"""Silence [s] of the robot after which a command is sent again: it, or its answer, may be lost, and
-a simulator in lockstep waits for it."""
-SWITCH_INTERVAL: Final = 0.0005
-"""Time [s] for which another thread may keep Python to itself, so that the loop keeps its pace."""
+REPEAT, REPEATS = 0.01, 10
+"""Silence [s] of the robot after which a command is sent again, and how often at most until the
+limit of stale states: it, or its answer, may be lost, and a simulator in lockstep waits for it. One
+that is only slow takes the repetition for the next command: where more is allowed, wait longer."""
 LOOPBACK: Final = "lo"
 """Where simulators live, which need not have a motion switcher; a robot has one."""
 CONSENT: Final = (
@@ -101,6 +102,7 @@ class UnitreePlant(Plant):
 
         model = RobotModel()
         self._config = guards or GuardConfig()
+        self._repeat = max(REPEAT, self._config.stale_limit / REPEATS)
         self._guards = Guards(model, self._config)
         self._estimator = StateEstimator(model, estimator)
         self._model = model
@@ -126,10 +128,11 @@ class UnitreePlant(Plant):
     def _take_over(self) -> None:
         sys.setswitchinterval(min(sys.getswitchinterval(), SWITCH_INTERVAL))
         self._is_taken_over = True
-        at_the_end(self.close)
+        atexit.register(self.close)
+        _exit_on_signals()
         self._watchdog = threading.Thread(target=self._watch, name="unitree-watchdog", daemon=True)
         self._watchdog.start()
-        self._fall_into_step()
+        self._synchronise()
 
     @property
     def control_period(self) -> float:
@@ -183,11 +186,10 @@ class UnitreePlant(Plant):
         if self._is_closed:
             return
         self._is_closed = True
-        forget(self.close)
-        end = time.monotonic() + FAREWELL
-        while time.monotonic() < end:
+        atexit.unregister(self.close)
+        for _ in range(EXIT_DAMPINGS):
             self._damp_once()
-            time.sleep(FAREWELL_PERIOD)
+            time.sleep(DAMPING_PERIOD)
 
     def _check_open(self) -> None:
         if self._is_closed:
@@ -221,7 +223,7 @@ class UnitreePlant(Plant):
         lost, and what a robot does without any is not known.
         """
         while not self._is_closed:
-            time.sleep(WATCH if self._failure is None else FAREWELL_PERIOD)
+            time.sleep(WATCH if self._failure is None else DAMPING_PERIOD)
             with self._sending:
                 if self._is_closed:
                     return
@@ -255,33 +257,33 @@ class UnitreePlant(Plant):
         )
 
     def _hears_a_state(self) -> bool:
-        """Take the next state; False if the robot is silent for ``REPEAT``."""
+        """Take the next state; False if the robot is silent for a while."""
         while (state := self._take()) is None:
             silence = time.monotonic() - self._heard
             left = self._config.stale_limit - silence
             if left < 0.0:
                 reason = f"no rt/lowstate for {1000 * silence:.0f} ms on {self._where}"
                 raise self._stop(PlantTimeout(reason))
-            if not self._states.wait(min(REPEAT, left + 0.001)):
+            if not self._states.wait(min(self._repeat, left + 0.001)):
                 return False
         self._state = state
         return True
 
-    def _fall_into_step(self) -> None:
+    def _synchronise(self) -> None:
         """Take in what came before a command was heard: from then on a write is a period.
 
         A simulator in lockstep falls silent once it obeys. What lives by the clock never does.
         """
-        for _ in range(STEP_TRIES):
+        for _ in range(SYNC_TRIES):
             self._send(JointCommand.damping(DAMPING))
-            if self._hears_silence(STEP_LIMIT):
+            if self._hears_silence(SYNC_LIMIT):
                 break
         self._heard = time.monotonic()
 
     def _hears_silence(self, limit: float) -> bool:
         end = time.monotonic() + limit
         while time.monotonic() < end:
-            if not self._states.wait(STEP_SILENCE):
+            if not self._states.wait(SYNC_SILENCE):
                 return True
             self._state = self._take() or self._state
         return False
@@ -317,3 +319,19 @@ class UnitreePlant(Plant):
                 f"the robot must lie on its belly at the start; its base is {height:.2f} m above "
                 f"its feet, tilted by {np.degrees(state.tilt):.0f} deg"
             )
+
+
+def _exit_on_signals() -> None:
+    """Let SIGTERM and SIGHUP end the interpreter as its exit handlers want it, which damp.
+
+    Signals that the program handles itself, and other threads' programs, are left alone.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, _exit)
+
+
+def _exit(number: int, frame: FrameType | None) -> None:
+    raise SystemExit(128 + number)

@@ -14,6 +14,7 @@ from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.low_level import CommandGate, fill_imu, low_state_message
 from controller.bridges.unitree.sport_api import SportMode
+from controller.pacing import Pacer
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.plant.sensors import ImuSample
 from go2_wbc.robot.state import JointCommand, RobotState
@@ -69,7 +70,7 @@ class ServedPlant(Plant):
         self._encode_state = codec_of(layout.LOW_STATE).encode
         self._encode_sport_state = codec_of(layout.SPORT_STATE).encode
         self._ticks = 0
-        self._written = 0.0
+        self._pacer = Pacer(CATCH_UP * inner.control_period, late=0.0)
 
     @property
     def control_period(self) -> float:
@@ -103,13 +104,8 @@ class ServedPlant(Plant):
             while not self.gate.hear(self._commands.take()) and time.monotonic() < deadline:
                 self._commands.wait(max(0.0, deadline - time.monotonic()))
         else:
-            self._keep_apart()
+            self._pacer.wait()
             self.gate.hear(self._commands.take())
-
-    def _keep_apart(self) -> None:
-        due = self._written + CATCH_UP * self.control_period
-        time.sleep(max(0.0, due - time.monotonic()))
-        self._written = time.monotonic()
 
 
 def sport_state_message(

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, final
 
+from controller.bridges.unitree import idl
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.low_level import CommandGate
-from controller.bridges.unitree.neighbours import require_no_robot
 from controller.bridges.unitree.rpc import LeaseServer, Server
 from controller.bridges.unitree.served_plant import ServedPlant, SportStatus
 from controller.bridges.unitree.sport_api import (
@@ -23,7 +23,9 @@ from controller.bridges.unitree.sport_api import (
 )
 from controller.bridges.unitree.sport_robot import SportRobot
 from controller.bridges.unitree.sport_service import SportService
+from controller.pacing import SWITCH_INTERVAL
 from go2_wbc.config import Config, load_config
+from go2_wbc.errors import BridgeError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 
@@ -32,9 +34,8 @@ _log = logging.getLogger(__name__)
 SIMULATOR_DOMAIN: Final = 1
 """DDS domain of simulators, as in ``unitree_mujoco``; the robot is on 0."""
 LOOPBACK: Final = "lo"
-SWITCH_INTERVAL: Final = 0.0005
-"""Time [s] for which one thread may keep Python to itself: a quarter of a control period, not two
-and a half, so that planning a motion does not hold up the control loop."""
+DISCOVERY: Final = 0.5
+"""Time [s] that another robot gets to be heard; some hundredths on an idle machine."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +78,7 @@ class UnitreeSimulator:
         """
         sys.setswitchinterval(SWITCH_INTERVAL)
         config = Config() if settings.config is None else load_config(settings.config)
-        require_no_robot(settings.domain, settings.interface)
+        _require_no_robot(settings.domain, settings.interface)
         bus = Bus(settings.domain, settings.interface)
         inner = MujocoPlant(
             settings.mjcf,
@@ -152,3 +153,13 @@ class UnitreeSimulator:
             reply(Code.OK, "")
         else:
             reply(Code.NOT_SUPPORTED, "")
+
+
+def _require_no_robot(domain: int, interface: str) -> None:
+    """Raise BridgeError if somebody publishes ``rt/lowstate``: two would answer every call."""
+    states = Bus(domain, interface).reader("rt/lowstate", idl.low_state(), depth=1)
+    if states.wait(DISCOVERY):  # not its writer: the C++ SDK has one and uses it for nothing
+        raise BridgeError(
+            f"a robot is already on DDS domain {domain}, interface {interface}; "
+            "choose another --domain, or end the other simulator"
+        )

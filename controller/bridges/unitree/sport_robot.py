@@ -9,20 +9,17 @@ from typing import Final, final
 import numpy as np
 from jaxtyping import Float
 
+from controller.assembly import PilotSettings, build_pilot
 from controller.behaviours.plans import ChangePosture
 from controller.bridges.unitree.sport_api import Api
-from controller.loop import ControlLoop
 from controller.modes import Mode
-from controller.pilot import Pilot
 from controller.procedures import ProcedureRunner
-from controller.runner import Runner
-from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant.base import Plant
 from go2_wbc.reference import MotionPlan, TrackedPoint
-from go2_wbc.robot.model import RobotModel
-from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.robot.state import RobotState
 from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
 from motions.postures import lean
 
@@ -60,15 +57,14 @@ class SportRobot:
     ) -> None:
         """Take over a robot that lies on the ground; call ``after_tick`` after every tick."""
         self._config = config
-        self._model = model = RobotModel()
         self._checker = FeasibilityChecker()  # with a model of its own: the loop is another thread
         self._plans: dict[int, MotionPlan] = {
-            api: compile_timeline(load_motion(name), model) for api, name in MOTIONS.items()
+            api: compile_timeline(load_motion(name), self._checker.model)
+            for api, name in MOTIONS.items()
         }
-        wbc = WholeBodyController(model, config.backend, config.wbc)
-        self._loop = ControlLoop(plant, model, wbc, Telemetry(model, 1), config.safety)
-        self._runner = Runner(self._loop, realtime=True, after_tick=after_tick)
-        self.pilot = Pilot(self._runner, config)
+        settings = PilotSettings(realtime=True, recorded_time=0.0, after_tick=after_tick)
+        self._assembly = build_pilot(plant, config, settings)
+        self.pilot, self._runner = self._assembly.pilot, self._assembly.runner
         self._procedures = ProcedureRunner(self._runner)
         self.is_locked = False
         self.is_leaning = False
@@ -86,6 +82,11 @@ class SportRobot:
     def mode(self) -> Mode:
         """What the robot is doing."""
         return self.pilot.mode
+
+    @property
+    def state(self) -> RobotState:
+        """The newest measured state."""
+        return self._runner.loop.state
 
     @property
     def is_alive(self) -> bool:
@@ -123,10 +124,7 @@ class SportRobot:
             self.pilot.square_up()
         target = np.array(rpy)
         behaviour = ChangePosture(
-            "lean",
-            lambda pose: lean(pose, target, LEAN_TIME),
-            TrackedPoint.COM,
-            self._model.foot_radius,
+            "lean", lambda pose: lean(pose, target, LEAN_TIME), TrackedPoint.COM, FOOT_RADIUS
         )
         self.is_leaning = True
         self._procedures.run(behaviour, LEAN_LIMIT)
@@ -153,14 +151,18 @@ class SportRobot:
         x, y, turn = inside.linear_x, inside.linear_y, inside.angular_z
         self.pilot.set_command(VelocityCommand(share * x, share * y, share * turn))
 
-    def collapse(self, reason: str) -> None:
+    def damp(self) -> None:
         """Go limp at once; ends the action that runs."""
         self.is_locked = self.is_leaning = False
-        self.pilot.collapse(reason)
+        self.pilot.collapse("limp, as asked by Damp")
+
+    def cancel(self) -> None:
+        """Leave the motion that plays, safely, and stand."""
+        self.pilot.recall()
 
     def close(self) -> None:
         """Go limp and stop."""
-        self._runner.close()
+        self._assembly.close()
 
     def _balance_stand(self) -> None:
         self.pilot.stand()

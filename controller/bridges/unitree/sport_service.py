@@ -10,18 +10,17 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Final, final
 
 from controller.bridges.unitree import sport_api
 from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
 from controller.bridges.unitree.sport_robot import MOTIONS, POSE, SportRobot
+from controller.jobs import Answer, Job, JobServer
 from controller.modes import Mode
-from controller.procedures import Aborted
-from go2_wbc.errors import ClosedError, Go2WbcError
+from controller.procedures import Aborted, Figures
+from go2_wbc.errors import Go2WbcError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 
 _log = logging.getLogger(__name__)
@@ -47,41 +46,19 @@ _ENTRY: Final = {
 """Modes from which an action may begin; one that is not listed: from all but fallen."""
 
 
-@dataclass(slots=True)
-class _Job:
-    api: int
-    perform: Callable[[], None]
-    reply: Reply
-    due: float
-    is_answered: bool = False
-    is_over: bool = False
-
-    def answer(self, code: Code) -> None:
-        if not self.is_answered:
-            self.is_answered = True
-            self.reply(code, "")
-
-
 @final
 class SportService:
-    """Turns requests into actions of one robot.
-
-    Attributes:
-        error_code: of the last action that failed, 0 since one was done.
-    """
+    """Turns requests into actions of one robot."""
 
     def __init__(self, robot: SportRobot, is_released: Callable[[], bool]) -> None:
         """Serve ``robot`` unless ``is_released()`` says that low-level commands have it."""
-        self.error_code = 0
         self._robot, self._is_released = robot, is_released
-        self._waiting: deque[_Job] = deque()
-        self._running: _Job | None = None
-        self._changed = threading.Condition()
-        self._stopping = False
+        self._jobs = JobServer(robot, queue=WAITING, patience=PATIENCE)
+        self._rising: Api | None = None
+        self._lock = threading.Lock()
         self._wanted, self._wanted_until = ZERO_COMMAND, 0.0
         self._share = sport_api.SPEED_LEVELS[0]
-        self._worker = threading.Thread(target=self._work, name="sport", daemon=True)
-        self._worker.start()
+        self._jobs.start("sport")
 
     # --- requests -------------------------------------------------------------------------
 
@@ -111,7 +88,7 @@ class SportService:
             self._share = sport_api.SPEED_LEVELS[sport_api.level(request.parameter)]
             reply(Code.OK, "")
         else:
-            self._submit(_Job(api, self._procedure(api, request.parameter), reply, _in(PATIENCE)))
+            self._submit(api, self._procedure(api, request.parameter), reply)
 
     def _procedure(self, api: Api, parameter: str) -> Callable[[], None]:
         robot = self._robot
@@ -122,37 +99,67 @@ class SportService:
             return lambda: robot.lean_to(POSE)
         if api is Api.POSE:
             return lambda: robot.perform(Api.BALANCE_STAND)
+        if api in _STANDING_UP:
+            return lambda: self._rise(api)
         return lambda: robot.perform(api)
+
+    def _rise(self, api: Api) -> None:
+        """Stand up, and do what was asked meanwhile: ``BalanceStand`` may come while it rises."""
+        asked, self._rising = api, api
+        try:
+            while True:
+                self._robot.perform(asked)
+                with self._lock:
+                    if self._rising is asked:
+                        self._rising = None  # what is asked from now on is another action
+                        return
+                    asked = self._rising or asked
+        finally:
+            self._rising = None
+
+    def _joins(self, api: Api) -> bool:
+        """Whether a robot that rises anyway needs no other action for ``api``."""
+        with self._lock:
+            is_rising = self._rising is not None and api in _STANDING_UP
+            if is_rising and api is not Api.STAND_UP:
+                self._rising = api
+        return is_rising
 
     def _lean(self, rpy: tuple[float, float, float]) -> None:
         limits = zip(rpy, sport_api.EULER_LIMITS, strict=True)
         if any(abs(angle) > limit for angle, limit in limits) or not self._robot.can_lean_to(rpy):
-            raise _PoseRefused
+            raise _PoseRefused("the robot cannot take this attitude")
         self._robot.lean_to(rpy)
 
     def _damp(self, reply: Reply) -> None:
         self._wanted = ZERO_COMMAND
-        with self._changed:
-            for job in self._waiting:
-                job.answer(Code.NOT_READY)
-            self._waiting.clear()
-        self._robot.collapse("limp, as asked by Damp")
+        self._jobs.damp()
         reply(Code.OK, "")
 
-    def _submit(self, job: _Job) -> None:
-        with self._changed:
-            running = self._running
-            is_running = running is not None and not running.is_over
-            if running and is_running and {running.api, job.api} <= _STANDING_UP:
-                if job.api is not Api.STAND_UP:
-                    running.perform = job.perform  # what the worker does at the end: see _work
-                    running.api = job.api
-                job.answer(Code.OK)
-            elif len(self._waiting) >= WAITING:
-                job.answer(Code.NOT_READY)
-            else:
-                self._waiting.append(job)
-                self._changed.notify_all()
+    def _submit(self, api: Api, perform: Callable[[], None], reply: Reply) -> None:
+        def act(_job: Job) -> Figures:
+            perform()
+            return {}
+
+        def answer(answer: Answer) -> None:
+            reply(_code_of(answer), "")
+
+        if self._joins(api):
+            reply(Code.OK, "")
+        else:
+            self._jobs.submit(Job(api.name, act, answer, begin=lambda: self._begin(api)))
+
+    def _begin(self, api: Api) -> str:
+        """Why an action cannot begin; empty when it has."""
+        self._robot.begin()
+        mode = self._robot.mode
+        if self._is_released():
+            return f"{api.name}: low-level commands have the robot"
+        if mode not in _ENTRY.get(api, Mode) or (
+            mode is Mode.FALLEN and api is not Api.RECOVERY_STAND
+        ):
+            return f"{api.name}: not from {mode.value}"
+        return ""
 
     # --- walking --------------------------------------------------------------------------
 
@@ -161,129 +168,74 @@ class SportService:
             min(max(value, low), high)
             for value, (low, high) in zip(velocity, sport_api.MOVE_RANGES, strict=True)
         ]
-        self._wanted, self._wanted_until = VelocityCommand(*clipped), _in(HOLD)
+        self._wanted = VelocityCommand(*clipped)
+        self._wanted_until = time.monotonic() + HOLD
         self._follow()
 
     def _follow(self) -> None:
         robot = self._robot
         if time.monotonic() > self._wanted_until:
             self._wanted = ZERO_COMMAND
-        if self._running is not None or self._waiting or self._is_released():
+        if self._jobs.job is not None or self._is_released():
             return
         if robot.mode is Mode.WALKING:
             robot.steer(self._wanted, self._share)
         elif not self._wanted.is_zero and robot.mode is Mode.STANDING and not robot.is_locked:
-            walk = _Job(Api.MOVE, lambda: robot.perform(Api.MOVE), _no_reply, _in(PATIENCE))
-            self._submit(walk)
+            self._submit(Api.MOVE, lambda: robot.perform(Api.MOVE), _no_reply)
         elif not self._wanted.is_zero:
             what = "locked after StandUp" if robot.is_locked else robot.mode.value
             _log.warning("Move ignored: the robot is %s; BalanceStand first", what)
             self._wanted = ZERO_COMMAND
 
-    # --- actions --------------------------------------------------------------------------
-
     def patrol(self) -> None:
         """Look after what is pending; to be called every few hundredths of a second."""
-        now = time.monotonic()
-        with self._changed:
-            if self._running is not None and now > self._running.due:
-                self._running.answer(Code.OK)
-            late = [job for job in self._waiting if now > job.due]
-            for job in late:
-                self._waiting.remove(job)
-                job.answer(Code.NOT_READY)
+        self._jobs.expire()
         try:
             self._follow()
         except Go2WbcError as error:  # the robot fell or was damped in between
             _log.info("Move ended: %s", error)
 
-    def _work(self) -> None:
-        while True:
-            with self._changed:
-                self._running = None
-                self._changed.wait_for(lambda: self._waiting or self._stopping)
-                if self._stopping:
-                    return
-                job = self._running = self._waiting.popleft()
-                code = self._begin(job)  # under the lock: a Damp after it ends the action
-            code = code or self._perform(job)
-            self.error_code = int(code)
-            try:
-                job.answer(code)
-            except Exception:
-                _log.exception("%s could not be answered", Api(job.api).name)
+    # --- what it does ---------------------------------------------------------------------
 
-    def _begin(self, job: _Job) -> Code | None:
-        """Why the action cannot begin, or None when it has."""
-        try:
-            self._robot.begin()
-        except Go2WbcError as error:
-            _log.error("%s not begun: %s", Api(job.api).name, error)
-            return Code.INTERNAL
-        return self._refusal(job)
-
-    def _refusal(self, job: _Job) -> Code | None:
-        mode, api = self._robot.mode, Api(job.api)
-        if mode is Mode.FALLEN and api is not Api.RECOVERY_STAND:
-            return Code.NOT_READY
-        if self._is_released() or mode not in _ENTRY.get(api, Mode):
-            return Code.NOT_READY
-        return None
-
-    def _perform(self, job: _Job) -> Code:
-        try:
-            while not job.is_over:
-                perform = job.perform
-                perform()
-                with self._changed:  # BalanceStand may have come while it stood up
-                    job.is_over = job.perform is perform
-            return Code.OK
-        except _PoseRefused:
-            return Code.POSE_REFUSED
-        except Aborted as aborted:
-            _log.warning("%s not done: %s", Api(job.api).name, aborted)
-            return Code.ACTION_TIMEOUT
-        except ClosedError:
-            return Code.INTERNAL
-        except Exception:
-            _log.exception("%s failed", Api(job.api).name)
-            return Code.INTERNAL
+    @property
+    def error_code(self) -> int:
+        """Of the last action that failed, 0 since one was done."""
+        last = self._jobs.last
+        return 0 if last is None else int(_code_of(last))
 
     @property
     def is_idle(self) -> bool:
         """Whether no action runs or waits and the robot lies limp."""
-        is_limp = self._robot.mode in _LIMP
-        with self._changed:
-            return is_limp and self._running is None and not self._waiting
+        return self._robot.mode in _LIMP and self._jobs.job is None
 
     @property
     def is_acting(self) -> bool:
         """Whether an action is running."""
-        return self._running is not None
+        return self._jobs.job is not None
 
     def sport_mode(self) -> SportMode:
         """What ``rt/sportmodestate`` calls what the robot is doing."""
-        running, robot = self._running, self._robot
+        job, robot = self._jobs.job, self._robot
         if robot.is_leaning and robot.mode not in _LIMP:
             return SportMode.POSE
-        if running is not None and running.api in _MODE_OF_ACTION:
-            return _MODE_OF_ACTION[running.api]
+        action = self._rising or (None if job is None else Api[job.name])
+        if action in _MODE_OF_ACTION:
+            return _MODE_OF_ACTION[action]
         if robot.mode is Mode.STANDING and robot.is_locked:
             return SportMode.JOINT_LOCK
         return _MODE_OF_STATE.get(robot.mode, SportMode.IDLE)
 
     def close(self) -> None:
-        """Stop; the action that runs ends when the robot is closed."""
-        with self._changed:
-            self._stopping = True
-            self._changed.notify_all()
+        """Stop: who waits is answered; the action that runs ends when the robot is closed."""
+        self._jobs.abandon("the service ends")
 
 
-class _PoseRefused(Exception):
+class _PoseRefused(Aborted):
     """The robot cannot take the attitude that was asked for."""
 
 
-_MODE_OF_ACTION: Final[Mapping[int, SportMode]] = {
+_CODE_OF_ERROR: Final = {Aborted: Code.ACTION_TIMEOUT, _PoseRefused: Code.POSE_REFUSED}
+_MODE_OF_ACTION: Final[Mapping[Api | None, SportMode]] = {
     Api.RECOVERY_STAND: SportMode.RECOVERY_STAND,
     Api.STAND_DOWN: SportMode.LIE_DOWN,
     Api.SIT: SportMode.SIT,
@@ -298,8 +250,12 @@ _MODE_OF_STATE: Final = {
 }
 
 
-def _in(seconds: float) -> float:
-    return time.monotonic() + seconds
+def _code_of(answer: Answer) -> Code:
+    if answer.success:
+        return Code.OK
+    if answer.is_refused:
+        return Code.NOT_READY
+    return _CODE_OF_ERROR.get(type(answer.error), Code.INTERNAL)
 
 
 def _no_reply(code: int, data: str) -> None:

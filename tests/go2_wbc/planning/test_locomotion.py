@@ -12,7 +12,7 @@ from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
-from go2_wbc.robot.rotations import rotation_from_rpy, yaw_rotation
+from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from tests import engine_helpers as helpers
 
@@ -85,6 +85,13 @@ class IdealRobot:
 
 
 # --- standing and starting ------------------------------------------------------------------------
+
+
+def test_before_it_has_started_it_is_not_stepping_and_has_no_heading() -> None:
+    # It had no attribute to tell it by.
+    planner = LocomotionPlanner(MODEL, TROT, CONFIG)
+    assert not planner.is_stepping
+    assert planner.heading == 0.0
 
 
 def test_without_a_command_it_stands_and_holds_its_place() -> None:
@@ -188,6 +195,19 @@ def test_the_reference_of_an_ideal_robot_is_the_integral_of_the_command() -> Non
     time = robot.snapshot.state.time
     expected = [0.5 * (time - ramp[0] / 2), 0.1 * (time - ramp[1] / 2), 0.0]
     np.testing.assert_allclose(way, expected, atol=0.5 * TICK)
+
+
+def test_velocities_of_the_reference_are_the_rates_of_its_pose() -> None:
+    robot, planner = IdealRobot(), started(resting())
+    before = planner.update(robot.snapshot, ZERO_COMMAND).body
+    for _ in range(300):
+        robot.follow(planner.update(robot.snapshot, VelocityCommand(0.3, -0.1, 0.5)))
+        body = planner.update(robot.snapshot, VelocityCommand(0.3, -0.1, 0.5)).body
+        turned = log_rotation(body.R_world_base @ before.R_world_base.T) / TICK
+        np.testing.assert_allclose(body.w_world, turned, atol=1e-6)
+        moved = (body.p_world - before.p_world) / TICK
+        np.testing.assert_allclose(body.v_world, moved, atol=1e-3)
+        before = body
 
 
 def test_a_robot_that_hangs_low_is_asked_for_more_height() -> None:

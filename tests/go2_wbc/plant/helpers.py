@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.robot.state import JointCommand, RobotState
 
 GRAVITY = 9.81
@@ -34,3 +35,22 @@ def momentum(robot: pin.Model, state: RobotState) -> np.ndarray:
     """Linear momentum, then angular about the centre of mass, along world axes (Pinocchio's)."""
     data = robot.createData()
     return pin.computeCentroidalMomentum(robot, data, state.q, state.v).vector.copy()
+
+
+def empty_recording(n: int, v_contacts: np.ndarray) -> TruthRecording:
+    """What MuJoCo said of a robot at the origin, ``n`` ticks of 2 ms, with sliding feet."""
+    return TruthRecording(
+        time=0.002 * np.arange(n),
+        q=np.zeros((n, 19)),
+        v=np.zeros((n, 18)),
+        rpy=np.zeros((n, 3)),
+        tau=np.zeros((n, 12)),
+        foot_forces=np.zeros((n, 4)),
+        p_world_com=np.zeros((n, 3)),
+        p_world_feet=np.zeros((n, 4, 3)),
+        p_world_contacts=np.zeros((n, 4, 3)),
+        v_world_contacts=v_contacts,
+        trunk_force=np.zeros(n),
+        limb_force=np.zeros(n),
+        touches_itself=np.zeros(n, dtype=bool),
+    )

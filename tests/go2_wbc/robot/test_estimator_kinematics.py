@@ -6,14 +6,14 @@ the air and kicks. The joints' rates follow from the feet's Jacobians, and nothi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.robot.estimator import IMU_FRAME, SensorReading, StateEstimator
+from go2_wbc.robot.estimator import IMU_FRAME, EstimatorConfig, SensorReading, StateEstimator
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
@@ -25,6 +25,7 @@ NUDGE = 1e-4  # s; of differences
 # m/s and m. The filter takes the acceleration as constant over a tick,.
 SPEED_ERROR, PLACE_ERROR = 1e-3, 5e-5
 IN_THE_AIR = Leg.FL
+CONTACT_FORCE = EstimatorConfig().contact_force
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +122,11 @@ def test_place_and_speed_of_an_exactly_known_motion_are_found(
 
 def test_what_needs_no_estimate_is_passed_on(motion: Motion, model: RobotModel) -> None:
     reading = motion.readings[7]
-    state = StateEstimator(model).update(reading)
+    forces = np.array([0.0, CONTACT_FORCE, CONTACT_FORCE + 0.01, 40.0])
+    scaled = replace(reading, quaternion=1.01 * reading.quaternion, foot_forces=forces)
+    state = StateEstimator(model).update(scaled)
+    assert state.q[3:7] == pytest.approx(reading.quaternion, abs=1e-12)
     assert state.time == reading.time
     assert state.tau.tolist() == reading.tau.tolist()
-    assert state.foot_forces.tolist() == reading.foot_forces.tolist()
-    assert state.feet_in_contact.tolist() == [leg is not IN_THE_AIR for leg in LEGS]
+    assert state.foot_forces.tolist() == forces.tolist()
+    assert state.feet_in_contact.tolist() == [False, False, True, True]

@@ -78,6 +78,13 @@ def test_a_stand_puts_the_feet_and_the_trunk_where_asked() -> None:
     assert all(row.norm < EXACT for row in solution.residuals)
 
 
+def test_the_steps_of_both_phases_are_counted() -> None:
+    found = solve_pose(MODEL, STAND, START)
+    again = solve_pose(MODEL, STAND, found.q)
+    assert again.iterations == 2  # it is there, so each phase takes the step that says so
+    assert found.iterations > again.iterations
+
+
 def test_a_paw_is_raised_with_the_asked_margins() -> None:
     solution = solve_pose(MODEL, PAW, START)
     com, feet = MODEL.forward_kinematics(solution.q)

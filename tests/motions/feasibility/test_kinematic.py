@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from go2_wbc.legs import LEGS
+from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
-from motions.feasibility.kinematic import clearance
+from motions.feasibility.kinematic import clearance, ends
 from motions.feasibility.limits import FeasibilityLimits
 from motions.trajectory import Trajectory, trajectory_of
 
@@ -19,10 +22,14 @@ def model() -> RobotModel:
 
 
 @pytest.fixture(scope="module")
-def raising(model: RobotModel) -> Trajectory:
+def plan(model: RobotModel) -> MotionPlan:
     line = Timeline().foot("FR", z=0.06, over=0.8).home(over=0.8)
-    line = line.foot("RL", z=0.06, over=0.8).home(over=0.8)
-    return trajectory_of(compile_timeline(line, model), model)
+    return compile_timeline(line.foot("RL", z=0.06, over=0.8).home(over=0.8), model)
+
+
+@pytest.fixture(scope="module")
+def raising(plan: MotionPlan, model: RobotModel) -> Trajectory:
+    return trajectory_of(plan, model)
 
 
 def test_only_a_standing_foot_is_excused_from_clearance(
@@ -35,3 +42,31 @@ def test_only_a_standing_foot_is_excused_from_clearance(
         assert foot.tolist() == raising.stance[:, leg].tolist()
         assert not unchecked[:, series.subjects.index(f"{leg.name} knee")].any()
     assert not unchecked[:, series.subjects.index("trunk")].any()
+
+
+@pytest.mark.parametrize(("end", "row"), [("entry", 0), ("exit", -1)])
+def test_the_ends_are_the_very_first_and_the_very_last_sample(
+    plan: MotionPlan, model: RobotModel, raising: Trajectory, end: str, row: int
+) -> None:
+    q, rpy, v = raising.q.copy(), raising.rpy.copy(), raising.v.copy()
+    q[row, 1] += 0.07
+    rpy[row, 2] -= 0.2
+    v[row, 9] = -0.9
+    bent = replace(raising, q=q, rpy=rpy, v=v)
+    series = ends(plan, bent, model, FeasibilityLimits())
+    values = dict(zip(series.subjects, series.values[0].tolist(), strict=True))
+    expected = {f"{end} place": 0.07, f"{end} attitude": 0.2, f"{end} speed": 0.9}
+    other = {name: value for name, value in values.items() if name not in expected}
+    assert {name: values[name] for name in expected} == pytest.approx(expected, abs=1e-5)
+    assert max(other.values()) < 1e-5
+
+
+@pytest.mark.parametrize(("end", "row"), [("entry", 0), ("exit", -1)])
+def test_a_motion_that_begins_or_ends_with_a_foot_in_the_air_has_no_place(
+    plan: MotionPlan, model: RobotModel, raising: Trajectory, end: str, row: int
+) -> None:
+    stance = raising.stance.copy()
+    stance[row, 2] = False
+    series = ends(plan, replace(raising, stance=stance), model, FeasibilityLimits())
+    broken = {finding.subject for finding in series.findings() if finding.margin < 0.0}
+    assert broken == {f"{end} place"}

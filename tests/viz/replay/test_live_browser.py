@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 _BADGE = "document.getElementById('badge').textContent"
-_TROUBLE = "document.getElementById('trouble')"
+_ERROR = "document.getElementById('error')"
 
 
 @pytest.mark.slow
@@ -38,18 +38,18 @@ def test_the_page_follows_every_save(tmp_path: Path, chromium_browser: Browser) 
         assert browser.evaluate("document.querySelectorAll('.annotation.broken').length") > 0
 
         file.write_text(BROKEN, encoding="utf-8")
-        browser.wait_for(f"!{_TROUBLE}.hidden")
-        assert "rise.py, line 9: SyntaxError" in browser.evaluate(f"{_TROUBLE}.textContent")
+        browser.wait_for(f"!{_ERROR}.hidden")
+        assert "rise.py, line 9: SyntaxError" in browser.evaluate(f"{_ERROR}.textContent")
         assert "broken" in browser.evaluate(_BADGE)
 
         file.write_text(GOOD, encoding="utf-8")
-        browser.wait_for(f"{_TROUBLE}.hidden && {_BADGE} === 'feasible'")
+        browser.wait_for(f"{_ERROR}.hidden && {_BADGE} === 'feasible'")
         assert np.abs(browser.stage() - before).mean() < 0.5
         assert browser.complaints == []
         assert all(url.startswith(preview.url) for url in browser.requested)
 
         assert preview.interrupt() == 0
-        browser.wait_for(f"{_TROUBLE}.textContent.includes('The preview has ended')")
+        browser.wait_for(f"{_ERROR}.textContent.includes('The preview has ended')")
 
 
 def _camera(browser: Tab) -> list[float]:

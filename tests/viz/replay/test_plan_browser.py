@@ -146,6 +146,17 @@ def test_a_margin_that_is_clicked_is_shown_large(browser: Tab) -> None:
     assert browser.evaluate("document.querySelector('.margin').className") == "margin broken"
 
 
+def test_the_numbers_of_a_scale_are_not_cut_off_at_its_ends(browser: Tab) -> None:
+    written = browser.evaluate(
+        "(() => { const seen = [], paint = replay.verdict.large.picture.getContext('2d');"
+        " const ownText = paint.fillText; paint.fillText = (text, x, y) => seen.push([text, y]);"
+        " drawGrid(paint, {low: 0, high: 50, height: 80, width: 200, left: 40, right: 2,"
+        " yAt: (value) => 80 * (1 - value / 50)}); paint.fillText = ownText; return seen; })()"
+    )
+    assert (written[0][0], written[-1][0]) == ("0", "50")
+    assert all(5 <= y <= 75 for _, y in written)
+
+
 def test_the_timeline_is_red_where_a_limit_is_broken(browser: Tab) -> None:
     browser.evaluate("replay.scrub(0)")
     browser.evaluate(DRAWN)

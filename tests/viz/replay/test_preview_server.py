@@ -82,13 +82,13 @@ def test_it_listens_on_the_loopback_only(server: PreviewServer) -> None:
 
 
 def test_what_is_published_is_told_and_served(server: PreviewServer, recording: Recording) -> None:
-    first = json.loads(server.news(None) or "")
+    first = json.loads(server.next_state(None) or "")
     assert first["error"] is None
     server.publish_error("line 3: oops")
-    second = json.loads(server.news(json.dumps(first)) or "")
+    second = json.loads(server.next_state(json.dumps(first)) or "")
     assert second == {"version": first["version"], "error": "line 3: oops"}
     server.publish(ReplayContent(recording, verdict=made_up_verdict(recording.duration)))
-    third = json.loads(server.news(json.dumps(second)) or "")
+    third = json.loads(server.next_state(json.dumps(second)) or "")
     assert third["version"] != first["version"]
     assert third["error"] is None
     header, _ = read_pack(_unpacked(_get(server, "/data")[1]))

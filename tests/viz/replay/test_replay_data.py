@@ -9,9 +9,9 @@ import pytest
 
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
+from viz.render.framing import smoothed
 from viz.render.posed_robot import PosedRobot
 from viz.render.robot_meshes import load_robot_visuals
-from viz.render.smoothing import smoothed
 from viz.replay.replay_data import replay_frames
 
 

@@ -34,7 +34,7 @@ class Player {
     const { title, is_plan: isPlan } = data.header;
     document.title = document.querySelector("h1").textContent = title;
     document.getElementById("total").textContent = ` / ${data.duration.toFixed(2)} s`;
-    document.getElementById("app").classList.toggle("haunted", data.ghost !== null);
+    document.getElementById("app").classList.toggle("has-ghost", data.ghost !== null);
     document.getElementById("force-key").textContent = isPlan ? "planned force" : "measured force";
   }
 

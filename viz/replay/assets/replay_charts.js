@@ -303,7 +303,7 @@ function drawGrid(paint, chart) {
     paint.strokeStyle = LINE;
     line(paint, chart.left, y, chart.width - chart.right, y);
     paint.fillStyle = MUTED;
-    paint.fillText((k * step).toFixed(digits), chart.left - 5, y);
+    paint.fillText((k * step).toFixed(digits), chart.left - 5, Math.min(Math.max(y, 6), chart.height - 5));
   }
 }
 

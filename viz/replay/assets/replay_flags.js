@@ -11,7 +11,7 @@ class Flags {
     this.box = document.getElementById("notes");
     this.leads = this.box.querySelector("svg");
     this.header = document.querySelector("header");
-    this.skins = new Map(); // of a mesh: its own material, and that in red
+    this.materials = new Map(); // of a mesh: its own, and that in red
     this.parts = partsOf(scene.body.root);
     scene.viewer.controls.addEventListener("change", () => this.placeNotes());
   }
@@ -44,7 +44,7 @@ class Flags {
     const judged = this.judged();
     for (const parts of [this.parts, this.ghostParts || new Map()]) {
       for (const [name, meshes] of parts) {
-        for (const mesh of meshes) this.dye(mesh, parts === judged && names.has(name));
+        for (const mesh of meshes) this.setRed(mesh, parts === judged && names.has(name));
       }
     }
     const ball = this.scene.node("com/ball");
@@ -54,9 +54,9 @@ class Flags {
     ball.scale.setScalar(names.has("com") ? 1.6 : 1);
   }
 
-  dye(mesh, isRed) {
-    if (!this.skins.has(mesh)) this.skins.set(mesh, [mesh.material, reddened(mesh.material)]);
-    mesh.material = this.skins.get(mesh)[isRed ? 1 : 0];
+  setRed(mesh, isRed) {
+    if (!this.materials.has(mesh)) this.materials.set(mesh, [mesh.material, reddened(mesh.material)]);
+    mesh.material = this.materials.get(mesh)[isRed ? 1 : 0];
   }
 
   write(broken) {

@@ -9,7 +9,6 @@ import pytest
 
 from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.checksum import seal
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.low_level import RELEASE, SILENCE, CommandGate
 from go2_wbc.legs import Leg
@@ -40,7 +39,7 @@ def sample(
     motors["q"][0, 1], motors["kp"][0, 1], motors["tau"][0, 1] = 0.8, 30.0, 4.0
     if sealed:
         change(message)
-    seal(message)
+    layout.seal(message)
     if not sealed:
         change(message)
     return codec_of(layout.LOW_CMD).encode(message)

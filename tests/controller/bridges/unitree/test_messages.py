@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.checksum import checksum, is_intact, seal
 from controller.bridges.unitree.codec import (
     Request,
     Response,
@@ -19,6 +18,7 @@ from controller.bridges.unitree.codec import (
     encode_request,
     encode_response,
 )
+from controller.bridges.unitree.layout import checksum, is_intact, seal
 from go2_wbc.errors import CommandError
 from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
 

@@ -56,6 +56,19 @@ def while_acting(at: Scene) -> Iterator[None]:
         yield
 
 
+def passing(at: Scene, seconds: float) -> Iterator[None]:
+    """Again and again until so much of the robot's own time has passed."""
+    deadline, end = time.monotonic() + LIMIT, robot_time(at) + seconds
+    while robot_time(at) < end:
+        assert time.monotonic() < deadline
+        yield
+
+
+def robot_time(at: Scene) -> float:
+    stamp = at.observer.now()["stamp"][0]
+    return float(stamp["sec"]) + 1e-9 * float(stamp["nanosec"])
+
+
 def rpy(at: Scene) -> np.ndarray:
     return np.array(at.observer.now()["imu_state"]["rpy"][0])
 
@@ -72,8 +85,8 @@ def test_after_stand_up_it_does_not_walk_until_balance_stand(simulated: Scene) -
     at.observer.wait_for_rest()
     assert at.observer.mode == SportMode.JOINT_LOCK
     assert at.call(Api.MOVE, FAST) == Code.OK
-    time.sleep(0.5)
-    assert at.observer.speed < 0.05
+    for _ in passing(at, 0.5):
+        assert at.observer.speed < 0.05
     assert at.call(Api.BALANCE_STAND) == Code.OK
     at.observer.wait_for_rest()
     assert at.observer.mode == SportMode.BALANCE_STAND
@@ -144,9 +157,8 @@ def test_an_attitude_is_taken_or_refused(
 @pytest.mark.parametrize(("level", "speed"), [(-1, 0.6), (0, 1.05)])
 def test_the_speed_level_bounds_move(at: Scene, level: int, speed: float) -> None:
     assert at.call(Api.SPEED_LEVEL, json.dumps({"data": level})) == Code.OK
-    for _ in range(60):
+    for _ in passing(at, 3.0):
         at.client.send(Api.MOVE, FAST)
-        time.sleep(0.05)
     assert at.observer.speed == pytest.approx(speed, abs=0.1)
     assert at.call(Api.STOP_MOVE) == Code.OK
     assert at.call(Api.SPEED_LEVEL, '{"data": 0}') == Code.OK
@@ -177,21 +189,29 @@ def test_damp_ends_an_action_whose_caller_hears_that_it_was_not_done(at: Scene) 
 
 def test_damp_wins_against_an_attitude_that_is_still_being_checked(at: Scene) -> None:
     at.client.send(Api.EULER, '{"x": 0.1, "y": 0.1, "z": 0.0}')
-    time.sleep(0.05)  # the check takes longer
+    assert wait_until(lambda: progress(at) == 1, LIMIT)
     assert at.call(Api.DAMP) == Code.OK
     at.require_lying()
-    time.sleep(1.0)
-    at.require_lying()
+    for _ in passing(at, 1.0):
+        at.require_lying()
     assert at.observer.mode == SportMode.DAMPING
 
 
 def test_who_has_the_lease_has_the_robot_until_it_ends(at: Scene) -> None:
     lease = client_of(at.observer.bus, "sport_lease")
-    assert lease.call(Api.LEASE_APPLY, '{"name": "somebody else"}').code == Code.OK
-    assert at.call(Api.STOP_MOVE) == Code.LEASE_DENIED
-    assert lease.call(Api.LEASE_APPLY, '{"name": "me"}').code == Code.LEASE_EXIST
-    time.sleep(1.2 * LEASE_TERM)
-    assert at.call(Api.STOP_MOVE) == Code.OK
+
+    def codes_during_a_lease() -> list[int]:
+        """Of a stop and another lease; none if the machine paused for as long as the lease."""
+        start = time.monotonic()
+        assert lease.call(Api.LEASE_APPLY, '{"name": "somebody else"}').code == Code.OK
+        codes = [at.call(Api.STOP_MOVE), lease.call(Api.LEASE_APPLY, '{"name": "me"}').code]
+        was_in_time = time.monotonic() - start < LEASE_TERM
+        assert wait_until(lambda: at.call(Api.STOP_MOVE) == Code.OK, LIMIT)
+        return codes if was_in_time else []
+
+    codes: list[int] = []
+    assert wait_until(lambda: bool(codes.extend(codes_during_a_lease()) or codes), LIMIT)
+    assert codes == [Code.LEASE_DENIED, Code.LEASE_EXIST]
 
 
 def test_the_switcher_releases_a_robot_that_lies_only(at: Scene) -> None:

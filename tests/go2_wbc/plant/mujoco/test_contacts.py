@@ -13,6 +13,7 @@ from go2_wbc.errors import CommandError
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.description import find_description
+from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.state import JointCommand
 from tests.go2_wbc.plant.contract import DAMPED
 from tests.go2_wbc.plant.helpers import GRAVITY, STAND, fly, momentum, stand_up
@@ -21,6 +22,7 @@ from tests.go2_wbc.plant.helpers import GRAVITY, STAND, fly, momentum, stand_up
 STATIC_TOLERANCE = 5e-3
 # Identities that hold exactly for the integrator; rounding of sums of numbers of order one.
 EXACT = 1e-9
+SINKING = 3e-3  # m; contacts are soft
 # Momentum is conserved by the continuous equations; 2 ms steps lose this share of it.
 INTEGRATOR_TOLERANCE = 5e-3
 
@@ -53,6 +55,14 @@ def test_the_feet_of_a_standing_robot_carry_its_whole_weight(plant: MujocoPlant)
     assert state.foot_forces.sum() == pytest.approx(weight, rel=STATIC_TOLERANCE)
     assert state.feet_in_contact.all()
     assert plant.base_contact_force == plant.limb_contact_force == 0.0
+
+
+def test_the_contact_of_each_foot_is_below_its_own_centre(plant: MujocoPlant) -> None:
+    stand_up(plant)
+    contacts = plant.foot_contacts()
+    assert contacts.touching.all()
+    below = contacts.p_world_contact - plant.p_world_feet
+    assert below == pytest.approx(np.tile([0.0, 0.0, -FOOT_RADIUS], (4, 1)), abs=SINKING)
 
 
 def test_in_the_air_nothing_touches(plant: MujocoPlant) -> None:

@@ -127,6 +127,22 @@ def test_other_free_objects_in_the_scene_do_not_confuse_the_state(
     assert plant.read().foot_forces.sum() == pytest.approx(weight, rel=5e-3)
 
 
+def test_a_servo_that_drives_no_leg_is_the_users_own_affair(
+    users_mjcf: Callable[..., Path],
+) -> None:
+    def edit(spec: mujoco.MjSpec) -> None:
+        arm = spec.body("base").add_body(name="arm", pos=[0.0, 0.0, 0.1])
+        arm.add_joint(name="arm_joint", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 1, 0])
+        arm.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.02, 0, 0], mass=0.1)
+        servo = spec.add_actuator(name="arm_servo", target="arm_joint")
+        servo.trntype = mujoco.mjtTrn.mjTRN_JOINT
+        servo.set_to_position(kp=5.0)
+
+    plant = MujocoPlant(users_mjcf(edit))
+    assert plant.model.nu == 13
+    assert plant.read().joint_positions.shape == (12,)
+
+
 def feet_on_the_calves(spec: mujoco.MjSpec) -> None:
     """The Menagerie's way: each foot is a geom ``FL`` of the calf, without a body of its own."""
     for leg in LEGS:

@@ -6,23 +6,24 @@ its own, without this project. Prints one JSON line.
 
 import importlib
 import json
+import signal
 import sys
-import time
+import threading
 
 unitree = importlib.import_module("unitree_interface")
-PERIOD = 0.002
+LIMIT, PERIOD = 60.0, 0.002
 
 
 def main() -> None:
-    """Publish at 500 Hz for some seconds, then tell the newest command."""
+    """Publish at 500 Hz until SIGTERM comes, then tell the newest command."""
+    is_over = threading.Event()
+    signal.signal(signal.SIGTERM, lambda *_: is_over.set())
     robot = unitree.UnitreeInterface.create_go2(sys.argv[1])
     state = unitree.LowState(12)
     state.motor.q = [0.1 * joint for joint in range(12)]
-    deadline = time.monotonic() + float(sys.argv[2])
-    while time.monotonic() < deadline:
+    while state.tick < 1000 * LIMIT and not is_over.wait(PERIOD):
         state.tick += 2
         robot.publish_low_state(state)
-        time.sleep(PERIOD)
     print(json.dumps({"q_target": list(robot.read_incoming_command().q_target)}), flush=True)
 
 

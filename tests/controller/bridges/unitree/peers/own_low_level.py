@@ -1,8 +1,9 @@
 """Our own low level, writing ``rt/lowcmd`` and ``rt/lowstate`` and reading the peer's states.
 
-    python own_low_level.py SECONDS MASK
+    python own_low_level.py COUNT MASK
 
-``MASK`` is XORed into the checksums: 0 leaves them right. Prints one JSON line.
+Ends when it has written and heard ``COUNT`` messages, or after a minute. ``MASK`` is XORed into the
+checksums: 0 leaves them right. Prints one JSON line.
 """
 
 import json
@@ -13,18 +14,18 @@ import numpy as np
 
 from controller.bridges.unitree import idl, layout
 from controller.bridges.unitree.bus import Bus
-from controller.bridges.unitree.checksum import is_intact, seal
 from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.layout import is_intact, seal
 from controller.bridges.unitree.low_client import low_cmd_message
 from go2_wbc.robot.state import JointCommand
 
-PERIOD = 0.002
+LIMIT, PERIOD = 60.0, 0.002
 ANGLES = np.linspace(0.1, 1.2, 12)
 
 
 def main() -> None:
     """Write both messages at 500 Hz, count the states that came."""
-    seconds, mask = float(sys.argv[1]), int(sys.argv[2])
+    wanted, mask = int(sys.argv[1]), int(sys.argv[2])
     bus = Bus(0, "lo")
     reader = bus.reader("rt/lowstate", idl.low_state(), depth=64)
     commands = bus.writer("rt/lowcmd", idl.low_cmd())
@@ -36,9 +37,10 @@ def main() -> None:
     seal(state)
     for message in (command, state):
         message["crc"] ^= mask
-    counts = {"intact": 0, "broken": 0}
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
+    counts, written = {"intact": 0, "broken": 0}, 0
+    deadline = time.monotonic() + LIMIT
+    while min(written, sum(counts.values())) < wanted and time.monotonic() < deadline:
+        written += 1
         commands.write(command_codec.encode(command))
         states.write(state_codec.encode(state))
         for message in map(state_codec.decode, reader.take()):

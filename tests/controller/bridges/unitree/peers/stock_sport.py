@@ -41,6 +41,11 @@ def report(name: str, code: int) -> None:
     print(json.dumps(values), flush=True)
 
 
+def robot_time() -> float:
+    """The robot's own time [s]."""
+    return states[-1].stamp.sec + 1e-9 * states[-1].stamp.nanosec
+
+
 def main() -> None:
     """Find the robot, then run the script."""
     channel.ChannelFactoryInitialize(int(sys.argv[1]), "lo")
@@ -54,10 +59,11 @@ def main() -> None:
         if time.monotonic() > deadline:
             sys.exit("the robot was not found")
         time.sleep(0.2)
+    deadline += 60.0
     report("StandUp", client.StandUp())
     report("BalanceStand", client.BalanceStand())
-    codes = []
-    for _ in range(60):
+    codes, end = [], robot_time() + 3.0
+    while robot_time() < end and time.monotonic() < deadline:
         codes.append(client.Move(0.5, 0.0, 0.0))
         time.sleep(0.05)
     report("Move", max(codes))

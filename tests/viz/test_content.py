@@ -9,7 +9,7 @@ import pytest
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
-from viz.checks import check_recording
+from viz.content import check_recording
 
 
 def _first(recording: Recording, count: int) -> Recording:

@@ -11,7 +11,6 @@ import pytest
 import controller.bridges.ros2 as bridge
 from controller.behaviours.joints import DAMPING
 from controller.bridges.ros2.hooked_plant import HookedPlant
-from controller.bridges.ros2.pacing import Pacer
 from controller.cli.common import ExitCode
 from go2_wbc.robot.state import JointCommand
 from tests.controller.plants import StillPlant, is_limp
@@ -69,28 +68,3 @@ def test_the_hook_follows_every_write_but_not_its_own() -> None:
     plant.silence()
     plant.write(JointCommand.damping(DAMPING))
     assert len(turns) == 3
-
-
-def test_the_pace_is_kept_and_taken_up_anew_after_a_long_lag(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    clock, naps = [100.0], []
-
-    def sleep(seconds: float) -> None:
-        naps.append(seconds)
-        clock[0] += seconds
-
-    monkeypatch.setattr("controller.bridges.ros2.pacing.time.monotonic", lambda: clock[0])
-    monkeypatch.setattr("controller.bridges.ros2.pacing.time.sleep", sleep)
-    pacer = Pacer(0.004)
-    for _ in range(10):
-        pacer.wait(lambda: None)
-    assert clock[0] == pytest.approx(100.04)
-    assert max(naps) <= 0.001
-    clock[0] += 0.1  # a short lag is made up for, without a nap
-    naps.clear()
-    pacer.wait(lambda: None)
-    assert (naps, pacer.give_ups) == ([], 0)
-    clock[0] += 10.0
-    pacer.wait(lambda: None)
-    assert pacer.give_ups == 1

@@ -1,33 +1,43 @@
-"""The desk carries out one order at a time and tells the truth about it. No ROS is needed."""
+"""What can be ordered over ROS 2, carried out by a job server. No ROS is needed."""
 
 from __future__ import annotations
 
+import logging
 import math
+import sys
 import threading
 import time
+from collections.abc import Callable
+from typing import Any
 
 import pytest
 
-from controller.bridges.ros2 import throttle
-from controller.bridges.ros2.behaviors import COMMANDS, motion_job, order, parse_settings
-from controller.bridges.ros2.desk import Answer, Desk, Job
+from controller.bridges.ros2.behaviors import COMMANDS, Jobs, motion_job, order, parse_settings
 from controller.bridges.ros2.names import CMD_VEL_SILENCE
 from controller.bridges.ros2.velocity import VelocityInput
 from controller.go2_controller import GO2Controller
+from controller.jobs import Answer, JobServer
 from controller.modes import Mode
+from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError, ModeError
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
+from motions.compiler import compile_timeline
+from motions.feasibility.report import FeasibilityReport
 from tests.controller.fake_go2 import FakeGo2
 from tests.controller.plants import PERIOD, WatchedPlant
 
 HANG_GUARD = 30.0
 
 
-def ordered(desk: Desk, command: str) -> list[Answer]:
-    """The answers to an order, after the desk has worked."""
+def jobs_of(go2: GO2Controller) -> Jobs:
+    return JobServer(go2)
+
+
+def ordered(jobs: Jobs, command: str) -> list[Answer]:
+    """The answers to an order, after the server has worked."""
     answers: list[Answer] = []
-    order(desk, command, answers.append)
-    desk.work()
+    order(jobs, command, answers.append)
+    jobs.work()
     return answers
 
 
@@ -36,74 +46,51 @@ def ordered(desk: Desk, command: str) -> list[Answer]:
 )
 def test_an_order_is_answered_after_it_has_happened(command: str, call: str) -> None:
     go2 = FakeGo2()
-    desk, answers = Desk(go2), []
-    order(desk, command, answers.append)
+    jobs, answers = jobs_of(go2), []
+    order(jobs, command, answers.append)
     assert answers == []
-    assert desk.work()
+    assert jobs.work()
     assert go2.calls == [call]
     assert [answer.success for answer in answers] == [True]
     assert "done in" in answers[0].message
 
 
-def test_an_order_is_begun_before_the_loop_can_see_it() -> None:
-    # A motion that another thread ordered was played before it was prepared: the server ended.
-    desk, seen = Desk(FakeGo2()), []
-
-    class Watched(Job):
-        def begin(self, now: float) -> None:
-            seen.append(desk.job)
-            super().begin(now)
-
-    desk.submit(Watched("nod", lambda _go2, _job: True, lambda _answer: None))
-    assert seen == [None]
-    assert desk.job is not None
-
-
 def test_an_unknown_order_is_refused_with_the_valid_names() -> None:
-    (answer,) = ordered(Desk(FakeGo2()), "moonwalk")
+    (answer,) = ordered(jobs_of(FakeGo2()), "moonwalk")
     assert not answer.success
     assert "'moonwalk'" in answer.message
     assert all(name in answer.message for name in COMMANDS)
 
 
 def test_what_did_not_happen_is_answered_with_the_reason() -> None:
-    (answer,) = ordered(Desk(FakeGo2(refusals={"sit": "sit not done within 3.0 s"})), "sit")
+    (answer,) = ordered(jobs_of(FakeGo2(refusals={"sit": "sit not done within 3.0 s"})), "sit")
     assert (answer.success, answer.message) == (False, "sit not done within 3.0 s")
-    (answer,) = ordered(Desk(FakeGo2(errors={"walk": ModeError("fallen: recover")})), "walk")
+    (answer,) = ordered(jobs_of(FakeGo2(errors={"walk": ModeError("fallen: recover")})), "walk")
     assert (answer.success, answer.message) == (False, "fallen: recover")
 
 
 def test_a_second_order_is_refused_at_once_and_the_first_goes_on() -> None:
     go2 = FakeGo2()
-    desk, first, second = Desk(go2), [], []
-    order(desk, "sit", first.append)
-    order(desk, "up", second.append)
+    jobs, first, second = jobs_of(go2), [], []
+    order(jobs, "sit", first.append)
+    order(jobs, "up", second.append)
     assert "busy with 'sit'" in second[0].message
-    desk.work()
+    jobs.work()
     assert first[0].success
     assert go2.calls == ["sit"]
-    assert ordered(desk, "up")[0].success
-
-
-def test_whoever_waits_is_told_when_the_server_ends() -> None:
-    desk, answers = Desk(FakeGo2()), []
-    order(desk, "sit", answers.append)
-    desk.abandon("ending")
-    assert answers == [Answer(False, "ending")]
-    desk.abandon("ending")
-    assert len(answers) == 1
+    assert ordered(jobs, "up")[0].success
 
 
 def test_stop_in_a_motion_leaves_it_and_is_answered_when_the_robot_stands() -> None:
     plant = WatchedPlant()
     with GO2Controller(plant=plant) as go2:
         assert go2.stand()
-        desk, answers = Desk(go2), {}
-        job = motion_job("nod", [], lambda answer: answers.setdefault("nod", answer))
-        assert desk.submit(job) == ""
-        stop = lambda: order(desk, "stop", lambda answer: answers.setdefault("stop", answer))  # noqa: E731
+        jobs, answers = jobs_of(go2), {}
+        job = motion_job("nod", [], go2, lambda answer: answers.setdefault("nod", answer))
+        assert jobs.submit(job)
+        stop = lambda: order(jobs, "stop", lambda answer: answers.setdefault("stop", answer))  # noqa: E731
         plant.once_at(go2.state.time + 2.0, stop)
-        while not desk.work():
+        while not jobs.work():
             time.sleep(0.01)
         assert not answers["nod"].success
         assert "cancelled" in answers["nod"].message
@@ -114,11 +101,11 @@ def test_stop_in_a_motion_leaves_it_and_is_answered_when_the_robot_stands() -> N
 def test_damp_in_a_posture_ends_it() -> None:
     plant = WatchedPlant()
     with GO2Controller(plant=plant) as go2:
-        desk, answers = Desk(go2), {}
-        order(desk, "up", lambda answer: answers.setdefault("up", answer))
-        damp = lambda: order(desk, "damp", lambda answer: answers.setdefault("damp", answer))  # noqa: E731
+        jobs, answers = jobs_of(go2), {}
+        order(jobs, "up", lambda answer: answers.setdefault("up", answer))
+        damp = lambda: order(jobs, "damp", lambda answer: answers.setdefault("damp", answer))  # noqa: E731
         plant.once_at(1.2, damp)
-        desk.work()
+        jobs.work()
         assert not answers["up"].success
         assert answers["damp"].success
         assert go2.mode is Mode.DAMPED
@@ -127,24 +114,10 @@ def test_damp_in_a_posture_ends_it() -> None:
 # --- motions ------------------------------------------------------------------------------------
 
 
-def test_damp_calls_off_an_order_that_has_not_begun() -> None:
-    class Limp(FakeGo2):
-        def damp(self) -> None:
-            self.calls.append("damp")
-
-    go2 = Limp()
-    desk, answers = Desk(go2), []
-    order(desk, "up", answers.append)
-    order(desk, "damp", lambda _answer: None)
-    desk.work()
-    assert go2.calls == ["damp"]
-    assert [answer.success for answer in answers] == [False]
-
-
 def played(go2: GO2Controller, motion: str, *settings: str) -> Answer:
-    desk, answers, answered = Desk(go2), [], threading.Event()
-    assert desk.submit(motion_job(motion, settings, answers.append)) == ""
-    while not desk.work():
+    jobs, answers, answered = jobs_of(go2), [], threading.Event()
+    assert jobs.submit(motion_job(motion, settings, go2, answers.append))
+    while not jobs.work():
         answered.wait(0.01)
     return answers[0]
 
@@ -154,6 +127,35 @@ def test_a_motion_is_prepared_beside_the_loop_and_played_from_lying() -> None:
         answer = played(go2, "nod", "times=1")
         assert answer.success, answer.message
         assert go2.mode is Mode.STANDING
+
+
+def test_a_high_five_is_compiled_and_checked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    # It was compiled for the check, and again by the robot's own high five, in the loop's thread.
+    done: list[str] = []
+
+    def counted(name: str, real: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*args: Any) -> Any:
+            done.append(f"{name} in {threading.current_thread().name}")
+            return real(*args)
+
+        return call
+
+    for module in [m for name, m in sys.modules.items() if name.startswith(("motions", "contro"))]:
+        if vars(module).get("compile_timeline") is compile_timeline:
+            monkeypatch.setattr(module, "compile_timeline", counted("compiled", compile_timeline))
+    report = counted("checked", FeasibilityReport.of)
+    monkeypatch.setattr(FeasibilityReport, "of", staticmethod(report))
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        answer = played(go2, "high_five", "hold=0.5", "side=left")
+    assert answer.success, answer.message
+    assert "mean paw height" in answer.message
+    assert done == ["compiled in prepare", "checked in prepare"]
+
+
+def test_a_motion_that_does_not_exist_is_answered_with_those_that_do() -> None:
+    answer = played(FakeGo2(), "moonwalk")
+    assert not answer.success
+    assert answer.message.startswith("unknown motion 'moonwalk'; valid: bow,")
 
 
 @pytest.mark.parametrize(
@@ -166,18 +168,6 @@ def test_wrong_settings_are_answered_with_the_reason(settings: list[str], compla
     assert not answer.success
     assert complaint in answer.message
     assert go2.calls == []
-
-
-def test_a_bug_in_the_slow_work_is_an_answer_and_not_a_silence() -> None:
-    def prepare() -> None:
-        raise RuntimeError("no memory")
-
-    desk, answers = Desk(FakeGo2()), []
-    job = Job("nod", lambda _go2, _job: True, answers.append, prepare)
-    assert desk.submit(job) == ""
-    while not desk.work():
-        pass
-    assert answers[0].message == "RuntimeError: no memory"
 
 
 def test_settings_are_read_as_numbers_or_words() -> None:
@@ -206,11 +196,11 @@ def test_a_velocity_lasts_half_a_second() -> None:
 
 
 def test_velocities_that_cannot_be_followed_are_counted_and_warned_of_once(
-    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    caplog: pytest.LogCaptureFixture,
 ) -> None:
-    monkeypatch.setattr(throttle, "PERIOD", math.inf)
     with GO2Controller(plant=WatchedPlant()) as go2:
         velocity = VelocityInput(go2, VelocityEnvelope())
+        velocity._throttle = LogThrottle(logging.getLogger("cmd_vel"), math.inf)
         for _ in range(5):
             velocity.accept(0.3, 0.0, 0.0, is_busy=False)
             velocity.accept(math.nan, 0.0, 0.0, is_busy=False)

@@ -1,0 +1,219 @@
+"""The sport service on a robot that obeys the test: order and codes of answers. Needs no DDS."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+from unittest.mock import create_autospec
+
+import pytest
+
+from controller.bridges.unitree import sport_service
+from controller.bridges.unitree.codec import Request
+from controller.bridges.unitree.sport_api import Api, Code, SportMode
+from controller.bridges.unitree.sport_robot import SportRobot
+from controller.bridges.unitree.sport_service import WAITING, SportService
+from controller.modes import Mode
+from controller.procedures import Aborted
+from go2_wbc.errors import ClosedError, PlantError
+from tests.controller.plants import HANG_GUARD, lying_state
+
+LEAN = '{"x": 0.1, "y": 0.1, "z": 0.0}'
+
+
+class Stage:
+    """A service, its robot, and what it has answered."""
+
+    def __init__(self) -> None:
+        self.robot: Any = create_autospec(SportRobot, instance=True)
+        self.robot.state, self.robot.mode = lying_state(0.0), Mode.STANDING
+        self.robot.is_locked = self.robot.is_leaning = False
+        self.robot.damp.side_effect = lambda: self.is_limp.set()
+        self.is_limp, self.is_released = threading.Event(), False
+        self.service = SportService(self.robot, lambda: self.is_released)
+        self.codes: list[tuple[str, int]] = []
+        self.news = threading.Condition()
+
+    def ask(self, api: Api, parameter: str = "", name: str = "") -> None:
+        def reply(code: int, _data: str) -> None:
+            with self.news:
+                self.codes.append((name or api.name, code))
+                self.news.notify_all()
+
+        self.service.handle(Request(1, api, parameter=parameter), reply)
+
+    def answers(self, count: int) -> list[tuple[str, int]]:
+        """The first answers, in the order in which they came; waits for them."""
+        with self.news:
+            assert self.news.wait_for(lambda: len(self.codes) >= count, HANG_GUARD)
+            return self.codes[:count]
+
+    def code(self, api: Api, parameter: str = "") -> int:
+        """The answer to a request with nothing before it."""
+        count = len(self.codes)
+        self.ask(api, parameter)
+        return self.answers(count + 1)[-1][1]
+
+    def acting(self, api: Api, meanwhile: Callable[[], None]) -> None:
+        """Do something in the middle of an action."""
+        self.robot.perform.side_effect = lambda _api: meanwhile()
+        self.ask(api)
+
+
+def wait_for(event: threading.Event) -> None:
+    assert event.wait(HANG_GUARD)
+
+
+@pytest.fixture
+def stage() -> Iterator[Stage]:
+    stage = Stage()
+    yield stage
+    stage.service.close()
+
+
+def test_an_action_is_answered_when_it_is_done(stage: Stage) -> None:
+    assert stage.code(Api.SIT) == Code.OK
+    stage.robot.perform.assert_called_once_with(Api.SIT)
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (Aborted("sit not done"), Code.ACTION_TIMEOUT),
+        (ClosedError("closed"), Code.INTERNAL),
+        (ValueError("a bug"), Code.INTERNAL),
+    ],
+)
+def test_an_action_that_was_not_done_is_answered_why(
+    stage: Stage, error: Exception, code: Code
+) -> None:
+    stage.robot.perform.side_effect = error
+    assert stage.code(Api.SIT) == code
+    assert stage.service.error_code == code
+    stage.robot.perform.side_effect = None
+    assert stage.code(Api.SIT) == Code.OK
+    assert stage.service.error_code == 0
+
+
+def test_a_robot_whose_loop_has_ended_cannot_begin(stage: Stage) -> None:
+    stage.robot.begin.side_effect = PlantError("the loop has ended")
+    assert stage.code(Api.SIT) == Code.INTERNAL
+    stage.robot.perform.assert_not_called()
+
+
+@pytest.mark.parametrize(
+    ("mode", "api", "code"),
+    [
+        (Mode.STANDING, Api.RISE_SIT, Code.NOT_READY),
+        (Mode.SITTING, Api.HELLO, Code.NOT_READY),
+        (Mode.FALLEN, Api.STAND_UP, Code.NOT_READY),
+        (Mode.FALLEN, Api.RECOVERY_STAND, Code.OK),
+        (Mode.LYING, Api.STAND_UP, Code.OK),
+    ],
+)
+def test_an_action_begins_only_from_where_it_can(
+    stage: Stage, mode: Mode, api: Api, code: Code
+) -> None:
+    stage.robot.mode = mode
+    assert stage.code(api) == code
+    assert stage.robot.perform.called == (code == Code.OK)
+
+
+def test_low_level_commands_keep_the_robot_from_the_service(stage: Stage) -> None:
+    stage.acting(Api.DANCE1, lambda: setattr(stage, "is_released", True))
+    stage.ask(Api.SIT)  # the robot is taken while this one waits
+    assert dict(stage.answers(2))["SIT"] == Code.NOT_READY
+    assert stage.code(Api.STOP_MOVE) == Code.NOT_READY
+    assert stage.code(Api.DAMP) == Code.OK
+
+
+def test_an_attitude_is_checked_after_the_action_has_begun(stage: Stage) -> None:
+    # What Damp must end is an action that has begun: the check takes a third of a second.
+    def check(_rpy: object) -> bool:
+        stage.robot.begin.assert_called_once()
+        stage.ask(Api.DAMP)
+        return True
+
+    stage.robot.can_lean_to.side_effect = check
+    stage.robot.lean_to.side_effect = Aborted("damped")
+    stage.ask(Api.EULER, LEAN)
+    assert stage.answers(2) == [("DAMP", Code.OK), ("EULER", Code.ACTION_TIMEOUT)]
+
+
+def test_an_attitude_out_of_reach_is_refused(stage: Stage) -> None:
+    stage.robot.can_lean_to.return_value = False
+    assert stage.code(Api.EULER, LEAN) == Code.POSE_REFUSED
+    stage.robot.lean_to.assert_not_called()
+
+
+def test_what_is_asked_of_a_rising_robot_is_done_at_the_end_of_the_same_action(
+    stage: Stage,
+) -> None:
+    asked = iter((Api.BALANCE_STAND, Api.STAND_UP))
+
+    def meanwhile() -> None:
+        for api in asked:
+            stage.ask(api)
+            assert stage.codes[-1] == (api.name, Code.OK)
+
+    stage.acting(Api.STAND_UP, meanwhile)
+    assert [name for name, _ in stage.answers(3)] == ["BALANCE_STAND", "STAND_UP", "STAND_UP"]
+    performed = [call.args[0] for call in stage.robot.perform.call_args_list]
+    assert performed == [Api.STAND_UP, Api.BALANCE_STAND]
+
+
+def test_after_the_patience_a_running_action_has_begun_and_a_waiting_one_is_refused(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    is_over = threading.Event()
+    monkeypatch.setattr(stage.service._jobs, "_patience", -1.0)
+    stage.acting(Api.DANCE1, lambda: wait_for(is_over))
+    stage.ask(Api.HELLO)
+    stage.service.patrol()
+    assert stage.answers(2) == [("DANCE1", Code.OK), ("HELLO", Code.NOT_READY)]
+    assert stage.service.is_acting
+    is_over.set()
+    assert sport_service.PATIENCE < 1.0  # s; Unitree's clients wait so long
+
+
+def test_so_many_requests_may_wait_and_damp_answers_all_of_them(stage: Stage) -> None:
+    has_begun = threading.Event()
+
+    def dance() -> None:
+        has_begun.set()
+        wait_for(stage.is_limp)
+        raise Aborted("damped")
+
+    stage.acting(Api.DANCE1, dance)
+    wait_for(has_begun)
+    for number in range(WAITING):
+        stage.ask(Api.HELLO, name=str(number))
+    assert stage.codes == []
+    stage.ask(Api.HELLO, name="too many")
+    assert stage.answers(1) == [("too many", Code.NOT_READY)]
+    stage.ask(Api.DAMP)
+    codes = dict(stage.answers(WAITING + 3))
+    assert codes.pop("DAMP") == Code.OK
+    assert codes.pop("DANCE1") == Code.ACTION_TIMEOUT
+    assert set(codes.values()) == {Code.NOT_READY}
+    assert [call.args for call in stage.robot.perform.call_args_list] == [(Api.DANCE1,)]
+
+
+def test_the_mode_is_that_of_the_action_that_runs(stage: Stage) -> None:
+    modes: list[SportMode] = []
+    stage.acting(Api.SIT, lambda: modes.append(stage.service.sport_mode()))
+    stage.answers(1)
+    assert modes == [SportMode.SIT]
+    assert stage.service.sport_mode() == SportMode.BALANCE_STAND
+    stage.robot.is_locked = True
+    assert stage.service.sport_mode() == SportMode.JOINT_LOCK
+
+
+def test_a_move_that_meets_a_standing_robot_starts_to_walk_first(stage: Stage) -> None:
+    started = threading.Event()
+    stage.robot.perform.side_effect = lambda _api: started.set()
+    assert stage.code(Api.MOVE, LEAN) == Code.OK
+    wait_for(started)
+    stage.robot.perform.assert_called_once_with(Api.MOVE)
+    stage.robot.steer.assert_not_called()

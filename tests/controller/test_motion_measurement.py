@@ -1,0 +1,75 @@
+"""What is measured of a played motion is what happened in it, and nothing beside it."""
+
+from __future__ import annotations
+
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from controller.go2_controller import GO2Controller
+from controller.motion_measurement import SETTLED_CONTACT, _slip, measure_motion
+from go2_wbc.legs import Leg
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.ground_truth import GroundTruth
+from go2_wbc.reference import MotionPlan
+from go2_wbc.robot.model import RobotModel
+from motions import Timeline, compile_timeline
+from tests.go2_wbc.plant.helpers import empty_recording
+
+PERIOD = 0.002
+SKID = 0.5  # m/s
+
+
+@pytest.fixture(scope="module")
+def model() -> RobotModel:
+    return RobotModel()
+
+
+@pytest.fixture(scope="module")
+def raised(model: RobotModel) -> MotionPlan:
+    """A paw that is raised and put down again."""
+    line = Timeline(name="raise").foot("FR", z=0.06, over=0.5).hold(0.2).home(over=0.5)
+    return compile_timeline(line, model)
+
+
+def slip(plan: MotionPlan, start: float, end: float) -> float:
+    """What counts as slip if the right front foot slides between two times [s]."""
+    n = round(plan.duration / PERIOD) + 1
+    velocity = np.zeros((n, 4, 3))
+    velocity[round(start / PERIOD) : round(end / PERIOD), Leg.FR, 0] = SKID
+    return _slip(empty_recording(n, velocity), plan, PERIOD)
+
+
+def touchdown(plan: MotionPlan) -> float:
+    times = PERIOD * np.arange(round(plan.duration / PERIOD))
+    in_air = [t for t in times if not plan.at(float(t)).stance[Leg.FR]]
+    return float(in_air[-1]) + PERIOD
+
+
+def test_a_standing_foot_that_slides_counts_by_its_way(raised: MotionPlan) -> None:
+    start = touchdown(raised) + SETTLED_CONTACT + 5 * PERIOD
+    assert slip(raised, start, start + 0.02) == pytest.approx(SKID * 0.02)
+
+
+def test_a_foot_in_the_air_or_just_landed_may_move(raised: MotionPlan) -> None:
+    landed = touchdown(raised)
+    assert slip(raised, landed - 0.1, landed + SETTLED_CONTACT - PERIOD) == 0.0
+
+
+def test_a_played_motion_is_measured_from_its_begin_to_its_end(
+    raised: MotionPlan, model: RobotModel
+) -> None:
+    with closing(GroundTruth(MujocoPlant())) as truth, GO2Controller(plant=truth) as go2:
+        assert go2.stand()
+        found = measure_motion(go2, truth, raised, model)
+    assert found.ok, found.reason
+    assert 0.0 < found.slip < 0.005
+    assert 0.0 < found.tracking < 0.02
+    assert 0.0 < found.torque < 1.0
+    assert found.touched == 0.0
+    assert found.as_dict() == {
+        "ok": True,
+        **{name: getattr(found, name) for name in found.__slots__},
+    }
+    assert [unit for _, _, unit in found.lines()] == ["mm", "mm", "%", "%", "rad"]

@@ -1,0 +1,122 @@
+"""Ground truth is what the simulator holds, one row per tick, and changes nothing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.ground_truth import GroundTruth, true_runs
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.state import JointCommand
+from tests.go2_wbc.plant.contract import same
+from tests.go2_wbc.plant.helpers import STAND, empty_recording
+
+TICKS = 20
+SERVO = JointCommand.servo(STAND, np.zeros(12), 60.0, 3.0)
+
+
+def test_every_tick_is_a_row_with_what_the_simulator_holds() -> None:
+    plant = MujocoPlant(sensors="noisy", seed=3)
+    truth = GroundTruth(plant)
+    for _ in range(TICKS):
+        truth.write(SERVO)
+    recorded = truth.recording()
+    assert len(recorded.time) == TICKS + 1
+    assert np.diff(recorded.time) == pytest.approx(plant.control_period)
+    assert recorded.time[-1] == plant.time
+    masses = plant.model.body_mass[1:, None]
+    com = (masses * plant.data.xipos[1:]).sum(axis=0) / masses.sum()
+    assert recorded.p_world_com[-1] == pytest.approx(com, abs=1e-12)
+    assert np.array_equal(recorded.p_world_feet[-1], plant.p_world_feet)
+
+
+def test_recording_changes_nothing_for_the_controller() -> None:
+    bare, recorded = MujocoPlant(seed=1), GroundTruth(MujocoPlant(seed=1))
+    for _ in range(TICKS):
+        bare.write(SERVO)
+        recorded.write(SERVO)
+    assert same(bare.read(), recorded.read())
+    assert recorded.control_period == bare.control_period
+
+
+def test_a_cleared_recording_begins_with_the_present_state() -> None:
+    truth = GroundTruth(MujocoPlant())
+    for _ in range(TICKS):
+        truth.write(SERVO)
+    truth.clear()
+    assert truth.recording().time.tolist() == [truth.start]
+    assert truth.start == truth.read().time
+
+
+def test_what_shall_happen_in_a_call_is_called_after_every_tick() -> None:
+    truth, times = GroundTruth(MujocoPlant()), list[float]()
+    truth.on_tick = lambda: times.append(truth.read().time)
+    for _ in range(3):
+        truth.write(SERVO)
+    assert times == pytest.approx(truth.recording().time[1:].tolist())
+
+
+@pytest.mark.parametrize(
+    ("roll", "said"), [(0.0, "trunk is on the ground"), (math.pi, "fell by t=0.40 s: tilt 17")]
+)
+def test_a_robot_on_its_trunk_or_its_back_has_fallen(roll: float, said: str) -> None:
+    plant = MujocoPlant()
+    truth = GroundTruth(plant)
+    q = np.zeros(19)
+    q[2], q[3], q[6] = 0.12, math.sin(roll / 2), math.cos(roll / 2)
+    q[7:] = np.tile([0.0, 1.4, -2.7], 4)
+    plant.place(q, np.zeros(18))
+    for _ in range(200):
+        truth.write(JointCommand.damping(3.0))
+    assert said in str(truth.fall())
+
+
+def test_a_standing_robot_has_not_fallen() -> None:
+    plant = MujocoPlant()
+    q = np.concatenate([[0.0, 0.0, 0.34, 0.0, 0.0, 0.0, 1.0], STAND])
+    plant.place(q, np.zeros(18))
+    assert GroundTruth(plant).fall() is None
+
+
+def test_a_state_that_is_not_finite_is_a_fall(monkeypatch: pytest.MonkeyPatch) -> None:
+    plant = MujocoPlant()
+    truth, state = GroundTruth(plant), plant.read()
+    broken = replace(state, q=np.where(np.arange(19) == 2, math.nan, state.q))
+    monkeypatch.setattr(plant, "read", lambda: broken)
+    assert truth.fall() is not None
+
+
+def test_a_recording_gives_the_velocity_in_the_frame_of_the_heading() -> None:
+    recorded = empty_recording(11, np.zeros((11, 4, 3)))
+    recorded.rpy[:, 2] = math.pi / 2
+    recorded.p_world_com[:, :2] = recorded.time[:, None] * [0.2, 0.5]  # y is ahead, -x is left
+    assert recorded.com_velocity == pytest.approx(np.tile([0.5, -0.2, 0.0], (10, 1)))
+
+
+def test_shares_and_distances_are_those_of_the_worst_joint() -> None:
+    model = RobotModel()
+    recorded = empty_recording(3, np.zeros((3, 4, 3)))
+    recorded.tau[1, 5] = -0.5 * model.torque_limits[5]
+    recorded.v[2, 6 + 4] = -0.25 * model.speed_limits[4]
+    recorded.q[:, 7:] = 0.5 * (model.q_lower + model.q_upper)
+    recorded.q[2, 7 + 8] = model.q_upper[8] + 0.1
+    assert recorded.torque_shares(model) == pytest.approx([0.0, 0.5, 0.0])
+    assert recorded.peak_speed_share(model) == pytest.approx(0.25)
+    assert recorded.joint_distance(model) == pytest.approx(-0.1)
+
+
+def test_part_and_since_keep_every_column_in_step() -> None:
+    recorded = empty_recording(10, np.zeros((10, 4, 3)))
+    assert recorded.since(0.0041).time == pytest.approx(0.002 * np.arange(3, 10))
+    part = recorded.part(slice(2, 5))
+    assert {len(getattr(part, name)) for name in part.__slots__} == {3}
+
+
+def test_runs_are_where_flags_are_true_without_a_gap() -> None:
+    flags = np.array([1, 0, 1, 1, 0, 1], dtype=bool)
+    assert true_runs(flags) == [slice(0, 1), slice(2, 4), slice(5, 6)]
+    assert true_runs(np.zeros(3, dtype=bool)) == []
