@@ -47,14 +47,14 @@ EASE_SIGNS = 5
 CONTROLLER, COMMAND_LINE, CONFIGURATION = (
     f"docs/reference/{name}.md" for name in ("controller", "command-line", "configuration")
 )
-PYTHON = [
-    pytest.param(block, id=f"{Path(name).stem} {name_of(block)}")
+PYTHON = {
+    f"{Path(name).stem} {name_of(block)}": block
     for name in DOCS
     if name != TUTORIAL
     for block in blocks(name, "python")
     if block.text != blocks("README.md", "python")[0].text
-]
-RUNNING = [param for param in PYTHON if not param.values[0].text.startswith(NOT_RUN)]
+}
+RUNNING = {name: block for name, block in PYTHON.items() if not block.text.startswith(NOT_RUN)}
 
 
 # --- blocks -----------------------------------------------------------------------------------
@@ -90,17 +90,16 @@ def _output(block: Block, folder: Path, where: str) -> str:
 
 def test_the_pages_have_blocks_to_test() -> None:
     assert len(RUNNING) >= 14
-    left_out = [param.id.split()[0] for param in PYTHON if param not in RUNNING]
-    assert left_out == ["real-time", "worlds"]
+    assert [name.split()[0] for name in PYTHON if name not in RUNNING] == ["real-time", "worlds"]
 
 
-@pytest.mark.parametrize("block", PYTHON)
+@pytest.mark.parametrize("block", PYTHON.values(), ids=PYTHON)
 def test_a_python_block_compiles(block: Block) -> None:
     compile(block.text, "<block>", "exec")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("block", RUNNING)
+@pytest.mark.parametrize("block", RUNNING.values(), ids=RUNNING)
 def test_a_python_block_runs_alone_and_says_nothing_bad(block: Block, tmp_path: Path) -> None:
     done = run_python(block.text, tmp_path)
     assert done.returncode == 0, done.stderr

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib
 import re
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 from PIL import Image
@@ -116,7 +117,7 @@ def test_every_command_is_one_of_the_command_line_with_options_that_exist(
         assert program.main(words) == ExitCode.OK, words
 
 
-def _calls(name: str) -> list[tuple[object, list[str]]]:
+def _calls(name: str) -> list[tuple[ModuleType, list[str]]]:
     """The program of every line that calls one of ours, and its arguments."""
     found = []
     for words in command_lines(name):

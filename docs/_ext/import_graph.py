@@ -87,7 +87,7 @@ def _imports(
     for node in ast.walk(module.tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in modules)
-        elif isinstance(node, ast.ImportFrom) and node.module in modules:
+        elif isinstance(node, ast.ImportFrom) and node.module and node.module in modules:
             for alias in node.names:
                 full = f"{node.module}.{alias.name}"
                 own = homes.get(node.module, {}).get(alias.name, node.module)
