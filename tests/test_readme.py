@@ -17,7 +17,6 @@ from benchmarks import __main__ as benchmarks
 from controller.cli import main as cli
 from controller.cli.common import ExitCode
 from tests.pages import (
-    BRIDGES,
     MADE,
     NOT_RUN,
     PAGES,
@@ -188,7 +187,7 @@ METAPHORS = (
 )
 
 
-@pytest.mark.parametrize("name", [name for name in PAGES if name not in BRIDGES])
+@pytest.mark.parametrize("name", PAGES)
 def test_no_page_uses_a_metaphor_of_earlier_versions(name: str) -> None:
     text = " ".join(page(name).split()).lower()
     assert [word for word in METAPHORS if re.search(rf"\b{word}s?\b", text)] == []

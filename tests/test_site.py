@@ -67,6 +67,10 @@ def test_the_site_builds_without_a_warning_and_its_links_lead_somewhere(tmp_path
     assert 'id="controller.go2_controller.GO2Controller.high_five"' in api
     works = (target / "explanation/how-it-works.html").read_text(encoding="utf-8")
     assert works.count("<math") > 20
+    shown = (target / "examples.html").read_text(encoding="utf-8")
+    scripts = [file.name for file in ROOT.glob("examples/[0-9]*.py")]
+    assert len(scripts) >= 24
+    assert all(f"<h2>{name}<" in shown for name in scripts)
     drawn = (target / "explanation/architecture.html").read_text(encoding="utf-8")
     assert drawn.count('<svg class="import-graph"') == 5
 

@@ -22,7 +22,7 @@ from sphinx.util.docutils import SphinxDirective
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("benchmarks", "controller", "viz", "motions", "go2_wbc")
-WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN = 124, 42, 24, 34, 6
+WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN = 136, 42, 12, 34, 2
 """Size of a box and the space around it [px]."""
 MOST_PER_ROW = 5
 
@@ -87,7 +87,7 @@ def _imports(
     for node in ast.walk(module.tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in modules)
-        elif isinstance(node, ast.ImportFrom) and node.module in modules:
+        elif isinstance(node, ast.ImportFrom) and node.module and node.module in modules:
             for alias in node.names:
                 full = f"{node.module}.{alias.name}"
                 own = homes.get(node.module, {}).get(alias.name, node.module)

@@ -2,6 +2,7 @@
 
 - Before a build, a page for every room of the packages, from its docstrings, in ``reference/api``.
 - ``{cli-help} NAME``: what ``go2-wbc NAME --help`` prints.
+- ``{examples}``: the scripts of ``examples/``.
 - ``{config-table} MODULE.CLASS``: the fields of a configuration with default and meaning.
 """
 
@@ -170,9 +171,28 @@ class ConfigTable(SphinxDirective):
         return parent.children
 
 
+class Examples(SphinxDirective):
+    """The directive ``examples``: every script of ``examples/`` with what it teaches."""
+
+    def run(self) -> list[nodes.Node]:
+        """A section a script."""
+        return [self._section(file) for file in sorted((ROOT / "examples").glob("[0-9]*.py"))]
+
+    def _section(self, file: Path) -> nodes.Node:
+        self.env.note_dependency(str(file))
+        text = file.read_text(encoding="utf-8")
+        about = ast.get_docstring(ast.parse(text)) or ""
+        code = text.partition('"""')[2].partition('"""')[2].strip()
+        section = nodes.section("", nodes.title("", file.name), ids=[nodes.make_id(file.stem)])
+        section += [nodes.paragraph("", part) for part in about.split("\n\n")]
+        section += nodes.literal_block(code, code, language="python")
+        return section
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register pages and directives."""
     app.connect("builder-inited", write_api_pages)
     app.add_directive("cli-help", CliHelp)
     app.add_directive("config-table", ConfigTable)
+    app.add_directive("examples", Examples)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
