@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.checks import is_lying, is_sitting, is_standing, posture_figures
+from controller.checks import is_lying, is_sitting, is_standing, posture_measurements
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
-from motions.tracks import configuration, home_poses
+from motions.tracks import configurations, home_poses
 from tests.engine_helpers import state_of
 
 MODEL = RobotModel()
@@ -37,7 +37,9 @@ def at_rest(posture: Posture, ground: float = 0.0, speed: float = 0.0) -> Snapsh
     p_base_feet = (feet - pose[:3]) @ rotation_from_rpy(*pose[3:])
     joints = [leg_angles(LegGeometry.of(MODEL, leg), p_base_feet[leg][None]).q[0] for leg in LEGS]
     pose[2] += ground
-    state = state_of(configuration(pose, np.concatenate(joints)), np.full(18, speed))
+    state = state_of(
+        configurations(pose[None], np.concatenate(joints)[None])[0], np.full(18, speed)
+    )
     return MODEL.snapshot(replace(state, feet_in_contact=np.ones(4, dtype=bool)))
 
 
@@ -48,8 +50,8 @@ def test_a_posture_is_known_whatever_the_height_of_the_ground(
 ) -> None:
     snapshot = at_rest(posture, ground)
     assert [name for name, check in CHECKS.items() if check(snapshot, MODEL)] == [posture]
-    level = posture_figures(at_rest(posture), MODEL)
-    assert posture_figures(snapshot, MODEL) == pytest.approx(level, abs=1e-9)
+    level = posture_measurements(at_rest(posture), MODEL)
+    assert posture_measurements(snapshot, MODEL) == pytest.approx(level, abs=1e-9)
 
 
 @pytest.mark.parametrize("posture", Posture)
