@@ -17,6 +17,7 @@ from go2_wbc.plant.mujoco.model import FLOOR, IMU_SITE, JointDynamics, build_spe
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.state import JointCommand
+from tests.go2_wbc.plant.contract import DAMPED
 from tests.go2_wbc.plant.helpers import GRAVITY, STAND, fly, momentum, stand_up
 
 TOTAL_MASS = 16.085  # kg, the sum of the URDF's links
@@ -125,6 +126,20 @@ def test_other_free_objects_in_the_scene_do_not_confuse_the_state(
     assert stand_up(plant).q[2] == pytest.approx(stand_up(MujocoPlant()).q[2], abs=EXPORT_TOLERANCE)
     weight = TOTAL_MASS * GRAVITY
     assert plant.read().foot_forces.sum() == pytest.approx(weight, rel=5e-3)
+
+
+def test_what_stands_before_the_robot_in_the_file_can_be_pushed_too(
+    users_mjcf: Callable[..., Path],
+) -> None:
+    path = users_mjcf()
+    crate = '<body name="crate" pos="2 0 0.1"><freejoint/><geom size=".1" mass="1"/></body>'
+    text = path.read_text(encoding="utf-8").replace("<worldbody>", f"<worldbody>{crate}", 1)
+    path.write_text(text, encoding="utf-8")
+    plant = MujocoPlant(path)
+    plant.push(np.array([0.0, 30.0, 0.0]), 0.1, "crate")
+    for _ in range(50):
+        plant.write(DAMPED)
+    assert plant.data.body("crate").cvel[4] > 1.0  # m/s
 
 
 def test_a_servo_that_drives_no_leg_is_the_users_own_affair(
