@@ -41,7 +41,8 @@ test-unitree: $(VENV)/.stamp-unitree ## the tests of Unitree's protocol, with it
 	GO2_WBC_STOCK_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/stock/bin/python \
 	GO2_WBC_OLD_STOCK_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/stock-old/bin/python \
 	GO2_WBC_CPP_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/cpp/bin/python \
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal tests/controller/bridges/unitree $(ARGS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal tests/controller/bridges/unitree \
+		'tests/test_examples.py::test_an_example_runs_and_prints_its_point[30_sport_client]' $(ARGS)
 
 test-dist: $(VENV)/.stamp-dev ## build wheel and sdist, use each in an empty environment
 	tests/distribution.sh $(BIN)/python
@@ -66,7 +67,8 @@ doctor: $(VENV)/.stamp-run ## say what is installed and what is missing
 	$(BIN)/go2-wbc doctor $(ARGS)
 
 clean: ## remove the environment, builds and caches
-	rm -rf $(VENV) .venv-ros2* build dist *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .venv-ros2* build dist *.egg-info .pytest_cache .ruff_cache .hypothesis \
+		docs/_build docs/reference/api
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # --- installation -----------------------------------------------------------------------------

@@ -99,14 +99,19 @@ def roll_over(loop: ControlLoop) -> Iterator[Behaviour]:
     At the end it lies on its belly with folded legs, or it has not succeeded.
     """
     yield _fold()
+    has_freed, rolls = False, 0
     for _ in range(TRIES):
-        jammed = unfolded_legs(loop.snapshot)
-        if jammed:
-            yield _freed(loop.state.joint_positions, jammed)
-        elif loop.state.tilt < ON_BELLY:
+        jammed, lies_on_belly = unfolded_legs(loop.snapshot), loop.state.tilt < ON_BELLY
+        if lies_on_belly and not jammed:
             return
-        else:
-            side = 1 if loop.state.rpy[0] >= 0 else -1
+        if jammed and (lies_on_belly or not has_freed):
+            yield _freed(loop.state.joint_positions, jammed)
+            has_freed = True
+        else:  # on its back, legs that lie under the trunk come free only by rolling
+            has_freed = False
+            nearer = 1 if loop.state.rpy[0] >= 0 else -1
+            side = -nearer if rolls % 2 else nearer  # the legs of one side may be stuck
+            rolls += 1
             reach, push = _one_side(side, REACHED_BACK), _one_side(side, PUSHING)
             yield ServoJoints("reach back", ((0.5, reach), (0.1, reach)), kp=80.0)
             yield ServoJoints("push over", ((0.24, push), (0.4, push)), kp=80.0)

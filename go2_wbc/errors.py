@@ -8,7 +8,7 @@
     ├── CommandError            a command is not finite or not valid
     ├── ModeError               a call that the present mode does not allow
     ├── ClosedError             a call after close()
-    ├── BridgeError             a door to other middleware cannot be opened
+    ├── BridgeError             other middleware cannot be reached or used
     ├── QpError
     │   ├── QpInfeasible        no solution satisfies the constraints; carries residuals
     │   └── SolverUnavailable   unknown or uninstalled QP solver; lists the valid ones
@@ -62,7 +62,7 @@ class ClosedError(Go2WbcError):
 
 
 class BridgeError(Go2WbcError):
-    """A door to other middleware cannot be opened; says what stands in the way."""
+    """Other middleware cannot be reached or used; says why."""
 
 
 class QpError(Go2WbcError):

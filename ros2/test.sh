@@ -27,8 +27,9 @@ if [[ ! -f $stamp || $(cat "$stamp") != "$made_from" ]]; then
     "$python" -m venv --clear "$venv"
     ROS=$distribution ros2/build_interfaces.sh "$venv/bin/python" "$venv/interfaces"
     "$venv/bin/python" -m pip install --quiet --disable-pip-version-check \
-        --editable ".[dev,$extra]" "$venv"/interfaces/*.whl -r ros2/test-requirements.txt
+        --editable ".[test,$extra]" "$venv"/interfaces/*.whl -r ros2/test-requirements.txt
     echo "$made_from" >"$stamp"
 fi
 GO2_WBC_REQUIRE_ROS2=1 exec "$venv/bin/python" -m pytest tests/controller/bridges \
+    'tests/test_examples.py::test_an_example_runs_and_prints_its_point[29_ros2_student_class]' \
     --ignore=tests/controller/bridges/unitree -n "${WORKERS:-2}" --dist loadfile "$@"

@@ -1,4 +1,4 @@
-"""``go2-wbc doctor``: what is installed, what is missing, and the exact line that gets it."""
+"""``go2-wbc doctor``: what is installed, what is missing, and the command that installs it."""
 
 from __future__ import annotations
 

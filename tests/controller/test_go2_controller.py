@@ -5,19 +5,18 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from importlib import import_module
 
 import numpy as np
 import pytest
 
-from controller import GO2Controller, Mode, Outcome, go2_controller
+from controller import GO2Controller, Mode, Outcome
 from controller.checks import is_lying, is_sitting, is_standing
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ModeError, MotionInfeasible, StanceMismatch
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
-from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
+from motions import compile_timeline, load_motion
 from tests.controller.plants import (
     PERIOD,
     WatchedPlant,
@@ -349,36 +348,10 @@ def test_a_high_five_plays_by_its_name_and_measures_how_high_the_paw_was_held(
     assert standing.mode is Mode.STANDING
 
 
-def test_a_checked_motion_is_played_and_refused_without_compiling_or_checking_it_again(
-    standing: GO2Controller, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    checker = FeasibilityChecker()
-    good = checker.evaluate("nod")
-    bad = checker.evaluate(Timeline().body(z=0.18, over=1.0).home(over=1.0))
-    again = (
-        import_module("motions.feasibility.check"),
-        import_module("motions.feasibility.playable"),
-    )
-    for module, name in zip(again, ("trajectory_of", "compile_timeline"), strict=True):
-        monkeypatch.setattr(module, name, lambda *_: pytest.fail("done twice"))
-    assert standing.play(good)
-    with pytest.raises(MotionInfeasible, match="way of a foot"):
-        standing.play(bad)
-
-
-@pytest.mark.slow
-def test_a_high_five_takes_the_plan_of_a_caller_who_has_one(
-    standing: GO2Controller, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    plan = compile_timeline(load_motion("high_five", side="left", hold=0.5), RobotModel())
-    monkeypatch.setattr(go2_controller, "compile_timeline", lambda *_: pytest.fail("done twice"))
-    assert standing.high_five("left", hold=0.5, plan=plan), standing.last_outcome.reason
-
-
 # --- goals and other threads ----------------------------------------------------------------
 
 
-def test_during_an_goal_move_is_refused_and_stop_ends_it() -> None:
+def test_during_a_goal_move_is_refused_and_stop_ends_it() -> None:
     plant = WatchedPlant()
     refused: list[str] = []
 

@@ -87,3 +87,14 @@ def test_the_legs_that_are_not_folded_are_those_far_from_the_tucked_posture() ->
     q[7:][Leg.RL.joints] += (0.0, 0.0, 0.6)
     q[7:][Leg.FL.joints] += (0.6, 0.0, 0.0)
     assert unfolded_legs(RobotModel().snapshot(state_of(q))) == [Leg.FL, Leg.RL]
+
+
+def test_on_its_back_with_crossed_legs_it_rolls_to_the_other_side_in_the_end() -> None:
+    # Rolling by one side only it fell back every time: the legs of that side were stuck.
+    plant = MujocoPlant(control_period=PERIOD)
+    upside_down = [0.0, 0.0, 0.072, 1.0, 0.0, 0.0, 0.0]
+    rear = [-0.4, 0.8, -1.85, 1.1, 0.36, -2.68]
+    plant.place(np.array([*upside_down, 0.0, 1.31, -2.7, 0.0, 1.31, -2.7, *rear]), np.zeros(18))
+    with GO2Controller(plant=plant) as go2:
+        assert go2.recover(), go2.last_outcome.reason
+        assert go2.state.feet_in_contact.all()
