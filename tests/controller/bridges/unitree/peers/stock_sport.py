@@ -15,7 +15,8 @@ from typing import Any
 
 kinds: Any = importlib.import_module("cyclonedds.idl.types")
 uint8 = kinds.uint8
-if not importlib.metadata.version("cyclonedds").startswith("0.10."):
+IS_OF_THE_ROBOT = importlib.metadata.version("cyclonedds").startswith("0.10.")
+if not IS_OF_THE_ROBOT:
     kinds.uint8 = kinds.byte
 channel = importlib.import_module("unitree_sdk2py.core.channel")
 sport = importlib.import_module("unitree_sdk2py.go2.sport.sport_client")
@@ -73,7 +74,9 @@ def main() -> None:
     report("Euler", client.Euler(0.1, 0.15, 0.1))
     report("FrontFlip", client.FrontFlip())
     report("StandDown", client.StandDown())
-    if sys.version_info >= (3, 12):  # CycloneDDS 0.10.2 knows 3.10 and once crashed as 3.12 ended
+    # All is answered. Python's binding of CycloneDDS 0.10.2 crashes now and then while Python ends,
+    # seen once in about 40 runs on 3.12 and once on 3.11: leave without that end.
+    if IS_OF_THE_ROBOT:
         os._exit(0)
 
 
