@@ -14,6 +14,7 @@ from enum import Enum, IntEnum
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.robot.rotations import yaw_rotation
 
 
@@ -96,11 +97,39 @@ class Reference:
     v_joints: Float[np.ndarray, "12"]
     a_joints: Float[np.ndarray, "12"]
     stance: Bool[np.ndarray, "4"] = field(init=False)
+    _row: Float[np.ndarray, " size"] | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
         """Find the feet in stance."""
         stance = np.array([task is LegTask.STANCE for task in self.legs])
         object.__setattr__(self, "stance", stance)
+
+    @property
+    def row(self) -> Float[np.ndarray, " size"]:
+        """Everything that is asked for, one number after the other, for the kernels."""
+        if self._row is None:
+            body = self.body
+            values = [
+                body.point is TrackedPoint.COM,
+                body.p_world,
+                body.v_world,
+                body.a_world,
+                body.R_world_base,
+                body.w_world,
+                body.dw_world,
+                self.legs,
+                self.normal_force_min,
+                self.normal_force_max,
+                self.p_world_feet,
+                self.v_world_feet,
+                self.a_world_feet,
+                self.q_joints,
+                self.v_joints,
+                self.a_joints,
+            ]
+            object.__setattr__(self, "_row", REFERENCE.pack(values))
+        assert self._row is not None
+        return self._row
 
     def placed(self, anchor: Anchor) -> Reference:
         """This reference, given in the frame of a motion, in the world."""

@@ -15,6 +15,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from go2_wbc.errors import DescriptionError
+from go2_wbc.kernels.layout import SNAPSHOT
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.snapshot import Snapshot
@@ -71,6 +72,7 @@ class RobotModel:
         self._foot_frames = [self.pin_model.getFrameId(name) for name in FOOT_NAMES]
         self._zero_acceleration = np.zeros(18)
         self._read_constants()
+        self._bind_views()
 
     def _read_constants(self) -> None:
         model = self.pin_model
@@ -89,8 +91,36 @@ class RobotModel:
         self.p_base_feet_nominal = self.p_base_hips.copy()
         self.p_base_feet_nominal[:, 1] += self.hip_width * np.array([leg.side for leg in LEGS])
 
+    def _bind_views(self) -> None:
+        """What the kernel reads in Pinocchio's data, as arrays bound once; the next call changes them."""
+        data = self._data
+        frames = [self.pin_model.frames[frame] for frame in self._foot_frames]
+        calves = [frame.parentJoint for frame in frames]
+        self._views = (
+            data.M,
+            data.nle,
+            data.J,
+            tuple(data.oMi[calf].rotation for calf in calves),
+            tuple(data.oMi[calf].translation for calf in calves),
+            tuple(data.v[calf].vector for calf in calves),
+            tuple(data.a_gf[calf].vector for calf in calves),
+            np.array([frame.placement.translation for frame in frames]),
+            np.array(self._constants),
+        )
+
     def snapshot(self, state: RobotState) -> Snapshot:
         """Every dynamic quantity of ``state``, computed once."""
+        from go2_wbc.kernels.derivation import derive  # compiled; only who needs it waits for it
+
+        q, v = np.ascontiguousarray(state.q), np.ascontiguousarray(state.v)
+        pin.crba(self.pin_model, self._data, q, pin.Convention.WORLD)  # M, J and the poses
+        pin.nonLinearEffects(self.pin_model, self._data, q, v)  # h, velocities, accelerations
+        row = np.empty(SNAPSHOT.size)
+        derive(q, v, *self._views, row)
+        return Snapshot.of_row(state, row)
+
+    def readable_snapshot(self, state: RobotState) -> Snapshot:
+        """The same as ``snapshot``, by Pinocchio's own functions: what the kernel is held to."""
         model, data = self.pin_model, self._data
         q, v = state.q, state.v
         M = pin.crba(model, data, q, pin.Convention.WORLD)  # a copy, both triangles filled

@@ -9,11 +9,12 @@ to the material point.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.kernels.layout import SNAPSHOT
 from go2_wbc.robot.state import RobotState
 
 
@@ -49,6 +50,23 @@ class Snapshot:
     J_contacts: Float[np.ndarray, "4 3 18"]
     drift_contacts: Float[np.ndarray, "4 3"]
     v_world_contacts: Float[np.ndarray, "4 3"]
+    _row: Float[np.ndarray, " size"] | None = field(init=False, repr=False, default=None)
+
+    @staticmethod
+    def of_row(state: RobotState, row: Float[np.ndarray, " size"]) -> Snapshot:
+        """The snapshot whose arrays ``row`` holds (see ``kernels.layout.SNAPSHOT``)."""
+        snapshot = Snapshot(state, *SNAPSHOT.views(row))
+        object.__setattr__(snapshot, "_row", row)
+        return snapshot
+
+    @property
+    def row(self) -> Float[np.ndarray, " size"]:
+        """Every array after ``state``, one after the other, for the kernels."""
+        if self._row is None:
+            arrays = [getattr(self, name) for name in SNAPSHOT.start]
+            object.__setattr__(self, "_row", SNAPSHOT.pack(arrays))
+        assert self._row is not None
+        return self._row
 
     @staticmethod
     def build(

@@ -20,7 +20,7 @@ class WbcConfig:
     search on this robot in simulation. Every field can be overridden in a TOML file.
 
     Attributes:
-        solver: QP solver: daqp, proxqp or quadprog.
+        solver: QP solver: active_set (compiled), daqp, proxqp or quadprog.
         body_position: CoM or base, world axes.
         body_orientation: base, base axes.
         swing_foot: Cartesian swing.
@@ -36,7 +36,7 @@ class WbcConfig:
         joint_margin: distance [rad] that the joints keep from their position limits.
     """
 
-    solver: str = "daqp"
+    solver: str = "active_set"
     body_position: Gains = Gains((60.0, 60.0, 100.0), (15.0, 15.0, 20.0))
     body_orientation: Gains = Gains((200.0, 200.0, 80.0), (25.0, 25.0, 18.0))
     swing_foot: Gains = Gains.uniform(500.0, 40.0)

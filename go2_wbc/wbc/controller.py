@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -22,7 +23,8 @@ from go2_wbc.wbc.constraints import (
     StanceFeetStill,
     TorqueLimits,
 )
-from go2_wbc.wbc.problem import Bounds, Problem, Rows
+from go2_wbc.wbc.problem import ACCELERATION, FORCES, Bounds, Problem, Rows
+from go2_wbc.wbc.program import Program
 from go2_wbc.wbc.solution import WbcSolution
 from go2_wbc.wbc.solvers import check_solver
 from go2_wbc.wbc.tasks import (
@@ -73,6 +75,9 @@ class WholeBodyController:
         self._task_weights = np.array([task.weight for task in self.tasks])
         self.backend_name = backend
         self._backend = self._make_backend(backend)
+        constraints = (*self.equalities, *self.inequalities)
+        is_compiled = backend == "condensed" and self.config.solver == "active_set"
+        self._program = Program(self.tasks, constraints) if is_compiled else None
         if extra_tasks and backend == "placo":
             raise ConfigError("the placo back end has tasks of its own and takes no extra ones")
 
@@ -116,6 +121,18 @@ class WholeBodyController:
             QpInfeasible: if no torque meets the constraints; carries the residual table.
         """
         start = time.perf_counter()  # thread_time costs a tenth of a tick on some machines
+        found = self._program.solve(snapshot, reference) if self._program else None
+        if found is not None:
+            z, tau = found
+            return WbcSolution(
+                tau,
+                z[ACCELERATION],
+                z[FORCES].reshape(4, 3),
+                time.perf_counter() - start,
+                self.backend_name,
+                partial(self.formulate, snapshot, reference),
+                z,
+            )
         problem = self.formulate(snapshot, reference)
         z = self._backend.solve(problem)
         return WbcSolution.from_decision(z, problem, time.perf_counter() - start, self.backend_name)

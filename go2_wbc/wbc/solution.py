@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +31,7 @@ class WbcSolution:
     forces: Float[np.ndarray, "4 3"]
     solve_time: float
     backend: str
-    _problem: Problem
+    _problem: Callable[[], Problem]
     _z: Float[np.ndarray, "30"]
 
     @staticmethod
@@ -45,12 +46,12 @@ class WbcSolution:
         qdd, forces = z[ACCELERATION], z[FORCES]
         J_joints = snapshot.J_contacts[:, :, 6:].reshape(12, 12)
         tau = snapshot.mass_matrix[6:] @ qdd + snapshot.bias[6:] - J_joints.T @ forces
-        return WbcSolution(tau, qdd, forces.reshape(4, 3), solve_time, backend, problem, z)
+        return WbcSolution(tau, qdd, forces.reshape(4, 3), solve_time, backend, lambda: problem, z)
 
     @property
     def residuals(self) -> tuple[ResidualRow, ...]:
         """Error of every task and violation of every constraint, in its own unit."""
-        return self._problem.residuals(self._z)
+        return self._problem().residuals(self._z)
 
     @property
     def command(self) -> JointCommand:

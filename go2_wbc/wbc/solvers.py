@@ -1,5 +1,6 @@
-"""Dense QP solvers by name, through qpsolvers, all started fresh.
+"""Dense QP solvers by name, all started fresh.
 
+active_set: our compiled dual active set (``kernels.active_set``), the default;
 daqp: dual active set (Arnström, Bemporad & Axehill, IEEE Trans. Autom. Control 67(8), 2022);
 quadprog: dual active set (Goldfarb & Idnani, Math. Programming 27, 1983); proxqp: proximal
 augmented Lagrangian (Bambade et al., RSS 2022).
@@ -61,7 +62,7 @@ QPSOLVERS_OPTIONS: dict[str, dict[str, Any]] = {
 }
 """Solvers reached through qpsolvers, with the tolerances that make their torques agree."""
 
-SOLVERS: tuple[str, ...] = ("daqp", "proxqp", "quadprog")
+SOLVERS: tuple[str, ...] = ("active_set", "daqp", "proxqp", "quadprog")
 """Valid solver names."""
 
 PROXQP_EPS = 1e-9
@@ -83,7 +84,7 @@ def check_solver(name: str) -> str:
     Raises:
         SolverUnavailable: otherwise; lists the names that would work.
     """
-    installed = [s for s in SOLVERS if s in qpsolvers.available_solvers]
+    installed = [s for s in SOLVERS if s == "active_set" or s in qpsolvers.available_solvers]
     if name not in SOLVERS:
         raise SolverUnavailable(unknown_name("QP solver", name, installed))
     if name not in installed:
@@ -105,12 +106,37 @@ def solve_dense_qp(qp: DenseQp, solver: str) -> QpSolution:
         # ProxQP ponders over a nan for seconds, and a nan bound would count as an open side.
         raise QpInfeasible(solver, "the problem holds a nan")
     try:
-        solution = _solve_proxqp(qp) if solver == "proxqp" else _solve_by_qpsolvers(qp, solver)
+        if solver == "active_set":
+            solution = _solve_by_active_set(qp)
+        elif solver == "proxqp":
+            solution = _solve_proxqp(qp)
+        else:
+            solution = _solve_by_qpsolvers(qp, solver)
     except (qpsolvers.exceptions.QPError, ValueError, RuntimeError) as error:
         raise QpInfeasible(solver, str(error)) from error
     if solution is None or not np.isfinite(solution.x).all():
         raise QpInfeasible(solver, "no feasible point found")
     return solution
+
+
+def _solve_by_active_set(qp: DenseQp) -> QpSolution:
+    from go2_wbc.kernels.active_set import MESSAGES, SOLVED, solve_qp
+
+    n, k = len(qp.g), 0 if qp.e is None else len(qp.e)
+    E, e = (np.empty((0, n)), np.empty(0)) if qp.E is None or qp.e is None else (qp.E, qp.e)
+    rows = [np.ascontiguousarray(part, float) for part in (E, e, qp.C, qp.lower, qp.upper)]
+    x, y = np.empty(n), np.empty(k + len(qp.lower))
+    H, g = np.ascontiguousarray(qp.H, float), np.ascontiguousarray(qp.g, float)
+    outcome = solve_qp(H, g, *rows, x, y)
+    if outcome != SOLVED:
+        raise QpInfeasible("active_set", MESSAGES[outcome])
+    return QpSolution(x, _one_sided(qp, y[k:]), y[:k])
+
+
+def _one_sided(qp: DenseQp, multipliers: Float[np.ndarray, " m"]) -> Float[np.ndarray, " r"]:
+    """Multipliers of ``one_sided()`` from those of the rows, which are positive at ``upper``."""
+    up, low = np.isfinite(qp.upper), np.isfinite(qp.lower)
+    return np.concatenate([np.maximum(multipliers, 0.0)[up], np.maximum(-multipliers, 0.0)[low]])
 
 
 def _solve_by_qpsolvers(qp: DenseQp, solver: str) -> QpSolution | None:
@@ -139,7 +165,5 @@ def _solve_proxqp(qp: DenseQp) -> QpSolution | None:
     solver.solve()
     if solver.results.info.status != proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED:
         return None
-    z = np.asarray(solver.results.z)  # of lower <= C x <= upper: positive at upper
-    up, low = np.isfinite(qp.upper), np.isfinite(qp.lower)
-    multipliers = np.concatenate([np.maximum(z, 0.0)[up], np.maximum(-z, 0.0)[low]])
+    multipliers = _one_sided(qp, np.asarray(solver.results.z))
     return QpSolution(np.array(solver.results.x), multipliers, np.array(solver.results.y))

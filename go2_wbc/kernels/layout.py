@@ -1,0 +1,106 @@
+"""Rows of floats: where each array of a value lies in the one array that kernels read or fill."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+
+class Layout:
+    """Named arrays, one after the other in a row of float64.
+
+    Attributes:
+        size: length of the row.
+        start: index in the row at which each array begins.
+    """
+
+    def __init__(self, **shapes: tuple[int, ...]) -> None:
+        """Args: shapes: of each array, in the order of the row; () for a single number."""
+        lengths = [math.prod(shape) for shape in shapes.values()]
+        ends = np.cumsum(lengths).tolist()
+        self.start = {n: e - k for n, e, k in zip(shapes, ends, lengths, strict=True)}
+        self.size = ends[-1]
+        self._views = [
+            (slice(end - length, end), shape)
+            for end, length, shape in zip(ends, lengths, shapes.values(), strict=True)
+        ]
+
+    def views(self, row: Float[np.ndarray, " size"]) -> list[Float[np.ndarray, "..."]]:
+        """The arrays that ``row`` holds, in order; changing one changes the row."""
+        return [row[place].reshape(shape) for place, shape in self._views]
+
+    def pack(self, values: Sequence[Any]) -> Float[np.ndarray, " size"]:
+        """A new row that holds ``values``, arrays and numbers, given in order."""
+        row = np.empty(self.size)
+        for (place, shape), value in zip(self._views, values, strict=True):
+            row[place] = value if len(shape) < 2 else value.ravel()
+        return row
+
+
+SNAPSHOT = Layout(
+    R_world_base=(3, 3),
+    mass_matrix=(18, 18),
+    bias=(18,),
+    p_world_com=(3,),
+    v_world_com=(3,),
+    J_com=(3, 18),
+    drift_com=(3,),
+    p_world_feet=(4, 3),
+    v_world_feet=(4, 3),
+    J_feet=(4, 3, 18),
+    drift_feet=(4, 3),
+    J_contacts=(4, 3, 18),
+    drift_contacts=(4, 3),
+    v_world_contacts=(4, 3),
+)
+"""Of ``robot.snapshot.Snapshot``."""
+
+REFERENCE = Layout(
+    is_com=(),
+    p_world=(3,),
+    v_world=(3,),
+    a_world=(3,),
+    R_world_base=(3, 3),
+    w_world=(3,),
+    dw_world=(3,),
+    legs=(4,),
+    normal_force_min=(4,),
+    normal_force_max=(4,),
+    p_world_feet=(4, 3),
+    v_world_feet=(4, 3),
+    a_world_feet=(4, 3),
+    q_joints=(12,),
+    v_joints=(12,),
+    a_joints=(12,),
+)
+"""Of ``reference.Reference`` and its ``BodyTarget``."""
+
+PROGRAM = Layout(
+    position_kp=(3,),
+    position_kd=(3,),
+    position_weight=(),
+    orientation_kp=(3,),
+    orientation_kd=(3,),
+    orientation_weight=(),
+    swing_kp=(3,),
+    swing_kd=(3,),
+    swing_weight=(),
+    posture_kp=(3,),
+    posture_kd=(3,),
+    posture_weight=(),
+    force_weight=(),
+    weight_of_robot=(),
+    stance_damping=(),
+    friction=(),
+    torque_limits=(12,),
+    q_lower=(12,),
+    q_upper=(12,),
+    speed=(12,),
+    braking=(),
+    horizon=(),
+)
+"""Numbers of the built-in tasks and constraints of the whole-body controller."""
