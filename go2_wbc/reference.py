@@ -107,7 +107,8 @@ class Reference:
     @property
     def row(self) -> Float[np.ndarray, " size"]:
         """Everything that is asked for, one number after the other, for the kernels."""
-        if self._row is None:
+        row = self._row
+        if row is None:
             body = self.body
             values = [
                 body.point is TrackedPoint.COM,
@@ -127,9 +128,9 @@ class Reference:
                 self.v_joints,
                 self.a_joints,
             ]
-            object.__setattr__(self, "_row", REFERENCE.pack(values))
-        assert self._row is not None
-        return self._row
+            row = REFERENCE.pack(values)
+            object.__setattr__(self, "_row", row)
+        return row
 
     def placed(self, anchor: Anchor) -> Reference:
         """This reference, given in the frame of a motion, in the world."""

@@ -38,7 +38,7 @@ FREE, AT_LOWER, AT_UPPER = 0, -1, 1
 
 
 @kernel("b1(f8[:,::1], f8[:,::1])")
-def factorise(H, J):  # noqa: ANN001, ANN201
+def factorise(H, J):
     """J = L^-T of H = L L'; False if H is not positive definite."""
     n = H.shape[0]
     L = np.empty((n, n))
@@ -67,7 +67,7 @@ def factorise(H, J):  # noqa: ANN001, ANN201
 
 
 @kernel("void(f8[:,::1], f8[:,::1], f8[::1], i8)")
-def take_in(J, R, d, q):  # noqa: ANN001, ANN201
+def take_in(J, R, d, q):
     """Add the normal n with d = J'n as column q of R: rotate d so that nothing lies below q."""
     n = len(d)
     for j in range(n - 1, q, -1):
@@ -86,7 +86,7 @@ def take_in(J, R, d, q):  # noqa: ANN001, ANN201
 
 
 @kernel("void(f8[:,::1], f8[:,::1], i8, i8)")
-def drop(J, R, place, q):  # noqa: ANN001, ANN201
+def drop(J, R, place, q):
     """Remove column ``place`` of the q columns of R, and make R upper triangular again."""
     n = J.shape[0]
     for j in range(place, q - 1):
@@ -109,8 +109,129 @@ def drop(J, R, place, q):  # noqa: ANN001, ANN201
             J[k, j + 1] = c * second - s * first
 
 
+@kernel("void(f8[:,::1], f8[::1], f8[::1])")
+def minimise(J, g, x):
+    """x = -H^-1 g = -J J'g, for the upper triangular J of ``factorise``."""
+    n = len(g)
+    x[:] = 0.0
+    for j in range(n):
+        value = 0.0
+        for i in range(j + 1):
+            value += J[i, j] * g[i]
+        for i in range(j + 1):
+            x[i] -= J[i, j] * value
+
+
+@kernel("Tuple((i8, f8, f8))(f8[::1], f8[:,::1], f8[::1], f8[::1], i8[::1])")
+def most_violated(x, C, lower, upper, side):
+    """The free row that is violated most, or -1; 1 for its lower side, else -1; by how much."""
+    found, sign, worst = -1, 1.0, 0.0
+    for i in range(len(side)):
+        if side[i] != FREE:
+            continue
+        value = 0.0
+        for j in range(len(x)):
+            value += C[i, j] * x[j]
+        below, above = lower[i] - value, value - upper[i]
+        excess = max(below, above)
+        bound = lower[i] if below > above else upper[i]
+        if excess > worst and excess > VIOLATION * (1.0 + abs(bound)):
+            found, worst = i, excess
+            sign = 1.0 if below > above else -1.0
+    return found, sign, worst
+
+
+@kernel("Tuple((f8, f8))(f8[:,::1], f8[:,::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
+def directions(J, R, normal, q, d, z, r):
+    """Fill d = J'n, the primal direction z and the dual one r; returns |d outside|^2, |d|^2."""
+    n = len(normal)
+    outside, whole = 0.0, 0.0
+    for j in range(n):
+        value = 0.0
+        for i in range(n):
+            value += J[i, j] * normal[i]
+        d[j] = value
+        whole += value * value
+        if j >= q:
+            outside += value * value
+    for i in range(n):  # the part of J d outside the working set
+        value = 0.0
+        for j in range(q, n):
+            value += J[i, j] * d[j]
+        z[i] = value
+    for i in range(q - 1, -1, -1):  # R r = d
+        value = d[i]
+        for j in range(i + 1, q):
+            value -= R[i, j] * r[j]
+        r[i] = value / R[i, i]
+    return outside, whole
+
+
+@kernel("Tuple((f8, i8))(f8[::1], f8[::1], i8[::1], i8)")
+def partial_step(u, r, rows, q):
+    """The step at which the first multiplier of a bound reaches zero, and its place; inf and -1."""
+    step, leaving = np.inf, -1
+    for i in range(q):
+        if rows[i] >= 0 and r[i] > 0.0 and u[i] < step * r[i]:
+            step, leaving = u[i] / r[i], i
+    return step, leaving
+
+
+@kernel("i8(f8[:,::1], f8[:,::1], f8[::1], f8, f8, i8, i8[::1], i8, i8[::1], f8[::1], f8[::1])")
+def meet(J, R, normal, violation, slack, row, rows, q, side, u, x):
+    """Move x until a row is met, dropping others on the way; returns q, the new working set's size.
+
+    ``row`` is the row's number, negative for an equality; ``normal`` points to where it is met. An
+    equality that the others imply is left out, if it is met within ``slack``. -1: it cannot be met;
+    -2: too many steps.
+    """
+    n = len(x)
+    d, z, r = np.empty(n), np.empty(n), np.empty(n)
+    gained = 0.0  # the row's own multiplier
+    for _ in range(MAX_STEPS):
+        outside, whole = directions(J, R, normal, q, d, z, r)
+        has_direction = outside > DEPENDENT * whole
+        if row < 0 and not has_direction and violation <= slack:
+            return q
+        partial, leaving = partial_step(u, r, rows, q)
+        full = violation / outside if has_direction else np.inf
+        step = min(partial, full)
+        if not step < np.inf:
+            return -1
+        for i in range(q):
+            u[i] -= step * r[i]
+        gained += step
+        if has_direction:
+            for i in range(n):
+                x[i] += step * z[i]
+            violation -= step * outside
+        if full <= partial:
+            take_in(J, R, d, q)
+            rows[q], u[q] = row, gained
+            return q + 1
+        side[rows[leaving]] = FREE
+        drop(J, R, leaving, q)
+        for i in range(leaving, q - 1):
+            rows[i], u[i] = rows[i + 1], u[i + 1]
+        q -= 1
+    return -2
+
+
+@kernel("i8(i8[::1], f8[::1], i8, i8[::1], f8[::1], f8[::1], i8)")
+def finish(rows, u, q, side, x, y, k):
+    """Put the working set's multipliers in their places in y; an equality's sign waits there."""
+    signs = y[:k].copy()
+    y[:] = 0.0
+    for i in range(q):
+        if rows[i] < 0:
+            y[-1 - rows[i]] = signs[-1 - rows[i]] * u[i]
+        else:
+            y[k + rows[i]] = side[rows[i]] * u[i]
+    return SOLVED if np.isfinite(x).all() else UNFINISHED
+
+
 @kernel("i8(f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
-def solve_qp(H, g, E, e, C, lower, upper, x, y):  # noqa: ANN001, ANN201, C901
+def solve_qp(H, g, E, e, C, lower, upper, x, y):
     """Fill the minimiser x (n,) and the multipliers y (k + m,); returns the outcome.
 
     H x + g + (E' C') y = 0; a row of C has y >= 0 at its upper bound and y <= 0 at its lower one.
@@ -123,112 +244,31 @@ def solve_qp(H, g, E, e, C, lower, upper, x, y):  # noqa: ANN001, ANN201, C901
     J, R = np.empty((n, n)), np.zeros((n, n))
     if not factorise(H, J):
         return SINGULAR
-    for i in range(n):  # x = -H^-1 g = -J J' g
-        x[i] = 0.0
-    for j in range(n):
-        value = 0.0
-        for i in range(j + 1):  # J is upper triangular here
-            value += J[i, j] * g[i]
-        for i in range(j + 1):
-            x[i] -= J[i, j] * value
-    side = np.zeros(m, dtype=np.int8)
-    rows = np.empty(n + 1, dtype=np.int64)  # of the working set; equalities first, as -1 - row
-    u = np.zeros(n + 1)
-    r, d, z, normal = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    q, taken = 0, 0
-    steps = 0
-    while True:
-        sign = 1.0
-        if taken < k:
-            row = -1 - taken
-            taken += 1
-            value = e[-1 - row]
-            for i in range(n):
-                value -= E[-1 - row, i] * x[i]
-            sign = 1.0 if value >= 0.0 else -1.0
-            violation = abs(value)
-            for i in range(n):
-                normal[i] = sign * E[-1 - row, i]
-        else:
-            row, violation, worst = -1, 0.0, 0.0
-            for i in range(m):
-                if side[i] != FREE:
-                    continue
-                value = 0.0
-                for j in range(n):
-                    value += C[i, j] * x[j]
-                below, above = lower[i] - value, value - upper[i]
-                excess = max(below, above)
-                bound = abs(lower[i]) if below > above else abs(upper[i])
-                if excess > VIOLATION * (1.0 + bound) and excess > worst:
-                    row, worst, violation = i, excess, excess
-                    sign = 1.0 if below > above else -1.0
-            if row < 0:
-                break
-            for i in range(n):
-                normal[i] = sign * C[row, i]
-        gained = 0.0  # multiplier of the new row
-        while True:
-            steps += 1
-            if steps > MAX_STEPS:
-                return UNFINISHED
-            outside, whole = 0.0, 0.0
-            for j in range(n):  # d = J'n
-                value = 0.0
-                for i in range(n):
-                    value += J[i, j] * normal[i]
-                d[j] = value
-                whole += value * value
-                if j >= q:
-                    outside += value * value
-            for i in range(n):  # primal direction: the part of J d outside the working set
-                value = 0.0
-                for j in range(q, n):
-                    value += J[i, j] * d[j]
-                z[i] = value
-            for i in range(q - 1, -1, -1):  # dual direction: R r = d
-                value = d[i]
-                for j in range(i + 1, q):
-                    value -= R[i, j] * r[j]
-                r[i] = value / R[i, i]
-            partial, leaving = np.inf, -1
-            for i in range(q):
-                if rows[i] >= 0 and r[i] > 0.0 and u[i] < partial * r[i]:
-                    partial, leaving = u[i] / r[i], i
-            has_direction = outside > DEPENDENT * whole
-            if row < 0 and not has_direction and violation <= VIOLATION * (1.0 + abs(e[-1 - row])):
-                break  # an equality that says what others have said
-            full = violation / outside if has_direction else np.inf
-            step = min(partial, full)
-            if not step < np.inf:
-                return INFEASIBLE
-            for i in range(q):
-                u[i] -= step * r[i]
-            gained += step
-            if has_direction:
-                for i in range(n):
-                    x[i] += step * z[i]
-                violation -= step * outside
-            if full <= partial:
-                take_in(J, R, d, q)
-                rows[q], u[q] = row, gained
-                if row < 0:
-                    y[-1 - row] = -sign  # signs of the equalities, until the end
-                else:
-                    side[row] = AT_LOWER if sign > 0.0 else AT_UPPER
-                q += 1
-                break
-            side[rows[leaving]] = FREE
-            drop(J, R, leaving, q)
-            for i in range(leaving, q - 1):
-                rows[i], u[i] = rows[i + 1], u[i + 1]
-            q -= 1
-    for i in range(q):
-        if rows[i] < 0:
-            y[-1 - rows[i]] *= u[i]
-        else:
-            y[k + rows[i]] = side[rows[i]] * u[i]
-    for i in range(n):
-        if not np.isfinite(x[i]):
-            return UNFINISHED
-    return SOLVED
+    minimise(J, g, x)
+    rows, u = np.empty(n, dtype=np.int64), np.empty(n)  # working set: rows and multipliers
+    side = np.zeros(m, dtype=np.int64)
+    normal = np.empty(n)
+    q = 0
+    for i in range(k):
+        value = e[i]
+        for j in range(n):
+            value -= E[i, j] * x[j]
+        sign = 1.0 if value >= 0.0 else -1.0
+        for j in range(n):
+            normal[j] = sign * E[i, j]
+        y[i] = -sign  # until the end
+        slack = VIOLATION * (1.0 + abs(e[i]))
+        q = meet(J, R, normal, abs(value), slack, -1 - i, rows, q, side, u, x)
+        if q < 0:
+            return INFEASIBLE if q == -1 else UNFINISHED
+    for _ in range(MAX_STEPS):
+        row, sign, violation = most_violated(x, C, lower, upper, side)
+        if row < 0:
+            return finish(rows, u, q, side, x, y, k)
+        for j in range(n):
+            normal[j] = sign * C[row, j]
+        q = meet(J, R, normal, violation, 0.0, row, rows, q, side, u, x)
+        if q < 0:
+            return INFEASIBLE if q == -1 else UNFINISHED
+        side[row] = AT_LOWER if sign > 0.0 else AT_UPPER
+    return UNFINISHED

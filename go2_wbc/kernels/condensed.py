@@ -16,11 +16,6 @@ from go2_wbc.kernels.layout import PROGRAM, REFERENCE, SNAPSHOT
 
 STANCE, SWING, JOINTS = 0, 1, 2
 """The values of ``reference.LegTask``."""
-SINGULAR_DETERMINANT = 2e-4
-"""|det J_l| [m^3] below which a leg counts as singular; 1.5e-2 in standing (own measurement).
-
-For a point foot it is thigh * calf * |sin(knee)| * depth of the foot below the hip's axis.
-"""
 LARGEST_ERROR = 3.0
 """Orientation error [rad] beyond which this logarithm of a rotation is not accurate."""
 UNSUITED = 10
@@ -37,12 +32,8 @@ _P_FEET, _V_FEET, _J_FEET, _DRIFT_FEET = (
 _J_CONTACTS, _DRIFT_CONTACTS, _V_CONTACTS = (
     _S[n] for n in ("J_contacts", "drift_contacts", "v_world_contacts")
 )
-_IS_COM, _BODY_P, _BODY_V, _BODY_A = (
-    _T[n] for n in ("is_com", "p_world", "v_world", "a_world")
-)
-_BODY_R, _BODY_W, _BODY_DW, _LEGS = (
-    _T[n] for n in ("R_world_base", "w_world", "dw_world", "legs")
-)
+_IS_COM, _BODY_P, _BODY_V, _BODY_A = (_T[n] for n in ("is_com", "p_world", "v_world", "a_world"))
+_BODY_R, _BODY_W, _BODY_DW, _LEGS = (_T[n] for n in ("R_world_base", "w_world", "dw_world", "legs"))
 _F_MIN, _F_MAX = _T["normal_force_min"], _T["normal_force_max"]
 _FOOT_P, _FOOT_V, _FOOT_A = (_T[n] for n in ("p_world_feet", "v_world_feet", "a_world_feet"))
 _JOINT_Q, _JOINT_V, _JOINT_A = (_T[n] for n in ("q_joints", "v_joints", "a_joints"))
@@ -52,7 +43,7 @@ _POSITION, _ORIENTATION, _SWING, _POSTURE = (
 _FORCE_WEIGHT, _WEIGHT_OF_ROBOT = _P["force_weight"], _P["weight_of_robot"]
 _DAMPING, _FRICTION, _TORQUE = _P["stance_damping"], _P["friction"], _P["torque_limits"]
 _Q_LOWER, _Q_UPPER, _SPEED = _P["q_lower"], _P["q_upper"], _P["speed"]
-_BRAKING, _HORIZON = _P["braking"], _P["horizon"]
+_BRAKING, _HORIZON, _SINGULAR = _P["braking"], _P["horizon"], _P["singular_determinant"]
 
 
 @kernel("b1(f8[::1], f8[::1], f8[::1], i8, f8[:,::1])")
@@ -66,8 +57,10 @@ def stance_leg(snapshot, target, program, leg, legs_map):
             a, b = (k + 1) % 3, (k + 2) % 3
             d, e = c + (i + 1) % 3, c + (i + 2) % 3
             inverse[i, k] = J[a, d] * J[b, e] - J[a, e] * J[b, d]
-    determinant = J[0, c] * inverse[0, 0] + J[0, c + 1] * inverse[1, 0] + J[0, c + 2] * inverse[2, 0]
-    if not abs(determinant) >= SINGULAR_DETERMINANT:  # a nan counts as singular
+    determinant = (
+        J[0, c] * inverse[0, 0] + J[0, c + 1] * inverse[1, 0] + J[0, c + 2] * inverse[2, 0]
+    )
+    if not abs(determinant) >= program[_SINGULAR]:  # a nan counts as singular
         return False
     for i in range(3):
         for k in range(7):
@@ -173,7 +166,7 @@ def add_goal(H, g, row, b, weight):
 
 @kernel("void(f8[::1], f8[:,::1], i8, f8[::1])")
 def times_affine(J, affine, leg, row):
-    """row = J affine[:18], for a row J of 18 that is zero but for the base's and one leg's columns."""
+    """row = J affine[:18], for a J (18,) of which only the base's and one leg's columns count."""
     row[:] = 0.0
     for n in range(9):
         k = n if n < 6 else 3 * leg + n
@@ -344,14 +337,13 @@ def torques(snapshot, affine, z, tau):
         tau[n] = value
 
 
-@kernel(
-    "i8(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])"
-)
-def solve_condensed(q, v, snapshot, target, program, A_extra, b_extra, w_extra, z, tau):
+@kernel("i8(f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def solve_condensed(snapshot, target, program, A_extra, b_extra, w_extra, z, tau):
     """Fill the decision z (30,) and the torques (12,); returns the outcome.
 
     ``A_extra`` (k, 30), ``b_extra`` (k,) and ``w_extra`` (k,) are rows of a user's own tasks.
     """
+    q, v = snapshot[:19], snapshot[19:37]
     affine = np.empty((30, 13))
     if not eliminate(snapshot, target, program, affine):
         return UNSUITED

@@ -51,7 +51,9 @@ def derive_com(R, M, h, v, constants, row):
     row[_DRIFT_COM + 2] -= gravity
 
 
-@kernel("void(i8, f8[::1], f8[::1,:], f8[::1,:], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+@kernel(
+    "void(i8, f8[::1], f8[::1,:], f8[::1,:], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])"
+)
 def derive_foot(leg, v, J_pin, R, p_calf, v_calf, a_calf, p_calf_foot, constants, row):
     """Fill one foot's place, velocity, Jacobians and drifts, of its centre and its contact."""
     gravity, radius = constants[1], constants[2]
@@ -97,13 +99,17 @@ def derive_foot(leg, v, J_pin, R, p_calf, v_calf, a_calf, p_calf_foot, constants
 
 
 @kernel(
-    "void(f8[::1], f8[::1], f8[::1,:], f8[::1], f8[::1,:], UniTuple(f8[::1,:],4), "
+    "void(f8[::1,:], f8[::1], f8[::1,:], UniTuple(f8[::1,:],4), "
     "UniTuple(f8[::1],4), UniTuple(f8[::1],4), UniTuple(f8[::1],4), f8[:,::1], f8[::1], f8[::1])"
 )
 def derive(
-    q, v, M_pin, h_pin, J_pin, R_calves, p_calves, v_calves, a_calves, p_calf_feet, constants, row
+    M_pin, h_pin, J_pin, R_calves, p_calves, v_calves, a_calves, p_calf_feet, constants, row
 ):
-    """Fill the row of a snapshot. ``constants``: mass [kg], gravity [m/s^2], foot radius [m]."""
+    """Fill the row of a snapshot, which begins with q and v.
+
+    ``constants``: mass [kg], gravity [m/s^2], foot radius [m].
+    """
+    q, v = row[:19], row[19:37]
     R = row[_R : _R + 9].reshape(3, 3)
     rotation_of(q[3], q[4], q[5], q[6], R)
     M, h = row[_M : _M + 324].reshape(18, 18), row[_H : _H + 18]

@@ -42,6 +42,8 @@ class Layout:
 
 
 SNAPSHOT = Layout(
+    q=(19,),
+    v=(18,),
     R_world_base=(3, 3),
     mass_matrix=(18, 18),
     bias=(18,),
@@ -57,7 +59,7 @@ SNAPSHOT = Layout(
     drift_contacts=(4, 3),
     v_world_contacts=(4, 3),
 )
-"""Of ``robot.snapshot.Snapshot``."""
+"""Of ``robot.snapshot.Snapshot``, the state's q and v first."""
 
 REFERENCE = Layout(
     is_com=(),
@@ -102,5 +104,6 @@ PROGRAM = Layout(
     speed=(12,),
     braking=(),
     horizon=(),
+    singular_determinant=(),
 )
 """Numbers of the built-in tasks and constraints of the whole-body controller."""

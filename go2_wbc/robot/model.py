@@ -92,7 +92,7 @@ class RobotModel:
         self.p_base_feet_nominal[:, 1] += self.hip_width * np.array([leg.side for leg in LEGS])
 
     def _bind_views(self) -> None:
-        """What the kernel reads in Pinocchio's data, as arrays bound once; the next call changes them."""
+        """Bind what the kernel reads in Pinocchio's data: views, which its next call changes."""
         data = self._data
         frames = [self.pin_model.frames[frame] for frame in self._foot_frames]
         calves = [frame.parentJoint for frame in frames]
@@ -112,11 +112,12 @@ class RobotModel:
         """Every dynamic quantity of ``state``, computed once."""
         from go2_wbc.kernels.derivation import derive  # compiled; only who needs it waits for it
 
-        q, v = np.ascontiguousarray(state.q), np.ascontiguousarray(state.v)
-        pin.crba(self.pin_model, self._data, q, pin.Convention.WORLD)  # M, J and the poses
-        pin.nonLinearEffects(self.pin_model, self._data, q, v)  # h, velocities, accelerations
+        model, data = self.pin_model, self._data
+        pin.crba(model, data, state.q, pin.Convention.WORLD)  # M, J and the poses
+        pin.nonLinearEffects(model, data, state.q, state.v)  # h, velocities and accelerations
         row = np.empty(SNAPSHOT.size)
-        derive(q, v, *self._views, row)
+        row[:19], row[19:37] = state.q, state.v
+        derive(*self._views, row)
         return Snapshot.of_row(state, row)
 
     def readable_snapshot(self, state: RobotState) -> Snapshot:

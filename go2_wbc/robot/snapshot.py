@@ -55,18 +55,19 @@ class Snapshot:
     @staticmethod
     def of_row(state: RobotState, row: Float[np.ndarray, " size"]) -> Snapshot:
         """The snapshot whose arrays ``row`` holds (see ``kernels.layout.SNAPSHOT``)."""
-        snapshot = Snapshot(state, *SNAPSHOT.views(row))
+        snapshot = Snapshot(state, *SNAPSHOT.views(row)[2:])
         object.__setattr__(snapshot, "_row", row)
         return snapshot
 
     @property
     def row(self) -> Float[np.ndarray, " size"]:
-        """Every array after ``state``, one after the other, for the kernels."""
-        if self._row is None:
-            arrays = [getattr(self, name) for name in SNAPSHOT.start]
-            object.__setattr__(self, "_row", SNAPSHOT.pack(arrays))
-        assert self._row is not None
-        return self._row
+        """The state's q and v and every array, one after the other, for the kernels."""
+        row = self._row
+        if row is None:
+            arrays = [getattr(self, name) for name in list(SNAPSHOT.start)[2:]]
+            row = SNAPSHOT.pack([self.state.q, self.state.v, *arrays])
+            object.__setattr__(self, "_row", row)
+        return row
 
     @staticmethod
     def build(

@@ -114,28 +114,43 @@ class WholeBodyController:
             ),
         )
 
+    @property
+    def is_compiled(self) -> bool:
+        """Whether ticks are solved by the compiled kernel: condensed, and by ``active_set``."""
+        return self._program is not None
+
     def solve(self, snapshot: Snapshot, reference: Reference) -> WbcSolution:
         """Solve one tick.
 
         Raises:
             QpInfeasible: if no torque meets the constraints; carries the residual table.
         """
+        solution = self.solve_compiled(snapshot, reference)
+        if solution is not None:
+            return solution
         start = time.perf_counter()  # thread_time costs a tenth of a tick on some machines
-        found = self._program.solve(snapshot, reference) if self._program else None
-        if found is not None:
-            z, tau = found
-            return WbcSolution(
-                tau,
-                z[ACCELERATION],
-                z[FORCES].reshape(4, 3),
-                time.perf_counter() - start,
-                self.backend_name,
-                partial(self.formulate, snapshot, reference),
-                z,
-            )
         problem = self.formulate(snapshot, reference)
         z = self._backend.solve(problem)
         return WbcSolution.from_decision(z, problem, time.perf_counter() - start, self.backend_name)
+
+    def solve_compiled(self, snapshot: Snapshot, reference: Reference) -> WbcSolution | None:
+        """Solve one tick by the kernel; None if it is not used here or finds no solution."""
+        if self._program is None:
+            return None
+        start = time.perf_counter()
+        found = self._program.solve(snapshot, reference)
+        if found is None:
+            return None
+        z, tau = found
+        return WbcSolution(
+            tau=tau,
+            qdd=z[ACCELERATION],
+            forces=z[FORCES].reshape(4, 3),
+            solve_time=time.perf_counter() - start,
+            backend=self.backend_name,
+            _formulate=partial(self.formulate, snapshot, reference),
+            _z=z,
+        )
 
 
 def _tasks(model: RobotModel, config: WbcConfig) -> tuple[Task, ...]:

@@ -7,6 +7,7 @@ each. A task of a user's own keeps its ``rows`` and is condensed along.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -14,9 +15,9 @@ from jaxtyping import Float
 from go2_wbc.kernels.layout import PROGRAM
 from go2_wbc.reference import Reference
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.wbc.backends import SINGULAR_DETERMINANT
 from go2_wbc.wbc.constraints import (
     Equality,
-    FloatingBaseDynamics,
     FrictionPyramid,
     Inequality,
     JointLimits,
@@ -33,34 +34,21 @@ from go2_wbc.wbc.tasks import (
     Task,
 )
 
-TASKS = (BodyPosition, BodyOrientation, SwingFoot, LegPosture, ForceRegularisation)
-CONSTRAINTS = (
-    FloatingBaseDynamics,
-    StanceFeetStill,
-    FrictionPyramid,
-    TorqueLimits,
-    JointLimits,
-)
+BUILT_IN_TASKS = 5
+"""How many of the controller's tasks the kernel knows; a user's own come after them."""
+
+T = TypeVar("T")
 
 
 class Program:
     """What ``WholeBodyController`` formulates, in the form of ``kernels.condensed``."""
 
-    def __init__(
-        self, tasks: Sequence[Task], constraints: Sequence[Equality | Inequality]
-    ) -> None:
+    def __init__(self, tasks: Sequence[Task], constraints: Sequence[Equality | Inequality]) -> None:
         """Read the numbers of the built-in tasks, which come first, and of the constraints."""
-        position, orientation, swing, posture, force = tasks[: len(TASKS)]
-        _, still, friction, torque, joints = constraints
-        assert isinstance(position, BodyPosition)
-        assert isinstance(orientation, BodyOrientation)
-        assert isinstance(swing, SwingFoot)
-        assert isinstance(posture, LegPosture)
-        assert isinstance(force, ForceRegularisation)
-        assert isinstance(still, StanceFeetStill)
-        assert isinstance(friction, FrictionPyramid)
-        assert isinstance(torque, TorqueLimits)
-        assert isinstance(joints, JointLimits)
+        position, orientation = _first(BodyPosition, tasks), _first(BodyOrientation, tasks)
+        swing, posture = _first(SwingFoot, tasks), _first(LegPosture, tasks)
+        force, still = _first(ForceRegularisation, tasks), _first(StanceFeetStill, constraints)
+        torque, joints = _first(TorqueLimits, constraints), _first(JointLimits, constraints)
         gains = [
             part
             for task in (position, orientation, swing, posture)
@@ -72,22 +60,17 @@ class Program:
                 force.weight,
                 force.weight_of_robot,
                 still.damping,
-                friction.friction,
+                _first(FrictionPyramid, constraints).friction,
                 torque.limits,
                 joints.q_lower,
                 joints.q_upper,
                 joints.speed,
                 joints.braking,
                 joints.horizon,
+                SINGULAR_DETERMINANT,
             ]
         )
-        self._extra_tasks = tasks[len(TASKS) :]
-
-    @staticmethod
-    def covers(tasks: Sequence[Task], constraints: Sequence[Equality | Inequality]) -> bool:
-        """Whether the kernel knows every constraint, and the first tasks, by their kinds."""
-        kinds = tuple(type(task) for task in tasks[: len(TASKS)])
-        return kinds == TASKS and tuple(type(item) for item in constraints) == CONSTRAINTS
+        self._extra_tasks = tasks[BUILT_IN_TASKS:]
 
     def solve(
         self, snapshot: Snapshot, reference: Reference
@@ -97,12 +80,8 @@ class Program:
         from go2_wbc.kernels.condensed import solve_condensed
 
         A, b, weights = self._extra_rows(snapshot, reference)
-        state = snapshot.state
-        q, v = np.ascontiguousarray(state.q), np.ascontiguousarray(state.v)
         z, tau = np.empty(SIZE), np.empty(12)
-        outcome = solve_condensed(
-            q, v, snapshot.row, reference.row, self._numbers, A, b, weights, z, tau
-        )
+        outcome = solve_condensed(snapshot.row, reference.row, self._numbers, A, b, weights, z, tau)
         return (z, tau) if outcome == SOLVED else None
 
     def _extra_rows(
@@ -118,3 +97,7 @@ class Program:
 
 
 _NO_ROWS = (np.empty((0, SIZE)), np.empty(0), np.empty(0))
+
+
+def _first(kind: type[T], items: Sequence[object]) -> T:
+    return next(item for item in items if isinstance(item, kind))

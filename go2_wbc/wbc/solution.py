@@ -31,7 +31,7 @@ class WbcSolution:
     forces: Float[np.ndarray, "4 3"]
     solve_time: float
     backend: str
-    _problem: Callable[[], Problem]
+    _formulate: Callable[[], Problem]
     _z: Float[np.ndarray, "30"]
 
     @staticmethod
@@ -51,7 +51,7 @@ class WbcSolution:
     @property
     def residuals(self) -> tuple[ResidualRow, ...]:
         """Error of every task and violation of every constraint, in its own unit."""
-        return self._problem().residuals(self._z)
+        return self._formulate().residuals(self._z)
 
     @property
     def command(self) -> JointCommand:

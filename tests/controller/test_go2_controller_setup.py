@@ -68,7 +68,9 @@ def test_a_missing_urdf_or_mjcf_is_named(tmp_path: Path) -> None:
 
 def test_an_unknown_solver_is_refused_with_the_valid_ones() -> None:
     config = Config(wbc=replace(WbcConfig(), solver="gurobi9000"))
-    with pytest.raises(SolverUnavailable, match="unknown QP solver 'gurobi9000'; valid: daqp, "):
+    with pytest.raises(
+        SolverUnavailable, match="unknown QP solver 'gurobi9000'; valid: active_set, daqp, "
+    ):
         GO2Controller(config=config)
 
 
@@ -77,7 +79,9 @@ def test_a_solver_that_is_not_installed_is_refused_with_the_line_that_installs_i
 ) -> None:
     monkeypatch.setattr(qpsolvers, "available_solvers", ["daqp"])
     config = Config(wbc=replace(WbcConfig(), solver="proxqp"))
-    with pytest.raises(SolverUnavailable, match="pip install proxsuite; installed: daqp"):
+    with pytest.raises(
+        SolverUnavailable, match="pip install proxsuite; installed: active_set, daqp"
+    ):
         GO2Controller(config=config)
 
 

@@ -291,7 +291,7 @@ def test_an_unknown_back_end_is_answered_with_the_valid_names(model: RobotModel)
 def test_an_unknown_solver_is_refused_before_the_first_tick(
     backend: str, model: RobotModel
 ) -> None:
-    with pytest.raises(SolverUnavailable, match="valid: daqp, proxqp, quadprog"):
+    with pytest.raises(SolverUnavailable, match="valid: active_set, daqp, proxqp, quadprog"):
         WholeBodyController(model, backend, WbcConfig(solver="cplex"))
 
 

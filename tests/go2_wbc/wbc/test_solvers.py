@@ -148,7 +148,9 @@ def test_every_valid_solver_is_installed(solver: str) -> None:
 
 
 def test_an_unknown_solver_is_answered_with_the_valid_names() -> None:
-    with pytest.raises(SolverUnavailable, match=r"QP solver 'gurobi'; valid: daqp, proxqp, quad"):
+    with pytest.raises(
+        SolverUnavailable, match=r"QP solver 'gurobi'; valid: active_set, daqp, proxqp, quad"
+    ):
         check_solver("gurobi")
 
 

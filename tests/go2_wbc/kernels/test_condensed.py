@@ -1,0 +1,193 @@
+"""The compiled QP is held to the readable one: same torques, refused where that is refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from go2_wbc.errors import QpInfeasible
+from go2_wbc.legs import Leg
+from go2_wbc.reference import LegTask, Reference
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import rotation_from_rpy
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.wbc.backends import SINGULAR_DETERMINANT
+from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.problem import SIZE, Rows
+from go2_wbc.wbc.solution import WbcSolution
+from go2_wbc.wbc.tasks import Gains, Task
+from tests.engine_helpers import cases, holding_reference, random_state, standing_q, state_of
+
+AGREEMENT = 1e-6  # [N m] between two solvers; measured 2.3e-8
+COUNT = 1040  # 80 of every contact mode
+SATURATING = {"speed_share": 0.15, "torque_share": 0.4}  # bounds bind in most of the random states
+ODD_NUMBERS = WbcConfig(
+    body_position=Gains((31.0, 32.0, 33.0), (11.0, 12.0, 13.0)),
+    body_orientation=Gains((101.0, 102.0, 103.0), (14.0, 15.0, 16.0)),
+    swing_foot=Gains((201.0, 202.0, 203.0), (21.0, 22.0, 23.0)),
+    leg_posture=Gains((301.0, 302.0, 303.0), (31.0, 32.0, 33.0)),
+    position_weight=1.7,
+    orientation_weight=3.1,
+    swing_weight=0.7,
+    posture_weight=1.3,
+    force_weight=2e-4,
+    friction=0.37,
+    stance_damping=13.0,
+    braking=170.0,
+    limit_horizon=0.03,
+    joint_margin=0.01,
+)
+"""No two numbers alike, so that one in another's place is seen."""
+
+
+def solve_or_none(
+    wbc: WholeBodyController, snapshot: Snapshot, reference: Reference
+) -> WbcSolution | None:
+    try:
+        return wbc.solve(snapshot, reference)
+    except QpInfeasible:
+        return None
+
+
+@pytest.mark.parametrize(
+    "config",
+    [WbcConfig(), WbcConfig(**SATURATING), ODD_NUMBERS],
+    ids=["default", "saturating", "odd numbers"],
+)
+def test_torques_are_those_of_the_full_problem(config: WbcConfig) -> None:
+    model = RobotModel()
+    compiled = WholeBodyController(model, "condensed", config)
+    readable = WholeBodyController(model, "full", replace(config, solver="daqp"))
+    refused = 0
+    for snapshot, reference in cases(model, COUNT, seed=21):
+        ours = compiled.solve_compiled(snapshot, reference)
+        theirs = solve_or_none(readable, snapshot, reference)
+        assert (ours is None) == (theirs is None)
+        if ours is None or theirs is None:
+            refused += 1
+            continue
+        np.testing.assert_allclose(ours.tau, theirs.tau, atol=AGREEMENT, rtol=0)
+        np.testing.assert_allclose(ours.forces, theirs.forces, atol=1e-4, rtol=0)
+        np.testing.assert_allclose(ours.qdd, theirs.qdd, atol=1e-4, rtol=0)
+    assert refused < COUNT / 4
+
+
+@dataclass(frozen=True, slots=True)
+class SpreadFeet(Task):
+    """Pull the forces of the front feet apart: rows in every column of z."""
+
+    weight: float = 0.3
+    name: str = "spread"
+    unit: str = "N"
+
+    def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
+        A = np.random.default_rng(1).normal(size=(4, SIZE))
+        return Rows(A, np.array([1.0, -2.0, 3.0, 4.0]))
+
+
+def test_tasks_of_a_users_own_are_condensed_along() -> None:
+    model = RobotModel()
+    compiled, readable = (
+        WholeBodyController(model, name, WbcConfig(solver=solver), extra_tasks=[SpreadFeet()] * 2)
+        for name, solver in (("condensed", "active_set"), ("full", "daqp"))
+    )
+    for snapshot, reference in cases(model, 52, seed=22):
+        ours, theirs = compiled.solve(snapshot, reference), readable.solve(snapshot, reference)
+        np.testing.assert_allclose(ours.tau, theirs.tau, atol=AGREEMENT, rtol=0)
+        assert [row.name for row in ours.residuals] == [row.name for row in theirs.residuals]
+
+
+def test_residuals_are_those_of_the_readable_problem() -> None:
+    model = RobotModel()
+    wbc = WholeBodyController(model)
+    for snapshot, reference in cases(model, 26, seed=23):
+        solution = wbc.solve(snapshot, reference)
+        z = np.concatenate([solution.qdd, solution.forces.ravel()])
+        assert solution.residuals == wbc.formulate(snapshot, reference).residuals(z)
+
+
+@pytest.mark.parametrize("angle", [2.9, 3.05, np.pi])
+def test_a_trunk_turned_over_is_solved_as_by_the_readable_form(angle: float) -> None:
+    """The logarithm of a rotation near pi is left to Pinocchio's."""
+    model = RobotModel()
+    snapshot = model.snapshot(state_of(standing_q()))
+    reference = holding_reference(snapshot)
+    body = replace(reference.body, R_world_base=rotation_from_rpy(0.0, 0.0, angle))
+    reference = replace(reference, body=body)
+    ours = WholeBodyController(model).solve(snapshot, reference)
+    theirs = WholeBodyController(model, "full", WbcConfig(solver="daqp")).solve(snapshot, reference)
+    np.testing.assert_allclose(ours.tau, theirs.tau, atol=AGREEMENT, rtol=0)
+
+
+def test_a_singular_leg_is_solved_in_full() -> None:
+    model = RobotModel()
+    snapshots = [straight_leg(model, calf) for calf in np.linspace(-0.4, 0.4, 201)]
+    snapshot = min(snapshots, key=determinant)
+    assert determinant(snapshot) < SINGULAR_DETERMINANT
+    wbc, full = WholeBodyController(model), WholeBodyController(model, "full")
+    reference = holding_reference(snapshot)
+    assert wbc.solve_compiled(snapshot, reference) is None
+    ours, theirs = (solve_or_none(way, snapshot, reference) for way in (wbc, full))
+    assert (ours is None) == (theirs is None)
+
+
+def straight_leg(model: RobotModel, calf: float) -> Snapshot:
+    q = standing_q()
+    q[7:][Leg.FL.joints] = [0.0, 0.3, calf]
+    return model.snapshot(state_of(q))
+
+
+def determinant(snapshot: Snapshot) -> float:
+    return abs(float(np.linalg.det(snapshot.J_contacts[Leg.FL][:, Leg.FL.velocities])))
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["normal_force_min", "normal_force_max", "p_world_feet", "a_world_feet", "q_joints"],
+)
+def test_a_nan_in_any_array_of_the_reference_is_refused(name: str) -> None:
+    model = RobotModel()
+    snapshot, reference = list(cases(model, 13, seed=24))[11]
+    assert set(reference.legs) == {LegTask.STANCE, LegTask.SWING, LegTask.JOINTS}
+    values = getattr(reference, name).copy()
+    values[:] = np.nan
+    reference = replace(reference, **{name: values})
+    wbc = WholeBodyController(model)
+    assert wbc.solve_compiled(snapshot, reference) is None
+    with pytest.raises(QpInfeasible):
+        wbc.solve(snapshot, reference)
+
+
+@pytest.mark.parametrize("name", ["p_world", "v_world", "a_world", "w_world", "dw_world"])
+def test_a_nan_in_the_body_target_is_refused(name: str) -> None:
+    model = RobotModel()
+    snapshot = model.snapshot(random_state(np.random.default_rng(3)))
+    reference = holding_reference(snapshot)
+    body = replace(reference.body, **{name: np.full(3, np.nan)})
+    with pytest.raises(QpInfeasible):
+        WholeBodyController(model).solve(snapshot, replace(reference, body=body))
+
+
+def test_bounds_that_contradict_each_other_are_refused_by_both_ways() -> None:
+    """An active-set method sees one side of a row, so the sides are compared before."""
+    model = RobotModel()
+    snapshot = model.snapshot(state_of(standing_q()))
+    reference = replace(
+        holding_reference(snapshot),
+        normal_force_min=np.full(4, 60.0),
+        normal_force_max=np.full(4, 50.0),
+    )
+    wbc = WholeBodyController(model)
+    assert wbc.solve_compiled(snapshot, reference) is None
+    with pytest.raises(QpInfeasible):
+        wbc.solve(snapshot, reference)
+
+
+@pytest.mark.parametrize("solver", ["daqp", "proxqp", "quadprog"])
+def test_a_named_solver_is_the_one_that_solves(solver: str) -> None:
+    wbc = WholeBodyController(RobotModel(), config=WbcConfig(solver=solver))
+    assert not wbc.is_compiled
+    assert WholeBodyController(RobotModel()).is_compiled
