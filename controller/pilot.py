@@ -26,7 +26,7 @@ from go2_wbc.contacts import Gait, find_gait
 from go2_wbc.errors import ModeError, StanceMismatch
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.locomotion import LocomotionPlanner
+from go2_wbc.planning.compiled import CompiledPlanner
 from go2_wbc.reference import MotionPlan, Posture, TrackedPoint
 from motions.compiler import CompiledPlan
 from motions.postures import lie_down, rise, sit_down
@@ -226,7 +226,7 @@ class Pilot:
 
     def _start_walking(self, gait: str | Gait) -> Walking:
         self._gait = find_gait(gait)
-        walking = Walking(LocomotionPlanner(self._model, self._gait, self._config.locomotion))
+        walking = Walking(CompiledPlanner(self._model, self._gait, self._config.locomotion))
         self._procedures.engage(walking)
         self._walking = walking
         return walking

@@ -38,6 +38,9 @@ class LegTask(IntEnum):
     JOINTS = 2
 
 
+_LEG_TASKS = tuple(LegTask)
+
+
 class TrackedPoint(Enum):
     """Which point of the trunk ``BodyTarget.p_world`` speaks of."""
 
@@ -103,6 +106,16 @@ class Reference:
         """Find the feet in stance."""
         stance = np.array([task is LegTask.STANCE for task in self.legs])
         object.__setattr__(self, "stance", stance)
+
+    @staticmethod
+    def of_row(row: Float[np.ndarray, " size"]) -> Reference:
+        """The reference whose numbers ``row`` holds (see ``kernels.layout.REFERENCE``)."""
+        is_com, p, v, a, R, w, dw, legs, *rest = REFERENCE.views(row)
+        point = TrackedPoint.COM if is_com else TrackedPoint.BASE
+        body = BodyTarget(point, p, v, a, R, w, dw)
+        reference = Reference(body, tuple(_LEG_TASKS[int(task)] for task in legs.tolist()), *rest)
+        object.__setattr__(reference, "_row", row)
+        return reference
 
     @property
     def row(self) -> Float[np.ndarray, " size"]:

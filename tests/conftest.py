@@ -25,6 +25,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.active_set",  # compiled: a kernel cannot be wrapped
         "go2_wbc.kernels.condensed",
         "go2_wbc.kernels.derivation",
+        "go2_wbc.kernels.locomotion",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",
         "go2_wbc.robot.rotations",

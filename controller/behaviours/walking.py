@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from controller.behaviours.base import Behaviour
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.locomotion import LocomotionPlanner
+from go2_wbc.planning.locomotion import GaitPlanner
 from go2_wbc.reference import Reference
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -14,7 +14,7 @@ class Walking(Behaviour):
 
     label = "walk"
 
-    def __init__(self, planner: LocomotionPlanner) -> None:
+    def __init__(self, planner: GaitPlanner) -> None:
         """Walk with ``planner``."""
         self._planner = planner
         self.command: VelocityCommand = ZERO_COMMAND

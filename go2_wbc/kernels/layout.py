@@ -107,3 +107,46 @@ PROGRAM = Layout(
     singular_determinant=(),
 )
 """Numbers of the built-in tasks and constraints of the whole-body controller."""
+
+PLANNER = Layout(
+    yaw=(),
+    position=(2,),
+    velocity=(3,),
+    is_stepping=(),
+    phase_time=(),
+    time=(),
+    ground=(),
+    height_offset=(),
+    liftoff=(4, 3),
+    was_stance=(4,),
+)
+"""State of the locomotion planner from tick to tick."""
+
+LOCOMOTION = Layout(
+    period=(),
+    duty=(),
+    offsets=(4,),
+    height=(),
+    acceleration=(3,),
+    velocity_feedback=(),
+    position_leash=(),
+    yaw_leash=(),
+    foothold_reach=(),
+    normal_force_min=(),
+    normal_force_max=(),
+    load_ramp=(),
+    settle_speed=(),
+    settled_command=(),
+    capture_margin=(),
+    square_tolerance=(),
+    apex=(),
+    touchdown_depth=(),
+    ground_share=(),
+    correction_rate=(),
+    correction_window=(),
+    correction_limit=(),
+    gravity=(),
+    foot_radius=(),
+    p_base_feet_nominal=(4, 3),
+)
+"""Numbers of the locomotion planner: gait, configuration, robot."""

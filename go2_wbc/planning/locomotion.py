@@ -16,6 +16,7 @@ frame (z up, x along the reference's yaw).
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields
 
 import numpy as np
@@ -100,8 +101,34 @@ class LocomotionConfig:
             )
 
 
-class LocomotionPlanner:
+class GaitPlanner(ABC):
     """Turns a velocity command into references, one tick after the other."""
+
+    @abstractmethod
+    def start(self, snapshot: Snapshot) -> None:
+        """Begin from the measured state, standing."""
+
+    @property
+    @abstractmethod
+    def is_stepping(self) -> bool:
+        """Whether the gait is running; not before ``start``."""
+
+    @property
+    @abstractmethod
+    def heading(self) -> float:
+        """Yaw [rad] of the reference; 0 before ``start``."""
+
+    @abstractmethod
+    def square_up(self, snapshot: Snapshot) -> bool:
+        """Start stepping unless every foot is below its hip; returns whether they all are."""
+
+    @abstractmethod
+    def update(self, snapshot: Snapshot, command: VelocityCommand) -> Reference:
+        """The reference of this tick for the wanted ``command`` (already inside the envelope)."""
+
+
+class LocomotionPlanner(GaitPlanner):
+    """The planner in its readable form, to which ``compiled.CompiledPlanner`` is held."""
 
     def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
         """Prepare a planner; ``start`` sets it on its way."""

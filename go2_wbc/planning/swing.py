@@ -15,6 +15,10 @@ from jaxtyping import Float
 from go2_wbc.curves import Ease
 from go2_wbc.validation import require_not_negative, require_positive
 
+TIE = 1e-9
+"""Progress this near to the middle counts as the middle, where the acceleration changes its sign:
+a gait passes through it in whole ticks, and rounding must not decide."""
+
 
 @dataclass(frozen=True, slots=True)
 class SwingConfig:
@@ -61,7 +65,7 @@ def swing_foot(
     v[:2] = ds / duration * delta
     a[:2] = dds / duration**2 * delta
     apex = max(start[2], goal[2]) + config.apex
-    is_rising = progress < 0.5
+    is_rising = progress < 0.5 - TIE
     begin, end = (start[2], apex) if is_rising else (apex, goal[2] - config.touchdown_depth)
     s, ds, dds = Ease.CUBIC.progress(2.0 * progress - (0.0 if is_rising else 1.0))
     p[2] = begin + s * (end - begin)

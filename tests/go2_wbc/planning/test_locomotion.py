@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
+from go2_wbc.planning.compiled import CompiledPlanner
+from go2_wbc.planning.locomotion import GaitPlanner, LocomotionConfig, LocomotionPlanner
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
@@ -23,6 +25,19 @@ TICK = 0.002
 EXACT = 1e-9  # rounding in sums of a few hundred ticks
 SWING_END = TROT.swing_time - TICK
 LAST_TICK = 5e-4  # [m] the swing curve's way in the last tick, with margin
+KINDS = [LocomotionPlanner, CompiledPlanner]
+
+
+@pytest.fixture(params=KINDS, ids=lambda kind: kind.__name__, autouse=True)
+def planner_kind(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Every test holds for the readable planner and for the compiled one."""
+    global make_planner
+    make_planner = request.param
+    yield
+    make_planner = LocomotionPlanner
+
+
+make_planner: type[LocomotionPlanner] | type[CompiledPlanner] = LocomotionPlanner
 
 
 def resting(time: float = 0.0, yaw: float = 0.0) -> Snapshot:
@@ -44,14 +59,14 @@ def moving(snapshot: Snapshot, v_world: np.ndarray) -> Snapshot:
     return replace(snapshot, v_world_com=v_world)
 
 
-def started(snapshot: Snapshot, gait: Gait = TROT) -> LocomotionPlanner:
-    planner = LocomotionPlanner(MODEL, gait, CONFIG)
+def started(snapshot: Snapshot, gait: Gait = TROT) -> GaitPlanner:
+    planner = make_planner(MODEL, gait, CONFIG)
     planner.start(snapshot)
     return planner
 
 
 def hold(
-    planner: LocomotionPlanner, snapshot: Snapshot, command: VelocityCommand, seconds: float
+    planner: GaitPlanner, snapshot: Snapshot, command: VelocityCommand, seconds: float
 ) -> Reference:
     """The last reference of a robot that stays where it is whatever it is asked."""
     start = snapshot.state.time
@@ -89,7 +104,7 @@ class IdealRobot:
 
 def test_before_it_has_started_it_is_not_stepping_and_has_no_heading() -> None:
     # It had no attribute to tell it by.
-    planner = LocomotionPlanner(MODEL, TROT, CONFIG)
+    planner = make_planner(MODEL, TROT, CONFIG)
     assert not planner.is_stepping
     assert planner.heading == 0.0
 

@@ -1,0 +1,272 @@
+"""One tick of the locomotion planner as a kernel; ``planning.locomotion`` is its readable form.
+
+Names and order follow the methods there. ``s`` is the planner's state (``layout.PLANNER``), ``c``
+its numbers (``layout.LOCOMOTION``), ``snapshot`` and ``target`` are the rows of a snapshot and of
+the reference that is filled.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from go2_wbc.kernels.compilation import kernel
+from go2_wbc.kernels.layout import LOCOMOTION, PLANNER, REFERENCE, SNAPSHOT
+
+TIE = 1e-9
+"""As ``contacts.TIE`` and ``swing.TIE``."""
+TINY = 1e-9
+
+_N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLANNER.start, LOCOMOTION.start
+_Q, _P_COM, _V_COM, _P_FEET = (_N[n] for n in ("q", "p_world_com", "v_world_com", "p_world_feet"))
+_YAW, _POSITION, _VELOCITY = (_S[n] for n in ("yaw", "position", "velocity"))
+_STEPPING, _PHASE_TIME, _TIME = (_S[n] for n in ("is_stepping", "phase_time", "time"))
+_GROUND, _HEIGHT_OFFSET = _S["ground"], _S["height_offset"]
+_LIFTOFF, _WAS_STANCE = _S["liftoff"], _S["was_stance"]
+_PERIOD, _DUTY, _OFFSETS, _HEIGHT = (_C[n] for n in ("period", "duty", "offsets", "height"))
+_ACCELERATION, _FEEDBACK = _C["acceleration"], _C["velocity_feedback"]
+_LEASH, _YAW_LEASH, _REACH = (_C[n] for n in ("position_leash", "yaw_leash", "foothold_reach"))
+_F_MIN, _F_MAX, _RAMP = (_C[n] for n in ("normal_force_min", "normal_force_max", "load_ramp"))
+_SETTLE_SPEED, _SETTLED = _C["settle_speed"], _C["settled_command"]
+_CAPTURE, _SQUARE = _C["capture_margin"], _C["square_tolerance"]
+_APEX, _DEPTH, _GROUND_SHARE = (_C[n] for n in ("apex", "touchdown_depth", "ground_share"))
+_RATE, _WINDOW, _LIMIT = (
+    _C[n] for n in ("correction_rate", "correction_window", "correction_limit")
+)
+_GRAVITY, _RADIUS, _NOMINAL = (_C[n] for n in ("gravity", "foot_radius", "p_base_feet_nominal"))
+_IS_COM, _BODY_P, _BODY_V = (_T[n] for n in ("is_com", "p_world", "v_world"))
+_BODY_R, _BODY_W = _T["R_world_base"], _T["w_world"]
+_LEGS, _T_F_MIN, _T_F_MAX = (_T[n] for n in ("legs", "normal_force_min", "normal_force_max"))
+_FOOT_P, _FOOT_V, _FOOT_A = (_T[n] for n in ("p_world_feet", "v_world_feet", "a_world_feet"))
+_JOINT_Q = _T["q_joints"]
+
+
+@kernel("f8(f8[::1])")
+def yaw_of(q):
+    """Heading of the quaternion in a configuration."""
+    x, y, z, w = q[3], q[4], q[5], q[6]
+    return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+
+
+@kernel("Tuple((b1, f8, f8))(f8, f8, f8[::1])")
+def foot_phase(t, offset, c):
+    """Whether a foot is in stance at ``t`` of the gait, since when, and for how long yet [s]."""
+    period, duty = c[_PERIOD], c[_DUTY]
+    if duty >= 1.0:
+        return True, np.inf, np.inf
+    stance_time = duty * period
+    elapsed = (t - offset * period + TIE) % period - TIE
+    if elapsed < stance_time - TIE:
+        return True, max(elapsed, 0.0), stance_time - elapsed
+    return False, max(elapsed - stance_time, 0.0), period - elapsed
+
+
+@kernel("void(f8[::1], f8[::1], f8[:,::1])")
+def nominal_feet(snapshot, c, feet):
+    """Points below the hips of a level trunk with the measured heading."""
+    q = snapshot[_Q : _Q + 19]
+    yaw = yaw_of(q)
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    for leg in range(4):
+        x, y = c[_NOMINAL + 3 * leg], c[_NOMINAL + 3 * leg + 1]
+        feet[leg, 0] = q[0] + cosine * x - sine * y
+        feet[leg, 1] = q[1] + sine * x + cosine * y
+
+
+@kernel("b1(f8[::1], f8[::1])")
+def is_square(snapshot, c):
+    """Whether the feet form the nominal rectangle, wherever its middle is."""
+    offsets, mean = np.empty((4, 2)), np.zeros(2)
+    nominal_feet(snapshot, c, offsets)
+    for leg in range(4):
+        for i in range(2):
+            offsets[leg, i] = snapshot[_P_FEET + 3 * leg + i] - offsets[leg, i]
+            mean[i] += offsets[leg, i] / 4
+    for leg in range(4):
+        if not np.hypot(offsets[leg, 0] - mean[0], offsets[leg, 1] - mean[1]) < c[_SQUARE]:
+            return False
+    return True
+
+
+@kernel("b1(f8[::1], f8[::1])")
+def must_step(snapshot, c):
+    """Whether the capture point is too far from the feet's middle."""
+    omega = np.sqrt(c[_GRAVITY] / c[_HEIGHT])
+    offset = np.empty(2)
+    for i in range(2):
+        middle = 0.0
+        for leg in range(4):
+            middle += snapshot[_P_FEET + 3 * leg + i] / 4
+        offset[i] = snapshot[_P_COM + i] + snapshot[_V_COM + i] / omega - middle
+    return np.hypot(offset[0], offset[1]) > c[_CAPTURE]
+
+
+@kernel("b1(f8[::1], f8[::1])")
+def is_landing(s, c):
+    """Whether feet touch down at this tick and no other one is in the air."""
+    has_landed = False
+    for leg in range(4):
+        stance, _, _ = foot_phase(s[_PHASE_TIME], c[_OFFSETS + leg], c)
+        was_stance = s[_WAS_STANCE + leg] != 0.0
+        if not (stance or was_stance):
+            return False
+        has_landed |= stance and not was_stance
+    return has_landed
+
+
+@kernel("b1(f8[::1], f8[::1], f8[::1])")
+def may_stop(snapshot, s, c):
+    """Whether the robot is slow, no longer commanded, and stands squarely."""
+    for i in range(3):
+        if not abs(s[_VELOCITY + i]) < c[_SETTLED]:
+            return False
+    slow = np.hypot(snapshot[_V_COM], snapshot[_V_COM + 1]) < c[_SETTLE_SPEED]
+    return slow and is_square(snapshot, c)
+
+
+@kernel("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
+def advance_phase(snapshot, s, c, dt, command):
+    """Start, go on, or come to rest."""
+    is_zero = command[0] == 0.0 and command[1] == 0.0 and command[2] == 0.0
+    if s[_STEPPING] != 0.0:
+        s[_PHASE_TIME] += dt
+        if is_zero and is_landing(s, c) and may_stop(snapshot, s, c):
+            s[_STEPPING] = 0.0
+    elif not is_zero or must_step(snapshot, c):
+        s[_STEPPING], s[_PHASE_TIME] = 1.0, 0.0
+
+
+@kernel("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
+def integrate(snapshot, s, c, dt, command):
+    """Ramp the velocity, integrate it to the pose, apply the leash, correct the height."""
+    for i in range(3):
+        most = c[_ACCELERATION + i] * dt
+        s[_VELOCITY + i] += min(max(command[i] - s[_VELOCITY + i], -most), most)
+    s[_YAW] += s[_VELOCITY + 2] * dt
+    difference = s[_YAW] - yaw_of(snapshot[_Q : _Q + 19])
+    lead = np.arctan2(np.sin(difference), np.cos(difference))
+    s[_YAW] += min(max(lead, -c[_YAW_LEASH]), c[_YAW_LEASH]) - lead
+    cosine, sine = np.cos(s[_YAW]), np.sin(s[_YAW])
+    s[_POSITION] += (cosine * s[_VELOCITY] - sine * s[_VELOCITY + 1]) * dt
+    s[_POSITION + 1] += (sine * s[_VELOCITY] + cosine * s[_VELOCITY + 1]) * dt
+    x, y = s[_POSITION] - snapshot[_P_COM], s[_POSITION + 1] - snapshot[_P_COM + 1]
+    distance = np.hypot(x, y)
+    if distance > c[_LEASH]:
+        s[_POSITION] = snapshot[_P_COM] + x * c[_LEASH] / distance
+        s[_POSITION + 1] = snapshot[_P_COM + 1] + y * c[_LEASH] / distance
+    sag = s[_GROUND] + c[_HEIGHT] - snapshot[_P_COM + 2]
+    if abs(sag) < c[_WINDOW]:
+        offset = s[_HEIGHT_OFFSET] + c[_RATE] * dt * sag
+        s[_HEIGHT_OFFSET] = min(max(offset, -c[_LIMIT]), c[_LIMIT])
+
+
+@kernel("void(f8[::1], f8[::1], f8[::1], b1[::1])")
+def note_liftoffs(snapshot, s, c, stance):
+    """Remember where feet leave the ground; low-pass the ground's height where they land."""
+    landed, height = 0, 0.0
+    for leg in range(4):
+        was_stance = s[_WAS_STANCE + leg] != 0.0
+        if was_stance and not stance[leg]:
+            for i in range(3):
+                s[_LIFTOFF + 3 * leg + i] = snapshot[_P_FEET + 3 * leg + i]
+        elif stance[leg] and not was_stance:
+            landed += 1
+            height += snapshot[_P_FEET + 3 * leg + 2]
+        s[_WAS_STANCE + leg] = 1.0 if stance[leg] else 0.0
+    if landed:
+        s[_GROUND] += c[_GROUND_SHARE] * (height / landed - c[_RADIUS] - s[_GROUND])
+
+
+@kernel("Tuple((f8, f8, f8))(f8)")
+def cubic(x):
+    """As ``curves.Ease.CUBIC``."""
+    return x * x * (3 - 2 * x), 6 * x * (1 - x), 6 - 12 * x
+
+
+@kernel("void(i8, f8[::1], f8[::1], f8, f8[::1], f8[::1])")
+def swing(leg, s, c, progress, goal, target):
+    """As ``planning.swing.swing_foot``, from the foot's lift-off to ``goal`` (3,)."""
+    duration = (1.0 - c[_DUTY]) * c[_PERIOD]
+    start = s[_LIFTOFF + 3 * leg : _LIFTOFF + 3 * leg + 3]
+    k = 3 * leg
+    x, dx, ddx = cubic(progress)
+    for i in range(2):
+        delta = goal[i] - start[i]
+        target[_FOOT_P + k + i] = start[i] + x * delta
+        target[_FOOT_V + k + i] = dx / duration * delta
+        target[_FOOT_A + k + i] = ddx / duration**2 * delta
+    apex = max(start[2], goal[2]) + c[_APEX]
+    is_rising = progress < 0.5 - TIE
+    begin = start[2] if is_rising else apex
+    delta = (apex if is_rising else goal[2] - c[_DEPTH]) - begin
+    x, dx, ddx = cubic(2.0 * progress - (0.0 if is_rising else 1.0))
+    target[_FOOT_P + k + 2] = begin + x * delta
+    target[_FOOT_V + k + 2] = dx * delta * 2.0 / duration
+    target[_FOOT_A + k + 2] = ddx * delta * 4.0 / duration**2
+
+
+@kernel("void(i8, f8[::1], f8[::1], f8[::1], f8[:,::1], f8, f8[::1])")
+def foothold(leg, snapshot, s, c, nominal, remaining, goal):
+    """Touchdown point: p_hip + v t + v T / 2 + k (v - v_ref), the last two within reach."""
+    cosine, sine = np.cos(s[_YAW]), np.sin(s[_YAW])
+    ref_x = cosine * s[_VELOCITY] - sine * s[_VELOCITY + 1]
+    ref_y = sine * s[_VELOCITY] + cosine * s[_VELOCITY + 1]
+    arm_x, arm_y = nominal[leg, 0] - snapshot[_Q], nominal[leg, 1] - snapshot[_Q + 1]
+    v_x = snapshot[_V_COM] - s[_VELOCITY + 2] * arm_y
+    v_y = snapshot[_V_COM + 1] + s[_VELOCITY + 2] * arm_x
+    half = c[_DUTY] * c[_PERIOD] / 2
+    x = v_x * half + c[_FEEDBACK] * (snapshot[_V_COM] - ref_x)
+    y = v_y * half + c[_FEEDBACK] * (snapshot[_V_COM + 1] - ref_y)
+    share = min(1.0, c[_REACH] / max(np.hypot(x, y), TINY))
+    goal[0] = nominal[leg, 0] + x * share + v_x * remaining
+    goal[1] = nominal[leg, 1] + y * share + v_y * remaining
+    goal[2] = s[_GROUND] + c[_RADIUS]
+
+
+@kernel("void(f8[::1], f8[::1], f8[::1])")
+def fill_body(s, c, target):
+    """The trunk's reference: integrated pose, commanded velocity, level."""
+    cosine, sine = np.cos(s[_YAW]), np.sin(s[_YAW])
+    target[_IS_COM] = 1.0
+    target[_BODY_P], target[_BODY_P + 1] = s[_POSITION], s[_POSITION + 1]
+    target[_BODY_P + 2] = s[_GROUND] + c[_HEIGHT] + s[_HEIGHT_OFFSET]
+    target[_BODY_V] = cosine * s[_VELOCITY] - sine * s[_VELOCITY + 1]
+    target[_BODY_V + 1] = sine * s[_VELOCITY] + cosine * s[_VELOCITY + 1]
+    target[_BODY_R], target[_BODY_R + 1] = cosine, -sine
+    target[_BODY_R + 3], target[_BODY_R + 4] = sine, cosine
+    target[_BODY_R + 8] = 1.0
+    target[_BODY_W + 2] = s[_VELOCITY + 2]
+
+
+@kernel("void(f8[::1], f8, f8[::1], f8[::1], f8[::1], f8[::1])")
+def plan(snapshot, time, s, c, command, target):
+    """Bring the state to ``time`` and fill the reference of this tick."""
+    dt = time - s[_TIME]
+    s[_TIME] = time
+    advance_phase(snapshot, s, c, dt, command)
+    integrate(snapshot, s, c, dt, command)
+    stance = np.ones(4, dtype=np.bool_)
+    elapsed, remaining = np.full(4, np.inf), np.full(4, np.inf)
+    if s[_STEPPING] != 0.0:
+        for leg in range(4):
+            stance[leg], elapsed[leg], remaining[leg] = foot_phase(
+                s[_PHASE_TIME], c[_OFFSETS + leg], c
+            )
+    note_liftoffs(snapshot, s, c, stance)
+    target[:] = 0.0
+    fill_body(s, c, target)
+    nominal, goal = np.empty((4, 2)), np.empty(3)
+    nominal_feet(snapshot, c, nominal)
+    for leg in range(4):
+        target[_LEGS + leg] = 0.0 if stance[leg] else 1.0
+        for i in range(3):
+            target[_FOOT_P + 3 * leg + i] = snapshot[_P_FEET + 3 * leg + i]
+        share = 0.0
+        if stance[leg]:
+            share = min(min(elapsed[leg], remaining[leg]) / max(c[_RAMP], TIE), 1.0)
+        else:
+            foothold(leg, snapshot, s, c, nominal, remaining[leg], goal)
+            progress = elapsed[leg] / (elapsed[leg] + remaining[leg])
+            swing(leg, s, c, progress, goal, target)
+        target[_T_F_MIN + leg], target[_T_F_MAX + leg] = c[_F_MIN] * share, c[_F_MAX] * share
+    for n in range(12):
+        target[_JOINT_Q + n] = snapshot[_Q + 7 + n]

@@ -1,0 +1,111 @@
+"""The locomotion planner by its compiled kernel: what the robot walks with."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from go2_wbc.contacts import Gait
+from go2_wbc.kernels.layout import LOCOMOTION, PLANNER, REFERENCE
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.correction import CorrectionConfig
+from go2_wbc.planning.locomotion import (
+    GROUND_SHARE,
+    SETTLED_COMMAND,
+    GaitPlanner,
+    LocomotionConfig,
+)
+from go2_wbc.reference import Reference
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+
+_STATE = PLANNER.start
+
+
+class CompiledPlanner(GaitPlanner):
+    """``LocomotionPlanner``, fifteen times faster: the same references, tick by tick."""
+
+    def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
+        """Prepare a planner; ``start`` sets it on its way."""
+        self._foot_radius = model.foot_radius
+        self._numbers = _numbers(model, gait, config)
+        self._state = np.zeros(PLANNER.size)
+        self._command = np.zeros(3)
+
+    def start(self, snapshot: Snapshot) -> None:
+        """Begin from the measured state, standing."""
+        feet = snapshot.p_world_feet
+        self._state = PLANNER.pack(
+            [
+                snapshot.state.yaw,
+                snapshot.p_world_com[:2],
+                np.zeros(3),
+                0.0,
+                0.0,
+                snapshot.state.time,
+                float(np.mean(feet[:, 2])) - self._foot_radius,
+                0.0,
+                feet,
+                np.ones(4),
+            ]
+        )
+
+    @property
+    def is_stepping(self) -> bool:
+        """Whether the gait is running; not before ``start``."""
+        return bool(self._state[_STATE["is_stepping"]])
+
+    @property
+    def heading(self) -> float:
+        """Yaw [rad] of the reference; 0 before ``start``."""
+        return float(self._state[_STATE["yaw"]])
+
+    def square_up(self, snapshot: Snapshot) -> bool:
+        """Start stepping unless every foot is below its hip; returns whether they all are."""
+        from go2_wbc.kernels.locomotion import is_square
+
+        stands = bool(is_square(snapshot.row, self._numbers))
+        self._state[_STATE["is_stepping"]] = not stands
+        self._state[_STATE["phase_time"]] = 0.0
+        return stands
+
+    def update(self, snapshot: Snapshot, command: VelocityCommand) -> Reference:
+        """The reference of this tick for the wanted ``command`` (already inside the envelope)."""
+        from go2_wbc.kernels.locomotion import plan
+
+        wanted, row = self._command, np.empty(REFERENCE.size)
+        wanted[0], wanted[1], wanted[2] = command.linear_x, command.linear_y, command.angular_z
+        plan(snapshot.row, snapshot.state.time, self._state, self._numbers, wanted, row)
+        return Reference.of_row(row)
+
+
+def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndarray:
+    correction = CorrectionConfig()
+    return LOCOMOTION.pack(
+        [
+            gait.period,
+            gait.duty,
+            gait.offsets,
+            config.height,
+            [config.linear_acceleration] * 2 + [config.angular_acceleration],
+            config.velocity_feedback,
+            config.position_leash,
+            config.yaw_leash,
+            config.foothold_reach,
+            config.normal_force_min,
+            config.normal_force_max,
+            config.load_ramp,
+            config.settle_speed,
+            SETTLED_COMMAND,
+            config.capture_margin,
+            config.square_tolerance,
+            config.swing.apex,
+            config.swing.touchdown_depth,
+            GROUND_SHARE,
+            correction.rate,
+            correction.position_window,
+            correction.position_limit,
+            model.gravity,
+            model.foot_radius,
+            model.p_base_feet_nominal,
+        ]
+    )

@@ -1,0 +1,107 @@
+"""The planner's kernel is held to the readable planner, tick by tick, on robots that stumble."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from go2_wbc.contacts import GAITS, ContactPhase, Gait
+from go2_wbc.kernels.layout import LOCOMOTION
+from go2_wbc.kernels.locomotion import foot_phase
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.compiled import CompiledPlanner
+from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
+from go2_wbc.planning.swing import SwingConfig
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+from tests.engine_helpers import random_state, standing_q, state_of
+
+TICK = 0.002
+ROUNDING = 1e-8  # of accelerations up to 100 m/s^2; measured 2e-10
+ODD = Gait("odd", period=0.37, duty=0.61, offsets=(0.13, 0.58, 0.0, 0.83))
+ODD_CONFIG = LocomotionConfig(
+    height=0.27,
+    linear_acceleration=1.1,
+    angular_acceleration=3.3,
+    velocity_feedback=0.17,
+    position_leash=0.05,
+    yaw_leash=0.21,
+    foothold_reach=0.13,
+    normal_force_min=3.0,
+    normal_force_max=310.0,
+    load_ramp=0.041,
+    settle_speed=0.3,
+    capture_margin=0.07,
+    square_tolerance=0.05,
+    swing=SwingConfig(apex=0.083, touchdown_depth=0.011),
+)
+"""No two numbers alike, so that one in another's place is seen."""
+
+
+def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.ndarray) -> Snapshot:
+    """A measured state near ``at``: calm for a while, then wild, now and then upright at rest."""
+    state = random_state(rng, tilt=0.3 if tick % 1000 >= 500 else 0.02)
+    q = state.q.copy()
+    q[:3] = [*(at + rng.normal(scale=0.02, size=2)), 0.3 + 0.02 * rng.normal()]
+    if tick % 700 >= 350:
+        q[3:] = standing_q()[3:]
+    pace = 0.02 if tick % 1400 >= 700 else 1.0
+    return model.snapshot(replace(state, time=tick * TICK, q=q, v=pace * state.v))
+
+
+@pytest.mark.parametrize(
+    ("gait", "config"),
+    [(GAITS["trot"], LocomotionConfig()), (ODD, ODD_CONFIG)],
+    ids=["trot", "odd"],
+)
+def test_references_are_those_of_the_readable_planner(gait: Gait, config: LocomotionConfig) -> None:
+    model, rng = RobotModel(), np.random.default_rng(8)
+    readable = LocomotionPlanner(model, gait, config)
+    compiled = CompiledPlanner(model, gait, config)
+    start = model.snapshot(state_of(standing_q()))
+    readable.start(start)
+    compiled.start(start)
+    command, at = ZERO_COMMAND, start.p_world_com[:2]
+    starts = 0
+    for tick in range(1, 5001):
+        if tick % 200 == 0:
+            command = VelocityCommand(*rng.normal(size=3)) if rng.random() < 0.6 else ZERO_COMMAND
+        snapshot = stumbling(model, rng, tick, at)
+        was_stepping = readable.is_stepping
+        theirs, ours = readable.update(snapshot, command), compiled.update(snapshot, command)
+        np.testing.assert_allclose(ours.row, theirs.row, atol=ROUNDING, rtol=0)
+        assert ours.legs == theirs.legs
+        assert compiled.is_stepping == readable.is_stepping
+        assert compiled.heading == pytest.approx(readable.heading, abs=ROUNDING)
+        starts += readable.is_stepping and not was_stepping
+        at = theirs.body.p_world[:2]
+        if tick % 900 == 0:
+            assert compiled.square_up(snapshot) == readable.square_up(snapshot)
+    assert starts >= 3, "the comparison must go through standing and stepping"
+
+
+@pytest.mark.parametrize(
+    "gait",
+    [
+        GAITS["trot"],
+        ODD,
+        Gait("walk", 0.5, 0.75, (0.0, 0.5, 0.75, 0.25)),
+        Gait("all", 0.4, 1.0, (0.0,) * 4),
+    ],
+    ids=lambda gait: gait.name,
+)
+def test_the_gait_is_that_of_the_contact_schedule(gait: Gait) -> None:
+    numbers = np.zeros(LOCOMOTION.size)
+    numbers[LOCOMOTION.start["period"]] = gait.period
+    numbers[LOCOMOTION.start["duty"]] = gait.duty
+    schedule = gait.schedule()
+    events = [event + shift for event in schedule.times for shift in (-2e-9, 0.0, 1e-10)]
+    for t in (*np.arange(0.0, 3 * gait.period, 0.0007), *events, *np.add(events, gait.period)):
+        phase: ContactPhase = schedule.at(max(t, 0.0))
+        for leg in range(4):
+            stance, elapsed, remaining = foot_phase(max(t, 0.0), gait.offsets[leg], numbers)
+            assert stance == phase.stance[leg], (t, leg)
+            assert elapsed == pytest.approx(phase.elapsed[leg], abs=2e-9)
+            assert remaining == pytest.approx(phase.remaining[leg], abs=2e-9)
