@@ -300,7 +300,7 @@ def test_an_uninstalled_solver_is_refused_before_the_first_tick(
 ) -> None:
     monkeypatch.setattr(qpsolvers, "available_solvers", ["quadprog"])
     with pytest.raises(SolverUnavailable, match="pip install daqp; installed: active_set, quadprog"):
-        WholeBodyController(model)
+        WholeBodyController(model, config=WbcConfig(solver="daqp"))
 
 
 # --- the solution ---------------------------------------------------------------------------------
