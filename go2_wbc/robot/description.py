@@ -63,7 +63,7 @@ class RobotDescription:
         raise DescriptionError(f"{self.urdf_path}: mesh {filename!r} not found; tried {tried}")
 
 
-def find_description(urdf: Path | None = None) -> RobotDescription:
+def find_description(urdf: Path | str | None = None) -> RobotDescription:
     """The description of the Go2: the installed one, or a user's own URDF.
 
     A user's URDF uses the SRDF beside it (``<name>.srdf`` or ``../srdf/<name>.srdf``), else the
