@@ -106,7 +106,9 @@ def build_spec(
         geom.friction = [friction, _TORSIONAL, _ROLLING]
     if visuals:
         add_visuals(spec, description)
-    _set_options(spec)
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = _IMPRATIO
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     return spec
 
 
@@ -172,12 +174,11 @@ def add_motors(spec: mujoco.MjSpec, joints: Sequence[str], description: RobotDes
 def add_imu(spec: mujoco.MjSpec, base: str) -> None:
     """Adds the IMU's site to the body ``base`` with gyro, accelerometer and orientation."""
     spec.body(base).add_site(name=IMU_SITE, pos=list(IMU_POSITION), size=[0.005, 0.005, 0.005])
-    kinds = {
-        GYRO: mujoco.mjtSensor.mjSENS_GYRO,
-        ACCELEROMETER: mujoco.mjtSensor.mjSENS_ACCELEROMETER,
-        ORIENTATION: mujoco.mjtSensor.mjSENS_FRAMEQUAT,
-    }
-    for name, kind in kinds.items():
+    for name, kind in (
+        (GYRO, mujoco.mjtSensor.mjSENS_GYRO),
+        (ACCELEROMETER, mujoco.mjtSensor.mjSENS_ACCELEROMETER),
+        (ORIENTATION, mujoco.mjtSensor.mjSENS_FRAMEQUAT),
+    ):
         site = mujoco.mjtObj.mjOBJ_SITE
         spec.add_sensor(name=name, type=kind, objtype=site, objname=IMU_SITE)
 
@@ -220,13 +221,6 @@ def _add_boxes(spec: mujoco.MjSpec, terrain: Boxes) -> None:
             size=[half, half, 0.5 * height],
             rgba=[0.55, 0.45, 0.35, 1.0],
         )
-
-
-def _set_options(spec: mujoco.MjSpec) -> None:
-    option = spec.option
-    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    option.impratio = _IMPRATIO
-    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 
 
 def add_payload(spec: mujoco.MjSpec, base: str, payload: float) -> None:
