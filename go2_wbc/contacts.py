@@ -81,10 +81,7 @@ class ContactSchedule:
         object.__setattr__(self, "_changes", changes)
 
     def _changes_of(self, leg: int) -> Float[np.ndarray, " k"]:
-        """When the foot's contact changes, from the last time before the start to the next after.
-
-        Without a period, or a change, these two are infinitely far away.
-        """
+        """When the foot's contact changes, with the last time before these and the next after."""
         column = self.modes[:, leg]
         previous = np.roll(column, 1)
         if self.period is None:
