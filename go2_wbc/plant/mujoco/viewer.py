@@ -17,12 +17,12 @@ _log = logging.getLogger(__name__)
 
 FRAME_RATE = 50.0
 """Frames per second of robot time that ``PlantViewer.show`` shows at most."""
-_DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
 def display_problem() -> str | None:
     """Why no window can be opened here, in one sentence, or ``None`` if one can."""
-    if not sys.platform.startswith("linux") or any(map(os.environ.get, _DISPLAY_VARIABLES)):
+    has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if has_display or not sys.platform.startswith("linux"):
         return None
     return (
         "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); "
