@@ -18,8 +18,6 @@ ROBOT_BINS = 6
 # FOREIGN + 5) from robot-robot (at most 10) and world-world (2 FOREIGN).
 FOREIGN = 16
 
-Selector = slice | Int[np.ndarray, "12"]
-
 
 @dataclass(frozen=True, slots=True)
 class MujocoLayout:
@@ -42,9 +40,9 @@ class MujocoLayout:
     base: int
     base_q: slice
     base_v: slice
-    joint_q: Selector
-    joint_v: Selector
-    motors: Selector
+    joint_q: Int[np.ndarray, "12"]
+    joint_v: Int[np.ndarray, "12"]
+    motors: Int[np.ndarray, "12"]
     torque_limits: Float[np.ndarray, "12"]
     foot_geoms: Int[np.ndarray, "4"]
     foot_bodies: Int[np.ndarray, "4"]
@@ -69,17 +67,23 @@ def find_layout(
     motors = np.array([drives[name] for name in JOINT_NAMES])
     feet = [[geom.id for geom in foot_geoms(spec, leg)] for leg in LEGS]
     first = np.array([ids[0] for ids in feet])
+    body = model.geom_bodyid
+    on_trunk = model.body_weldid[body] == model.body_weldid[base]
+    codes = np.where(on_trunk, TRUNK_BIN, LIMB_BIN)
+    codes[model.body_rootid[body] != base] = FOREIGN
+    for leg, ids in zip(LEGS, feet, strict=True):
+        codes[ids] = int(leg)
     return MujocoLayout(
         base=base,
         base_q=slice(q, q + 7),
         base_v=slice(v, v + 6),
-        joint_q=_selector(model.jnt_qposadr[joints]),
-        joint_v=_selector(model.jnt_dofadr[joints]),
-        motors=_selector(motors),
+        joint_q=model.jnt_qposadr[joints].astype(int),
+        joint_v=model.jnt_dofadr[joints].astype(int),
+        motors=motors,
         torque_limits=_torque_limits(model, joints, motors, efforts),
         foot_geoms=first,
-        foot_bodies=model.geom_bodyid[first].copy(),
-        geom_codes=_geom_codes(model, base, feet),
+        foot_bodies=body[first],
+        geom_codes=codes,
     )
 
 
@@ -113,23 +117,3 @@ def _torque_limits(
         tightest = np.minimum(-ranges[:, 0], ranges[:, 1])
         limits = np.where(limited, np.minimum(limits, tightest), limits)
     return limits
-
-
-def _geom_codes(
-    model: mujoco.MjModel, base: int, feet: list[list[int]]
-) -> Int[np.ndarray, " ngeom"]:
-    body = model.geom_bodyid
-    on_robot = model.body_rootid[body] == base
-    on_trunk = model.body_weldid[body] == model.body_weldid[base]
-    codes = np.where(on_robot, np.where(on_trunk, TRUNK_BIN, LIMB_BIN), FOREIGN)
-    for leg, ids in zip(LEGS, feet, strict=True):
-        codes[ids] = int(leg)
-    return codes
-
-
-def _selector(indices: Int[np.ndarray, "12"]) -> Selector:
-    """A slice when the indices are contiguous, because it reads without a copy."""
-    first = int(indices[0])
-    if np.array_equal(indices, np.arange(first, first + len(indices))):
-        return slice(first, first + len(indices))
-    return np.asarray(indices, dtype=np.int64)

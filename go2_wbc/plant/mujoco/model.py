@@ -186,7 +186,17 @@ def add_imu(spec: mujoco.MjSpec, base: str) -> None:
 def add_floor(spec: mujoco.MjSpec) -> None:
     """Adds an infinite chequered plane at z = 0, and a light."""
     if spec.material(_GRID) is None:
-        _add_grid(spec)
+        spec.add_texture(
+            name=_GRID,
+            type=mujoco.mjtTexture.mjTEXTURE_2D,
+            builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+            rgb1=[0.42, 0.47, 0.53],
+            rgb2=[0.36, 0.41, 0.47],
+            width=256,
+            height=256,
+        )
+        grid = spec.add_material(name=_GRID, texrepeat=[2, 2], texuniform=True)
+        grid.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _GRID
     spec.worldbody.add_geom(
         name=FLOOR,
         type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -194,20 +204,6 @@ def add_floor(spec: mujoco.MjSpec) -> None:
         material=_GRID,
     )
     spec.worldbody.add_light(pos=[0, 0, 5], dir=[0, 0, -1], castshadow=False)
-
-
-def _add_grid(spec: mujoco.MjSpec) -> None:
-    spec.add_texture(
-        name=_GRID,
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=[0.42, 0.47, 0.53],
-        rgb2=[0.36, 0.41, 0.47],
-        width=256,
-        height=256,
-    )
-    grid = spec.add_material(name=_GRID, texrepeat=[2, 2], texuniform=True)
-    grid.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _GRID
 
 
 def _add_boxes(spec: mujoco.MjSpec, terrain: Boxes) -> None:

@@ -34,7 +34,6 @@ _logger = logging.getLogger(__name__)
 
 # N; a foot reads a contact above this. A standing foot carries about 40 N, so 1 N is "touching".
 FOOT_CONTACT_THRESHOLD = 1.0
-_IDEAL, _NOISY = "ideal", "noisy"
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +92,7 @@ class MujocoPlant(Plant):
         payload: float = 0.0,
         mass_scale: float = 1.0,
         terrain: Boxes | None = None,
-        sensors: str = _IDEAL,
+        sensors: str = "ideal",
         noise: SensorNoise | None = None,
         seed: int = 0,
         initial_yaw: float = 0.0,
@@ -102,8 +101,8 @@ class MujocoPlant(Plant):
         urdf: Path | str | None = None,
         visuals: bool = False,
     ) -> None:
-        if sensors not in (_IDEAL, _NOISY):
-            raise ConfigError(unknown_name("sensors", sensors, (_IDEAL, _NOISY)))
+        if sensors not in ("ideal", "noisy"):
+            raise ConfigError(unknown_name("sensors", sensors, ("ideal", "noisy")))
         setup = PlantSetup(
             mjcf=mjcf,
             urdf=urdf,
@@ -124,8 +123,8 @@ class MujocoPlant(Plant):
         mujoco.set_mju_user_warning(partial(_logger.warning, "MuJoCo: %s"))
         self._model, self._layout = prepare(setup)
         self._data = mujoco.MjData(self._model)
-        self._noise = (noise or SensorNoise()) if sensors == _NOISY else None
-        self._period, self._substeps = control_period, setup.substeps
+        self._noise = (noise or SensorNoise()) if sensors == "noisy" else None
+        self._period, self._substeps = control_period, round(control_period / timestep)
         self._closed = False
         self._ticks = 0
         self._pushes = Pushes(self._model, self._data, self._layout)
@@ -343,18 +342,14 @@ class MujocoPlant(Plant):
 
     def _measure(self) -> RobotState:
         """The true state in Pinocchio's conventions."""
-        q, v = np.empty(19), np.empty(18)
         base_q, base_v = self._base_q, self._base_v
-        q[:3], q[3:6], q[6] = base_q[:3], base_q[4:7], base_q[3]
-        q[7:] = self._data.qpos[self._layout.joint_q]
-        v[:3] = base_v[:3] @ self._R_world_base
-        v[3:6] = base_v[3:6]
-        v[6:] = self._data.qvel[self._layout.joint_v]
+        q_joints = self._data.qpos[self._layout.joint_q]
+        v_joints = self._data.qvel[self._layout.joint_v]
         forces = self._forces[: len(LEGS)].copy()
         return RobotState(
             time=self.time,
-            q=q,
-            v=v,
+            q=np.concatenate([base_q[:3], base_q[[4, 5, 6, 3]], q_joints]),
+            v=np.concatenate([base_v[:3] @ self._R_world_base, base_v[3:], v_joints]),
             tau=self._tau.copy(),
             foot_forces=forces,
             feet_in_contact=forces > FOOT_CONTACT_THRESHOLD,

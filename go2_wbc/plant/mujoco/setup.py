@@ -29,7 +29,6 @@ LYING_POSE = (
     *(-0.372, 1.239, -2.722),
 )
 LYING_DAMPING = 3.0  # N m s/rad of the joints while lying; the value of Unitree's damping mode
-_MULTIPLE_TOLERANCE = 1e-9  # relative; only rounding of the two decimal numbers
 _DROP_HEIGHT = 0.11  # m of the base above the ground; it rests at 0.085
 _SETTLE_LIMIT = 3.0  # s of simulation; it settles in well under one
 _SETTLED_SPEED = 1e-3  # rad/s and m/s, largest entry of the velocity
@@ -68,18 +67,13 @@ class PlantSetup:
         require_not_negative(self, "payload", "initial_joint_noise", "seed")
         require_finite(self, "initial_yaw")
         ratio = self.control_period / self.timestep
-        if round(ratio) < 1 or abs(ratio - round(ratio)) > _MULTIPLE_TOLERANCE * ratio:
+        if not math.isclose(ratio, round(ratio)):  # only the two decimal numbers' rounding
             raise ConfigError(
                 f"control_period must be an integer multiple of timestep: "
                 f"{self.control_period!r} s is {ratio:.6g} times {self.timestep!r} s"
             )
         if self.mjcf is not None and self.terrain is not None:
             raise ConfigError("terrain is only for the built model; put it into the mjcf instead")
-
-    @property
-    def substeps(self) -> int:
-        """Physics steps in one control period."""
-        return round(self.control_period / self.timestep)
 
 
 def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout]:
@@ -146,17 +140,14 @@ def settle(
 
 
 def _place(model: mujoco.MjModel, data: mujoco.MjData, layout: MujocoLayout, yaw: float) -> None:
+    """Puts the base a little above the highest ground around the origin."""
     base_q = data.qpos[layout.base_q]
     base_q[:2] = 0.0
     base_q[2] = 2.0 * _RAY_TOP  # out of the rays' way
     base_q[3:] = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
     mujoco.mj_kinematics(model, data)
-    base_q[2] = _ground_height(model, data) + _DROP_HEIGHT
-
-
-def _ground_height(model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Height of the highest ground under the robot at the origin; 0 if there is none."""
     geom, down = np.zeros(1, dtype=np.int32), np.array([0.0, 0.0, -1.0])
     tops = [np.array([x, y, _RAY_TOP]) for x in _FOOTPRINT for y in _FOOTPRINT]
     distances = [mujoco.mj_ray(model, data, top, down, None, True, -1, geom) for top in tops]
-    return max((_RAY_TOP - distance for distance in distances if distance >= 0.0), default=0.0)
+    ground = max((_RAY_TOP - distance for distance in distances if distance >= 0.0), default=0.0)
+    base_q[2] = ground + _DROP_HEIGHT
