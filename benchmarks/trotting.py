@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from contextlib import closing
 
 import numpy as np
 
 from benchmarks.pushes import PUSH_TIME, force_of, measure_impulses, push_metrics
 from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.trials import ReusedRobot, Trial, TrialFailed, TrialRobot
+from benchmarks.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
@@ -121,24 +120,28 @@ def measure_pushes(trial: Trial) -> Measurement:
     upright, and its mean velocity over the last two strides is within 0.15 m/s of the command.
     """
     trial = Trial(trial.seed, has_nominal_friction=True)
-    with closing(ReusedRobot(trial, _start_pushed)) as reused:
+    trotting: list[TrialRobot] = []  # one for many pushes; after a failure a new one
 
-        def failure_of(impulse: float, direction: str) -> str | None:
-            force = force_of(impulse, direction)
-            failures = {
-                phase: reused.failure_of(lambda robot, phase=phase: _push(robot, force, phase))
-                for phase in range(PHASES)
-            }
-            lost = [f"phase {phase}: {why}" for phase, why in failures.items() if why is not None]
-            return "; ".join(lost) or None
+    def failure_of(impulse: float, direction: str) -> str | None:
+        lost: list[str] = []
+        for phase in range(PHASES):
+            try:
+                if not trotting:
+                    trotting.append(TrialRobot(trial))
+                    _start(trotting[0], VelocityCommand(PUSHED_SPEED))
+                    trotting[0].truth.clear()
+                    trotting[0].wait(START_TIME)
+                _push(trotting[0], force_of(impulse, direction), phase)
+            except TrialFailed as failed:
+                trotting.pop().close()
+                lost.append(f"phase {phase}: {failed}")
+        return "; ".join(lost) or None
 
+    try:
         return measure_impulses(PUSH_METRICS, failure_of)
-
-
-def _start_pushed(robot: TrialRobot) -> None:
-    _start(robot, VelocityCommand(PUSHED_SPEED))
-    robot.truth.clear()
-    robot.wait(START_TIME)
+    finally:
+        for robot in trotting:
+            robot.close()
 
 
 def _push(robot: TrialRobot, force: np.ndarray, phase: int) -> None:
@@ -157,4 +160,4 @@ def _push(robot: TrialRobot, force: np.ndarray, phase: int) -> None:
 
 
 TROT = Scenario("trot", TROT_METRICS, measure_trot)
-PUSHES = Scenario("trot-pushes", tuple(push.metric for push in PUSH_METRICS), measure_pushes)
+PUSHES = Scenario("trot-pushes", PUSH_METRICS, measure_pushes)
