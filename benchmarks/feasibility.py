@@ -16,7 +16,7 @@ from typing import Any
 
 from benchmarks.generated_motions import GeneratedMotion, generated_motion, near_limit_motion
 from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.session import add_options, checked_target, measure_all, positive, publish
+from benchmarks.session import add_options, measure_all, positive, publish
 from benchmarks.trials import Trial, TrialRobot
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_measurement import MotionMeasurement, measure_motion
@@ -74,12 +74,11 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check and play the motions; report how often the check was right."""
-    target = checked_target(args)
     tasks = [(CLEAR_MOTIONS, seed) for seed in range(args.motions)]
     results = measure_all(args, [*tasks, *((NEAR_LIMITS, seed) for seed in range(args.near))])
     matrix = ConfusionMatrix.of(results.get(CLEAR_MOTIONS.name, {}), generated_motion)
     near = ConfusionMatrix.of(results.get(NEAR_LIMITS.name, {}), near_limit_motion)
-    publish(args, target, {**matrix.as_dict(), "near_limits": near.as_dict()}, render(matrix, near))
+    publish(args, {**matrix.as_dict(), "near_limits": near.as_dict()}, render(matrix, near))
     return ExitCode.OK if matrix.ok else ExitCode.FAILED
 
 
