@@ -91,7 +91,7 @@ motion: the [tutorial](tutorial.md).
 EXAMPLES = """
 python -m benchmarks gallery docs              the page and all pictures
 python -m benchmarks gallery docs bow wave     the page and these pictures
-python -m benchmarks gallery docs --film       the film at the top of the README
+python -m benchmarks gallery docs --film         the film of the README
 """
 
 
