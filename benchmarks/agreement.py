@@ -10,6 +10,7 @@ block by block where blocks have different units, so that a large block cannot h
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -150,7 +151,7 @@ def mujoco_dynamics(model: mujoco.MjModel, sample: DynamicsSample) -> Dynamics:
     dense = np.zeros((18, 18))
     mujoco.mj_fullM(model, data, dense)
     return {
-        "mass": model.body_subtreemass[base],
+        "mass": np.array(model.body_subtreemass[base]),
         "com": data.subtree_com[base].copy(),
         "composite_inertia": _composite_inertia(model, data),
         "mass_matrix": T.T @ dense @ T,
@@ -172,11 +173,9 @@ def relative_errors(found: Dynamics, expected: Dynamics) -> dict[str, float]:
 
 def _blocks(value: np.ndarray) -> list[np.ndarray]:
     """The parts of a generalised vector or matrix that have different units."""
-    if value.shape == (18,):
-        return [value[i] for i in _BLOCKS]
-    if value.shape == (18, 18):
-        return [value[i, j] for i in _BLOCKS for j in _BLOCKS]
-    return [np.asarray(value)]
+    if value.shape[:1] != (18,):
+        return [value]
+    return [value[index] for index in product(_BLOCKS, repeat=value.ndim)]
 
 
 def _write_state(
