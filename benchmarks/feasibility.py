@@ -126,15 +126,7 @@ def what_went_wrong(run: MotionMeasurement, plan: MotionPlan) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One motion: what the check said, and what came of it.
-
-    Attributes:
-        seed: which motion.
-        kind: how it was generated.
-        is_refused: by the check.
-        has_failed: in physics.
-        refusal, harm: why, in words.
-    """
+    """One motion: whether the check refused it, whether physics failed it, and why."""
 
     seed: int
     kind: str

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 from PIL import Image, ImageDraw, ImageFont
 
 from controller.cli.common import ExitCode, Subparsers, add_parser
@@ -175,7 +174,8 @@ def telling_rows(recording: Recording) -> list[int]:
     trunk, among the rows that are at least ``FAR`` of the way from the start.
     """
     robot = PosedRobot(load_robot_visuals())
-    points = np.array([_points(q, robot) for q in recording.q])
+    places = ((robot.feet(q), robot.on_trunk(TRUNK_POINTS)) for q in recording.q)
+    points = np.array([np.vstack(pair).ravel() for pair in places])
     away = np.linalg.norm(points - points[0], axis=1)
     distance = np.where(away >= FAR * away.max(), away, -1.0)
     chosen = [0]
@@ -205,11 +205,6 @@ def picture(recording: Recording, rows: Sequence[int]) -> bytes:
         line, column = divmod(place, MOMENTS)
         sheet.paste(panel, (column * (width + GAP), line * (height + GAP)))
     return encoded_webp([sheet], 0, SIZE_LIMIT)
-
-
-def _points(q: Float[np.ndarray, "19"], robot: PosedRobot) -> Float[np.ndarray, " k"]:
-    """Places [m] in the world that tell poses apart."""
-    return np.vstack([robot.feet(q), robot.on_trunk(TRUNK_POINTS)]).ravel()
 
 
 def demo() -> Recording:

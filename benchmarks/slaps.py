@@ -28,14 +28,7 @@ PLACE_TOLERANCE = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Slap:
-    """A force on the held paw.
-
-    Attributes:
-        name: begins the names of its metrics.
-        item: what the report calls it.
-        force: [N].
-        duration: [s].
-    """
+    """A ``force`` [N] on the held paw for ``duration`` [s]; ``name`` begins its metrics' names."""
 
     name: str
     item: str
