@@ -32,13 +32,9 @@ _TORQUE = 10.0  # N m and N; half the hip's limit
 
 @dataclass(frozen=True, slots=True)
 class DynamicsSample:
-    """One random state with what goes into inverse and forward dynamics, as Pinocchio sees it.
+    """One random state, with an acceleration and a force, in Pinocchio's conventions.
 
-    Attributes:
-        q: configuration, quaternion x y z w.
-        v: velocity, base twist in the base frame.
-        a: acceleration, likewise.
-        tau: generalised force, likewise; the base's six are an external wrench.
+    The first six of ``tau`` are an external wrench on the base, in its frame as ``v`` and ``a``.
     """
 
     q: Float[np.ndarray, "19"]
@@ -59,20 +55,9 @@ Dynamics = dict[str, Float[np.ndarray, "..."]]
 """
 
 
-def model_agreement(
-    n: int, seed: int, description: RobotDescription | None = None
-) -> dict[str, float]:
-    """Worst relative disagreement between MuJoCo and Pinocchio over ``n`` random states.
-
-    Args:
-        n: number of states.
-        seed: of the states.
-        description: the robot; ``None`` takes the installed one.
-
-    Returns:
-        For each quantity of ``Dynamics`` the largest relative error.
-    """
-    description = description or find_description()
+def model_agreement(n: int, seed: int) -> dict[str, float]:
+    """Largest relative error of each quantity of ``Dynamics`` over ``n`` random states."""
+    description = find_description()
     pinocchio_model = pin.buildModelFromUrdf(str(description.urdf_path), pin.JointModelFreeFlyer())
     mujoco_model = ideal_mujoco_model(description)
     rng = np.random.default_rng(seed)
