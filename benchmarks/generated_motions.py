@@ -26,13 +26,11 @@ class GeneratedMotion:
 
     Attributes:
         kind: the maker's name.
-        is_broken: whether it is meant to be impossible; None if that is left to chance.
         line: as it is written.
         start: time [s] at which the plan is entered; above 0 for a wrong entry.
     """
 
     kind: str
-    is_broken: bool | None
     line: Timeline
     start: float = 0.0
 
@@ -328,18 +326,15 @@ LATE = 1.0
 
 def generated_motion(seed: int) -> GeneratedMotion:
     """The motion of a seed: even seeds give good ones, odd ones broken, each kind in turn."""
-    is_broken = bool(seed % 2)
-    return _made(BROKEN if is_broken else GOOD, seed // 2, seed, is_broken=is_broken)
+    return _made((GOOD, BROKEN)[seed % 2], seed // 2, seed)
 
 
 def near_limit_motion(seed: int) -> GeneratedMotion:
     """The motion of a seed among those from easy to impossible, each kind in turn."""
-    return _made(NEAR, seed, seed, is_broken=None)
+    return _made(NEAR, seed, seed)
 
 
-def _made(
-    makers: Mapping[str, Maker], turn: int, seed: int, *, is_broken: bool | None
-) -> GeneratedMotion:
+def _made(makers: Mapping[str, Maker], turn: int, seed: int) -> GeneratedMotion:
     kind = list(makers)[turn % len(makers)]
     line = replace(makers[kind](_Draw(seed)), name=f"{kind} {seed}")
-    return GeneratedMotion(kind, is_broken, line, LATE if kind == "wrong entry" else 0.0)
+    return GeneratedMotion(kind, line, LATE if kind == "wrong entry" else 0.0)
