@@ -19,7 +19,6 @@ from controller.demo import run_demo
 from controller.go2_controller import GO2Controller
 from go2_wbc.errors import MotionError
 from go2_wbc.files import checked_output, write_atomically
-from go2_wbc.plant import MujocoPlant
 from go2_wbc.recording import Recording
 from motions import Motion, Timeline, find_motion, motion_names
 from viz.palette import INK
@@ -114,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
         return ExitCode.OK
     target = checked_output(args.folder / "gallery.md", (".md",))
     timelines = [find_motion(name)() for name in args.names or motion_names()]
-    with GO2Controller(plant=MujocoPlant()) as robot:
+    with GO2Controller() as robot:
         robot.stand()
         for line in timelines:
             recording = played(line, robot)
