@@ -80,7 +80,7 @@ def _run_over_ros(args: argparse.Namespace) -> int:
     from controller.cli.progress import ProgressLine
     from controller.demo.report import DemoReport, StepResult
 
-    with ProgressLine(sys.stderr) as line:
+    with ProgressLine() as line:
         done: list[StepResult] = []
 
         def show(result: StepResult) -> None:

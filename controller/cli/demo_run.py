@@ -54,7 +54,7 @@ def run_demo_command(args: argparse.Namespace) -> int:
 
 
 def _perform(args: argparse.Namespace) -> tuple[DemoReport, Recording]:
-    with ProgressLine(sys.stderr) as line:
+    with ProgressLine() as line:
 
         def show(progress: DemoProgress) -> None:
             place = f"{progress.index + 1}/{progress.count} {progress.label}"
@@ -108,7 +108,7 @@ def _settings(args: argparse.Namespace) -> dict[str, object]:
 
 
 def _picture(recording: Recording, report: DemoReport, files: DemoFiles) -> list[Path]:
-    with ProgressLine(sys.stderr) as line:
+    with ProgressLine() as line:
         return export_media(
             recording,
             report,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from controller.cli.motion_args import add_motion, timelines
@@ -39,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     lines = timelines(args.motion, args.values)
     checker = FeasibilityChecker()
     reports = []
-    with ProgressLine(sys.stderr) as progress:
+    with ProgressLine() as progress:
         for number, line in enumerate(lines):
             progress.update(number / len(lines), line.name)
             reports.append(checker.check(line))

@@ -52,7 +52,7 @@ def write_files(args: argparse.Namespace) -> int:
 def _written(checked: CheckedMotion, targets: dict[str, Path]) -> dict[str, Path]:
     content, title = planned(checked), checked.plan.name
     written = {}
-    with ProgressLine(sys.stderr) as line:
+    with ProgressLine() as line:
         if "html" in targets:
             line.update(0.0, f"writing {targets['html'].name}")
             written["html"] = viz.export_html(content, targets["html"], title=title)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -68,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.force:
         report.raise_if_infeasible()
     with (
-        ProgressLine(sys.stderr) as line,
+        ProgressLine() as line,
         closing(GroundTruth(MujocoPlant(friction=args.friction))) as truth,
         GO2Controller(plant=truth) as go2,
     ):
