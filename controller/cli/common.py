@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from enum import IntEnum
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -53,3 +54,14 @@ def examples_epilog(examples: str) -> str | None:
 def print_json(value: object) -> None:
     """Print ``value`` for a program to read."""
     print(json.dumps(value, indent=2))
+
+
+def print_json_line(value: object) -> None:
+    """Print ``value`` as one line, at once, for a program that follows."""
+    print(json.dumps(value), flush=True)
+
+
+def shown_path(path: Path) -> Path:
+    """``path`` as a person reads it: relative where it lies below the working directory."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path

@@ -85,8 +85,7 @@ def _run_over_ros(args: argparse.Namespace) -> int:
 
         def show(result: StepResult) -> None:
             done.append(result)
-            verdict = "ok" if result.ok else f"NOT DONE: {result.reason}"
-            line.done(f"{len(done)}/{len(STEPS)} {result.label}: {verdict}")
+            line.done(f"{len(done)}/{len(STEPS)} {result.label}: {result.verdict}")
 
         results = run_ros_demo(args.namespace, show)
     ok = all(step.ok for step in results)
