@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from go2_wbc.errors import CommandError, unknown_name
 
 if TYPE_CHECKING:
-    from motions import Motion, Timeline
+    from motions import FeasibilityReport, Motion, Timeline
 
 MOTION_HELP = "a name of the library, FILE.py, or FILE.py:NAME"
 
@@ -76,6 +76,13 @@ def motions_of(word: str) -> list[Motion]:
     if name not in own:
         raise CommandError(f"{path}: {unknown_name('motion', name, own)}")
     return [own[name]]
+
+
+def print_verdict(report: FeasibilityReport) -> None:
+    """Print a line about a motion, and one for each limit that it breaks."""
+    print(
+        report.summary(), *(f"     {finding}" for finding in report.failures), sep="\n", flush=True
+    )
 
 
 class MotionSource:
