@@ -16,10 +16,8 @@ MOTION_HELP = "a name of the library, FILE.py, or FILE.py:NAME"
 
 def add_motion(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
     """Add the argument for one motion, or any number, and the option for parameters."""
-    if many:
-        parser.add_argument("motion", metavar="MOTION", nargs="*", help=MOTION_HELP)
-    else:
-        parser.add_argument("motion", metavar="MOTION", help=MOTION_HELP)
+    number = "*" if many else None
+    parser.add_argument("motion", metavar="MOTION", nargs=number, help=MOTION_HELP)
     parser.add_argument(
         "--set",
         metavar="NAME=VALUE",
@@ -80,9 +78,8 @@ def motions_of(word: str) -> list[Motion]:
 
 def print_verdict(report: FeasibilityReport) -> None:
     """Print a line about a motion, and one for each limit that it breaks."""
-    print(
-        report.summary(), *(f"     {finding}" for finding in report.failures), sep="\n", flush=True
-    )
+    lines = [report.summary(), *(f"     {finding}" for finding in report.failures)]
+    print("\n".join(lines), flush=True)
 
 
 class MotionSource:
