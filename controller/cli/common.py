@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib.metadata
 import json
 from enum import IntEnum
 from pathlib import Path
@@ -13,6 +14,10 @@ if TYPE_CHECKING:
 else:  # argparse's class takes no subscript at run time
     Subparsers = argparse._SubParsersAction
 """What a subcommand's ``register`` adds its parser to."""
+
+
+PROGRAM = "go2-wbc"
+"""The name of the command line, and of the package."""
 
 
 class ExitCode(IntEnum):
@@ -65,3 +70,11 @@ def shown_path(path: Path) -> Path:
     """``path`` as a person reads it: relative where it lies below the working directory."""
     here = Path.cwd()
     return path.relative_to(here) if path.is_relative_to(here) else path
+
+
+def installed_version(distribution: str) -> str | None:
+    """Version of an installed package; ``None`` if it is not installed."""
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return None

@@ -19,15 +19,15 @@ from enum import Enum
 from itertools import groupby
 from pathlib import Path
 
-from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
-from controller.cli.probes import (
-    PROJECT,
-    ImportProbe,
+from controller.cli.common import (
+    PROGRAM,
+    ExitCode,
+    Subparsers,
+    add_parser,
     installed_version,
-    probe_imports,
-    requirements_of,
-    satisfies,
+    print_json,
 )
+from controller.cli.probes import ImportProbe, probe_imports, requirements_of, satisfies
 from go2_wbc.errors import DescriptionError
 
 EXAMPLES = """
@@ -133,10 +133,10 @@ def examine() -> list[Finding]:
     versions = {name: installed_version(name) for name in (*LIBRARIES, *ROS2)}
     ros2 = {module for name, module in ROS2.items() if versions[name] is not None}
     probes = probe_imports({module for module in LIBRARIES.values() if module} | ros2)
-    bounds = requirements_of(PROJECT)
+    bounds = requirements_of(PROGRAM)
     findings = [
         judge_python(sys.version_info[:3], platform.platform()),
-        _judge_project(installed_version(PROJECT)),
+        _judge_project(installed_version(PROGRAM)),
     ]
     for name, module in LIBRARIES.items():
         probe = probes[module] if module else ImportProbe()
@@ -184,8 +184,8 @@ def judge_python(version: tuple[int, ...], system: str) -> Finding:
 
 def _judge_project(version: str | None) -> Finding:
     if version is None:
-        return Finding("Python", PROJECT, Status.PROBLEM, "not installed", f"{_pip()} -e .")
-    return Finding("Python", PROJECT, Status.OK, version)
+        return Finding("Python", PROGRAM, Status.PROBLEM, "not installed", f"{_pip()} -e .")
+    return Finding("Python", PROGRAM, Status.OK, version)
 
 
 def judge_library(name: str, version: str | None, bounds: str, probe: ImportProbe) -> Finding:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import importlib.metadata
 import logging
 import os
 import sys
@@ -19,7 +18,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
 
-from controller.cli.common import ExitCode, Subparsers, examples_epilog
+from controller.cli.common import (
+    PROGRAM,
+    ExitCode,
+    Subparsers,
+    examples_epilog,
+    installed_version,
+)
 from go2_wbc.errors import (
     CommandError,
     ConfigError,
@@ -29,8 +34,6 @@ from go2_wbc.errors import (
     QpInfeasible,
     SolverUnavailable,
 )
-
-PROGRAM = "go2-wbc"
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +112,13 @@ def run_program(program: Program, argv: Sequence[str] | None = None) -> int:
         0 fine, 1 infeasible or failed, 2 usage, 3 runtime error, 130 interrupted.
     """
     try:
-        code = _run_reporting_errors(program, list(sys.argv[1:] if argv is None else argv))
+        try:
+            code = _run(program, list(sys.argv[1:] if argv is None else argv))
+        except BrokenPipeError:
+            raise
+        except (KeyboardInterrupt, Exception) as error:
+            message, code = _explained(error)
+            print(f"{program.name}: {message}", file=sys.stderr)
         sys.stdout.flush()
     except BrokenPipeError:
         # The reader has gone. Python flushes once more at exit: let that go nowhere.
@@ -139,7 +148,8 @@ def build_parser(
         epilog=examples_epilog(program.examples),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"{PROGRAM} {_version()}")
+    version = installed_version(PROGRAM) or "(not installed)"
+    parser.add_argument("--version", action="version", version=f"{PROGRAM} {version}")
     parser.add_argument(
         "-v", "--verbose", action="store_true", help="log what happens (to standard error)"
     )
@@ -152,20 +162,6 @@ def build_parser(
         else:
             subparsers.add_parser(command.name, help=command.summary)
     return parser
-
-
-def _run_reporting_errors(program: Program, argv: list[str]) -> int:
-    try:
-        return _run(program, argv)
-    except BrokenPipeError:
-        raise
-    except KeyboardInterrupt:
-        return _complain(program, "interrupted", ExitCode.INTERRUPTED)
-    except Go2WbcError as error:
-        code = next(code for kind, code in EXIT_CODES if isinstance(error, kind))
-        return _complain(program, str(error), code)
-    except Exception as error:
-        return _complain_about_foreign(program, error)
 
 
 def _run(program: Program, argv: list[str]) -> int:
@@ -187,32 +183,19 @@ def _run(program: Program, argv: list[str]) -> int:
     return module.run(args)
 
 
-def _complain_about_foreign(program: Program, error: Exception) -> int:
-    """Report an error that is not of our tree: a missing library, a file, or a bug."""
+def _explained(error: BaseException) -> tuple[str, ExitCode]:
+    """What to say of an error, and the exit code; a bug shows its traceback first."""
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted", ExitCode.INTERRUPTED
+    if isinstance(error, Go2WbcError):
+        return str(error), next(code for kind, code in EXIT_CODES if isinstance(error, kind))
     if isinstance(error, ImportError) and (error.name or "").split(".")[0] not in _OURS:
-        return _complain(
-            program,
-            f"{error}; `{PROGRAM} doctor` says what is missing and how to get it",
-            ExitCode.RUNTIME,
-        )
+        hint = f"`{PROGRAM} doctor` says what is missing and how to get it"
+        return f"{error}; {hint}", ExitCode.RUNTIME
     if isinstance(error, OSError) and error.filename is not None:
-        return _complain(program, f"{error.filename}: {error.strerror}", ExitCode.RUNTIME)
+        return f"{error.filename}: {error.strerror}", ExitCode.RUNTIME
     traceback.print_exception(error)
-    return _complain(
-        program, "this is a bug in the program; the lines above say where", ExitCode.RUNTIME
-    )
-
-
-def _complain(program: Program, message: str, code: ExitCode) -> int:
-    print(f"{program.name}: {message}", file=sys.stderr)
-    return code
-
-
-def _version() -> str:
-    try:
-        return importlib.metadata.version(PROGRAM)
-    except importlib.metadata.PackageNotFoundError:
-        return "(not installed)"
+    return "this is a bug in the program; the lines above say where", ExitCode.RUNTIME
 
 
 if __name__ == "__main__":

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
-PROJECT = "go2-wbc"
 IMPORT_TIME_LIMIT = 60.0
 """Seconds after which an import counts as hung; the slowest takes 1 s on a laptop."""
 
@@ -73,14 +72,6 @@ def _probe(module: str) -> ImportProbe:
         return ImportProbe(error=lines[-1])
     answer = json.loads(done.stdout.splitlines()[-1])
     return ImportProbe(file=answer["file"], solvers=tuple(answer["solvers"]))
-
-
-def installed_version(distribution: str) -> str | None:
-    """Version of an installed package; ``None`` if it is not installed."""
-    try:
-        return importlib.metadata.version(distribution)
-    except importlib.metadata.PackageNotFoundError:
-        return None
 
 
 def requirements_of(distribution: str) -> Mapping[str, str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from controller.cli import doctor, probes
-from controller.cli.common import ExitCode
+from controller.cli.common import PROGRAM, ExitCode
 from controller.cli.doctor import Finding, Status
 from controller.cli.probes import ImportProbe
 from go2_wbc.errors import DescriptionError
@@ -28,7 +28,7 @@ def test_the_environment_of_these_tests_is_healthy() -> None:
     findings = doctor.examine()
     # Whether the project itself is installed does not matter for running its tests.
     problems = [item for item in findings if item.status is Status.PROBLEM]
-    assert [item for item in problems if item.subject != probes.PROJECT] == []
+    assert [item for item in problems if item.subject != PROGRAM] == []
     subjects = {item.subject for item in findings}
     assert {"pin", "placo", "mujoco", "placo + pin", "URDF", "SRDF", "daqp"} <= subjects
 
