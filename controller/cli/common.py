@@ -34,14 +34,7 @@ class ExitCode(IntEnum):
 def add_parser(
     subparsers: Subparsers, name: str, description: str, *, examples: str = ""
 ) -> argparse.ArgumentParser:
-    """Add the parser of the subcommand ``name``.
-
-    Args:
-        subparsers: where to add it.
-        name: the subcommand.
-        description: what it does, shown above the options.
-        examples: command lines, one per line, shown below the options.
-    """
+    """Add the parser of the subcommand ``name``; its examples are one line each."""
     return subparsers.add_parser(
         name,
         description=description,

@@ -16,15 +16,8 @@ import sys
 import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import ModuleType
 
-from controller.cli.common import (
-    PROGRAM,
-    ExitCode,
-    Subparsers,
-    examples_epilog,
-    installed_version,
-)
+from controller.cli.common import PROGRAM, ExitCode, examples_epilog, installed_version
 from go2_wbc.errors import (
     CommandError,
     ConfigError,
@@ -96,9 +89,8 @@ class Program:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run ``go2-wbc``; see ``run_program``."""
-    return run_program(
-        Program(PROGRAM, "Whole-body control of the Unitree Go2.", COMMANDS, EXAMPLES), argv
-    )
+    description = "Whole-body control of the Unitree Go2."
+    return run_program(Program(PROGRAM, description, COMMANDS, EXAMPLES), argv)
 
 
 def run_program(program: Program, argv: Sequence[str] | None = None) -> int:
@@ -132,15 +124,27 @@ def high_five_demo() -> int:
     return main(["demo", *sys.argv[1:]])
 
 
-def build_parser(
-    program: Program, module: ModuleType | None, requested: str | None
-) -> argparse.ArgumentParser:
-    """The parser of the whole command line.
+def _run(program: Program, argv: list[str]) -> int:
+    requested = next((word for word in argv if not word.startswith("-")), None)
+    parser = build_parser(program, requested)
+    try:
+        args = parser.parse_args(argv)
+    except SystemExit as stop:  # argparse has printed its help, version or complaint
+        return stop.code if isinstance(stop.code, int) else ExitCode.USAGE
+    logging.basicConfig(
+        level=logging.INFO if args.verbose else logging.WARNING,
+        format="%(levelname)s: %(message)s",
+    )
+    if args.run is None:
+        parser.print_help(sys.stderr)
+        return ExitCode.USAGE
+    return args.run(args)
 
-    Args:
-        program: whose.
-        module: the module of the requested subcommand, which registers its own options.
-        requested: that subcommand's name; the others are listed by name and summary only.
+
+def build_parser(program: Program, requested: str | None) -> argparse.ArgumentParser:
+    """The parser of a whole command line.
+
+    Only the ``requested`` subcommand is imported and adds its options; the others are listed.
     """
     parser = argparse.ArgumentParser(
         prog=program.name,
@@ -153,34 +157,16 @@ def build_parser(
     parser.add_argument(
         "-v", "--verbose", action="store_true", help="log what happens (to standard error)"
     )
-    subparsers: Subparsers = parser.add_subparsers(
-        title="commands", dest="command", metavar="COMMAND"
-    )
+    parser.set_defaults(run=None)
+    subparsers = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
     for command in program.commands:
-        if module is not None and command.name == requested:
+        if command.name == requested:
+            module = importlib.import_module(command.module)
             module.register(subparsers)
+            parser.set_defaults(run=module.run)
         else:
             subparsers.add_parser(command.name, help=command.summary)
     return parser
-
-
-def _run(program: Program, argv: list[str]) -> int:
-    requested = next((word for word in argv if not word.startswith("-")), None)
-    modules = {command.name: command.module for command in program.commands}
-    module = importlib.import_module(modules[requested]) if requested in modules else None
-    parser = build_parser(program, module, requested)
-    try:
-        args = parser.parse_args(argv)
-    except SystemExit as stop:  # argparse has printed its help, version or complaint
-        return stop.code if isinstance(stop.code, int) else ExitCode.USAGE
-    logging.basicConfig(
-        level=logging.INFO if args.verbose else logging.WARNING,
-        format="%(levelname)s: %(message)s",
-    )
-    if module is None:
-        parser.print_help(sys.stderr)
-        return ExitCode.USAGE
-    return module.run(args)
 
 
 def _explained(error: BaseException) -> tuple[str, ExitCode]:
