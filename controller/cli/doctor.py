@@ -78,7 +78,7 @@ NEEDED_SOLVERS: Mapping[str, str] = {"daqp": "daqp", "proxqp": "proxsuite", "qua
 
 
 class Status(Enum):
-    """How a finding bears on the installation."""
+    """How a finding bears on the installation: with a problem the project does not work."""
 
     OK = "ok"
     NOTE = "note"
@@ -87,15 +87,7 @@ class Status(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at.
-
-    Attributes:
-        section: heading that it is printed under.
-        subject: what was looked at.
-        status: ``PROBLEM`` means that the project does not work like this.
-        detail: what was found.
-        remedy: the line to type, if there is something to do.
-    """
+    """One thing that was looked at, and the line to type if there is something to do."""
 
     section: str
     subject: str
@@ -209,14 +201,7 @@ def judge_library(name: str, version: str | None, bounds: str, probe: ImportProb
 
 
 def judge_pairing(placo: str | None, pin: str | None, wanted: str, bounds: str) -> list[Finding]:
-    """Whether placo and Pinocchio were built for each other: placo decides Pinocchio's version.
-
-    Args:
-        placo: installed version of placo.
-        pin: installed version of Pinocchio.
-        wanted: the Pinocchio that the installed placo requires.
-        bounds: of placo.
-    """
+    """Whether placo and Pinocchio were built for each other: placo says which is ``wanted``."""
     if placo is None or pin is None:
         return []
     too_new = satisfies(pin, ">=4") and satisfies(placo, "<0.10")
