@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib.metadata
 import json
+import textwrap
 from enum import IntEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -32,7 +33,7 @@ class ExitCode(IntEnum):
 
 
 def add_parser(
-    subparsers: Subparsers, name: str, description: str, *, examples: str = ""
+    subparsers: Subparsers, name: str, description: str, *, examples: str
 ) -> argparse.ArgumentParser:
     """Add the parser of the subcommand ``name``; its examples are one line each."""
     return subparsers.add_parser(
@@ -43,10 +44,9 @@ def add_parser(
     )
 
 
-def examples_epilog(examples: str) -> str | None:
-    """The ``examples:`` block at the end of a help text; ``None`` without examples."""
-    lines = [line.strip() for line in examples.strip().splitlines()]
-    return "\n".join(["examples:", *(f"  {line}" for line in lines)]) if lines else None
+def examples_epilog(examples: str) -> str:
+    """The ``examples:`` block at the end of a help text."""
+    return "examples:\n" + textwrap.indent(examples.strip(), "  ")
 
 
 def print_json(value: object) -> None:

@@ -8,6 +8,7 @@ import json
 import sys
 from collections.abc import Mapping
 from dataclasses import fields, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -170,12 +171,7 @@ def filmstrip_times(report: DemoReport, recording: Recording) -> list[float] | N
     return [float(recording.time[row] - recording.time[0]) for row in rows]
 
 
-def _longest_mode(
-    recording: Recording, rows: Int[np.ndarray, " k"], feet: int
-) -> Int[np.ndarray, " j"]:
+def _longest_mode(recording: Recording, rows: Int[np.ndarray, " k"], feet: int) -> list[int]:
     """The longest run of ``rows`` in which the same ``feet`` feet are in stance."""
-    modes = recording.stance[rows] @ np.array([1, 2, 4, 8])
-    borders = np.flatnonzero(np.diff(modes)) + 1
-    runs = [run for run in np.split(rows, borders) if len(run)]
-    runs = [run for run in runs if recording.stance[run[0]].sum() == feet]
-    return max(runs, key=len, default=rows[:0])
+    modes = groupby(rows.tolist(), key=lambda row: recording.stance[row].tolist())
+    return max((list(run) for mode, run in modes if sum(mode) == feet), key=len, default=[])
