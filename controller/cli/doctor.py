@@ -39,6 +39,8 @@ OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)
 LIBRARIES: Mapping[str, str | None] = {
     "pin": "pinocchio",
     "placo": "placo",
+    "coal": "coal",
+    "scipy": "scipy",
     "mujoco": "mujoco",
     "numpy": "numpy",
     "proxsuite": "proxsuite",
