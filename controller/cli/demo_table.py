@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from controller.demo.report import DemoReport, DemoTotals, Measurement, StepResult
 
 WIDTH = 80
+_HEADER = f"     {'step':<21}{'time':>7}  {'figure':<23}{'asked':>9}{'measured':>9}"
 _INDENT = " " * 5
 _DECIMALS = {"deg": 1}
 """Decimals of a unit's numbers; 3 for any other."""
@@ -33,11 +34,11 @@ def render(report: DemoReport, encoding: str | None = None) -> str:
 def render_steps(steps: Sequence[StepResult], encoding: str | None = None) -> str:
     """The table of steps alone, with a line below; see ``render``."""
     marks = _marks(encoding)
-    rows = [_row("", "step", "time", "figure", "asked", "measured"), "-" * WIDTH]
+    rows = [_HEADER, "-" * WIDTH]
     for step in steps:
-        first, *others = [_cells(figure) for figure in step.figures] or [()]
-        rows.append(_row(marks[step.ok], step.label, f"{step.duration:.1f} s", *first))
-        rows += [_row("", "", "", *cells) for cells in others]
+        head = f"{marks[step.ok]:>4} {step.label:<21}{step.duration:>5.1f} s  "
+        first, *others = [_cells(figure) for figure in step.figures] or [""]
+        rows += [(head + first).rstrip(), *(" " * len(head) + cells for cells in others)]
         if not step.ok:
             rows += textwrap.wrap(
                 step.reason, WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT
@@ -53,23 +54,11 @@ def _marks(encoding: str | None) -> dict[bool, str]:
     return {True: "✓", False: "✗"}
 
 
-def _row(
-    mark: str,
-    label: str,
-    time: str,
-    name: str = "",
-    asked: str = "",
-    measured: str = "",
-    unit: str = "",
-) -> str:
-    return f"{mark:>4} {label:<21}{time:>7}  {name:<23}{asked:>9}{measured:>9} {unit}".rstrip()
-
-
-def _cells(figure: Measurement) -> tuple[str, str, str, str]:
+def _cells(figure: Measurement) -> str:
     decimals = _DECIMALS.get(figure.unit, 3)
     asked = "" if figure.asked is None else f"{figure.asked:.{decimals}f}"
     measured = f"{figure.measured:.{decimals}f}" if math.isfinite(figure.measured) else "-"
-    return figure.name, asked, measured, figure.unit
+    return f"{figure.name:<23}{asked:>9}{measured:>9} {figure.unit}"
 
 
 def _total_rows(totals: DemoTotals) -> list[str]:
