@@ -63,16 +63,12 @@ go2-wbc doctor --json    the same for a program to read
 go2-wbc COMMAND --help   the options of a command, with examples
 """
 
-EXIT_CODES: tuple[tuple[type[Go2WbcError], ExitCode], ...] = (
-    (MotionError, ExitCode.FAILED),
-    (QpInfeasible, ExitCode.FAILED),
-    (IkError, ExitCode.FAILED),
-    (CommandError, ExitCode.USAGE),
-    (ConfigError, ExitCode.USAGE),
-    (SolverUnavailable, ExitCode.USAGE),
-    (Go2WbcError, ExitCode.RUNTIME),
+EXIT_CODES: tuple[tuple[tuple[type[Go2WbcError], ...], ExitCode], ...] = (
+    ((MotionError, QpInfeasible, IkError), ExitCode.FAILED),
+    ((CommandError, ConfigError, SolverUnavailable), ExitCode.USAGE),
+    ((Go2WbcError,), ExitCode.RUNTIME),
 )
-"""The exit code of an error; the first class that fits counts."""
+"""The exit code of an error; the first row that fits counts."""
 
 _OURS = frozenset({"go2_wbc", "controller", "motions", "viz", "benchmarks"})
 
@@ -174,7 +170,7 @@ def _explained(error: BaseException) -> tuple[str, ExitCode]:
     if isinstance(error, KeyboardInterrupt):
         return "interrupted", ExitCode.INTERRUPTED
     if isinstance(error, Go2WbcError):
-        return str(error), next(code for kind, code in EXIT_CODES if isinstance(error, kind))
+        return str(error), next(code for kinds, code in EXIT_CODES if isinstance(error, kinds))
     if isinstance(error, ImportError) and (error.name or "").split(".")[0] not in _OURS:
         hint = f"`{PROGRAM} doctor` says what is missing and how to get it"
         return f"{error}; {hint}", ExitCode.RUNTIME
