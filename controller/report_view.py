@@ -97,14 +97,15 @@ def _grouped(annotations: Sequence[Annotation]) -> tuple[Annotation, ...]:
     """One annotation for the subjects that meet the same limit at about the same time."""
     joined, left = [], list(annotations)
     while left:
-        first = left[0]
+        first, *others = left
         group = [
             item
-            for item in left
+            for item in others
             if (item.limit, item.is_broken) == (first.limit, first.is_broken)
             and abs(item.time - first.time) < _TOGETHER
         ]
-        left = [item for item in left if item not in group]
+        left = [item for item in others if item not in group]
+        group.insert(0, first)
         whole = replace(
             first,
             subject=_together([item.subject for item in group]),
