@@ -81,7 +81,7 @@ def measure_all(args: argparse.Namespace, tasks: Sequence[Task]) -> Results:
             results[scenario.name][seed] = measurement
         else:
             left.append((scenario, seed))
-    with ProgressLine(sys.stderr) as line:
+    with ProgressLine() as line:
         line.update(0.0, "starting")
         for scenario, seed, measurement in run_tasks(left, getattr(args, "jobs", 1)):
             log.append(scenario.name, seed, measurement)
