@@ -113,12 +113,10 @@ def _round_trip(client: Client) -> float:
 
 def measure_stream(_trial: Trial) -> Measurement:
     """Answer every ``rt/lowstate`` with a damping command for ten seconds."""
-    from controller.bridges.unitree import idl
-
     with own_domain() as domain, simulator(domain) as process:
         bus = Observer(domain).bus
-        states = bus.reader("rt/lowstate", idl.low_state(), depth=64)
-        commands = bus.writer("rt/lowcmd", idl.low_cmd())
+        states = bus.reader("rt/lowstate", depth=64)
+        commands = bus.writer("rt/lowcmd")
         decode, encode = codec_of(layout.LOW_STATE).decode, codec_of(layout.LOW_CMD).encode
         states.wait(5.0)
         time.sleep(1.0)  # both ends must have found each other before losses count

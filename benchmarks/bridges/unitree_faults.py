@@ -76,12 +76,10 @@ class Scene:
 
     def __init__(self, process: Process, domain: int) -> None:
         """Join the domain of a simulator that serves."""
-        from controller.bridges.unitree import idl
-
         self.process, self.domain = process, domain
         self.observer = Observer(domain)
         self.client = client_of(self.observer.bus, SPORT_SERVICE)
-        self._commands = self.observer.bus.writer("rt/lowcmd", idl.low_cmd())
+        self._commands = self.observer.bus.writer("rt/lowcmd")
 
     def call(self, api: int, parameter: str = "{}") -> int:
         """The code that a call of the sport service is answered with."""

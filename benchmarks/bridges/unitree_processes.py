@@ -95,13 +95,12 @@ class Observer:
     def __init__(self, domain: int) -> None:
         """Listen on the loopback."""
         require_dds()
-        from controller.bridges.unitree import idl
         from controller.bridges.unitree.bus import Bus
         from controller.bridges.unitree.codec import codec_of
         from controller.bridges.unitree.layout import SPORT_STATE
 
         self.bus = Bus(domain, LOOPBACK)
-        self._reader = self.bus.reader("rt/sportmodestate", idl.sport_state(), depth=1000)
+        self._reader = self.bus.reader("rt/sportmodestate", depth=1000)
         self._decode = codec_of(SPORT_STATE).decode
         self._newest: Shaped[np.ndarray, "1"] | None = None
         self.largest_tilt = 0.0

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cache
-from typing import Final, final
+from typing import Any, Final, TypeVar, final
 
 import numpy as np
 from jaxtyping import Shaped
@@ -22,8 +22,6 @@ from go2_wbc.errors import CommandError
 
 LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 """Encapsulation header of little-endian CDR."""
-_REQUEST_HEAD: Final = struct.Struct("<qqqi?")
-_RESPONSE_HEAD: Final = struct.Struct("<qqi")
 _LENGTH: Final = struct.Struct("<I")
 
 
@@ -96,14 +94,16 @@ class Request:
         id: chosen by the client, repeated in the response.
         api_id: which procedure.
         lease_id: of a client that asked for sole control, else 0.
-        wants_reply: whether the client waits for a response.
+        priority: not used.
+        is_one_way: whether the client waits for no response.
         parameter: JSON, or empty.
     """
 
     id: int
     api_id: int
     lease_id: int = 0
-    wants_reply: bool = True
+    priority: int = 0
+    is_one_way: bool = False
     parameter: str = ""
 
 
@@ -117,70 +117,36 @@ class Response:
     data: str = ""
 
 
+Call = TypeVar("Call", Request, Response)
 Reply = Callable[[int, str], None]
 """Answers a request: code and data. Any thread may call it, once."""
+_HEADS: Final = {Request: struct.Struct("<qqqi?3x"), Response: struct.Struct("<qqi")}
+"""What goes before the text."""
 
 
-def encode_request(request: Request) -> bytes:
-    """The wire's bytes of a request."""
-    head = _REQUEST_HEAD.pack(
-        request.id, request.api_id, request.lease_id, 0, not request.wants_reply
-    )
-    return LITTLE_ENDIAN + _with_text(head, request.parameter)
-
-
-def decode_request(data: bytes) -> Request:
-    """The request of the wire's bytes.
-
-    Raises:
-        CommandError: if they are none.
-    """
-    number, api_id, lease_id, _, no_reply = _unpack(_REQUEST_HEAD, data)
-    text = _text(data, 4 + _REQUEST_HEAD.size)
-    return Request(number, api_id, lease_id, not no_reply, text)
-
-
-def encode_response(response: Response) -> bytes:
-    """The wire's bytes of a response."""
-    head = _RESPONSE_HEAD.pack(response.id, response.api_id, response.code)
-    return LITTLE_ENDIAN + _with_text(head, response.data)
-
-
-def decode_response(data: bytes) -> Response:
-    """The response of the wire's bytes.
-
-    Raises:
-        CommandError: if they are none.
-    """
-    number, api_id, code = _unpack(_RESPONSE_HEAD, data)
-    return Response(number, api_id, code, _text(data, 4 + _RESPONSE_HEAD.size))
-
-
-def _unpack(head: struct.Struct, data: bytes) -> tuple[int, ...]:
-    try:
-        return head.unpack_from(data, len(LITTLE_ENDIAN))
-    except struct.error as error:
-        raise CommandError(f"{len(data)} bytes are no message of the RPC: {error}") from error
-
-
-def _with_text(head: bytes, text: str) -> bytes:
-    """``head``, then ``text`` as a CDR string, then an empty sequence of octets."""
+def encode_call(call: Request | Response) -> bytes:
+    """The wire's bytes: numbers, the text as a CDR string, an empty sequence of octets."""
+    *numbers, text = astuple(call)
     encoded = text.encode() + b"\0"
-    body = _aligned(head) + _LENGTH.pack(len(encoded)) + encoded
-    return _aligned(body) + _LENGTH.pack(0)
+    body = _HEADS[type(call)].pack(*numbers) + _LENGTH.pack(len(encoded)) + encoded
+    return LITTLE_ENDIAN + body + bytes(-len(body) % 4) + _LENGTH.pack(0)
 
 
-def _aligned(body: bytes) -> bytes:
-    return body + bytes(-len(body) % 4)
+def decode_call(kind: type[Call], data: bytes) -> Call:
+    """The request or response of the wire's bytes.
 
-
-def _text(data: bytes, start: int) -> str:
-    start += -start % 4
+    Raises:
+        CommandError: if they are none.
+    """
+    head = _HEADS[kind]
+    start = len(LITTLE_ENDIAN) + head.size + _LENGTH.size
     try:
-        (length,) = _LENGTH.unpack_from(data, start)
-        encoded = data[start + 4 : start + 4 + length]
+        numbers = head.unpack_from(data, len(LITTLE_ENDIAN))
+        (length,) = _LENGTH.unpack_from(data, start - _LENGTH.size)
+        encoded = data[start : start + length]
         if len(encoded) != length:
             raise CommandError(f"a string of {length} bytes is cut off after {len(encoded)}")
-        return encoded.rstrip(b"\0").decode()
+        fields: list[Any] = [*numbers, encoded.rstrip(b"\0").decode()]
+        return kind(*fields)
     except (struct.error, UnicodeDecodeError) as error:
-        raise CommandError(f"the string of a message of the RPC is broken: {error}") from error
+        raise CommandError(f"{len(data)} bytes are a broken message of the RPC: {error}") from error

@@ -96,7 +96,6 @@ class UnitreePlant(Plant):
         if i_have_the_remote_in_hand is not True:
             raise CommandError(CONSENT)
         require_dds()
-        from controller.bridges.unitree import idl
         from controller.bridges.unitree.bus import Bus
         from controller.bridges.unitree.takeover import release_sport
 
@@ -108,8 +107,8 @@ class UnitreePlant(Plant):
         self._model = model
         self._where = f"DDS domain {domain}, interface {interface}"
         bus = Bus(domain, interface)
-        self._states = bus.reader("rt/lowstate", idl.low_state(), depth=QUEUE)
-        self._commands = bus.writer("rt/lowcmd", idl.low_cmd())
+        self._states = bus.reader("rt/lowstate", depth=QUEUE)
+        self._commands = bus.writer("rt/lowcmd")
         self._decode, self._encode = codec_of(LOW_STATE).decode, codec_of(LOW_CMD).encode
         self._bad_states = 0
         self._tick = -1

@@ -9,16 +9,13 @@ import time
 from collections.abc import Callable
 from typing import Final, final
 
-from controller.bridges.unitree import idl
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import (
     Reply,
     Request,
     Response,
-    decode_request,
-    decode_response,
-    encode_request,
-    encode_response,
+    decode_call,
+    encode_call,
 )
 from controller.bridges.unitree.sport_api import API_VERSION, LEASE_TERM, Api, Code
 from go2_wbc.errors import CommandError
@@ -46,10 +43,8 @@ class Server:
     ) -> None:
         """Hand requests to ``handle``; call ``patrol`` in between, every ``PATROL`` seconds."""
         self._name, self._handle, self._patrol = service, handle, patrol
-        self._reader = bus.reader(
-            f"rt/api/{service}/request", idl.request(), depth=QUEUE, reliable=True
-        )
-        self._writer = bus.writer(f"rt/api/{service}/response", idl.response())
+        self._reader = bus.reader(f"rt/api/{service}/request", depth=QUEUE, reliable=True)
+        self._writer = bus.writer(f"rt/api/{service}/response")
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._serve, name=f"rpc-{service}", daemon=True)
         self._thread.start()
@@ -72,7 +67,7 @@ class Server:
 
     def _serve_one(self, data: bytes) -> None:
         try:
-            request = decode_request(data)
+            request = decode_call(Request, data)
         except CommandError as error:
             _log.warning("%s: ignored what is no request: %s", self._name, error)
             return
@@ -91,9 +86,9 @@ class Server:
 
     def _reply_to(self, request: Request) -> Reply:
         def reply(code: int, data: str) -> None:
-            if request.wants_reply:
+            if not request.is_one_way:
                 answer = Response(request.id, request.api_id, int(code), data)
-                self._writer.write(encode_response(answer))
+                self._writer.write(encode_call(answer))
 
         return reply
 
@@ -141,10 +136,8 @@ class Client:
 
     def __init__(self, bus: Bus, service: str) -> None:
         """Call ``service``."""
-        self._writer = bus.writer(f"rt/api/{service}/request", idl.request())
-        self._reader = bus.reader(
-            f"rt/api/{service}/response", idl.response(), depth=QUEUE, reliable=True
-        )
+        self._writer = bus.writer(f"rt/api/{service}/request")
+        self._reader = bus.reader(f"rt/api/{service}/response", depth=QUEUE, reliable=True)
 
     def wait_for_server(self, seconds: float) -> bool:
         """Wait until a server has been discovered, for ``seconds`` at most."""
@@ -158,12 +151,12 @@ class Client:
     def call(self, api_id: int, parameter: str = "{}", timeout: float = 1.0) -> Response:
         """Call and wait for the answer; code 3104 (``API_TIMEOUT``) if none comes."""
         request = Request(time.time_ns(), api_id, parameter=parameter)
-        self._writer.write(encode_request(request))
+        self._writer.write(encode_call(request))
         deadline = time.monotonic() + timeout
         while (remaining := deadline - time.monotonic()) > 0.0:
             self._reader.wait(remaining)
             for data in self._reader.take():
-                response = decode_response(data)
+                response = decode_call(Response, data)
                 if response.id == request.id:
                     return response
         return Response(request.id, api_id, Code.API_TIMEOUT)
@@ -178,5 +171,5 @@ class Client:
 
     def send(self, api_id: int, parameter: str = "{}") -> None:
         """Call without an answer."""
-        request = Request(time.time_ns(), api_id, wants_reply=False, parameter=parameter)
-        self._writer.write(encode_request(request))
+        request = Request(time.time_ns(), api_id, is_one_way=True, parameter=parameter)
+        self._writer.write(encode_call(request))

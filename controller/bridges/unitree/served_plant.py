@@ -9,7 +9,7 @@ from typing import Final, final
 import numpy as np
 from jaxtyping import Shaped
 
-from controller.bridges.unitree import idl, layout
+from controller.bridges.unitree import layout
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.low_level import CommandGate, fill_imu, low_state_message
@@ -64,9 +64,9 @@ class ServedPlant(Plant):
         self._is_lockstep = lockstep
         self.gate, self.status = gate, SportStatus()
         self._inner = inner
-        self._commands = bus.reader("rt/lowcmd", idl.low_cmd(), depth=COMMAND_QUEUE)
-        self._states = bus.writer("rt/lowstate", idl.low_state())
-        self._sport_states = bus.writer("rt/sportmodestate", idl.sport_state())
+        self._commands = bus.reader("rt/lowcmd", depth=COMMAND_QUEUE)
+        self._states = bus.writer("rt/lowstate")
+        self._sport_states = bus.writer("rt/sportmodestate")
         self._encode_state = codec_of(layout.LOW_STATE).encode
         self._encode_sport_state = codec_of(layout.SPORT_STATE).encode
         self._ticks = 0

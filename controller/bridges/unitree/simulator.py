@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, final
 
-from controller.bridges.unitree import idl
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.low_level import CommandGate
@@ -157,7 +156,7 @@ class UnitreeSimulator:
 
 def _require_no_robot(domain: int, interface: str) -> None:
     """Raise BridgeError if somebody publishes ``rt/lowstate``: two would answer every call."""
-    states = Bus(domain, interface).reader("rt/lowstate", idl.low_state(), depth=1)
+    states = Bus(domain, interface).reader("rt/lowstate", depth=1)
     if states.wait(DISCOVERY):  # not its writer: the C++ SDK has one and uses it for nothing
         raise BridgeError(
             f"a robot is already on DDS domain {domain}, interface {interface}; "

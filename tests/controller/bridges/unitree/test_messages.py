@@ -13,10 +13,8 @@ from controller.bridges.unitree.codec import (
     Request,
     Response,
     codec_of,
-    decode_request,
-    decode_response,
-    encode_request,
-    encode_response,
+    decode_call,
+    encode_call,
 )
 from controller.bridges.unitree.layout import checksum, is_intact, seal
 from go2_wbc.errors import CommandError
@@ -116,21 +114,22 @@ def test_a_message_that_is_cut_off_or_big_endian_is_refused() -> None:
 
 @pytest.mark.parametrize("text", ["", "{}", '{"x": 0.5}', "abc", "ä"])
 def test_requests_and_responses_come_back(text: str) -> None:
-    request = Request(2**62, 1008, lease_id=7, wants_reply=False, parameter=text)
-    assert decode_request(encode_request(request)) == request
+    request = Request(2**62, 1008, lease_id=7, is_one_way=True, parameter=text)
+    assert decode_call(Request, encode_call(request)) == request
     response = Response(-5, 1016, 4205, text)
-    assert decode_response(encode_response(response)) == response
-    assert decode_request(encode_request(replace(request, wants_reply=True))).wants_reply
+    assert decode_call(Response, encode_call(response)) == response
+    answered = replace(request, is_one_way=False)
+    assert not decode_call(Request, encode_call(answered)).is_one_way
 
 
 @pytest.mark.parametrize("size", [0, 3, 20, 38, 41])
 def test_a_request_that_is_cut_off_is_refused(size: int) -> None:
-    data = encode_request(Request(1, 1008, parameter='{"x": 1}'))
+    data = encode_call(Request(1, 1008, parameter='{"x": 1}'))
     with pytest.raises(CommandError):
-        decode_request(data[:size])
+        decode_call(Request, data[:size])
 
 
 def test_a_request_with_bytes_that_are_no_text_is_refused() -> None:
-    data = encode_request(Request(1, 1008, parameter="abcd")).replace(b"abcd", b"\xff\xfe\xfd\xfc")
+    data = encode_call(Request(1, 1008, parameter="abcd")).replace(b"abcd", b"\xff\xfe\xfd\xfc")
     with pytest.raises(CommandError, match="broken"):
-        decode_request(data)
+        decode_call(Request, data)

@@ -51,10 +51,10 @@ class Robot:
         self.commands: list[np.ndarray] = []
         self.writers = self.readers = 1
 
-    def reader(self, topic: str, kind: type, *, depth: int) -> Robot:
+    def reader(self, topic: str, *, depth: int) -> Robot:
         return self
 
-    def writer(self, topic: str, kind: type) -> Robot:
+    def writer(self, topic: str) -> Robot:
         return self
 
     def wait(self, seconds: float) -> bool:

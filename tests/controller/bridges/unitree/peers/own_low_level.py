@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 
-from controller.bridges.unitree import idl, layout
+from controller.bridges.unitree import layout
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import codec_of
 from controller.bridges.unitree.layout import is_intact, seal
@@ -27,9 +27,9 @@ def main() -> None:
     """Write both messages at 500 Hz, count the states that came."""
     wanted, mask = int(sys.argv[1]), int(sys.argv[2])
     bus = Bus(0, "lo")
-    reader = bus.reader("rt/lowstate", idl.low_state(), depth=64)
-    commands = bus.writer("rt/lowcmd", idl.low_cmd())
-    states = bus.writer("rt/lowstate", idl.low_state())
+    reader = bus.reader("rt/lowstate", depth=64)
+    commands = bus.writer("rt/lowcmd")
+    states = bus.writer("rt/lowstate")
     command_codec, state_codec = codec_of(layout.LOW_CMD), codec_of(layout.LOW_STATE)
     command = low_cmd_message(JointCommand.servo(ANGLES, np.zeros(12), 20.0, 1.0))
     state = layout.new_message(layout.LOW_STATE)
