@@ -13,10 +13,10 @@ import struct
 from collections.abc import Callable
 from dataclasses import astuple, dataclass
 from functools import cache
-from typing import Any, Final, TypeVar, final
+from typing import Any, Final, TypeVar
 
 import numpy as np
-from jaxtyping import Shaped
+from jaxtyping import Int, Shaped, UInt8
 
 from go2_wbc.errors import CommandError
 
@@ -25,65 +25,51 @@ LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 _LENGTH: Final = struct.Struct("<I")
 
 
-@final
-class StructCodec:
-    """Encodes and decodes messages of one layout."""
-
-    def __init__(self, layout: np.dtype[np.void]) -> None:
-        """Work out where each byte goes."""
-        self._layout = layout
-        pairs, length = _byte_pairs(layout)
-        source, target = np.array(pairs).T
-        # A byte that the other side does not have is taken from the spare zero byte at the end.
-        self._gather = np.full(length, layout.itemsize)
-        self._gather[target] = source
-        self._scatter = np.full(layout.itemsize, length)
-        self._scatter[source] = target
-        self.size = len(LITTLE_ENDIAN) + length
-
-    def encode(self, message: Shaped[np.ndarray, "1"]) -> bytes:
-        """The wire's bytes of a message."""
-        padded = np.append(message.view(np.uint8), np.uint8(0))
-        return LITTLE_ENDIAN + padded[self._gather].tobytes()
-
-    def decode(self, data: bytes) -> Shaped[np.ndarray, "1"]:
-        """The message of the wire's bytes.
-
-        Raises:
-            CommandError: if they are too short, or not little-endian CDR.
-        """
-        if len(data) < self.size or data[:2] != LITTLE_ENDIAN[:2]:
-            raise CommandError(f"{len(data)} bytes are no message of {self.size} bytes of CDR")
-        body = np.frombuffer(data, np.uint8, self.size - 4, 4)
-        return np.append(body, np.uint8(0))[self._scatter].view(self._layout)
+def encode_message(message: Shaped[np.ndarray, "1"]) -> bytes:
+    """The wire's bytes of a message of any layout."""
+    gather, _ = _byte_maps(message.dtype)
+    return LITTLE_ENDIAN + _with_spare(message.view(np.uint8))[gather].tobytes()
 
 
-def _byte_pairs(layout: np.dtype[np.void]) -> tuple[list[tuple[int, int]], int]:
-    """Pairs (byte of the C struct, byte of the CDR body), and the body's length."""
-    pairs: list[tuple[int, int]] = []
+def decode_message(layout: np.dtype[np.void], data: bytes) -> Shaped[np.ndarray, "1"]:
+    """The message of the wire's bytes.
 
-    def walk(kind: np.dtype[np.generic], offset: int, at: int) -> int:
-        if kind.fields is not None:
-            for field, start, *_ in kind.fields.values():
-                at = walk(field, offset + start, at)
-        elif kind.subdtype is not None:
-            item, shape = kind.subdtype
-            for index in range(int(np.prod(shape))):
-                at = walk(item, offset + index * item.itemsize, at)
-        else:
-            at += -at % kind.itemsize
-            pairs.extend((offset + byte, at + byte) for byte in range(kind.itemsize))
-            at += kind.itemsize
-        return at
+    Raises:
+        CommandError: if they are too short, or not little-endian CDR.
+    """
+    gather, scatter = _byte_maps(layout)
+    size = len(LITTLE_ENDIAN) + gather.size
+    if len(data) < size or data[:2] != LITTLE_ENDIAN[:2]:
+        raise CommandError(f"{len(data)} bytes are no message of {size} bytes of CDR")
+    return _with_spare(np.frombuffer(data, np.uint8)[4:size])[scatter].view(layout)
 
-    length = walk(layout, 0, 0)
-    return pairs, length
+
+def _with_spare(values: UInt8[np.ndarray, " n"]) -> UInt8[np.ndarray, " n+1"]:
+    """With a zero at the end: bytes that the other side does not have are taken from there."""
+    return np.append(values, np.uint8(0))
 
 
 @cache
-def codec_of(layout: np.dtype[np.void]) -> StructCodec:
-    """The codec of a layout; made once."""
-    return StructCodec(layout)
+def _byte_maps(layout: np.dtype[np.void]) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " m"]]:
+    """Where in the C struct each byte of the CDR body is found, and the other way round."""
+    gather: list[int] = []
+
+    def walk(kind: np.dtype[np.generic], offset: int) -> None:
+        if kind.fields is not None:
+            for field, start, *_ in kind.fields.values():
+                walk(field, offset + start)
+        elif kind.subdtype is not None:
+            item, (count,) = kind.subdtype
+            for index in range(count):
+                walk(item, offset + index * item.itemsize)
+        else:
+            gather.extend([layout.itemsize] * (-len(gather) % kind.itemsize))
+            gather.extend(range(offset, offset + kind.itemsize))
+
+    walk(layout, 0)
+    scatter = np.full(layout.itemsize + 1, len(gather))
+    scatter[gather] = np.arange(len(gather))
+    return np.array(gather), scatter[:-1]
 
 
 @dataclass(frozen=True, slots=True)

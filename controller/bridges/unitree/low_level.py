@@ -17,7 +17,7 @@ from jaxtyping import Float, Shaped
 
 from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.codec import decode_message
 from controller.bridges.unitree.layout import (
     FEET_FROM_UNITREE,
     FEET_TO_UNITREE,
@@ -158,7 +158,6 @@ class CommandGate:
         self.accepted = 0
         self.refused: Counter[str] = Counter()
         self._lower, self._upper, self._clock = lower, upper, clock
-        self._codec = codec_of(layout.LOW_CMD)
         self._last: JointCommand | None = None
         self._heard = -np.inf
         self._is_damping = False
@@ -207,7 +206,7 @@ class CommandGate:
         found = None
         for data in samples:
             try:
-                message = self._codec.decode(data)
+                message = decode_message(layout.LOW_CMD, data)
                 found = joint_command(message, self._lower, self._upper)
                 self.accepted += 1
             except CommandError as error:

@@ -14,10 +14,10 @@ from typing import Final, final
 import numpy as np
 
 from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.codec import decode_message, encode_message
 from controller.bridges.unitree.extra import require_dds
 from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
-from controller.bridges.unitree.layout import LOW_CMD, LOW_STATE, is_intact
+from controller.bridges.unitree.layout import LOW_STATE, is_intact
 from controller.bridges.unitree.low_level import low_cmd_message, sensor_reading
 from controller.pacing import SWITCH_INTERVAL
 from go2_wbc.errors import ClosedError, CommandError, PlantError, PlantTimeout
@@ -109,7 +109,6 @@ class UnitreePlant(Plant):
         bus = Bus(domain, interface)
         self._states = bus.reader("rt/lowstate", depth=QUEUE)
         self._commands = bus.writer("rt/lowcmd")
-        self._decode, self._encode = codec_of(LOW_STATE).decode, codec_of(LOW_CMD).encode
         self._bad_states = 0
         self._tick = -1
         self._heard = time.monotonic()
@@ -198,7 +197,7 @@ class UnitreePlant(Plant):
 
     def _send(self, command: JointCommand) -> None:
         with self._sending:
-            self._commands.write(self._encode(low_cmd_message(command)))
+            self._commands.write(encode_message(low_cmd_message(command)))
             self._written = None if is_passive(command) else time.monotonic()
 
     def _damp_once(self) -> None:
@@ -292,7 +291,7 @@ class UnitreePlant(Plant):
         state = None
         for data in self._states.take():
             try:
-                message = self._decode(data)
+                message = decode_message(LOW_STATE, data)
             except CommandError:
                 self._bad_states += 1
                 continue

@@ -11,7 +11,7 @@ from jaxtyping import Shaped
 
 from controller.bridges.unitree import layout
 from controller.bridges.unitree.bus import Bus
-from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.codec import encode_message
 from controller.bridges.unitree.low_level import CommandGate, fill_imu, low_state_message
 from controller.bridges.unitree.sport_api import SportMode
 from controller.pacing import Pacer
@@ -67,8 +67,6 @@ class ServedPlant(Plant):
         self._commands = bus.reader("rt/lowcmd", depth=COMMAND_QUEUE)
         self._states = bus.writer("rt/lowstate")
         self._sport_states = bus.writer("rt/sportmodestate")
-        self._encode_state = codec_of(layout.LOW_STATE).encode
-        self._encode_sport_state = codec_of(layout.SPORT_STATE).encode
         self._ticks = 0
         self._pacer = Pacer(CATCH_UP * inner.control_period, late=0.0)
 
@@ -86,10 +84,10 @@ class ServedPlant(Plant):
         self._hear()
         self._inner.write(self.gate.choose(command))
         state, imu = self._inner.read(), self._inner.imu()
-        self._states.write(self._encode_state(low_state_message(state, imu)))
+        self._states.write(encode_message(low_state_message(state, imu)))
         if self._ticks % SPORT_STATE_TICKS == 0:
             message = sport_state_message(state, imu, self.status)
-            self._sport_states.write(self._encode_sport_state(message))
+            self._sport_states.write(encode_message(message))
         self._ticks += 1
 
     def close(self) -> None:

@@ -15,7 +15,7 @@ import pytest
 from benchmarks.bridges.processes import wait_until
 from controller import GO2Controller
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.codec import decode_message, encode_message
 from controller.bridges.unitree.guards import GuardConfig
 from controller.bridges.unitree.layout import seal
 from controller.bridges.unitree.low_level import low_cmd_message, low_state_message
@@ -70,10 +70,10 @@ class Robot:
         message["tick"] = self.tick
         self.change(message)
         seal(message)
-        return [codec_of(layout.LOW_STATE).encode(message)]
+        return [encode_message(message)]
 
     def write(self, data: bytes) -> None:
-        self.commands.append(codec_of(layout.LOW_CMD).decode(data))
+        self.commands.append(decode_message(layout.LOW_CMD, data))
 
     def is_damped_since(self, start: int) -> bool:
         """Whether many commands come from then on, and all of them brake."""
