@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
@@ -13,7 +12,7 @@ from controller.bridges.unitree import layout
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import encode_message
 from controller.bridges.unitree.low_level import CommandGate, fill_imu, low_state_message
-from controller.bridges.unitree.sport_api import SportMode
+from controller.bridges.unitree.sport_api import SportStatus
 from controller.pacing import Pacer
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.plant.sensors import ImuSample
@@ -31,30 +30,13 @@ CATCH_UP: Final = 0.9
 simulator that is late must not run ahead of its peer's commands to catch up."""
 
 
-@dataclass(slots=True)
-class SportStatus:
-    """What the sport service says of itself in ``rt/sportmodestate``.
-
-    Attributes:
-        mode: see ``SportMode``.
-        is_acting: whether an action is running.
-        is_trotting: whether the robot is in walking mode.
-        error_code: of the last action that failed, else 0.
-    """
-
-    mode: SportMode = SportMode.DAMPING
-    is_acting: bool = False
-    is_trotting: bool = False
-    error_code: int = 0
-
-
 @final
 class ServedPlant(Plant):
     """Hands everything on to a ``MujocoPlant``, publishes its state, obeys low-level commands.
 
     Attributes:
         gate: decides who has the motors.
-        status: what ``rt/sportmodestate`` says; written by the sport service.
+        status: what ``rt/sportmodestate`` says besides.
     """
 
     def __init__(

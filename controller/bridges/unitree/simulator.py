@@ -13,7 +13,7 @@ from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.low_level import CommandGate
 from controller.bridges.unitree.rpc import LeaseServer, Server
-from controller.bridges.unitree.served_plant import ServedPlant, SportStatus
+from controller.bridges.unitree.served_plant import ServedPlant
 from controller.bridges.unitree.sport_api import (
     SPORT_SERVICE,
     SWITCHER_SERVICE,
@@ -66,7 +66,11 @@ class SimulatorSettings:
 
 @final
 class UnitreeSimulator:
-    """Serves a simulated robot until it is closed."""
+    """Serves a simulated robot until it is closed.
+
+    Attributes:
+        gate: who has the motors, with the counts of good and refused commands.
+    """
 
     def __init__(self, settings: SimulatorSettings) -> None:
         """Start serving.
@@ -87,8 +91,8 @@ class UnitreeSimulator:
             seed=settings.seed,
         )
         model = RobotModel()
-        self._gate = CommandGate(model.q_lower, model.q_upper)
-        self._plant = ServedPlant(inner, bus, self._gate, lockstep=settings.lockstep)
+        self.gate = CommandGate(model.q_lower, model.q_upper)
+        self._plant = ServedPlant(inner, bus, self.gate, lockstep=settings.lockstep)
         self._robot = SportRobot(self._plant, config)
         self._is_released = False
         self._sport = SportService(self._robot, self._has_low_level)
@@ -103,16 +107,6 @@ class UnitreeSimulator:
         """Whether the simulation goes on."""
         return self._robot.is_alive
 
-    @property
-    def gate(self) -> CommandGate:
-        """Who has the motors, with the counts of good and refused commands."""
-        return self._gate
-
-    @property
-    def status(self) -> SportStatus:
-        """What the sport service says of itself."""
-        return self._plant.status
-
     def close(self) -> None:
         """Go limp and stop serving; idempotent."""
         for server in self._servers:
@@ -123,15 +117,12 @@ class UnitreeSimulator:
         self._plant.close()
 
     def _has_low_level(self) -> bool:
-        return self._is_released or self._gate.is_active
+        return self._is_released or self.gate.is_active
 
     def _patrol(self) -> None:
         self._sport.patrol()
-        self._gate.is_open = self._is_released or self._sport.is_idle
-        status = self._plant.status
-        status.mode = self._sport.sport_mode()
-        status.is_acting, status.error_code = self._sport.is_acting, self._sport.error_code
-        status.is_trotting = self._robot.mode.value == "walking"
+        self.gate.is_open = self._is_released or self._sport.is_idle
+        self._plant.status = self._sport.status
 
     def _handle_sport(self, request: Request, reply: Reply) -> None:
         if self._lease.allows(request):

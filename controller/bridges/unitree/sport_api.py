@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final
 
@@ -79,7 +80,24 @@ class SportMode(IntEnum):
     SIT = 10
 
 
-MOVE_RANGES: Final = ((-2.5, 3.8), (-1.0, 1.0), (-4.0, 4.0))
+@dataclass(frozen=True, slots=True)
+class SportStatus:
+    """What the sport service says of itself in ``rt/sportmodestate``.
+
+    Attributes:
+        mode: see ``SportMode``.
+        is_acting: whether an action is running.
+        is_trotting: whether the robot is in walking mode.
+        error_code: of the last action that failed, 0 since one was done.
+    """
+
+    mode: SportMode = SportMode.DAMPING
+    is_acting: bool = False
+    is_trotting: bool = False
+    error_code: int = 0
+
+
+MOVE_LEAST, MOVE_GREATEST = (-2.5, -1.0, -4.0), (3.8, 1.0, 4.0)
 """Of ``Move``: forward, left [m/s], turning left [rad/s]."""
 EULER_LIMITS: Final = (0.75, 0.75, 0.6)
 """Of ``Euler``: roll, pitch, yaw [rad], either way."""

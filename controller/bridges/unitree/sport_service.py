@@ -13,9 +13,11 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Final, final
 
+import numpy as np
+
 from controller.bridges.unitree import sport_api
 from controller.bridges.unitree.codec import Reply, Request
-from controller.bridges.unitree.sport_api import Api, Code, SportMode
+from controller.bridges.unitree.sport_api import Api, Code, SportMode, SportStatus
 from controller.bridges.unitree.sport_robot import MOTIONS, POSE, SportRobot
 from controller.jobs import Answer, Job, JobServer
 from controller.modes import Mode
@@ -74,7 +76,9 @@ class SportService:
             return
         api = Api(request.api_id)
         if api is Api.DAMP:
-            self._damp(reply)
+            self._wanted = ZERO_COMMAND
+            self._jobs.damp()
+            reply(Code.OK, "")
         elif self._is_released():
             reply(Code.NOT_READY, "")
         elif api is Api.STOP_MOVE:
@@ -126,15 +130,10 @@ class SportService:
         return is_rising
 
     def _lean(self, rpy: tuple[float, float, float]) -> None:
-        limits = zip(rpy, sport_api.EULER_LIMITS, strict=True)
-        if any(abs(angle) > limit for angle, limit in limits) or not self._robot.can_lean_to(rpy):
+        is_beyond = (np.abs(rpy) > sport_api.EULER_LIMITS).any()
+        if is_beyond or not self._robot.can_lean_to(rpy):
             raise _PoseRefused("the robot cannot take this attitude")
         self._robot.lean_to(rpy)
-
-    def _damp(self, reply: Reply) -> None:
-        self._wanted = ZERO_COMMAND
-        self._jobs.damp()
-        reply(Code.OK, "")
 
     def _submit(self, api: Api, perform: Callable[[], None], reply: Reply) -> None:
         def act(_job: Job) -> Measurements:
@@ -164,11 +163,9 @@ class SportService:
     # --- walking --------------------------------------------------------------------------
 
     def _move(self, velocity: tuple[float, float, float]) -> None:
-        clipped = [
-            min(max(value, low), high)
-            for value, (low, high) in zip(velocity, sport_api.MOVE_RANGES, strict=True)
-        ]
-        self._wanted = VelocityCommand(*clipped)
+        self._wanted = VelocityCommand(
+            *np.clip(velocity, sport_api.MOVE_LEAST, sport_api.MOVE_GREATEST)
+        )
         self._wanted_until = time.monotonic() + HOLD
         self._follow()
 
@@ -198,32 +195,25 @@ class SportService:
     # --- what it does ---------------------------------------------------------------------
 
     @property
-    def error_code(self) -> int:
-        """Of the last action that failed, 0 since one was done."""
-        last = self._jobs.last
-        return 0 if last is None else int(_code_of(last))
-
-    @property
     def is_idle(self) -> bool:
         """Whether no action runs or waits and the robot lies limp."""
         return self._robot.mode in _LIMP and self._jobs.job is None
 
     @property
-    def is_acting(self) -> bool:
-        """Whether an action is running."""
-        return self._jobs.job is not None
-
-    def sport_mode(self) -> SportMode:
-        """What ``rt/sportmodestate`` calls what the robot is doing."""
-        job, robot = self._jobs.job, self._robot
-        if robot.is_leaning and robot.mode not in _LIMP:
-            return SportMode.POSE
+    def status(self) -> SportStatus:
+        """What ``rt/sportmodestate`` says of what the robot is doing."""
+        job, last, robot = self._jobs.job, self._jobs.last, self._robot
         action = self._rising or (None if job is None else Api[job.name])
-        if action in _MODE_OF_ACTION:
-            return _MODE_OF_ACTION[action]
-        if robot.mode is Mode.STANDING and robot.is_locked:
-            return SportMode.JOINT_LOCK
-        return _MODE_OF_STATE.get(robot.mode, SportMode.IDLE)
+        if robot.is_leaning and robot.mode not in _LIMP:
+            mode = SportMode.POSE
+        elif action in _MODE_OF_ACTION:
+            mode = _MODE_OF_ACTION[action]
+        elif robot.mode is Mode.STANDING and robot.is_locked:
+            mode = SportMode.JOINT_LOCK
+        else:
+            mode = _MODE_OF_STATE.get(robot.mode, SportMode.IDLE)
+        code = Code.OK if last is None else _code_of(last)
+        return SportStatus(mode, job is not None, robot.mode is Mode.WALKING, code)
 
     def close(self) -> None:
         """Stop: who waits is answered; the action that runs ends when the robot is closed."""
