@@ -97,10 +97,6 @@ class Guards:
             return f"joint {worst} is {beyond[worst]:.2f} rad beyond its limit"
         return None
 
-    def is_lying(self, state: RobotState, height: float) -> bool:
-        """Whether the robot lies on its belly, the base ``height`` [m] above its lowest foot."""
-        return height < self._config.lying_height and state.tilt < self._config.lying_tilt
-
     def soften(self, command: JointCommand, state: RobotState) -> JointCommand:
         """``command`` within the motors' torque, not pushing past a joint's limit, ramped in."""
         if is_passive(command):

@@ -37,16 +37,26 @@ REPORT_PERIOD: Final = 1.0
 """Time [s] between two reports of the same kind."""
 
 
+def intact_message(kind: np.dtype[np.void], data: bytes) -> Shaped[np.ndarray, "1"]:
+    """The low-level message of the wire's bytes.
+
+    Raises:
+        CommandError: if they are none, or the checksum is wrong.
+    """
+    message = decode_message(kind, data)
+    if not layout.is_intact(message):
+        raise CommandError("wrong checksum")
+    return message
+
+
 def joint_command(
     message: Shaped[np.ndarray, "1"], lower: Float[np.ndarray, "12"], upper: Float[np.ndarray, "12"]
 ) -> JointCommand:
     """What a ``rt/lowcmd`` message asks of the motors, in our joint order.
 
     Raises:
-        CommandError: if the checksum is wrong or a value is not finite or out of limits.
+        CommandError: if a value is not finite or out of limits.
     """
-    if not layout.is_intact(message):
-        raise CommandError("wrong checksum")
     motors = message["motor_cmd"][0, :MOTORS][JOINTS_FROM_UNITREE]
     obeys = motors["mode"] == layout.SERVO
     q, dq, tau, kp, kd = (motors[name].astype(float) for name in ("q", "dq", "tau", "kp", "kd"))
@@ -159,7 +169,7 @@ class CommandGate:
         newest = None
         for data in samples:
             try:
-                message = decode_message(layout.LOW_CMD, data)
+                message = intact_message(layout.LOW_CMD, data)
                 newest = joint_command(message, self._lower, self._upper)
                 self.accepted += 1
             except CommandError as error:

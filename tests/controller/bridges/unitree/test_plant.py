@@ -19,6 +19,7 @@ from controller.bridges.unitree.codec import decode_message, encode_message
 from controller.bridges.unitree.guards import GuardConfig
 from controller.bridges.unitree.layout import seal
 from controller.bridges.unitree.low_level import low_cmd_message, low_state_message
+from controller.bridges.unitree.plant import UnitreePlant
 from go2_wbc.errors import CommandError, ConfigError, PlantError, PlantTimeout
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.base import Plant
@@ -87,19 +88,13 @@ def is_damping(command: np.ndarray) -> bool:
 
 @pytest.fixture
 def robot(monkeypatch: pytest.MonkeyPatch) -> Robot:
-    import controller.bridges.unitree.takeover  # noqa: F401  (it must see the real bus's type)
-
     robot = Robot()
     monkeypatch.setattr("controller.bridges.unitree.bus.Bus", lambda domain, interface: robot)
-    monkeypatch.setattr(
-        "controller.bridges.unitree.takeover.release_sport", lambda *args, **options: None
-    )
+    monkeypatch.setattr(UnitreePlant, "_release_sport", lambda *args, **options: None)
     return robot
 
 
 def driven(guards: GuardConfig) -> Plant:
-    from controller.bridges.unitree.plant import UnitreePlant
-
     return UnitreePlant("lo", 1, i_have_the_remote_in_hand=True, guards=guards)
 
 
@@ -234,7 +229,7 @@ def test_a_robot_that_gets_up_while_it_is_taken_over_is_let_go(
     def get_up(*args: object, **options: object) -> None:
         robot.change = tilted
 
-    monkeypatch.setattr("controller.bridges.unitree.takeover.release_sport", get_up)
+    monkeypatch.setattr(UnitreePlant, "_release_sport", get_up)
     with pytest.raises(PlantError, match="must lie on its belly"):
         driven(PATIENT)
     assert robot.commands == []
