@@ -108,13 +108,10 @@ class Bus:
         with _lock:
             _open_domain(domain, interface)
             self._participant = DomainParticipant(domain)
-        self._owned: list[Any] = []
 
     def writer(self, topic: str) -> Writer:
         """A writer of ``topic``, with the quality of service that Unitree's SDK has."""
-        writer = DataWriter(self._participant, self._topic(topic))
-        self._owned.append(writer)
-        return Writer(writer)
+        return Writer(DataWriter(self._participant, self._topic(topic)))
 
     def reader(self, topic: str, *, depth: int, reliable: bool = False) -> Reader:
         """A reader of ``topic`` that keeps the newest ``depth`` samples until they are taken."""
@@ -122,7 +119,6 @@ class Bus:
         if reliable:
             policies.append(Policy.Reliability.Reliable(duration(seconds=1)))
         reader = DataReader(self._participant, self._topic(topic), Qos(*policies))
-        self._owned.append(reader)
         return Reader(self._participant, reader, depth)
 
     def _topic(self, name: str) -> Topic[Any]:
