@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -99,12 +100,12 @@ class LeaseServer:
 
     def __init__(self, bus: Bus, service: str) -> None:
         """Serve ``service``'s leases."""
-        self._id, self._renewed = 0, 0.0
+        self._id, self._renewed = 0, -math.inf
         self._server = Server(bus, f"{service}_lease", self._handle)
 
     def allows(self, request: Request) -> bool:
         """Whether the client of ``request`` may control the service now."""
-        return self._id == 0 or self._is_expired() or request.lease_id == self._id
+        return self._is_expired() or request.lease_id == self._id
 
     def close(self) -> None:
         """Stop serving; idempotent."""
@@ -114,20 +115,19 @@ class LeaseServer:
         return time.monotonic() > self._renewed + LEASE_TERM
 
     def _handle(self, request: Request, reply: Reply) -> None:
-        if request.api_id == Api.LEASE_APPLY:
-            if self._id and not self._is_expired():
-                reply(Code.LEASE_EXIST, "")
-                return
+        code, data = Code.OK, ""
+        if request.api_id == Api.LEASE_APPLY and self._is_expired():
             self._id, self._renewed = time.time_ns() // 1000, time.monotonic()
-            reply(Code.OK, json.dumps({"id": self._id, "term": round(1e6 * LEASE_TERM)}))
-        elif request.api_id == Api.LEASE_RENEWAL:
-            if self._id != request.lease_id or self._is_expired():
-                reply(Code.LEASE_NOT_EXIST, "")
-                return
-            self._renewed = time.monotonic()
-            reply(Code.OK, "")
+            data = json.dumps({"id": self._id, "term": round(1e6 * LEASE_TERM)})
+        elif request.api_id == Api.LEASE_APPLY:
+            code = Code.LEASE_EXIST
+        elif request.api_id != Api.LEASE_RENEWAL:
+            code = Code.NOT_SUPPORTED
+        elif self._id != request.lease_id or self._is_expired():
+            code = Code.LEASE_NOT_EXIST
         else:
-            reply(Code.NOT_SUPPORTED, "")
+            self._renewed = time.monotonic()
+        reply(code, data)
 
 
 @final
