@@ -14,18 +14,14 @@ from typing import Final
 import numpy as np
 from jaxtyping import Shaped
 
-from go2_wbc.legs import LEGS, Leg
+from go2_wbc.legs import Leg
 
 UNITREE_LEGS: Final = (Leg.FR, Leg.FL, Leg.RR, Leg.RL)
 """Unitree's order of the legs."""
-FEET_TO_UNITREE: Final = np.array([int(leg) for leg in UNITREE_LEGS])
-"""Takes a per-leg array of ours into Unitree's order."""
-FEET_FROM_UNITREE: Final = np.array([UNITREE_LEGS.index(leg) for leg in LEGS])
-"""Takes a per-leg array of Unitree's into our order."""
-JOINTS_TO_UNITREE: Final = np.array([3 * leg + part for leg in UNITREE_LEGS for part in range(3)])
-"""Takes a (12,) joint array of ours into Unitree's order."""
-JOINTS_FROM_UNITREE: Final = np.argsort(JOINTS_TO_UNITREE)
-"""Takes a (12,) motor array of Unitree's into our order."""
+FEET_SWAPPED: Final = np.array([int(leg) for leg in UNITREE_LEGS])
+JOINTS_SWAPPED: Final = np.array([3 * leg + part for leg in UNITREE_LEGS for part in range(3)])
+"""Take a per-leg array, or one of twelve joints or motors, from our order into Unitree's, and back:
+both orders differ in left and right only."""
 MOTORS: Final = 12
 """Motors that exist; a message has room for twenty."""
 HEAD: Final = (0xFE, 0xEF)

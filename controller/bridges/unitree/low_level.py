@@ -18,7 +18,7 @@ from jaxtyping import Float, Shaped
 from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree import layout
 from controller.bridges.unitree.codec import decode_message
-from controller.bridges.unitree.layout import JOINTS_FROM_UNITREE, JOINTS_TO_UNITREE, MOTORS
+from controller.bridges.unitree.layout import FEET_SWAPPED, JOINTS_SWAPPED, MOTORS
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError
 from go2_wbc.plant.sensors import ImuSample
@@ -57,7 +57,7 @@ def joint_command(
     Raises:
         CommandError: if a value is not finite or out of limits.
     """
-    motors = message["motor_cmd"][0, :MOTORS][JOINTS_FROM_UNITREE]
+    motors = message["motor_cmd"][0, :MOTORS][JOINTS_SWAPPED]
     obeys = motors["mode"] == layout.SERVO
     q, dq, tau, kp, kd = (motors[name].astype(float) for name in ("q", "dq", "tau", "kp", "kd"))
     for name in ("q", "dq", "tau", "kp", "kd"):
@@ -88,10 +88,10 @@ def low_state_message(state: RobotState, imu: ImuSample) -> Shaped[np.ndarray, "
     fill_imu(message["imu_state"], imu, state)
     motors = message["motor_state"][0, :MOTORS]
     motors["mode"] = layout.SERVO
-    motors["q"] = state.joint_positions[JOINTS_TO_UNITREE]
-    motors["dq"] = state.joint_velocities[JOINTS_TO_UNITREE]
-    motors["tau_est"] = state.tau[JOINTS_TO_UNITREE]
-    message["foot_force"] = np.rint(state.foot_forces[layout.FEET_TO_UNITREE])
+    motors["q"] = state.joint_positions[JOINTS_SWAPPED]
+    motors["dq"] = state.joint_velocities[JOINTS_SWAPPED]
+    motors["tau_est"] = state.tau[JOINTS_SWAPPED]
+    message["foot_force"] = np.rint(state.foot_forces[FEET_SWAPPED])
     message["tick"] = round(1000 * state.time)
     layout.seal(message)
     return message
@@ -110,16 +110,16 @@ def low_cmd_message(command: JointCommand) -> Shaped[np.ndarray, "1"]:
     message["head"], message["level_flag"] = layout.HEAD, layout.LOW_LEVEL
     motors = message["motor_cmd"][0, :MOTORS]
     motors["mode"] = layout.SERVO
-    motors["q"], motors["dq"] = command.q_des[JOINTS_TO_UNITREE], command.v_des[JOINTS_TO_UNITREE]
-    motors["kp"], motors["kd"] = command.kp[JOINTS_TO_UNITREE], command.kd[JOINTS_TO_UNITREE]
-    motors["tau"] = command.tau[JOINTS_TO_UNITREE]
+    motors["q"], motors["dq"] = command.q_des[JOINTS_SWAPPED], command.v_des[JOINTS_SWAPPED]
+    motors["kp"], motors["kd"] = command.kp[JOINTS_SWAPPED], command.kd[JOINTS_SWAPPED]
+    motors["tau"] = command.tau[JOINTS_SWAPPED]
     layout.seal(message)
     return message
 
 
 def sensor_reading(message: Shaped[np.ndarray, "1"]) -> SensorReading:
     """What a ``rt/lowstate`` message says, in our order of legs and joints."""
-    motors = message["motor_state"][0, :MOTORS][JOINTS_FROM_UNITREE]
+    motors = message["motor_state"][0, :MOTORS][JOINTS_SWAPPED]
     imu = message["imu_state"][0]
     return SensorReading(
         time=0.001 * float(message["tick"][0]),
@@ -129,7 +129,7 @@ def sensor_reading(message: Shaped[np.ndarray, "1"]) -> SensorReading:
         q_joints=motors["q"].astype(float),
         v_joints=motors["dq"].astype(float),
         tau=motors["tau_est"].astype(float),
-        foot_forces=message["foot_force"][0].astype(float)[layout.FEET_FROM_UNITREE],
+        foot_forces=message["foot_force"][0].astype(float)[FEET_SWAPPED],
     )
 
 

@@ -101,5 +101,5 @@ def sport_state_message(
     message["position"], message["body_height"] = state.q[:3], state.q[2]
     message["velocity"] = state.R_world_base @ state.v[:3]
     message["yaw_speed"] = imu.gyro[2]
-    message["foot_force"] = np.rint(state.foot_forces[layout.FEET_TO_UNITREE])
+    message["foot_force"] = np.rint(state.foot_forces[layout.FEET_SWAPPED])
     return message

@@ -80,12 +80,11 @@ def test_the_structs_have_the_sizes_of_the_c_structs() -> None:
 
 
 def test_motors_and_feet_are_mapped_to_the_order_of_the_sdk_and_back() -> None:
-    assert [JOINT_NAMES[index] for index in layout.JOINTS_TO_UNITREE] == MOTOR_ORDER
-    assert [JOINT_NAMES.index(name) for name in MOTOR_ORDER] == list(layout.JOINTS_TO_UNITREE)
+    assert [JOINT_NAMES[index] for index in layout.JOINTS_SWAPPED] == MOTOR_ORDER
     joints, feet = np.arange(12), np.array(LEGS)
-    assert np.array_equal(joints[layout.JOINTS_TO_UNITREE][layout.JOINTS_FROM_UNITREE], joints)
-    assert np.array_equal(feet[layout.FEET_TO_UNITREE], [Leg.FR, Leg.FL, Leg.RR, Leg.RL])
-    assert np.array_equal(feet[layout.FEET_TO_UNITREE][layout.FEET_FROM_UNITREE], feet)
+    assert np.array_equal(joints[layout.JOINTS_SWAPPED][layout.JOINTS_SWAPPED], joints)
+    assert np.array_equal(feet[layout.FEET_SWAPPED], [Leg.FR, Leg.FL, Leg.RR, Leg.RL])
+    assert np.array_equal(feet[layout.FEET_SWAPPED][layout.FEET_SWAPPED], feet)
 
 
 @pytest.mark.parametrize("kind", [layout.LOW_STATE, layout.LOW_CMD, layout.SPORT_STATE])
