@@ -10,7 +10,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from types import TracebackType
 from typing import Final, final
 
 from go2_wbc.errors import BridgeError
@@ -122,16 +121,12 @@ class Process:
         try:
             self.wait_for(self._says)
         except BridgeError:
-            self.__exit__(BridgeError, None, None)
+            self.__exit__(BridgeError)
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None = None, *_: object) -> None:
+        """End it, politely if that is wanted and there was no error."""
         if self._is_stopped and kind is None:
             self.stop()
         elif self.code is None:
