@@ -133,9 +133,9 @@ class UnitreePlant(Plant):
         self._is_closed = False
         self._sending = threading.RLock()
         self._is_taken_over = False
-        self._state = self._first_state()
+        self._find()
         self._require_lying()
-        self._release_sport(bus, may_lack=interface == LOOPBACK)
+        self._release_sport(bus, interface)
         self._require_lying()
         self._take_over()
 
@@ -248,22 +248,20 @@ class UnitreePlant(Plant):
 
     # --- states ---------------------------------------------------------------------------
 
-    def _first_state(self) -> RobotState:
+    def _find(self) -> None:
         deadline = time.monotonic() + FIRST_STATE_LIMIT
-        while time.monotonic() < deadline:
+        while not self._take():
             self._states.wait(0.1)
-            state = self._take()
-            if state is not None:
-                return state
-        what = f"only {self.bad_states} broken ones" if self.bad_states else "none"
-        raise PlantTimeout(
-            f"no rt/lowstate on {self._where} within {FIRST_STATE_LIMIT:g} s ({what}): "
-            "is the robot, or go2-wbc unitree-sim, on, and the interface right?"
-        )
+            if time.monotonic() > deadline:
+                what = f"only {self.bad_states} broken ones" if self.bad_states else "none"
+                raise PlantTimeout(
+                    f"no rt/lowstate on {self._where} within {FIRST_STATE_LIMIT:g} s ({what}): "
+                    "is the robot, or go2-wbc unitree-sim, on, and the interface right?"
+                )
 
     def _hears_a_state(self) -> bool:
         """Take the next state; False if the robot is silent for a while."""
-        while (state := self._take()) is None:
+        while not self._take():
             silence = time.monotonic() - self._heard
             left = self._config.stale_limit - silence
             if left < 0.0:
@@ -271,7 +269,6 @@ class UnitreePlant(Plant):
                 raise self._stop(PlantTimeout(reason))
             if not self._states.wait(min(self._repeat, left + 0.001)):
                 return False
-        self._state = state
         return True
 
     def _synchronise(self) -> None:
@@ -290,12 +287,12 @@ class UnitreePlant(Plant):
         while time.monotonic() < end:
             if not self._states.wait(SYNC_SILENCE):
                 return True
-            self._state = self._take() or self._state
+            self._take()
         return False
 
-    def _take(self) -> RobotState | None:
-        """The state after all samples that have come, or None if there is no new one."""
-        state = None
+    def _take(self) -> bool:
+        """Take in all samples that have come; returns whether there is a new state."""
+        known = self._tick
         for data in self._states.take():
             try:
                 message = intact_message(LOW_STATE, data)
@@ -307,31 +304,29 @@ class UnitreePlant(Plant):
                 raise self._stop(PlantError("the robot's clock went back: it has started anew"))
             if tick > self._tick:
                 self._tick, self._heard = tick, time.monotonic()
-                state = self._estimator.update(sensor_reading(message))
-        return state
+                self._state = self._estimator.update(sensor_reading(message))
+        return self._tick > known
 
     # --- taking over ----------------------------------------------------------------------
 
     def _require_lying(self) -> None:
-        self._state = state = self._take() or self._state
+        self._take()
+        state = self._state
         _, p_feet = self._model.forward_kinematics(state.q)
         height = float(state.q[2] - p_feet[:, 2].min()) + self._model.foot_radius
-        if height >= self._config.lying_height or state.tilt >= self._config.lying_tilt:
+        if not (height < self._config.lying_height and state.tilt < self._config.lying_tilt):
             raise PlantError(
                 f"the robot must lie on its belly at the start; its base is {height:.2f} m above "
                 f"its feet, tilted by {np.degrees(state.tilt):.0f} deg"
             )
 
-    def _release_sport(self, bus: Bus, *, may_lack: bool) -> None:
-        """Release whatever motion service has the robot: it would fight the commands.
-
-        Some simulators have no motion switcher: they ``may_lack`` it.
-        """
+    def _release_sport(self, bus: Bus, interface: str) -> None:
+        """Release whatever motion service has the robot: it would fight the commands."""
         from controller.bridges.unitree.rpc import Client
 
         client = Client(bus, SWITCHER_SERVICE)
         if not client.wait_for_server(SWITCHER_LIMIT):
-            if not may_lack:
+            if interface != LOOPBACK:
                 raise PlantError(
                     "no motion switcher answers, so nobody can tell what else moves this robot"
                 )

@@ -90,7 +90,7 @@ def is_damping(command: np.ndarray) -> bool:
 def robot(monkeypatch: pytest.MonkeyPatch) -> Robot:
     robot = Robot()
     monkeypatch.setattr("controller.bridges.unitree.bus.Bus", lambda domain, interface: robot)
-    monkeypatch.setattr(UnitreePlant, "_release_sport", lambda *args, **options: None)
+    monkeypatch.setattr(UnitreePlant, "_release_sport", lambda *args: None)
     return robot
 
 
@@ -226,7 +226,7 @@ def test_a_robot_that_does_not_lie_is_sent_nothing(robot: Robot) -> None:
 def test_a_robot_that_gets_up_while_it_is_taken_over_is_let_go(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def get_up(*args: object, **options: object) -> None:
+    def get_up(*args: object) -> None:
         robot.change = tilted
 
     monkeypatch.setattr(UnitreePlant, "_release_sport", get_up)
