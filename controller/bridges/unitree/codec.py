@@ -16,37 +16,30 @@ from functools import cache
 from typing import Any, Final, TypeVar
 
 import numpy as np
-from jaxtyping import Int, Shaped, UInt8
+from jaxtyping import Int, Shaped
 
 from go2_wbc.errors import CommandError
 
 LITTLE_ENDIAN: Final = b"\x00\x01\x00\x00"
 """Encapsulation header of little-endian CDR."""
 _LENGTH: Final = struct.Struct("<I")
+_SPARE: Final = np.uint8(0)
+"""Stands at the end for every byte that the other side does not have."""
 
 
 def encode_message(message: Shaped[np.ndarray, "1"]) -> bytes:
     """The wire's bytes of a message of any layout."""
     gather, _ = _byte_maps(message.dtype)
-    return LITTLE_ENDIAN + _with_spare(message.view(np.uint8))[gather].tobytes()
+    return LITTLE_ENDIAN + np.append(message.view(np.uint8), _SPARE)[gather].tobytes()
 
 
 def decode_message(layout: np.dtype[np.void], data: bytes) -> Shaped[np.ndarray, "1"]:
-    """The message of the wire's bytes.
-
-    Raises:
-        CommandError: if they are too short, or not little-endian CDR.
-    """
+    """The message of the wire's bytes; CommandError if they are no CDR, or too few."""
     gather, scatter = _byte_maps(layout)
     size = len(LITTLE_ENDIAN) + gather.size
     if len(data) < size or data[:2] != LITTLE_ENDIAN[:2]:
         raise CommandError(f"{len(data)} bytes are no message of {size} bytes of CDR")
-    return _with_spare(np.frombuffer(data, np.uint8)[4:size])[scatter].view(layout)
-
-
-def _with_spare(values: UInt8[np.ndarray, " n"]) -> UInt8[np.ndarray, " n+1"]:
-    """With a zero at the end: bytes that the other side does not have are taken from there."""
-    return np.append(values, np.uint8(0))
+    return np.append(np.frombuffer(data, np.uint8)[4:size], _SPARE)[scatter].view(layout)
 
 
 @cache
@@ -119,11 +112,7 @@ def encode_call(call: Request | Response) -> bytes:
 
 
 def decode_call(kind: type[Call], data: bytes) -> Call:
-    """The request or response of the wire's bytes.
-
-    Raises:
-        CommandError: if they are none.
-    """
+    """The request or response of the wire's bytes; CommandError if they are none."""
     head = _HEADS[kind]
     start = len(LITTLE_ENDIAN) + head.size + _LENGTH.size
     try:

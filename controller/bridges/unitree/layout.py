@@ -16,10 +16,8 @@ from jaxtyping import Shaped
 
 from go2_wbc.legs import Leg
 
-UNITREE_LEGS: Final = (Leg.FR, Leg.FL, Leg.RR, Leg.RL)
-"""Unitree's order of the legs."""
-FEET_SWAPPED: Final = np.array([int(leg) for leg in UNITREE_LEGS])
-JOINTS_SWAPPED: Final = np.array([3 * leg + part for leg in UNITREE_LEGS for part in range(3)])
+FEET_SWAPPED: Final = np.array([Leg.FR, Leg.FL, Leg.RR, Leg.RL])
+JOINTS_SWAPPED: Final = np.array([3 * leg + part for leg in FEET_SWAPPED for part in range(3)])
 """Take a per-leg array, or one of twelve joints or motors, from our order into Unitree's, and back:
 both orders differ in left and right only."""
 MOTORS: Final = 12

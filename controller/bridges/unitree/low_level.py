@@ -38,11 +38,7 @@ REPORT_PERIOD: Final = 1.0
 
 
 def intact_message(kind: np.dtype[np.void], data: bytes) -> Shaped[np.ndarray, "1"]:
-    """The low-level message of the wire's bytes.
-
-    Raises:
-        CommandError: if they are none, or the checksum is wrong.
-    """
+    """A low-level message of the wire's bytes; CommandError if it is none, or damaged."""
     message = decode_message(kind, data)
     if not layout.is_intact(message):
         raise CommandError("wrong checksum")

@@ -8,6 +8,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Final, final
 
 from controller.bridges.unitree.bus import Bus
@@ -72,7 +73,7 @@ class Server:
         except CommandError as error:
             _log.warning("%s: ignored what is no request: %s", self._name, error)
             return
-        reply = self._reply_to(request)
+        reply = partial(self._reply, request)
         try:
             if request.api_id == Api.VERSION:
                 reply(Code.OK, API_VERSION)
@@ -85,13 +86,10 @@ class Server:
             _log.exception("%s: request %d failed", self._name, request.api_id)
             reply(Code.INTERNAL, "")
 
-    def _reply_to(self, request: Request) -> Reply:
-        def reply(code: int, data: str) -> None:
-            if not request.is_one_way:
-                answer = Response(request.id, request.api_id, int(code), data)
-                self._writer.write(encode_call(answer))
-
-        return reply
+    def _reply(self, request: Request, code: int, data: str) -> None:
+        if not request.is_one_way:
+            answer = Response(request.id, request.api_id, int(code), data)
+            self._writer.write(encode_call(answer))
 
 
 @final

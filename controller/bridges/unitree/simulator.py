@@ -30,9 +30,6 @@ from go2_wbc.robot.model import RobotModel
 
 _log = logging.getLogger(__name__)
 
-SIMULATOR_DOMAIN: Final = 1
-"""DDS domain of simulators, as in ``unitree_mujoco``; the robot is on 0."""
-LOOPBACK: Final = "lo"
 DISCOVERY: Final = 0.5
 """Time [s] that another robot gets to be heard; some hundredths on an idle machine."""
 
@@ -42,7 +39,7 @@ class SimulatorSettings:
     """Where the simulator is found, and what it simulates.
 
     Attributes:
-        domain: DDS domain.
+        domain: DDS domain; 1 is that of simulators, as in ``unitree_mujoco``, 0 the robot's.
         interface: network interface.
         mjcf: a user's own Go2 model or scene.
         friction: of the feet; None is the model's.
@@ -53,8 +50,8 @@ class SimulatorSettings:
         lockstep: under low-level control let time pass only command by command.
     """
 
-    domain: int = SIMULATOR_DOMAIN
-    interface: str = LOOPBACK
+    domain: int = 1
+    interface: str = "lo"
     mjcf: Path | None = None
     friction: float | None = None
     payload: float = 0.0
@@ -95,7 +92,7 @@ class UnitreeSimulator:
         self._plant = ServedPlant(inner, bus, self.gate, lockstep=settings.lockstep)
         self._robot = SportRobot(self._plant, config)
         self._is_released = False
-        self._sport = SportService(self._robot, self._has_low_level)
+        self._sport = SportService(self._robot, lambda: self._is_released or self.gate.is_active)
         self._lease = LeaseServer(bus, SPORT_SERVICE)
         self._servers = (
             Server(bus, SPORT_SERVICE, self._handle_sport, self._patrol),
@@ -115,9 +112,6 @@ class UnitreeSimulator:
         self._sport.close()
         self._robot.close()
         self._plant.close()
-
-    def _has_low_level(self) -> bool:
-        return self._is_released or self.gate.is_active
 
     def _patrol(self) -> None:
         self._sport.patrol()

@@ -95,19 +95,11 @@ class SportRobot:
         return self._runner.is_alive
 
     def begin(self) -> None:
-        """Begin an action: whatever makes the robot limp from now on ends it.
-
-        Raises:
-            PlantError: if the control loop has ended.
-        """
+        """Begin an action: what makes the robot limp ends it; PlantError without a control loop."""
         self.pilot.begin()
 
     def perform(self, api: int) -> None:
-        """Do an action that has begun, or play the motion that stands for it.
-
-        Raises:
-            Aborted: if it was not done; says why.
-        """
+        """Do an action that has begun; ``Aborted`` says why it was not done."""
         ends_standing = api in _STANDS
         if not ends_standing:
             if self.is_leaning:
@@ -118,11 +110,7 @@ class SportRobot:
             self.is_locked, self.is_leaning = api == Api.STAND_UP, False
 
     def lean_to(self, rpy: tuple[float, float, float]) -> None:
-        """Turn the trunk to roll, pitch, yaw [rad] over the feet and hold it.
-
-        Raises:
-            Aborted: if it does not get there.
-        """
+        """Turn the trunk to roll, pitch, yaw [rad] over the feet and hold it, or ``Aborted``."""
         if self.mode is Mode.WALKING:
             self.pilot.square_up()
         target = np.array(rpy)

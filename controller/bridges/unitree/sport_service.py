@@ -43,6 +43,7 @@ _ENTRY: Final = {
     Api.EULER: _ON_FEET,
     Api.POSE: _ON_FEET,
     Api.MOVE: _ON_FEET,
+    Api.RECOVERY_STAND: frozenset(Mode),
     **dict.fromkeys(MOTIONS, _ON_FEET),
 }
 """Modes from which an action may begin; one that is not listed: from all but fallen."""
@@ -65,11 +66,7 @@ class SportService:
     # --- requests -------------------------------------------------------------------------
 
     def handle(self, request: Request, reply: Reply) -> None:
-        """Answer a request, now or later.
-
-        Raises:
-            CommandError: for a parameter that is not valid.
-        """
+        """Answer a request, now or later; CommandError for a parameter that is not valid."""
         if request.api_id not in _SUPPORTED:
             _log.warning("request %d is not supported", request.api_id)
             reply(Code.NOT_SUPPORTED, "")
@@ -154,9 +151,7 @@ class SportService:
         mode = self._robot.mode
         if self._is_released():
             return f"{api.name}: low-level commands have the robot"
-        if mode not in _ENTRY.get(api, Mode) or (
-            mode is Mode.FALLEN and api is not Api.RECOVERY_STAND
-        ):
+        if mode not in _ENTRY.get(api, frozenset(Mode) - {Mode.FALLEN}):
             return f"{api.name}: not from {mode.value}"
         return ""
 
@@ -178,7 +173,7 @@ class SportService:
         if robot.mode is Mode.WALKING:
             robot.steer(self._wanted, self._share)
         elif not self._wanted.is_zero and robot.mode is Mode.STANDING and not robot.is_locked:
-            self._submit(Api.MOVE, lambda: robot.perform(Api.MOVE), _no_reply)
+            self._submit(Api.MOVE, lambda: robot.perform(Api.MOVE), lambda *_: None)
         elif not self._wanted.is_zero:
             what = "locked after StandUp" if robot.is_locked else robot.mode.value
             _log.warning("Move ignored: the robot is %s; BalanceStand first", what)
@@ -246,7 +241,3 @@ def _code_of(answer: Answer) -> Code:
     if answer.is_refused:
         return Code.NOT_READY
     return _CODE_OF_ERROR.get(type(answer.error), Code.INTERNAL)
-
-
-def _no_reply(code: int, data: str) -> None:
-    """Nobody waits for it."""
