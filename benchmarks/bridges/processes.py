@@ -81,11 +81,7 @@ class Process:
         return self._process.poll()
 
     def wait_for(self, text: str, limit: float = START_LIMIT) -> None:
-        """Wait until the process has said ``text``.
-
-        Raises:
-            BridgeError: if it does not, or ends before.
-        """
+        """Wait until the process has said ``text``; BridgeError if it does not."""
         wait_until(lambda: text in self.text or self.code is not None, limit)
         if self.code is not None:
             self._reader.join(5.0)
@@ -113,11 +109,7 @@ class Process:
         return self.text
 
     def __enter__(self) -> Process:
-        """Wait until it is ready.
-
-        Raises:
-            BridgeError: if it does not say so.
-        """
+        """Wait until it is ready; BridgeError if it does not say so."""
         try:
             self.wait_for(self._says)
         except BridgeError:

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.bridges.faults import require
+from benchmarks.bridges.processes import wait_until
 from benchmarks.bridges.unitree_processes import MOVE, SPEED, Scene, driver, good_commands, scene
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial
@@ -144,7 +145,7 @@ def measure_drive(
     """
     with scene(*simulator_options) as at:
         with driver(at.domain, *driver_options) as peer:
-            speeds = _true_speeds(at, peer.lines, time.monotonic() + DRIVE_LIMIT)
+            speeds = _true_speeds(at, peer.lines)
             text = peer.finish(DRIVE_LIMIT)
         said = at.process.stop()
     steps = [json.loads(line) for line in text.splitlines() if line.startswith("{")]
@@ -157,16 +158,17 @@ def measure_drive(
     return Measurement({"unitree.steps": float(undone), "unitree.mae": error}, failures)
 
 
-def _true_speeds(at: Scene, lines: list[str], deadline: float) -> list[float]:
+def _true_speeds(at: Scene, lines: list[str]) -> list[float]:
     """Forward speeds over the four seconds before the trot's end, while the driver runs."""
     samples: list[tuple[float, float]] = []
-    while time.monotonic() < deadline:
+
+    def has_walked() -> bool:
         for message in at.take():
             seconds, nanoseconds = message["stamp"][0]
             samples.append((seconds + 1e-9 * nanoseconds, float(message["velocity"][0, 0])))
-        if any('"high_five"' in line or '"ok": false' in line for line in lines):
-            break
-        time.sleep(0.05)
+        return any('"high_five"' in line or '"ok": false' in line for line in lines)
+
+    wait_until(has_walked, DRIVE_LIMIT)
     walking = [time for time, speed in samples if speed > 0.8 * SPEED]
     if not walking:
         return []

@@ -54,11 +54,7 @@ _tries = itertools.count(os.getpid())
 
 @contextmanager
 def own_domain() -> Iterator[int]:
-    """A DDS domain that nobody else who asks here, on this machine, has meanwhile.
-
-    Raises:
-        BridgeError: if there is none left.
-    """
+    """A DDS domain that nobody else who asks here, on this machine, has meanwhile."""
     for _ in DOMAINS:
         domain = DOMAINS[next(_tries) % len(DOMAINS)]
         with socket.socket() as lock:
@@ -91,11 +87,7 @@ def good_commands(text: str) -> int:
 
 
 def client_of(bus: Bus, service: str) -> Client:
-    """A client of ``service`` that has got an answer from it.
-
-    Raises:
-        BridgeError: if it gets none.
-    """
+    """A client of ``service`` that has got an answer from it; BridgeError if it gets none."""
     from controller.bridges.unitree.rpc import Client
 
     client = Client(bus, service)
@@ -150,11 +142,7 @@ class Scene:
         return messages
 
     def now(self) -> Shaped[np.ndarray, "1"]:
-        """The newest ``rt/sportmodestate``.
-
-        Raises:
-            PlantTimeout: if there is none.
-        """
+        """The newest ``rt/sportmodestate``; PlantTimeout if there is none."""
         wait_until(lambda: bool(self.take()), 2.0)
         if self._newest is None:
             raise PlantTimeout("nobody publishes rt/sportmodestate")
