@@ -33,7 +33,7 @@ MOTIONS: Final[Mapping[int, str]] = {
     Api.SCRAPE: "shake_paw",
 }
 """The motion of the library that stands for each of Unitree's."""
-_STANDS: Final = frozenset({Api.BALANCE_STAND, Api.STAND_UP, Api.RECOVERY_STAND, Api.RISE_SIT})
+STANDING_UP: Final = frozenset({Api.STAND_UP, Api.BALANCE_STAND, Api.RECOVERY_STAND})
 POSE: Final = (0.12, -0.15, 0.2)
 """Roll, pitch, yaw [rad] of ``Pose``."""
 FINDINGS_TOLD: Final = 3
@@ -100,14 +100,12 @@ class SportRobot:
 
     def perform(self, api: int) -> None:
         """Do an action that has begun; ``Aborted`` says why it was not done."""
-        ends_standing = api in _STANDS
-        if not ends_standing:
-            if self.is_leaning:
-                self.pilot.stand()
+        if self.is_leaning and api not in STANDING_UP:
+            self.pilot.stand()
+        if api not in STANDING_UP:
             self.is_locked = self.is_leaning = False
         self._actions[api]()
-        if ends_standing:
-            self.is_locked, self.is_leaning = api == Api.STAND_UP, False
+        self.is_locked, self.is_leaning = api == Api.STAND_UP, False
 
     def lean_to(self, rpy: tuple[float, float, float]) -> None:
         """Turn the trunk to roll, pitch, yaw [rad] over the feet and hold it, or ``Aborted``."""

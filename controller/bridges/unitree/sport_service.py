@@ -18,7 +18,7 @@ import numpy as np
 from controller.bridges.unitree import sport_api
 from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode, SportStatus
-from controller.bridges.unitree.sport_robot import MOTIONS, POSE, SportRobot
+from controller.bridges.unitree.sport_robot import MOTIONS, POSE, STANDING_UP, SportRobot
 from controller.jobs import Answer, Job, JobServer
 from controller.modes import Mode
 from controller.procedures import Aborted, Measurements
@@ -34,7 +34,6 @@ HOLD: Final = 1.0
 WAITING: Final = 8
 """Requests that may wait for the running action."""
 _SUPPORTED: Final = frozenset(map(int, Api))
-_STANDING_UP: Final = frozenset({Api.STAND_UP, Api.BALANCE_STAND, Api.RECOVERY_STAND})
 _LIMP: Final = frozenset({Mode.LYING, Mode.DAMPED, Mode.FALLEN})
 _ON_FEET: Final = frozenset({Mode.STANDING, Mode.WALKING})
 _ENTRY: Final = {
@@ -100,7 +99,7 @@ class SportService:
             return lambda: robot.lean_to(POSE)
         if api is Api.POSE:
             return lambda: robot.perform(Api.BALANCE_STAND)
-        if api in _STANDING_UP:
+        if api in STANDING_UP:
             return lambda: self._rise(api)
         return lambda: robot.perform(api)
 
@@ -121,7 +120,7 @@ class SportService:
     def _joins(self, api: Api) -> bool:
         """Whether a robot that rises anyway needs no other action for ``api``."""
         with self._lock:
-            is_rising = self._rising is not None and api in _STANDING_UP
+            is_rising = self._rising is not None and api in STANDING_UP
             if is_rising and api is not Api.STAND_UP:
                 self._rising = api
         return is_rising
