@@ -172,9 +172,19 @@ class CommandGate:
                 kind = str(error).split(":")[0]
                 self.refused[kind] += 1
                 self._throttle.warn(kind, f"lowcmd refused, {self.refused[kind]} so far: {error}")
-        if newest is not None:
-            self._offer(newest)
-        return newest is not None
+        if newest is None:
+            return False
+        if not (self.is_open or self.is_active):
+            self._throttle.warn(
+                "ignored", "lowcmd ignored: the sport service has the robot; lie down or Damp first"
+            )
+            return True
+        if self._last is None:
+            _log.info("low-level commands have the robot")
+        elif self._is_damping:
+            _log.info("low-level commands go on")
+        self._last, self._heard, self._is_damping = newest, self._clock(), False
+        return True
 
     def choose(self, own: JointCommand) -> JointCommand:
         """The command of this tick: the newest good one that was heard, ``own``, or damping."""
@@ -190,15 +200,3 @@ class CommandGate:
             _log.info("low-level control has ended")
             self._last = None
         return JointCommand.damping(DAMPING)
-
-    def _offer(self, command: JointCommand) -> None:
-        if not (self.is_open or self.is_active):
-            self._throttle.warn(
-                "ignored", "lowcmd ignored: the sport service has the robot; lie down or Damp first"
-            )
-            return
-        if self._last is None:
-            _log.info("low-level commands have the robot")
-        elif self._is_damping:
-            _log.info("low-level commands go on")
-        self._last, self._heard, self._is_damping = command, self._clock(), False
