@@ -73,7 +73,6 @@ class Request:
         id: chosen by the client, repeated in the response.
         api_id: which procedure.
         lease_id: of a client that asked for sole control, else 0.
-        priority: not used.
         is_one_way: whether the client waits for no response.
         parameter: JSON, or empty.
     """
@@ -81,7 +80,6 @@ class Request:
     id: int
     api_id: int
     lease_id: int = 0
-    priority: int = 0
     is_one_way: bool = False
     parameter: str = ""
 
@@ -99,8 +97,8 @@ class Response:
 Call = TypeVar("Call", Request, Response)
 Reply = Callable[[int, str], None]
 """Answers a request: code and data. Any thread may call it, once."""
-_HEADS: Final = {Request: struct.Struct("<qqqi?3x"), Response: struct.Struct("<qqi")}
-"""What goes before the text."""
+_HEADS: Final = {Request: struct.Struct("<qqq4x?3x"), Response: struct.Struct("<qqi")}
+"""What goes before the text; of a request without its priority, which nobody uses."""
 
 
 def encode_call(call: Request | Response) -> bytes:
