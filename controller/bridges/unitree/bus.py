@@ -50,11 +50,7 @@ class Writer:
         self._writer = writer
 
     def write(self, data: bytes) -> None:
-        """Send one encoded sample; never waits for its readers.
-
-        Raises:
-            PlantError: if the DDS library refuses it.
-        """
+        """Send one encoded sample, without waiting for readers; PlantError if it is refused."""
         if ddspy_write(self._writer._ref, data + bytes(-len(data) % 4)) < 0:
             raise PlantError("the DDS library refused to write a sample")
 
