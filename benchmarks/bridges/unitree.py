@@ -151,11 +151,11 @@ def measure_drive(
     steps = [json.loads(line) for line in text.splitlines() if line.startswith("{")]
     undone = 4 - sum(bool(step["ok"]) for step in steps)
     reason = "; ".join(step["reason"] for step in steps if not step["ok"]) or text[-400:] + said
-    if not speeds:
-        return Measurement({"unitree.steps": float(undone)}, reason=reason)
+    values = {"unitree.steps": float(undone)}
+    if speeds:
+        values["unitree.mae"] = float(np.mean(np.abs(np.array(speeds) - SPEED)))
     failures = {"unitree.steps": reason} if undone else {}
-    error = float(np.mean(np.abs(np.array(speeds) - SPEED)))
-    return Measurement({"unitree.steps": float(undone), "unitree.mae": error}, failures)
+    return Measurement(values, failures, "" if speeds else reason)
 
 
 def _true_speeds(at: Scene, lines: list[str]) -> list[float]:

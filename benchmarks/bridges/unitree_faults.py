@@ -49,7 +49,7 @@ def require_end(peer: Process, code: ExitCode, *texts: str) -> None:
 
 
 def garbage() -> list[bytes]:
-    """``rt/lowcmd`` that must move nothing: not finite, out of limits, damaged, cut off."""
+    """``rt/lowcmd`` that must move nothing: not finite, out of limits, damaged."""
     command = JointCommand.servo(np.zeros(12), np.zeros(12), 400.0, 1.0)
     damaged = low_cmd_message(JointCommand.torque(np.full(12, 20.0)))
     damaged["crc"] ^= 1

@@ -18,7 +18,6 @@ from jaxtyping import Shaped
 from benchmarks.bridges.faults import require
 from benchmarks.bridges.processes import PROGRAM, START_LIMIT, Process, wait_until
 from controller.bridges.unitree.codec import decode_message
-from controller.bridges.unitree.extra import require_dds
 from controller.bridges.unitree.layout import SPORT_STATE
 from controller.bridges.unitree.sport_api import (
     SPORT_SERVICE,
@@ -54,7 +53,7 @@ _tries = itertools.count(os.getpid())
 
 @contextmanager
 def own_domain() -> Iterator[int]:
-    """A DDS domain that nobody else who asks here, on this machine, has meanwhile."""
+    """A DDS domain that nobody else on this machine gets here; BridgeError if none is left."""
     for _ in DOMAINS:
         domain = DOMAINS[next(_tries) % len(DOMAINS)]
         with socket.socket() as lock:
@@ -120,7 +119,6 @@ class Scene:
 
     def __init__(self, process: Process, domain: int) -> None:
         """Join the domain of a simulator that serves."""
-        require_dds()
         from controller.bridges.unitree.bus import Bus
 
         self.process, self.domain = process, domain
@@ -130,8 +128,6 @@ class Scene:
         self._newest: Shaped[np.ndarray, "1"] | None = None
         self.client = client_of(self.bus, SPORT_SERVICE)
         self._commands = self.bus.writer("rt/lowcmd")
-
-    # --- what the robot says --------------------------------------------------------------
 
     def take(self) -> list[Shaped[np.ndarray, "1"]]:
         """All ``rt/sportmodestate`` since the last call, oldest first."""
@@ -163,8 +159,6 @@ class Scene:
         """See ``SportMode``."""
         return int(self.now()["mode"][0])
 
-    # --- what is asked of it --------------------------------------------------------------
-
     def call(self, api: int, parameter: str = "{}") -> int:
         """The code that a call of the sport service is answered with."""
         return self.client.call(api, parameter, timeout=10.0).code
@@ -190,8 +184,6 @@ class Scene:
         """Wait until no action runs."""
         time.sleep(0.1)
         return wait_until(lambda: not self.now()["progress"][0], LIMIT)
-
-    # --- what must be so ------------------------------------------------------------------
 
     def require_code(self, api: Api, code: Code = Code.OK) -> None:
         """Make sure that a call of the sport service is answered with ``code``."""
