@@ -58,16 +58,16 @@ class SportRobot:
         """Take over a robot that lies on the ground."""
         self._config = config
         self._checker = FeasibilityChecker()  # with a model of its own: the loop is another thread
+        plans = {
+            api: compile_timeline(load_motion(name), self._checker.model)
+            for api, name in MOTIONS.items()
+        }
         settings = PilotSettings(realtime=True, recorded_time=0.0)
         self._assembly = build_pilot(plant, config, settings)
         self.pilot, self._runner = self._assembly.pilot, self._assembly.runner
         self._procedures = ProcedureRunner(self._runner)
         self.is_locked = False
         self.is_leaning = False
-        plans = {
-            api: compile_timeline(load_motion(name), self._checker.model)
-            for api, name in MOTIONS.items()
-        }
         self._actions: Mapping[int, Callable[[], object]] = {
             Api.BALANCE_STAND: self.pilot.stand,
             Api.STAND_UP: self.pilot.stand,
@@ -100,9 +100,9 @@ class SportRobot:
 
     def perform(self, api: int) -> None:
         """Do an action that has begun; ``Aborted`` says why it was not done."""
-        if self.is_leaning and api not in STANDING_UP:
-            self.pilot.stand()
         if api not in STANDING_UP:
+            if self.is_leaning:
+                self.pilot.stand()
             self.is_locked = self.is_leaning = False
         self._actions[api]()
         self.is_locked, self.is_leaning = api == Api.STAND_UP, False
