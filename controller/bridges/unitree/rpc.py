@@ -93,26 +93,22 @@ class Server:
 
 
 @final
-class LeaseServer:
+class Lease:
     """Gives one client at a time the sole control of a service, as Unitree's servers do."""
 
-    def __init__(self, bus: Bus, service: str) -> None:
-        """Serve ``service``'s leases."""
+    def __init__(self) -> None:
+        """Nobody has it."""
         self._id, self._renewed = 0, -math.inf
-        self._server = Server(bus, f"{service}_lease", self._handle)
 
     def allows(self, request: Request) -> bool:
         """Whether the client of ``request`` may control the service now."""
         return self._is_expired() or request.lease_id == self._id
 
-    def close(self) -> None:
-        """Stop serving; idempotent."""
-        self._server.close()
-
     def _is_expired(self) -> bool:
         return time.monotonic() > self._renewed + LEASE_TERM
 
-    def _handle(self, request: Request, reply: Reply) -> None:
+    def handle(self, request: Request, reply: Reply) -> None:
+        """Answer a request for a lease."""
         code, data = Code.OK, ""
         if request.api_id == Api.LEASE_APPLY and self._is_expired():
             self._id, self._renewed = time.time_ns() // 1000, time.monotonic()

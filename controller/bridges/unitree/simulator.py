@@ -12,7 +12,7 @@ from typing import Final, final
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.low_level import CommandGate
-from controller.bridges.unitree.rpc import LeaseServer, Server
+from controller.bridges.unitree.rpc import Lease, Server
 from controller.bridges.unitree.served_plant import ServedPlant
 from controller.bridges.unitree.sport_api import (
     SPORT_SERVICE,
@@ -93,9 +93,10 @@ class UnitreeSimulator:
         self._robot = SportRobot(self._plant, config)
         self._is_released = False
         self._sport = SportService(self._robot, lambda: self._is_released or self.gate.is_active)
-        self._lease = LeaseServer(bus, SPORT_SERVICE)
+        self._lease = Lease()
         self._servers = (
             Server(bus, SPORT_SERVICE, self._handle_sport, self._patrol),
+            Server(bus, f"{SPORT_SERVICE}_lease", self._lease.handle),
             Server(bus, SWITCHER_SERVICE, self._handle_switcher),
         )
 
@@ -108,7 +109,6 @@ class UnitreeSimulator:
         """Go limp and stop serving; idempotent."""
         for server in self._servers:
             server.close()
-        self._lease.close()
         self._sport.close()
         self._robot.close()
         self._plant.close()
