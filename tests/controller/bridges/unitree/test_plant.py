@@ -223,6 +223,13 @@ def test_a_robot_that_does_not_lie_is_sent_nothing(robot: Robot) -> None:
     assert robot.commands == []
 
 
+def test_a_robot_that_measures_no_finite_joint_angle_is_sent_nothing(robot: Robot) -> None:
+    robot.change = broken
+    with pytest.raises(PlantError, match="must lie on its belly"):
+        driven(PATIENT)
+    assert robot.commands == []
+
+
 def test_a_robot_that_gets_up_while_it_is_taken_over_is_let_go(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
