@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 from PIL import Image, ImageFilter
 
 from viz.render.camera import Camera
-from viz.render.posed_robot import WorldTriangles
+from viz.render.mesh import Surface
 from viz.render.rasterizer import rasterize
 
 _LEAST_SCALE = 1e-4  # pixels closer than this to the horizon count as sky
@@ -47,7 +47,7 @@ class FloorStyle:
 
 
 def paint_floor(
-    camera: Camera, casters: WorldTriangles, light: Float[np.ndarray, "3"], style: FloorStyle
+    camera: Camera, casters: Surface, light: Float[np.ndarray, "3"], style: FloorStyle
 ) -> Float[np.ndarray, "h w 3"]:
     """The picture without the robot: floor, background and shadow.
 
@@ -127,7 +127,7 @@ def _triangle_wave(value: Float[np.ndarray, "r w"]) -> Float[np.ndarray, "r w"]:
 
 
 def _shadow_on_picture(
-    camera: Camera, casters: WorldTriangles, light: Float[np.ndarray, "3"], style: FloorStyle
+    camera: Camera, casters: Surface, light: Float[np.ndarray, "3"], style: FloorStyle
 ) -> Float[np.ndarray, "h w"]:
     """Share of light that the robot takes from each pixel of the floor, 0..1."""
     per_metre = style.shadow_texels / style.shadow_width

@@ -15,8 +15,9 @@ from viz.content import Annotation
 from viz.palette import FORCE, rgb
 from viz.render.camera import Camera
 from viz.render.framing import camera_path, heading_path, nearest_rows
+from viz.render.mesh import Surface
 from viz.render.overlay import Caption, draw_caption
-from viz.render.posed_robot import PosedRobot, WorldTriangles, arrow
+from viz.render.posed_robot import PosedRobot, arrow
 from viz.render.renderer import RenderStyle, render
 from viz.render.robot_meshes import load_robot_visuals
 
@@ -122,7 +123,7 @@ class FrameRenderer:
         azimuth = style.azimuth + heading + sway
         return Camera(target, float(azimuth), style.elevation, style.distance, style.size)
 
-    def _arrows(self, recording: Recording, k: int) -> list[WorldTriangles]:
+    def _arrows(self, recording: Recording, k: int) -> list[Surface]:
         style = self._style
         feet = self._robot.feet(recording.q[k]) - [0.0, 0.0, FOOT_RADIUS]
         return [

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int, UInt8
 
 from viz.render.camera import Camera
 from viz.render.floor import FloorStyle, paint_floor
-from viz.render.posed_robot import WorldTriangles
+from viz.render.mesh import Surface
 from viz.render.rasterizer import doubled_area, plane_coefficients, rasterize
 
 
@@ -73,10 +73,10 @@ class RenderStyle:
 
 def render(
     camera: Camera,
-    robot: WorldTriangles,
+    robot: Surface,
     style: RenderStyle,
     *,
-    extras: Sequence[WorldTriangles] = (),
+    extras: Sequence[Surface] = (),
 ) -> UInt8[np.ndarray, "h w 3"]:
     """One picture.
 
@@ -88,7 +88,7 @@ def render(
     """
     width, height = camera.size
     picture = paint_floor(camera, robot, style.lighting.towards_key, style.floor)
-    solids = WorldTriangles.joined([robot, *extras]) if extras else robot
+    solids = Surface.joined([robot, *extras]) if extras else robot
     projected = camera.scaled(style.samples).project(solids.points)
     projected[len(robot.points) :, 2] *= style.extras_lead
     color, coverage = _solids(camera, solids, projected, style)
@@ -99,7 +99,7 @@ def render(
 
 def _solids(
     camera: Camera,
-    solids: WorldTriangles,
+    solids: Surface,
     projected: Float[np.ndarray, "n 3"],
     style: RenderStyle,
 ) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, " k"]]:
@@ -153,7 +153,7 @@ def _interpolated(
 
 
 def _vertex_brightness(
-    camera: Camera, solids: WorldTriangles, lighting: Lighting
+    camera: Camera, solids: Surface, lighting: Lighting
 ) -> Float[np.ndarray, "n 2"]:
     """Diffuse (times the material's colour) and white highlight at each vertex."""
     normals = solids.normals

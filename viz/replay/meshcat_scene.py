@@ -13,13 +13,12 @@ import meshcat
 import meshcat.geometry as shapes
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
 from meshcat.commands import SetObject, SetTransform
 from meshcat.transformations import rotation_matrix, translation_matrix
 
 from go2_wbc.legs import LEGS
 from viz.palette import FORCE, INK, LEG_COLORS
-from viz.render.mesh import SurfaceMesh
+from viz.render.mesh import Surface
 from viz.render.robot_meshes import RobotVisuals
 from viz.replay.packing import Pack
 
@@ -91,13 +90,18 @@ def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
     for joint, path in turning:
         placement = visuals.model.jointPlacements[joint].homogeneous
         scene[path.removesuffix("/turn")].set_transform(placement)
-    for visual in visuals.visuals:
-        for row, part in enumerate(visuals.meshes[visual.mesh]):
-            node = scene[f"{paths[visual.joint]}/{visual.name}_{row}"]
-            node.set_object(SharedMesh(table[visual.mesh, row]), _material(part.color))
-            node.set_transform(visual.T_joint_visual)
+    for item in visuals.geometry.geometryObjects:
+        link = visuals.model.frames[item.parentFrame].name
+        for row, part in enumerate(visuals.meshes[item.meshPath]):
+            node = scene[f"{paths[item.parentJoint]}/{link}_{row}"]
+            node.set_object(SharedMesh(table[item.meshPath, row]), _material(part))
+            node.set_transform(item.placement.homogeneous)
     _add_markers(scene)
-    joints = [{"path": path, "axis": _axis(visuals.model.joints[joint])} for joint, path in turning]
+    # The axis of a revolute joint, in its own frame, is the lower half of its motion subspace.
+    axes = [np.ravel(visuals.model.joints[joint].createData().S)[3:] for joint, _ in turning]
+    joints = [
+        {"path": path, "axis": axis.tolist()} for (_, path), axis in zip(turning, axes, strict=True)
+    ]
     return {
         "meshes": len(table),
         "commands": window.commands,
@@ -109,10 +113,14 @@ def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
 def _add_meshes(visuals: RobotVisuals, pack: Pack) -> dict[tuple[str, int], int]:
     """Store each mesh once; returns its row in the table by file and part."""
     table: dict[tuple[str, int], int] = {}
-    for name, parts in visuals.meshes.items():
+    for path, parts in visuals.meshes.items():
         for row, part in enumerate(parts):
-            table[name, row] = len(table)
-            _add_mesh(pack, table[name, row], part.surface)
+            index = table[path, row] = len(table)
+            pack.add_quantised(f"mesh{index}.points", part.points)
+            normals = np.round(part.normals * _NORMAL_LEVELS).astype(np.int8)
+            pack.add(f"mesh{index}.normals", normals)
+            kind = np.uint16 if len(part.points) <= np.iinfo(np.uint16).max + 1 else np.uint32
+            pack.add(f"mesh{index}.triangles", part.triangles.astype(kind))
     return table
 
 
@@ -124,26 +132,9 @@ def _joint_paths(model: pin.Model) -> dict[int, str]:
     return paths
 
 
-def _axis(joint: pin.JointModel) -> list[float]:
-    """Unit axis of a revolute joint in its own frame, read off its motion subspace."""
-    data = joint.createData()
-    joint.calc(data, np.zeros(joint.nq), np.zeros(joint.nv))
-    axis: Float[np.ndarray, "3"] = np.ravel(data.S)[3:]
-    return [float(value) for value in axis]
-
-
-def _add_mesh(pack: Pack, index: int, surface: SurfaceMesh) -> None:
-    pack.add_quantised(f"mesh{index}.points", surface.points)
-    normals = np.round(surface.normals * _NORMAL_LEVELS).astype(np.int8)
-    pack.add(f"mesh{index}.normals", normals)
-    kind = np.uint16 if len(surface.points) <= np.iinfo(np.uint16).max + 1 else np.uint32
-    pack.add(f"mesh{index}.triangles", surface.triangles.astype(kind))
-
-
-def _material(color: tuple[int, int, int]) -> shapes.MeshPhongMaterial:
-    red, green, blue = color
-    value = (red << 16) | (green << 8) | blue
-    return shapes.MeshPhongMaterial(color=value, side=0, shininess=45, specular=0x3A3A3A)
+def _material(part: Surface) -> shapes.MeshPhongMaterial:
+    color = int.from_bytes(np.round(255 * part.colors[0]).astype(np.uint8).tobytes())
+    return shapes.MeshPhongMaterial(color=color, side=0, shininess=45, specular=0x3A3A3A)
 
 
 def _add_markers(scene: meshcat.Visualizer) -> None:

@@ -9,7 +9,8 @@ from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import FOOT_RADIUS
 from viz.render.camera import Camera
 from viz.render.floor import FloorStyle, paint_floor
-from viz.render.posed_robot import PosedRobot, WorldTriangles
+from viz.render.mesh import Surface
+from viz.render.posed_robot import PosedRobot
 from viz.render.rasterizer import rasterize
 from viz.render.renderer import Lighting, RenderStyle, render
 from viz.render.robot_meshes import load_robot_visuals
@@ -49,7 +50,7 @@ def test_the_floor_is_darker_under_the_robot_than_beside_it() -> None:
     style, light = FloorStyle(tile=100.0), Lighting().towards_key
     camera = _camera()
     with_shadow = paint_floor(camera, robot.at(q), light, style)
-    nothing = WorldTriangles(
+    nothing = Surface(
         robot.at(q).points, robot.at(q).normals, np.zeros((0, 3), dtype=int), np.zeros((0, 3))
     )
     without = paint_floor(camera, nothing, light, style)
@@ -59,7 +60,7 @@ def test_the_floor_is_darker_under_the_robot_than_beside_it() -> None:
 
 
 def test_the_shadow_falls_away_from_the_light() -> None:
-    tower = WorldTriangles(
+    tower = Surface(
         np.array([[-0.02, 0.0, 0.3], [0.02, 0.0, 0.3], [0.0, 0.03, 0.3]]),
         np.tile([0.0, 0.0, 1.0], (3, 1)),
         np.array([[0, 1, 2]]),
@@ -71,7 +72,7 @@ def test_the_shadow_falls_away_from_the_light() -> None:
     picture = paint_floor(camera, tower, light, style)
     bare = paint_floor(
         camera,
-        WorldTriangles(tower.points, tower.normals, tower.triangles[:0], tower.colors[:0]),
+        Surface(tower.points, tower.normals, tower.triangles[:0], tower.colors[:0]),
         light,
         style,
     )
@@ -93,12 +94,10 @@ def test_the_robot_covers_a_good_part_of_the_picture_with_its_own_colours() -> N
     assert np.abs(picture[0].astype(int) - empty[0]).max() == 0
 
 
-def _raised(robot: PosedRobot, q: np.ndarray, height: float) -> WorldTriangles:
+def _raised(robot: PosedRobot, q: np.ndarray, height: float) -> Surface:
     """The robot far behind the camera's back: out of the picture."""
     away = robot.at(q)
-    return WorldTriangles(
-        away.points - [0.0, 0.0, height], away.normals, away.triangles, away.colors
-    )
+    return Surface(away.points - [0.0, 0.0, height], away.normals, away.triangles, away.colors)
 
 
 def test_more_samples_only_smooth_the_edges() -> None:
