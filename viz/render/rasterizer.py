@@ -53,8 +53,8 @@ def rasterize(
     x, y = points[:, 0][corners], points[:, 1][corners]
     area = _doubled_area(x, y)
     kept = area > _LEAST_AREA if cull_back else np.abs(area) > _LEAST_AREA
-    top = np.maximum(np.ceil(y.min(axis=0) - 0.5), 0)
-    bottom = np.minimum(np.floor(y.max(axis=0) - 0.5), height - 1)
+    top = np.maximum(np.ceil(np.minimum(np.minimum(y[0], y[1]), y[2]) - 0.5), 0)
+    bottom = np.minimum(np.floor(np.maximum(np.maximum(y[0], y[1]), y[2]) - 0.5), height - 1)
     kept = np.flatnonzero(kept & (top <= bottom))
     x, y, top = x[:, kept], y[:, kept], top[kept].astype(np.int64)
     counts = bottom[kept].astype(np.int64) - top + 1
@@ -120,12 +120,12 @@ def _spans(
     """
     low = np.full(len(row), -np.inf)
     high = np.full(len(row), np.inf)
-    turn = np.sign(_doubled_area(x, y))
+    centre, turn = row + 0.5, np.sign(_doubled_area(x, y))
     for a, b in ((0, 1), (1, 2), (2, 0)):
         rise = y[b] - y[a]
         slope = (x[b] - x[a]) / np.where(rise == 0, 1.0, rise)
         start = x[a] - y[a] * slope
-        crossing = start[triangle] + (row + 0.5) * slope[triangle]
+        crossing = start[triangle] + centre * slope[triangle]
         side = (rise * turn)[triangle]
         np.maximum(low, crossing, out=low, where=side > 0)
         np.minimum(high, crossing, out=high, where=side < 0)

@@ -1,19 +1,21 @@
 """Builds the replay's scene with meshcat, without a server and with each mesh stored once.
 
-meshcat's own static export repeats a mesh for every link that shows it. Here a recording window
-takes the place of the server: it keeps the commands, and meshes in them are references that the
-page resolves against one table.
+meshcat's own static export repeats a mesh for every link that shows it. Here the commands are kept
+instead of being sent, and meshes in them are references that the page resolves against one table.
 """
 
 from __future__ import annotations
 
+import json
+import re
+import uuid
+from types import SimpleNamespace
 from typing import final
 
 import meshcat
 import meshcat.geometry as shapes
 import numpy as np
 import pinocchio as pin
-from meshcat.commands import SetObject, SetTransform
 from meshcat.transformations import rotation_matrix, translation_matrix
 
 from go2_wbc.legs import LEGS
@@ -26,34 +28,8 @@ _NORMAL_LEVELS = 127  # of a signed 8-bit number
 _SHAFT_RADIUS, _HEAD_RADIUS, _HEAD_LENGTH = 0.007, 0.018, 0.035  # [m] force arrow
 _COM_RADIUS = 0.016  # [m]
 _SPOT_RADIUS = 0.014  # [m]
-_NAME_KEYS = ("uuid", "geometry", "material")
+_UUID = re.compile(r"[0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12}")
 _UPRIGHT = rotation_matrix(np.pi / 2, [1, 0, 0])  # meshcat's cylinders lie along y
-
-
-@final
-class RecordingWindow:
-    """Takes the place of meshcat's window: keeps the commands instead of sending them."""
-
-    def __init__(self) -> None:
-        """Start with no command."""
-        self.commands: list[object] = []
-        self._names: dict[str, str] = {}
-
-    def send(self, command: SetObject | SetTransform) -> None:
-        """Keep one meshcat command in the form that the browser reads."""
-        self.commands.append(self._plain(command.lower()))
-
-    def _plain(self, value: object, key: str = "") -> object:
-        """The same in types that JSON knows, with counted names for meshcat's random ones."""
-        if isinstance(value, dict):
-            return {name: self._plain(item, name) for name, item in value.items()}
-        if isinstance(value, list | tuple):
-            return [self._plain(item) for item in value]
-        if isinstance(value, np.generic):
-            return value.item()
-        if key in _NAME_KEYS and isinstance(value, str):
-            return self._names.setdefault(value, f"{len(self._names)}")
-        return value
 
 
 @final
@@ -62,8 +38,7 @@ class SharedMesh(shapes.Geometry):
 
     def __init__(self, index: int) -> None:
         """Refer to mesh ``index``."""
-        super().__init__()
-        self.uuid = f"mesh-{index}"
+        self.uuid = str(uuid.UUID(int=index))
         self._index = index
 
     def lower(self, _object_data: dict[str, object]) -> dict[str, object]:
@@ -82,32 +57,38 @@ def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
         Header entries: ``meshes`` (count), ``commands``, ``base`` (path of the moving trunk) and
         ``joints`` (path and axis of each joint, in the order of q).
     """
-    window = RecordingWindow()
-    scene = meshcat.Visualizer(window=window)
+    commands: list[object] = []
+    window = SimpleNamespace(send=lambda command: commands.append(command.lower()))
+    scene, model = meshcat.Visualizer(window=window), visuals.model
     table = _add_meshes(visuals, pack)
-    paths = _joint_paths(visuals.model)
-    turning = list(paths.items())[1:]
-    for joint, path in turning:
-        placement = visuals.model.jointPlacements[joint].homogeneous
-        scene[path.removesuffix("/turn")].set_transform(placement)
+    paths = _joint_paths(model)
+    joints = []
+    for joint in range(2, model.njoints):
+        fixed = scene[paths[joint].removesuffix("/turn")]
+        fixed.set_transform(model.jointPlacements[joint].homogeneous)
+        # The lower half of a revolute joint's motion subspace is its axis, in its own frame.
+        axis = np.ravel(model.joints[joint].createData().S)[3:].tolist()
+        joints.append({"path": paths[joint], "axis": axis})
     for item in visuals.geometry.geometryObjects:
-        link = visuals.model.frames[item.parentFrame].name
+        link = model.frames[item.parentFrame].name
         for row, part in enumerate(visuals.meshes[item.meshPath]):
             node = scene[f"{paths[item.parentJoint]}/{link}_{row}"]
             node.set_object(SharedMesh(table[item.meshPath, row]), _material(part))
             node.set_transform(item.placement.homogeneous)
     _add_markers(scene)
-    # The axis of a revolute joint, in its own frame, is the lower half of its motion subspace.
-    axes = [np.ravel(visuals.model.joints[joint].createData().S)[3:] for joint, _ in turning]
-    joints = [
-        {"path": path, "axis": axis.tolist()} for (_, path), axis in zip(turning, axes, strict=True)
-    ]
     return {
         "meshes": len(table),
-        "commands": window.commands,
+        "commands": _plain(commands),
         "base": paths[1],
         "joints": joints,
     }
+
+
+def _plain(commands: list[object]) -> object:
+    """The commands in types that JSON knows, with counted names for meshcat's random ones."""
+    names: dict[str, str] = {}
+    text = json.dumps(commands, default=np.generic.item)
+    return json.loads(_UUID.sub(lambda found: names.setdefault(found[0], f"{len(names)}"), text))
 
 
 def _add_meshes(visuals: RobotVisuals, pack: Pack) -> dict[tuple[str, int], int]:
@@ -139,22 +120,24 @@ def _material(part: Surface) -> shapes.MeshPhongMaterial:
 
 def _add_markers(scene: meshcat.Visualizer) -> None:
     """Unit force arrows and the CoM's markers; the page moves and scales them."""
+    cone = shapes.Cylinder(_HEAD_LENGTH, radiusTop=0.0, radiusBottom=_HEAD_RADIUS)
     for leg, color in zip(LEGS, LEG_COLORS, strict=True):
-        arrow = scene[f"forces/{leg.name}"]
-        material = _flat(FORCE)
-        arrow["shaft/body"].set_object(shapes.Cylinder(1.0, _SHAFT_RADIUS), material)
-        arrow["shaft/body"].set_transform(translation_matrix([0, 0, 0.5]) @ _UPRIGHT)
-        cone = shapes.Cylinder(_HEAD_LENGTH, radiusTop=0.0, radiusBottom=_HEAD_RADIUS)
-        arrow["head/body"].set_object(cone, material)
-        arrow["head/body"].set_transform(translation_matrix([0, 0, _HEAD_LENGTH / 2]) @ _UPRIGHT)
+        arrow, orange = scene[f"forces/{leg.name}"], _flat(FORCE)
+        _put_upright(arrow["shaft/body"], shapes.Cylinder(1.0, _SHAFT_RADIUS), orange, 0.5)
+        _put_upright(arrow["head/body"], cone, orange, _HEAD_LENGTH / 2)
         ring = shapes.Cylinder(0.002, 0.032)
-        scene[f"contacts/{leg.name}"].set_object(ring, _flat(color, glow=0.15))
-        scene[f"contacts/{leg.name}/<object>"].set_transform(_UPRIGHT)
+        _put_upright(scene[f"contacts/{leg.name}"], ring, _flat(color, glow=0.15))
     scene["com/ball"].set_object(shapes.Sphere(_COM_RADIUS), _flat(INK))
-    scene["com/line/body"].set_object(shapes.Cylinder(1.0, 0.002), _flat(INK))
-    scene["com/line/body"].set_transform(translation_matrix([0, 0, 0.5]) @ _UPRIGHT)
-    scene["com/spot"].set_object(shapes.Cylinder(0.003, _SPOT_RADIUS), _flat(INK))
-    scene["com/spot/<object>"].set_transform(_UPRIGHT)
+    _put_upright(scene["com/line/body"], shapes.Cylinder(1.0, 0.002), _flat(INK), 0.5)
+    _put_upright(scene["com/spot"], shapes.Cylinder(0.003, _SPOT_RADIUS), _flat(INK))
+
+
+def _put_upright(
+    node: meshcat.Visualizer, shape: shapes.Geometry, material: shapes.Material, middle: float = 0.0
+) -> None:
+    """Show a cylinder upright, its middle this far [m] above the node."""
+    node.set_object(shape, material)
+    node["<object>"].set_transform(translation_matrix([0, 0, middle]) @ _UPRIGHT)
 
 
 def _flat(color: str, *, glow: float = 0.4) -> shapes.MeshLambertMaterial:
