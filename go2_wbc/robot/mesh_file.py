@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -34,15 +35,16 @@ def read_mesh(path: Path) -> tuple[MeshPart, ...]:
     Raises:
         DescriptionError: if the file cannot be read or holds no triangles.
     """
-    import trimesh  # takes long to import, and a robot that nobody looks at has no meshes
+    import trimesh  # takes long, and is needed only where somebody looks at the robot
+    from trimesh.visual import TextureVisuals
 
     try:
-        scene = trimesh.load_scene(path)
+        scene: Any = trimesh.load_scene(path)
     except (OSError, ValueError) as error:
         raise DescriptionError(f"cannot read the mesh {path}: {error}") from error
     parts = []
     for mesh in scene.dump():
-        is_painted = isinstance(mesh.visual, trimesh.visual.TextureVisuals)
+        is_painted = isinstance(mesh.visual, TextureVisuals)
         color = mesh.visual.material.main_color if is_painted else _UNPAINTED
         rgba = tuple(float(value) / 255.0 for value in color)
         if len(mesh.faces):
