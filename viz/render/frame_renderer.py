@@ -22,6 +22,9 @@ from viz.render.renderer import render
 from viz.render.robot_meshes import load_robot_visuals
 
 _INSTANT = 0.04  # [s] a limit that is broken for an instant is told for this long around it
+_SWAY_PERIOD = 26.0  # [s]
+_METRES_PER_NEWTON = 0.002  # length of the force arrows
+_LEAST_FORCE = 4.0  # [N] weaker forces draw no arrow
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,29 +34,23 @@ class ShotStyle:
     Attributes:
         size: width and height [px].
         azimuth: mean direction of the camera seen from the robot, 0 is ahead of it [rad].
-        sway: the azimuth swings by this much [rad] around its mean ...
-        sway_period: ... once in this time [s]; a still camera looks dead.
+        sway: the azimuth swings by this much [rad] around its mean; a still camera looks dead.
         elevation: camera angle above the floor [rad].
         distance: from the camera to the robot [m].
         smoothing: standard deviation [s] of the low-pass filter on where the camera looks.
         turn_smoothing: the same for its turning with the robot.
         detail: size of the smallest feature kept of the meshes [m].
-        metres_per_newton: length of the force arrows.
-        least_force: weaker forces draw no arrow [N].
         samples: edge of the sample grid in each pixel.
     """
 
     size: tuple[int, int] = (640, 400)
     azimuth: float = np.deg2rad(-52.0)
     sway: float = np.deg2rad(14.0)
-    sway_period: float = 26.0
     elevation: float = np.deg2rad(17.0)
     distance: float = 1.62
     smoothing: float = 0.6
     turn_smoothing: float = 1.5
     detail: float = 0.006
-    metres_per_newton: float = 0.002
-    least_force: float = 4.0
     samples: int = 2
 
 
@@ -95,7 +92,7 @@ class FrameRenderer:
             label=recording.labels[k] if broken is None else f"{broken.limit}: {broken.subject}",
             time=time,
             progress=time / max(recording.duration, 1e-9) if with_progress else None,
-            contacts=recording.foot_forces[k] > self._style.least_force,
+            contacts=recording.foot_forces[k] > _LEAST_FORCE,
             speed=speed,
             is_alarm=broken is not None,
         )
@@ -115,15 +112,15 @@ class FrameRenderer:
         times, points = self._path
         target = np.array([np.interp(time, times, points[:, axis]) for axis in range(3)])
         heading = np.interp(self._recording.time[0] + time, self._recording.time, self._heading)
-        sway = style.sway * np.sin(2 * np.pi * time / style.sway_period)
+        sway = style.sway * np.sin(2 * np.pi * time / _SWAY_PERIOD)
         azimuth = style.azimuth + heading + sway
         return Camera(target, float(azimuth), style.elevation, style.distance, style.size)
 
     def _arrows(self, k: int) -> list[Surface]:
-        style, recording = self._style, self._recording
+        recording = self._recording
         feet = self._robot.feet(recording.q[k]) - [0.0, 0.0, FOOT_RADIUS]
         return [
-            arrow(foot, float(force) * style.metres_per_newton, 0.006, rgb(FORCE))
+            arrow(foot, float(force) * _METRES_PER_NEWTON, 0.006, rgb(FORCE))
             for foot, force in zip(feet, recording.foot_forces[k], strict=True)
-            if force > style.least_force
+            if force > _LEAST_FORCE
         ]

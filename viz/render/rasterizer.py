@@ -33,8 +33,6 @@ def rasterize(
     points: Float[np.ndarray, "n 3"],
     triangles: Int[np.ndarray, "m 3"],
     size: tuple[int, int],
-    *,
-    cull_back: bool = True,
 ) -> Fragments:
     """Find the triangle that is in front at each sample.
 
@@ -44,18 +42,16 @@ def rasterize(
 
     Args:
         points: x (right) and y (down) in pixels, and nearness (> 0, larger is closer).
-        triangles: rows of ``points``, counter-clockwise as seen (with y pointing up).
+        triangles: rows of ``points``, counter-clockwise as seen (with y pointing up); the others
+            are seen from behind, and dropped.
         size: width and height [px].
-        cull_back: drop triangles that are seen from behind.
     """
     width, height = size
     corners = triangles.T
     x, y = points[:, 0][corners], points[:, 1][corners]
-    area = _doubled_area(x, y)
-    kept = area > _LEAST_AREA if cull_back else np.abs(area) > _LEAST_AREA
     top = np.maximum(np.ceil(np.minimum(np.minimum(y[0], y[1]), y[2]) - 0.5), 0)
     bottom = np.minimum(np.floor(np.maximum(np.maximum(y[0], y[1]), y[2]) - 0.5), height - 1)
-    kept = np.flatnonzero(kept & (top <= bottom))
+    kept = np.flatnonzero((_doubled_area(x, y) > _LEAST_AREA) & (top <= bottom))
     x, y, top = x[:, kept], y[:, kept], top[kept].astype(np.int64)
     counts = bottom[kept].astype(np.int64) - top + 1
     triangle, row = np.repeat(np.arange(len(kept)), counts), _expand(top, counts)
@@ -120,13 +116,13 @@ def _spans(
     """
     low = np.full(len(row), -np.inf)
     high = np.full(len(row), np.inf)
-    centre, turn = row + 0.5, np.sign(_doubled_area(x, y))
+    centre = row + 0.5
     for a, b in ((0, 1), (1, 2), (2, 0)):
         rise = y[b] - y[a]
         slope = (x[b] - x[a]) / np.where(rise == 0, 1.0, rise)
         start = x[a] - y[a] * slope
         crossing = start[triangle] + centre * slope[triangle]
-        side = (rise * turn)[triangle]
+        side = rise[triangle]
         np.maximum(low, crossing, out=low, where=side > 0)
         np.minimum(high, crossing, out=high, where=side < 0)
     first = np.clip(np.ceil(low - 0.5 - _COVERAGE_SLACK), 0, width).astype(np.int64)
