@@ -42,7 +42,7 @@ class Surface:
         )
 
     def placed(self, T: pin.SE3) -> Surface:
-        """The same surface in the frame that ``T`` leads to."""
+        """The same surface in another frame, in which its own has the pose ``T``."""
         R = T.rotation.T
         return replace(self, points=self.points @ R + T.translation, normals=self.normals @ R)
 
