@@ -25,7 +25,6 @@ from viz.palette import INK
 from viz.render.animation import encoded_webp, frame_times
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.posed_robot import PosedRobot
-from viz.render.renderer import RenderStyle
 from viz.render.robot_meshes import load_robot_visuals
 
 MOMENTS = 3
@@ -49,7 +48,7 @@ STYLE = ShotStyle(
     turn_smoothing=20.0,
     distance=1.5,
     detail=0.003,
-    render=RenderStyle(samples=3),
+    samples=3,
 )
 """A camera that nearly stands still, so that what differs between the panels is the robot."""
 SIZE_LIMIT = 60_000

@@ -89,7 +89,6 @@ def build_spec(
 
     Raises:
         DescriptionError: if MuJoCo cannot read the URDF or a mesh is missing.
-        MissingDependency: for ``visuals`` without trimesh or pycollada.
     """
     spec = _spec_from_urdf(description)
     spec.modelname = "go2"
