@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import closing
 from typing import Final
 
 import numpy as np
@@ -12,7 +13,6 @@ from benchmarks.bridges.ros2_processes import (
     COMMAND_PERIOD,
     Probe,
     joined,
-    probing,
     quiet_client,
     serving,
 )
@@ -58,7 +58,7 @@ def measure(_trial: Trial) -> Measurement:
     from controller.bridges.ros2.demo import run_steps
 
     with joined(), serving(namespace=NAMESPACE):
-        with probing(NAMESPACE) as probe:
+        with closing(Probe(NAMESPACE)) as probe:
             values = _round_trips(probe) | _drive(probe)
         with quiet_client(NAMESPACE) as go2:
             undone = [f"{step.label}: {step.reason}" for step in run_steps(go2) if not step.ok]

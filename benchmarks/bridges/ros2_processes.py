@@ -16,6 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, final
 
+import numpy as np
+
 from benchmarks.bridges.processes import PROGRAM, Process, wait_until
 from controller.bridges.ros2.names import (
     BEHAVIOR_SERVICE,
@@ -106,7 +108,7 @@ class Probe:
     Attributes:
         node: to add subscriptions and clients to.
         namespace: of the robot.
-        largest_tilt: of the base since this was set to None [rad]; None without odometry.
+        largest_tilt: of the base so far [rad]; nan without odometry.
     """
 
     def __init__(self, namespace: str = "robot1") -> None:
@@ -114,7 +116,7 @@ class Probe:
         from controller.bridges.ros2 import imports as ros
 
         self._ros, self.namespace = ros, namespace
-        self.largest_tilt: float | None = None
+        self.largest_tilt = math.nan
         self._newest: RobotState | None = None
         self.node = ros.Node(
             f"probe_{namespace}", start_parameter_services=False, enable_rosout=False
@@ -140,7 +142,7 @@ class Probe:
         from controller.bridges.ros2.states import state_of
 
         self._newest = state = state_of(message)
-        self.largest_tilt = max(self.largest_tilt or 0.0, state.tilt)
+        self.largest_tilt = float(np.fmax(self.largest_tilt, state.tilt))
 
     # --- calls ----------------------------------------------------------------------------
 
@@ -243,16 +245,6 @@ class Probe:
         self._thread.join(5.0)
         self._executor.shutdown()
         self.node.destroy_node()
-
-
-@contextmanager
-def probing(namespace: str) -> Iterator[Probe]:
-    """A probe that is closed afterwards."""
-    probe = Probe(namespace)
-    try:
-        yield probe
-    finally:
-        probe.close()
 
 
 @contextmanager
