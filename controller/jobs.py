@@ -287,14 +287,18 @@ class JobServer(Generic[Robot]):
             followers, job._followers = job._followers, []
         self._answer(job, answer)
         for then in followers:
-            then()
+            self._guarded(job, then)
 
     def _answer(self, job: Job, answer: Answer) -> None:
         with self._changed:
             if job._is_answered:
                 return
             job._is_answered = True
+        self._guarded(job, lambda: job.reply(answer))
+
+    @staticmethod
+    def _guarded(job: Job, tell: Callable[[], object]) -> None:
         try:
-            job.reply(answer)
+            tell()
         except Exception:  # of the middleware; the robot goes on
             _log.exception("%s could not be answered", job.name)

@@ -120,6 +120,20 @@ def test_a_reply_that_fails_does_not_stop_the_server(
     assert client.only("up").success
 
 
+def test_somebody_who_fails_to_hear_of_an_end_does_not_stop_the_server(
+    client: Client, caplog: pytest.LogCaptureFixture
+) -> None:
+    # The ROS 2 server answers "stop" so: an error of the middleware ended its loop.
+    def act(_job: Job) -> Measurements:
+        assert client.jobs.cancel(failing(OSError("no route")))
+        return {}
+
+    client.submit("sit", act)
+    assert client.jobs.work()
+    assert client.only("sit").success
+    assert "sit could not be answered" in caplog.text
+
+
 # --- queue and patience -------------------------------------------------------------------------
 
 

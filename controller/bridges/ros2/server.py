@@ -13,9 +13,9 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -30,15 +30,14 @@ from controller.bridges.ros2.names import (
     CMD_VEL,
     SERVER_NODE,
     STATISTICS_SERVICE,
-    Rates,
     topic,
 )
-from controller.bridges.ros2.namespace_lock import GraphWatch, NamespaceLock
-from controller.bridges.ros2.polling import Call, PolledService, PolledSubscription
+from controller.bridges.ros2.namespace_lock import GraphWatch, lock_namespace
+from controller.bridges.ros2.polling import PolledService, PolledSubscription
 from controller.bridges.ros2.states import StatePublisher
 from controller.bridges.ros2.velocity import VelocityInput
 from controller.go2_controller import GO2Controller
-from controller.jobs import Answer, JobServer
+from controller.jobs import Answer, JobServer, Reply
 from controller.pacing import SWITCH_INTERVAL, LogThrottle, Pacer
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
@@ -63,14 +62,12 @@ class ServerSettings:
         realtime: at the pace of the wall clock; otherwise as fast as the CPU allows, with /clock.
         viewer: open MuJoCo's window.
         config: numbers of the engine, or a TOML file.
-        rates: of the topics.
     """
 
     namespace: str = "robot1"
     realtime: bool = False
     viewer: bool = False
     config: Config | Path | None = None
-    rates: Rates = field(default_factory=Rates)
 
 
 def serve(
@@ -99,7 +96,7 @@ def serve(
         context = ros.Context()
         ros.rclpy.init(args=[], context=context, signal_handler_options=ros.SignalHandlerOptions.NO)
         stack.callback(ros.rclpy.shutdown, context=context)
-        stack.callback(NamespaceLock(namespace, context.get_domain_id()).close)
+        stack.enter_context(lock_namespace(namespace, context.get_domain_id()))
         graph_node = ros.Node(
             f"go2_wbc_graph_watch_{os.getpid()}",
             namespace=namespace,
@@ -110,11 +107,11 @@ def serve(
         stack.callback(graph_node.destroy_node)
         watch = GraphWatch(graph_node, namespace)
         watch.check()
-        has_clock = not (settings.realtime or watch.has_clock)
-        plant = HookedPlant(MujocoPlant(visuals=settings.viewer))
+        simulator = MujocoPlant(visuals=settings.viewer)
+        plant = HookedPlant(simulator)
         stack.callback(plant.close)
         go2 = stack.enter_context(GO2Controller(namespace, plant=plant, config=config))
-        node = RobotNode(context, go2, plant, settings, config, has_clock=has_clock)
+        node = RobotNode(context, go2, simulator, settings, config)
         stack.callback(node.close)
         stack.callback(plant.silence)
         plant.after_write = lambda: node.serve(stop)
@@ -130,61 +127,49 @@ class RobotNode:
         self,
         context: Any,
         go2: GO2Controller,
-        plant: HookedPlant,
+        simulator: MujocoPlant,
         settings: ServerSettings,
         config: Config,
-        *,
-        has_clock: bool,
     ) -> None:
-        """Offer ``go2`` in ``context``."""
-        self._settings, self._go2, namespace = settings, go2, settings.namespace
+        """Offer ``go2``, which drives ``simulator``, in ``context``."""
+        self._go2, self._namespace = go2, settings.namespace
+        realtime, namespace = settings.realtime, settings.namespace
         self._node = ros.Node(
             SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
         self._jobs = JobServer(go2)
         self._velocity = VelocityInput(go2, config.envelope)
-        self._cmd_vel = PolledSubscription(self._node, ros.Twist, topic(namespace, CMD_VEL))
-        self._command = self._offer_command()
-        self._triggers = cycle(self._offer_triggers())
-        self._states = StatePublisher(
-            self._node,
-            namespace,
-            plant.inner,
-            settings.rates,
-            clock=has_clock,
-            realtime=settings.realtime,
-        )
-        self._actions = (
-            MotionActions(context, namespace, self._jobs, settings.rates)
-            if ros.PlayMotion is not None
+        name = topic(namespace, CMD_VEL)
+        self._twists = PolledSubscription(self._node, ros.Twist, name, self._take_twist)
+        self._commands = (
+            self._service(ros.RobotBehaviorCommand, BEHAVIOR_SERVICE, self._take_command)
+            if ros.RobotBehaviorCommand is not None
             else None
         )
-        self._viewer = open_viewer(plant.inner) if settings.viewer else None
-        self._pacer = Pacer(plant.control_period, LATE) if settings.realtime else None
+        self._triggers = cycle(self._offer_triggers())
+        self._states = StatePublisher(self._node, namespace, simulator, realtime=realtime)
+        self._actions = (
+            MotionActions(context, namespace, self._jobs) if ros.PlayMotion is not None else None
+        )
+        self._viewer = open_viewer(simulator) if settings.viewer else None
+        self._pacer = Pacer(simulator.control_period, LATE) if realtime else None
         self._throttle, self._errors = LogThrottle(_log), 0
         self._cpu, self._ticks, self._began = 0.0, 0, time.monotonic()
 
-    def _offer_command(self) -> PolledService | None:
-        if ros.RobotBehaviorCommand is None:
-            return None
-        name = topic(self._settings.namespace, BEHAVIOR_SERVICE)
-        return PolledService(self._node, ros.RobotBehaviorCommand, name)
+    def _service(self, kind: Any, name: str, act: Callable[[Any, Reply], None]) -> PolledService:
+        return PolledService(self._node, kind, topic(self._namespace, name), act)
 
-    def _offer_triggers(self) -> list[tuple[PolledService, Callable[[Call], None]]]:
-        acts: dict[str, Callable[[Call], None]] = {
-            command: lambda call, name=command: self._order(name, call) for command in COMMANDS
-        }
-        acts[STATISTICS_SERVICE] = self._take_statistics
-        namespace = self._settings.namespace
-        return [
-            (PolledService(self._node, ros.Trigger, topic(namespace, name)), act)
-            for name, act in acts.items()
-        ]
+    def _offer_triggers(self) -> Iterator[PolledService]:
+        for name in COMMANDS:
+            yield self._service(
+                ros.Trigger, name, lambda _request, reply, name=name: self._order(name, reply)
+            )
+        yield self._service(ros.Trigger, STATISTICS_SERVICE, self._tell_statistics)
 
     @property
     def offer(self) -> str:
         """What is offered, and what is missing with the line that brings it."""
-        namespace = self._settings.namespace
+        namespace = self._namespace
         lines = [f"serving /{namespace}: " + ("real time" if self._pacer else "free-running")]
         missing = ros.missing_interfaces()
         if missing:
@@ -205,61 +190,51 @@ class RobotNode:
 
     def serve(self, stop: threading.Event) -> None:
         """One turn after a control period; called by the plant."""
-        began = time.thread_time()
         self._ticks += 1
         self._guarded(self._serve_once)
         if stop.is_set() and self._jobs.job is not None:
             self._guarded(self._jobs.damp)
-        self._cpu += time.thread_time() - began
         if self._pacer is not None and not stop.is_set():
-            self._pacer.wait(self._listen)
+            self._pacer.wait(lambda: self._guarded(self._poll_commands))
         if self._viewer is not None:
             self._viewer.show(self._go2.state.time)
 
     def _serve_once(self) -> None:
-        service, act = next(self._triggers)
-        for call in service.take():
-            act(call)
-        self._take_orders()
-        self._take_velocities()
+        next(self._triggers).poll()
+        self._poll_commands()
+        self._twists.poll()
         self._velocity.expire()
         self._states.publish_due()
 
-    def _listen(self) -> None:
-        began = time.thread_time()
-        self._guarded(self._take_orders)
-        self._cpu += time.thread_time() - began
+    def _poll_commands(self) -> None:
+        if self._commands is not None:
+            self._commands.poll()
 
     def _guarded(self, act: Callable[[], object]) -> None:
+        began = time.thread_time()
         try:
             act()
         except Exception as error:  # whatever it is: the robot must not fall for it
             self._errors += 1
             self._throttle.warn(type(error).__name__, f"{type(error).__name__}: {error}")
+        self._cpu += time.thread_time() - began
 
-    def _take_orders(self) -> None:
-        if self._command is not None:
-            for call in self._command.take():
-                self._order(call.request.command, call)
+    # --- what comes in --------------------------------------------------------------------
 
-    def _take_velocities(self) -> None:
-        is_busy = self._jobs.job is not None
-        for twist in self._cmd_vel.take():
-            linear, turn = twist.linear, twist.angular.z
-            self._velocity.accept(linear.x, linear.y, turn, is_busy=is_busy)
+    def _take_twist(self, twist: Any) -> None:
+        linear, is_busy = twist.linear, self._jobs.job is not None
+        self._velocity.accept(linear.x, linear.y, twist.angular.z, is_busy=is_busy)
 
-    # --- services -------------------------------------------------------------------------
+    def _take_command(self, request: Any, reply: Reply) -> None:
+        self._order(request.command, reply)
 
-    def _order(self, command: str, call: Call) -> None:
-        def reply(answer: Answer) -> None:
-            self._guarded(lambda: call.answer(success=answer.success, message=answer.message))
-
+    def _order(self, command: str, reply: Reply) -> None:
         order(self._jobs, command, reply)
         if self._jobs.job is not None:
             self._velocity.end()
 
-    def _take_statistics(self, call: Call) -> None:
-        call.answer(success=True, message=json.dumps(self.statistics()))
+    def _tell_statistics(self, _request: Any, reply: Reply) -> None:
+        reply(Answer(True, json.dumps(self.statistics())))
 
     def statistics(self) -> dict[str, Any]:
         """Counts and times since the start."""
