@@ -10,7 +10,6 @@ from typing import Final
 import numpy as np
 
 from benchmarks.bridges.ros2_processes import (
-    COMMAND_PERIOD,
     Probe,
     joined,
     quiet_client,
@@ -18,6 +17,7 @@ from benchmarks.bridges.ros2_processes import (
 )
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial
+from controller.bridges.ros2.names import COMMAND_PERIOD
 from go2_wbc.errors import BridgeError, MissingDependency
 
 NAMESPACE: Final = "bench"

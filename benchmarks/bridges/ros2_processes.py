@@ -22,6 +22,7 @@ from benchmarks.bridges.processes import PROGRAM, Process, wait_until
 from controller.bridges.ros2.names import (
     BEHAVIOR_SERVICE,
     CMD_VEL,
+    COMMAND_PERIOD,
     ODOM,
     STATISTICS_SERVICE,
     topic,
@@ -36,8 +37,6 @@ DISCOVERY: Final = 20.0
 """Time [s] in which processes must find each other; half a second on an idle machine."""
 ANSWER: Final = 60.0
 """Time [s] in which a call must be answered; four on an idle machine."""
-COMMAND_PERIOD: Final = 0.02
-"""Time [s] between two velocity commands of a drive."""
 ODOM_QUEUE: Final = 5
 """Messages of odometry that wait for a probe: more of them would be stale on a busy machine."""
 
