@@ -75,10 +75,11 @@ def run(args: argparse.Namespace) -> int:
 
 def _run_over_ros(args: argparse.Namespace) -> int:
     """Run the demo on a robot that another process serves, print the steps."""
-    from controller.bridges.ros2.demo import STEPS, run_ros_demo
+    from controller.bridges.ros2.demo import run_ros_demo
     from controller.cli.demo_table import render_steps
     from controller.cli.progress import ProgressLine
     from controller.demo.report import DemoReport, StepResult
+    from controller.demo.steps import DEMO_STEPS
 
     with ProgressLine(sys.stderr) as line:
         done: list[StepResult] = []
@@ -86,7 +87,7 @@ def _run_over_ros(args: argparse.Namespace) -> int:
         def show(result: StepResult) -> None:
             done.append(result)
             verdict = "ok" if result.ok else f"NOT DONE: {result.reason}"
-            line.done(f"{len(done)}/{len(STEPS)} {result.label}: {verdict}")
+            line.done(f"{len(done)}/{len(DEMO_STEPS)} {result.label}: {verdict}")
 
         results = run_ros_demo(args.namespace, show)
     ok = all(step.ok for step in results)

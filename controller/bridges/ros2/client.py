@@ -267,6 +267,12 @@ class GO2ControllerNode(ros.Node):
         self._odometry = ros.Future()
         return self._result_of(self._odometry, ODOM_LIMIT)
 
+    def wait(self, seconds: float) -> None:
+        """Let ``seconds`` of the robot's time pass, or return at once if odometry ceases."""
+        start = state = self.state()
+        while start and state and state.time - start.time < seconds:
+            state = self.state()
+
     def _take_odometry(self, message: Any) -> None:
         if not self._odometry.done():
             self._odometry.set_result(state_of(message))
