@@ -120,11 +120,7 @@ class Probe:
         self.node = ros.Node(
             f"probe_{namespace}", start_parameter_services=False, enable_rosout=False
         )
-        self._request = ros.RobotBehaviorCommand.Request
-        self._client = self.node.create_client(
-            ros.RobotBehaviorCommand, topic(namespace, BEHAVIOR_SERVICE)
-        )
-        self._triggers: dict[str, Any] = {}
+        self._clients: dict[str, Any] = {}
         self._publisher = self.node.create_publisher(ros.Twist, topic(namespace, CMD_VEL), 10)
         self.node.create_subscription(ros.Odometry, topic(namespace, ODOM), self._note, ODOM_QUEUE)
         self._executor = ros.SingleThreadedExecutor()
@@ -151,7 +147,8 @@ class Probe:
         Raises:
             BridgeError: if there is no server.
         """
-        return self._called(self._client, self._request(command=command))
+        kind = self._ros.RobotBehaviorCommand
+        return self._called(kind, BEHAVIOR_SERVICE, kind.Request(command=command))
 
     def result(self, future: Any, limit: float = ANSWER) -> Any:
         """What ``future`` comes to.
@@ -172,11 +169,12 @@ class Probe:
     def trigger(self, name: str) -> Any:
         """The answer of one of the ``std_srvs/Trigger`` services; see ``send`` and ``result``."""
         kind = self._ros.Trigger
-        if name not in self._triggers:
-            self._triggers[name] = self.node.create_client(kind, topic(self.namespace, name))
-        return self.result(self._called(self._triggers[name], kind.Request()))
+        return self.result(self._called(kind, name, kind.Request()))
 
-    def _called(self, client: Any, request: Any) -> Any:
+    def _called(self, kind: Any, name: str, request: Any) -> Any:
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(kind, topic(self.namespace, name))
+        client = self._clients[name]
         if not client.wait_for_service(DISCOVERY):
             raise BridgeError(f"nobody offers {client.srv_name}")
         return client.call_async(request)

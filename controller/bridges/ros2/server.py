@@ -15,7 +15,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -250,8 +250,8 @@ class RobotNode:
             "ros_cpu_in_loop": self._cpu,
             "cpu_of_loop": own,
             "cpu_of_other_threads": time.process_time() - own,
-            "cmd_vel": asdict(self._velocity.counts),
-            "published": dict(self._states.counts),
+            "cmd_vel": self._velocity.counts,
+            "published": self._states.counts,
             "errors": self._errors,
         }
 

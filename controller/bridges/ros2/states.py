@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import time
 from array import array
-from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -58,7 +57,7 @@ class StatePublisher:
         """Publish on ``node``; ``realtime``: stamp with the wall clock, and publish no /clock."""
         self._node, self._namespace, self._simulator = node, namespace, simulator
         self._realtime = realtime
-        self.counts: Counter[str] = Counter()
+        self.counts: dict[str, int] = {}
         self._streams: list[_Stream] = []
         base, odom = f"{namespace}/base_link", f"{namespace}/odom"
         joints = ros.JointState(name=list(JOINT_NAMES))
