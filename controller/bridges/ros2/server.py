@@ -24,7 +24,6 @@ from controller import arguments
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.actions import MotionActions
 from controller.bridges.ros2.behaviors import COMMANDS, order
-from controller.bridges.ros2.hooked_plant import HookedPlant
 from controller.bridges.ros2.names import (
     BEHAVIOR_SERVICE,
     CMD_VEL,
@@ -41,7 +40,6 @@ from controller.jobs import Answer, JobServer, Reply
 from controller.pacing import SWITCH_INTERVAL, LogThrottle, Pacer
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.mujoco.viewer import open_viewer
 
 _log = logging.getLogger(__name__)
 
@@ -108,13 +106,18 @@ def serve(
         watch = GraphWatch(graph_node, namespace)
         watch.check()
         simulator = MujocoPlant(visuals=settings.viewer)
-        plant = HookedPlant(simulator)
-        stack.callback(plant.close)
-        go2 = stack.enter_context(GO2Controller(namespace, plant=plant, config=config))
-        node = RobotNode(context, go2, simulator, settings, config)
+        stack.callback(simulator.close)
+        go2 = stack.enter_context(
+            GO2Controller(
+                namespace,
+                plant=simulator,
+                viewer=settings.viewer,
+                config=config,
+                after_tick=lambda: node.serve(stop),
+            )
+        )
+        node = RobotNode(context, go2, simulator, config, realtime=settings.realtime)
         stack.callback(node.close)
-        stack.callback(plant.silence)
-        plant.after_write = lambda: node.serve(stop)
         on_ready(node.offer)
         node.run(stop, watch)
         _log.info("ending: the robot goes limp")
@@ -128,12 +131,13 @@ class RobotNode:
         context: Any,
         go2: GO2Controller,
         simulator: MujocoPlant,
-        settings: ServerSettings,
         config: Config,
+        *,
+        realtime: bool,
     ) -> None:
         """Offer ``go2``, which drives ``simulator``, in ``context``."""
-        self._go2, self._namespace = go2, settings.namespace
-        realtime, namespace = settings.realtime, settings.namespace
+        self._go2, self._namespace = go2, go2.namespace
+        namespace = go2.namespace
         self._node = ros.Node(
             SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
@@ -151,7 +155,6 @@ class RobotNode:
         self._actions = (
             MotionActions(context, namespace, self._jobs) if ros.PlayMotion is not None else None
         )
-        self._viewer = open_viewer(simulator) if settings.viewer else None
         self._pacer = Pacer(simulator.control_period, LATE) if realtime else None
         self._throttle, self._errors = LogThrottle(_log), 0
         self._cpu, self._ticks, self._began = 0.0, 0, time.monotonic()
@@ -189,15 +192,13 @@ class RobotNode:
             watch.look()
 
     def serve(self, stop: threading.Event) -> None:
-        """One turn after a control period; called by the plant."""
+        """One turn after a control period."""
         self._ticks += 1
         self._guarded(self._serve_once)
         if stop.is_set() and self._jobs.job is not None:
             self._guarded(self._jobs.damp)
         if self._pacer is not None and not stop.is_set():
             self._pacer.wait(lambda: self._guarded(self._poll_commands))
-        if self._viewer is not None:
-            self._viewer.show(self._go2.state.time)
 
     def _serve_once(self) -> None:
         next(self._triggers).poll()
@@ -260,7 +261,5 @@ class RobotNode:
         self._jobs.abandon("the server is ending: the robot goes limp")
         if self._actions is not None:
             self._actions.close()
-        if self._viewer is not None:
-            self._viewer.close()
         time.sleep(LINGER)
         self._node.destroy_node()
