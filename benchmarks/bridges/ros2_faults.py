@@ -180,7 +180,8 @@ def client_killed_high_five(at: Scene) -> None:
         client.kill()
     refused = probe.call("up").message
     require("busy with 'high_five'" in refused, f"an order in the motion was answered: {refused}")
-    probe.wait_until(lambda: probe.statistics()["mode"] != "moving", "the motion's end")
+    ends = wait_until(lambda: probe.statistics()["mode"] != "moving", ANSWER)
+    require(ends, "the motion does not end")
     probe.let_pass(REST_TIME)
     require_mode(probe, "standing")
     require_done(probe.call("walk"))

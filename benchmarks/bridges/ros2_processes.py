@@ -10,7 +10,7 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -226,15 +226,6 @@ class Probe:
         end = self.place().time + seconds
         while (left := end - self.place().time) > 0.0:
             time.sleep(min(left, 0.05))
-
-    def wait_until(self, is_so: Callable[[], bool], what: str, limit: float = ANSWER) -> None:
-        """Wait for something.
-
-        Raises:
-            BridgeError: if it is not so within ``limit`` seconds; says ``what`` was awaited.
-        """
-        if not wait_until(is_so, limit):
-            raise BridgeError(f"/{self.namespace}: {what} was awaited for {limit:g} s in vain")
 
     def close(self) -> None:
         """Leave the graph."""

@@ -70,10 +70,9 @@ class MotionActions:
         return self._conclude(handle, answered.result())
 
     def _feedback(self, job: Job) -> Any:
-        feedback, go2 = ros.PlayMotion.Feedback(), self._jobs.robot
-        feedback.phase, feedback.progress = job.phase, float(go2.progress)
-        feedback.elapsed = float(go2.state.time - job.start)
-        return feedback
+        go2 = self._jobs.robot
+        progress, elapsed = float(go2.progress), float(go2.state.time - job.start)
+        return ros.PlayMotion.Feedback(phase=job.phase, progress=progress, elapsed=elapsed)
 
     def _conclude(self, handle: Any, answer: Answer) -> Any:
         if answer.success:

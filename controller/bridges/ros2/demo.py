@@ -10,8 +10,7 @@ from typing import Any
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.client import GO2ControllerNode
 from controller.checks import HEIGHT_TOLERANCE
-from controller.demo.report import Measurement as Figure
-from controller.demo.report import StepResult
+from controller.demo.report import Measurement, StepResult
 from controller.demo.steps import DEMO_STEPS, FORWARD_SPEED, FORWARD_TIME, TURN_ANGLE, DemoStep
 from controller.navigation import HEADING_TOLERANCE
 from go2_wbc.robot.state import RobotState
@@ -21,47 +20,41 @@ STAND_HEIGHT = 0.31
 """Height [m] of the base when standing; the CoM is 2 cm lower."""
 WAY_TOLERANCE = 0.06
 """Accepted error [m] of the way: commands travel through two processes."""
+TURN_TOLERANCE = 2.0 * math.degrees(HEADING_TOLERANCE)
+"""Accepted error [deg] of the turn."""
 REST_SPEED = 0.05
 """Speed [m/s] below which the robot rests."""
 
-Measure = Callable[[RobotState, RobotState], tuple[Figure, ...]]
-"""Figures from what odometry showed before a step and after it."""
+
+def _height(_before: RobotState, after: RobotState) -> float:
+    return float(after.q[2])
 
 
-def _height(asked: float) -> Measure:
-    def measure(_before: RobotState, after: RobotState) -> tuple[Figure, ...]:
-        return (Figure("base height", float(after.q[2]), "m", asked, HEIGHT_TOLERANCE),)
-
-    return measure
+def _way(before: RobotState, after: RobotState) -> float:
+    return math.dist(after.p_world_base[:2].tolist(), before.p_world_base[:2].tolist())
 
 
-def _way(before: RobotState, after: RobotState) -> tuple[Figure, ...]:
-    way = math.dist(after.p_world_base[:2].tolist(), before.p_world_base[:2].tolist())
-    return (Figure("way", way, "m", FORWARD_SPEED * FORWARD_TIME, WAY_TOLERANCE),)
+def _speed(_before: RobotState, after: RobotState) -> float:
+    return math.hypot(*after.v[:2].tolist())
 
 
-def _rest(_before: RobotState, after: RobotState) -> tuple[Figure, ...]:
-    speed = math.hypot(*after.v[:2].tolist())
-    return (Figure("speed at the end", speed, "m/s", 0.0, REST_SPEED),)
+def _turned(before: RobotState, after: RobotState) -> float:
+    return math.degrees(math.remainder(after.yaw - before.yaw, math.tau))
 
 
-def _turned(before: RobotState, after: RobotState) -> tuple[Figure, ...]:
-    turned = math.degrees(math.remainder(after.yaw - before.yaw, math.tau))
-    tolerance = 2.0 * math.degrees(HEADING_TOLERANCE)
-    return (Figure("turned left", turned, "deg", math.degrees(TURN_ANGLE), tolerance),)
-
-
-_MEASURES: Mapping[str, Measure] = {
-    "stand": _height(STAND_HEIGHT),
-    "sit": _height(float(SIT_POSE[2])),
-    "walk": _height(STAND_HEIGHT),
-    "forward": _way,
-    "stop": _rest,
-    "turn": _turned,
-    "high_five": _height(STAND_HEIGHT),
-    "sit_again": _height(float(SIT_POSE[2])),
+_STANDING = ("base height", _height, "m", STAND_HEIGHT, HEIGHT_TOLERANCE)
+_SITTING = ("base height", _height, "m", float(SIT_POSE[2]), HEIGHT_TOLERANCE)
+_FIGURES: Mapping[str, tuple[str, Callable[[RobotState, RobotState], float], str, float, float]] = {
+    "stand": _STANDING,
+    "sit": _SITTING,
+    "walk": _STANDING,
+    "forward": ("way", _way, "m", FORWARD_SPEED * FORWARD_TIME, WAY_TOLERANCE),
+    "stop": ("speed at the end", _speed, "m/s", 0.0, REST_SPEED),
+    "turn": ("turned left", _turned, "deg", math.degrees(TURN_ANGLE), TURN_TOLERANCE),
+    "high_five": _STANDING,
+    "sit_again": _SITTING,
 }
-"""By the name of a step."""
+"""By step: the figure's name, how odometry before and after gives it, unit, what is asked, +-."""
 
 
 def run_ros_demo(
@@ -101,8 +94,8 @@ def _run_step(go2: Any, step: DemoStep) -> StepResult:  # the client has the con
     if before is None or after is None:
         reason, start, duration = f"no odometry of /{go2.namespace}", 0.0, time.monotonic() - wall
         return StepResult(step.name, step.label, False, reason, start, duration)
-    figures = _MEASURES[step.name](before, after)
-    missed = "; ".join(str(figure) for figure in figures if not figure.is_met)
-    reason = missed if done else go2.last_message
-    ok, duration = done and not missed, after.time - before.time
-    return StepResult(step.name, step.label, ok, reason or "done", before.time, duration, figures)
+    name, seen, unit, asked, tolerance = _FIGURES[step.name]
+    figure = Measurement(name, seen(before, after), unit, asked, tolerance)
+    reason = go2.last_message if not done else "done" if figure.is_met else str(figure)
+    ok, duration = done and figure.is_met, after.time - before.time
+    return StepResult(step.name, step.label, ok, reason, before.time, duration, (figure,))

@@ -157,7 +157,7 @@ class RobotNode:
         )
         self._pacer = Pacer(simulator.control_period, LATE) if realtime else None
         self._throttle, self._errors = LogThrottle(_log), 0
-        self._cpu, self._ticks, self._began = 0.0, 0, time.monotonic()
+        self._cpu, self._began = 0.0, time.monotonic()
 
     def _service(self, kind: Any, name: str, act: Callable[[Any, Reply], None]) -> PolledService:
         return PolledService(self._node, kind, topic(self._namespace, name), act)
@@ -193,7 +193,6 @@ class RobotNode:
 
     def serve(self, stop: threading.Event) -> None:
         """One turn after a control period."""
-        self._ticks += 1
         self._guarded(self._serve_once)
         if stop.is_set() and self._jobs.job is not None:
             self._guarded(self._jobs.damp)
@@ -235,18 +234,14 @@ class RobotNode:
             self._velocity.end()
 
     def _tell_statistics(self, _request: Any, reply: Reply) -> None:
-        reply(Answer(True, json.dumps(self.statistics())))
-
-    def statistics(self) -> dict[str, Any]:
         """Counts and times since the start."""
         own, state = time.thread_time(), self._go2.state
-        return {
+        figures = {
             "mode": self._go2.mode.value,
             "robot_time": state.time,
             "position": state.p_world_base.tolist(),
             "heading": state.yaw,
             "wall_time": time.monotonic() - self._began,
-            "ticks": self._ticks,
             "paces_given_up": self._pacer.give_ups if self._pacer else 0,
             "ros_cpu_in_loop": self._cpu,
             "cpu_of_loop": own,
@@ -255,6 +250,7 @@ class RobotNode:
             "published": self._states.counts,
             "errors": self._errors,
         }
+        reply(Answer(True, json.dumps(figures)))
 
     def close(self) -> None:
         """Answer whoever waits and release everything."""

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from benchmarks.bridges.processes import Process, wait_until
-from benchmarks.bridges.ros2_processes import DISCOVERY, Place, Probe, serving, without
+from benchmarks.bridges.ros2_processes import ANSWER, DISCOVERY, Place, Probe, serving, without
 from tests.controller.bridges.ros2_graph import needs_ros2
 
 pytestmark = needs_ros2
@@ -131,7 +131,7 @@ def drive_until_counted(probe: Probe, x: float, kind: str) -> None:
         probe.drive(0.5, x)
         return probe.statistics()["cmd_vel"][kind] > before
 
-    probe.wait_until(is_counted, kind)
+    assert wait_until(is_counted, ANSWER), kind
 
 
 def test_the_triggers_do_the_same_as_the_command(server: Process, probe: Probe) -> None:
@@ -225,7 +225,7 @@ def test_a_motion_has_feedback_with_progress_and_a_result(server: Process, probe
 def test_a_high_five_that_is_cancelled_ends_standing(server: Process, probe: Probe) -> None:
     assert probe.call("up").success
     handle, feedback = goal_of(probe, "high_five", "hold=5.0")
-    probe.wait_until(lambda: bool(feedback) and feedback[-1].progress >= 0.4, "40 % of a motion")
+    assert wait_until(lambda: bool(feedback) and feedback[-1].progress >= 0.4, ANSWER)
     busy, _ = goal_of(probe, "nod")
     assert not busy.accepted
     probe.result(handle.cancel_goal_async())
