@@ -12,7 +12,7 @@ from typing import Any
 
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.behaviors import Jobs, motion_job
-from controller.bridges.ros2.names import FEEDBACK_RATE, MOTION_ACTION, MOTION_NODE, topic
+from controller.bridges.ros2.names import FEEDBACK_RATE, MOTION_ACTION, MOTION_NODE
 from controller.jobs import Answer, Job
 
 _log = logging.getLogger(__name__)
@@ -33,7 +33,7 @@ class MotionActions:
         self._server = ros.ActionServer(
             self._node,
             ros.PlayMotion,
-            topic(namespace, MOTION_ACTION),
+            MOTION_ACTION,
             execute_callback=self._execute,
             callback_group=ros.ReentrantCallbackGroup(),
             goal_callback=self._judge,

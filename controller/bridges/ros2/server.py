@@ -29,7 +29,6 @@ from controller.bridges.ros2.names import (
     CMD_VEL,
     SERVER_NODE,
     STATISTICS_SERVICE,
-    topic,
 )
 from controller.bridges.ros2.namespace_lock import GraphWatch, lock_namespace
 from controller.bridges.ros2.polling import PolledService, PolledSubscription
@@ -136,22 +135,20 @@ class RobotNode:
         realtime: bool,
     ) -> None:
         """Offer ``go2``, which drives ``simulator``, in ``context``."""
-        self._go2, self._namespace = go2, go2.namespace
-        namespace = go2.namespace
-        self._node = ros.Node(
+        self._go2, namespace = go2, go2.namespace
+        self._node = node = ros.Node(
             SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
         self._jobs = JobServer(go2)
         self._velocity = VelocityInput(go2, config.envelope)
-        name = topic(namespace, CMD_VEL)
-        self._twists = PolledSubscription(self._node, ros.Twist, name, self._take_twist)
+        self._twists = PolledSubscription(node, ros.Twist, CMD_VEL, self._take_twist)
         self._commands = (
-            self._service(ros.RobotBehaviorCommand, BEHAVIOR_SERVICE, self._take_command)
+            PolledService(node, ros.RobotBehaviorCommand, BEHAVIOR_SERVICE, self._take_command)
             if ros.RobotBehaviorCommand is not None
             else None
         )
         self._triggers = cycle(self._offer_triggers())
-        self._states = StatePublisher(self._node, namespace, simulator, realtime=realtime)
+        self._states = StatePublisher(node, simulator, realtime=realtime)
         self._actions = (
             MotionActions(context, namespace, self._jobs) if ros.PlayMotion is not None else None
         )
@@ -159,20 +156,20 @@ class RobotNode:
         self._throttle, self._errors = LogThrottle(_log), 0
         self._cpu, self._began = 0.0, time.monotonic()
 
-    def _service(self, kind: Any, name: str, act: Callable[[Any, Reply], None]) -> PolledService:
-        return PolledService(self._node, kind, topic(self._namespace, name), act)
-
     def _offer_triggers(self) -> Iterator[PolledService]:
         for name in COMMANDS:
-            yield self._service(
-                ros.Trigger, name, lambda _request, reply, name=name: self._order(name, reply)
+            yield PolledService(
+                self._node,
+                ros.Trigger,
+                name,
+                lambda _request, reply, name=name: self._order(name, reply),
             )
-        yield self._service(ros.Trigger, STATISTICS_SERVICE, self._tell_statistics)
+        yield PolledService(self._node, ros.Trigger, STATISTICS_SERVICE, self._tell_statistics)
 
     @property
     def offer(self) -> str:
         """What is offered, and what is missing with the line that brings it."""
-        namespace = self._namespace
+        namespace = self._go2.namespace
         lines = [f"serving /{namespace}: " + ("real time" if self._pacer else "free-running")]
         missing = ros.missing_interfaces()
         if missing:

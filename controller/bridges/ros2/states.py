@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from controller.bridges.ros2 import imports as ros
-from controller.bridges.ros2.names import ODOM, QUEUE, STATE_RATE, TRANSFORM_RATE, topic
+from controller.bridges.ros2.names import ODOM, QUEUE, STATE_RATE, TRANSFORM_RATE
 from go2_wbc.legs import JOINT_NAMES, Leg
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.robot.state import RobotState
@@ -36,11 +36,10 @@ Fill = Callable[[Any, RobotState, Any], None]
 class _Stream:
     """A topic: its message, who fills that in, and the robot time [s] at which it is due."""
 
-    name: str
+    publisher: Any
     message: Any
     fill: Fill
     period: float
-    publish: Callable[[Any], None]
     due: float = 0.0
 
 
@@ -51,14 +50,12 @@ class StatePublisher:
         counts: messages published so far, by topic.
     """
 
-    def __init__(
-        self, node: Any, namespace: str, simulator: MujocoPlant, *, realtime: bool
-    ) -> None:
+    def __init__(self, node: Any, simulator: MujocoPlant, *, realtime: bool) -> None:
         """Publish on ``node``; ``realtime``: stamp with the wall clock, and publish no /clock."""
-        self._node, self._namespace, self._simulator = node, namespace, simulator
-        self._realtime = realtime
+        self._node, self._simulator, self._realtime = node, simulator, realtime
         self.counts: dict[str, int] = {}
         self._streams: list[_Stream] = []
+        namespace = node.get_namespace().removeprefix("/")
         base, odom = f"{namespace}/base_link", f"{namespace}/odom"
         joints = ros.JointState(name=list(JOINT_NAMES))
         self._add("joint_states", joints, _fill_joints)
@@ -80,10 +77,9 @@ class StatePublisher:
             self._add("/clock", ros.Clock(), _fill_clock)
 
     def _add(self, name: str, message: Any, fill: Fill, rate: float = STATE_RATE) -> None:
-        full_name = name if name.startswith("/") else topic(self._namespace, name)
-        publisher = self._node.create_publisher(type(message), full_name, QUEUE)
-        self._streams.append(_Stream(full_name, message, fill, 1.0 / rate, publisher.publish))
-        self.counts[full_name] = 0
+        publisher = self._node.create_publisher(type(message), name, QUEUE)
+        self._streams.append(_Stream(publisher, message, fill, 1.0 / rate))
+        self.counts[publisher.topic_name] = 0
 
     def publish_due(self) -> None:
         """Publish whatever is due now."""
@@ -95,8 +91,8 @@ class StatePublisher:
         for stream in due:
             stream.due = max(stream.due + stream.period, state.time)
             stream.fill(stream.message, state, stamp)
-            stream.publish(stream.message)
-            self.counts[stream.name] += 1
+            stream.publisher.publish(stream.message)
+            self.counts[stream.publisher.topic_name] += 1
 
     def _fill_imu(self, message: Any, _state: RobotState, stamp: Any) -> None:
         sample = self._simulator.imu()
