@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from controller import jobs
 from controller.jobs import Answer, Job, JobServer
 from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import ModeError
@@ -28,14 +29,16 @@ def client(robot: Robot) -> Client:
 
 
 @pytest.fixture
-def clock() -> Clock:
-    return Clock()
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(jobs.time, "monotonic", clock)
+    return clock
 
 
 @pytest.fixture
 def queued(robot: Robot, clock: Clock) -> Client:
     """Of a server with a queue and a patience, as Unitree's clients want it."""
-    return Client(JobServer(robot, queue=2, patience=PATIENCE, clock=clock))
+    return Client(JobServer(robot, queue=2, patience=PATIENCE))
 
 
 @pytest.fixture
