@@ -9,15 +9,9 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.bridges.ros2_processes import (
-    Probe,
-    joined,
-    quiet_client,
-    serving,
-)
+from benchmarks.bridges.ros2_processes import Probe, joined, quiet_client, serving
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial
-from controller.bridges.ros2.names import COMMAND_PERIOD
 from go2_wbc.errors import BridgeError, MissingDependency
 
 NAMESPACE: Final = "bench"
@@ -89,14 +83,10 @@ def _drive(probe: Probe) -> dict[str, float]:
     answer = probe.call("walk")
     if not answer.success:
         raise BridgeError(f"the robot does not walk: {answer.message}")
-    before, began = probe.statistics(), time.monotonic()
-    sent, start = 0, before
-    while time.monotonic() - began < DRIVE_TIME:
-        probe.move(SPEED)
-        sent += 1
-        time.sleep(max(sent * COMMAND_PERIOD - (time.monotonic() - began), 0.0))
-        if start is before and time.monotonic() - began > SETTLE_TIME:
-            start = probe.statistics()
+    before = probe.statistics()
+    sent = probe.drive(SETTLE_TIME, SPEED)
+    start = probe.statistics()
+    sent += probe.drive(DRIVE_TIME - SETTLE_TIME, SPEED)
     after = probe.statistics()
     probe.move(0.0)
     way = math.dist(after["position"][:2], start["position"][:2])

@@ -191,12 +191,13 @@ class Probe:
         message.linear.x, message.linear.y, message.angular.z = x, y, turn
         self._publisher.publish(message)
 
-    def drive(self, seconds: float, x: float, turn: float = 0.0, *, y: float = 0.0) -> None:
-        """Command at 50 Hz for so long on the wall clock."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
+    def drive(self, seconds: float, x: float, turn: float = 0.0, *, y: float = 0.0) -> int:
+        """Command at 50 Hz for so long on the wall clock; returns how many commands were sent."""
+        count, began = round(seconds / COMMAND_PERIOD), time.monotonic()
+        for sent in range(count):
             self.move(x, turn, y=y)
-            time.sleep(COMMAND_PERIOD)
+            time.sleep(max(began + (sent + 1) * COMMAND_PERIOD - time.monotonic(), 0.0))
+        return count
 
     # --- looking --------------------------------------------------------------------------
 

@@ -50,6 +50,7 @@ class GO2ControllerNode(ros.Node):
         True
 
     Attributes:
+        namespace: of the robot.
         last_message: what came of the last call, in plain words.
         progress: share of the motion that plays, 0 to 1.
     """
@@ -66,7 +67,7 @@ class GO2ControllerNode(ros.Node):
             MissingDependency: if the interfaces are not installed; names the line that builds them.
             BridgeError: if ``rclpy.init()`` has not been called.
         """
-        self._namespace = arguments.namespace(namespace)
+        self.namespace = arguments.namespace(namespace)
         if ros.RobotBehaviorCommand is None:
             raise MissingDependency(f"quadropted_msgs is not here; build it: {ros.BUILD}")
         if not ros.rclpy.ok():
@@ -252,11 +253,6 @@ class GO2ControllerNode(ros.Node):
 
     # --- looking --------------------------------------------------------------------------
 
-    @property
-    def namespace(self) -> str:
-        """Namespace of the robot."""
-        return self._namespace
-
     def check_served(self) -> None:
         """Raise BridgeError, with the line that starts a server, if there is none."""
         if not self._behavior_client.service_is_ready():
@@ -323,10 +319,10 @@ class GO2ControllerNode(ros.Node):
 
     def _absence(self) -> str:
         if self._behavior_client.service_is_ready():
-            return f"the server of /{self._namespace} has not answered in time"
+            return f"the server of /{self.namespace} has not answered in time"
         return (
-            f"no server of /{self._namespace}: start one with "
-            f"`go2-wbc ros2 --namespace {self._namespace}`, in the same ROS_DOMAIN_ID"
+            f"no server of /{self.namespace}: start one with "
+            f"`go2-wbc ros2 --namespace {self.namespace}`, in the same ROS_DOMAIN_ID"
         )
 
     def _report(self, what: str, answer: Any) -> bool:

@@ -63,12 +63,9 @@ class GraphWatch:
         Raises:
             BridgeError: if one of them serves this namespace.
         """
-        end = time.monotonic() + DISCOVERY
-        while time.monotonic() < end and not self._servers():
-            time.sleep(0.05)
-        end = time.monotonic() + LEASE
-        while self._servers():
-            if time.monotonic() > end:
+        began = time.monotonic()
+        while (passed := time.monotonic() - began) < DISCOVERY or self._servers():
+            if passed > LEASE:
                 raise _already_served(self._namespace.removeprefix("/"))
             time.sleep(0.05)
 

@@ -24,12 +24,7 @@ from controller import arguments
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.actions import MotionActions
 from controller.bridges.ros2.behaviors import COMMANDS, order
-from controller.bridges.ros2.names import (
-    BEHAVIOR_SERVICE,
-    CMD_VEL,
-    SERVER_NODE,
-    STATISTICS_SERVICE,
-)
+from controller.bridges.ros2.names import BEHAVIOR_SERVICE, CMD_VEL, SERVER_NODE, STATISTICS_SERVICE
 from controller.bridges.ros2.namespace_lock import GraphWatch, lock_namespace
 from controller.bridges.ros2.polling import PolledService, PolledSubscription
 from controller.bridges.ros2.states import StatePublisher
