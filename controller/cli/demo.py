@@ -76,16 +76,19 @@ def run(args: argparse.Namespace) -> int:
 
 def _run_over_ros(args: argparse.Namespace) -> int:
     """Run the demo on a robot that another process serves, print the steps."""
-    from controller.bridges.ros2.demo import STEPS, run_ros_demo
+    from controller.bridges.ros2.demo import run_ros_demo
     from controller.cli.demo_table import render_steps
     from controller.cli.progress import ProgressLine
     from controller.demo.report import DemoReport
+    from controller.demo.steps import DEMO_STEPS
 
     number = count(1)
     with ProgressLine() as line:
         results = run_ros_demo(
             args.namespace,
-            lambda step: line.done(f"{next(number)}/{len(STEPS)} {step.label}: {step.verdict}"),
+            lambda step: line.done(
+                f"{next(number)}/{len(DEMO_STEPS)} {step.label}: {step.verdict}"
+            ),
         )
     ok = all(step.ok for step in results)
     if args.json:
