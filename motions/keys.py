@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TypeVar
+from typing import Self
 
 from go2_wbc.curves import Ease
 from go2_wbc.legs import Leg
@@ -14,8 +14,6 @@ from go2_wbc.reference import Posture
 BODY_CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw")
 """What of the trunk can move: places [m] and angles [rad], as offsets from the posture."""
 _FLIPPED = frozenset({"y", "roll", "yaw"})
-
-_KeyType = TypeVar("_KeyType", bound="Key")
 
 
 class Frame(Enum):
@@ -53,9 +51,9 @@ class LegTarget:
     def mirrored(self) -> LegTarget:
         """The same goal of the leg across."""
         first, second, third = self.values
-        if self.frame is Frame.JOINTS:
-            return LegTarget(self.frame, (-first, second, third))
-        return LegTarget(self.frame, (first, -second, third))
+        is_angle = self.frame is Frame.JOINTS
+        values = (-first, second, third) if is_angle else (first, -second, third)
+        return replace(self, values=values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +69,7 @@ class Key(ABC):
     end: float
     ease: Ease
 
-    def later(self: _KeyType, seconds: float) -> _KeyType:
+    def later(self, seconds: float) -> Self:
         """The same key, moved in time."""
         return replace(self, start=self.start + seconds, end=self.end + seconds)
 
@@ -79,6 +77,11 @@ class Key(ABC):
     @abstractmethod
     def track(self) -> str:
         """What moves, in words."""
+
+    @property
+    def mirrored(self) -> Self:
+        """Left and right exchanged."""
+        return self
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +97,7 @@ class BodyKey(Key):
         return f"body {self.channel}"
 
     @property
-    def mirrored(self) -> BodyKey:
+    def mirrored(self) -> Self:
         """Left and right exchanged."""
         return replace(self, value=-self.value) if self.channel in _FLIPPED else self
 
@@ -110,11 +113,6 @@ class PostureKey(Key):
         """The posture."""
         return "posture"
 
-    @property
-    def mirrored(self) -> PostureKey:
-        """Left and right exchanged."""
-        return self
-
 
 @dataclass(frozen=True, slots=True)
 class LegKey(Key):
@@ -129,7 +127,7 @@ class LegKey(Key):
         return f"foot {self.leg.name}"
 
     @property
-    def mirrored(self) -> LegKey:
+    def mirrored(self) -> Self:
         """Left and right exchanged."""
         return replace(self, leg=self.leg.mirror, target=self.target.mirrored)
 
@@ -145,11 +143,6 @@ class Mark(Key):
         """The name."""
         return f"span {self.name!r}"
 
-    @property
-    def mirrored(self) -> Mark:
-        """Left and right exchanged."""
-        return self
-
 
 @dataclass(frozen=True, slots=True)
 class BalanceShift(Key):
@@ -163,6 +156,6 @@ class BalanceShift(Key):
         return "balance"
 
     @property
-    def mirrored(self) -> BalanceShift:
+    def mirrored(self) -> Self:
         """Left and right exchanged."""
         return replace(self, raised=frozenset(leg.mirror for leg in self.raised))

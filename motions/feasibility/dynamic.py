@@ -26,6 +26,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.constraints import friction_pyramid
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from motions.feasibility.kinematic import FEET, JOINTS
 from motions.feasibility.limits import FeasibilityLimits
@@ -219,15 +220,5 @@ def _zero_moment_points(
 
 
 _SCALE = np.repeat([1.0, 1.0 / ARM], 3)
-_PYRAMID_ROWS = np.array(
-    [
-        [1.0, 0.0, -PYRAMID],
-        [-1.0, 0.0, -PYRAMID],
-        [0.0, 1.0, -PYRAMID],
-        [0.0, -1.0, -PYRAMID],
-        [0.0, 0.0, 1.0],
-    ]
-)
-"""Of one foot: f_x, -f_x, f_y, -f_y <= mu f_z, and the row of f_z itself."""
-_PYRAMIDS = tuple(np.kron(np.eye(feet), _PYRAMID_ROWS) for feet in (1, 2, 3, 4))
-"""The same for one to four feet."""
+_PYRAMIDS = tuple(np.kron(np.eye(feet), friction_pyramid(PYRAMID)) for feet in (1, 2, 3, 4))
+"""Rows of one to four feet."""

@@ -96,9 +96,9 @@ class Series:
                 continue
             row = int(np.nanargmin(self.margins[:, column]))
             tables = (self.values, self.limits, self.margins)
-            numbers = (float(table[row, column]) for table in tables)
-            time = float(self.times[row])
-            found.append(Finding(self.check, time, subject, *numbers, self.unit, self.note))
+            value, limit, margin = (float(table[row, column]) for table in tables)
+            at = (float(self.times[row]), subject, value, limit, margin)
+            found.append(Finding(self.check, *at, self.unit, self.note))
         return found
 
     def least_margins(self) -> Float[np.ndarray, " n"]:
