@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Self
+from typing import TypeVar
 
 from go2_wbc.curves import Ease
 from go2_wbc.legs import Leg
@@ -14,6 +14,8 @@ from go2_wbc.reference import Posture
 BODY_CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw")
 """What of the trunk can move: places [m] and angles [rad], as offsets from the posture."""
 _FLIPPED = frozenset({"y", "roll", "yaw"})
+
+_KeyType = TypeVar("_KeyType", bound="Key")
 
 
 class Frame(Enum):
@@ -69,7 +71,7 @@ class Key(ABC):
     end: float
     ease: Ease
 
-    def later(self, seconds: float) -> Self:
+    def later(self: _KeyType, seconds: float) -> _KeyType:
         """The same key, moved in time."""
         return replace(self, start=self.start + seconds, end=self.end + seconds)
 
@@ -79,7 +81,7 @@ class Key(ABC):
         """What moves, in words."""
 
     @property
-    def mirrored(self) -> Self:
+    def mirrored(self) -> Key:
         """Left and right exchanged."""
         return self
 
@@ -97,7 +99,7 @@ class BodyKey(Key):
         return f"body {self.channel}"
 
     @property
-    def mirrored(self) -> Self:
+    def mirrored(self) -> BodyKey:
         """Left and right exchanged."""
         return replace(self, value=-self.value) if self.channel in _FLIPPED else self
 
@@ -127,7 +129,7 @@ class LegKey(Key):
         return f"foot {self.leg.name}"
 
     @property
-    def mirrored(self) -> Self:
+    def mirrored(self) -> LegKey:
         """Left and right exchanged."""
         return replace(self, leg=self.leg.mirror, target=self.target.mirrored)
 
@@ -156,6 +158,6 @@ class BalanceShift(Key):
         return "balance"
 
     @property
-    def mirrored(self) -> Self:
+    def mirrored(self) -> BalanceShift:
         """Left and right exchanged."""
         return replace(self, raised=frozenset(leg.mirror for leg in self.raised))
