@@ -33,11 +33,22 @@ JOINT_MARGIN = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Unbalanced:
-    """A moment at which no balanced pose was found: when [s], and why."""
+class Problem:
+    """What cannot be done as it is written.
 
+    Attributes:
+        check: what the feasibility check calls it.
+        subject: the leg, or the trunk.
+        time: when [s] it is worst.
+        miss: distance [m] by which the leg is too short; nan if that is not what is wrong.
+        reason: why no pose is balanced.
+    """
+
+    check: str
+    subject: str
     time: float
-    reason: str
+    miss: float = np.nan
+    reason: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,11 +57,11 @@ class Balance:
 
     Attributes:
         offsets: (n, 2) to add to the trunk's place [m], in the frame of the motion.
-        failures: moments without a balanced pose.
+        problems: moments without a balanced pose.
     """
 
     offsets: Float[np.ndarray, "n 2"]
-    failures: tuple[Unbalanced, ...]
+    problems: tuple[Problem, ...]
 
 
 class Balancer:
@@ -68,7 +79,7 @@ class Balancer:
     def balance(self) -> Balance:
         """The shifts, moment by moment."""
         moves, last = [], np.zeros(2)
-        failures: list[Unbalanced] = []
+        problems: list[Problem] = []
         starts = [*(shift.start for shift in self._shifts), self._end]
         for shift, end in zip(self._shifts, starts[1:], strict=True):
             start = shift.start
@@ -76,10 +87,10 @@ class Balancer:
                 try:
                     last = self._offset(knot, shift.raised, last)
                 except IkError as error:
-                    failures.append(Unbalanced(knot, str(error)))
+                    problems.append(Problem("balance", "trunk", knot, reason=str(error)))
                 moves.append(Move(start, knot, Ease.MINIMUM_JERK, last))
                 start = knot
-        return Balance(followed(self._times, np.zeros(2), moves), tuple(failures))
+        return Balance(followed(self._times, np.zeros(2), moves), tuple(problems))
 
     def _knots(self, shift: BalanceShift, end: float) -> list[float]:
         """The end of the shift, and every later end of a key while it lasts."""
