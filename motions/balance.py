@@ -134,19 +134,16 @@ class Balancer:
         start = configurations(pose[None], joints[None])[0]
         best: IkError | None = None
         for margin in MARGINS:
-            hip, thigh, calf = joints[leg.joints].tolist()
             targets = PoseTargets(
                 p_world_feet=self._tracks.p_feet,
                 rpy=(float(pose[3]), float(pose[4]), float(pose[5])),
                 height=float(pose[2]),
                 raised=leg,
-                q_raised=(hip, thigh, calf),
-                support=tuple(other for other in LEGS if other is not leg),
                 com_margin=margin,
                 joint_margin=JOINT_MARGIN,
             )
             try:
-                return solve_pose(self._model, targets, start).q
+                return solve_pose(self._model, targets, start)
             except IkError as error:
                 best = error
         raise IkError(f"no pose balances without foot {leg.name}: {best}")
