@@ -8,19 +8,18 @@ written. Between those instants the trunk moves smoothly.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.curves import Ease
 from go2_wbc.errors import IkError
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.inverse_kinematics import PoseTargets, solve_pose
 from go2_wbc.robot.model import RobotModel
 from motions.keys import BalanceShift
 from motions.timeline import SAME, Timeline
-from motions.tracks import LegTracks, Move, Poses, Times, configurations, followed
+from motions.tracks import LegTracks, Poses, Times, configurations, followed
 
 MARGINS = (0.08, 0.065, 0.05, 0.035, 0.02)
 """Distances [m] of the CoM to the edges of the support polygon that are tried, best first.
@@ -51,19 +50,6 @@ class Problem:
     reason: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Balance:
-    """Shift of the trunk.
-
-    Attributes:
-        offsets: (n, 2) to add to the trunk's place [m], in the frame of the motion.
-        problems: moments without a balanced pose.
-    """
-
-    offsets: Float[np.ndarray, "n 2"]
-    problems: tuple[Problem, ...]
-
-
 class Balancer:
     """Finds the shifts of all raises of a timeline."""
 
@@ -76,8 +62,8 @@ class Balancer:
         self._shifts, self._end = timeline.in_order(BalanceShift), timeline.end
         self._key_ends = sorted(key.end for key in timeline.keys)
 
-    def balance(self) -> Balance:
-        """The shifts, moment by moment."""
+    def balance(self) -> tuple[Float[np.ndarray, "n 2"], list[Problem]]:
+        """What to add to the trunk's places [m] (n, 2), and the moments without a balanced pose."""
         moves, last = [], np.zeros(2)
         problems: list[Problem] = []
         starts = [*(shift.start for shift in self._shifts), self._end]
@@ -88,9 +74,9 @@ class Balancer:
                     last = self._offset(knot, shift.raised, last)
                 except IkError as error:
                     problems.append(Problem("balance", "trunk", knot, reason=str(error)))
-                moves.append(Move(start, knot, Ease.MINIMUM_JERK, last))
+                moves.append((replace(shift, start=start, end=knot), last))
                 start = knot
-        return Balance(followed(self._times, np.zeros(2), moves), tuple(problems))
+        return followed(self._times, np.zeros(2), moves), problems
 
     def _knots(self, shift: BalanceShift, end: float) -> list[float]:
         """The end of the shift, and every later end of a key while it lasts."""
@@ -107,9 +93,7 @@ class Balancer:
     ) -> Float[np.ndarray, "2"]:
         if not raised:
             return np.zeros(2)
-        after = min(int(np.searchsorted(self._times, t)), len(self._times) - 1)
-        before = max(after - 1, 0)
-        index = min(before, after, key=lambda row: abs(self._times[row] - t))
+        index = int(np.abs(self._times - t).argmin())
         pose = self._body[index].copy()
         pose[:2] += guess
         instant = self._times[index : index + 1]

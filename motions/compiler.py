@@ -11,6 +11,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -109,12 +110,11 @@ def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
     home = home_poses(model)
     tracks = LegTracks(timeline, model, home[timeline.entry])
     body = body_path(timeline, home, times)
-    balance = Balancer(timeline, tracks, model, times, body).balance()
-    body[:, :2] += balance.offsets
+    offsets, problems = Balancer(timeline, tracks, model, times, body).balance()
+    body[:, :2] += offsets
     paths = [tracks.path(leg, times, body) for leg in LEGS]
     joints = np.hstack([path.q for path in paths])
     com = np.array([model.center_of_mass(q) for q in configurations(body, joints)])
-    problems = list(balance.problems)
     for leg, path in zip(LEGS, paths, strict=True):
         worst = int(np.argmax(path.miss))
         if path.miss[worst] > REACH_TOLERANCE:
@@ -150,12 +150,7 @@ def _ramp(timeline: Timeline) -> float:
 
     Before the first flight the foot may use all the time that there is.
     """
-    longest = UNLOAD_TIME
-    for leg in LEGS:
-        touchdown = None
-        for lift_off, next_touchdown in flights(timeline, leg):
-            stood = lift_off if touchdown is None else (lift_off - touchdown) / 2
-            if stood > 0.0:
-                longest = min(longest, stood)
-            touchdown = next_touchdown
-    return longest
+    spans = [flights(timeline, leg) for leg in LEGS]
+    before = [flown[0][0] for flown in spans if flown]
+    between = [(up - down) / 2 for flown in spans for (_, down), (up, _) in pairwise(flown)]
+    return min([UNLOAD_TIME, *(stood for stood in (*before, *between) if stood > 0.0)])

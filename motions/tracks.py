@@ -8,19 +8,17 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise, starmap
 
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from go2_wbc.curves import Ease
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
-from motions.keys import BODY_CHANNELS, BodyKey, Frame, LegKey, LegTarget, PostureKey
+from motions.keys import BODY_CHANNELS, BodyKey, Frame, Key, LegKey, LegTarget, PostureKey
 from motions.postures import LIE_POSE, SIT_POSE, STAND_POSE
 from motions.timeline import Timeline
 
@@ -37,16 +35,7 @@ error (measured), since the legs, whose feet stay, follow the base only in part.
 
 Times = Float[np.ndarray, " n"]
 Poses = Float[np.ndarray, "n 6"]
-
-
-@dataclass(frozen=True, slots=True)
-class Move:
-    """A way to a goal: when [s] it starts and ends, how, and the goal (k,)."""
-
-    start: float
-    end: float
-    ease: Ease
-    goal: Float[np.ndarray, " k"]
+Move = tuple[Key, Float[np.ndarray, " k"]]
 
 
 def sample_times(duration: float) -> Times:
@@ -62,15 +51,15 @@ def followed(
     Args:
         times: increasing instants [s].
         first: where it is before the first move.
-        moves: by their starts; none starts before the one before it has ended.
+        moves: keys by their starts, each with its goal (k,); none starts before the one before it
+            has ended.
     """
     path = np.tile(first, (len(times), 1))
     last = first
-    edges = np.searchsorted(times, [*(move.start for move in moves), np.inf])
-    for move, rows in zip(moves, starmap(slice, pairwise(edges.tolist())), strict=True):
-        share = eased(move.start, move.end, move.ease, times[rows])
-        path[rows] = last + share[:, None] * (move.goal - last)
-        last = move.goal
+    edges = np.searchsorted(times, [*(key.start for key, _ in moves), np.inf]).tolist()
+    for (key, goal), rows in zip(moves, starmap(slice, pairwise(edges)), strict=True):
+        path[rows] = last + eased(key, times[rows])[:, None] * (goal - last)
+        last = goal
     return path
 
 
@@ -80,21 +69,18 @@ def body_path(
     """Base position [m] and roll, pitch, yaw [rad] at ``times``, without the shift for balance."""
     moves: dict[str, list[Move]] = {channel: [] for channel in BODY_CHANNELS}
     for key in timeline.in_order(BodyKey):
-        moves[key.channel].append(Move(key.start, key.end, key.ease, np.array([key.value])))
-    postures = [
-        Move(key.start, key.end, key.ease, home[key.posture])
-        for key in timeline.in_order(PostureKey)
-    ]
+        moves[key.channel].append((key, np.array([key.value])))
+    postures = [(key, home[key.posture]) for key in timeline.in_order(PostureKey)]
     offsets = [followed(times, np.zeros(1), moves[channel]) for channel in BODY_CHANNELS]
     return followed(times, home[timeline.entry], postures) + np.hstack(offsets)
 
 
-def eased(start: float, end: float, ease: Ease, times: Times) -> Float[np.ndarray, " n"]:
-    """0 before ``start``, 1 after ``end``, eased between them."""
-    s = np.clip((times - start) / (end - start), 0.0, 1.0)
+def eased(key: Key, times: Times) -> Float[np.ndarray, " n"]:
+    """0 before ``key`` starts, 1 after it has ended, eased between them."""
+    s = np.clip((times - key.start) / (key.end - key.start), 0.0, 1.0)
     shares = np.where(s < 1.0, 0.0, 1.0)
     during = (s > 0.0) & (s < 1.0)
-    shares[during] = [ease.progress(float(value))[0] for value in s[during]]
+    shares[during] = [key.ease.progress(float(value))[0] for value in s[during]]
     return shares
 
 
@@ -150,7 +136,7 @@ class LegTracks:
         return path
 
     def _move(self, key: LegKey, origin: LegTarget, times: Times, body: Poses) -> LegAngles:
-        share = eased(key.start, key.end, key.ease, times)[:, None]
+        share = eased(key, times)[:, None]
         goals = (origin, key.target)
         span = times <= key.end
         if all(goal.frame is not Frame.JOINTS for goal in goals):

@@ -10,10 +10,9 @@ from go2_wbc.robot.model import RobotModel
 from motions.balance import Problem
 from motions.compiler import CompiledPlan
 from motions.feasibility import dynamic, kinematic
-from motions.feasibility.checked_motion import CheckedMotion
+from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.limits import FeasibilityLimits
-from motions.feasibility.playable import Playable, compile_motion
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.trajectory import trajectory_of
 
