@@ -24,7 +24,6 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
-from motions.compiler import OutOfReach
 
 FRICTION = 0.5
 """Friction coefficient of the floor: the least of the trials' conditions."""
@@ -109,8 +108,8 @@ NEAR_LIMITS = Scenario("near limits", METRICS, partial(check_and_play, near_limi
 
 def what_went_wrong(run: MotionMeasurement, plan: MotionPlan) -> list[str]:
     """What went wrong while a motion was played, in words; empty if nothing did."""
-    unreached = [p for p in getattr(plan, "problems", ()) if isinstance(p, OutOfReach)]
-    missed = max((p.miss for p in unreached), default=0.0) - run.feet_off
+    misses = [problem.miss for problem in getattr(plan, "problems", ())]
+    missed = max((miss for miss in misses if miss > 0.0), default=0.0) - run.feet_off
     off = max(run.tracking, run.ends_off, run.feet_off, missed)
     found = {
         "fell": run.fall is not None,
