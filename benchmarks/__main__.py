@@ -13,7 +13,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("feasibility", "benchmarks.feasibility", "the feasibility check against physics"),
     Command("bridges", "benchmarks.bridges.command", "ROS 2 and Unitree's protocol, by processes"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
-    Command("evidence", "benchmarks.evidence", "fill the README's table from the results"),
+    Command("evidence", "benchmarks.evidence", "fill the table of docs/evidence.md"),
 )
 EXAMPLES = """
 python -m benchmarks --list                     these benchmarks

@@ -10,6 +10,7 @@ block by block where blocks have different units, so that a large block cannot h
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import mujoco
 import numpy as np
@@ -31,13 +32,9 @@ _TORQUE = 10.0  # N m and N; half the hip's limit
 
 @dataclass(frozen=True, slots=True)
 class DynamicsSample:
-    """One random state with what goes into inverse and forward dynamics, as Pinocchio sees it.
+    """One random state, with an acceleration and a force, in Pinocchio's conventions.
 
-    Attributes:
-        q: configuration, quaternion x y z w.
-        v: velocity, base twist in the base frame.
-        a: acceleration, likewise.
-        tau: generalised force, likewise; the base's six are an external wrench.
+    The first six of ``tau`` are an external wrench on the base, in its frame as ``v`` and ``a``.
     """
 
     q: Float[np.ndarray, "19"]
@@ -58,20 +55,9 @@ Dynamics = dict[str, Float[np.ndarray, "..."]]
 """
 
 
-def model_agreement(
-    n: int, seed: int, description: RobotDescription | None = None
-) -> dict[str, float]:
-    """Worst relative disagreement between MuJoCo and Pinocchio over ``n`` random states.
-
-    Args:
-        n: number of states.
-        seed: of the states.
-        description: the robot; ``None`` takes the installed one.
-
-    Returns:
-        For each quantity of ``Dynamics`` the largest relative error.
-    """
-    description = description or find_description()
+def model_agreement(n: int, seed: int) -> dict[str, float]:
+    """Largest relative error of each quantity of ``Dynamics`` over ``n`` random states."""
+    description = find_description()
     pinocchio_model = pin.buildModelFromUrdf(str(description.urdf_path), pin.JointModelFreeFlyer())
     mujoco_model = ideal_mujoco_model(description)
     rng = np.random.default_rng(seed)
@@ -150,7 +136,7 @@ def mujoco_dynamics(model: mujoco.MjModel, sample: DynamicsSample) -> Dynamics:
     dense = np.zeros((18, 18))
     mujoco.mj_fullM(model, data, dense)
     return {
-        "mass": model.body_subtreemass[base],
+        "mass": np.array(model.body_subtreemass[base]),
         "com": data.subtree_com[base].copy(),
         "composite_inertia": _composite_inertia(model, data),
         "mass_matrix": T.T @ dense @ T,
@@ -172,11 +158,9 @@ def relative_errors(found: Dynamics, expected: Dynamics) -> dict[str, float]:
 
 def _blocks(value: np.ndarray) -> list[np.ndarray]:
     """The parts of a generalised vector or matrix that have different units."""
-    if value.shape == (18,):
-        return [value[i] for i in _BLOCKS]
-    if value.shape == (18, 18):
-        return [value[i, j] for i in _BLOCKS for j in _BLOCKS]
-    return [np.asarray(value)]
+    if value.shape[:1] != (18,):
+        return [value]
+    return [value[index] for index in product(_BLOCKS, repeat=value.ndim)]
 
 
 def _write_state(

@@ -70,11 +70,11 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "evidence",
-        "Fill the README's table from what `behaviour --out` wrote; a metric that is in\n"
+        "Fill the page's table from what `behaviour --out` wrote; a metric that is in\n"
         "several files is taken from the last.",
         examples=EXAMPLES,
     )
-    parser.add_argument("readme", metavar="README", type=Path)
+    parser.add_argument("page", metavar="PAGE", type=Path)
     parser.add_argument("results", metavar="JSON", type=Path, nargs="+")
 
 
@@ -83,8 +83,8 @@ def run(args: argparse.Namespace) -> int:
     rows = {}
     for file in args.results:
         rows |= {row["name"]: row for row in json.loads(file.read_text())["rows"]}
-    text = filled(args.readme.read_text(encoding="utf-8"), rows)
-    args.readme.write_text(text, encoding="utf-8")
+    text = filled(args.page.read_text(encoding="utf-8"), rows)
+    args.page.write_text(text, encoding="utf-8")
     return ExitCode.OK
 
 

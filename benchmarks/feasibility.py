@@ -7,6 +7,8 @@ whatever the check said, on the least friction that the check counts on.
 from __future__ import annotations
 
 import argparse
+import re
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -14,7 +16,7 @@ from typing import Any
 
 from benchmarks.generated_motions import GeneratedMotion, generated_motion, near_limit_motion
 from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.session import add_options, checked_target, measure_all, positive, publish
+from benchmarks.session import add_options, measure_all, positive, publish
 from benchmarks.trials import Trial, TrialRobot
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_measurement import MotionMeasurement, measure_motion
@@ -22,7 +24,6 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
-from motions.compiler import OutOfReach
 
 FRICTION = 0.5
 """Friction coefficient of the floor: the least of the trials' conditions."""
@@ -44,6 +45,7 @@ python -m benchmarks feasibility --json --out feasibility.json
 """
 REFUSED = Metric("feasibility.refused", "verdict", "refused by the check", "", None)
 FAILED = Metric("feasibility.failed", "physics", "went wrong in MuJoCo", "", None)
+METRICS = (REFUSED, FAILED)
 
 
 def register(subparsers: Subparsers) -> None:
@@ -71,12 +73,11 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Check and play the motions; report how often the check was right."""
-    target = checked_target(args)
     tasks = [(CLEAR_MOTIONS, seed) for seed in range(args.motions)]
     results = measure_all(args, [*tasks, *((NEAR_LIMITS, seed) for seed in range(args.near))])
     matrix = ConfusionMatrix.of(results.get(CLEAR_MOTIONS.name, {}), generated_motion)
     near = ConfusionMatrix.of(results.get(NEAR_LIMITS.name, {}), near_limit_motion)
-    publish(args, target, {**matrix.as_dict(), "near_limits": near.as_dict()}, render(matrix, near))
+    publish(args, {**matrix.as_dict(), "near_limits": near.as_dict()}, render(matrix, near))
     return ExitCode.OK if matrix.ok else ExitCode.FAILED
 
 
@@ -101,15 +102,14 @@ def check_and_play(make: Make, trial: Trial) -> Measurement:
     return Measurement(values, {name: reason for name, reason in reasons.items() if reason})
 
 
-METRICS = (REFUSED, FAILED)
 CLEAR_MOTIONS = Scenario("feasibility", METRICS, partial(check_and_play, generated_motion))
 NEAR_LIMITS = Scenario("near limits", METRICS, partial(check_and_play, near_limit_motion))
 
 
 def what_went_wrong(run: MotionMeasurement, plan: MotionPlan) -> list[str]:
     """What went wrong while a motion was played, in words; empty if nothing did."""
-    unreached = [p for p in getattr(plan, "problems", ()) if isinstance(p, OutOfReach)]
-    missed = max((p.miss for p in unreached), default=0.0) - run.feet_off
+    misses = [problem.miss for problem in getattr(plan, "problems", ())]
+    missed = max((miss for miss in misses if miss > 0.0), default=0.0) - run.feet_off
     off = max(run.tracking, run.ends_off, run.feet_off, missed)
     found = {
         "fell": run.fall is not None,
@@ -125,15 +125,7 @@ def what_went_wrong(run: MotionMeasurement, plan: MotionPlan) -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One motion: what the check said, and what came of it.
-
-    Attributes:
-        seed: which motion.
-        kind: how it was generated.
-        is_refused: by the check.
-        has_failed: in physics.
-        refusal, harm: why, in words.
-    """
+    """One motion: whether the check refused it, whether physics failed it, and why."""
 
     seed: int
     kind: str
@@ -158,38 +150,35 @@ class ConfusionMatrix:
     @staticmethod
     def of(measured: dict[int, Measurement], make: Make) -> ConfusionMatrix:
         """The matrix of the measurements of the motions that ``make`` generates, by seed."""
-        found = {seed: one for seed, one in sorted(measured.items()) if one.values}
-        cases = (
-            Case(
-                seed,
-                make(seed).kind,
-                one.values[REFUSED.name] > 0.0,
-                one.values[FAILED.name] > 0.0,
-                one.failures.get(REFUSED.name, ""),
-                one.failures.get(FAILED.name, ""),
-            )
-            for seed, one in found.items()
-        )
-        lost = {seed: one.reason for seed, one in sorted(measured.items()) if seed not in found}
+        cases: list[Case] = []
+        lost: dict[int, str] = {}
+        for seed, one in sorted(measured.items()):
+            if not one.values:
+                lost[seed] = one.reason
+                continue
+            refused, failed = (one.values[metric.name] > 0.0 for metric in METRICS)
+            reasons = (one.failures.get(metric.name, "") for metric in METRICS)
+            cases.append(Case(seed, make(seed).kind, refused, failed, *reasons))
         return ConfusionMatrix(tuple(cases), lost)
 
-    def count(self, *, is_refused: bool, has_failed: bool) -> int:
-        """How many motions were so judged and so ended."""
-        pairs = [(case.is_refused, case.has_failed) for case in self.cases]
-        return pairs.count((is_refused, has_failed))
+    @property
+    def counts(self) -> Counter[tuple[bool, bool]]:
+        """Number of motions, by whether they were refused and whether they failed."""
+        return Counter((case.is_refused, case.has_failed) for case in self.cases)
 
     @property
     def precision(self) -> float:
         """Share of the refused motions that really go wrong."""
-        return self._share_of_right([case for case in self.cases if case.is_refused])
+        return self._share_of_right((True, False))
 
     @property
     def recall(self) -> float:
         """Share of the motions that go wrong that are refused."""
-        return self._share_of_right([case for case in self.cases if case.has_failed])
+        return self._share_of_right((False, True))
 
-    def _share_of_right(self, cases: list[Case]) -> float:
-        return self.count(is_refused=True, has_failed=True) / len(cases) if cases else 1.0
+    def _share_of_right(self, mistake: tuple[bool, bool]) -> float:
+        right, wrong = self.counts[True, True], self.counts[mistake]
+        return right / (right + wrong) if right + wrong else 1.0
 
     @property
     def ok(self) -> bool:
@@ -203,15 +192,17 @@ class ConfusionMatrix:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
+        counts = self.counts
         return {
             "passed": self.ok,
             "precision": self.precision,
             "recall": self.recall,
             "threshold": THRESHOLD,
             "matrix": {
-                f"{verdict}_{outcome}": self.count(is_refused=refused, has_failed=failed)
-                for verdict, refused in (("refused", True), ("accepted", False))
-                for outcome, failed in (("failed", True), ("done", False))
+                "refused_failed": counts[True, True],
+                "refused_done": counts[True, False],
+                "accepted_failed": counts[False, True],
+                "accepted_done": counts[False, False],
             },
             "cases": [asdict(case) for case in self.cases],
             "lost": {str(seed): reason for seed, reason in self.lost.items()},
@@ -235,8 +226,8 @@ def render(clear: ConfusionMatrix, near: ConfusionMatrix) -> str:
 def _tables(matrix: ConfusionMatrix) -> list[str]:
     lines = [f"{'':<26}{'went wrong':>14}{'was done':>12}", "-" * 80]
     for what, refused in (("the check refuses it", True), ("the check lets it pass", False)):
-        counts = [matrix.count(is_refused=refused, has_failed=failed) for failed in (True, False)]
-        lines.append(f"{what:<26}{counts[0]:>14}{counts[1]:>12}")
+        failed, done = matrix.counts[refused, True], matrix.counts[refused, False]
+        lines.append(f"{what:<26}{failed:>14}{done:>12}")
     lines += ["-" * 80, f"{'kind':<16}{'n':>3}{'refused':>9}{'wrong':>7}  most often, in physics"]
     kinds = dict.fromkeys(case.kind for case in matrix.cases)
     lines += [_kind_line(kind, matrix) for kind in kinds]
@@ -251,10 +242,7 @@ def _tables(matrix: ConfusionMatrix) -> list[str]:
 def _kind_line(kind: str, matrix: ConfusionMatrix) -> str:
     cases = [case for case in matrix.cases if case.kind == kind]
     refused, failed = sum(c.is_refused for c in cases), sum(c.has_failed for c in cases)
-    harm = [_without_numbers(part) for case in cases for part in case.harm.split("; ") if part]
-    common = max(dict.fromkeys(harm), key=harm.count) if harm else ""
+    parts = (part for case in cases for part in case.harm.split("; ") if part)
+    harm = Counter(re.sub(r"[\d.]+", "...", part) for part in parts)
+    common = harm.most_common(1)[0][0] if harm else ""
     return f"{kind:<16}{len(cases):>3}{refused:>9}{failed:>7}  {common}".rstrip()
-
-
-def _without_numbers(text: str) -> str:
-    return " ".join("..." if word.replace(".", "").isdigit() else word for word in text.split())

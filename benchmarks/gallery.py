@@ -1,31 +1,30 @@
-"""``python -m benchmarks gallery``: every motion of the library, moments of it in a picture.
+"""``python -m benchmarks gallery``: the pictures of the documentation, all of runs in MuJoCo.
 
 Writes ``gallery.md`` and ``images/gallery/NAME.webp``: the start, and the moments in which the
-robot, as measured, is farthest from it and from each other.
+robot, as measured, is farthest from it and from each other. With ``--film`` it writes
+``images/demo.webp`` instead: the README's film, the demo from the first steps on.
 """
 
 from __future__ import annotations
 
 import argparse
-import io
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 from PIL import Image, ImageDraw, ImageFont
 
 from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.demo import run_demo
 from controller.go2_controller import GO2Controller
 from go2_wbc.errors import MotionError
 from go2_wbc.files import checked_output, write_atomically
-from go2_wbc.plant import MujocoPlant
 from go2_wbc.recording import Recording
 from motions import Motion, Timeline, find_motion, motion_names
 from viz.palette import INK
+from viz.render.animation import encoded_webp, frame_times
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.posed_robot import PosedRobot
-from viz.render.renderer import RenderStyle
 from viz.render.robot_meshes import load_robot_visuals
 
 MOMENTS = 3
@@ -49,13 +48,28 @@ STYLE = ShotStyle(
     turn_smoothing=20.0,
     distance=1.5,
     detail=0.003,
-    render=RenderStyle(samples=3),
+    samples=3,
 )
 """A camera that nearly stands still, so that what differs between the panels is the robot."""
-QUALITIES = (88, 80, 72, 64, 56)
-"""Of the compression: the first that keeps a picture small enough."""
 SIZE_LIMIT = 60_000
 """Largest picture [bytes]."""
+FILM_SPEED, FILM_RATE = 2.0, 10.0
+"""Seconds of the run in a second of the film, and pictures in a second of it."""
+LEAD = 0.6
+"""How long [s] the robot stands in the film before its first step."""
+_STILL = 1e6  # [s] a path that is smoothed over so long is its mean
+FILM_STYLE = ShotStyle(
+    size=(640, 400),
+    azimuth=np.deg2rad(15.0),
+    sway=0.0,
+    smoothing=_STILL,
+    turn_smoothing=_STILL,
+    distance=1.8,
+    detail=0.004,
+)
+"""A camera that sees the robot from the left at first, and its face after the turn."""
+FILM_SIZE_LIMIT = 700_000
+"""Largest film [bytes]."""
 TRUNK_POINTS = np.array([[0.35, 0.0, 0.0], [-0.25, 0.0, 0.0], [0.0, 0.0, 0.15]])
 """Nose, tail, and a point [m] above the trunk, in its frame: they tell attitudes apart."""
 
@@ -74,6 +88,7 @@ motion: the [tutorial](tutorial.md).
 EXAMPLES = """
 python -m benchmarks gallery docs              the page and all pictures
 python -m benchmarks gallery docs bow wave     the page and these pictures
+python -m benchmarks gallery docs --film         the film of the README
 """
 
 
@@ -87,23 +102,29 @@ def register(subparsers: Subparsers) -> None:
     )
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="of the page")
     parser.add_argument("names", metavar="MOTION", nargs="*", help="default: all")
+    parser.add_argument("--film", action="store_true", help="write the README's film instead")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write the page, and the pictures of the motions that were named."""
+    """Write the film, or the page and the pictures of the motions that were named."""
+    if args.film:
+        _write(args.folder / "images" / "demo.webp", film(from_first_step(demo())))
+        return ExitCode.OK
     target = checked_output(args.folder / "gallery.md", (".md",))
     timelines = [find_motion(name)() for name in args.names or motion_names()]
-    with GO2Controller(plant=MujocoPlant()) as robot:
+    with GO2Controller() as robot:
         robot.stand()
         for line in timelines:
             recording = played(line, robot)
             name = args.folder / "images" / "gallery" / f"{line.name}.webp"
-            file = write_atomically(
-                checked_output(name, (".webp",)), picture(recording, telling_rows(recording))
-            )
-            print(f"{line.name:<14}{file.stat().st_size:>7} bytes")
+            _write(name, picture(recording, telling_rows(recording)))
     write_atomically(target, page().encode())
     return ExitCode.OK
+
+
+def _write(name: Path, content: bytes) -> None:
+    write_atomically(checked_output(name, (".webp",)), content)
+    print(f"{name.stem:<14}{len(content):>7} bytes")
 
 
 def page() -> str:
@@ -151,7 +172,8 @@ def telling_rows(recording: Recording) -> list[int]:
     trunk, among the rows that are at least ``FAR`` of the way from the start.
     """
     robot = PosedRobot(load_robot_visuals())
-    points = np.array([_points(q, robot) for q in recording.q])
+    places = ((robot.feet(q), robot.on_trunk(TRUNK_POINTS)) for q in recording.q)
+    points = np.array([np.vstack(pair).ravel() for pair in places])
     away = np.linalg.norm(points - points[0], axis=1)
     distance = np.where(away >= FAR * away.max(), away, -1.0)
     chosen = [0]
@@ -162,7 +184,11 @@ def telling_rows(recording: Recording) -> list[int]:
 
 
 def picture(recording: Recording, rows: Sequence[int]) -> bytes:
-    """The moments, ``MOMENTS`` in a line, as one WebP of at most ``SIZE_LIMIT`` bytes."""
+    """The moments, ``MOMENTS`` in a line, as one WebP of at most ``SIZE_LIMIT`` bytes.
+
+    Raises:
+        ConfigError: if it is larger in every quality.
+    """
     frame_renderer = FrameRenderer(recording, STYLE)
     width, height = PANEL
     lines = -(-len(rows) // MOMENTS)
@@ -176,16 +202,36 @@ def picture(recording: Recording, rows: Sequence[int]) -> bytes:
         ImageDraw.Draw(panel).text(corner, f"{time:.1f} s", INK, font, anchor="rs")
         line, column = divmod(place, MOMENTS)
         sheet.paste(panel, (column * (width + GAP), line * (height + GAP)))
-    content = b""
-    for quality in QUALITIES:
-        stream = io.BytesIO()
-        sheet.save(stream, "WEBP", quality=quality, method=6)
-        content = stream.getvalue()
-        if len(content) <= SIZE_LIMIT:
-            break
-    return content
+    return encoded_webp([sheet], 0, SIZE_LIMIT)
 
 
-def _points(q: Float[np.ndarray, "19"], robot: PosedRobot) -> Float[np.ndarray, " k"]:
-    """Places [m] in the world that tell poses apart."""
-    return np.vstack([robot.feet(q), robot.on_trunk(TRUNK_POINTS)]).ravel()
+def demo() -> Recording:
+    """A run of the demo.
+
+    Raises:
+        MotionError: if it was not done.
+    """
+    with GO2Controller() as go2:
+        if not run_demo(go2).ok:
+            raise MotionError("the demo was not done: no film of it")
+        return go2.recording()
+
+
+def from_first_step(run: Recording) -> Recording:
+    """The run from a moment before it first walks."""
+    start = run.time[run.labels.index("walk")] - LEAD
+    return run.part(slice(int(np.searchsorted(run.time, start)), None))
+
+
+def film(recording: Recording) -> bytes:
+    """The run as a looping WebP of at most ``FILM_SIZE_LIMIT`` bytes.
+
+    Raises:
+        ConfigError: if it is too long for that.
+    """
+    frame_renderer = FrameRenderer(recording, FILM_STYLE)
+    frames = [
+        Image.fromarray(frame_renderer.shoot_captioned(time, speed=FILM_SPEED))
+        for time in frame_times(recording, speed=FILM_SPEED, fps=FILM_RATE)
+    ]
+    return encoded_webp(frames, round(1000 / FILM_RATE), FILM_SIZE_LIMIT)

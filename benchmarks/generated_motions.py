@@ -26,13 +26,11 @@ class GeneratedMotion:
 
     Attributes:
         kind: the maker's name.
-        is_broken: whether it is meant to be impossible; None if that is left to chance.
         line: as it is written.
         start: time [s] at which the plan is entered; above 0 for a wrong entry.
     """
 
     kind: str
-    is_broken: bool | None
     line: Timeline
     start: float = 0.0
 
@@ -113,11 +111,6 @@ def _to_and_fro(
     return line
 
 
-def _outward(leg: Leg) -> float:
-    """Sign of y on the leg's side."""
-    return 1.0 if leg in (Leg.FL, Leg.RL) else -1.0
-
-
 # --- what the robot can do --------------------------------------------------------------------
 
 
@@ -171,7 +164,7 @@ def _wave(draw: _Draw) -> Timeline:
     leg, thigh = draw.front(), draw.between(-0.9, -0.5)
     line = Timeline().leg(leg, hip=0.0, thigh=thigh, calf=-1.3, over=1.2)
     for _ in draw.times(1, 3):
-        for hip in (_outward(leg) * draw.between(0.1, 0.35), 0.0):
+        for hip in (leg.side * draw.between(0.1, 0.35), 0.0):
             line = line.leg(leg, hip=hip, thigh=thigh, calf=-1.3, over=0.4)
     return line.home(over=1.2)
 
@@ -226,7 +219,7 @@ def _too_fast(draw: _Draw) -> Timeline:
 
 def _off_balance(draw: _Draw) -> Timeline:
     leg = draw.leg()
-    line = Timeline(balance=False).body(y=_outward(leg) * draw.between(0.03, 0.07), over=0.8)
+    line = Timeline(balance=False).body(y=leg.side * draw.between(0.03, 0.07), over=0.8)
     return line.foot(leg, z=draw.between(0.08, 0.15), over=0.6).hold(1.0).home(over=0.8)
 
 
@@ -239,7 +232,7 @@ def _foot_unloaded(draw: _Draw) -> Timeline:
 
 def _colliding(draw: _Draw) -> Timeline:
     leg = draw.front()
-    y, z = -_outward(leg) * draw.between(0.28, 0.34), draw.between(0.03, 0.06)
+    y, z = -leg.side * draw.between(0.28, 0.34), draw.between(0.03, 0.06)
     line = Timeline().foot(leg, z=0.10, over=0.8).foot(leg, y=y, z=z, over=0.9)
     return line.hold(0.4).home(over=1.2)
 
@@ -309,13 +302,13 @@ def _farther_paw(draw: _Draw) -> Timeline:
 def _closer_legs(draw: _Draw) -> Timeline:
     leg = draw.front()
     line = Timeline().foot(leg, z=0.08, over=0.8)
-    line = line.foot(leg, y=-_outward(leg) * draw.between(0.12, 0.30), z=0.05, over=0.9)
+    line = line.foot(leg, y=-leg.side * draw.between(0.12, 0.30), z=0.05, over=0.9)
     return line.hold(0.3).home(over=1.2)
 
 
 def _leaning(draw: _Draw) -> Timeline:
     leg = draw.leg()
-    line = Timeline(balance=False).body(y=-_outward(leg) * draw.between(0.0, 0.08), over=0.8)
+    line = Timeline(balance=False).body(y=-leg.side * draw.between(0.0, 0.08), over=0.8)
     return line.foot(leg, z=0.08, over=0.6).hold(0.8).home(over=0.8)
 
 
@@ -333,18 +326,15 @@ LATE = 1.0
 
 def generated_motion(seed: int) -> GeneratedMotion:
     """The motion of a seed: even seeds give good ones, odd ones broken, each kind in turn."""
-    is_broken = bool(seed % 2)
-    return _made(BROKEN if is_broken else GOOD, seed // 2, seed, is_broken=is_broken)
+    return _made((GOOD, BROKEN)[seed % 2], seed // 2, seed)
 
 
 def near_limit_motion(seed: int) -> GeneratedMotion:
     """The motion of a seed among those from easy to impossible, each kind in turn."""
-    return _made(NEAR, seed, seed, is_broken=None)
+    return _made(NEAR, seed, seed)
 
 
-def _made(
-    makers: Mapping[str, Maker], turn: int, seed: int, *, is_broken: bool | None
-) -> GeneratedMotion:
+def _made(makers: Mapping[str, Maker], turn: int, seed: int) -> GeneratedMotion:
     kind = list(makers)[turn % len(makers)]
     line = replace(makers[kind](_Draw(seed)), name=f"{kind} {seed}")
-    return GeneratedMotion(kind, is_broken, line, LATE if kind == "wrong entry" else 0.0)
+    return GeneratedMotion(kind, line, LATE if kind == "wrong entry" else 0.0)

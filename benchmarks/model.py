@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import closing
+
 import numpy as np
 from jaxtyping import Float
 
 from benchmarks.agreement import model_agreement
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.trials import Trial, TrialFailed
-from controller.loop import ControlLoop
+from controller.assembly import build_pilot
 from controller.pilot import Pilot
 from controller.procedures import Aborted
-from controller.runner import Runner
-from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import VelocityCommand
@@ -20,7 +20,6 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.solution import WbcSolution
 from motions import compile_timeline, load_motion
@@ -40,20 +39,18 @@ DRIVERS = ("condensed", "placo")
 BACKENDS = ("condensed", "full", "placo")
 """Back ends that are compared with the driving one."""
 
-_AGREEMENT_QUANTITIES = {
-    "mass": "mass",
-    "com": "centre of mass",
-    "composite_inertia": "inertia",
-    "mass_matrix": "mass matrix",
-    "inverse_dynamics": "inverse dynamics",
-    "forward_dynamics": "forward dynamics",
-}
-_MODEL_ITEM = "Pinocchio against MuJoCo, relative"
 _SOLUTION_ITEM = "whole-body solutions"
 
 AGREEMENT_METRICS = tuple(
-    Metric(f"model.{name}", _MODEL_ITEM, quantity, "", AGREEMENT_LIMIT)
-    for name, quantity in _AGREEMENT_QUANTITIES.items()
+    Metric(f"model.{name}", "Pinocchio against MuJoCo, relative", quantity, "", AGREEMENT_LIMIT)
+    for name, quantity in (
+        ("mass", "mass"),
+        ("com", "centre of mass"),
+        ("composite_inertia", "inertia"),
+        ("mass_matrix", "mass matrix"),
+        ("inverse_dynamics", "inverse dynamics"),
+        ("forward_dynamics", "forward dynamics"),
+    )
 )
 SOLUTION_METRICS = (
     *(
@@ -72,19 +69,15 @@ def measure_agreement(trial: Trial) -> Measurement:
 
 
 class AuditedController(WholeBodyController):
-    """Checks every solution, and solves some ticks with the other back ends as well.
+    """Checks every solution, and solves some ticks with the other back ends as well."""
 
-    Attributes:
-        worst: largest value so far, by metric; see ``measure_solutions``.
-    """
-
-    def __init__(self, model: RobotModel, backend: str, config: WbcConfig) -> None:
-        """Solve with ``backend``; the others share its numbers."""
-        super().__init__(model, backend, config)
+    def __init__(self, model: RobotModel, backend: str, worst: dict[str, float]) -> None:
+        """Solve with ``backend``; keep what is larger than in ``worst`` there."""
+        super().__init__(model, backend)
         others = [name for name in BACKENDS if name != backend]
-        self._others = [WholeBodyController(model, name, config) for name in others]
+        self._others = [WholeBodyController(model, name) for name in others]
         self._ticks = 0
-        self.worst: dict[str, float] = {}
+        self._worst = worst
 
     def solve(self, snapshot: Snapshot, reference: Reference) -> WbcSolution:
         """Solve one tick and audit the solution."""
@@ -102,7 +95,7 @@ class AuditedController(WholeBodyController):
         self._note(f"wbc.motion_{solution.backend}", motion_error(self.model, snapshot, solution))
 
     def _note(self, metric: str, value: float) -> None:
-        self.worst[metric] = max(value, self.worst.get(metric, 0.0))
+        self._worst[metric] = max(value, self._worst.get(metric, 0.0))
 
 
 def motion_error(model: RobotModel, snapshot: Snapshot, solution: WbcSolution) -> float:
@@ -123,23 +116,17 @@ def measure_solutions(trial: Trial) -> Measurement:
     - torque between back ends: largest difference of any joint's torque for the same snapshot and
       reference, on every tenth tick.
     """
-    worst: dict[str, float] = {}
-    failures = 0
+    worst = {"wbc.failures": 0.0}
     for driver in DRIVERS:
-        config, model = Config(), RobotModel()
-        wbc = AuditedController(model, driver, config.wbc)
-        telemetry = Telemetry(model, capacity=1)
-        plant = trial.plant()
-        loop = ControlLoop(plant, model, wbc, telemetry, config.safety)
-        try:
-            _exercise(Pilot(Runner(loop, realtime=False, after_tick=lambda: None), config), plant)
-        except Aborted as aborted:
-            raise TrialFailed(f"driven by {driver}: {aborted}") from aborted
-        finally:
-            plant.close()
-        worst = {name: max(value, worst.get(name, 0.0)) for name, value in wbc.worst.items()}
-        failures += telemetry.qp_failures
-    return Measurement({**worst, "wbc.failures": float(failures)})
+        with closing(trial.plant()) as plant, closing(build_pilot(plant, Config())) as robot:
+            loop = robot.runner.loop
+            loop.wbc = AuditedController(loop.model, driver, worst)
+            try:
+                _exercise(robot.pilot, plant)
+            except Aborted as aborted:
+                raise TrialFailed(f"driven by {driver}: {aborted}") from aborted
+            worst["wbc.failures"] += robot.telemetry.qp_failures
+    return Measurement(worst)
 
 
 def _exercise(pilot: Pilot, plant: MujocoPlant) -> None:

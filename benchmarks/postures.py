@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from benchmarks.pushes import PUSH_TIME, force_of, measure_impulses, push_metrics
+from benchmarks.pushes import PUSH_TIME, directions_of, force_of, measure_impulses, push_metrics
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.trials import Trial, TrialFailed, TrialRobot
 from controller.modes import Mode
@@ -28,7 +28,7 @@ STAND_METRICS = (
     Metric("stand.height", _RISE, "final CoM height off", "mm", 5.0),
     Metric("stand.tilt", _RISE, "final tilt", "deg", None),
 )
-PUSH_METRICS = push_metrics("stand.push", _PUSH, lateral=14.0, forward=18.0)
+PUSHED = push_metrics("stand.push", _PUSH, lateral=14.0, forward=18.0)
 MOVED = Metric("stand.push_moved", _PUSH, "a foot moved, to threshold", "mm", None)
 
 
@@ -81,29 +81,22 @@ def measure_pushes(trial: Trial) -> Measurement:
     def failure_of(impulse: float, direction: str) -> str | None:
         with TrialRobot(trial) as robot:
             try:
-                distance, failure = _push_standing(robot, impulse, direction)
+                robot.require(robot.go2.stand())
+                feet = robot.plant.p_world_feet
+                robot.push(force_of(impulse, direction), PUSH_TIME)
+                robot.wait(RECOVERY_TIME)
             except TrialFailed as failed:
                 return str(failed)
-        thresholds = [p.metric.threshold or 0.0 for p in PUSH_METRICS if direction in p.directions]
-        if impulse <= max(thresholds):
-            moved.append(distance)
-        return failure
+            steps = (robot.plant.p_world_feet - feet)[:, :2]
+            if impulse <= max(m.threshold or 0.0 for m in PUSHED if direction in directions_of(m)):
+                moved.append(float(np.linalg.norm(steps, axis=1).max()))
+            if robot.go2.mode is not Mode.STANDING:
+                return f"the robot is {robot.go2.mode.value}"
+            return standing_failure(robot)
 
-    found = measure_impulses(PUSH_METRICS, failure_of)
+    found = measure_impulses(PUSHED, failure_of)
     return Measurement({**found.values, MOVED.name: 1000.0 * max(moved)}, found.failures)
 
 
-def _push_standing(robot: TrialRobot, impulse: float, direction: str) -> tuple[float, str | None]:
-    """How far [m] a foot moved, and what was wrong in the end, if anything."""
-    robot.require(robot.go2.stand())
-    feet = robot.plant.p_world_feet
-    robot.push(force_of(impulse, direction), PUSH_TIME)
-    robot.wait(RECOVERY_TIME)
-    distance = float(np.linalg.norm((robot.plant.p_world_feet - feet)[:, :2], axis=1).max())
-    if robot.go2.mode is not Mode.STANDING:
-        return distance, f"the robot is {robot.go2.mode.value}"
-    return distance, standing_failure(robot)
-
-
 STAND = Scenario("stand", STAND_METRICS, measure_stand)
-PUSHES = Scenario("stand-pushes", (*(p.metric for p in PUSH_METRICS), MOVED), measure_pushes)
+PUSHES = Scenario("stand-pushes", (*PUSHED, MOVED), measure_pushes)

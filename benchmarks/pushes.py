@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -26,33 +25,19 @@ FailureOf = Callable[[float, str], str | None]
 """Pushes a robot with an impulse [N s] in a direction; says what went wrong, or None."""
 
 
-@dataclass(frozen=True, slots=True)
-class PushMetric:
-    """The largest impulse that is survived.
-
-    Attributes:
-        metric: its row of the report, in N s.
-        directions: all of them must be survived; of ``DIRECTIONS``.
-        first: impulse [N s] with which the search begins.
-    """
-
-    metric: Metric
-    directions: tuple[str, ...]
-    first: float
-
-
-def push_metrics(prefix: str, item: str, lateral: float, forward: float) -> tuple[PushMetric, ...]:
+def push_metrics(prefix: str, item: str, lateral: float, forward: float) -> tuple[Metric, ...]:
     """Both sides, ahead and back, with the thresholds [N s]; the last one informs only."""
-
-    def metric(name: str, threshold: float | None) -> Metric:
-        quantity = f"{name} impulse"
-        return Metric(f"{prefix}_{name}", item, quantity, "N s", threshold, Direction.AT_LEAST)
-
-    return (
-        PushMetric(metric("lateral", lateral), ("left", "right"), lateral),
-        PushMetric(metric("forward", forward), ("forward",), forward),
-        PushMetric(metric("backward", None), ("backward",), forward),
+    thresholds = {"lateral": lateral, "forward": forward, "backward": None}
+    return tuple(
+        Metric(f"{prefix}_{name}", item, f"{name} impulse", "N s", least, Direction.AT_LEAST)
+        for name, least in thresholds.items()
     )
+
+
+def directions_of(metric: Metric) -> tuple[str, ...]:
+    """The directions in which an impulse must be survived."""
+    name = metric.quantity.split()[0]
+    return ("left", "right") if name == "lateral" else (name,)
 
 
 def force_of(impulse: float, direction: str) -> np.ndarray:
@@ -60,34 +45,36 @@ def force_of(impulse: float, direction: str) -> np.ndarray:
     return np.array(DIRECTIONS[direction]) * impulse / PUSH_TIME
 
 
-def measure_impulses(pushes: tuple[PushMetric, ...], failure_of: FailureOf) -> Measurement:
-    """Search the largest impulse of every metric.
+def measure_impulses(metrics: Sequence[Metric], failure_of: FailureOf) -> Measurement:
+    """Search the largest impulse of every metric, from its threshold or the last one on.
 
     A metric below its threshold counts as failed, with what went wrong at the least impulse.
     """
     values: dict[str, float] = {}
     failures: dict[str, str] = {}
-    for push in pushes:
-        name, threshold = push.metric.name, push.metric.threshold
-        values[name], reason = _search(push, failure_of)
-        if threshold is not None and values[name] < threshold:
-            failures[name] = reason
+    first = 0.0
+    for metric in metrics:
+        first = metric.threshold or first
+        largest, reason = _search(directions_of(metric), first, failure_of)
+        values[metric.name] = largest
+        if metric.threshold is not None and largest < metric.threshold:
+            failures[metric.name] = reason
     return Measurement(values, failures)
 
 
-def _search(push: PushMetric, failure_of: FailureOf) -> tuple[float, str]:
+def _search(directions: Sequence[str], first: float, failure_of: FailureOf) -> tuple[float, str]:
     """The largest impulse [N s] that is survived, and why the least of the others is not."""
     failures: dict[float, str] = {}
 
     def survives(impulse: float) -> bool:
-        for direction in push.directions:
+        for direction in directions:
             failure = failure_of(impulse, direction)
             if failure is not None:
                 failures[impulse] = f"{impulse:g} N s {direction}: {failure}"
                 return False
         return True
 
-    largest = largest_impulse(survives, push.first)
+    largest = largest_impulse(survives, first)
     return largest, failures[min(failures)] if failures else ""
 
 

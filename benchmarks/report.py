@@ -95,14 +95,12 @@ def summarise(scenarios: Sequence[Scenario], results: Results) -> Report:
 
 def summarise_metric(metric: Metric, trials: Mapping[int, Measurement]) -> MetricResult:
     """One metric over the trials of its scenario, given by seed."""
-    found = {
-        s: trials[s].values[metric.name] for s in sorted(trials) if metric.name in trials[s].values
-    }
-    reasons = {s: trials[s].failure(metric.name) for s in sorted(trials)}
-    failures = {s: reason for s, reason in reasons.items() if reason is not None}
+    name, ordered = metric.name, dict(sorted(trials.items()))
+    found = {s: trial.values[name] for s, trial in ordered.items() if name in trial.values}
+    failures = {s: why for s, trial in ordered.items() if (why := trial.failure(name)) is not None}
     failures |= {s: f"{v} was measured" for s, v in found.items() if math.isnan(v)}
     values = {s: v for s, v in found.items() if not math.isnan(v)}
-    missing = [s for s in reasons if s not in values]
+    missing = [s for s in ordered if s not in values]
     worst = metric.direction.worst(values) if values else None
     return MetricResult(
         metric=metric,

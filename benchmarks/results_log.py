@@ -12,6 +12,7 @@ import json
 import os
 import platform
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -66,10 +67,8 @@ class ResultsLog:
 
     def append(self, scenario: str, seed: int, measurement: Measurement) -> None:
         """Keep a result; whoever kills the process leaves a whole line or a damaged last one."""
-        values, failures = dict(measurement.values), dict(measurement.failures)
-        result = {"values": values, "failures": failures, "reason": measurement.reason}
         with self._path.open("ab", buffering=0) as file:
-            file.write(_line({"scenario": scenario, "seed": seed, **result}))
+            file.write(_line({"scenario": scenario, "seed": seed, **asdict(measurement)}))
 
     def _read(self, header: dict[str, str]) -> None:
         text = self._path.read_bytes()

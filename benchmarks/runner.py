@@ -16,7 +16,6 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 
 from benchmarks.scenario import Measurement, Scenario
 from benchmarks.trials import Trial, TrialFailed
@@ -35,7 +34,7 @@ def run_tasks(tasks: Sequence[Task], jobs: int) -> Iterator[Done]:
 
     Args:
         tasks: what to measure.
-        jobs: processes at a time; 0 runs everything in this process, one after the other.
+        jobs: processes at a time, from the main thread; 0 runs everything in this process.
     """
     if not jobs:
         yield from ((s, seed, run_trial(s.measure, seed)) for s, seed in tasks)
@@ -73,8 +72,11 @@ def _in_one_pool(tasks: Sequence[Task], jobs: int) -> Iterator[Done]:
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(jobs, context, initializer=_settle_in)
     try:
-        with _interrupts_ignored():  # inherited by the children: only the parent is interrupted
+        handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+        try:  # the children inherit it: Ctrl-C interrupts the parent only
             futures = {pool.submit(run_trial, s.measure, seed): (s, seed) for s, seed in tasks}
+        finally:
+            signal.signal(signal.SIGINT, handler)
         for future in as_completed(futures):
             yield *futures[future], future.result()
     except BaseException:
@@ -97,16 +99,3 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)
-
-
-@contextmanager
-def _interrupts_ignored() -> Iterator[None]:
-    """Ignores Ctrl-C for a moment; does nothing outside the main thread, which gets none."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    previous = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, previous)

@@ -36,7 +36,7 @@ def add_options(
         "--resume", action="store_true", help="skip what an interrupted run has finished"
     )
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
-    parser.add_argument("--out", metavar="FILE", type=Path, help="also write the JSON here")
+    parser.add_argument("--out", metavar="FILE", type=_output, help="also write the JSON here")
 
 
 def positive(text: str) -> int:
@@ -45,6 +45,11 @@ def positive(text: str) -> int:
     if value < 1:
         raise argparse.ArgumentTypeError(f"must be at least 1, got {value}")
     return value
+
+
+def _output(name: str) -> Path:
+    """The type of ``--out``: writable before the run already, so that no result can be lost."""
+    return checked_output(name, [".json"])
 
 
 def tasks_of(scenarios: Sequence[Scenario], seeds: int) -> list[Task]:
@@ -59,9 +64,8 @@ def run_and_report(
     if args.list:
         _print_list(scenarios)
         return ExitCode.OK
-    target = checked_target(args)
     report = summarise(scenarios, measure_all(args, tasks))
-    publish(args, target, report.as_dict(), render(report))
+    publish(args, report.as_dict(), render(report))
     return ExitCode.OK if report.ok else ExitCode.FAILED
 
 
@@ -77,7 +81,7 @@ def measure_all(args: argparse.Namespace, tasks: Sequence[Task]) -> Results:
             results[scenario.name][seed] = measurement
         else:
             left.append((scenario, seed))
-    with ProgressLine(sys.stderr) as line:
+    with ProgressLine() as line:
         line.update(0.0, "starting")
         for scenario, seed, measurement in run_tasks(left, getattr(args, "jobs", 1)):
             log.append(scenario.name, seed, measurement)
@@ -90,17 +94,10 @@ def measure_all(args: argparse.Namespace, tasks: Sequence[Task]) -> Results:
     return results
 
 
-def checked_target(args: argparse.Namespace) -> Path | None:
-    """Where the JSON goes, known to be writable before the run: its results must not be lost."""
-    return None if args.out is None else checked_output(args.out, [".json"])
-
-
-def publish(
-    args: argparse.Namespace, target: Path | None, values: dict[str, Any], table: str
-) -> None:
+def publish(args: argparse.Namespace, values: dict[str, Any], table: str) -> None:
     """Print the table or the JSON, and write the JSON where it was asked for."""
-    if target is not None:
-        write_atomically(target, (json.dumps(values, indent=2) + "\n").encode())
+    if args.out is not None:
+        write_atomically(args.out, (json.dumps(values, indent=2) + "\n").encode())
     if args.json:
         print_json(values)
     else:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -28,14 +28,7 @@ PLACE_TOLERANCE = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Slap:
-    """A force on the held paw.
-
-    Attributes:
-        name: begins the names of its metrics.
-        item: what the report calls it.
-        force: [N].
-        duration: [s].
-    """
+    """A ``force`` [N] on the held paw for ``duration`` [s]; ``name`` begins its metrics' names."""
 
     name: str
     item: str
@@ -104,7 +97,8 @@ def _slap_all(trial: Trial, slap: Slap) -> tuple[dict[str, float], dict[str, str
     while remaining:
         with TrialRobot(trial) as robot:
             found: dict[str, float] = {}
-            robot.truth.on_tick = _Schedule(robot, _slaps(robot, side, slap, remaining, found))
+            ticks = _slaps(robot, side, slap, remaining, found)
+            robot.truth.on_tick = partial(next, ticks, None)
             try:
                 robot.require(robot.go2.stand())
                 said = robot.go2.high_five(side, hold=SETTLE_TIME + slap.cycle * len(remaining))
@@ -120,39 +114,33 @@ def _slap_all(trial: Trial, slap: Slap) -> tuple[dict[str, float], dict[str, str
     return distances, lost, float(said)
 
 
-class _Schedule:
-    """Called after every tick, goes on with ``events`` at the plant times [s] that they yield."""
-
-    def __init__(self, robot: TrialRobot, events: Iterator[float]) -> None:
-        self._robot, self._events, self._due = robot, events, 0.0
-
-    def __call__(self) -> None:
-        if self._robot.plant.time >= self._due:
-            self._due = next(self._events, math.inf)
-
-
 def _slaps(
     robot: TrialRobot, side: str, slap: Slap, directions: Sequence[str], found: dict[str, float]
-) -> Iterator[float]:
-    """Slap the paw from one direction after the other, once it is raised.
+) -> Iterator[None]:
+    """Slap the paw from one direction after the other, once it is raised; one ``next`` a tick.
 
-    Yields the plant time [s] at which to go on; puts into ``found`` how far [mm] the paw was off
-    its place afterwards. A robot that has fallen, or whose paw is down, raises ``TrialFailed``.
+    Puts into ``found`` how far [mm] the paw was off its place afterwards. A robot that has fallen,
+    or whose paw is down, raises ``TrialFailed``.
     """
     leg = SIDES[side]
     while robot.plant.p_world_feet[leg, 2] <= RAISED:
-        yield robot.plant.time
+        yield
     start = robot.plant.time + SETTLE_TIME
     for index, direction in enumerate(directions):
         begin = start + index * slap.cycle
-        yield begin
+        yield from _until(robot, begin)
         place = robot.plant.p_world_feet[leg]
         robot.push(slap.force * np.array(DIRECTIONS[direction]), slap.duration, leg.foot)
-        yield begin + slap.duration + RETURN_TIME
+        yield from _until(robot, begin + slap.duration + RETURN_TIME)
         paw, fall = robot.plant.p_world_feet[leg], robot.truth.fall()
         if fall is not None or paw[2] < RAISED:
             raise TrialFailed(fall or f"the paw is at {paw[2]:.2f} m two seconds later")
         found[direction] = 1000.0 * float(np.linalg.norm(paw - place))
+
+
+def _until(robot: TrialRobot, time: float) -> Iterator[None]:
+    while robot.plant.time < time:
+        yield
 
 
 SCENARIO = Scenario("slaps", tuple(metric for slap in SLAPS for metric in slap.metrics), measure)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,30 +116,3 @@ class TrialRobot:
         """Push with a force [N] that points ahead, left, up of the robot, beginning now."""
         yaw = float(self.plant.read().rpy[2])
         self.plant.push(yaw_rotation(yaw) @ f_heading, duration, where)
-
-
-class ReusedRobot:
-    """One robot for many attempts, made ready; after a failed attempt the next gets a new one."""
-
-    def __init__(self, trial: Trial, prepare: Callable[[TrialRobot], None]) -> None:
-        """Make robots for ``trial``; ``prepare`` makes one ready and may raise ``TrialFailed``."""
-        self._trial, self._prepare = trial, prepare
-        self._robot: TrialRobot | None = None
-
-    def failure_of(self, attempt: Callable[[TrialRobot], None]) -> str | None:
-        """Why an attempt failed, or None; it raises ``TrialFailed`` then."""
-        try:
-            if self._robot is None:
-                self._robot = TrialRobot(self._trial)
-                self._prepare(self._robot)
-            attempt(self._robot)
-        except TrialFailed as failed:
-            self.close()
-            return str(failed)
-        return None
-
-    def close(self) -> None:
-        """End the present robot, if there is one."""
-        if self._robot is not None:
-            self._robot.close()
-            self._robot = None

@@ -62,6 +62,7 @@ class GO2Controller:
         viewer: bool = False,
         config: Config | Path | str | None = None,
         urdf: Path | str | None = None,
+        after_tick: Callable[[], None] = lambda: None,
     ) -> None:
         """Take over a robot that lies on the ground, damped.
 
@@ -73,6 +74,7 @@ class GO2Controller:
             config: numbers of the engine, or a TOML file that overrides some.
             urdf: another URDF of the Go2 instead of the installed one: what the controller takes
                 the robot for. Without ``plant`` the simulated robot is built from it, too.
+            after_tick: is called after every control period, in the thread that ticks.
 
         Raises:
             ConfigError: for a namespace or configuration that is not valid, or without
@@ -87,7 +89,9 @@ class GO2Controller:
         plant = arguments.plant_or_none(plant)
         realtime = arguments.pace(realtime, plant)
         description = find_description(arguments.path_or_none("urdf", urdf))
-        settings = PilotSettings(realtime=realtime, viewer=viewer, description=description)
+        settings = PilotSettings(
+            realtime=realtime, viewer=viewer, description=description, after_tick=after_tick
+        )
         with ExitStack() as opened:
             if plant is None:
                 plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer)

@@ -102,25 +102,17 @@ class JobServer(Generic[Robot]):
         last: what came of the last job whose turn came, or None.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        *,
-        queue: int = 0,
-        patience: float = math.inf,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
+    def __init__(self, robot: Robot, *, queue: int = 0, patience: float = math.inf) -> None:
         """Serve ``robot``.
 
         Args:
             robot: that carries out the jobs.
             queue: jobs that may wait for their turn; with 0 a second one is refused.
             patience: time [s] after which ``expire`` answers a job that is not over.
-            clock: tells seconds of the wall clock.
         """
         self.robot = robot
         self.last: Answer | None = None
-        self._queue, self._patience, self._clock = queue, patience, clock
+        self._queue, self._patience = queue, patience
         self._job: Job | None = None
         self._waiting: deque[Job] = deque()
         self._changed = threading.Condition()
@@ -145,7 +137,7 @@ class JobServer(Generic[Robot]):
         with self._changed:
             refusal = self.refusal()
             if not refusal:
-                job._due = self._clock() + self._patience
+                job._due = time.monotonic() + self._patience
                 self._waiting.append(job)
                 self._take_turn()
         if refusal:
@@ -154,7 +146,7 @@ class JobServer(Generic[Robot]):
 
     def expire(self) -> None:
         """Answer what has lasted longer than the patience; to be called again and again."""
-        now = self._clock()
+        now = time.monotonic()
         with self._changed:
             running, waiting = self._job, self._waiting
             self._waiting = deque(job for job in waiting if now <= job._due)
@@ -259,10 +251,8 @@ class JobServer(Generic[Robot]):
         job.start = self.robot.state.time
         if job.prepare is not None:
             job._is_prepared = False
-            prepare = (job, job.prepare)
-            threading.Thread(
-                target=self._prepare, args=prepare, name="prepare", daemon=True
-            ).start()
+            args = (job, job.prepare)
+            threading.Thread(target=self._prepare, args=args, name="prepare", daemon=True).start()
         self._job = job
         self._changed.notify_all()
 
@@ -287,14 +277,18 @@ class JobServer(Generic[Robot]):
             followers, job._followers = job._followers, []
         self._answer(job, answer)
         for then in followers:
-            then()
+            self._guarded(job, then)
 
     def _answer(self, job: Job, answer: Answer) -> None:
         with self._changed:
             if job._is_answered:
                 return
             job._is_answered = True
+        self._guarded(job, lambda: job.reply(answer))
+
+    @staticmethod
+    def _guarded(job: Job, tell: Callable[[], object]) -> None:
         try:
-            job.reply(answer)
+            tell()
         except Exception:  # of the middleware; the robot goes on
             _log.exception("%s could not be answered", job.name)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from jaxtyping import Float
 
 from controller.go2_controller import GO2Controller
 from go2_wbc.legs import LEGS
@@ -145,19 +144,11 @@ def _off_plan(
     for row in range(0, len(recorded.time), TRACKING_STRIDE):
         reference = plan.at(float(recorded.time[row]) - start).placed(anchor)
         body, q = reference.body, recorded.q[row]
-        R = rotation_from_rpy(*recorded.rpy[row].tolist())
         point = recorded.p_world_com[row] if body.point is TrackedPoint.COM else q[:3]
+        turn = body.R_world_base @ rotation_from_rpy(*recorded.rpy[row].tolist()).T
         joints = np.vstack([q[7:], reference.q_joints])
-        feet = [
-            _distance(*foot_places(legs[leg], joints[:, leg.joints]))
-            for leg in LEGS
-            if reference.legs[leg] is LegTask.JOINTS
-        ]
-        turned = float(np.linalg.norm(log_rotation(body.R_world_base @ R.T)))
-        off = [_distance(point, body.p_world), turned, max(feet, default=0.0)]
-        worst = np.maximum(worst, off)
+        raised = [leg for leg in LEGS if reference.legs[leg] is LegTask.JOINTS]
+        feet = [np.subtract(*foot_places(legs[leg], joints[:, leg.joints])) for leg in raised]
+        off = np.linalg.norm([point - body.p_world, log_rotation(turn), *feet], axis=1)
+        worst = np.maximum(worst, [off[0], off[1], off[2:].max(initial=0.0)])
     return float(worst[0]), float(worst[1]), float(worst[2])
-
-
-def _distance(a: Float[np.ndarray, "3"], b: Float[np.ndarray, "3"]) -> float:
-    return float(np.linalg.norm(a - b))

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from scipy.spatial.transform import Rotation
 
 from go2_wbc.errors import PlantError
 from go2_wbc.legs import LEGS
+from go2_wbc.plant.mujoco.ground_truth import true_runs
 from go2_wbc.recording import Recording
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import yaw_rotation
 from motions import CheckedMotion, FeasibilityReport, Finding
 from motions.feasibility import Series
 from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Verdict
@@ -43,10 +43,9 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
     """
     own = _in_motion_frame(_part(run, checked.plan.name), model)
     plan = checked.recording()
-    labels = tuple(_label_at(plan, float(time)) for time in own.time)
-    return ReplayContent(
-        replace(own, labels=labels), verdict=verdict_of(checked.report), ghost=plan
-    )
+    labels = (*plan.labels, "afterwards")
+    own = replace(own, labels=tuple(labels[row] for row in np.searchsorted(plan.time, own.time)))
+    return ReplayContent(own, verdict=verdict_of(checked.report), ghost=plan)
 
 
 def verdict_of(report: FeasibilityReport) -> Verdict:
@@ -55,16 +54,17 @@ def verdict_of(report: FeasibilityReport) -> Verdict:
     text = "feasible" if report.ok else _count(broken, "limit") + " broken"
     if tight:
         text += f", {_count(tight, 'tight margin')}"
-    judged = [item for item in report.series if len(item.times) >= _LEAST_SAMPLES]
-    judged = [item for item in judged if item.check in report.margins]
-    judged.sort(key=lambda item: _share_left(report.margins[item.check]))
-    annotations = [
-        _annotation(finding, report.series) for finding in (*report.failures, *report.warnings)
+    judged = [
+        item
+        for item in report.series
+        if len(item.times) >= _LEAST_SAMPLES and item.check in report.margins
     ]
+    judged.sort(key=lambda item: _share_left(report.margins[item.check]))
+    findings = (*report.failures, *report.warnings)
     return Verdict(
         ok=report.ok,
         text=text,
-        annotations=_grouped(annotations),
+        annotations=_grouped([_annotation(finding, report.series) for finding in findings]),
         curves=tuple(_curve(item) for item in judged),
     )
 
@@ -79,41 +79,41 @@ def _annotation(finding: Finding, series: tuple[Series, ...]) -> Annotation:
         and finding.time in item.times
     )
     margins = item.margins[:, item.subjects.index(finding.subject)]
-    known = ~np.isnan(margins)
-    flags = known & (margins < 0.0) if is_broken else known & (margins < item.tight)
+    runs = true_runs(margins < (0.0 if is_broken else item.tight))  # nan is neither
     return Annotation(
         limit=finding.check,
         subject=finding.subject,
         time=finding.time,
         text=_words(finding),
         is_broken=is_broken,
-        spans=_spans(item.times, flags),
+        spans=tuple(
+            (float(item.times[run.start]), float(item.times[run.stop - 1])) for run in runs
+        ),
         parts=parts_of(finding.subject),
     )
 
 
 def _grouped(annotations: Sequence[Annotation]) -> tuple[Annotation, ...]:
     """One annotation for the subjects that meet the same limit at about the same time."""
-    groups: list[list[Annotation]] = []
-    for annotation in annotations:
-        for group in groups:
-            first = group[0]
-            is_same = (first.limit, first.is_broken) == (annotation.limit, annotation.is_broken)
-            if is_same and abs(first.time - annotation.time) < _TOGETHER:
-                group.append(annotation)
-                break
-        else:
-            groups.append([annotation])
-    return tuple(_joined(group) for group in groups)
-
-
-def _joined(group: Sequence[Annotation]) -> Annotation:
-    return replace(
-        group[0],
-        subject=_together([annotation.subject for annotation in group]),
-        spans=tuple(sorted({span for annotation in group for span in annotation.spans})),
-        parts=tuple(dict.fromkeys(part for annotation in group for part in annotation.parts)),
-    )
+    joined, left = [], list(annotations)
+    while left:
+        first, *others = left
+        group = [
+            item
+            for item in others
+            if (item.limit, item.is_broken) == (first.limit, first.is_broken)
+            and abs(item.time - first.time) < _TOGETHER
+        ]
+        left = [item for item in others if item not in group]
+        group.insert(0, first)
+        whole = replace(
+            first,
+            subject=_together([item.subject for item in group]),
+            spans=tuple(sorted({span for item in group for span in item.spans})),
+            parts=tuple(dict.fromkeys(part for item in group for part in item.parts)),
+        )
+        joined.append(whole)
+    return tuple(joined)
 
 
 def _together(subjects: Sequence[str]) -> str:
@@ -135,18 +135,16 @@ def _words(finding: Finding) -> str:
 def parts_of(subject: str) -> tuple[str, ...]:
     """Links that a subject of a check concerns; the trunk if it is none of the others."""
     legs = [leg.name for leg in LEGS]
-    if subject in legs:
-        return f"{subject}_foot", f"{subject}_calf"
+    links = {f"{leg}_{part}" for leg in legs for part in ("hip", "thigh", "calf", "foot")}
     if subject in ("CoM", "ZMP"):
         return (CENTRE_OF_MASS,)
-    links = {f"{leg}_{part}" for leg in legs for part in ("hip", "thigh", "calf", "foot")}
-    named = [name for name in subject.split("-") if name in links | {"base"}]
-    if named:
-        return tuple(named)
+    if named := tuple(name for name in subject.split("-") if name in links | {"base"}):
+        return named
     leg, _, part = subject.partition(" ")
-    if leg in legs:
-        return (f"{leg}_foot",) if part == "foot" else (f"{leg}_calf",)
-    return ("base",)
+    if leg not in legs:
+        return ("base",)
+    places = {"": ("foot", "calf"), "foot": ("foot",)}.get(part, ("calf",))
+    return tuple(f"{leg}_{place}" for place in places)
 
 
 def _curve(series: Series) -> MarginCurve:
@@ -167,16 +165,6 @@ def _share_left(finding: Finding) -> float:
     return finding.margin / max(abs(finding.limit), 1e-9)
 
 
-def _spans(
-    times: Float[np.ndarray, " n"], flags: Bool[np.ndarray, " n"]
-) -> tuple[tuple[float, float], ...]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return tuple(
-        (float(times[start]), float(times[end - 1]))
-        for start, end in zip(edges[::2], edges[1::2], strict=True)
-    )
-
-
 def _part(run: Recording, name: str) -> Recording:
     """The samples of the motion and a moment after it."""
     rows = np.flatnonzero(np.array(run.labels) == name)
@@ -188,29 +176,15 @@ def _part(run: Recording, name: str) -> Recording:
     return replace(part, time=part.time - part.time[0])
 
 
-def _label_at(plan: Recording, time: float) -> str:
-    """What the plan says is done at that time."""
-    if time > plan.time[-1]:
-        return "afterwards"
-    return plan.labels[min(int(np.searchsorted(plan.time, time)), len(plan.labels) - 1)]
-
-
 def _in_motion_frame(run: Recording, model: RobotModel) -> Recording:
     """The same run, seen from the middle of its feet at the start."""
     _, p_world_feet = model.forward_kinematics(run.q[0])
     anchor = Anchor.of_feet(p_world_feet.copy(), model.foot_radius)
-    R = yaw_rotation(-anchor.yaw)
+    turn = Rotation.from_euler("z", -anchor.yaw)
     q = run.q.copy()
-    q[:, :3] = (q[:, :3] - anchor.p_world) @ R.T
-    q[:, 3:7] = _turned(-anchor.yaw, q[:, 3:7])
-    return replace(run, q=q, p_world_com=(run.p_world_com - anchor.p_world) @ R.T)
-
-
-def _turned(yaw: float, quaternions: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 4"]:
-    """Quaternions x y z w, turned about world z."""
-    s, c = np.sin(yaw / 2), np.cos(yaw / 2)
-    x, y, z, w = quaternions.T
-    return np.column_stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z])
+    q[:, :3] = turn.apply(q[:, :3] - anchor.p_world)
+    q[:, 3:7] = (turn * Rotation.from_quat(q[:, 3:7])).as_quat()
+    return replace(run, q=q, p_world_com=turn.apply(run.p_world_com - anchor.p_world))
 
 
 def _count(number: int, what: str) -> str:

@@ -47,13 +47,8 @@ def keys_help() -> str:
     """Every key with what it does, for a person; at most 80 columns wide."""
     moves = [f"{key} {label}" for key, (label, _) in STEPS.items()]
     acts = [f"{key} {label}" for key, (label, _) in ACTIONS.items()]
-    return "\n".join(
-        [
-            "   ".join(acts),
-            "   ".join(moves),
-            "space stop   k go limp   x quit",
-        ]
-    )
+    rows = [acts, moves, ["space stop", "k go limp", "x quit"]]
+    return "\n".join("   ".join(row) for row in rows)
 
 
 @final
@@ -75,13 +70,19 @@ class Teleop:
 
     def press(self, key: str) -> bool:
         """Do what ``key`` means; False if it means to end."""
-        if key == QUIT:
-            return False
         try:
-            self._obey(key)
+            if key in STEPS:
+                self._change(STEPS[key][1])
+            elif key in ACTIONS:
+                self._begin(*ACTIONS[key])
+            elif key == STOP:
+                self._go2.stop()
+            elif key == DAMP:
+                self._jobs.damp()
+                self._news.put("limp")
         except Go2WbcError as error:
             self._news.put(str(error))
-        return True
+        return key != QUIT
 
     def status(self) -> str:
         """One line of at most 80 columns: what it does, what is asked and what is measured."""
@@ -101,17 +102,6 @@ class Teleop:
         """Go limp, and wait for a running call to notice."""
         self._jobs.damp()
         self._jobs.abandon("the robot is let go", JOIN_TIME)
-
-    def _obey(self, key: str) -> None:
-        if key in STEPS:
-            self._change(STEPS[key][1])
-        elif key in ACTIONS:
-            self._begin(*ACTIONS[key])
-        elif key == STOP:
-            self._go2.stop()
-        elif key == DAMP:
-            self._jobs.damp()
-            self._news.put("limp")
 
     def _change(self, step: VelocityCommand) -> None:
         now = self._go2.command

@@ -14,7 +14,6 @@ overrides what it names and nothing else:
 from __future__ import annotations
 
 import dataclasses
-import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -25,6 +24,7 @@ from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.planning.command import VelocityEnvelope
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.robot.safety import SafetyConfig
+from go2_wbc.validation import is_finite_number
 from go2_wbc.wbc.config import WbcConfig
 
 _Part = TypeVar("_Part")
@@ -75,8 +75,7 @@ def override(part: _Part, values: Mapping[str, Any], where: str) -> _Part:
     Raises:
         ConfigError: for an unknown key, or a value of another type than the field's.
     """
-    names = [f.name for f in dataclasses.fields(part)]  # type: ignore[arg-type]
-    fields = {name: getattr(part, name) for name in names}
+    fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(part)}  # type: ignore[arg-type]
     changes = {}
     for key, value in values.items():
         if key not in fields:
@@ -95,11 +94,7 @@ def _convert(current: object, value: object, where: str) -> object:
             raise ConfigError(f"{where} must be a list of {len(current)} numbers, got {value!r}")
         return tuple(_convert(c, v, where) for c, v in zip(current, value, strict=True))
     if isinstance(current, float):
-        if (
-            isinstance(value, bool)
-            or not isinstance(value, int | float)
-            or not math.isfinite(value)
-        ):
+        if not is_finite_number(value):
             raise ConfigError(f"{where} must be a finite number, got {value!r}")
         return float(value)
     if type(value) is not type(current):

@@ -81,11 +81,16 @@ class ContactSchedule:
         object.__setattr__(self, "_changes", changes)
 
     def _changes_of(self, leg: int) -> Float[np.ndarray, " k"]:
+        """When the foot's contact changes, with the last time before these and the next after."""
         column = self.modes[:, leg]
         previous = np.roll(column, 1)
         if self.period is None:
             previous[0] = column[0]
-        return np.asarray(self.times, float)[column != previous]
+        changes = np.asarray(self.times, float)[column != previous]
+        before, after = -np.inf, np.inf
+        if self.period is not None and len(changes):
+            before, after = changes[-1] - self.period, changes[0] + self.period
+        return np.array([before, *changes, after])
 
     def at(self, t: float) -> ContactPhase:
         """The contacts at ``t`` seconds after the schedule's start."""
@@ -93,22 +98,12 @@ class ContactSchedule:
             t = (t + TIE) % self.period
             t = max(t - TIE, 0.0)
         index = max(bisect_right(self.times, t + TIE) - 1, 0)
-        elapsed = np.full(4, np.inf)
-        remaining = np.full(4, np.inf)
-        for leg in LEGS:
-            elapsed[leg], remaining[leg] = self._around(self._changes[leg], t)
+        elapsed, remaining = np.empty(4), np.empty(4)
+        for leg, changes in zip(LEGS, self._changes, strict=True):
+            upcoming = bisect_right(changes, t + TIE)
+            elapsed[leg] = max(t - changes[upcoming - 1], 0.0)
+            remaining[leg] = changes[upcoming] - t
         return ContactPhase(self.modes[index].copy(), elapsed, remaining)
-
-    def _around(self, changes: Float[np.ndarray, " k"], t: float) -> tuple[float, float]:
-        if len(changes) == 0:
-            return np.inf, np.inf
-        after = int(np.searchsorted(changes, t + TIE, side="right"))
-        last = changes[after - 1] if after > 0 else -np.inf
-        upcoming = changes[after] if after < len(changes) else np.inf
-        if self.period is not None:
-            last = changes[-1] - self.period if after == 0 else last
-            upcoming = changes[0] + self.period if after == len(changes) else upcoming
-        return max(t - last, 0.0), upcoming - t
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,10 +141,9 @@ class Gait:
 
     def schedule(self) -> ContactSchedule:
         """This gait as a periodic schedule that starts at phase 0."""
-        touchdowns = [o % 1.0 for o in self.offsets]
         liftoffs = [(o + self.duty) % 1.0 for o in self.offsets]
-        phases = np.unique(np.round([0.0, *touchdowns, *liftoffs], 12))
-        phase_of = (phases[:, None] - np.asarray(touchdowns)[None, :] + TIE) % 1.0
+        phases = np.unique(np.round([0.0, *self.offsets, *liftoffs], 12))
+        phase_of = (phases[:, None] - self.offsets + TIE) % 1.0
         return ContactSchedule(
             tuple(float(p) * self.period for p in phases), phase_of < self.duty, self.period
         )

@@ -7,7 +7,7 @@ with zero acceleration. ``keyframes`` chains such pieces.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -24,39 +24,6 @@ class CurvePoint:
     value: Float[np.ndarray, " n"]
     rate: Float[np.ndarray, " n"]
     acceleration: Float[np.ndarray, " n"]
-
-
-def _minimum_jerk(s: float) -> tuple[float, float, float]:
-    """10 s^3 - 15 s^4 + 6 s^5: least integral of jerk^2 from rest to rest (Flash & Hogan 1985)."""
-    return (
-        s**3 * (10 - 15 * s + 6 * s * s),
-        30 * s * s * (1 - s) ** 2,
-        60 * s * (1 - s) * (1 - 2 * s),
-    )
-
-
-def _cubic(s: float) -> tuple[float, float, float]:
-    """3 s^2 - 2 s^3: least integral of acceleration^2 from rest to rest (Hermite's cubic)."""
-    return s * s * (3 - 2 * s), 6 * s * (1 - s), 6 - 12 * s
-
-
-def _linear(s: float) -> tuple[float, float, float]:
-    return s, 1.0, 0.0
-
-
-def _in(s: float) -> tuple[float, float, float]:
-    """2 s^3 - s^4: from rest, with the acceleration 0 at both ends."""
-    return s**3 * (2 - s), s * s * (6 - 4 * s), 12 * s * (1 - s)
-
-
-def _out(s: float) -> tuple[float, float, float]:
-    """1 - in(1 - s), so the acceleration alone changes its sign."""
-    value, rate, acceleration = _in(1 - s)
-    return 1 - value, rate, -acceleration
-
-
-def _hold(s: float) -> tuple[float, float, float]:
-    return (0.0 if s < 1.0 else 1.0), 0.0, 0.0
 
 
 class Ease(Enum):
@@ -77,17 +44,21 @@ class Ease(Enum):
 
     def progress(self, s: float) -> tuple[float, float, float]:
         """Progress in [0, 1] at s in [0, 1], with d/ds and d2/ds2."""
-        return _PROGRESS[self](s)
-
-
-_PROGRESS: dict[Ease, Callable[[float], tuple[float, float, float]]] = {
-    Ease.MINIMUM_JERK: _minimum_jerk,
-    Ease.CUBIC: _cubic,
-    Ease.LINEAR: _linear,
-    Ease.IN: _in,
-    Ease.OUT: _out,
-    Ease.HOLD: _hold,
-}
+        match self:
+            case Ease.MINIMUM_JERK:  # least integral of jerk^2 from rest to rest
+                value = s**3 * (10 - 15 * s + 6 * s * s)
+                return value, 30 * s * s * (1 - s) ** 2, 60 * s * (1 - s) * (1 - 2 * s)
+            case Ease.CUBIC:  # Hermite's: least integral of acceleration^2 from rest to rest
+                return s * s * (3 - 2 * s), 6 * s * (1 - s), 6 - 12 * s
+            case Ease.LINEAR:
+                return s, 1.0, 0.0
+            case Ease.IN:  # from rest, with the acceleration 0 at both ends
+                return s**3 * (2 - s), s * s * (6 - 4 * s), 12 * s * (1 - s)
+            case Ease.OUT:  # 1 - in(1 - s), so the acceleration alone changes its sign
+                value, rate, acceleration = Ease.IN.progress(1 - s)
+                return 1 - value, rate, -acceleration
+            case Ease.HOLD:
+                return (0.0 if s < 1.0 else 1.0), 0.0, 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,25 +19,21 @@ def convex_hull(points: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "h 2"]:
 
 
 def support_margin(points: Float[np.ndarray, "k 2"], p: Float[np.ndarray, "2"]) -> float:
-    """Distance [m] from ``p`` to the border of the convex hull of ``points``.
-
-    Positive inside, negative outside. On a hull without area (one point, or all on a line)
-    nothing is inside, and the result is minus the distance to it.
-
-    Args:
-        points: contact points on the ground [m], at least one.
-        p: the point, usually the CoM projected to the ground [m].
-
-    Raises:
-        ValueError: if there is no point.
-    """
+    """``support_margins`` of one place ``p`` [m]."""
     return float(support_margins(points, p[None])[0])
 
 
 def support_margins(
     points: Float[np.ndarray, "k 2"], p: Float[np.ndarray, "n 2"]
 ) -> Float[np.ndarray, " n"]:
-    """``support_margin`` of many places ``p`` [m] over the same ``points`` [m].
+    """Distance [m] from each place ``p`` to the border of the convex hull of ``points``.
+
+    Positive inside, negative outside. On a hull without area (one point, or all on a line)
+    nothing is inside, and the result is minus the distance to it.
+
+    Args:
+        points: contact points on the ground [m], at least one.
+        p: the places, usually the CoM projected to the ground [m].
 
     Raises:
         ValueError: if there is no point.
@@ -63,13 +59,10 @@ _TINY = 1e-300
 def _chain(ordered: Float[np.ndarray, "k 2"]) -> list[Float[np.ndarray, "2"]]:
     chain: list[Float[np.ndarray, "2"]] = []
     for point in ordered:
-        while len(chain) >= 2 and _cross(chain[-1] - chain[-2], point - chain[-2]) <= 0.0:
+        while len(chain) >= 2:
+            (x1, y1), (x2, y2) = chain[-1] - chain[-2], point - chain[-2]
+            if x1 * y2 - y1 * x2 > 0.0:  # a turn to the left
+                break
             chain.pop()
         chain.append(point)
     return chain
-
-
-def _cross(
-    a: Float[np.ndarray, "*k 2"], b: Float[np.ndarray, "*k 2"]
-) -> Float[np.ndarray, "*k"] | np.floating:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]

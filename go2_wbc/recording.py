@@ -6,6 +6,7 @@ The loop's telemetry fills it, the viewers replay it, the benchmarks measure it.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from itertools import groupby, pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -70,8 +71,8 @@ class Recording:
     def spans(self) -> tuple[Span, ...]:
         """Stretches of equal labels, in order; each ends where the next begins."""
         labels, time = self.labels, self.time - self.time[0]
-        starts = [0] + [k for k in range(1, len(labels)) if labels[k] != labels[k - 1]]
-        ends = [*(float(time[k]) for k in starts[1:]), float(time[-1])]
+        starts = [next(rows) for _, rows in groupby(range(len(labels)), labels.__getitem__)]
         return tuple(
-            Span(float(time[k]), end, labels[k]) for k, end in zip(starts, ends, strict=True)
+            Span(float(time[start]), float(time[end]), labels[start])
+            for start, end in pairwise([*starts, len(labels) - 1])
         )

@@ -5,37 +5,39 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from numbers import Real
+from typing import TypeGuard
 
 from go2_wbc.errors import ConfigError
 
 
 def require_positive(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is finite and above 0."""
-    for name in names:
-        _require(config, name, lambda value: value > 0.0, "positive")
+    _require(config, "positive", lambda value: value > 0.0, *names)
 
 
 def require_not_negative(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is finite and at least 0."""
-    for name in names:
-        _require(config, name, lambda value: value >= 0.0, "at least 0")
+    _require(config, "at least 0", lambda value: value >= 0.0, *names)
 
 
 def require_finite(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is a finite number."""
-    for name in names:
-        _require(config, name, lambda _: True, "finite")
+    _require(config, "finite", lambda _: True, *names)
 
 
 def require_share(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is in (0, 1]."""
+    _require(config, "above 0 and at most 1", lambda value: 0.0 < value <= 1.0, *names)
+
+
+def is_finite_number(value: object) -> TypeGuard[Real]:
+    """Whether ``value`` is a finite number; True and False are none."""
+    return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _require(config: object, what: str, holds: Callable[[float], bool], *names: str) -> None:
     for name in names:
-        _require(config, name, lambda value: 0.0 < value <= 1.0, "above 0 and at most 1")
-
-
-def _require(config: object, name: str, holds: Callable[[float], bool], what: str) -> None:
-    field = getattr(config, name)
-    for value in field if isinstance(field, tuple) else (field,):
-        is_number = isinstance(value, Real) and not isinstance(value, bool)
-        if not (is_number and math.isfinite(value) and holds(float(value))):
-            raise ConfigError(f"{type(config).__name__}.{name} must be {what}, got {field!r}")
+        field = getattr(config, name)
+        for value in field if isinstance(field, tuple) else (field,):
+            if not (is_finite_number(value) and holds(float(value))):
+                raise ConfigError(f"{type(config).__name__}.{name} must be {what}, got {field!r}")

@@ -90,16 +90,11 @@ class Parameter:
             if value not in self.valid.words:
                 raise TimelineError(unknown_name(self.name, str(value), self.valid.words))
             return value
-        if not (is_number(value) and self._is_inside(float(value))):
+        if not (is_number(value) and self.valid.low <= float(value) <= self.valid.high):
             raise TimelineError(f"{self.name} must be {self.valid}, got {value!r}")
-        if not isinstance(self.default, int):
-            return float(value)
-        if float(value) != round(float(value)):
+        if isinstance(self.default, int) and not float(value).is_integer():
             raise TimelineError(f"{self.name} must be a whole number, got {value!r}")
-        return round(float(value))
-
-    def _is_inside(self, value: float) -> bool:
-        return isinstance(self.valid, Range) and self.valid.low <= value <= self.valid.high
+        return type(self.default)(value)
 
     def __str__(self) -> str:
         """For a person."""
@@ -149,10 +144,15 @@ class Motion:
     def _told(self, error: Exception) -> str:
         """``error`` with the line of the motion's file that caused it."""
         file, _, first = self.source.rpartition(":")
-        lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
-        where = f"{self.name} ({Path(file).name}, line {lines[-1] if lines else first})"
+        where = f"{self.name} ({Path(file).name}, line {last_line(error, file) or first})"
         what = "" if isinstance(error, TimelineError) else f"{type(error).__name__}: "
         return f"{where}: {what}{error}"
+
+
+def last_line(error: Exception, file: str) -> int | None:
+    """Line of ``file`` that was running when ``error`` came, if one was."""
+    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
+    return lines[-1] if lines else None
 
 
 def motion(function: Callable[..., Timeline]) -> Motion:

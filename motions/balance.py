@@ -8,19 +8,18 @@ written. Between those instants the trunk moves smoothly.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.curves import Ease
 from go2_wbc.errors import IkError
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.inverse_kinematics import PoseTargets, solve_pose
 from go2_wbc.robot.model import RobotModel
 from motions.keys import BalanceShift
 from motions.timeline import SAME, Timeline
-from motions.tracks import LegTracks, Move, Poses, Times, configurations, followed
+from motions.tracks import LegTracks, Poses, Times, configurations, followed
 
 MARGINS = (0.08, 0.065, 0.05, 0.035, 0.02)
 """Distances [m] of the CoM to the edges of the support polygon that are tried, best first.
@@ -33,24 +32,22 @@ JOINT_MARGIN = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Unbalanced:
-    """A moment at which no balanced pose was found: when [s], and why."""
-
-    time: float
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class Balance:
-    """Shift of the trunk.
+class Problem:
+    """What cannot be done as it is written.
 
     Attributes:
-        offsets: (n, 2) to add to the trunk's place [m], in the frame of the motion.
-        failures: moments without a balanced pose.
+        check: what the feasibility check calls it.
+        subject: the leg, or the trunk.
+        time: when [s] it is worst.
+        miss: distance [m] by which the leg is too short; nan if that is not what is wrong.
+        reason: why no pose is balanced.
     """
 
-    offsets: Float[np.ndarray, "n 2"]
-    failures: tuple[Unbalanced, ...]
+    check: str
+    subject: str
+    time: float
+    miss: float = np.nan
+    reason: str = ""
 
 
 class Balancer:
@@ -65,10 +62,10 @@ class Balancer:
         self._shifts, self._end = timeline.in_order(BalanceShift), timeline.end
         self._key_ends = sorted(key.end for key in timeline.keys)
 
-    def balance(self) -> Balance:
-        """The shifts, moment by moment."""
+    def balance(self) -> tuple[Float[np.ndarray, "n 2"], list[Problem]]:
+        """What to add to the trunk's places [m] (n, 2), and the moments without a balanced pose."""
         moves, last = [], np.zeros(2)
-        failures: list[Unbalanced] = []
+        problems: list[Problem] = []
         starts = [*(shift.start for shift in self._shifts), self._end]
         for shift, end in zip(self._shifts, starts[1:], strict=True):
             start = shift.start
@@ -76,10 +73,10 @@ class Balancer:
                 try:
                     last = self._offset(knot, shift.raised, last)
                 except IkError as error:
-                    failures.append(Unbalanced(knot, str(error)))
-                moves.append(Move(start, knot, Ease.MINIMUM_JERK, last))
+                    problems.append(Problem("balance", "trunk", knot, reason=str(error)))
+                moves.append((replace(shift, start=start, end=knot), last))
                 start = knot
-        return Balance(followed(self._times, np.zeros(2), moves), tuple(failures))
+        return followed(self._times, np.zeros(2), moves), problems
 
     def _knots(self, shift: BalanceShift, end: float) -> list[float]:
         """The end of the shift, and every later end of a key while it lasts."""
@@ -96,9 +93,7 @@ class Balancer:
     ) -> Float[np.ndarray, "2"]:
         if not raised:
             return np.zeros(2)
-        after = min(int(np.searchsorted(self._times, t)), len(self._times) - 1)
-        before = max(after - 1, 0)
-        index = min(before, after, key=lambda row: abs(self._times[row] - t))
+        index = int(np.abs(self._times - t).argmin())
         pose = self._body[index].copy()
         pose[:2] += guess
         instant = self._times[index : index + 1]
@@ -123,19 +118,16 @@ class Balancer:
         start = configurations(pose[None], joints[None])[0]
         best: IkError | None = None
         for margin in MARGINS:
-            hip, thigh, calf = joints[leg.joints].tolist()
             targets = PoseTargets(
                 p_world_feet=self._tracks.p_feet,
                 rpy=(float(pose[3]), float(pose[4]), float(pose[5])),
                 height=float(pose[2]),
                 raised=leg,
-                q_raised=(hip, thigh, calf),
-                support=tuple(other for other in LEGS if other is not leg),
                 com_margin=margin,
                 joint_margin=JOINT_MARGIN,
             )
             try:
-                return solve_pose(self._model, targets, start).q
+                return solve_pose(self._model, targets, start)
             except IkError as error:
                 best = error
         raise IkError(f"no pose balances without foot {leg.name}: {best}")

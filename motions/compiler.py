@@ -11,6 +11,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
@@ -22,31 +23,25 @@ from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
-from motions.balance import Balancer, Unbalanced
+from motions.balance import Balancer, Problem
 from motions.keys import Mark
-from motions.plan import body_target, reference
+from motions.plan import reference
 from motions.timeline import Timeline
-from motions.tracks import LegTracks, body_path, configurations, flights, home_poses
+from motions.tracks import (
+    LegTracks,
+    body_path,
+    configurations,
+    flights,
+    home_poses,
+    sample_times,
+)
 
-SAMPLE_PERIOD = 0.01
-"""Time [s] between the instants at which a timeline is sampled. A cubic spline through samples of f
-misses it by 5/384 h^4 max|d4f/dt4| at most (Hall & Meyer 1976): 0.2 um for a way L of 0.1 m by
-minimum jerk in T = 0.4 s, where the derivative is 360 L / T^4 at most."""
 REACH_TOLERANCE = 1e-3
 """Distance [m] by which a place may be out of reach before it counts: own choice, less than what
 tracking adds."""
 UNLOAD_TIME = 0.3
 """Time [s] over which a foot gives up its load before lift-off, if there is that much: own choice,
 so that the forces of the others change slowly."""
-
-
-@dataclass(frozen=True, slots=True)
-class OutOfReach:
-    """A leg is asked for a place that it cannot reach; worst instant."""
-
-    time: float
-    leg: str
-    miss: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +63,7 @@ class CompiledPlan(MotionPlan):
     curves: CubicSpline
     contacts: ContactSchedule
     ramp: float
-    problems: tuple[OutOfReach | Unbalanced, ...]
+    problems: tuple[Problem, ...]
     spans: Mapping[str, tuple[float, float]]
 
     @property
@@ -78,10 +73,12 @@ class CompiledPlan(MotionPlan):
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""
-        curves = self._curves_at(t)
-        body = body_target(TrackedPoint.COM, CurvePoint(*(curve[:6] for curve in curves)))
-        joints = CurvePoint(*(curve[6:] for curve in curves))
-        return reference(body, joints, self.contacts.at(t), self.ramp)
+        curves, phase = self._curves_at(t), self.contacts.at(t)
+        body, joints = (
+            CurvePoint(*(curve[part] for curve in curves)) for part in (slice(6), slice(6, None))
+        )
+        share = phase.load_share(self.ramp)
+        return reference(TrackedPoint.COM, body, joints, phase.stance, share)
 
     def _curves_at(self, t: float) -> tuple[Float[np.ndarray, "18"], ...]:
         inside = min(max(t, 0.0), self.duration)
@@ -105,25 +102,24 @@ def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
     Raises:
         TimelineError: if it is empty.
     """
-    end = timeline.end
     if not timeline.keys:
         raise TimelineError(
             f"motion {timeline.name!r} is empty: it needs at least one body(), foot() or leg()"
         )
-    times = np.linspace(0.0, end, max(round(end / SAMPLE_PERIOD), 2) + 1)
+    times = sample_times(timeline.end)
     home = home_poses(model)
     tracks = LegTracks(timeline, model, home[timeline.entry])
     body = body_path(timeline, home, times)
-    balance = Balancer(timeline, tracks, model, times, body).balance()
-    body[:, :2] += balance.offsets
+    offsets, problems = Balancer(timeline, tracks, model, times, body).balance()
+    body[:, :2] += offsets
     paths = [tracks.path(leg, times, body) for leg in LEGS]
     joints = np.hstack([path.q for path in paths])
     com = np.array([model.center_of_mass(q) for q in configurations(body, joints)])
-    problems: list[OutOfReach | Unbalanced] = list(balance.failures)
     for leg, path in zip(LEGS, paths, strict=True):
         worst = int(np.argmax(path.miss))
         if path.miss[worst] > REACH_TOLERANCE:
-            problems.append(OutOfReach(float(times[worst]), leg.name, float(path.miss[worst])))
+            miss = float(path.miss[worst])
+            problems.append(Problem("way of a foot", leg.name, float(times[worst]), miss))
     samples = np.hstack([com, body[:, 3:], joints])
     return CompiledPlan(
         name=timeline.name,
@@ -154,12 +150,7 @@ def _ramp(timeline: Timeline) -> float:
 
     Before the first flight the foot may use all the time that there is.
     """
-    longest = UNLOAD_TIME
-    for leg in LEGS:
-        touchdown = None
-        for lift_off, next_touchdown in flights(timeline, leg):
-            stood = lift_off if touchdown is None else (lift_off - touchdown) / 2
-            if stood > 0.0:
-                longest = min(longest, stood)
-            touchdown = next_touchdown
-    return longest
+    spans = [flights(timeline, leg) for leg in LEGS]
+    before = [flown[0][0] for flown in spans if flown]
+    between = [(up - down) / 2 for flown in spans for (_, down), (up, _) in pairwise(flown)]
+    return min([UNLOAD_TIME, *(stood for stood in (*before, *between) if stood > 0.0)])

@@ -53,9 +53,9 @@ class LegTarget:
     def mirrored(self) -> LegTarget:
         """The same goal of the leg across."""
         first, second, third = self.values
-        if self.frame is Frame.JOINTS:
-            return LegTarget(self.frame, (-first, second, third))
-        return LegTarget(self.frame, (first, -second, third))
+        is_angle = self.frame is Frame.JOINTS
+        values = (-first, second, third) if is_angle else (first, -second, third)
+        return replace(self, values=values)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +79,11 @@ class Key(ABC):
     @abstractmethod
     def track(self) -> str:
         """What moves, in words."""
+
+    @property
+    def mirrored(self) -> Key:
+        """Left and right exchanged."""
+        return self
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,11 +115,6 @@ class PostureKey(Key):
         """The posture."""
         return "posture"
 
-    @property
-    def mirrored(self) -> PostureKey:
-        """Left and right exchanged."""
-        return self
-
 
 @dataclass(frozen=True, slots=True)
 class LegKey(Key):
@@ -144,11 +144,6 @@ class Mark(Key):
     def track(self) -> str:
         """The name."""
         return f"span {self.name!r}"
-
-    @property
-    def mirrored(self) -> Mark:
-        """Left and right exchanged."""
-        return self
 
 
 @dataclass(frozen=True, slots=True)

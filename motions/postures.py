@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.contacts import standing
-from go2_wbc.curves import Curve, keyframes
-from go2_wbc.reference import Posture, TrackedPoint
-from motions.plan import KeyframePlan
+from go2_wbc.curves import CurvePoint, Segment
+from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
+from motions.plan import reference
 
 STAND_HEIGHT = 0.29
 """Height [m] of the CoM above the ground when standing."""
@@ -28,49 +27,56 @@ TUCKED_JOINTS = np.tile([0.0, 1.30, -2.66], 4)
 """Joint angles [rad] with the feet under the hips and the belly on the ground."""
 SPLAYED_JOINTS = TUCKED_JOINTS + np.tile([0.3, 0.0, 0.0, -0.3, 0.0, 0.0], 2)
 """Joint angles [rad] with the feet beside the hips, so that the folded legs carry nothing."""
+_STILL = CurvePoint(*(np.zeros(12) for _ in range(3)))
 
 
-def rise(start: Float[np.ndarray, "6"], entry: Posture, duration: float = 1.2) -> KeyframePlan:
+@dataclass(frozen=True, slots=True)
+class PosturePlan(MotionPlan):
+    """The trunk goes from one pose to another by minimum jerk.
+
+    Attributes:
+        name, entry, exit: see ``MotionPlan``.
+        point: which point the first three components of ``body`` move.
+        body: from x, y, z [m] and roll, pitch, yaw [rad] (6,) to others.
+    """
+
+    name: str
+    entry: Posture
+    exit: Posture
+    point: TrackedPoint
+    body: Segment
+
+    @property
+    def duration(self) -> float:  # type: ignore[override]
+        """Length of the motion [s]."""
+        return self.body.duration
+
+    def at(self, t: float) -> Reference:
+        """The reference at ``t``; see ``MotionPlan.at``."""
+        return reference(self.point, self.body.at(t), _STILL, np.ones(4, dtype=bool), np.ones(4))
+
+
+def rise(start: Float[np.ndarray, "6"], entry: Posture, duration: float = 1.2) -> PosturePlan:
     """From a CoM pose (6,) to standing."""
-    return _posture_plan(
-        "rise", entry, Posture.STAND, TrackedPoint.COM, (start, STAND_POSE), duration
-    )
+    way = Segment(start, STAND_POSE, duration)
+    return PosturePlan("rise", entry, Posture.STAND, TrackedPoint.COM, way)
 
 
 def lean(
     start: Float[np.ndarray, "6"], rpy: Float[np.ndarray, "3"], duration: float = 1.0
-) -> KeyframePlan:
+) -> PosturePlan:
     """From a standing CoM pose (6,) to standing with the trunk at roll, pitch, yaw [rad]."""
-    poses = (start, np.concatenate([STAND_POSE[:3], rpy]))
-    return _posture_plan("lean", Posture.STAND, Posture.STAND, TrackedPoint.COM, poses, duration)
+    way = Segment(start, np.concatenate([STAND_POSE[:3], rpy]), duration)
+    return PosturePlan("lean", Posture.STAND, Posture.STAND, TrackedPoint.COM, way)
 
 
-def sit_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> KeyframePlan:
+def sit_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> PosturePlan:
     """From a standing base pose (6,) to the dog-like sit."""
-    poses = (start, SIT_POSE)
-    return _posture_plan("sit", Posture.STAND, Posture.SIT, TrackedPoint.BASE, poses, duration)
+    way = Segment(start, SIT_POSE, duration)
+    return PosturePlan("sit", Posture.STAND, Posture.SIT, TrackedPoint.BASE, way)
 
 
-def lie_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> KeyframePlan:
+def lie_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> PosturePlan:
     """From a standing base pose (6,) down to the ground."""
-    poses = (start, LIE_POSE)
-    return _posture_plan("lie down", Posture.STAND, Posture.LIE, TrackedPoint.BASE, poses, duration)
-
-
-def _posture_plan(
-    name: str,
-    entry: Posture,
-    exit_posture: Posture,
-    point: TrackedPoint,
-    poses: Sequence[Float[np.ndarray, "6"]],
-    duration: float,
-) -> KeyframePlan:
-    times = np.linspace(0.0, duration, len(poses)).tolist()
-    return KeyframePlan(
-        name, entry, exit_posture, point, keyframes(times, poses), _no_joints(), standing()
-    )
-
-
-def _no_joints() -> Curve:
-    zeros = np.zeros(12)
-    return keyframes((0.0, 1.0), (zeros, zeros))
+    way = Segment(start, LIE_POSE, duration)
+    return PosturePlan("lie down", Posture.STAND, Posture.LIE, TrackedPoint.BASE, way)

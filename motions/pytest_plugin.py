@@ -14,6 +14,7 @@ run of pytest in its environment, so it imports nothing heavy until it is needed
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +23,6 @@ import pytest
 if TYPE_CHECKING:
     from motions import FeasibilityChecker, FeasibilityReport, Motion, Timeline
 
-_CHECKER: pytest.StashKey[FeasibilityChecker] = pytest.StashKey()
 _SIGNS = ("@motion", "import")
 """What a file with motions contains."""
 PINOCCHIO_WARNING = "ignore:Please update your 'hppfcl' imports:DeprecationWarning:hppfcl"
@@ -57,7 +57,7 @@ def pytest_configure(config: pytest.Config) -> None:
         "markers", "motion_margins(**margins): margins that check_motion requires, by check"
     )
     config.addinivalue_line("filterwarnings", PINOCCHIO_WARNING)
-    for folder in _folders(config):
+    for folder in config.getoption("--motions") or []:
         if not Path(folder).exists():
             raise pytest.UsageError(f"--motions: there is no folder {folder}")
         config.args.append(folder)
@@ -99,7 +99,7 @@ class MotionItem(pytest.Item):
 
     def runtest(self) -> None:
         """Raise InfeasibleMotion if the robot cannot do it."""
-        _require(self.config, self._motion(), _ini_margins(self.config))
+        _require(self._motion, _ini_margins(self.config))
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException]) -> str:  # type: ignore[override]
         """The table of margins instead of a traceback."""
@@ -122,7 +122,7 @@ def check_motion(request: pytest.FixtureRequest) -> Callable[..., FeasibilityRep
     def check(motion: Motion | Timeline) -> FeasibilityReport:
         __tracebackhide__ = True
         try:
-            return _require(request.config, motion, margins)
+            return _require(motion, margins)
         except InfeasibleMotion as error:
             message = str(error)
         pytest.fail(message, pytrace=False)
@@ -130,14 +130,15 @@ def check_motion(request: pytest.FixtureRequest) -> Callable[..., FeasibilityRep
     return check
 
 
-def _require(
-    config: pytest.Config, motion: Motion | Timeline, margins: Mapping[str, float]
-) -> FeasibilityReport:
+@cache
+def _checker() -> FeasibilityChecker:
     from motions import FeasibilityChecker
 
-    checker = config.stash.get(_CHECKER, None) or FeasibilityChecker()
-    config.stash[_CHECKER] = checker
-    report = checker.check(motion)
+    return FeasibilityChecker()
+
+
+def _require(motion: Motion | Timeline, margins: Mapping[str, float]) -> FeasibilityReport:
+    report = _checker().check(motion)
     short: dict[str, str] = {}
     for check, least in margins.items():
         name = check.replace("_", " ")
@@ -169,10 +170,6 @@ def _is_wanted(path: Path, config: pytest.Config) -> bool:
         for arg in config.invocation_params.args
         if isinstance(arg, str) and not arg.startswith("-")
     ]
-    folders = [Path(folder).resolve() for folder in _folders(config)]
+    folders = [Path(folder).resolve() for folder in config.getoption("--motions") or []]
     is_test = path.name.startswith("test_") or path.name.endswith("_test.py")
     return (path in named and not is_test) or any(folder in path.parents for folder in folders)
-
-
-def _folders(config: pytest.Config) -> list[str]:
-    return config.getoption("--motions") or []

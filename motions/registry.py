@@ -5,17 +5,15 @@ from __future__ import annotations
 import ast
 import importlib
 import pkgutil
-import sys
-import traceback
+import runpy
 from collections.abc import Mapping
 from functools import cache
-from importlib.machinery import SourceFileLoader
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 from go2_wbc.errors import CommandError, TimelineError, unknown_name
 from motions import library
-from motions.authoring import Motion, Value
+from motions.authoring import Motion, Value, last_line
 from motions.timeline import Timeline
 
 
@@ -57,7 +55,7 @@ def load_file(path: Path | str) -> Mapping[str, Motion]:
     file = Path(path)
     if not file.is_file():
         raise TimelineError(f"there is no file {file}")
-    found = {item.name: item for item in vars(_run(file)).values() if isinstance(item, Motion)}
+    found = {item.name: item for item in _run(file).values() if isinstance(item, Motion)}
     own = {
         name: item for name, item in found.items() if item.source.startswith(str(file.resolve()))
     }
@@ -78,32 +76,21 @@ def _require_own_names(file: Path, names: set[str]) -> None:
             first_lines[node.name] = node.lineno
 
 
-def _run(file: Path) -> ModuleType:
-    name = f"_motion_file_{file.stem}"
+def _run(file: Path) -> dict[str, Any]:
     if file.suffix != ".py":
         raise TimelineError(f"{file} is not a Python file: its name must end in .py")
-    path = str(file.resolve())
-    loader = SourceFileLoader(name, path)
-    module = ModuleType(name)
-    module.__file__ = path
-    sys.modules[name] = module  # dataclasses look their module up
     try:
-        # Never from cached bytecode: it tells two saves within a second apart by their size only.
-        exec(loader.source_to_code(loader.get_data(path), path), vars(module))
+        # An import would take cached bytecode, which tells two saves within a second apart by their
+        # size only.
+        return runpy.run_path(str(file.resolve()), run_name=f"_motion_file_{file.stem}")
     except Exception as error:
         raise TimelineError(f"{_place(file, error)}: {type(error).__name__}: {error}") from error
-    finally:
-        del sys.modules[name]
-    return module
 
 
 def _place(file: Path, error: Exception) -> str:
     """``file`` and the line of it that was running, or that cannot be read."""
-    if isinstance(error, SyntaxError) and error.filename == str(file.resolve()):
-        return f"{file}, line {error.lineno}"
-    lines = [
-        frame.lineno
-        for frame in traceback.extract_tb(error.__traceback__)
-        if frame.filename == str(file.resolve())
-    ]
-    return f"{file}, line {lines[-1]}" if lines else str(file)
+    path = str(file.resolve())
+    line = last_line(error, path)
+    if isinstance(error, SyntaxError) and error.filename == path:
+        line = error.lineno
+    return f"{file}, line {line}" if line else str(file)

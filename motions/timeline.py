@@ -27,6 +27,7 @@ from motions.keys import (
     BalanceShift,
     BodyKey,
     Frame,
+    Key,
     LegKey,
     LegTarget,
     Mark,
@@ -42,8 +43,7 @@ _EASES = {ease.value: ease for ease in Ease}
 _FRAMES = {frame.value: frame for frame in (Frame.GROUND, Frame.BODY)}
 _POSTURES = {posture.value: posture for posture in Posture}
 
-AnyKey = BodyKey | PostureKey | LegKey | BalanceShift | Mark
-_KeyType = TypeVar("_KeyType", BodyKey, PostureKey, LegKey, BalanceShift, Mark)
+_KeyType = TypeVar("_KeyType", bound=Key)
 
 
 def deg(angle: float) -> float:
@@ -74,7 +74,7 @@ class Timeline:
     name: str = field(default="motion", kw_only=True)
     balance: bool = field(default=True, kw_only=True)
     shift_time: float = field(default=SHIFT_TIME, kw_only=True)
-    keys: tuple[AnyKey, ...] = field(default=(), kw_only=True)
+    keys: tuple[Key, ...] = field(default=(), kw_only=True)
     cursor: float = field(default=0.0, kw_only=True)
     beat: float = field(default=1.0, kw_only=True)
     shift_beats: float = field(default=0.0, kw_only=True)
@@ -205,7 +205,7 @@ class Timeline:
         for leg in sorted(self.raised):
             line = replace(line, cursor=self.cursor).down(leg, over=over)
         start, end = line._span(over)
-        keys: list[AnyKey] = [
+        keys: list[Key] = [
             BodyKey(start, end, Ease.MINIMUM_JERK, channel, 0.0)
             for channel in BODY_CHANNELS
             if line.body_value(channel) != 0.0
@@ -313,7 +313,7 @@ class Timeline:
         end = self.cursor + (self.shift_beats * self.beat or self.shift_time)
         return self._longer([BalanceShift(self.cursor, end, Ease.MINIMUM_JERK, raised)], end)
 
-    def _longer(self, keys: Sequence[AnyKey], cursor: float) -> Timeline:
+    def _longer(self, keys: Sequence[Key], cursor: float) -> Timeline:
         return replace(
             self,
             keys=(*self.keys, *keys),
@@ -337,8 +337,8 @@ class Timeline:
         return self.cursor, self.cursor + positive("over", over) * self.beat
 
 
-def _require_no_overlap(keys: Sequence[AnyKey]) -> None:
-    last: dict[str, AnyKey] = {}
+def _require_no_overlap(keys: Sequence[Key]) -> None:
+    last: dict[str, Key] = {}
     for key in sorted(keys, key=lambda key: key.start):
         before = last.get(key.track)
         if before is not None and key.start < before.end - SAME:

@@ -20,11 +20,9 @@ from go2_wbc.legs import LEGS
 from go2_wbc.reference import LegTask, MotionPlan, Reference, TrackedPoint
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import rpy_from_rotation
-from motions.tracks import attitudes, standing_feet
+from go2_wbc.robot.rotations import angular_velocity_from_rpy, rpy_from_rotation
+from motions.tracks import attitudes, sample_times, standing_feet
 
-SAMPLE_PERIOD = 0.01
-"""Time [s] between the instants that are looked at."""
 CENTRING_STEPS = 5
 """Steps that put the CoM in its place; each leaves an eighth of the error (measured).
 
@@ -69,8 +67,7 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     Raises:
         MotionError: if the plan is not finite.
     """
-    count = max(round(plan.duration / SAMPLE_PERIOD), 2) + 1
-    times = np.linspace(0.0, plan.duration, count)
+    times = sample_times(plan.duration)
     references = [plan.at(float(t)) for t in times]
     for t, reference in zip(times, references, strict=True):
         parts = (reference.body.p_world, reference.body.R_world_base.ravel(), reference.q_joints)
@@ -135,40 +132,13 @@ def _rates(
     """Velocity and acceleration (n, 18) as Pinocchio counts them: the base's in its own frame.
 
     With v_b = R' v_w, the acceleration is the derivative of these very components,
-    dv_b/dt = R' a_w - w_b x v_b (Featherstone 2008, ch. 2: spatial, not classical).
+    dv_b/dt = R' a_w - w_b x v_b (Featherstone 2008, ch. 2: spatial, not classical); so that of
+    w_b = R' w_w is R' dw_w.
     """
     spline = CubicSpline(times, np.hstack([q[:, :3], rpy, q[:, 7:]]), bc_type="clamped")
     rate, acceleration = spline(times, 1), spline(times, 2)
-    w, dw = _body_rates(rpy, rate[:, 3:6], acceleration[:, 3:6])
-    v_base = attitude.apply(rate[:, :3], inverse=True)
-    a_base = attitude.apply(acceleration[:, :3], inverse=True) - np.cross(w, v_base)
-    return np.hstack([v_base, w, rate[:, 6:]]), np.hstack([a_base, dw, acceleration[:, 6:]])
-
-
-def _body_rates(
-    rpy: Float[np.ndarray, "n 3"], rate: Float[np.ndarray, "n 3"], second: Float[np.ndarray, "n 3"]
-) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
-    """Angular velocity and its derivative in the base frame (Diebel 2006, eq. 67 and 74).
-
-    w_b = E(roll, pitch) d(rpy)/dt, and dw_b = E d2(rpy)/dt2 + dE/dt d(rpy)/dt, written out by row.
-    """
-    (roll, pitch, _), (d_roll, d_pitch, d_yaw) = rpy.T, rate.T
-    sr, cr, sp, cp = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
-    w = np.column_stack(
-        [d_roll - d_yaw * sp, d_pitch * cr + d_yaw * cp * sr, -d_pitch * sr + d_yaw * cp * cr]
-    )
-    dd_roll, dd_pitch, dd_yaw = second.T
-    dw = np.column_stack(
-        [
-            dd_roll - dd_yaw * sp - d_yaw * d_pitch * cp,
-            dd_pitch * cr
-            - d_pitch * d_roll * sr
-            + dd_yaw * cp * sr
-            + d_yaw * (d_roll * cp * cr - d_pitch * sp * sr),
-            -dd_pitch * sr
-            - d_pitch * d_roll * cr
-            + dd_yaw * cp * cr
-            - d_yaw * (d_roll * cp * sr + d_pitch * sp * cr),
-        ]
-    )
-    return w, dw
+    turns = zip(rpy, rate[:, 3:6], acceleration[:, 3:6], strict=True)
+    w_world, dw_world = np.swapaxes([angular_velocity_from_rpy(*turn) for turn in turns], 0, 1)
+    worlds = (rate[:, :3], w_world, acceleration[:, :3], dw_world)
+    v, w, a, dw = (attitude.apply(vectors, inverse=True) for vectors in worlds)
+    return np.hstack([v, w, rate[:, 6:]]), np.hstack([a - np.cross(w, v), dw, acceleration[:, 6:]])

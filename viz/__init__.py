@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
+
+from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from viz.content import Annotation, MarginCurve, ReplayContent, Verdict
@@ -27,19 +28,13 @@ __all__ = [
     "margin_figure",
 ]
 
-_HOMES = {
-    "content": ("Annotation", "MarginCurve", "ReplayContent", "Verdict"),
-    "render.animation": ("ANIMATION_SUFFIXES", "export_animation"),
-    "render.margin_plot": ("PLOT_SUFFIXES", "export_plot", "margin_figure"),
-    "render.still": ("export_filmstrip",),
-    "replay.html_page": ("HTML_SUFFIXES", "export_html"),
-}
-"""The module of every public name."""
-
-
-def __getattr__(name: str) -> object:
-    """Import the module of a name when it is first asked for: a page needs no matplotlib."""
-    for home, names in _HOMES.items():
-        if name in names:
-            return getattr(import_module(f"viz.{home}"), name)
-    raise AttributeError(f"module 'viz' has no attribute {name!r}")
+__getattr__ = lazy_exports(
+    __name__,
+    {
+        "content": ("Annotation", "MarginCurve", "ReplayContent", "Verdict"),
+        "render.animation": ("ANIMATION_SUFFIXES", "export_animation"),
+        "render.margin_plot": ("PLOT_SUFFIXES", "export_plot", "margin_figure"),
+        "render.still": ("export_filmstrip",),
+        "replay.html_page": ("HTML_SUFFIXES", "export_html"),
+    },
+)

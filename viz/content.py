@@ -93,7 +93,7 @@ class Verdict:
 
     def ranked(self) -> tuple[MarginCurve, ...]:
         """The curves: broken ones first, then the tight ones, then the others as they come."""
-        return tuple(sorted(self.curves, key=_rank))
+        return tuple(sorted(self.curves, key=lambda c: (not c.is_broken, c.least >= c.tight)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +147,3 @@ def check_recording(recording: Recording) -> None:
         raise ConfigError(
             f"the configuration is not finite at t={recording.time[first]:.3f} s; cannot draw it"
         )
-
-
-def _rank(curve: MarginCurve) -> int:
-    return 0 if curve.is_broken else 1 if curve.least < curve.tight else 2

@@ -10,7 +10,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from types import TracebackType
 from typing import Final, final
 
 from go2_wbc.errors import BridgeError
@@ -82,11 +81,7 @@ class Process:
         return self._process.poll()
 
     def wait_for(self, text: str, limit: float = START_LIMIT) -> None:
-        """Wait until the process has said ``text``.
-
-        Raises:
-            BridgeError: if it does not, or ends before.
-        """
+        """Wait until the process has said ``text``; BridgeError if it does not."""
         wait_until(lambda: text in self.text or self.code is not None, limit)
         if self.code is not None:
             self._reader.join(5.0)
@@ -114,24 +109,16 @@ class Process:
         return self.text
 
     def __enter__(self) -> Process:
-        """Wait until it is ready.
-
-        Raises:
-            BridgeError: if it does not say so.
-        """
+        """Wait until it is ready; BridgeError if it does not say so."""
         try:
             self.wait_for(self._says)
         except BridgeError:
-            self.__exit__(BridgeError, None, None)
+            self.__exit__(BridgeError)
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None = None, *_: object) -> None:
+        """End it, politely if that is wanted and there was no error."""
         if self._is_stopped and kind is None:
             self.stop()
         elif self.code is None:

@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import closing
 from typing import Final
 
 import numpy as np
 
-from benchmarks.bridges.ros2_processes import (
-    COMMAND_PERIOD,
-    Probe,
-    joined,
-    probing,
-    quiet_client,
-    serving,
-)
+from benchmarks.bridges.ros2_processes import Probe, joined, quiet_client, serving
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial
 from go2_wbc.errors import BridgeError, MissingDependency
@@ -58,7 +52,7 @@ def measure(_trial: Trial) -> Measurement:
     from controller.bridges.ros2.demo import run_steps
 
     with joined(), serving(namespace=NAMESPACE):
-        with probing(NAMESPACE) as probe:
+        with closing(Probe(NAMESPACE)) as probe:
             values = _round_trips(probe) | _drive(probe)
         with quiet_client(NAMESPACE) as go2:
             undone = [f"{step.label}: {step.reason}" for step in run_steps(go2) if not step.ok]
@@ -89,14 +83,10 @@ def _drive(probe: Probe) -> dict[str, float]:
     answer = probe.call("walk")
     if not answer.success:
         raise BridgeError(f"the robot does not walk: {answer.message}")
-    before, began = probe.statistics(), time.monotonic()
-    sent, start = 0, before
-    while time.monotonic() - began < DRIVE_TIME:
-        probe.move(SPEED)
-        sent += 1
-        time.sleep(max(sent * COMMAND_PERIOD - (time.monotonic() - began), 0.0))
-        if start is before and time.monotonic() - began > SETTLE_TIME:
-            start = probe.statistics()
+    before = probe.statistics()
+    sent = probe.drive(SETTLE_TIME, SPEED)
+    start = probe.statistics()
+    sent += probe.drive(DRIVE_TIME - SETTLE_TIME, SPEED)
     after = probe.statistics()
     probe.move(0.0)
     way = math.dist(after["position"][:2], start["position"][:2])

@@ -10,9 +10,10 @@ import math
 import signal
 import sys
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, closing, contextmanager
-from typing import Any, Final, final
+from collections.abc import Mapping
+from contextlib import ExitStack, closing
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final
 
 from benchmarks.bridges.faults import Fault, fault, metrics_of, require, run_all
 from benchmarks.bridges.processes import Process, wait_until
@@ -21,12 +22,14 @@ from benchmarks.bridges.ros2_processes import (
     DISCOVERY,
     Probe,
     joined,
-    probing,
     quiet_client,
     serving,
 )
 from benchmarks.scenario import Measurement, Scenario
-from benchmarks.trials import Trial, TrialFailed
+from benchmarks.trials import Trial
+
+if TYPE_CHECKING:
+    from controller.bridges.ros2 import GO2ControllerNode
 
 STANDING: Final = 0.29
 """Height [m] of the base above which the robot stands; 0.31 when it has come to rest."""
@@ -77,77 +80,29 @@ print(f"rate {sent / passed:.0f}", flush=True)
 FAULTS: Final[list[Fault]] = []
 
 
-@final
+@dataclass(frozen=True, slots=True)
 class Scene:
-    """One robot that the faults share, and others that end with theirs.
+    """A robot's namespace, and what is started there; it ends with the scene.
 
     Attributes:
-        namespace: of the shared robot; those of the others begin with it.
+        probe: watches the robot.
+        exits: what is to be ended.
     """
 
-    def __init__(self, namespace: str = "bench_faults") -> None:
-        """Start nothing yet; ``rclpy.init()`` must have been called."""
-        self.namespace = namespace
-        self._shared: tuple[Process, Probe] | None = None
-        self._exits = ExitStack()
-        self._tilts: list[float] = []
+    probe: Probe
+    exits: ExitStack
 
-    def tilt_during(self, fault: Fault) -> float:
-        """The largest tilt [deg] while a fault is played; a failure ends the shared robot.
+    def serve(self, says: str = "serving /") -> Process:
+        """A server; see ``serving``."""
+        return self.exits.enter_context(serving(namespace=self.probe.namespace, says=says))
 
-        Raises:
-            TrialFailed: if the robot, or somebody who should have been told, did not do as
-                expected.
-            BridgeError: if a process did not start, or nobody answered.
-        """
-        self._tilts.clear()
-        if self._shared is not None:
-            self._shared[1].largest_tilt = None
-        try:
-            fault.play(self)
-            if self._shared is not None:
-                self._note(self._shared[1])
-        except BaseException:
-            self.close()
-            raise
-        if not self._tilts:
-            raise TrialFailed("no odometry was heard")
-        return math.degrees(max(self._tilts))
+    def client(self) -> GO2ControllerNode:
+        """A client in this process."""
+        return self.exits.enter_context(quiet_client(self.probe.namespace))
 
-    def _note(self, probe: Probe) -> None:
-        if probe.largest_tilt is not None:
-            self._tilts.append(probe.largest_tilt)
-
-    def robot(self) -> tuple[Process, Probe]:
-        """The shared robot, standing or walking: its server and a probe."""
-        if self._shared is None:
-            self._shared = self._exits.enter_context(self.another_robot())
-            require_done(self._shared[1].call("up"))
-        return self._shared
-
-    @contextmanager
-    def another_robot(self, suffix: str = "") -> Iterator[tuple[Process, Probe]]:
-        """A robot of one's own."""
-        namespace = self.namespace + suffix
-        with serving(namespace=namespace) as server, self.watched(namespace) as probe:
-            yield server, probe
-
-    @contextmanager
-    def watched(self, namespace: str) -> Iterator[Probe]:
-        """A probe whose tilts count."""
-        with probing(namespace) as probe:
-            yield probe
-            self._note(probe)
-
-    def close(self) -> None:
-        """End the shared robot; the next fault gets a new one."""
-        self._shared = None
-        self._exits.close()
-
-
-def script(code: str, namespace: str) -> Process:
-    """A client in a process of its own; without priority, since a flood never sleeps."""
-    return Process([sys.executable, "-c", code, namespace], has_priority=False)
+    def script(self, code: str) -> Process:
+        """A client in a process of its own; without priority, since a flood never sleeps."""
+        return Process([sys.executable, "-c", code, self.probe.namespace], has_priority=False)
 
 
 # --- what is required: each raises TrialFailed ----------------------------------------------------
@@ -197,8 +152,9 @@ def require_refused(server: Process, namespace: str) -> None:
 @fault(FAULTS, "ros2.client_killed_walking", "client killed: walking")
 def client_killed_walking(at: Scene) -> None:
     """The robot stops where it is, within a stride or two, and goes on obeying."""
-    _, probe = at.robot()
-    with script(WALKER, at.namespace) as client:
+    at.serve()
+    probe = at.probe
+    with at.script(WALKER) as client:
         client.wait_for("walking")
         start = probe.place()
         probe.let_pass(1.5)
@@ -216,14 +172,16 @@ def client_killed_walking(at: Scene) -> None:
 @fault(FAULTS, "ros2.client_killed_high_five", "client killed: high five")
 def client_killed_high_five(at: Scene) -> None:
     """The motion is finished, nobody else may disturb it, and the robot stands."""
-    _, probe = at.robot()
+    at.serve()
+    probe = at.probe
     require_done(probe.call("up"))
-    with script(RAISER, at.namespace) as client:
+    with at.script(RAISER) as client:
         client.wait_for("raised")
         client.kill()
     refused = probe.call("up").message
     require("busy with 'high_five'" in refused, f"an order in the motion was answered: {refused}")
-    probe.wait_until(lambda: probe.statistics()["mode"] != "moving", "the motion's end")
+    ends = wait_until(lambda: probe.statistics()["mode"] != "moving", ANSWER)
+    require(ends, "the motion does not end")
     probe.let_pass(REST_TIME)
     require_mode(probe, "standing")
     require_done(probe.call("walk"))
@@ -232,10 +190,11 @@ def client_killed_high_five(at: Scene) -> None:
 @fault(FAULTS, "ros2.flood", "commands at 5 kHz")
 def flood(at: Scene) -> None:
     """Commands at 5 kHz: the robot walks by them, stays in one piece, and stops after them."""
-    _, probe = at.robot()
+    at.serve()
+    probe = at.probe
     require_done(probe.call("walk"))
     before, start = probe.statistics(), probe.place()
-    with script(FLOODER, at.namespace) as flooder:
+    with at.script(FLOODER) as flooder:
         said = flooder.finish(ANSWER)
     after, way = probe.statistics(), probe.place().way_from(start)
     require_said("rate ", said)
@@ -253,7 +212,7 @@ def flood(at: Scene) -> None:
 @fault(FAULTS, "ros2.garbage", "garbage on cmd_vel")
 def garbage(at: Scene) -> None:
     """What is not finite moves nothing, what is huge is clipped; both are told."""
-    server, probe = at.robot()
+    server, probe = at.serve(), at.probe
     require_done(probe.call("walk"))
     before, start = probe.statistics(), probe.place()
     for value in GARBAGE:
@@ -278,9 +237,9 @@ def garbage(at: Scene) -> None:
 @fault(FAULTS, "ros2.two_servers", "a second server")
 def two_servers(at: Scene) -> None:
     """The second one of a namespace ends and says why; the first goes on."""
-    _, probe = at.robot()
-    with serving(namespace=at.namespace, says="") as second:
-        require_refused(second, at.namespace)
+    at.serve()
+    probe = at.probe
+    require_refused(at.serve(says=""), at.probe.namespace)
     require_done(probe.call("walk"))
     require_done(probe.call("up"))
 
@@ -288,67 +247,68 @@ def two_servers(at: Scene) -> None:
 @fault(FAULTS, "ros2.two_servers_at_once", "two servers at once")
 def two_servers_at_once(at: Scene) -> None:
     """Of two servers of one namespace that are started together exactly one serves."""
-    namespace = at.namespace + "_t"
-    with (
-        serving(namespace=namespace, says="") as one,
-        serving(namespace=namespace, says="") as other,
-        at.watched(namespace) as probe,
-    ):
-        wait_until(lambda: one.code is not None or other.code is not None, DISCOVERY)
-        loser, winner = (one, other) if one.code is not None else (other, one)
-        require(loser.code is not None, "both servers live")
-        require_refused(loser, namespace)
-        require_done(probe.call("up"))
-        require(winner.code is None, f"the other one ended too: {winner.text}")
+    one, other = at.serve(says=""), at.serve(says="")
+    wait_until(lambda: one.code is not None or other.code is not None, DISCOVERY)
+    loser, winner = (one, other) if one.code is not None else (other, one)
+    require(loser.code is not None, "both servers live")
+    require_refused(loser, at.probe.namespace)
+    require_done(at.probe.call("up"))
+    require(winner.code is None, f"the other one ended too: {winner.text}")
 
 
 @fault(FAULTS, "ros2.server_killed", "server killed: high five")
 def server_killed(at: Scene) -> None:
     """The client hears of it in the middle of a motion, and finds the next server by itself."""
+    server, go2 = at.serve(), at.client()
     killed_at: list[float] = []
 
-    with at.another_robot("_k") as (server, _), quiet_client(at.namespace + "_k") as go2:
+    def kill(share: float) -> None:
+        if share > 0.3 and not killed_at:
+            server.kill()
+            killed_at.append(time.monotonic())
 
-        def kill(share: float) -> None:
-            if share > 0.3 and not killed_at:
-                server.kill()
-                killed_at.append(time.monotonic())
-
-        require(go2.stand(), f"stand: {go2.last_message}")
-        require(not go2.play("high_five", {}, kill), "a motion without a robot was called done")
-        require(bool(killed_at), f"the motion ended before the server: {go2.last_message}")
-        took = time.monotonic() - killed_at[0]
-        require(took < NOTICE_LIMIT, f"the client heard of it after {took:.0f} s")
-        require_said("no server of", go2.last_message)
-        with at.another_robot("_k") as (_, probe):
-            require(go2.stand(), f"stand, with a new server: {go2.last_message}")
-            require(probe.height() > STANDING, "the robot of the new server does not stand")
+    require(go2.stand(), f"stand: {go2.last_message}")
+    require(not go2.play("high_five", {}, kill), "a motion without a robot was called done")
+    require(bool(killed_at), f"the motion ended before the server: {go2.last_message}")
+    took = time.monotonic() - killed_at[0]
+    require(took < NOTICE_LIMIT, f"the client heard of it after {took:.0f} s")
+    require_said("no server of", go2.last_message)
+    at.serve()
+    require(go2.stand(), f"stand, with a new server: {go2.last_message}")
+    require(at.probe.height() > STANDING, "the robot of the new server does not stand")
 
 
 @fault(FAULTS, "ros2.server_second", "server after its client")
 def server_second(at: Scene) -> None:
     """A client that was there first finds the server when it comes."""
-    namespace = at.namespace + "_s"
-    with serving(namespace=namespace, says="") as server, at.watched(namespace) as probe:
-        require("serving /" not in server.text, "the server was there first")
-        with quiet_client(namespace) as go2:
-            wait_until(go2._behavior_client.service_is_ready, DISCOVERY)
-            require(go2.stand(), f"stand: {go2.last_message}")
-        require(probe.height() > STANDING, "the robot does not stand")
+    server = at.serve(says="")
+    require("serving /" not in server.text, "the server was there first")
+    go2 = at.client()
+    wait_until(go2._behavior_client.service_is_ready, DISCOVERY)
+    require(go2.stand(), f"stand: {go2.last_message}")
+    require(at.probe.height() > STANDING, "the robot does not stand")
 
 
 @fault(FAULTS, "ros2.interrupt", "Ctrl-C in a behaviour")
 def interrupt(at: Scene) -> None:
     """Ctrl-C at a server: who waits for an answer gets one, and the robot goes limp."""
-    with at.another_robot("_i") as (server, probe):
-        waiting = probe.send("up")
-        probe.let_pass(1.0)
-        require(not waiting.done(), "the behaviour was over before the interrupt")
-        server.stop(signal.SIGINT)
-        require(server.code == 0, f"the server ended with exit code {server.code}")
-        answer = probe.result(waiting, 10.0)
-        require(not answer.success, "a behaviour that was cut short was called done")
-        require_said("damped", answer.message)
+    server, probe = at.serve(), at.probe
+    waiting = probe.send("up")
+    probe.let_pass(1.0)
+    require(not waiting.done(), "the behaviour was over before the interrupt")
+    server.stop(signal.SIGINT)
+    require(server.code == 0, f"the server ended with exit code {server.code}")
+    answer = probe.result(waiting, 10.0)
+    require(not answer.success, "a behaviour that was cut short was called done")
+    require_said("damped", answer.message)
+
+
+def tilt_during(fault: Fault) -> float:
+    """Largest tilt [deg] of a robot of its own while the fault is played."""
+    with closing(Probe(fault.name.replace(".", "_"))) as probe, ExitStack() as exits:
+        fault.play(Scene(probe, exits))
+        require(math.isfinite(probe.largest_tilt), "no odometry was heard")
+        return math.degrees(probe.largest_tilt)
 
 
 def measure(_trial: Trial) -> Measurement:
@@ -357,8 +317,8 @@ def measure(_trial: Trial) -> Measurement:
     Raises:
         MissingDependency: if ROS 2 is not installed.
     """
-    with joined(), closing(Scene()) as scene:
-        return run_all(FAULTS, scene.tilt_during)
+    with joined():
+        return run_all(FAULTS, tilt_during)
 
 
 METRICS: Final = metrics_of(FAULTS, "ROS 2: faults, largest tilt of the robot")

@@ -10,16 +10,19 @@ import math
 import os
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, final
 
+import numpy as np
+
 from benchmarks.bridges.processes import PROGRAM, Process, wait_until
 from controller.bridges.ros2.names import (
     BEHAVIOR_SERVICE,
     CMD_VEL,
+    COMMAND_PERIOD,
     ODOM,
     STATISTICS_SERVICE,
     topic,
@@ -34,8 +37,6 @@ DISCOVERY: Final = 20.0
 """Time [s] in which processes must find each other; half a second on an idle machine."""
 ANSWER: Final = 60.0
 """Time [s] in which a call must be answered; four on an idle machine."""
-COMMAND_PERIOD: Final = 0.02
-"""Time [s] between two velocity commands of a drive."""
 ODOM_QUEUE: Final = 5
 """Messages of odometry that wait for a probe: more of them would be stale on a busy machine."""
 
@@ -106,7 +107,7 @@ class Probe:
     Attributes:
         node: to add subscriptions and clients to.
         namespace: of the robot.
-        largest_tilt: of the base since this was set to None [rad]; None without odometry.
+        largest_tilt: of the base so far [rad]; nan without odometry.
     """
 
     def __init__(self, namespace: str = "robot1") -> None:
@@ -114,16 +115,12 @@ class Probe:
         from controller.bridges.ros2 import imports as ros
 
         self._ros, self.namespace = ros, namespace
-        self.largest_tilt: float | None = None
+        self.largest_tilt = math.nan
         self._newest: RobotState | None = None
         self.node = ros.Node(
             f"probe_{namespace}", start_parameter_services=False, enable_rosout=False
         )
-        self._request = ros.RobotBehaviorCommand.Request
-        self._client = self.node.create_client(
-            ros.RobotBehaviorCommand, topic(namespace, BEHAVIOR_SERVICE)
-        )
-        self._triggers: dict[str, Any] = {}
+        self._clients: dict[str, Any] = {}
         self._publisher = self.node.create_publisher(ros.Twist, topic(namespace, CMD_VEL), 10)
         self.node.create_subscription(ros.Odometry, topic(namespace, ODOM), self._note, ODOM_QUEUE)
         self._executor = ros.SingleThreadedExecutor()
@@ -140,7 +137,7 @@ class Probe:
         from controller.bridges.ros2.states import state_of
 
         self._newest = state = state_of(message)
-        self.largest_tilt = max(self.largest_tilt or 0.0, state.tilt)
+        self.largest_tilt = float(np.fmax(self.largest_tilt, state.tilt))
 
     # --- calls ----------------------------------------------------------------------------
 
@@ -150,7 +147,8 @@ class Probe:
         Raises:
             BridgeError: if there is no server.
         """
-        return self._called(self._client, self._request(command=command))
+        kind = self._ros.RobotBehaviorCommand
+        return self._called(kind, BEHAVIOR_SERVICE, kind.Request(command=command))
 
     def result(self, future: Any, limit: float = ANSWER) -> Any:
         """What ``future`` comes to.
@@ -171,11 +169,12 @@ class Probe:
     def trigger(self, name: str) -> Any:
         """The answer of one of the ``std_srvs/Trigger`` services; see ``send`` and ``result``."""
         kind = self._ros.Trigger
-        if name not in self._triggers:
-            self._triggers[name] = self.node.create_client(kind, topic(self.namespace, name))
-        return self.result(self._called(self._triggers[name], kind.Request()))
+        return self.result(self._called(kind, name, kind.Request()))
 
-    def _called(self, client: Any, request: Any) -> Any:
+    def _called(self, kind: Any, name: str, request: Any) -> Any:
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(kind, topic(self.namespace, name))
+        client = self._clients[name]
         if not client.wait_for_service(DISCOVERY):
             raise BridgeError(f"nobody offers {client.srv_name}")
         return client.call_async(request)
@@ -192,12 +191,13 @@ class Probe:
         message.linear.x, message.linear.y, message.angular.z = x, y, turn
         self._publisher.publish(message)
 
-    def drive(self, seconds: float, x: float, turn: float = 0.0, *, y: float = 0.0) -> None:
-        """Command at 50 Hz for so long on the wall clock."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
+    def drive(self, seconds: float, x: float, turn: float = 0.0, *, y: float = 0.0) -> int:
+        """Command at 50 Hz for so long on the wall clock; returns how many commands were sent."""
+        count, began = round(seconds / COMMAND_PERIOD), time.monotonic()
+        for sent in range(count):
             self.move(x, turn, y=y)
-            time.sleep(COMMAND_PERIOD)
+            time.sleep(max(began + (sent + 1) * COMMAND_PERIOD - time.monotonic(), 0.0))
+        return count
 
     # --- looking --------------------------------------------------------------------------
 
@@ -228,31 +228,12 @@ class Probe:
         while (left := end - self.place().time) > 0.0:
             time.sleep(min(left, 0.05))
 
-    def wait_until(self, is_so: Callable[[], bool], what: str, limit: float = ANSWER) -> None:
-        """Wait for something.
-
-        Raises:
-            BridgeError: if it is not so within ``limit`` seconds; says ``what`` was awaited.
-        """
-        if not wait_until(is_so, limit):
-            raise BridgeError(f"/{self.namespace}: {what} was awaited for {limit:g} s in vain")
-
     def close(self) -> None:
         """Leave the graph."""
         self._is_closing.set()
         self._thread.join(5.0)
         self._executor.shutdown()
         self.node.destroy_node()
-
-
-@contextmanager
-def probing(namespace: str) -> Iterator[Probe]:
-    """A probe that is closed afterwards."""
-    probe = Probe(namespace)
-    try:
-        yield probe
-    finally:
-        probe.close()
 
 
 @contextmanager

@@ -4,33 +4,23 @@ from __future__ import annotations
 
 import json
 import time
+import timeit
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 
 from benchmarks.bridges.faults import require
-from benchmarks.bridges.unitree_processes import (
-    Observer,
-    client_of,
-    driver,
-    good_commands,
-    own_domain,
-    simulator,
-)
+from benchmarks.bridges.processes import wait_until
+from benchmarks.bridges.unitree_processes import MOVE, SPEED, Scene, driver, good_commands, scene
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.codec import codec_of
-from controller.bridges.unitree.low_level import low_cmd_message
-from controller.bridges.unitree.sport_api import SPORT_SERVICE, Api
+from controller.bridges.unitree.codec import decode_message, encode_message
+from controller.bridges.unitree.low_level import intact_message, low_cmd_message
+from controller.bridges.unitree.sport_api import Api
 from go2_wbc.robot.state import JointCommand
 
-if TYPE_CHECKING:
-    from controller.bridges.unitree.rpc import Client
-
-SPEED: Final = 0.5
-"""Of ``Move`` and of the trot [m/s]."""
 MOVE_TIME, MOVE_PERIOD = 3.0, 0.05
 STREAM_TIME: Final = 10.0
 """Time [s] of listening at 500 Hz."""
@@ -63,63 +53,49 @@ DRIVE_METRICS: Final = (
 
 def measure_sport(_trial: Trial) -> Measurement:
     """The script of a SportClient: up, balance, move, stop, hello, Euler, down."""
-    with own_domain() as domain, simulator(domain):
-        observer = Observer(domain)
-        client = client_of(observer.bus, SPORT_SERVICE)
+    with scene() as at:
 
         def code_of(api: Api, parameter: str = "{}") -> int:
-            code = client.call(api, parameter, timeout=5.0).code
-            observer.wait_for_rest()
+            code = at.call(api, parameter)
+            at.wait_for_rest()
             return code
 
         codes = [code_of(Api.STAND_UP), code_of(Api.BALANCE_STAND)]
-        speed = _move(client, observer)
+        speed = _move(at)
         codes.append(code_of(Api.STOP_MOVE))
-        trips = [_round_trip(client) for _ in range(ROUND_TRIPS)]
+        trips = timeit.repeat(lambda: at.client.call(Api.STOP_MOVE), number=1, repeat=ROUND_TRIPS)
         codes.append(code_of(Api.HELLO))
         codes.append(code_of(Api.EULER, '{"x": 0.1, "y": 0.1, "z": 0.1}'))
         codes.append(code_of(Api.STAND_DOWN))
-        require(observer.height <= 0.12, f"StandDown left the base at {observer.height:.2f} m")
+        require(at.height <= 0.12, f"StandDown left the base at {at.height:.2f} m")
     return Measurement(
         {
-            "unitree.codes": float(sum(code != 0 for code in codes)),
+            "unitree.codes": float(np.count_nonzero(codes)),
             "unitree.move": abs(speed - SPEED),
-            "unitree.latency": float(np.median(trips)),
-            "unitree.latency_p99": float(np.percentile(trips, 99)),
+            "unitree.latency": 1e3 * float(np.median(trips)),
+            "unitree.latency_p99": 1e3 * float(np.percentile(trips, 99)),
         }
     )
 
 
-def _move(client: Client, observer: Observer) -> float:
+def _move(at: Scene) -> float:
     """Mean forward speed [m/s] over the last two of three seconds of ``Move``."""
-    parameter = json.dumps({"x": SPEED, "y": 0.0, "z": 0.0})
     end = time.monotonic() + MOVE_TIME
     speeds: list[float] = []
     while time.monotonic() < end:
-        client.send(Api.MOVE, parameter)
+        at.client.send(Api.MOVE, MOVE)
         time.sleep(MOVE_PERIOD)
-        messages = observer.take()
+        messages = at.take()
         if end - time.monotonic() < MOVE_TIME - 1.0:
             speeds += [float(message["velocity"][0, 0]) for message in messages]
     return float(np.mean(speeds)) if speeds else 0.0
 
 
-def _round_trip(client: Client) -> float:
-    """Time [ms] of a call that is answered at once."""
-    start = time.perf_counter()
-    client.call(Api.STOP_MOVE)
-    return 1000 * (time.perf_counter() - start)
-
-
 def measure_stream(_trial: Trial) -> Measurement:
     """Answer every ``rt/lowstate`` with a damping command for ten seconds."""
-    from controller.bridges.unitree import idl
-
-    with own_domain() as domain, simulator(domain) as process:
-        bus = Observer(domain).bus
-        states = bus.reader("rt/lowstate", idl.low_state(), depth=64)
-        commands = bus.writer("rt/lowcmd", idl.low_cmd())
-        decode, encode = codec_of(layout.LOW_STATE).decode, codec_of(layout.LOW_CMD).encode
+    with scene() as at:
+        states = at.bus.reader("rt/lowstate", depth=64)
+        commands = at.bus.writer("rt/lowcmd")
         states.wait(5.0)
         time.sleep(1.0)  # both ends must have found each other before losses count
         states.take()
@@ -127,14 +103,14 @@ def measure_stream(_trial: Trial) -> Measurement:
         while time.monotonic() - start < STREAM_TIME:
             states.wait(0.1)
             for data in states.take():
-                message = decode(data)
+                message = decode_message(layout.LOW_STATE, data)
                 bad += not layout.is_intact(message)
                 ticks.append(int(message["tick"][0]))
-                commands.write(encode(low_cmd_message(DAMPED)))
+                commands.write(encode_message(low_cmd_message(DAMPED)))
                 sent += 1
         elapsed = time.monotonic() - start
         time.sleep(0.2)
-        good = good_commands(process.stop())
+        good = good_commands(at.process.stop())
     expected = (ticks[-1] - ticks[0]) // 2 + 1
     return Measurement(
         {
@@ -149,13 +125,15 @@ def measure_stream(_trial: Trial) -> Measurement:
 
 def codec_time() -> float:
     """CPU time [us] of one lowcmd made, sealed and encoded, one lowstate decoded and checked."""
-    encode, codec = codec_of(layout.LOW_CMD).encode, codec_of(layout.LOW_STATE)
-    data = codec.encode(layout.new_message(layout.LOW_STATE))
-    start = time.process_time()
-    for _ in range(CODINGS):
-        encode(low_cmd_message(DAMPED))
-        layout.is_intact(codec.decode(data))
-    return 1e6 * (time.process_time() - start) / CODINGS
+    state = layout.new_message(layout.LOW_STATE)
+    layout.seal(state)
+    data = encode_message(state)
+
+    def code() -> None:
+        encode_message(low_cmd_message(DAMPED))
+        intact_message(layout.LOW_STATE, data)
+
+    return 1e6 / CODINGS * timeit.timeit(code, timer=time.process_time, number=CODINGS)
 
 
 def measure_drive(
@@ -165,32 +143,32 @@ def measure_drive(
 
     Stand, trot, high five, lie down; the speed is the simulator's truth.
     """
-    with own_domain() as domain, simulator(domain, *simulator_options) as process:
-        observer = Observer(domain)
-        with driver(domain, *driver_options) as peer:
-            speeds = _true_speeds(observer, peer.lines, time.monotonic() + DRIVE_LIMIT)
+    with scene(*simulator_options) as at:
+        with driver(at.domain, *driver_options) as peer:
+            speeds = _true_speeds(at, peer.lines)
             text = peer.finish(DRIVE_LIMIT)
-        said = process.stop()
+        said = at.process.stop()
     steps = [json.loads(line) for line in text.splitlines() if line.startswith("{")]
     undone = 4 - sum(bool(step["ok"]) for step in steps)
     reason = "; ".join(step["reason"] for step in steps if not step["ok"]) or text[-400:] + said
-    if not speeds:
-        return Measurement({"unitree.steps": float(undone)}, reason=reason)
+    values = {"unitree.steps": float(undone)}
+    if speeds:
+        values["unitree.mae"] = float(np.mean(np.abs(np.array(speeds) - SPEED)))
     failures = {"unitree.steps": reason} if undone else {}
-    error = float(np.mean(np.abs(np.array(speeds) - SPEED)))
-    return Measurement({"unitree.steps": float(undone), "unitree.mae": error}, failures)
+    return Measurement(values, failures, "" if speeds else reason)
 
 
-def _true_speeds(observer: Observer, lines: list[str], deadline: float) -> list[float]:
+def _true_speeds(at: Scene, lines: list[str]) -> list[float]:
     """Forward speeds over the four seconds before the trot's end, while the driver runs."""
     samples: list[tuple[float, float]] = []
-    while time.monotonic() < deadline:
-        for message in observer.take():
+
+    def has_walked() -> bool:
+        for message in at.take():
             seconds, nanoseconds = message["stamp"][0]
             samples.append((seconds + 1e-9 * nanoseconds, float(message["velocity"][0, 0])))
-        if any('"high_five"' in line or '"ok": false' in line for line in lines):
-            break
-        time.sleep(0.05)
+        return any('"high_five"' in line or '"ok": false' in line for line in lines)
+
+    wait_until(has_walked, DRIVE_LIMIT)
     walking = [time for time, speed in samples if speed > 0.8 * SPEED]
     if not walking:
         return []

@@ -2,51 +2,30 @@
 
 from __future__ import annotations
 
-import json
 import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
-from typing import Final, final
+from typing import Final
 
 import numpy as np
 
 from benchmarks.bridges.faults import Fault, fault, metrics_of, require, run_all
 from benchmarks.bridges.processes import PROGRAM, Process, wait_until
-from benchmarks.bridges.unitree_processes import Observer, client_of, driver, own_domain, simulator
+from benchmarks.bridges.unitree_processes import LIMIT, MOVE, Scene, driver, flood, scene, simulator
 from benchmarks.scenario import Measurement, Scenario
 from benchmarks.trials import Trial
-from controller.bridges.unitree.codec import codec_of
-from controller.bridges.unitree.layout import LOW_CMD
+from controller.bridges.unitree.codec import encode_message
 from controller.bridges.unitree.low_level import low_cmd_message
-from controller.bridges.unitree.sport_api import (
-    SPORT_SERVICE,
-    SWITCHER_SERVICE,
-    Api,
-    Code,
-    SportMode,
-    SwitcherApi,
-)
+from controller.bridges.unitree.sport_api import Api, Code, SportMode
 from controller.cli.common import ExitCode
 from go2_wbc.robot.state import JointCommand
 
-LIMIT: Final = 60.0
-"""Time [s] that only ends what hangs."""
-UPRIGHT: Final = 0.35
-"""Tilt [rad] below which a robot that stands or lies is upright."""
-STANDS, LIES = 0.25, 0.13
-"""Height [m] of the base above which the robot stands, below which it lies."""
-FLOOD: Final = 5000.0
-"""Samples per second."""
-MOVE: Final = json.dumps({"x": 0.5, "y": 0.0, "z": 0.0})
 BAD_MOVES: Final = ('{"x": NaN, "y": 0, "z": 0}', "rubbish", "[1]", '{"x": "fast"}')
 PATIENT: Final = ("--stale-limit", "1.0")
 """A busy machine pauses processes for longer than the 30 ms of the real limit."""
 ENDLESS_TROT: Final = (*PATIENT, "--steps", "stand", "trot", "--seconds", "60")
 MOVER: Final = """
 import sys, time
-from benchmarks.bridges.unitree_faults import MOVE
+from benchmarks.bridges.unitree_processes import MOVE
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.rpc import Client
 from controller.bridges.unitree.sport_api import SPORT_SERVICE, Api
@@ -58,79 +37,8 @@ while True:
 """
 """A program that asks for ``Move`` until it is killed."""
 FAULTS: Final[list[Fault]] = []
-_encode = codec_of(LOW_CMD).encode
-DAMPED: Final = _encode(low_cmd_message(JointCommand.damping(3.0)))
+DAMPED: Final = encode_message(low_cmd_message(JointCommand.damping(3.0)))
 """A good ``rt/lowcmd``."""
-
-
-@final
-class Scene:
-    """A simulator, an observer of it, and a client of its sport service.
-
-    Attributes:
-        process: the simulator.
-        domain: its DDS domain.
-        observer: what the robot says of itself.
-        client: calls its sport service.
-    """
-
-    def __init__(self, process: Process, domain: int) -> None:
-        """Join the domain of a simulator that serves."""
-        from controller.bridges.unitree import idl
-
-        self.process, self.domain = process, domain
-        self.observer = Observer(domain)
-        self.client = client_of(self.observer.bus, SPORT_SERVICE)
-        self._commands = self.observer.bus.writer("rt/lowcmd", idl.low_cmd())
-
-    def call(self, api: int, parameter: str = "{}") -> int:
-        """The code that a call of the sport service is answered with."""
-        return self.client.call(api, parameter, timeout=10.0).code
-
-    def require_code(self, api: Api, code: Code = Code.OK) -> None:
-        """Make sure that a call of the sport service is answered with ``code``."""
-        answered = self.call(api)
-        require(answered == code, f"{api.name} was answered {answered}")
-
-    def stand_up(self) -> None:
-        """Make the robot stand."""
-        self.require_code(Api.RECOVERY_STAND)
-        self.observer.wait_for_rest()
-        self.require_standing()
-
-    def take_back(self) -> None:
-        """Give the robot back to the sport service after low-level control."""
-        switcher = client_of(self.observer.bus, SWITCHER_SERVICE)
-        code = switcher.call(SwitcherApi.SELECT_MODE, '{"name": "normal"}').code
-        require(code == Code.OK, f"SelectMode was answered {code}")
-        self.require_said("low-level control has ended")
-
-    def require_standing(self) -> None:
-        """Make sure that the robot stands."""
-        height, tilt = self.observer.height, self.observer.tilt
-        stands = height > STANDS and tilt < UPRIGHT
-        require(stands, f"the robot does not stand: {height:.2f} m, {np.degrees(tilt):.0f} deg")
-
-    def require_lying(self) -> None:
-        """Make sure that the robot comes to lie on its belly."""
-        require(wait_until(lambda: self.observer.height < LIES, LIMIT), "the robot is not limp")
-        tilt = self.observer.tilt
-        require(tilt < UPRIGHT, f"the robot lies tilted by {np.degrees(tilt):.0f} deg")
-
-    def require_said(self, *texts: str) -> None:
-        """Make sure that the simulator reports these."""
-        for text in texts:
-            is_said = wait_until(lambda text=text: text in self.process.text, LIMIT)
-            require(is_said, f"the simulator did not say {text!r}")
-
-    def require_walking(self, peer: Process) -> None:
-        """Make sure that ``peer`` gets the robot to walk."""
-        walks = wait_until(lambda: self.observer.speed > 0.4 or peer.code is not None, LIMIT)
-        require(walks and peer.code is None, f"the robot does not walk: {peer.text}")
-
-    def flood(self, samples: list[bytes], seconds: float) -> None:
-        """Write ``rt/lowcmd`` samples in turn, 5000 a second."""
-        flood(lambda count: self._commands.write(samples[count % len(samples)]), seconds)
 
 
 def require_end(peer: Process, code: ExitCode, *texts: str) -> None:
@@ -140,32 +48,15 @@ def require_end(peer: Process, code: ExitCode, *texts: str) -> None:
     require(all(text in said for text in texts), f"it does not say {texts}: {said}")
 
 
-def flood(write: Callable[[int], None], seconds: float) -> None:
-    """Call ``write`` with 0, 1, ..., 5000 times a second."""
-    start, count = time.monotonic(), 0
-    while (now := time.monotonic() - start) < seconds:
-        while count < now * FLOOD:
-            write(count)
-            count += 1
-        time.sleep(0.0005)
-
-
-@contextmanager
-def scene(*options: str) -> Iterator[Scene]:
-    """A simulator with these options, and what is needed to watch it."""
-    with own_domain() as domain, simulator(domain, *options) as process:
-        yield Scene(process, domain)
-
-
 def garbage() -> list[bytes]:
-    """``rt/lowcmd`` that must move nothing: not finite, out of limits, damaged, cut off."""
+    """``rt/lowcmd`` that must move nothing: not finite, out of limits, damaged."""
     command = JointCommand.servo(np.zeros(12), np.zeros(12), 400.0, 1.0)
     damaged = low_cmd_message(JointCommand.torque(np.full(12, 20.0)))
     damaged["crc"] ^= 1
     return [
-        _encode(low_cmd_message(replace(command, tau=np.full(12, np.nan)))),
-        _encode(low_cmd_message(replace(command, q_des=np.full(12, 9.0)))),
-        _encode(damaged),
+        encode_message(low_cmd_message(replace(command, tau=np.full(12, np.nan)))),
+        encode_message(low_cmd_message(replace(command, q_des=np.full(12, 9.0)))),
+        encode_message(damaged),
     ]
 
 
@@ -200,7 +91,7 @@ def flood_of_moves(at: Scene) -> None:
     flood(lambda count: at.client.send(Api.MOVE, BAD_MOVES[count % 4] if count % 5 else MOVE), 3.0)
     at.require_standing()
     at.require_code(Api.STOP_MOVE)
-    at.observer.wait_for_rest()
+    at.wait_for_rest()
     at.require_standing()
 
 
@@ -210,9 +101,9 @@ def move_client_killed(at: Scene) -> None:
     at.stand_up()
     with Process([sys.executable, "-c", MOVER, str(at.domain)]) as peer:
         at.require_walking(peer)
-        require(at.observer.mode == SportMode.LOCOMOTION, "the mode is not locomotion")
+        require(at.mode == SportMode.LOCOMOTION, "the mode is not locomotion")
         peer.kill()
-    stops = wait_until(lambda: at.observer.speed < 0.1, 5.0)
+    stops = wait_until(lambda: at.speed < 0.1, 5.0)
     require(stops, "the robot walks on without its client")
     at.require_standing()
 
@@ -249,8 +140,7 @@ def simulator_killed(at: Scene) -> None:
     with simulator(at.domain) as process:
         second = Scene(process, at.domain)
         second.stand_up()
-        tilts = (at.observer.largest_tilt, second.observer.largest_tilt)
-        at.observer.largest_tilt = max(tilts)
+        at.largest_tilt = max(at.largest_tilt, second.largest_tilt)
 
 
 @fault(FAULTS, "unitree.robot_claimed", "a standing robot is claimed")
@@ -275,7 +165,7 @@ def tilt_during(fault: Fault) -> float:
     """Largest tilt [deg] of a robot of its own while the fault is played."""
     with scene(*fault.options) as at:
         fault.play(at)
-        return at.observer.largest_tilt
+        return at.largest_tilt
 
 
 def measure(_trial: Trial) -> Measurement:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import importlib.metadata
 import json
+import textwrap
 from enum import IntEnum
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -12,6 +15,10 @@ if TYPE_CHECKING:
 else:  # argparse's class takes no subscript at run time
     Subparsers = argparse._SubParsersAction
 """What a subcommand's ``register`` adds its parser to."""
+
+
+PROGRAM = "go2-wbc"
+"""The name of the command line, and of the package."""
 
 
 class ExitCode(IntEnum):
@@ -26,16 +33,9 @@ class ExitCode(IntEnum):
 
 
 def add_parser(
-    subparsers: Subparsers, name: str, description: str, *, examples: str = ""
+    subparsers: Subparsers, name: str, description: str, *, examples: str
 ) -> argparse.ArgumentParser:
-    """Add the parser of the subcommand ``name``.
-
-    Args:
-        subparsers: where to add it.
-        name: the subcommand.
-        description: what it does, shown above the options.
-        examples: command lines, one per line, shown below the options.
-    """
+    """Add the parser of the subcommand ``name``; its examples are one line each."""
     return subparsers.add_parser(
         name,
         description=description,
@@ -44,12 +44,30 @@ def add_parser(
     )
 
 
-def examples_epilog(examples: str) -> str | None:
-    """The ``examples:`` block at the end of a help text; ``None`` without examples."""
-    lines = [line.strip() for line in examples.strip().splitlines()]
-    return "\n".join(["examples:", *(f"  {line}" for line in lines)]) if lines else None
+def examples_epilog(examples: str) -> str:
+    """The ``examples:`` block at the end of a help text."""
+    return "examples:\n" + textwrap.indent(examples.strip(), "  ")
 
 
 def print_json(value: object) -> None:
     """Print ``value`` for a program to read."""
     print(json.dumps(value, indent=2))
+
+
+def print_json_line(value: object) -> None:
+    """Print ``value`` as one line, at once, for a program that follows."""
+    print(json.dumps(value), flush=True)
+
+
+def shown_path(path: Path) -> Path:
+    """``path`` as a person reads it: relative where it lies below the working directory."""
+    here = Path.cwd()
+    return path.relative_to(here) if path.is_relative_to(here) else path
+
+
+def installed_version(distribution: str) -> str | None:
+    """Version of an installed package; ``None`` if it is not installed."""
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return None

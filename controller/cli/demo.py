@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from itertools import count
 from pathlib import Path
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
@@ -75,20 +76,20 @@ def run(args: argparse.Namespace) -> int:
 
 def _run_over_ros(args: argparse.Namespace) -> int:
     """Run the demo on a robot that another process serves, print the steps."""
-    from controller.bridges.ros2.demo import STEPS, run_ros_demo
+    from controller.bridges.ros2.demo import run_ros_demo
     from controller.cli.demo_table import render_steps
     from controller.cli.progress import ProgressLine
-    from controller.demo.report import DemoReport, StepResult
+    from controller.demo.report import DemoReport
+    from controller.demo.steps import DEMO_STEPS
 
-    with ProgressLine(sys.stderr) as line:
-        done: list[StepResult] = []
-
-        def show(result: StepResult) -> None:
-            done.append(result)
-            verdict = "ok" if result.ok else f"NOT DONE: {result.reason}"
-            line.done(f"{len(done)}/{len(STEPS)} {result.label}: {verdict}")
-
-        results = run_ros_demo(args.namespace, show)
+    number = count(1)
+    with ProgressLine() as line:
+        results = run_ros_demo(
+            args.namespace,
+            lambda step: line.done(
+                f"{next(number)}/{len(DEMO_STEPS)} {step.label}: {step.verdict}"
+            ),
+        )
     ok = all(step.ok for step in results)
     if args.json:
         print_json({"ok": ok, "steps": DemoReport.steps_as_dicts(results)})

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 from controller.demo.report import DemoReport, DemoTotals, Measurement, StepResult
 
 WIDTH = 80
-_ROW = "{mark:>4} {label:<21}{time:>7}  {name:<23}{asked:>9}{measured:>9} {unit}"
+_HEADER = f"     {'step':<21}{'time':>7}  {'figure':<23}{'asked':>9}{'measured':>9}"
 _INDENT = " " * 5
 _DECIMALS = {"deg": 1}
 """Decimals of a unit's numbers; 3 for any other."""
@@ -22,28 +22,27 @@ def render(report: DemoReport, encoding: str | None = None) -> str:
         report: what was measured.
         encoding: of the terminal; ticks and crosses become words where it lacks them.
     """
-    rows = [render_steps(report.steps, encoding)]
-    rows += [*_total_rows(report.totals), "", _verdict(report)]
-    return "\n".join(rows)
+    done = sum(step.ok for step in report.steps)
+    verdict = f"{done} of {len(report.steps)} steps done."
+    if report.ok:
+        verdict = f"All {done} steps done, each judged by what was measured."
+    return "\n".join(
+        [render_steps(report.steps, encoding), *_total_rows(report.totals), "", verdict]
+    )
 
 
 def render_steps(steps: Sequence[StepResult], encoding: str | None = None) -> str:
     """The table of steps alone, with a line below; see ``render``."""
     marks = _marks(encoding)
-    rows = [
-        _ROW.format(
-            mark="",
-            label="step",
-            time="time",
-            name="figure",
-            asked="asked",
-            measured="measured",
-            unit="",
-        ).rstrip(),
-        "-" * WIDTH,
-    ]
+    rows = [_HEADER, "-" * WIDTH]
     for step in steps:
-        rows += _step_rows(step, marks[step.ok])
+        head = f"{marks[step.ok]:>4} {step.label:<21}{step.duration:>5.1f} s  "
+        first, *others = [_cells(figure) for figure in step.figures] or [""]
+        rows += [(head + first).rstrip(), *(" " * len(head) + cells for cells in others)]
+        if not step.ok:
+            rows += textwrap.wrap(
+                step.reason, WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT
+            )
     return "\n".join([*rows, "-" * WIDTH])
 
 
@@ -55,25 +54,11 @@ def _marks(encoding: str | None) -> dict[bool, str]:
     return {True: "✓", False: "✗"}
 
 
-def _step_rows(step: StepResult, mark: str) -> Iterator[str]:
-    heads = [(mark, step.label, f"{step.duration:.1f} s")]
-    cells = [_cells(figure) for figure in step.figures] or [("", "", "", "")]
-    heads += [("", "", "")] * (len(cells) - 1)
-    for (tick, label, time), (name, asked, measured, unit) in zip(heads, cells, strict=True):
-        yield _ROW.format(
-            mark=tick, label=label, time=time, name=name, asked=asked, measured=measured, unit=unit
-        ).rstrip()
-    if not step.ok:
-        yield from textwrap.wrap(
-            step.reason, WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT
-        )
-
-
-def _cells(figure: Measurement) -> tuple[str, str, str, str]:
+def _cells(figure: Measurement) -> str:
     decimals = _DECIMALS.get(figure.unit, 3)
     asked = "" if figure.asked is None else f"{figure.asked:.{decimals}f}"
     measured = f"{figure.measured:.{decimals}f}" if math.isfinite(figure.measured) else "-"
-    return figure.name, asked, measured, figure.unit
+    return f"{figure.name:<23}{asked:>9}{measured:>9} {figure.unit}"
 
 
 def _total_rows(totals: DemoTotals) -> list[str]:
@@ -92,10 +77,3 @@ def _total_rows(totals: DemoTotals) -> list[str]:
 
 def _or_dash(value: float, unit: str, decimals: int) -> str:
     return f"{value:.{decimals}f} {unit}" if math.isfinite(value) else "-"
-
-
-def _verdict(report: DemoReport) -> str:
-    done = sum(step.ok for step in report.steps)
-    if report.ok:
-        return f"All {done} steps done, each judged by what was measured."
-    return f"{done} of {len(report.steps)} steps done."

@@ -1,4 +1,8 @@
-"""``go2-wbc doctor``: what is installed, what is missing, and the command that installs it."""
+"""``go2-wbc doctor``: what is installed, what is missing, and the command that installs it.
+
+Each ``judge_...`` looks at one thing. ``version`` is the installed one, ``bounds`` are the versions
+that this project asks for, and a ``probe`` says how the import of a module went.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +14,20 @@ import sys
 import textwrap
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from enum import Enum
+from itertools import groupby
 from pathlib import Path
 
-from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
-from controller.cli.probes import (
-    PROJECT,
-    ImportProbe,
+from controller.cli.common import (
+    PROGRAM,
+    ExitCode,
+    Subparsers,
+    add_parser,
     installed_version,
-    probe_imports,
-    requirements_of,
-    satisfies,
+    print_json,
 )
+from controller.cli.probes import ImportProbe, probe_imports, requirements_of, satisfies
 from go2_wbc.errors import DescriptionError
 
 EXAMPLES = """
@@ -34,6 +39,8 @@ OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)
 LIBRARIES: Mapping[str, str | None] = {
     "pin": "pinocchio",
     "placo": "placo",
+    "coal": "coal",
+    "scipy": "scipy",
     "mujoco": "mujoco",
     "numpy": "numpy",
     "proxsuite": "proxsuite",
@@ -68,11 +75,12 @@ EXTRAS: Mapping[str, tuple[str, str, str]] = {
     "unitree": ("cyclonedds", "==11.0.1", "Unitree's protocol: unitree-sim, unitree-drive"),
 }
 """What an optional extra brings: a package, its version, and what it is for."""
-NEEDED_SOLVERS = ("daqp", "proxqp", "quadprog")
+NEEDED_SOLVERS: Mapping[str, str] = {"daqp": "daqp", "proxqp": "proxsuite", "quadprog": "quadprog"}
+"""The QP solvers that the project uses, and the package that brings each."""
 
 
 class Status(Enum):
-    """How a finding bears on the installation."""
+    """How a finding bears on the installation: with a problem the project does not work."""
 
     OK = "ok"
     NOTE = "note"
@@ -81,15 +89,7 @@ class Status(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One thing that was looked at.
-
-    Attributes:
-        section: heading that it is printed under.
-        subject: what was looked at.
-        status: ``PROBLEM`` means that the project does not work like this.
-        detail: what was found.
-        remedy: the line to type, if there is something to do.
-    """
+    """One thing that was looked at, and the line to type if there is something to do."""
 
     section: str
     subject: str
@@ -115,7 +115,8 @@ def run(args: argparse.Namespace) -> int:
     findings = examine()
     problems = [finding for finding in findings if finding.status is Status.PROBLEM]
     if args.json:
-        print_json({"ok": not problems, "findings": [_as_json(item) for item in findings]})
+        rows = [asdict(item) | {"status": item.status.value.lower()} for item in findings]
+        print_json({"ok": not problems, "findings": rows})
     else:
         print(render(findings))
     return ExitCode.FAILED if problems else ExitCode.OK
@@ -123,12 +124,16 @@ def run(args: argparse.Namespace) -> int:
 
 def examine() -> list[Finding]:
     """Everything that can be said about this installation."""
-    probes = probe_imports(module for module in LIBRARIES.values() if module is not None)
-    bounds = requirements_of(PROJECT)
-    versions = {name: installed_version(name) for name in LIBRARIES}
-    findings = [judge_python(sys.version_info[:3], platform.platform()), _judge_project()]
+    versions = {name: installed_version(name) for name in (*LIBRARIES, *ROS2)}
+    ros2 = {module for name, module in ROS2.items() if versions[name] is not None}
+    probes = probe_imports({module for module in LIBRARIES.values() if module} | ros2)
+    bounds = requirements_of(PROGRAM)
+    findings = [
+        judge_python(sys.version_info[:3], platform.platform()),
+        _judge_project(installed_version(PROGRAM)),
+    ]
     for name, module in LIBRARIES.items():
-        probe = None if module is None else probes[module]
+        probe = probes[module] if module else ImportProbe()
         findings.append(judge_library(name, versions[name], bounds.get(name, ""), probe))
     pairing = requirements_of("placo").get("pin", "")
     findings += judge_pairing(versions["placo"], versions["pin"], pairing, bounds.get("placo", ""))
@@ -136,83 +141,60 @@ def examine() -> list[Finding]:
     findings += judge_solvers(probes["qpsolvers"].solvers, bounds)
     findings += [judge_extra(name, installed_version(EXTRAS[name][0])) for name in EXTRAS]
     findings.append(judge_display(sys.platform, os.environ))
-    return findings + _examine_ros2()
-
-
-def _examine_ros2() -> list[Finding]:
-    versions = {name: installed_version(name) for name in ROS2}
-    here = {ROS2[name] for name, version in versions.items() if version is not None}
-    return judge_ros2(versions, probe_imports(sorted(here)))
+    return findings + judge_ros2(versions, probes)
 
 
 def judge_ros2(
     versions: Mapping[str, str | None], probes: Mapping[str, ImportProbe]
 ) -> list[Finding]:
-    """Whether ``go2-wbc ros2`` can run; it is optional, so that nothing here is a problem.
-
-    Args:
-        versions: installed version of each package of ``ROS2``.
-        probes: how the imports of those that are installed went.
-    """
-    section = "ROS 2 (optional)"
+    """Whether ``go2-wbc ros2`` can run; it is optional, so that nothing here is a problem."""
+    section, install = "ROS 2 (optional)", f'{_pip()} -e ".[ros2]"'
     if versions["ros-rclpy"] is None:
-        line = f'{_pip()} -e ".[ros2]"'
         detail = "not installed: go2-wbc ros2 and high_five_demo --ros2 need it"
-        return [Finding(section, "extra [ros2]", Status.NOTE, detail, line)]
+        return [Finding(section, "extra [ros2]", Status.NOTE, detail, install)]
+    build = BUILD_LINE.format(python=_python(), pip=_pip())
     found = []
-    for name, version in versions.items():
-        build = BUILD_LINE.format(python=_python(), pip=_pip())
-        remedy = build if name in BUILT else f'{_pip()} -e ".[ros2]"'
-        error = "" if version is None else probes[ROS2[name]].error
-        if version is not None and not error:
-            found.append(Finding(section, name, Status.OK, version))
-        else:
-            detail = f"{version} does not import: {error}" if error else "not installed"
+    for name, module in ROS2.items():
+        version, remedy = versions[name], build if name in BUILT else install
+        if version is None:
+            found.append(Finding(section, name, Status.NOTE, "not installed", remedy))
+        elif error := probes[module].error:
+            detail = f"{version} does not import: {error}"
             found.append(Finding(section, name, Status.NOTE, detail, remedy))
+        else:
+            found.append(Finding(section, name, Status.OK, version))
     return found
 
 
 def judge_python(version: tuple[int, ...], system: str) -> Finding:
     """Whether this Python is one that all libraries have wheels for."""
     name = ".".join(map(str, version))
-    fits = OLDEST_PYTHON <= version[:2] <= NEWEST_PYTHON
-    remedy = "" if fits else "make clean && make PYTHON=python3.12 demo"
-    status = Status.OK if fits else Status.PROBLEM
-    detail = f"{name} on {system}" if fits else f"{name}: 3.11, 3.12 or 3.13 is needed"
-    return Finding("Python", "python", status, detail, remedy)
+    if OLDEST_PYTHON <= version[:2] <= NEWEST_PYTHON:
+        return Finding("Python", "python", Status.OK, f"{name} on {system}")
+    detail = f"{name}: 3.11, 3.12 or 3.13 is needed"
+    remedy = "make clean && make PYTHON=python3.12 demo"
+    return Finding("Python", "python", Status.PROBLEM, detail, remedy)
 
 
-def _judge_project() -> Finding:
-    version = installed_version(PROJECT)
+def _judge_project(version: str | None) -> Finding:
     if version is None:
-        remedy = f"{_pip()} -e ."
-        return Finding("Python", PROJECT, Status.PROBLEM, "not installed", remedy)
-    return Finding("Python", PROJECT, Status.OK, version)
+        return Finding("Python", PROGRAM, Status.PROBLEM, "not installed", f"{_pip()} -e .")
+    return Finding("Python", PROGRAM, Status.OK, version)
 
 
-def judge_library(
-    name: str, version: str | None, bounds: str, probe: ImportProbe | None
-) -> Finding:
-    """Whether a library is there, in a version that fits, and can be imported.
-
-    Args:
-        name: the package as pip knows it.
-        version: its installed version.
-        bounds: what this project asks of it.
-        probe: how its import went; ``None`` if there is nothing to import.
-    """
+def judge_library(name: str, version: str | None, bounds: str, probe: ImportProbe) -> Finding:
+    """Whether a library is there, in a version that fits, and can be imported."""
     remedy = install_line(name, bounds)
-    error = "" if probe is None else probe.error
     if version is None:
         detail = "not installed"
-        if probe is not None and not error:
-            detail = f"not installed by pip here, but found at {probe.file}"
+        if probe.file:
+            detail += f" by pip here, but found at {probe.file}"
     elif not satisfies(version, bounds):
         detail = f"{version} does not fit {bounds}"
-    elif error:
-        detail = f"{version} is installed, but its import fails: {error}"
+    elif probe.error:
+        detail = f"{version} is installed, but its import fails: {probe.error}"
         remedy = install_line(name, bounds, again=True)
-    elif probe is not None and _is_foreign(probe.file):
+    elif _is_foreign(probe.file):
         detail = f"{version}, but {probe.file} is imported in its place"
         remedy = "unset PYTHONPATH"
     else:
@@ -221,14 +203,7 @@ def judge_library(
 
 
 def judge_pairing(placo: str | None, pin: str | None, wanted: str, bounds: str) -> list[Finding]:
-    """Whether placo and Pinocchio were built for each other: placo decides Pinocchio's version.
-
-    Args:
-        placo: installed version of placo.
-        pin: installed version of Pinocchio.
-        wanted: the Pinocchio that the installed placo requires.
-        bounds: what this project asks of placo.
-    """
+    """Whether placo and Pinocchio were built for each other: placo says which is ``wanted``."""
     if placo is None or pin is None:
         return []
     too_new = satisfies(pin, ">=4") and satisfies(placo, "<0.10")
@@ -240,24 +215,20 @@ def judge_pairing(placo: str | None, pin: str | None, wanted: str, bounds: str) 
 
 
 def judge_robot_files(bounds: str) -> list[Finding]:
-    """Whether the Go2's URDF, SRDF and meshes are found.
-
-    Args:
-        bounds: what this project asks of ``example-robot-data``.
-    """
+    """Whether the Go2's URDF, SRDF and meshes are found; ``example-robot-data`` brings them."""
     section, remedy = "Robot files", install_line("example-robot-data", bounds, again=True)
     try:
         from go2_wbc.robot.description import find_description
 
         description = find_description()
-        meshes = sorted({item.get("filename", "") for item in _meshes(description.urdf_path)})
-        for mesh in meshes:
+        urdf, srdf = description.urdf_path, description.srdf_path
+        meshes = {mesh.get("filename", "") for mesh in ET.parse(urdf).iter("mesh")}
+        for mesh in sorted(meshes):
             description.mesh_path(mesh)
     except (DescriptionError, ImportError) as error:
         return [Finding(section, "Go2", Status.PROBLEM, str(error), remedy)]
-    srdf = description.srdf_path
     return [
-        Finding(section, "URDF", Status.OK, str(description.urdf_path)),
+        Finding(section, "URDF", Status.OK, str(urdf)),
         Finding(section, "SRDF", Status.OK, str(srdf))
         if srdf is not None
         else Finding(section, "SRDF", Status.PROBLEM, "not found", remedy),
@@ -265,21 +236,10 @@ def judge_robot_files(bounds: str) -> list[Finding]:
     ]
 
 
-def _meshes(urdf: Path) -> list[ET.Element]:
-    return list(ET.parse(urdf).getroot().iter("mesh"))
-
-
 def judge_solvers(available: tuple[str, ...], bounds: Mapping[str, str]) -> list[Finding]:
-    """Whether ``qpsolvers`` sees every QP solver that the project uses.
-
-    Args:
-        available: the names that ``qpsolvers`` lists.
-        bounds: what this project asks of its dependencies.
-    """
-    packages = {"proxqp": "proxsuite"}
+    """Whether every QP solver that the project uses is ``available`` in ``qpsolvers``."""
     found = []
-    for name in NEEDED_SOLVERS:
-        package = packages.get(name, name)
+    for name, package in NEEDED_SOLVERS.items():
         if name in available:
             found.append(Finding("QP solvers", name, Status.OK, "available"))
         else:
@@ -292,32 +252,25 @@ def judge_solvers(available: tuple[str, ...], bounds: Mapping[str, str]) -> list
 
 
 def judge_extra(name: str, version: str | None) -> Finding:
-    """Whether an optional extra is there; nothing else needs it.
-
-    Args:
-        name: of the extra.
-        version: installed version of its package.
-    """
+    """Whether the package of an optional extra is there; nothing else needs it."""
     package, bounds, purpose = EXTRAS[name]
-    remedy = install_line(package, bounds)
-    if version is None:
-        return Finding("Extras", name, Status.NOTE, f"not installed; for {purpose}", remedy)
-    if not satisfies(version, bounds):
-        detail = f"{package} {version} does not fit {bounds}; for {purpose}"
-        return Finding("Extras", name, Status.NOTE, detail, remedy)
-    return Finding("Extras", name, Status.OK, f"{package} {version}")
+    if version is not None and satisfies(version, bounds):
+        return Finding("Extras", name, Status.OK, f"{package} {version}")
+    found = "not installed" if version is None else f"{package} {version} does not fit {bounds}"
+    line = install_line(package, bounds)
+    return Finding("Extras", name, Status.NOTE, f"{found}; for {purpose}", line)
 
 
 def judge_display(system: str, environment: Mapping[str, str]) -> Finding:
     """Whether ``--viewer`` can open a window; nothing else needs one."""
+    found = next((v for v in ("WAYLAND_DISPLAY", "DISPLAY") if environment.get(v)), None)
     if system in {"darwin", "win32"}:
-        return Finding("Display", "--viewer", Status.OK, "this system has a desktop")
-    for variable in ("WAYLAND_DISPLAY", "DISPLAY"):
-        if environment.get(variable):
-            detail = f"possible, {variable} is {environment[variable]}"
-            return Finding("Display", "--viewer", Status.OK, detail)
-    detail = "no display here; everything else runs without one"
-    return Finding("Display", "--viewer", Status.NOTE, detail)
+        status, detail = Status.OK, "this system has a desktop"
+    elif found is not None:
+        status, detail = Status.OK, f"possible, {found} is {environment[found]}"
+    else:
+        status, detail = Status.NOTE, "no display here; everything else runs without one"
+    return Finding("Display", "--viewer", status, detail)
 
 
 def install_line(name: str, bounds: str, *, again: bool = False) -> str:
@@ -339,33 +292,26 @@ def _is_foreign(file: str) -> bool:
     return bool(file) and not any(Path(file).is_relative_to(home) for home in homes)
 
 
-def _as_json(finding: Finding) -> dict[str, str]:
-    return {
-        "section": finding.section,
-        "subject": finding.subject,
-        "status": finding.status.value.lower(),
-        "detail": finding.detail,
-        "remedy": finding.remedy,
-    }
-
-
 def render(findings: list[Finding]) -> str:
     """The findings as text for a person, 80 columns wide but for paths and lines to type."""
     lines: list[str] = []
-    section = ""
-    for finding in findings:
-        if finding.section != section:
-            section = finding.section
-            lines += [""] * bool(lines) + [section]
-        head = f"  {finding.status.value:<8} {finding.subject:<19} "
-        wrapped = textwrap.wrap(
-            finding.detail, WIDTH - len(head), break_long_words=False, break_on_hyphens=False
-        ) or [""]
-        lines += [(" " * len(head) if number else head) + row for number, row in enumerate(wrapped)]
-        if finding.remedy:
-            lines.append(f"           -> {finding.remedy}")
+    for section, items in groupby(findings, key=lambda finding: finding.section):
+        lines += [section, *(row for item in items for row in _rows(item)), ""]
     problems = sum(finding.status is Status.PROBLEM for finding in findings)
     verdict = "Everything that is needed is here."
     if problems:
         verdict = f"{problems} problem{'s' * (problems > 1)}; the lines after -> fix them."
-    return "\n".join([*lines, "", verdict])
+    return "\n".join([*lines, verdict])
+
+
+def _rows(finding: Finding) -> list[str]:
+    head = f"  {finding.status.value:<8} {finding.subject:<19} "
+    rows = textwrap.wrap(
+        finding.detail,
+        WIDTH,
+        initial_indent=head,
+        subsequent_indent=" " * len(head),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [*rows, f"           -> {finding.remedy}"] if finding.remedy else rows

@@ -10,16 +10,14 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import importlib.metadata
 import logging
 import os
 import sys
 import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
-from types import ModuleType
 
-from controller.cli.common import ExitCode, Subparsers, examples_epilog
+from controller.cli.common import PROGRAM, ExitCode, examples_epilog, installed_version
 from go2_wbc.errors import (
     CommandError,
     ConfigError,
@@ -29,8 +27,6 @@ from go2_wbc.errors import (
     QpInfeasible,
     SolverUnavailable,
 )
-
-PROGRAM = "go2-wbc"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,16 +63,12 @@ go2-wbc doctor --json    the same for a program to read
 go2-wbc COMMAND --help   the options of a command, with examples
 """
 
-EXIT_CODES: tuple[tuple[type[Go2WbcError], ExitCode], ...] = (
-    (MotionError, ExitCode.FAILED),
-    (QpInfeasible, ExitCode.FAILED),
-    (IkError, ExitCode.FAILED),
-    (CommandError, ExitCode.USAGE),
-    (ConfigError, ExitCode.USAGE),
-    (SolverUnavailable, ExitCode.USAGE),
-    (Go2WbcError, ExitCode.RUNTIME),
+EXIT_CODES: tuple[tuple[tuple[type[Go2WbcError], ...], ExitCode], ...] = (
+    ((MotionError, QpInfeasible, IkError), ExitCode.FAILED),
+    ((CommandError, ConfigError, SolverUnavailable), ExitCode.USAGE),
+    ((Go2WbcError,), ExitCode.RUNTIME),
 )
-"""The exit code of an error; the first class that fits counts."""
+"""The exit code of an error; the first row that fits counts."""
 
 _OURS = frozenset({"go2_wbc", "controller", "motions", "viz", "benchmarks"})
 
@@ -93,9 +85,8 @@ class Program:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run ``go2-wbc``; see ``run_program``."""
-    return run_program(
-        Program(PROGRAM, "Whole-body control of the Unitree Go2.", COMMANDS, EXAMPLES), argv
-    )
+    description = "Whole-body control of the Unitree Go2."
+    return run_program(Program(PROGRAM, description, COMMANDS, EXAMPLES), argv)
 
 
 def run_program(program: Program, argv: Sequence[str] | None = None) -> int:
@@ -109,7 +100,13 @@ def run_program(program: Program, argv: Sequence[str] | None = None) -> int:
         0 fine, 1 infeasible or failed, 2 usage, 3 runtime error, 130 interrupted.
     """
     try:
-        code = _run_reporting_errors(program, list(sys.argv[1:] if argv is None else argv))
+        try:
+            code = _run(program, list(sys.argv[1:] if argv is None else argv))
+        except BrokenPipeError:
+            raise
+        except (KeyboardInterrupt, Exception) as error:
+            message, code = _explained(error)
+            print(f"{program.name}: {message}", file=sys.stderr)
         sys.stdout.flush()
     except BrokenPipeError:
         # The reader has gone. Python flushes once more at exit: let that go nowhere.
@@ -123,56 +120,9 @@ def high_five_demo() -> int:
     return main(["demo", *sys.argv[1:]])
 
 
-def build_parser(
-    program: Program, module: ModuleType | None, requested: str | None
-) -> argparse.ArgumentParser:
-    """The parser of the whole command line.
-
-    Args:
-        program: whose.
-        module: the module of the requested subcommand, which registers its own options.
-        requested: that subcommand's name; the others are listed by name and summary only.
-    """
-    parser = argparse.ArgumentParser(
-        prog=program.name,
-        description=program.description,
-        epilog=examples_epilog(program.examples),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    parser.add_argument("--version", action="version", version=f"{PROGRAM} {_version()}")
-    parser.add_argument(
-        "-v", "--verbose", action="store_true", help="log what happens (to standard error)"
-    )
-    subparsers: Subparsers = parser.add_subparsers(
-        title="commands", dest="command", metavar="COMMAND"
-    )
-    for command in program.commands:
-        if module is not None and command.name == requested:
-            module.register(subparsers)
-        else:
-            subparsers.add_parser(command.name, help=command.summary)
-    return parser
-
-
-def _run_reporting_errors(program: Program, argv: list[str]) -> int:
-    try:
-        return _run(program, argv)
-    except BrokenPipeError:
-        raise
-    except KeyboardInterrupt:
-        return _complain(program, "interrupted", ExitCode.INTERRUPTED)
-    except Go2WbcError as error:
-        code = next(code for kind, code in EXIT_CODES if isinstance(error, kind))
-        return _complain(program, str(error), code)
-    except Exception as error:
-        return _complain_about_foreign(program, error)
-
-
 def _run(program: Program, argv: list[str]) -> int:
     requested = next((word for word in argv if not word.startswith("-")), None)
-    modules = {command.name: command.module for command in program.commands}
-    module = importlib.import_module(modules[requested]) if requested in modules else None
-    parser = build_parser(program, module, requested)
+    parser = build_parser(program, requested)
     try:
         args = parser.parse_args(argv)
     except SystemExit as stop:  # argparse has printed its help, version or complaint
@@ -181,38 +131,53 @@ def _run(program: Program, argv: list[str]) -> int:
         level=logging.INFO if args.verbose else logging.WARNING,
         format="%(levelname)s: %(message)s",
     )
-    if module is None:
+    if args.run is None:
         parser.print_help(sys.stderr)
         return ExitCode.USAGE
-    return module.run(args)
+    return args.run(args)
 
 
-def _complain_about_foreign(program: Program, error: Exception) -> int:
-    """Report an error that is not of our tree: a missing library, a file, or a bug."""
-    if isinstance(error, ImportError) and (error.name or "").split(".")[0] not in _OURS:
-        return _complain(
-            program,
-            f"{error}; `{PROGRAM} doctor` says what is missing and how to get it",
-            ExitCode.RUNTIME,
-        )
-    if isinstance(error, OSError) and error.filename is not None:
-        return _complain(program, f"{error.filename}: {error.strerror}", ExitCode.RUNTIME)
-    traceback.print_exception(error)
-    return _complain(
-        program, "this is a bug in the program; the lines above say where", ExitCode.RUNTIME
+def build_parser(program: Program, requested: str | None) -> argparse.ArgumentParser:
+    """The parser of a whole command line.
+
+    Only the ``requested`` subcommand is imported and adds its options; the others are listed.
+    """
+    parser = argparse.ArgumentParser(
+        prog=program.name,
+        description=program.description,
+        epilog=examples_epilog(program.examples),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    version = installed_version(PROGRAM) or "(not installed)"
+    parser.add_argument("--version", action="version", version=f"{PROGRAM} {version}")
+    parser.add_argument(
+        "-v", "--verbose", action="store_true", help="log what happens (to standard error)"
+    )
+    parser.set_defaults(run=None)
+    subparsers = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
+    for command in program.commands:
+        if command.name == requested:
+            module = importlib.import_module(command.module)
+            module.register(subparsers)
+            parser.set_defaults(run=module.run)
+        else:
+            subparsers.add_parser(command.name, help=command.summary)
+    return parser
 
 
-def _complain(program: Program, message: str, code: ExitCode) -> int:
-    print(f"{program.name}: {message}", file=sys.stderr)
-    return code
-
-
-def _version() -> str:
-    try:
-        return importlib.metadata.version(PROGRAM)
-    except importlib.metadata.PackageNotFoundError:
-        return "(not installed)"
+def _explained(error: BaseException) -> tuple[str, ExitCode]:
+    """What to say of an error, and the exit code; a bug shows its traceback first."""
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted", ExitCode.INTERRUPTED
+    if isinstance(error, Go2WbcError):
+        return str(error), next(code for kinds, code in EXIT_CODES if isinstance(error, kinds))
+    if isinstance(error, ImportError) and (error.name or "").split(".")[0] not in _OURS:
+        hint = f"`{PROGRAM} doctor` says what is missing and how to get it"
+        return f"{error}; {hint}", ExitCode.RUNTIME
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}", ExitCode.RUNTIME
+    traceback.print_exception(error)
+    return "this is a bug in the program; the lines above say where", ExitCode.RUNTIME
 
 
 if __name__ == "__main__":

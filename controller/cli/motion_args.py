@@ -9,17 +9,15 @@ from typing import TYPE_CHECKING
 from go2_wbc.errors import CommandError, unknown_name
 
 if TYPE_CHECKING:
-    from motions import Motion, Timeline
+    from motions import FeasibilityReport, Motion, Timeline
 
 MOTION_HELP = "a name of the library, FILE.py, or FILE.py:NAME"
 
 
 def add_motion(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
     """Add the argument for one motion, or any number, and the option for parameters."""
-    if many:
-        parser.add_argument("motion", metavar="MOTION", nargs="*", help=MOTION_HELP)
-    else:
-        parser.add_argument("motion", metavar="MOTION", help=MOTION_HELP)
+    number = "*" if many else None
+    parser.add_argument("motion", metavar="MOTION", nargs=number, help=MOTION_HELP)
     parser.add_argument(
         "--set",
         metavar="NAME=VALUE",
@@ -45,12 +43,7 @@ def timelines(words: list[str], settings: list[str]) -> list[Timeline]:
 
 
 def the_motion(word: str, settings: list[str]) -> Timeline:
-    """The one motion that is meant.
-
-    Raises:
-        CommandError: for an unknown name, a setting that cannot be read, or several motions.
-        TimelineError: for a file that cannot be used or a parameter out of range.
-    """
+    """The one motion that is meant; raises as ``timelines``, and CommandError for several."""
     found = timelines([word], settings)
     if len(found) > 1:
         names = ", ".join(line.name for line in found)
@@ -71,11 +64,15 @@ def motions_of(word: str) -> list[Motion]:
     if not path.endswith(".py"):
         return [find_motion(word)]
     own = load_file(path)
-    if not name:
-        return list(own.values())
-    if name not in own:
+    if name and name not in own:
         raise CommandError(f"{path}: {unknown_name('motion', name, own)}")
-    return [own[name]]
+    return [own[name]] if name else list(own.values())
+
+
+def print_verdict(report: FeasibilityReport) -> None:
+    """Print a line about a motion, and one for each limit that it breaks."""
+    lines = [report.summary(), *(f"     {finding}" for finding in report.failures)]
+    print("\n".join(lines), flush=True)
 
 
 class MotionSource:
@@ -87,33 +84,18 @@ class MotionSource:
     """
 
     def __init__(self, word: str, settings: list[str]) -> None:
-        """Find the motion.
-
-        Args:
-            word: a name of the library, ``FILE.py`` or ``FILE.py:NAME``.
-            settings: parameters as ``NAME=VALUE``.
-
-        Raises:
-            CommandError: for an unknown name, or a file with several motions.
-            TimelineError: for a file that cannot be used.
-        """
-        self._word, self._settings = word, settings
+        """Find the one motion that is meant; raises as ``the_motion``."""
         own, _, _ = word.partition(":")
         if not own.endswith(".py"):  # of the library: read its file too, as if it were one's own
             (motion,) = motions_of(word)
             own = motion.source.rpartition(":")[0]
-            self._word = f"{own}:{word}"
-        self.path = Path(own)
+            word = f"{own}:{word}"
+        self._word, self._settings, self.path = word, settings, Path(own)
         self._seen = self._last = self._signature()
         self.name = self.timeline().name
 
     def timeline(self) -> Timeline:
-        """The motion as its file says now.
-
-        Raises:
-            CommandError: if the file has no such motion, or several and none was chosen.
-            TimelineError: for a file that cannot be used or a parameter that is not valid.
-        """
+        """The motion as its file says now; raises as ``the_motion``."""
         return the_motion(self._word, self._settings)
 
     def has_changed(self) -> bool:

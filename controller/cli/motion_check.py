@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
-from controller.cli.motion_args import add_motion, timelines
+from controller.cli.motion_args import add_motion, print_verdict, timelines
 from controller.cli.progress import ProgressLine
 
 EXAMPLES = """
@@ -39,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     lines = timelines(args.motion, args.values)
     checker = FeasibilityChecker()
     reports = []
-    with ProgressLine(sys.stderr) as progress:
+    with ProgressLine() as progress:
         for number, line in enumerate(lines):
             progress.update(number / len(lines), line.name)
             reports.append(checker.check(line))
@@ -51,7 +50,5 @@ def run(args: argparse.Namespace) -> int:
             print(f"x {finding}")
     else:
         for report in reports:
-            print(report.summary())
-            for finding in report.failures:
-                print(f"     {finding}")
+            print_verdict(report)
     return ExitCode.OK if all(report.ok for report in reports) else ExitCode.FAILED

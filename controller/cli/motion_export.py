@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +27,8 @@ columns, 100 rows a second, in the frame between the feet (x ahead, z up):
 npz: the same as arrays time, q (position, quaternion x y z w, joints), v, a (in
 the base frame), rpy, p_com, stance.
 """
+ARRAYS = ("q", "v", "a", "rpy", "p_com", "stance")
+"""What an npz file holds beside the time."""
 
 
 def register(subparsers: Subparsers) -> None:
@@ -57,38 +58,34 @@ def run(args: argparse.Namespace) -> int:
     path = trajectory_of(compile_timeline(line, model), model)
     if target.suffix == ".npz":
         stream = io.BytesIO()
-        np.savez_compressed(
-            stream,
-            time=path.times,
-            q=path.q,
-            v=path.v,
-            a=path.a,
-            rpy=path.rpy,
-            p_com=path.p_com,
-            stance=path.stance,
-        )
+        arrays: dict[str, Any] = {name: getattr(path, name) for name in ARRAYS}
+        np.savez_compressed(stream, time=path.times, **arrays)
         content = stream.getvalue()
     else:
         content = _csv(path).encode()
     write_atomically(target, content)
-    rows, name = len(path.times), line.name
     if args.json:
-        print_json({"motion": name, "file": str(target), "rows": rows})
+        print_json({"motion": line.name, "file": str(target), "rows": len(path.times)})
     else:
-        print(f"wrote {args.out}: {rows} rows of {name}")
+        print(f"wrote {args.out}: {len(path.times)} rows of {line.name}")
     return ExitCode.OK
 
 
 def _csv(path: Trajectory) -> str:
     joints = [name.removesuffix("_joint") for name in JOINT_NAMES]
     header = ["time", "x", "y", "z", "roll", "pitch", "yaw", *joints]
-    header += [f"{joint}_speed" for joint in joints]
-    header += ["com_x", "com_y", "com_z", *(f"{leg.name}_stance" for leg in LEGS)]
+    header += [f"{joint}_speed" for joint in joints] + ["com_x", "com_y", "com_z"]
+    numbers, feet = ["%.6f"] * len(header), ["%d"] * len(LEGS)
+    header += [f"{leg.name}_stance" for leg in LEGS]
     q, v = path.q, path.v
-    table = np.column_stack([path.times, q[:, :3], path.rpy, q[:, 7:], v[:, 6:], path.p_com])
+    columns = [path.times, q[:, :3], path.rpy, q[:, 7:], v[:, 6:], path.p_com, path.stance]
     stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(header)
-    for row, feet in zip(table, path.stance.astype(int), strict=True):
-        writer.writerow([*(f"{value:.6f}" for value in row), *feet])
+    np.savetxt(
+        stream,
+        np.column_stack(columns),
+        fmt=[*numbers, *feet],
+        delimiter=",",
+        header=",".join(header),
+        comments="",
+    )
     return stream.getvalue()

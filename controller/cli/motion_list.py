@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import argparse
 import textwrap
+from typing import TYPE_CHECKING
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
+
+if TYPE_CHECKING:
+    from motions import Motion
 
 EXAMPLES = """
 go2-wbc list                 the library
@@ -33,24 +37,18 @@ def run(args: argparse.Namespace) -> int:
     else:
         found = list(load_file(args.file).values())
     if args.json:
-        print_json(
-            [
-                {
-                    "name": motion.name,
-                    "summary": motion.summary,
-                    "parameters": {p.name: [p.default, str(p.valid)] for p in motion.parameters},
-                }
-                for motion in found
-            ]
-        )
+        print_json([_as_dict(motion) for motion in found])
         return ExitCode.OK
     column = max(len(motion.name) for motion in found) + 2
     indent = " " * column
     for motion in found:
-        text = textwrap.fill(
-            motion.name.ljust(column) + motion.summary, WIDTH, subsequent_indent=indent
-        )
-        print(text)
+        head = motion.name.ljust(column)
+        print(textwrap.fill(head + motion.summary, WIDTH, subsequent_indent=indent))
         for parameter in motion.parameters:
             print(f"{indent}--set {parameter}")
     return ExitCode.OK
+
+
+def _as_dict(motion: Motion) -> dict[str, object]:
+    values = {item.name: [item.default, str(item.valid)] for item in motion.parameters}
+    return {"name": motion.name, "summary": motion.summary, "parameters": values}

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable
 from contextlib import closing
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     if not args.force:
         report.raise_if_infeasible()
     with (
-        ProgressLine(sys.stderr) as line,
+        ProgressLine() as line,
         closing(GroundTruth(MujocoPlant(friction=args.friction))) as truth,
         GO2Controller(plant=truth) as go2,
     ):
@@ -94,13 +94,11 @@ def run(args: argparse.Namespace) -> int:
 
 def _teller(line: ProgressLine, period: float, name: str, duration: float) -> Callable[[], None]:
     """Shows after every so many ticks how far the robot has come."""
-    ticks = 0
+    ticks = count(1)
 
     def tell() -> None:
-        nonlocal ticks
-        ticks += 1
-        if ticks % TELL_EVERY == 0:
-            time = ticks * period
+        if (tick := next(ticks)) % TELL_EVERY == 0:
+            time = tick * period
             line.update(min(time / (GETTING_READY + duration), 1.0), f"{name}, {time:.1f} s")
 
     return tell

@@ -11,13 +11,13 @@ import json
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 from packaging.requirements import Requirement
 from packaging.specifiers import SpecifierSet
 
-PROJECT = "go2-wbc"
 IMPORT_TIME_LIMIT = 60.0
 """Seconds after which an import counts as hung; the slowest takes 1 s on a laptop."""
 
@@ -27,6 +27,7 @@ module = importlib.import_module(sys.argv[1])
 solvers = getattr(module, "available_solvers", [])
 print(json.dumps({"file": getattr(module, "__file__", None) or "", "solvers": solvers}))
 """
+_SIGNALS = {number.value: number.name for number in signal.Signals}
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,50 +45,33 @@ class ImportProbe:
     solvers: tuple[str, ...] = ()
 
 
-def probe_imports(modules: Iterable[str]) -> dict[str, ImportProbe]:
+def probe_imports(modules: Collection[str]) -> dict[str, ImportProbe]:
     """Import each module in a process of its own, all at the same time."""
-    running = {
-        name: subprocess.Popen(
-            [sys.executable, "-P", "-c", _PROBE, name],
+    with ThreadPoolExecutor(max(len(modules), 1)) as pool:
+        return dict(zip(modules, pool.map(_probe, modules), strict=True))
+
+
+def _probe(module: str) -> ImportProbe:
+    command = [sys.executable, "-P", "-c", _PROBE, module]
+    try:
+        done = subprocess.run(
+            command,
             stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            capture_output=True,
             text=True,
+            timeout=IMPORT_TIME_LIMIT,
+            check=False,
         )
-        for name in modules
-    }
-    return {name: _result(process) for name, process in running.items()}
-
-
-def _result(process: subprocess.Popen[str]) -> ImportProbe:
-    try:
-        out, complaint = process.communicate(timeout=IMPORT_TIME_LIMIT)
     except subprocess.TimeoutExpired:
-        process.kill()
-        process.communicate()
         return ImportProbe(error=f"the import did not end within {IMPORT_TIME_LIMIT:g} s")
-    if process.returncode < 0:
-        return ImportProbe(error=f"the import crashed ({_signal_name(-process.returncode)})")
-    lines = complaint.strip().splitlines()
-    if process.returncode > 0:
-        return ImportProbe(error=lines[-1] if lines else f"exit code {process.returncode}")
-    answer = json.loads(out.splitlines()[-1])
+    if done.returncode < 0:
+        name = _SIGNALS.get(-done.returncode, f"signal {-done.returncode}")
+        return ImportProbe(error=f"the import crashed ({name})")
+    if done.returncode > 0:
+        lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+        return ImportProbe(error=lines[-1])
+    answer = json.loads(done.stdout.splitlines()[-1])
     return ImportProbe(file=answer["file"], solvers=tuple(answer["solvers"]))
-
-
-def _signal_name(number: int) -> str:
-    try:
-        return signal.Signals(number).name
-    except ValueError:
-        return f"signal {number}"
-
-
-def installed_version(distribution: str) -> str | None:
-    """Version of an installed package; ``None`` if it is not installed."""
-    try:
-        return importlib.metadata.version(distribution)
-    except importlib.metadata.PackageNotFoundError:
-        return None
 
 
 def requirements_of(distribution: str) -> Mapping[str, str]:

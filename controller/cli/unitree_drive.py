@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 from contextlib import closing
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.common import ExitCode, Subparsers, add_parser, print_json_line
 
 if TYPE_CHECKING:
     from controller.bridges.unitree.drive import Step
@@ -79,7 +78,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _tell(step: Step, *, as_json: bool) -> None:
     if as_json:
-        print(json.dumps(asdict(step)), flush=True)
+        print_json_line(asdict(step))
         return
     error = "" if step.speed_error is None else f", speed off by {step.speed_error:.3f} m/s"
     print(f"{step.name:<12}{'done' if step.ok else 'NOT done: ' + step.reason}{error}", flush=True)

@@ -63,6 +63,11 @@ class StepResult:
     duration: float
     figures: tuple[Measurement, ...] = ()
 
+    @property
+    def verdict(self) -> str:
+        """A few words for a person."""
+        return "ok" if self.ok else f"NOT DONE: {self.reason}"
+
 
 @dataclass(frozen=True, slots=True)
 class DemoTotals:

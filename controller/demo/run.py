@@ -105,25 +105,15 @@ def _run_step(go2: GO2Controller, step: DemoStep) -> tuple[StepResult, float]:
     except Go2WbcError as error:
         answer, refusal = False, str(error).splitlines()[0]
     cpu_time = time.process_time() - cpu_start
-    recording = _window(go2.recording(MEASUREMENT_RATE), start, go2.state.time)
-    figures = () if refusal else _measured(go2, step, recording)
+    end = go2.state.time
+    recording = _window(go2.recording(MEASUREMENT_RATE), start, end)
+    is_measured = not refusal and len(recording.time) > 0
+    figures = step.measure(StepRun(go2.last_outcome, recording)) if is_measured else ()
     reason = refusal or _failure(go2, answer, figures)
     result = StepResult(
-        step.name,
-        step.label,
-        not reason,
-        reason or "done",
-        start,
-        go2.state.time - start,
-        figures,
+        step.name, step.label, not reason, reason or "done", start, end - start, figures
     )
     return result, cpu_time
-
-
-def _measured(go2: GO2Controller, step: DemoStep, recording: Recording) -> tuple[Measurement, ...]:
-    if len(recording.time) == 0:
-        return ()
-    return step.measure(StepRun(go2.last_outcome, recording))
 
 
 def _failure(go2: GO2Controller, answer: bool | None, figures: Sequence[Measurement]) -> str:

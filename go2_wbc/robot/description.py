@@ -63,7 +63,7 @@ class RobotDescription:
         raise DescriptionError(f"{self.urdf_path}: mesh {filename!r} not found; tried {tried}")
 
 
-def find_description(urdf: Path | None = None) -> RobotDescription:
+def find_description(urdf: Path | str | None = None) -> RobotDescription:
     """The description of the Go2: the installed one, or a user's own URDF.
 
     A user's URDF uses the SRDF beside it (``<name>.srdf`` or ``../srdf/<name>.srdf``), else the
@@ -84,15 +84,16 @@ def find_description(urdf: Path | None = None) -> RobotDescription:
     own = () if share is not None and urdf.is_relative_to(share) else tuple(urdf.parents)
     root = _parse(urdf, "URDF")
     _check_names(urdf, root)
-    _check_joints(urdf, root)
+    _check_masses(urdf, root)
+    efforts, speeds = _joint_limits(urdf, root)
     srdf = _find_srdf(urdf, share)
     return RobotDescription(
         urdf_path=urdf,
         srdf_path=srdf,
         package_dirs=own if share is None else (share, *own),
         disabled_pairs=() if srdf is None else parse_disabled_pairs(srdf),
-        efforts=_limits(urdf, root, "effort"),
-        speeds=_limits(urdf, root, "velocity"),
+        efforts=efforts,
+        speeds=speeds,
     )
 
 
@@ -144,32 +145,27 @@ def _check_names(urdf: Path, root: ET.Element) -> None:
         raise DescriptionError(f"{urdf} does not describe a Go2; it lacks: {', '.join(lacking)}")
 
 
-def _limits(urdf: Path, root: ET.Element, attribute: str) -> tuple[float, ...]:
+def _joint_limits(urdf: Path, root: ET.Element) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Efforts and speeds of the twelve joints, which must turn between two angles."""
     joints = {joint.get("name"): joint for joint in root.findall("joint")}
-    values: list[float] = []
-    for name in JOINT_NAMES:
-        limit = joints[name].find("limit")
-        text = None if limit is None else limit.get(attribute)
-        value = _number(text)
-        if not value > 0.0:
-            message = f"{urdf}: joint {name} has no valid {attribute} limit ({text!r})"
-            raise DescriptionError(message)
-        values.append(value)
-    return tuple(values)
-
-
-def _check_joints(urdf: Path, root: ET.Element) -> None:
-    """The twelve joints must turn between two angles, and no link may have a negative mass."""
-    joints = {joint.get("name"): joint for joint in root.findall("joint")}
+    efforts, speeds = list[float](), list[float]()
     for name in JOINT_NAMES:
         kind, limit = joints[name].get("type"), joints[name].find("limit")
         if kind != "revolute":
             raise DescriptionError(f"{urdf}: joint {name} must be revolute, it is {kind}")
-        lower, upper = (
-            _number(None if limit is None else limit.get(side)) for side in ("lower", "upper")
-        )
+        texts = {} if limit is None else limit.attrib
+        lower, upper = _number(texts.get("lower")), _number(texts.get("upper"))
         if not lower < upper:
             raise DescriptionError(f"{urdf}: joint {name} has no range: {lower:g} to {upper:g} rad")
+        for what, values in (("effort", efforts), ("velocity", speeds)):
+            values.append(_number(texts.get(what)))
+            if not values[-1] > 0.0:
+                message = f"{urdf}: joint {name} has no valid {what} limit ({texts.get(what)!r})"
+                raise DescriptionError(message)
+    return tuple(efforts), tuple(speeds)
+
+
+def _check_masses(urdf: Path, root: ET.Element) -> None:
     for link in root.findall("link"):
         mass = link.find("inertial/mass")
         if mass is not None and not _number(mass.get("value")) >= 0.0:

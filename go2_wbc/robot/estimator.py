@@ -34,6 +34,7 @@ from jaxtyping import Float
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.legs import FOOT_NAMES
+from go2_wbc.robot.description import BASE_LINK
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import cross
 from go2_wbc.robot.state import RobotState
@@ -124,8 +125,10 @@ class StateEstimator:
         self._pin_model = model.pin_model
         self._data = self._pin_model.createData()
         self._foot_frames = [self._pin_model.getFrameId(name) for name in FOOT_NAMES]
-        self._p_base_imu = self._find_imu()
-        self._time: float | None = None
+        imu = IMU_FRAME if self._pin_model.existFrame(IMU_FRAME) else BASE_LINK
+        frame = self._pin_model.frames[self._pin_model.getFrameId(imu)]
+        self._p_base_imu = frame.placement.translation.copy()
+        self._time = -np.inf  # before the first reading
         self._x = np.zeros((6, 3))
         self._P = np.zeros((3, 6, 6))
         self._H = np.zeros((13, 6))
@@ -134,28 +137,19 @@ class StateEstimator:
         self._H[_HEIGHTS, _FEET] = np.eye(4)
         self._H[_REST, _VELOCITY] = 1.0
 
-    def _find_imu(self) -> Float[np.ndarray, "3"]:
-        if not self._pin_model.existFrame(IMU_FRAME):
-            return np.zeros(3)
-        pin.forwardKinematics(self._pin_model, self._data, pin.neutral(self._pin_model))
-        frame = self._pin_model.getFrameId(IMU_FRAME)
-        return np.array(pin.updateFramePlacement(self._pin_model, self._data, frame).translation)
-
     def update(self, reading: SensorReading) -> RobotState:
         """Take in a reading that is newer than the last one; returns the state at its time."""
         quaternion = reading.quaternion / np.linalg.norm(reading.quaternion)
         R = pin.Quaternion(quaternion).toRotationMatrix()
         p_feet, v_feet, rolling = self._feet(reading, R)
         trust = self._trust(reading.foot_forces)
-        step = 0.0 if self._time is None else reading.time - self._time
-        if self._time is None:
+        step = reading.time - self._time
+        if np.isinf(step):
             self._x[_POSITION] = R @ self._p_base_imu
-        if self._time is None or not 0.0 <= step <= self._config.longest_step:
+        if not 0.0 <= step <= self._config.longest_step:
             self._begin(p_feet)
         else:
-            acceleration = (
-                R @ reading.accelerometer
-            )  # specific force: what moves the IMU but gravity
+            acceleration = R @ reading.accelerometer  # what moves the IMU but gravity
             acceleration[2] -= self._gravity
             self._predict(step, acceleration, rolling, trust)
         self._correct(p_feet, rolling - v_feet, trust)

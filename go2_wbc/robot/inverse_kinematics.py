@@ -13,6 +13,7 @@ that solve poses need two models.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
@@ -40,25 +41,17 @@ class PoseTargets:
         p_world_feet: foot centres [m]; the row of a raised leg is not used.
         rpy: roll, pitch, yaw [rad] of the trunk.
         height: height [m] of the base's origin.
-        raised: leg in the air, if any.
-        p_world_paw: foot centre [m] of the raised leg.
-        q_raised: joint angles [rad] of the raised leg, instead of ``p_world_paw``.
-        support: feet that span the polygon for the CoM; by default all that stand.
-        com_margin: least distance [m] of the CoM to the edges of that polygon.
+        raised: leg in the air, if any; its joints stay as they are at the start.
+        com_margin: least distance [m] of the CoM to the edges of the support polygon.
         joint_margin: least distance [rad] of every joint to its limits.
-        is_body_hard: whether orientation and height hold exactly, or give way to the rest.
     """
 
     p_world_feet: Float[np.ndarray, "4 3"]
     rpy: tuple[float, float, float]
     height: float
     raised: Leg | None = None
-    p_world_paw: tuple[float, float, float] | None = None
-    q_raised: tuple[float, float, float] | None = None
-    support: tuple[Leg, ...] | None = None
     com_margin: float = 0.0
     joint_margin: float = 0.05
-    is_body_hard: bool = True
 
     @property
     def stance(self) -> tuple[Leg, ...]:
@@ -68,26 +61,7 @@ class PoseTargets:
     @property
     def polygon(self) -> Float[np.ndarray, "k 2"]:
         """Points on the ground [m] that span the polygon for the CoM."""
-        return self.p_world_feet[list(self.support or self.stance), :2]
-
-
-@dataclass(frozen=True, slots=True)
-class PoseSolution:
-    """A pose that meets its targets.
-
-    Attributes:
-        q: (19,) base position [m], quaternion x y z w, 12 joint angles [rad].
-        p_world_com: CoM [m].
-        com_margin: distance [m] of the CoM to the edges of the targets' polygon, + inside.
-        residuals: how far each target is missed.
-        iterations: Gauss-Newton steps taken.
-    """
-
-    q: Float[np.ndarray, "19"]
-    p_world_com: Float[np.ndarray, "3"]
-    com_margin: float
-    residuals: tuple[ResidualRow, ...]
-    iterations: int
+        return self.p_world_feet[list(self.stance), :2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,15 +69,16 @@ class IkConfig:
     """Numbers of the inverse kinematics. Own choice unless said otherwise.
 
     Attributes:
-        foot_weight: of the soft foot and paw positions, against 1 rad^2 of trunk orientation.
+        foot_weight: of the soft foot positions, against 1 rad^2 of trunk orientation, and of the
+            raised leg's joints.
         body_weight: of the soft trunk height and orientation.
         posture_weight: pulls the standing legs towards ``q_start``; chooses among equal poses.
         damping: of each step, keeps the QP definite at singularities.
         max_step: longest change [rad or m] of a coordinate in one step.
         converged_step: step [rad or m] below which the iteration has converged.
         max_iterations: of each of the two phases.
-        position_tolerance: largest error [m] of a foot or of the hard height.
-        angle_tolerance: largest error [rad] of the hard orientation and of joint targets.
+        position_tolerance: largest error [m] of a foot or of the height.
+        angle_tolerance: largest error [rad] of the orientation and of a raised leg's joints.
         constraint_tolerance: largest violation [m, rad] of CoM margin and joint limits.
     """
 
@@ -153,17 +128,15 @@ def solve_pose(
     targets: PoseTargets,
     q_start: Float[np.ndarray, "19"],
     config: IkConfig | None = None,
-) -> PoseSolution:
+) -> Float[np.ndarray, "19"]:
     """The pose that meets ``targets``, found from ``q_start`` and as near to it as they allow.
 
     Only one thread at a time may solve with the same ``model``; see the module.
 
     Raises:
         IkError: if a target is missed by more than its tolerance; the message gives the table.
-        ValueError: if the targets contradict themselves (a raised leg without its target).
     """
     config = config or IkConfig()
-    _check(targets)
     robot = _ROBOTS.get(model)
     if robot is None:
         robot = _ROBOTS[model] = load_placo_robot(model)
@@ -180,15 +153,15 @@ def solve_pose(
         iterations += more
         if failure:
             robot.state.q = soft_q
-    return _verified(model, targets, np.array(robot.state.q), (iterations, failure), config)
-
-
-def _check(targets: PoseTargets) -> None:
-    given = (targets.p_world_paw is not None) + (targets.q_raised is not None)
-    if given != (targets.raised is not None):
-        raise ValueError(
-            "a raised leg needs one of p_world_paw and q_raised; other poses need neither"
-        )
+    q = np.array(robot.state.q)
+    rows = _residuals(model, targets, q_start, q, config)
+    missed = [(row, limit) for row, limit in rows if not row.norm <= limit]
+    if missed:
+        table = [f"  {r.name:<20} {r.norm:10.3g} {r.unit} (limit {at:g})" for r, at in missed]
+        why = f" ({failure})" if failure else ""
+        head = f"no pose meets the targets after {iterations} steps{why}"
+        raise IkError("\n".join([head, *table]), [row for row, _ in rows])
+    return q
 
 
 def _limit_joints(robot: placo.RobotWrapper, model: RobotModel, margin: float) -> None:
@@ -205,23 +178,20 @@ def _formulate(
     """PlaCo's solver with every target soft, and the tasks to be made exact afterwards."""
     solver = placo.KinematicsSolver(robot)
     solver.enable_joint_limits(True)
-    exact = []
+    exact: list[placo.Task] = []
     for leg in targets.stance:
         exact.append(solver.add_position_task(leg.foot, targets.p_world_feet[leg]))
         exact[-1].configure(leg.foot, "soft", config.foot_weight)
     if targets.raised is not None:
-        exact.append(_raised_task(solver, targets, targets.raised))
+        exact.append(_joints_task(solver, [targets.raised], q_start))
         exact[-1].configure("raised leg", "soft", config.foot_weight)
     orientation = solver.add_orientation_task(_BASE, rotation_from_rpy(*targets.rpy))
     orientation.configure("orientation", "soft", config.body_weight)
     height = solver.add_position_task(_BASE, np.array([0.0, 0.0, targets.height]))
     height.mask.set_axises("z")
     height.configure("height", "soft", config.body_weight)
-    if targets.is_body_hard:
-        exact += [orientation, height]
-    posture = solver.add_joints_task()
-    for leg in targets.stance:
-        posture.set_joints(dict(zip(JOINT_NAMES[leg.joints], q_start[7:][leg.joints], strict=True)))
+    exact += [orientation, height]
+    posture = _joints_task(solver, targets.stance, q_start)
     posture.configure("posture", "soft", config.posture_weight)
     solver.add_regularization_task(config.damping)
     clockwise = list(convex_hull(targets.polygon)[::-1])
@@ -230,13 +200,12 @@ def _formulate(
     return solver, exact
 
 
-def _raised_task(
-    solver: placo.KinematicsSolver, targets: PoseTargets, leg: Leg
-) -> placo.PositionTask | placo.JointsTask:
-    if targets.q_raised is None:
-        return solver.add_position_task(leg.foot, np.array(targets.p_world_paw))
+def _joints_task(
+    solver: placo.KinematicsSolver, legs: Sequence[Leg], q: Float[np.ndarray, "19"]
+) -> placo.JointsTask:
     task = solver.add_joints_task()
-    task.set_joints(dict(zip(JOINT_NAMES[leg.joints], targets.q_raised, strict=True)))
+    for leg in legs:
+        task.set_joints(dict(zip(JOINT_NAMES[leg.joints], q[7:][leg.joints], strict=True)))
     return task
 
 
@@ -258,64 +227,28 @@ def _iterate(
     return config.max_iterations, ""
 
 
-def _verified(
+def _residuals(
     model: RobotModel,
     targets: PoseTargets,
+    q_start: Float[np.ndarray, "19"],
     q: Float[np.ndarray, "19"],
-    outcome: tuple[int, str],
     config: IkConfig,
-) -> PoseSolution:
+) -> list[tuple[ResidualRow, float]]:
+    """How far ``q`` misses each target, with the tolerance."""
     com, feet = model.forward_kinematics(q)
-    margin = support_margin(targets.polygon, com[:2])
-    rows = [*_position_rows(targets, q, feet, config), *_angle_rows(targets, q, config)]
-    short = max(targets.com_margin - margin, 0.0)
-    rows.append((ResidualRow("CoM margin short by", short, "m"), config.constraint_tolerance))
-    beyond = _beyond_limits(model, targets, q)
-    rows.append((ResidualRow("joint limits beyond", beyond, "rad"), config.constraint_tolerance))
-    missed = [(row, limit) for row, limit in rows if not row.norm <= limit]
-    iterations, failure = outcome
-    if missed:
-        table = [f"  {r.name:<20} {r.norm:10.3g} {r.unit} (limit {at:g})" for r, at in missed]
-        why = f" ({failure})" if failure else ""
-        head = f"no pose meets the targets after {iterations} steps{why}"
-        raise IkError("\n".join([head, *table]), [row for row, _ in rows])
-    return PoseSolution(q, com, margin, tuple(row for row, _ in rows), iterations)
-
-
-_Checked = list[tuple[ResidualRow, float]]
-
-
-def _position_rows(
-    targets: PoseTargets,
-    q: Float[np.ndarray, "19"],
-    feet: Float[np.ndarray, "4 3"],
-    config: IkConfig,
-) -> _Checked:
-    at = config.position_tolerance
-    wanted = np.array(targets.p_world_feet)
-    legs = targets.stance
-    if targets.raised is not None and targets.p_world_paw is not None:
-        wanted[targets.raised] = targets.p_world_paw
-        legs = LEGS
-    errors = np.linalg.norm(feet - wanted, axis=1)
-    rows = [(ResidualRow(FOOT_NAMES[leg], float(errors[leg]), "m"), at) for leg in legs]
-    height_error = abs(float(q[2]) - targets.height)
-    limit = at if targets.is_body_hard else np.inf
-    return [*rows, (ResidualRow("height", height_error, "m"), limit)]
-
-
-def _angle_rows(targets: PoseTargets, q: Float[np.ndarray, "19"], config: IkConfig) -> _Checked:
+    joints, most = q[7:], config.position_tolerance
+    off = np.linalg.norm(feet - targets.p_world_feet, axis=1)
+    rows = [(ResidualRow(FOOT_NAMES[leg], float(off[leg]), "m"), most) for leg in targets.stance]
+    rows.append((ResidualRow("height", abs(float(q[2]) - targets.height), "m"), most))
     R_world_base = pin.Quaternion(q[3:7]).matrix()
-    error = log_rotation(R_world_base.T @ rotation_from_rpy(*targets.rpy))
-    limit = config.angle_tolerance if targets.is_body_hard else np.inf
-    rows = [(ResidualRow("orientation", float(np.linalg.norm(error)), "rad"), limit)]
-    if targets.raised is not None and targets.q_raised is not None:
-        difference = q[7:][targets.raised.joints] - np.array(targets.q_raised)
-        row = ResidualRow("raised joints", float(np.abs(difference).max()), "rad")
-        rows.append((row, config.angle_tolerance))
+    turn = float(np.linalg.norm(log_rotation(R_world_base.T @ rotation_from_rpy(*targets.rpy))))
+    rows.append((ResidualRow("orientation", turn, "rad"), config.angle_tolerance))
+    if targets.raised is not None:
+        moved = float(np.abs(joints - q_start[7:])[targets.raised.joints].max())
+        rows.append((ResidualRow("raised joints", moved, "rad"), config.angle_tolerance))
+    short = max(targets.com_margin - support_margin(targets.polygon, com[:2]), 0.0)
+    rows.append((ResidualRow("CoM margin short by", short, "m"), config.constraint_tolerance))
+    least, greatest = model.q_lower + targets.joint_margin, model.q_upper - targets.joint_margin
+    beyond = float(max((least - joints).max(), (joints - greatest).max(), 0.0))
+    rows.append((ResidualRow("joint limits beyond", beyond, "rad"), config.constraint_tolerance))
     return rows
-
-
-def _beyond_limits(model: RobotModel, targets: PoseTargets, q: Float[np.ndarray, "19"]) -> float:
-    lower, upper = model.q_lower + targets.joint_margin, model.q_upper - targets.joint_margin
-    return float(max((lower - q[7:]).max(), (q[7:] - upper).max(), 0.0))

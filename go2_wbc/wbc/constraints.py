@@ -102,7 +102,7 @@ class FrictionPyramid(Inequality):
         C = np.zeros((5 * count, SIZE))
         lower = np.full(5 * count, -np.inf)
         upper = np.zeros(5 * count)
-        pattern = _pyramid(self.friction)
+        pattern = friction_pyramid(self.friction)
         for i, leg in enumerate(stance):
             start = FORCES.start + 3 * leg
             C[5 * i : 5 * i + 5, start : start + 3] = pattern
@@ -187,7 +187,7 @@ def torque_map(
     return A, snapshot.bias[6:]
 
 
-def _pyramid(mu: float) -> Float[np.ndarray, "5 3"]:
+def friction_pyramid(mu: float) -> Float[np.ndarray, "5 3"]:
     """Rows of +-f_x - mu f_z, +-f_y - mu f_z (at most 0) and f_z, on level ground."""
     return np.array(
         [[1.0, 0.0, -mu], [-1.0, 0.0, -mu], [0.0, 1.0, -mu], [0.0, -1.0, -mu], [0.0, 0.0, 1.0]]

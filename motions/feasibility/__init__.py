@@ -1,9 +1,8 @@
 """Feasibility: whether the robot can do a motion, told without simulating it."""
 
 from motions.feasibility.check import FeasibilityChecker, check
-from motions.feasibility.checked_motion import CheckedMotion
+from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion
 from motions.feasibility.limits import FeasibilityLimits
-from motions.feasibility.playable import Playable, compile_motion
 from motions.feasibility.report import FeasibilityReport, Finding, Series
 
 __all__ = [

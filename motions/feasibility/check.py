@@ -7,12 +7,12 @@ import numpy as np
 from go2_wbc.errors import MotionError
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
-from motions.compiler import CompiledPlan, OutOfReach
+from motions.balance import Problem
+from motions.compiler import CompiledPlan
 from motions.feasibility import dynamic, kinematic
-from motions.feasibility.checked_motion import CheckedMotion
+from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.limits import FeasibilityLimits
-from motions.feasibility.playable import Playable, compile_motion
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.trajectory import trajectory_of
 
@@ -70,7 +70,7 @@ class FeasibilityChecker:
         try:
             return self.evaluate(plan).report
         except MotionError as error:
-            unknown = _failed("numbers", "plan", 0.0, np.nan, str(error))
+            unknown = _failed(Problem("numbers", "plan", 0.0, reason=str(error)))
             return FeasibilityReport.of(plan.name, plan.duration, [unknown])
 
     def evaluate(self, motion: Playable) -> CheckedMotion:
@@ -92,11 +92,11 @@ class FeasibilityChecker:
         plan, model, limits = compile_motion(motion, self.model), self.model, self._limits
         path = trajectory_of(plan, model)
         forces = dynamic.forces_of(path, model)
-        unreachable, unbalanced = _as_written(plan)
+        problems = plan.problems if isinstance(plan, CompiledPlan) else ()
         com, zero_moment_point = dynamic.support(path, forces, limits)
         landing_place, landing_speed = kinematic.landing(path, model, limits)
         in_order_of_causes = [
-            *unreachable,
+            *(_failed(problem) for problem in problems if problem.check != "balance"),
             kinematic.reach(path, limits),
             kinematic.joint_position(path, model),
             self_distance(path, self._collision, limits),
@@ -104,7 +104,7 @@ class FeasibilityChecker:
             kinematic.dragging(path, model, limits),
             landing_place,
             kinematic.ends(plan, path, model, limits),
-            *unbalanced,
+            *(_failed(problem) for problem in problems if problem.check == "balance"),
             com,
             kinematic.joint_speed(path, model),
             landing_speed,
@@ -122,19 +122,7 @@ def check(motion: Playable) -> FeasibilityReport:
     return FeasibilityChecker().check(motion)
 
 
-def _as_written(plan: MotionPlan) -> tuple[list[Series], list[Series]]:
-    """What the compiler could not do as it was written: places of feet, and balance."""
-    unreachable, unbalanced = [], []
-    for problem in plan.problems if isinstance(plan, CompiledPlan) else ():
-        if isinstance(problem, OutOfReach):
-            what = (problem.leg, problem.time, problem.miss, "")
-            unreachable.append(_failed("way of a foot", *what))
-        else:
-            what = ("trunk", problem.time, np.nan, problem.reason)
-            unbalanced.append(_failed("balance", *what))
-    return unreachable, unbalanced
-
-
-def _failed(what: str, subject: str, time: float, value: float, note: str) -> Series:
-    one = np.ones((1, 1))
-    return Series(what, "m", (subject,), np.array([time]), value * one, 0 * one, -one, note=note)
+def _failed(problem: Problem) -> Series:
+    one, times, subjects = np.ones((1, 1)), np.array([problem.time]), (problem.subject,)
+    values = problem.miss * one
+    return Series(problem.check, "m", subjects, times, values, 0 * one, -one, note=problem.reason)

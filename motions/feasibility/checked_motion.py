@@ -1,4 +1,4 @@
-"""A motion as the check saw it: its report, the movement, and the forces that it needs."""
+"""A motion as the check saw it, and the one place where all that stands for one is told apart."""
 
 from __future__ import annotations
 
@@ -8,13 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from go2_wbc.geometry import support_margins
+from go2_wbc.errors import CommandError
 from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
 from go2_wbc.reference import MotionPlan
-from motions.compiler import CompiledPlan
+from go2_wbc.robot.model import RobotModel
+from motions.authoring import Motion
+from motions.compiler import CompiledPlan, compile_timeline
 from motions.feasibility.dynamic import Forces
 from motions.feasibility.report import FeasibilityReport
+from motions.registry import load_motion
+from motions.timeline import Timeline
 from motions.trajectory import Trajectory
 
 _LEAST_FEET = 3
@@ -43,11 +47,8 @@ class CheckedMotion:
         Labels are the names of the plan's holds, elsewhere the feet that are in the air.
         """
         path = self.path
-        margin = np.full(len(path.times), np.nan)
-        for stands in np.unique(path.stance, axis=0):
-            if stands.sum() >= _LEAST_FEET:
-                rows = (path.stance == stands).all(axis=1)
-                margin[rows] = support_margins(path.p_feet[stands, :2], path.p_com[rows, :2])
+        (support,) = (series for series in self.report.series if series.check == "support")
+        has_area = path.stance.sum(axis=1) >= _LEAST_FEET
         spans = self.plan.spans if isinstance(self.plan, CompiledPlan) else {}
         return Recording(
             time=path.times,
@@ -57,12 +58,44 @@ class CheckedMotion:
             foot_forces=self.forces.contact[:, :, 2],
             stance=path.stance,
             p_world_com=path.p_com,
-            support_margin=margin,
+            support_margin=np.where(has_area, support.values[:, 0], np.nan),
             labels=tuple(
                 _label(float(t), stands, spans)
                 for t, stands in zip(path.times, path.stance, strict=True)
             ),
         )
+
+
+Playable = str | Motion | Timeline | MotionPlan | CheckedMotion
+"""What stands for a motion: a name of the library, a motion (with its default parameters), a
+timeline, a plan, or a motion that was checked before."""
+
+
+def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
+    """The plan of ``motion`` on the robot ``model``; what is compiled already is not done again.
+
+    Args:
+        motion: a ``Playable``; anything else is refused.
+        model: must not be that of a control loop that runs in another thread.
+
+    Raises:
+        CommandError: for an unknown name, or for what stands for no motion.
+        TimelineError: if the timeline is empty or its parameters are not valid.
+    """
+    if isinstance(motion, CheckedMotion):
+        return motion.plan
+    if isinstance(motion, MotionPlan):
+        return motion
+    if isinstance(motion, str):
+        motion = load_motion(motion)
+    elif isinstance(motion, Motion):
+        motion = motion()
+    if not isinstance(motion, Timeline):
+        raise CommandError(
+            "motion must be a name of the library, a function with @motion before it, a Timeline, "
+            f"a plan or a CheckedMotion, got {motion!r}"
+        )
+    return compile_timeline(motion, model)
 
 
 def _label(

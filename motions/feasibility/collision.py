@@ -55,10 +55,8 @@ def self_distance(
     found = [collision.nearest(q) for q in motion.q[rows]]
     values = np.array([[distance] for distance, _ in found])
     worst = found[int(np.argmin(values))][1]
-    bounds = np.full_like(values, limits.self_distance)
-    return Series(
-        "self-collision", "m", (worst,), motion.times[rows], values, bounds, values - bounds
-    )
+    what = ("self-collision", "m", (worst,), motion.times[rows], values)
+    return Series.against(*what, limits.self_distance, is_floor=True)
 
 
 def _load(model: pin.Model, description: RobotDescription) -> pin.GeometryModel:

@@ -26,6 +26,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.constraints import friction_pyramid
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from motions.feasibility.kinematic import FEET, JOINTS
 from motions.feasibility.limits import FeasibilityLimits
@@ -96,17 +97,16 @@ def torque(
     greatest one, tau <= tau_max (1 - |v| / v_max) / (1 - knee); below the knee the current is the
     limit, tau_max. Only a driving motor, tau v > 0, meets that line; one that brakes is helped.
     """
-    asked = np.abs(forces.tau)
-    bounds = np.tile(limits.torque_share * model.torque_limits, (len(asked), 1))
+    asked, most = np.abs(forces.tau), limits.torque_share * model.torque_limits
     share = np.abs(motion.v[:, 6:]) / model.speed_limits
     fade = np.clip((1.0 - share) / (1.0 - limits.knee_speed_share), 0.0, 1.0)
     at_speed = fade * model.torque_limits
     drives = forces.tau * motion.v[:, 6:] > 0.0
-    left = np.where(drives, at_speed - asked, np.nan)
     tight = TIGHT_TORQUE * float(model.torque_limits.min())
+    what = ("N m", JOINTS, motion.times, asked)
     return (
-        Series("torque", "N m", JOINTS, motion.times, asked, bounds, bounds - asked, tight),
-        Series("torque at speed", "N m", JOINTS, motion.times, asked, at_speed, left, tight),
+        Series.against("torque", *what, most, tight=tight),
+        Series.against("torque at speed", *what, at_speed, where=drives, tight=tight),
     )
 
 
@@ -117,30 +117,19 @@ def contacts(
 
     Friction is max(|f_x|, |f_y|) / f_z, in the axes of the pyramid that the controller keeps.
     """
-    bounds = np.tile([limits.wrench, limits.wrench * ARM], (len(motion.times), 1))
-    short = Series(
-        "contact wrench",
-        "N",
-        ("force", "moment"),
-        motion.times,
-        forces.missing,
-        bounds,
-        bounds - forces.missing,
-    )
-    normal = forces.contact[:, :, 2]
+    times, normal = motion.times, forces.contact[:, :, 2]
     is_needed = ~motion.stance.all(axis=1, keepdims=True)  # on four feet one may be unloaded
     stands = (motion.load_share > LOADED) & is_needed
-    load = np.where(stands, normal - limits.foot_load, np.nan)
-    floor = np.full_like(normal, limits.foot_load)
     sideways = np.abs(forces.contact[:, :, :2]).max(axis=2)
-    is_pressed = normal > PRESSED
-    needed = np.where(is_pressed, sideways / np.where(is_pressed, normal, 1.0), 0.0)
-    grip = np.full_like(needed, limits.friction)
-    left = np.where(is_pressed, grip - needed, np.nan)
+    pressed = normal > PRESSED
+    needed = np.where(pressed, sideways / np.where(pressed, normal, 1.0), 0.0)
+    wrench = ("contact wrench", "N", ("force", "moment"), times, forces.missing)
+    load = ("foot load", "N", FEET, times, normal)
+    grip = ("friction", "", FEET, times, needed)
     return (
-        short,
-        Series("foot load", "N", FEET, motion.times, normal, floor, load, tight=TIGHT_LOAD),
-        Series("friction", "", FEET, motion.times, needed, grip, left, tight=TIGHT_FRICTION),
+        Series.against(*wrench, np.array([limits.wrench, limits.wrench * ARM])),
+        Series.against(*load, limits.foot_load, is_floor=True, where=stands, tight=TIGHT_LOAD),
+        Series.against(*grip, limits.friction, where=pressed, tight=TIGHT_FRICTION),
     )
 
 
@@ -159,16 +148,12 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
         feet = motion.p_feet[stands, :2]
         for column, points in enumerate((motion.p_com[:, :2], forces.zmp)):
             values[rows, column] = support_margins(feet, points[rows])
-    series = []
-    for column, (check, subject, least) in enumerate(
-        (("support", "CoM", limits.support), ("support of ZMP", "ZMP", limits.zero_moment))
-    ):
-        value = values[:, column : column + 1]
-        bound = np.full_like(value, least)
-        series.append(
-            Series(check, "m", (subject,), motion.times, value, bound, value - bound, TIGHT_SUPPORT)
-        )
-    return series[0], series[1]
+    com = ("support", "m", ("CoM",), motion.times, values[:, :1])
+    zmp = ("support of ZMP", "m", ("ZMP",), motion.times, values[:, 1:])
+    return (
+        Series.against(*com, limits.support, is_floor=True, tight=TIGHT_SUPPORT),
+        Series.against(*zmp, limits.zero_moment, is_floor=True, tight=TIGHT_SUPPORT),
+    )
 
 
 def _state(motion: Trajectory, row: int) -> RobotState:
@@ -235,15 +220,5 @@ def _zero_moment_points(
 
 
 _SCALE = np.repeat([1.0, 1.0 / ARM], 3)
-_PYRAMID_ROWS = np.array(
-    [
-        [1.0, 0.0, -PYRAMID],
-        [-1.0, 0.0, -PYRAMID],
-        [0.0, 1.0, -PYRAMID],
-        [0.0, -1.0, -PYRAMID],
-        [0.0, 0.0, 1.0],
-    ]
-)
-"""Of one foot: f_x, -f_x, f_y, -f_y <= mu f_z, and the row of f_z itself."""
-_PYRAMIDS = tuple(np.kron(np.eye(feet), _PYRAMID_ROWS) for feet in (1, 2, 3, 4))
-"""The same for one to four feet."""
+_PYRAMIDS = tuple(np.kron(np.eye(feet), friction_pyramid(PYRAMID)) for feet in (1, 2, 3, 4))
+"""Rows of one to four feet."""

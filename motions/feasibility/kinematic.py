@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
+from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
@@ -32,7 +32,7 @@ TIGHT_ANGLE, TIGHT_SPEED = 0.03, 0.1
 
 def reach(motion: Trajectory, limits: FeasibilityLimits) -> Series:
     """Whether the standing legs reach their feet's places."""
-    return _below("reach", "m", FEET, motion, motion.miss, limits.reach)
+    return Series.against("reach", "m", FEET, motion.times, motion.miss, limits.reach)
 
 
 def joint_position(motion: Trajectory, model: RobotModel) -> Series:
@@ -46,12 +46,9 @@ def joint_position(motion: Trajectory, model: RobotModel) -> Series:
 
 def joint_speed(motion: Trajectory, model: RobotModel) -> Series:
     """Joint speeds against the URDF's limits."""
-    speed = np.abs(motion.v[:, 6:])
-    bounds = np.tile(model.speed_limits, (len(speed), 1))
+    what = ("joint speed", "rad/s", JOINTS, motion.times, np.abs(motion.v[:, 6:]))
     tight = TIGHT_SPEED * float(model.speed_limits.min())
-    return Series(
-        "joint speed", "rad/s", JOINTS, motion.times, speed, bounds, bounds - speed, tight
-    )
+    return Series.against(*what, model.speed_limits, tight=tight)
 
 
 def clearance(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) -> Series:
@@ -60,18 +57,16 @@ def clearance(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) 
     A point p_b of the base is at z of p + R p_b; knees and feet by the legs' forward kinematics.
     """
     corners = [motion.placed(np.tile(corner, (len(motion.times), 1))) for corner in BELLY]
-    heights = [np.min([corner[:, 2] for corner in corners], axis=0)]
-    for leg in LEGS:
-        geometry = LegGeometry.of(model, leg)
-        heights.append(_places(motion, leg, replace(geometry, calf=0.0))[:, 2])
-        heights.append(_places(motion, leg, geometry)[:, 2] - model.foot_radius)
-    values = np.column_stack(heights)
-    floor = np.full_like(values, limits.clearance)
-    floor[:, FOOT_COLUMNS] = -limits.swing_depth
-    margins = values - floor
-    margins[:, FOOT_COLUMNS][motion.stance] = np.nan
+    belly = np.min([corner[:, 2] for corner in corners], axis=0)
+    knees = _feet(motion, model, are_knees=True)[:, :, 2]
+    feet = _feet(motion, model)[:, :, 2] - model.foot_radius
+    values = np.column_stack([belly, np.stack([knees, feet], axis=2).reshape(-1, 8)])
+    floor = np.array([limits.clearance, *[limits.clearance, -limits.swing_depth] * len(LEGS)])
+    is_checked = np.ones_like(values, dtype=bool)
+    is_checked[:, FOOT_COLUMNS] = ~motion.stance
     subjects = ("trunk", *(f"{leg.name} {part}" for leg in LEGS for part in ("knee", "foot")))
-    return Series("clearance", "m", subjects, motion.times, values, floor, margins)
+    what = ("clearance", "m", subjects, motion.times, values)
+    return Series.against(*what, floor, is_floor=True, where=is_checked)
 
 
 def dragging(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) -> Series:
@@ -80,15 +75,13 @@ def dragging(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) -
     Such a foot is not raised, or moves on before it is put down: it would rub, with forces that the
     plan and this check leave out. The way is summed for as long as the foot stays that low.
     """
-    ways = np.zeros((len(motion.times), len(LEGS)))
-    for leg in LEGS:
-        place = _places(motion, leg, LegGeometry.of(model, leg))
-        low = place[:, 2] - model.foot_radius < limits.drag_height
-        rubs = low & ~motion.stance[:, leg]
-        steps = np.linalg.norm(np.diff(place[:, :2], axis=0), axis=1)
-        for row in np.flatnonzero(rubs[1:] & rubs[:-1]):
-            ways[row + 1, leg] = ways[row, leg] + steps[row]
-    return _below("dragging", "m", FEET, motion, ways, limits.drag)
+    places = _feet(motion, model)
+    rubs = (places[:, :, 2] - model.foot_radius < limits.drag_height) & ~motion.stance
+    steps = np.linalg.norm(np.diff(places[:, :, :2], axis=0), axis=2)
+    ways = np.zeros(rubs.shape)
+    for row, leg in np.argwhere(rubs[1:] & rubs[:-1]):
+        ways[row + 1, leg] = ways[row, leg] + steps[row, leg]
+    return Series.against("dragging", "m", FEET, motion.times, ways, limits.drag)
 
 
 def landing(
@@ -99,20 +92,17 @@ def landing(
     The speed at touchdown is that of the sample before: the central difference at the last one in
     the air already reaches to the foot that stands.
     """
-    away = np.full((len(motion.times), 4), np.nan)
-    speed = np.full((len(motion.times), 4), np.nan)
-    for leg in LEGS:
-        place = _places(motion, leg, LegGeometry.of(model, leg))
-        pace = np.linalg.norm(np.gradient(place, motion.times, axis=0), axis=1)
-        stands = motion.stance[:, leg]
-        edges = np.flatnonzero(stands[1:] != stands[:-1])
-        for edge in edges:
-            row = edge if stands[edge + 1] else edge + 1  # the sample of the flight
-            away[row, leg] = np.linalg.norm(place[row] - motion.p_feet[leg])
-            speed[row, leg] = pace[max(row - 1, 0)] if stands[edge + 1] else 0.0
+    stands, times, places = motion.stance, motion.times, _feet(motion, model)
+    paces = np.linalg.norm(np.gradient(places, times, axis=0), axis=2)
+    away, speed = np.full(stands.shape, np.nan), np.full(stands.shape, np.nan)
+    for edge, leg in np.argwhere(stands[1:] != stands[:-1]):
+        lands = stands[edge + 1, leg]
+        row = edge if lands else edge + 1  # the sample of the flight
+        away[row, leg] = np.linalg.norm(places[row, leg] - motion.p_feet[leg])
+        speed[row, leg] = paces[max(row - 1, 0), leg] if lands else 0.0
     return (
-        _below("landing place", "m", FEET, motion, away, limits.landing),
-        _below("landing speed", "m/s", FEET, motion, speed, limits.landing_speed),
+        Series.against("landing place", "m", FEET, times, away, limits.landing),
+        Series.against("landing speed", "m/s", FEET, times, speed, limits.landing_speed),
     )
 
 
@@ -122,12 +112,10 @@ def smoothness(motion: Trajectory, limits: FeasibilityLimits) -> Series:
     A limit on |v_i+1 - v_i|, so on the acceleration over a sample: 400 rad/s^2 of a joint.
     """
     jumps = np.vstack([np.zeros(18), np.abs(np.diff(motion.v, axis=0))])
-    values = np.column_stack(
-        [jumps[:, :3].max(axis=1), jumps[:, 3:6].max(axis=1), jumps[:, 6:].max(axis=1)]
-    )
-    bounds = np.tile([limits.body_jump, limits.body_jump, limits.joint_jump], (len(values), 1))
+    values = np.maximum.reduceat(jumps, (0, 3, 6), axis=1)
+    bounds = np.array([limits.body_jump, limits.body_jump, limits.joint_jump])
     subjects = ("trunk", "trunk turning", "joints")
-    return Series("continuity", "/s", subjects, motion.times, values, bounds, bounds - values)
+    return Series.against("continuity", "/s", subjects, motion.times, values, bounds)
 
 
 def ends(
@@ -136,36 +124,28 @@ def ends(
     """Whether the motion starts and ends at rest in the postures that it names."""
     home = home_poses(model)
     names = tuple(f"{end} {what}" for end in ENDS for what in ("place", "attitude", "speed"))
-    bounds = [limits.stance_position, limits.stance_angle, limits.end_speed] * 2
+    bounds = np.array([limits.stance_position, limits.stance_angle, limits.end_speed] * 2)
     values = []
     for row, posture in ((0, plan.entry), (-1, plan.exit)):
-        pose = np.concatenate([motion.q[row, :3], motion.rpy[row]])
-        off = pose - home[posture]
-        values += [float(np.abs(off[:3]).max()), float(np.abs(off[3:]).max())]
-        values.append(float(np.abs(motion.v[row]).max()))
+        place, attitude = home[posture][:3], home[posture][3:]
+        off = (motion.q[row, :3] - place, motion.rpy[row] - attitude, motion.v[row])
+        values += [float(np.abs(part).max()) for part in off]
     if plan.entry is Posture.LIE or not motion.stance[0].all():
         values[0] = np.inf
     if not motion.stance[-1].all():
         values[3] = np.inf
-    times = np.array([0.0, plan.duration])
-    table, limit = np.tile(values, (2, 1)), np.tile(bounds, (2, 1))
-    margins = limit - table
-    margins[0, 3:], margins[1, :3] = np.nan, np.nan
-    return Series("entry and exit", "m, rad", names, times, table, limit, margins)
+    times, own = np.array([0.0, plan.duration]), np.repeat(np.eye(2, dtype=bool), 3, axis=1)
+    table = np.tile(values, (2, 1))
+    return Series.against("entry and exit", "m, rad", names, times, table, bounds, where=own)
 
 
-def _places(motion: Trajectory, leg: Leg, geometry: LegGeometry) -> Float[np.ndarray, "n 3"]:
-    """The end of a leg of that ``geometry`` [m] in the frame of the motion."""
-    return motion.placed(foot_places(geometry, motion.q[:, 7:][:, leg.joints]))
-
-
-def _below(
-    check: str,
-    unit: str,
-    subjects: tuple[str, ...],
-    motion: Trajectory,
-    values: Float[np.ndarray, "n k"],
-    limit: float,
-) -> Series:
-    bounds = np.full_like(values, limit)
-    return Series(check, unit, subjects, motion.times, values, bounds, bounds - values)
+def _feet(
+    motion: Trajectory, model: RobotModel, *, are_knees: bool = False
+) -> Float[np.ndarray, "n 4 3"]:
+    """Places [m] of the feet's centres, or of the knees, in the frame of the motion."""
+    places = []
+    for leg in LEGS:
+        geometry = LegGeometry.of(model, leg)
+        end = replace(geometry, calf=0.0) if are_knees else geometry
+        places.append(motion.placed(foot_places(end, motion.q[:, 7:][:, leg.joints])))
+    return np.stack(places, axis=1)

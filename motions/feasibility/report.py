@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from go2_wbc.errors import MotionInfeasible
 
@@ -69,26 +69,36 @@ class Series:
     tight: float = 0.0
     note: str = ""
 
+    @staticmethod
+    def against(
+        check: str,
+        unit: str,
+        subjects: tuple[str, ...],
+        times: Float[np.ndarray, " n"],
+        values: Float[np.ndarray, "n k"],
+        limits: Float[np.ndarray, "*some"] | float,
+        *,
+        is_floor: bool = False,
+        where: Bool[np.ndarray, "n k"] | bool = True,
+        tight: float = 0.0,
+    ) -> Series:
+        """Of values that may not exceed ``limits``, or fall below them; checked only ``where``."""
+        bounds = np.broadcast_to(limits, values.shape)
+        left = values - bounds if is_floor else bounds - values
+        margins = np.where(where, left, np.nan)
+        return Series(check, unit, subjects, times, values, bounds, margins, tight)
+
     def findings(self) -> list[Finding]:
         """The worst instant of every subject that was checked."""
         found = []
         for column, subject in enumerate(self.subjects):
-            margins = self.margins[:, column]
-            if np.isnan(margins).all():
+            if np.isnan(self.margins[:, column]).all():
                 continue
-            row = int(np.nanargmin(margins))
-            found.append(
-                Finding(
-                    self.check,
-                    float(self.times[row]),
-                    subject,
-                    float(self.values[row, column]),
-                    float(self.limits[row, column]),
-                    float(margins[row]),
-                    self.unit,
-                    self.note,
-                )
-            )
+            row = int(np.nanargmin(self.margins[:, column]))
+            tables = (self.values, self.limits, self.margins)
+            value, limit, margin = (float(table[row, column]) for table in tables)
+            at = (float(self.times[row]), subject, value, limit, margin)
+            found.append(Finding(self.check, *at, self.unit, self.note))
         return found
 
     def least_margins(self) -> Float[np.ndarray, " n"]:

@@ -11,7 +11,7 @@ from controller.go2_controller import GO2Controller
 from controller.modes import Mode, Outcome
 from controller.telemetry import Telemetry
 from go2_wbc.contacts import Gait
-from go2_wbc.errors import Go2WbcError
+from go2_wbc.errors import Go2WbcError, ModeError
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
@@ -66,6 +66,8 @@ class FakeGo2(GO2Controller):
 
     def move(self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0) -> None:
         self.calls.append("move")
+        if self._the_mode is not Mode.WALKING:
+            raise ModeError(f"move() needs walking mode, not {self._the_mode.value}")
         self._speed = self._share * linear_x
 
     def wait(self, seconds: float) -> None:

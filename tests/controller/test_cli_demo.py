@@ -13,9 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller.cli import demo, demo_files, demo_run, main
+from controller.cli import demo, demo_run, main
 from controller.cli.common import ExitCode
-from controller.cli.demo_files import DemoFiles
 from controller.cli.main import high_five_demo
 from controller.demo import run_demo
 from go2_wbc.errors import ConfigError, PlantTimeout
@@ -51,7 +50,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
         return path
 
     for name in ("export_html", "export_filmstrip", "export_animation"):
-        monkeypatch.setattr(demo_files, name, draw)
+        monkeypatch.setattr(demo_run, name, draw)
 
 
 # --- the command --------------------------------------------------------------------------------
@@ -127,7 +126,7 @@ def test_a_picture_that_cannot_be_made_is_a_runtime_error_after_the_table(
         raise ConfigError("the page would have 9 bytes")
 
     pretend(FakeGo2())
-    monkeypatch.setattr(demo_files, "export_html", refuse)
+    monkeypatch.setattr(demo_run, "export_html", refuse)
     assert main.main(["demo", "--out", str(tmp_path)]) == ExitCode.RUNTIME
     captured = capsys.readouterr()
     assert "All 8 steps done" in captured.out
@@ -267,7 +266,7 @@ def test_the_filmstrip_shows_sitting_swinging_and_the_raised_paw() -> None:
     inside = np.abs(recording.time - forward.start - 1.0) < 0.1
     stance[inside] = (True, False, False, True)
     recording.stance[:] = stance
-    times = demo_files.filmstrip_times(report, recording)
+    times = demo_run.filmstrip_times(report, recording)
     assert times is not None
     rows = [int(np.abs(recording.time - recording.time[0] - t).argmin()) for t in times]
     sit = report.steps[1]
@@ -278,13 +277,13 @@ def test_the_filmstrip_shows_sitting_swinging_and_the_raised_paw() -> None:
 
 def test_a_run_without_these_moments_leaves_the_choice_to_the_filmstrip() -> None:
     go2 = FakeGo2(falls_in="walk")
-    assert demo_files.filmstrip_times(run_demo(go2), go2.recording()) is None
+    assert demo_run.filmstrip_times(run_demo(go2), go2.recording()) is None
 
 
 def test_a_file_in_the_way_of_the_folder_is_named(tmp_path: Path) -> None:
     (tmp_path / "x").touch()
     with pytest.raises(ConfigError, match="it is a file"):
-        DemoFiles.inside(tmp_path / "x")
+        demo_run.checked_paths(tmp_path / "x")
 
 
 # --- the real thing -----------------------------------------------------------------------------

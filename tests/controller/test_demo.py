@@ -14,7 +14,6 @@ import pytest
 
 from controller.demo import DEMO_STEPS, DemoProgress, Measurement, StepResult, run_demo
 from controller.demo.run import three_leg_minima
-from controller.modes import Mode
 from go2_wbc.errors import IkError, PlantTimeout
 from tests.controller.fake_go2 import FakeGo2
 
@@ -34,7 +33,7 @@ def test_the_demo_stands_sits_walks_stops_turns_gives_a_high_five_and_sits() -> 
     go2 = FakeGo2()
     report = run_demo(go2)
     assert go2.calls == [
-        *("stand", "sit", "walk", "move", "wait", "stop", "wait"),
+        *("stand", "sit", "walk", "move", "wait", "move", "stop", "wait"),
         *("turn_left", "high_five", "sit"),
     ]
     assert report.ok
@@ -108,9 +107,7 @@ def test_a_fall_while_waiting_fails_the_walk() -> None:
 def test_there_is_nothing_to_stop_unless_the_robot_walks() -> None:
     stop = next(step for step in DEMO_STEPS if step.name == "stop")
     report = run_demo(FakeGo2(), steps=[stop])
-    assert (
-        report.steps[0].reason == f"nothing to stop: the robot is {Mode.LYING.value}, not walking"
-    )
+    assert report.steps[0].reason == "move() needs walking mode, not lying"
 
 
 def test_progress_is_told_when_a_step_begins_and_when_it_ends() -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import math
+import sys
 
 import pytest
 
@@ -68,18 +68,15 @@ def test_a_terminal_without_ticks_gets_words(encoding: str | None) -> None:
 # --- the progress line --------------------------------------------------------------------------
 
 
-class Terminal(io.StringIO):
-    def isatty(self) -> bool:
-        return True
-
-
-def test_on_a_terminal_progress_is_one_line_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_on_a_terminal_progress_is_one_line_in_place(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setenv("COLUMNS", "40")
-    stream = Terminal()
-    with ProgressLine(stream) as line:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with ProgressLine() as line:
         line.update(0.5, "x" * 100)
         line.done("one piece")
-    text = stream.getvalue()
+    text = capsys.readouterr().err
     assert "\n" not in text
     assert "one piece" not in text
     shown = text.split("\x1b[2K")[1].rstrip("\r")
@@ -87,13 +84,14 @@ def test_on_a_terminal_progress_is_one_line_in_place(monkeypatch: pytest.MonkeyP
     assert text.endswith("\r\x1b[2K")
 
 
-def test_elsewhere_progress_is_one_line_for_each_finished_piece() -> None:
-    stream = io.StringIO()
-    with ProgressLine(stream) as line:
+def test_elsewhere_progress_is_one_line_for_each_finished_piece(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with ProgressLine() as line:
         line.update(0.5, "going on")
         line.done("1/2 stand: ok")
         line.done("2/2 sit: ok")
-    assert stream.getvalue() == "1/2 stand: ok\n2/2 sit: ok\n"
+    assert capsys.readouterr().err == "1/2 stand: ok\n2/2 sit: ok\n"
 
 
 @pytest.mark.parametrize(

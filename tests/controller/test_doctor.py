@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import json
 import sys
+import tomllib
 from argparse import Namespace
 from pathlib import Path
 
 import pytest
 
 from controller.cli import doctor, probes
-from controller.cli.common import ExitCode
+from controller.cli.common import PROGRAM, ExitCode
 from controller.cli.doctor import Finding, Status
 from controller.cli.probes import ImportProbe
 from go2_wbc.errors import DescriptionError
 
+ROOT = Path(__file__).resolve().parents[2]
 INSIDE = str(Path(sys.prefix) / "lib" / "placo.so")
 BOUNDS = ">=0.10.2,<0.11"
 HEALTHY = Finding("Python", "python", Status.OK, "3.11.7")
@@ -28,7 +30,7 @@ def test_the_environment_of_these_tests_is_healthy() -> None:
     findings = doctor.examine()
     # Whether the project itself is installed does not matter for running its tests.
     problems = [item for item in findings if item.status is Status.PROBLEM]
-    assert [item for item in problems if item.subject != probes.PROJECT] == []
+    assert [item for item in problems if item.subject != PROGRAM] == []
     subjects = {item.subject for item in findings}
     assert {"pin", "placo", "mujoco", "placo + pin", "URDF", "SRDF", "daqp"} <= subjects
 
@@ -92,6 +94,12 @@ def test_version_bounds_are_compared_by_number(version: str, bounds: str, fits: 
 def test_requirements_are_read_without_extras() -> None:
     rows = ["placo<0.11,>=0.10.2", "pin", "x[y]>=1 ; python_version>'3'", "ruff; extra == 'dev'"]
     assert probes.parse_requirements(rows) == {"placo": "<0.11,>=0.10.2", "pin": "", "x": ">=1"}
+
+
+def test_every_library_that_the_project_asks_for_is_looked_at() -> None:
+    """``coal`` and ``scipy`` were not: without them all was said to be there."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert set(doctor.LIBRARIES) == set(probes.parse_requirements(project["dependencies"]))
 
 
 def test_the_requirements_of_an_absent_package_are_empty() -> None:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from controller import jobs
 from controller.jobs import Answer, Job, JobServer
 from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import ModeError
@@ -28,14 +29,16 @@ def client(robot: Robot) -> Client:
 
 
 @pytest.fixture
-def clock() -> Clock:
-    return Clock()
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(jobs.time, "monotonic", clock)
+    return clock
 
 
 @pytest.fixture
 def queued(robot: Robot, clock: Clock) -> Client:
     """Of a server with a queue and a patience, as Unitree's clients want it."""
-    return Client(JobServer(robot, queue=2, patience=PATIENCE, clock=clock))
+    return Client(JobServer(robot, queue=2, patience=PATIENCE))
 
 
 @pytest.fixture
@@ -118,6 +121,20 @@ def test_a_reply_that_fails_does_not_stop_the_server(
     client.submit("up")
     client.jobs.work()
     assert client.only("up").success
+
+
+def test_somebody_who_fails_to_hear_of_an_end_does_not_stop_the_server(
+    client: Client, caplog: pytest.LogCaptureFixture
+) -> None:
+    # The ROS 2 server answers "stop" so: an error of the middleware ended its loop.
+    def act(_job: Job) -> Measurements:
+        assert client.jobs.cancel(failing(OSError("no route")))
+        return {}
+
+    client.submit("sit", act)
+    assert client.jobs.work()
+    assert client.only("sit").success
+    assert "sit could not be answered" in caplog.text
 
 
 # --- queue and patience -------------------------------------------------------------------------

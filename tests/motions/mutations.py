@@ -18,8 +18,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, load_motion, motion_names
-from motions.keys import BalanceShift, BodyKey, Frame, LegKey, LegTarget
-from motions.timeline import AnyKey
+from motions.keys import BalanceShift, BodyKey, Frame, Key, LegKey, LegTarget
 
 Mutator = Callable[[Timeline, np.random.Generator], Timeline | None]
 _KeyType = TypeVar("_KeyType", BodyKey, LegKey, BalanceShift)
@@ -185,11 +184,11 @@ def _one(
     return keys[int(rng.integers(len(keys)))] if keys else None
 
 
-def _with(line: Timeline, old: AnyKey, new: AnyKey) -> Timeline:
+def _with(line: Timeline, old: Key, new: Key) -> Timeline:
     return replace(line, keys=tuple(new if key is old else key for key in line.keys))
 
 
-def _without(line: Timeline, old: AnyKey) -> Timeline:
+def _without(line: Timeline, old: Key) -> Timeline:
     return replace(line, keys=tuple(key for key in line.keys if key is not old), cursor=line.end)
 
 

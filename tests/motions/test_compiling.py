@@ -26,6 +26,7 @@ from motions import (
     load_motion,
     tracks,
 )
+from motions.keys import Mark
 
 CHECK = import_module("motions.feasibility.check")  # the package has a function of that name
 SPARE = 1.25
@@ -121,8 +122,8 @@ def test_the_work_of_compiling_grows_as_the_motion_does(
 def test_moves_in_turn_lead_from_goal_to_goal() -> None:
     times = np.linspace(0.0, 4.0, 401)
     moves = [
-        tracks.Move(1.0, 2.0, Ease.LINEAR, np.array([1.0, -2.0])),
-        tracks.Move(2.5, 3.0, Ease.LINEAR, np.array([0.0, 4.0])),
+        (Mark(1.0, 2.0, Ease.LINEAR, "there"), np.array([1.0, -2.0])),
+        (Mark(2.5, 3.0, Ease.LINEAR, "on"), np.array([0.0, 4.0])),
     ]
     path = tracks.followed(times, np.array([0.0, 1.0]), moves)
     for t, expected in ((0.5, (0, 1)), (1.5, (0.5, -0.5)), (2.2, (1, -2)), (2.75, (0.5, 1))):

@@ -16,7 +16,7 @@ from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, deg
-from motions.compiler import OutOfReach, contact_schedule
+from motions.compiler import contact_schedule
 from motions.keys import BalanceShift, BodyKey, LegKey
 from motions.timeline import SHIFT_TIME
 from motions.tracks import home_poses
@@ -158,8 +158,8 @@ def test_in_the_frame_of_the_body_a_raised_foot_goes_with_the_trunk() -> None:
 
 def test_a_place_out_of_reach_is_a_problem_of_the_plan_and_no_near_miss() -> None:
     problems = plan_of(Timeline().foot("FR", x=0.9, z=0.1, over=1.0)).problems
-    (problem,) = [item for item in problems if isinstance(item, OutOfReach)]
-    assert problem.leg == "FR"
+    (problem,) = [item for item in problems if item.check == "way of a foot"]
+    assert problem.subject == "FR"
     assert problem.miss > 0.3
 
 

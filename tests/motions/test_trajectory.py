@@ -7,35 +7,33 @@ import pinocchio as pin
 import pytest
 
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
+from go2_wbc.robot.rotations import log_rotation
 from motions import Timeline, compile_timeline, deg
-from motions.trajectory import SAMPLE_PERIOD, _body_rates, trajectory_of
+from motions.tracks import SAMPLE_PERIOD, attitudes
+from motions.trajectory import _rates, trajectory_of
 
-STEP = 1e-5  # s; of the differences
+STEP = 1e-3  # s; of the differences
+FINE_W, FINE_DW = 1e-4, 1e-3  # of a second derivative of about 1e2 /s^2 times the step squared
 # Of a third derivative of about 1e3 /s^3 times the sample period squared.
 COARSE_V, COARSE_A = 0.02, 0.5
 
 
-def angles(t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Roll, pitch and yaw that all move at once, with both derivatives."""
-    size, rate = np.array([0.4, -0.6, 0.9]), np.array([3.0, 2.0, 1.7])
-    phase = rate * t + np.array([0.3, 0.9, 2.0])
-    return size * np.sin(phase), size * rate * np.cos(phase), -size * rate**2 * np.sin(phase)
+def angles(t: float) -> np.ndarray:
+    """Roll, pitch and yaw that all move at once."""
+    return np.array([0.4, -0.6, 0.9]) * np.sin([3.0 * t + 0.3, 2.0 * t + 0.9, 1.7 * t + 2.0])
 
 
-def turning(t: float) -> tuple[np.ndarray, np.ndarray]:
-    w, dw = _body_rates(*(value[None] for value in angles(t)))
-    return w[0], dw[0]
-
-
-@pytest.mark.parametrize("t", np.linspace(0.0, 3.0, 7))
-def test_angular_velocity_and_acceleration_are_those_of_the_turning_trunk(t: float) -> None:
-    R, before, after = (rotation_from_rpy(*angles(t + d)[0]) for d in (0.0, -STEP, STEP))
-    w = log_rotation(before.T @ after) / (2.0 * STEP)
-    dw = (turning(t + STEP)[0] - turning(t - STEP)[0]) / (2.0 * STEP)
-    assert turning(t)[0] == pytest.approx(w, abs=1e-6)
-    assert turning(t)[1] == pytest.approx(dw, abs=1e-6)
-    assert np.linalg.det(R) == pytest.approx(1.0)
+def test_angular_velocity_and_acceleration_are_those_of_the_turning_trunk() -> None:
+    times = np.arange(0.0, 3.0, STEP)
+    rpy = np.array([angles(float(t)) for t in times])
+    attitude, still = attitudes(rpy), np.zeros((len(times), 15))
+    v, a = _rates(times, np.hstack([still[:, :3], attitude.as_quat(), still[:, 3:]]), rpy, attitude)
+    R = attitude.as_matrix()
+    for row in range(100, len(times) - 100, 100):
+        w = log_rotation(R[row - 1].T @ R[row + 1]) / (2.0 * STEP)
+        assert v[row, 3:6] == pytest.approx(w, abs=FINE_W)
+        dw = (v[row + 1, 3:6] - v[row - 1, 3:6]) / (2.0 * STEP)
+        assert a[row, 3:6] == pytest.approx(dw, abs=FINE_DW)
 
 
 def test_configuration_velocity_and_acceleration_of_a_lively_motion_fit_together() -> None:

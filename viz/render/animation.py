@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -72,9 +73,10 @@ def export_animation(
     for k, time in enumerate(times):
         frames.append(Image.fromarray(frame_renderer.shoot_captioned(time, speed=speed)))
         report(_RENDER_SHARE * (k + 1) / len(times))
-    is_gif = target.suffix.lower() == ".gif"
-    limit = GIF_SIZE_LIMIT if is_gif else SIZE_LIMIT
-    encoded = (encoded_gif if is_gif else encoded_webp)(frames, round(1000 / fps), limit)
+    if target.suffix.lower() == ".gif":
+        encoded = _encoded_gif(frames, round(1000 / fps), GIF_SIZE_LIMIT)
+    else:
+        encoded = encoded_webp(frames, round(1000 / fps), SIZE_LIMIT)
     report(1.0)
     return write_atomically(target, encoded)
 
@@ -85,9 +87,7 @@ def frame_times(recording: Recording, *, speed: float | int, fps: float | int) -
     return [float(time) for time in np.linspace(0.0, recording.duration, count)]
 
 
-def encoded_webp(
-    frames: Sequence[Image.Image], milliseconds: int, limit: int = SIZE_LIMIT
-) -> bytes:
+def encoded_webp(frames: Sequence[Image.Image], milliseconds: int, limit: int) -> bytes:
     """The pictures as one looping WebP, in the best quality that is small enough.
 
     Args:
@@ -99,24 +99,18 @@ def encoded_webp(
         ConfigError: if the file is too large in every quality.
     """
     probes = frames[:: max(1, len(frames) // _PROBES)]
-    quality = _QUALITIES[-1]
-    for candidate in _QUALITIES:
-        mean = np.mean([len(_still_webp(frame, candidate)) for frame in probes])
+    # Every frame whole (kmax): frames that repair others leave ghosts where all moves.
+    settings = {"method": _EFFORT, "kmax": 1}
+    for quality in _QUALITIES:
+        settings["quality"] = quality
+        mean = np.mean([len(_saved(frame, "WEBP", settings)) for frame in probes])
         if mean * len(frames) <= _HEADROOM * limit:
-            quality = candidate
             break
-    # Every frame whole: frames that repair others leave ghosts where all moves.
-    settings = {"quality": quality, "method": _EFFORT, "kmax": 1}
     return _within(limit, frames, _film(frames, "WEBP", milliseconds, settings))
 
 
-def encoded_gif(
-    frames: Sequence[Image.Image], milliseconds: int, limit: int = GIF_SIZE_LIMIT
-) -> bytes:
-    """The pictures as one looping GIF, in the most colours that are small enough.
-
-    Args: and Raises: as of ``encoded_webp``.
-    """
+def _encoded_gif(frames: Sequence[Image.Image], milliseconds: int, limit: int) -> bytes:
+    """The same as one looping GIF, in the most colours that are small enough."""
     content = b""
     for colors in _COLORS:
         few = [frame.quantize(colors, dither=Image.Dither.NONE) for frame in frames]
@@ -129,9 +123,13 @@ def encoded_gif(
 def _film(
     frames: Sequence[Image.Image], kind: str, milliseconds: int, settings: Mapping[str, int]
 ) -> bytes:
+    film = {"save_all": True, "append_images": frames[1:], "duration": milliseconds, "loop": 0}
+    return _saved(frames[0], kind, {**film, **settings})
+
+
+def _saved(frame: Image.Image, kind: str, settings: Mapping[str, Any]) -> bytes:
     stream = io.BytesIO()
-    more = {"append_images": frames[1:], "duration": milliseconds, "loop": 0, **settings}
-    frames[0].save(stream, kind, save_all=True, **more)
+    frame.save(stream, kind, **settings)
     return stream.getvalue()
 
 
@@ -142,9 +140,3 @@ def _within(limit: int, frames: Sequence[Image.Image], content: bytes) -> bytes:
             f"of {frames[0].size}: raise speed, or lower fps or size"
         )
     return content
-
-
-def _still_webp(frame: Image.Image, quality: int) -> bytes:
-    stream = io.BytesIO()
-    frame.save(stream, "WEBP", quality=quality, method=_EFFORT)
-    return stream.getvalue()

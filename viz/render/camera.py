@@ -54,36 +54,25 @@ class Camera:
 
         Points must lie in front of the camera.
         """
-        seen = (points - self.p_world_camera) @ self.R_camera_world.T
-        nearness = -1.0 / seen[:, 2]
-        focal = self.focal_length
-        return np.column_stack(
-            [
-                self.size[0] / 2 + focal * seen[:, 0] * nearness,
-                self.size[1] / 2 - focal * seen[:, 1] * nearness,
-                nearness,
-            ]
-        )
+        scaled = (points - self.p_world_camera) @ self._M_picture_world.T
+        nearness = 1 / scaled[:, 2:]
+        return np.hstack([scaled[:, :2] * nearness, nearness])
 
     @property
     def H_floor_picture(self) -> Float[np.ndarray, "3 3"]:
         """Homography from (column, row, 1) [px] to floor (x, y, 1) [m] up to scale.
 
-        The ray of a pixel is d = M (column, row, 1), here ``ray`` @ it, and the eye e + s d meets
-        the floor z = 0 at s = -e_z / d_z: x = e_x - e_z d_x / d_z, so that x (-d_z) = e_z d_x -
-        e_x d_z, and likewise y. The third component, -d_z, is positive where the pixel shows the
-        floor, negative above the horizon.
+        The inverse of how floor points are projected, times the height of the eye. The third
+        component is the slope of the pixel's ray: positive where it goes down to the floor,
+        negative above the horizon.
         """
-        focal = self.focal_length
-        right, up, back = self.R_camera_world
-        ray = np.column_stack(
-            [
-                right / focal,
-                -up / focal,
-                -back - right * self.size[0] / 2 / focal + up * self.size[1] / 2 / focal,
-            ]
-        )
         eye = self.p_world_camera
-        return np.vstack(
-            [-eye[0] * ray[2] + eye[2] * ray[0], -eye[1] * ray[2] + eye[2] * ray[1], -ray[2]]
-        )
+        onto_floor = np.column_stack([np.eye(3)[:, :2], -eye])  # (x, y, 1) less the eye
+        return eye[2] * np.linalg.inv(self._M_picture_world @ onto_floor)
+
+    @property
+    def _M_picture_world(self) -> Float[np.ndarray, "3 3"]:
+        """From a point less the eye to (column, row, 1), times its distance along the view."""
+        focal, (width, height) = self.focal_length, self.size
+        K = np.array([[focal, 0.0, -width / 2], [0.0, -focal, -height / 2], [0.0, 0.0, -1.0]])
+        return K @ self.R_camera_world

@@ -2,52 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 from PIL import Image, ImageFilter
 
 from viz.render.camera import Camera
-from viz.render.posed_robot import WorldTriangles
+from viz.render.mesh import Surface
 from viz.render.rasterizer import rasterize
 
 _LEAST_SCALE = 1e-4  # pixels closer than this to the horizon count as sky
-
-
-@dataclass(frozen=True, slots=True)
-class FloorStyle:
-    """How the floor looks. Colours are red, green, blue in 0..1.
-
-    Attributes:
-        light, dark: the two tiles.
-        sky_top, horizon: the background, from the picture's top to the horizon.
-        tile: edge of a tile [m].
-        fog_start, fog_end: distances from the target [m] where tiles begin to fade and are gone.
-        shadow: darkness of a full shadow, 0..1.
-        shadow_texels: edge of the square shadow texture [px].
-        shadow_width: edge of the floor square that the texture covers [m].
-        sharp_below: casters lower than this [m] throw a sharp shadow.
-        blur_low, blur_high: standard deviation of the blur for low and high casters [m].
-    """
-
-    light: tuple[float, float, float] = (0.965, 0.970, 0.978)
-    dark: tuple[float, float, float] = (0.905, 0.916, 0.934)
-    sky_top: tuple[float, float, float] = (0.985, 0.988, 0.994)
-    horizon: tuple[float, float, float] = (0.930, 0.940, 0.955)
-    tile: float = 0.25
-    fog_start: float = 1.2
-    fog_end: float = 4.5
-    shadow: float = 0.62
-    shadow_texels: int = 320
-    shadow_width: float = 2.0
-    sharp_below: float = 0.12
-    blur_low: float = 0.010
-    blur_high: float = 0.028
+# Red, green, blue in 0..1: the two tiles, and the background from the picture's top to the horizon.
+_LIGHT_TILE, _DARK_TILE = (0.965, 0.970, 0.978), (0.905, 0.916, 0.934)
+_SKY_TOP, _HORIZON = (0.985, 0.988, 0.994), (0.930, 0.940, 0.955)
+_TILE = 0.25  # [m] edge of a tile
+_FOG_START, _FOG_END = 1.2, 4.5  # [m] from the target: tiles begin to fade there, and are gone
+_SHADOW = 0.62  # darkness of a full shadow, 0..1
+_TEXELS = 320  # [px] edge of the square shadow texture
+_TEXELS_PER_METRE = _TEXELS / 2.0  # it covers a square of 2 m
+_SHARP_BELOW = 0.12  # [m] casters lower than this throw a sharp shadow
+_BLUR_LOW, _BLUR_HIGH = 0.010, 0.028  # [m] standard deviation of the blur for low and high casters
 
 
 def paint_floor(
-    camera: Camera, casters: WorldTriangles, light: Float[np.ndarray, "3"], style: FloorStyle
+    camera: Camera, casters: Surface, light: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "h w 3"]:
     """The picture without the robot: floor, background and shadow.
 
@@ -55,19 +32,19 @@ def paint_floor(
         camera: where the picture is taken from.
         casters: what throws a shadow.
         light: unit vector towards the light in the world.
-        style: colours and sizes.
     """
     horizon, x, y = _floor_points(camera)
-    visible = _visibility(x, y, camera, style)
-    checker = _checker(x, y, camera, style.tile)
-    lit = 1 - np.float32(style.shadow) * _shadow_on_picture(camera, casters, light, style)
+    visible = _visibility(x, y, camera)
+    checker = _checker(x, y)
+    lit = 1 - np.float32(_SHADOW) * _shadow_on_picture(camera, casters, light)
     width, height = camera.size
     picture = np.empty((height, width, 3), dtype=np.float32)
     ramp = np.linspace(0, 1, height, dtype=np.float32)[:, None] ** np.float32(0.7)
-    for channel in range(3):
-        sky = style.sky_top[channel] + (style.horizon[channel] - style.sky_top[channel]) * ramp
+    colors = zip(_SKY_TOP, _HORIZON, _DARK_TILE, _LIGHT_TILE, strict=True)
+    for channel, (top, bottom, dark, light_tile) in enumerate(colors):
+        sky = top + (bottom - top) * ramp
         picture[:, :, channel] = sky
-        tiles = style.dark[channel] + (style.light[channel] - style.dark[channel]) * checker
+        tiles = dark + (light_tile - dark) * checker
         tiles -= sky[horizon:]
         tiles *= visible
         picture[horizon:, :, channel] += tiles
@@ -95,24 +72,22 @@ def _floor_points(
 
 
 def _visibility(
-    x: Float[np.ndarray, "r w"], y: Float[np.ndarray, "r w"], camera: Camera, style: FloorStyle
+    x: Float[np.ndarray, "r w"], y: Float[np.ndarray, "r w"], camera: Camera
 ) -> Float[np.ndarray, "r w"]:
     """1 near the target, falling to 0 where the fog hides the tiles."""
     distance = np.hypot(x - float(camera.p_world_target[0]), y - float(camera.p_world_target[1]))
-    clear = (style.fog_end - distance) / (style.fog_end - style.fog_start)
+    clear = (_FOG_END - distance) / (_FOG_END - _FOG_START)
     return np.clip(clear, 0, 1, out=clear) ** 2
 
 
-def _checker(
-    x: Float[np.ndarray, "r w"], y: Float[np.ndarray, "r w"], camera: Camera, tile: float
-) -> Float[np.ndarray, "r w"]:
+def _checker(x: Float[np.ndarray, "r w"], y: Float[np.ndarray, "r w"]) -> Float[np.ndarray, "r w"]:
     """Box-filtered checkerboard in 0..1 (Quilez, "Filtering the checkerboard pattern", 2016)."""
     columns = np.abs(np.diff(x[:, :2])), np.abs(np.diff(y[:, :2]))
     product = np.ones((), dtype=np.float32)
     for value, across in zip((x, y), columns, strict=True):
         along = np.abs(np.gradient(value[:, value.shape[1] // 2]))[:, None]
-        spread = np.maximum(np.maximum(across, along), _LEAST_SCALE) / (2 * tile)
-        middle = value / (2 * tile)
+        spread = np.maximum(np.maximum(across, along), _LEAST_SCALE) / (2 * _TILE)
+        middle = value / (2 * _TILE)
         filtered = _triangle_wave(middle + spread / 2) - _triangle_wave(middle - spread / 2)
         filtered /= spread
         product = product * filtered
@@ -127,19 +102,18 @@ def _triangle_wave(value: Float[np.ndarray, "r w"]) -> Float[np.ndarray, "r w"]:
 
 
 def _shadow_on_picture(
-    camera: Camera, casters: WorldTriangles, light: Float[np.ndarray, "3"], style: FloorStyle
+    camera: Camera, casters: Surface, light: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "h w"]:
     """Share of light that the robot takes from each pixel of the floor, 0..1."""
-    per_metre = style.shadow_texels / style.shadow_width
-    left = float(camera.p_world_target[0]) - style.shadow_width / 2
-    top = float(camera.p_world_target[1]) + style.shadow_width / 2
-    to_texel = per_metre * np.array([[1, 0, -left], [0, -1, top], [0, 0, 1 / per_metre]])
+    scale, half = _TEXELS_PER_METRE, _TEXELS / 2
+    left, top = (scale * float(value) for value in camera.p_world_target[:2])
+    to_texel = np.array([[scale, 0, half - left], [0, -scale, half + top], [0, 0, 1]])
     flat = casters.points[:, :2] - casters.points[:, 2:] * (light[:2] / light[2])
     texels = np.column_stack([flat, np.ones(len(flat))]) @ to_texel.T
-    is_low = casters.points[:, 2][casters.triangles[:, 0]] < style.sharp_below
+    is_low = casters.points[:, 2][casters.triangles[:, 0]] < _SHARP_BELOW
     lit = 1.0
-    for mask, blur in ((is_low, style.blur_low), (~is_low, style.blur_high)):
-        lit = lit * (1 - _blurred_mask(texels, casters.triangles[mask], blur * per_metre, style))
+    for mask, blur in ((is_low, _BLUR_LOW), (~is_low, _BLUR_HIGH)):
+        lit = lit * (1 - _blurred_mask(texels, casters.triangles[mask], blur * scale))
     texture = Image.fromarray(np.round(255 * (1 - lit)).astype(np.uint8))
     H = to_texel @ camera.H_floor_picture
     coefficients = tuple((H / H[2, 2]).ravel()[:8])
@@ -150,13 +124,9 @@ def _shadow_on_picture(
 
 
 def _blurred_mask(
-    texels: Float[np.ndarray, "n 3"],
-    triangles: Int[np.ndarray, "m 3"],
-    blur: float,
-    style: FloorStyle,
+    texels: Float[np.ndarray, "n 3"], triangles: Int[np.ndarray, "m 3"], blur: float
 ) -> Float[np.ndarray, "s s"]:
-    size = (style.shadow_texels, style.shadow_texels)
-    covered = np.zeros(size[0] * size[1], dtype=np.uint8)
-    covered[rasterize(texels, triangles, size).pixel] = 255
-    image = Image.fromarray(covered.reshape(size)).filter(ImageFilter.GaussianBlur(blur))
+    covered = np.zeros((_TEXELS, _TEXELS), dtype=np.uint8)
+    covered.reshape(-1)[rasterize(texels, triangles, covered.shape).pixel] = 255
+    image = Image.fromarray(covered).filter(ImageFilter.GaussianBlur(blur))
     return np.asarray(image, dtype=np.float32) / 255

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import final
 
 import numpy as np
@@ -15,12 +15,16 @@ from viz.content import Annotation
 from viz.palette import FORCE, rgb
 from viz.render.camera import Camera
 from viz.render.framing import camera_path, heading_path, nearest_rows
+from viz.render.mesh import Surface
 from viz.render.overlay import Caption, draw_caption
-from viz.render.posed_robot import PosedRobot, WorldTriangles, arrow
-from viz.render.renderer import RenderStyle, render
+from viz.render.posed_robot import PosedRobot, arrow
+from viz.render.renderer import render
 from viz.render.robot_meshes import load_robot_visuals
 
 _INSTANT = 0.04  # [s] a limit that is broken for an instant is told for this long around it
+_SWAY_PERIOD = 26.0  # [s]
+_METRES_PER_NEWTON = 0.002  # length of the force arrows
+_LEAST_FORCE = 4.0  # [N] weaker forces draw no arrow
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,30 +34,24 @@ class ShotStyle:
     Attributes:
         size: width and height [px].
         azimuth: mean direction of the camera seen from the robot, 0 is ahead of it [rad].
-        sway: the azimuth swings by this much [rad] around its mean ...
-        sway_period: ... once in this time [s]; a still camera looks dead.
+        sway: the azimuth swings by this much [rad] around its mean; a still camera looks dead.
         elevation: camera angle above the floor [rad].
         distance: from the camera to the robot [m].
         smoothing: standard deviation [s] of the low-pass filter on where the camera looks.
         turn_smoothing: the same for its turning with the robot.
         detail: size of the smallest feature kept of the meshes [m].
-        metres_per_newton: length of the force arrows.
-        least_force: weaker forces draw no arrow [N].
-        render: lights, floor, samples.
+        samples: edge of the sample grid in each pixel.
     """
 
     size: tuple[int, int] = (640, 400)
     azimuth: float = np.deg2rad(-52.0)
     sway: float = np.deg2rad(14.0)
-    sway_period: float = 26.0
     elevation: float = np.deg2rad(17.0)
     distance: float = 1.62
     smoothing: float = 0.6
     turn_smoothing: float = 1.5
     detail: float = 0.006
-    metres_per_newton: float = 0.002
-    least_force: float = 4.0
-    render: RenderStyle = field(default_factory=RenderStyle)
+    samples: int = 2
 
 
 @final
@@ -79,33 +77,29 @@ class FrameRenderer:
 
     def shoot(self, time: float) -> UInt8[np.ndarray, "h w 3"]:
         """The picture at ``time`` seconds after the start of the recording."""
-        recording, style = self._recording, self._style
-        k = int(nearest_rows(recording, np.array([time]))[0])
-        robot = self._robot.at(recording.q[k])
-        camera = self._camera(time)
-        lighting = style.render.lighting.turned(camera.azimuth - style.azimuth)
-        shown = replace(style.render, lighting=lighting)
-        return render(camera, robot, shown, extras=self._arrows(recording, k))
-
-    def caption(
-        self, time: float, *, speed: float | int = 1.0, with_progress: bool = True
-    ) -> Caption:
-        """What there is to say about the same time."""
-        recording = self._recording
-        k = int(nearest_rows(recording, np.array([time]))[0])
-        progress = time / max(recording.duration, 1e-9) if with_progress else None
-        touching = recording.foot_forces[k] > self._style.least_force
-        broken = self._broken_at(time)
-        if broken is None:
-            return Caption(recording.labels[k], time, progress, touching, speed)
-        label = f"{broken.limit}: {broken.subject}"
-        return Caption(label, time, progress, touching, speed, is_alarm=True)
+        style, k = self._style, self._row(time)
+        camera, robot = self._camera(time), self._robot.at(self._recording.q[k])
+        turn = camera.azimuth - style.azimuth
+        return render(camera, robot, self._arrows(k), samples=style.samples, turn=turn)
 
     def shoot_captioned(
-        self, time: float, *, speed: float | int = 1.0
+        self, time: float, *, speed: float | int = 1.0, with_progress: bool = True
     ) -> UInt8[np.ndarray, "h w 3"]:
         """The picture at ``time`` with its caption."""
-        return draw_caption(self.shoot(time), self.caption(time, speed=speed))
+        recording, k = self._recording, self._row(time)
+        broken = self._broken_at(time)
+        caption = Caption(
+            label=recording.labels[k] if broken is None else f"{broken.limit}: {broken.subject}",
+            time=time,
+            progress=time / max(recording.duration, 1e-9) if with_progress else None,
+            contacts=recording.foot_forces[k] > _LEAST_FORCE,
+            speed=speed,
+            is_alarm=broken is not None,
+        )
+        return draw_caption(self.shoot(time), caption)
+
+    def _row(self, time: float) -> int:
+        return int(nearest_rows(self._recording, np.array([time]))[0])
 
     def _broken_at(self, time: float) -> Annotation | None:
         for annotation in self._broken:
@@ -118,15 +112,15 @@ class FrameRenderer:
         times, points = self._path
         target = np.array([np.interp(time, times, points[:, axis]) for axis in range(3)])
         heading = np.interp(self._recording.time[0] + time, self._recording.time, self._heading)
-        sway = style.sway * np.sin(2 * np.pi * time / style.sway_period)
+        sway = style.sway * np.sin(2 * np.pi * time / _SWAY_PERIOD)
         azimuth = style.azimuth + heading + sway
         return Camera(target, float(azimuth), style.elevation, style.distance, style.size)
 
-    def _arrows(self, recording: Recording, k: int) -> list[WorldTriangles]:
-        style = self._style
+    def _arrows(self, k: int) -> list[Surface]:
+        recording = self._recording
         feet = self._robot.feet(recording.q[k]) - [0.0, 0.0, FOOT_RADIUS]
         return [
-            arrow(foot, float(force) * style.metres_per_newton, 0.006, rgb(FORCE))
+            arrow(foot, float(force) * _METRES_PER_NEWTON, 0.006, rgb(FORCE))
             for foot, force in zip(feet, recording.foot_forces[k], strict=True)
-            if force > style.least_force
+            if force > _LEAST_FORCE
         ]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+import pinocchio as pin
 import trimesh
 from jaxtyping import Float, Int
 
@@ -13,23 +15,45 @@ _QUADRIC_REGULARISATION = 0.02  # share of the mean point in a cluster's positio
 
 
 @dataclass(frozen=True, slots=True)
-class SurfaceMesh:
-    """An indexed triangle surface in its own frame.
+class Surface:
+    """Coloured triangles.
 
     Attributes:
         points: (n, 3) vertex positions [m].
         normals: (n, 3) outward unit normals; a crease repeats the point with another normal.
         triangles: (m, 3) vertex rows, counter-clockwise seen from outside.
+        colors: (m, 3) red, green, blue of each triangle in 0..1.
     """
 
     points: Float[np.ndarray, "n 3"]
     normals: Float[np.ndarray, "n 3"]
     triangles: Int[np.ndarray, "m 3"]
+    colors: Float[np.ndarray, "m 3"]
+
+    @staticmethod
+    def joined(parts: Sequence[Surface]) -> Surface:
+        """All triangles of several surfaces as one."""
+        offsets = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
+        return Surface(
+            np.concatenate([part.points for part in parts]),
+            np.concatenate([part.normals for part in parts]),
+            np.concatenate([part.triangles + o for part, o in zip(parts, offsets, strict=True)]),
+            np.concatenate([part.colors for part in parts]),
+        )
+
+    def placed(self, T: pin.SE3) -> Surface:
+        """The same surface in another frame, in which its own has the pose ``T``."""
+        R = T.rotation.T
+        return replace(self, points=self.points @ R + T.translation, normals=self.normals @ R)
 
 
 def smooth_surface(
-    points: Float[np.ndarray, "n 3"], triangles: Int[np.ndarray, "m 3"], *, crease: float
-) -> SurfaceMesh:
+    points: Float[np.ndarray, "n 3"],
+    triangles: Int[np.ndarray, "m 3"],
+    color: Float[np.ndarray, "3"],
+    *,
+    crease: float,
+) -> Surface:
     """Weld a triangle soup and give it normals that are smooth except across creases.
 
     The surface is cut into patches along its creases, and a vertex has the mean normal of the
@@ -38,17 +62,21 @@ def smooth_surface(
     Args:
         points: vertex positions [m], repeated ones allowed.
         triangles: vertex rows.
+        color: red, green, blue in 0..1.
         crease: faces that meet at a larger angle than this [rad] keep a sharp edge.
     """
     mesh = _welded(points, triangles)
     mesh.update_faces(mesh.nondegenerate_faces())
     patches = trimesh.graph.smooth_shade(mesh, angle=crease, facet_minarea=None)
-    return SurfaceMesh(
-        np.array(patches.vertices), np.array(patches.vertex_normals), np.array(patches.faces)
+    return Surface(
+        np.array(patches.vertices),
+        np.array(patches.vertex_normals),
+        np.array(patches.faces),
+        np.tile(color, (len(patches.faces), 1)),
     )
 
 
-def simplify(mesh: SurfaceMesh, *, cell: float, crease: float) -> SurfaceMesh:
+def simplify(mesh: Surface, *, cell: float, crease: float) -> Surface:
     """Collapse all vertices within one grid cell into one, placed by quadric error.
 
     Vertex clustering (Rossignac and Borrel, "Multi-resolution 3D approximations for rendering
@@ -58,7 +86,7 @@ def simplify(mesh: SurfaceMesh, *, cell: float, crease: float) -> SurfaceMesh:
     survive with opposite orientation.
 
     Args:
-        mesh: the surface.
+        mesh: the surface, of one colour.
         cell: edge of the grid cells [m]; features smaller than this disappear.
         crease: see ``smooth_surface``, for the new normals [rad].
     """
@@ -71,7 +99,8 @@ def simplify(mesh: SurfaceMesh, *, cell: float, crease: float) -> SurfaceMesh:
     # Every triangle once: turned so that its lowest row leads, which keeps its orientation.
     order = (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3
     faces = np.unique(np.take_along_axis(faces, order, axis=1), axis=0)
-    return smooth_surface(_cluster_points(welded, cluster), faces, crease=crease)
+    points = _cluster_points(welded, cluster)
+    return smooth_surface(points, faces, mesh.colors[0], crease=crease)
 
 
 def _welded(points: Float[np.ndarray, "n 3"], triangles: Int[np.ndarray, "m 3"]) -> trimesh.Trimesh:

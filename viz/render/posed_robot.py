@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from go2_wbc.legs import FOOT_NAMES
+from viz.render.mesh import Surface
 from viz.render.robot_meshes import RobotVisuals
 
 _ARROW_SIDES = 12
@@ -19,70 +18,24 @@ _HEAD_SHARE = 2.4  # arrow head: its radius over the shaft's
 _HEAD_LENGTH = 4.5  # arrow head: its length over the shaft's radius
 
 
-@dataclass(frozen=True, slots=True)
-class WorldTriangles:
-    """Triangles in the world, with what the renderer needs to shade them.
-
-    Attributes:
-        points: (n, 3) [m].
-        normals: (n, 3) unit.
-        triangles: (m, 3) rows of ``points``.
-        colors: (m, 3) in 0..1.
-    """
-
-    points: Float[np.ndarray, "n 3"]
-    normals: Float[np.ndarray, "n 3"]
-    triangles: Int[np.ndarray, "m 3"]
-    colors: Float[np.ndarray, "m 3"]
-
-    @staticmethod
-    def joined(parts: Sequence[WorldTriangles]) -> WorldTriangles:
-        """All triangles of several sets as one."""
-        offsets = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
-        return WorldTriangles(
-            np.concatenate([part.points for part in parts]),
-            np.concatenate([part.normals for part in parts]),
-            np.concatenate([part.triangles + o for part, o in zip(parts, offsets, strict=True)]),
-            np.concatenate([part.colors for part in parts]),
-        )
-
-
 @final
 class PosedRobot:
     """Places the robot's surface in the world."""
 
     def __init__(self, visuals: RobotVisuals) -> None:
-        """Gather all meshes, in the frames of their joints, into one array sorted by joint."""
+        """Gather the surfaces of each link in the frame of its joint."""
         self._model = visuals.model
         self._data = visuals.model.createData()
         self._foot_frames = [visuals.model.getFrameId(name) for name in FOOT_NAMES]
-        parts = []
-        self._slices: list[tuple[int, slice]] = []
-        count = 0
-        for visual in visuals.visuals:
-            start = count
-            R, p = visual.T_joint_visual[:3, :3], visual.T_joint_visual[:3, 3]
-            for part in visuals.meshes[visual.mesh]:
-                surface = part.surface
-                colors = np.tile(np.array(part.color) / 255, (len(surface.triangles), 1))
-                points, normals = surface.points @ R.T + p, surface.normals @ R.T
-                parts.append(WorldTriangles(points, normals, surface.triangles, colors))
-                count += len(points)
-            self._slices.append((visual.joint, slice(start, count)))
-        self._local = WorldTriangles.joined(parts)
+        self._links = [
+            (item.parentJoint, Surface.joined(visuals.meshes[item.meshPath]).placed(item.placement))
+            for item in visuals.geometry.geometryObjects
+        ]
 
-    def at(self, q: Float[np.ndarray, "19"]) -> WorldTriangles:
+    def at(self, q: Float[np.ndarray, "19"]) -> Surface:
         """The robot's surface in the configuration ``q`` (quaternion x y z w)."""
         pin.forwardKinematics(self._model, self._data, q)
-        local = self._local
-        points, normals = np.empty_like(local.points), np.empty_like(local.normals)
-        for joint, rows in self._slices:
-            T_world_joint = self._data.oMi[joint]
-            R = T_world_joint.rotation.T
-            np.matmul(local.points[rows], R, out=points[rows])
-            points[rows] += T_world_joint.translation
-            np.matmul(local.normals[rows], R, out=normals[rows])
-        return WorldTriangles(points, normals, local.triangles, local.colors)
+        return Surface.joined([link.placed(self._data.oMi[joint]) for joint, link in self._links])
 
     def feet(self, q: Float[np.ndarray, "19"]) -> Float[np.ndarray, "4 3"]:
         """Centres of the four feet in the world [m]."""
@@ -97,7 +50,7 @@ class PosedRobot:
 
 def arrow(
     start: Float[np.ndarray, "3"], length: float, radius: float, color: tuple[float, float, float]
-) -> WorldTriangles:
+) -> Surface:
     """An upright arrow.
 
     Args:
@@ -110,7 +63,7 @@ def arrow(
     wide = _HEAD_SHARE * radius
     neck = length - head
     profile = [(0.0, 0.0), (radius, 0.0), (radius, neck), (wide, neck), (0.0, length)]
-    return WorldTriangles.joined(
+    return Surface.joined(
         [_cone_band(start, *band, color=color) for band in itertools.pairwise(profile)]
     )
 
@@ -121,7 +74,7 @@ def _cone_band(
     high: tuple[float, float],
     *,
     color: tuple[float, float, float],
-) -> WorldTriangles:
+) -> Surface:
     """The surface between two rings (radius, height) around the vertical through ``start``.
 
     Its normal is the profile's way (d_radius, d_height) after a right turn: (d_height, -d_radius).
@@ -135,7 +88,7 @@ def _cone_band(
     faces = [np.column_stack([a, b, b + _ARROW_SIDES])]
     faces += [np.column_stack([a, b + _ARROW_SIDES, a + _ARROW_SIDES])]
     triangles = np.concatenate(faces)
-    return WorldTriangles(
+    return Surface(
         np.concatenate(rings),
         np.tile(normal, (2, 1)),
         triangles,

@@ -29,22 +29,10 @@ class Fragments:
     triangle: Int[np.ndarray, " k"]
 
 
-@dataclass(frozen=True, slots=True)
-class _Rows:
-    """Horizontal runs of samples: run i is row ``y`` from ``first``, ``count`` samples long."""
-
-    triangle: Int[np.ndarray, " r"]
-    y: Int[np.ndarray, " r"]
-    first: Int[np.ndarray, " r"]
-    count: Int[np.ndarray, " r"]
-
-
 def rasterize(
     points: Float[np.ndarray, "n 3"],
     triangles: Int[np.ndarray, "m 3"],
     size: tuple[int, int],
-    *,
-    cull_back: bool = True,
 ) -> Fragments:
     """Find the triangle that is in front at each sample.
 
@@ -54,32 +42,34 @@ def rasterize(
 
     Args:
         points: x (right) and y (down) in pixels, and nearness (> 0, larger is closer).
-        triangles: rows of ``points``, counter-clockwise as seen (with y pointing up).
+        triangles: rows of ``points``, counter-clockwise as seen (with y pointing up); the others
+            are seen from behind, and dropped.
         size: width and height [px].
-        cull_back: drop triangles that are seen from behind.
     """
     width, height = size
     corners = triangles.T
     x, y = points[:, 0][corners], points[:, 1][corners]
-    area = doubled_area(x, y)
-    kept = area > _LEAST_AREA if cull_back else np.abs(area) > _LEAST_AREA
-    top = np.ceil(np.minimum(np.minimum(y[0], y[1]), y[2]) - 0.5)
-    bottom = np.floor(np.maximum(np.maximum(y[0], y[1]), y[2]) - 0.5)
-    rows = np.flatnonzero(kept & (top <= bottom) & (bottom >= 0) & (top < height))
-    x, y, area = x[:, rows], y[:, rows], area[rows]
-    runs = _scan(x, y, area, (width, height))
-    step_x, step_y, start = plane_coefficients(x, y, area, points[:, 2][corners[:, rows]])
-    at_row = start[runs.triangle] + step_y[runs.triangle] * (runs.y + 0.5)
-    run = np.repeat(np.arange(len(runs.y)), runs.count)
-    column = _expand(runs.first, runs.count)
-    nearness = at_row.astype(np.float32)[run] + step_x[runs.triangle].astype(np.float32)[run] * (
+    top = np.maximum(np.ceil(np.minimum(np.minimum(y[0], y[1]), y[2]) - 0.5), 0)
+    bottom = np.minimum(np.floor(np.maximum(np.maximum(y[0], y[1]), y[2]) - 0.5), height - 1)
+    kept = np.flatnonzero((_doubled_area(x, y) > _LEAST_AREA) & (top <= bottom))
+    x, y, top = x[:, kept], y[:, kept], top[kept].astype(np.int64)
+    counts = bottom[kept].astype(np.int64) - top + 1
+    triangle, row = np.repeat(np.arange(len(kept)), counts), _expand(top, counts)
+    first, last = _spans(x, y, triangle, row, width)
+    covered = np.flatnonzero(last >= first)
+    triangle, row, first, last = (values[covered] for values in (triangle, row, first, last))
+    step_x, step_y, start = plane_coefficients(x, y, points[:, 2][corners[:, kept]])
+    at_row = start[triangle] + step_y[triangle] * (row + 0.5)
+    column = _expand(first, last - first + 1)
+    run = np.repeat(np.arange(len(row)), last - first + 1)
+    nearness = at_row.astype(np.float32)[run] + step_x[triangle].astype(np.float32)[run] * (
         column.astype(np.float32) + np.float32(0.5)
     )
-    pixel = (runs.y * width)[run] + column
-    return _resolve(pixel, nearness, rows[runs.triangle].astype(np.int32)[run], width * height)
+    pixel = (row * width)[run] + column
+    return _resolve(pixel, nearness, kept[triangle].astype(np.int32)[run], width * height)
 
 
-def doubled_area(
+def _doubled_area(
     x: Float[np.ndarray, "3 m"], y: Float[np.ndarray, "3 m"]
 ) -> Float[np.ndarray, " m"]:
     """Twice the area of each triangle [px^2], positive if counter-clockwise (with y up).
@@ -93,61 +83,51 @@ def doubled_area(
 def plane_coefficients(
     x: Float[np.ndarray, "3 m"],
     y: Float[np.ndarray, "3 m"],
-    area: Float[np.ndarray, " m"],
     value: Float[np.ndarray, "3 m"],
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
     """Slopes along x and y, and value at the origin, of the plane through three corner values.
 
     From value[k] - value[0] = slope_x (x[k] - x[0]) + slope_y (y[k] - y[0]) for k = 1, 2 by
-    Cramer's rule, whose determinant is ``area``.
+    Cramer's rule, whose determinant is twice the area.
 
     Args:
         x: columns of the three corners [px].
         y: rows of the three corners [px].
-        area: ``doubled_area(x, y)``.
         value: the quantity at the corners.
     """
+    area = _doubled_area(x, y)
     d1, d2 = value[1] - value[0], value[2] - value[0]
     slope_x = (d2 * (y[1] - y[0]) - d1 * (y[2] - y[0])) / area
     slope_y = (d1 * (x[2] - x[0]) - d2 * (x[1] - x[0])) / area
     return slope_x, slope_y, value[0] - slope_x * x[0] - slope_y * y[0]
 
 
-def _scan(
+def _spans(
     x: Float[np.ndarray, "3 m"],
     y: Float[np.ndarray, "3 m"],
-    area: Float[np.ndarray, " m"],
-    size: tuple[int, int],
-) -> _Rows:
-    """Cut every triangle into its rows of covered samples, clipped to the picture.
+    triangle: Int[np.ndarray, " r"],
+    row: Int[np.ndarray, " r"],
+    width: int,
+) -> tuple[Int[np.ndarray, " r"], Int[np.ndarray, " r"]]:
+    """First and last column that each triangle covers in its rows, clipped to the picture.
 
     At the height y an edge a-b is crossed at x = x_a + (y - y_a) (x_b - x_a) / (y_b - y_a). Edges
     that rise bound a row of a triangle on one side, those that fall on the other.
     """
-    width, height = size
-    top = np.ceil(np.minimum(np.minimum(y[0], y[1]), y[2]) - 0.5)
-    bottom = np.floor(np.maximum(np.maximum(y[0], y[1]), y[2]) - 0.5)
-    top = np.maximum(top, 0).astype(np.int64)
-    counts = np.minimum(bottom, height - 1).astype(np.int64) - top + 1
-    triangle = np.repeat(np.arange(len(counts)), counts)
-    row = _expand(top, counts)
-    centre = row + 0.5
     low = np.full(len(row), -np.inf)
     high = np.full(len(row), np.inf)
-    turn = np.sign(area)
+    centre = row + 0.5
     for a, b in ((0, 1), (1, 2), (2, 0)):
         rise = y[b] - y[a]
         slope = (x[b] - x[a]) / np.where(rise == 0, 1.0, rise)
         start = x[a] - y[a] * slope
         crossing = start[triangle] + centre * slope[triangle]
-        side = (rise * turn)[triangle]
+        side = rise[triangle]
         np.maximum(low, crossing, out=low, where=side > 0)
         np.minimum(high, crossing, out=high, where=side < 0)
     first = np.clip(np.ceil(low - 0.5 - _COVERAGE_SLACK), 0, width).astype(np.int64)
     last = np.clip(np.floor(high - 0.5 + _COVERAGE_SLACK), -1, width - 1).astype(np.int64)
-    covered = np.flatnonzero(last >= first)
-    first = first[covered]
-    return _Rows(triangle[covered], row[covered], first, last[covered] - first + 1)
+    return first, last
 
 
 def _expand(first: Int[np.ndarray, " r"], count: Int[np.ndarray, " r"]) -> Int[np.ndarray, " k"]:

@@ -3,119 +3,78 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
+from go2_wbc.robot.rotations import yaw_rotation
 from viz.render.camera import Camera
-from viz.render.floor import FloorStyle, paint_floor
-from viz.render.posed_robot import WorldTriangles
-from viz.render.rasterizer import doubled_area, plane_coefficients, rasterize
+from viz.render.floor import paint_floor
+from viz.render.mesh import Surface
+from viz.render.rasterizer import plane_coefficients, rasterize
 
-
-@dataclass(frozen=True, slots=True)
-class Lighting:
-    """A key light, a weak fill light and a sky that is brighter above than below.
-
-    Attributes:
-        key: towards the key light, world frame, need not be unit.
-        fill: towards the fill light.
-        key_strength, fill_strength: diffuse intensities.
-        sky, ground: ambient intensity on faces that look up and down.
-        gloss: strength of the highlight.
-        shininess: exponent of the highlight (Blinn-Phong).
-    """
-
-    key: tuple[float, float, float] = (0.35, -0.55, 0.95)
-    fill: tuple[float, float, float] = (-0.8, -0.3, 0.35)
-    key_strength: float = 0.64
-    fill_strength: float = 0.16
-    sky: float = 0.53
-    ground: float = 0.30
-    gloss: float = 0.26
-    shininess: float = 28.0
-
-    def turned(self, angle: float) -> Lighting:
-        """The same lights turned about the vertical [rad], as when they move with the camera."""
-        c, s = np.cos(angle), np.sin(angle)
-        (kx, ky, kz), (fx, fy, fz) = self.key, self.fill
-        return replace(
-            self,
-            key=(float(c * kx - s * ky), float(s * kx + c * ky), kz),
-            fill=(float(c * fx - s * fy), float(s * fx + c * fy), fz),
-        )
-
-    @property
-    def towards_key(self) -> Float[np.ndarray, "3"]:
-        """Unit vector towards the key light."""
-        key = np.array(self.key)
-        return key / np.linalg.norm(key)
-
-
-@dataclass(frozen=True, slots=True)
-class RenderStyle:
-    """How a picture is drawn.
-
-    Attributes:
-        samples: edge of the sample grid in each pixel; 2 gives four samples.
-        floor: the floor.
-        lighting: the lights.
-        extras_lead: extras count as nearer by this factor, so that an arrow shows in front of the
-            leg that it stands in.
-    """
-
-    samples: int = 2
-    extras_lead: float = 1.1
-    floor: FloorStyle = field(default_factory=FloorStyle)
-    lighting: Lighting = field(default_factory=Lighting)
+# Towards the key light and a weak fill light, world frame.
+_LIGHTS = np.array([[0.35, -0.55, 0.95], [-0.8, -0.3, 0.35]])
+_KEY_STRENGTH, _FILL_STRENGTH = 0.64, 0.16  # diffuse intensities
+_SKY, _GROUND = 0.53, 0.30  # ambient intensities on faces that look up and down
+_GLOSS, _SHININESS = 0.26, 28.0  # strength and exponent of the highlight (Blinn-Phong)
+_EXTRAS_LEAD = 1.1  # extras count as nearer: an arrow shows in front of the leg that it stands in
 
 
 def render(
     camera: Camera,
-    robot: WorldTriangles,
-    style: RenderStyle,
+    robot: Surface,
+    extras: Sequence[Surface] = (),
     *,
-    extras: Sequence[WorldTriangles] = (),
+    samples: int = 2,
+    turn: float = 0.0,
 ) -> UInt8[np.ndarray, "h w 3"]:
     """One picture.
 
     Args:
         camera: view and picture size.
         robot: the robot's surface; throws the shadow.
-        style: lights, floor, samples per pixel.
         extras: more geometry, without shadow and in front, such as arrows.
+        samples: edge of the sample grid in each pixel; 2 gives four samples.
+        turn: of the lights about the vertical [rad], as when they move with the camera.
     """
     width, height = camera.size
-    picture = paint_floor(camera, robot, style.lighting.towards_key, style.floor)
-    solids = WorldTriangles.joined([robot, *extras]) if extras else robot
-    projected = camera.scaled(style.samples).project(solids.points)
-    projected[len(robot.points) :, 2] *= style.extras_lead
-    color, coverage = _solids(camera, solids, projected, style)
+    lights = towards_lights(turn)
+    picture = paint_floor(camera, robot, lights[0])
+    solids = Surface.joined([robot, *extras])
+    projected = camera.scaled(samples).project(solids.points)
+    projected[len(robot.points) :, 2] *= _EXTRAS_LEAD
+    brightness = _vertex_brightness(solids.normals, camera.R_camera_world[2], lights)
+    color, coverage = _solids(solids, projected, brightness, camera.size, samples)
     picture *= 1 - coverage.reshape(height, width, 1)
     picture += color.reshape(height, width, 3)
     return np.round(255 * np.clip(picture, 0, 1)).astype(np.uint8)
 
 
+def towards_lights(turn: float = 0.0) -> Float[np.ndarray, "2 3"]:
+    """Unit vectors towards the key and the fill light, turned about the vertical [rad]."""
+    lights = _LIGHTS @ yaw_rotation(turn).T
+    return lights / np.linalg.norm(lights, axis=1, keepdims=True)
+
+
 def _solids(
-    camera: Camera,
-    solids: WorldTriangles,
+    solids: Surface,
     projected: Float[np.ndarray, "n 3"],
-    style: RenderStyle,
+    brightness: Float[np.ndarray, "n 2"],
+    size: tuple[int, int],
+    samples: int,
 ) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, " k"]]:
     """Colour (times coverage) and coverage of each pixel by solid geometry."""
-    fine = camera.scaled(style.samples)
-    seen = rasterize(projected, solids.triangles, fine.size)
-    is_seen = np.zeros(len(solids.triangles), dtype=bool)
-    is_seen[seen.triangle] = True
+    width, height = size
+    seen = rasterize(projected, solids.triangles, (width * samples, height * samples))
+    is_seen = np.bincount(seen.triangle, minlength=len(solids.triangles)) > 0
     faces, slot = np.flatnonzero(is_seen), (np.cumsum(is_seen) - 1)[seen.triangle]
-    row, column = np.divmod(seen.pixel, fine.size[0])
+    row, column = np.divmod(seen.pixel, width * samples)
     corners = solids.triangles[faces].T
-    brightness = _vertex_brightness(camera, solids, style.lighting)
     diffuse, highlight = _interpolated(projected, corners, brightness, (row, column, slot))
-    pixel = (row // style.samples) * camera.size[0] + column // style.samples
-    count = camera.size[0] * camera.size[1]
-    share = 1 / style.samples**2
+    pixel = (row // samples) * width + column // samples
+    count = width * height
+    share = 1 / samples**2
     color = np.empty((count, 3), dtype=np.float32)
     for channel in range(3):
         tint = solids.colors[faces, channel].astype(np.float32)[slot]
@@ -140,11 +99,9 @@ def _interpolated(
     """
     row, column, slot = samples
     x, y = projected[:, 0][corners], projected[:, 1][corners]
-    area = doubled_area(x, y)
     result = []
-    for channel in range(values.shape[1]):
-        value = values[:, channel][corners]
-        planes = plane_coefficients(x, y, area, value)
+    for value in values.T[:, corners]:
+        planes = plane_coefficients(x, y, value)
         step_x, step_y, start = (plane.astype(np.float32)[slot] for plane in planes)
         level = start + step_x * (column + np.float32(0.5)) + step_y * (row + np.float32(0.5))
         low, high = value.min(axis=0).astype(np.float32), value.max(axis=0).astype(np.float32)
@@ -153,17 +110,17 @@ def _interpolated(
 
 
 def _vertex_brightness(
-    camera: Camera, solids: WorldTriangles, lighting: Lighting
+    normals: Float[np.ndarray, "n 3"],
+    back: Float[np.ndarray, "3"],
+    lights: Float[np.ndarray, "2 3"],
 ) -> Float[np.ndarray, "n 2"]:
-    """Diffuse (times the material's colour) and white highlight at each vertex."""
-    normals = solids.normals
-    key = lighting.towards_key
-    fill = np.array(lighting.fill) / np.linalg.norm(lighting.fill)
-    half = key + camera.R_camera_world[2]
+    """Diffuse (times the material's colour) and white highlight, seen from the way ``back``."""
+    key, fill = lights
+    half = key + back
     half /= np.linalg.norm(half)
     upward = 0.5 + 0.5 * normals[:, 2]
-    diffuse = lighting.ground + (lighting.sky - lighting.ground) * upward
-    diffuse += lighting.key_strength * np.maximum(normals @ key, 0)
-    diffuse += lighting.fill_strength * np.maximum(normals @ fill, 0)
-    highlight = lighting.gloss * np.maximum(normals @ half, 0) ** lighting.shininess
+    diffuse = _GROUND + (_SKY - _GROUND) * upward
+    diffuse += _KEY_STRENGTH * np.maximum(normals @ key, 0)
+    diffuse += _FILL_STRENGTH * np.maximum(normals @ fill, 0)
+    highlight = _GLOSS * np.maximum(normals @ half, 0) ** _SHININESS
     return np.column_stack([diffuse, highlight])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -16,9 +17,7 @@ from go2_wbc.robot.model import FOOT_RADIUS
 from viz.content import check_recording
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.framing import nearest_rows
-from viz.render.overlay import draw_caption
 from viz.render.posed_robot import PosedRobot
-from viz.render.renderer import RenderStyle
 from viz.render.robot_meshes import load_robot_visuals
 
 FILMSTRIP_SUFFIXES = (".png",)
@@ -27,7 +26,7 @@ _COLUMNS = 3
 _PANEL = (560, 380)  # [px]
 _GAP = 12  # [px]
 _CORNER = 18  # [px] radius
-_STYLE = ShotStyle(size=_PANEL, distance=1.6, detail=0.003, render=RenderStyle(samples=3))
+_STYLE = ShotStyle(size=_PANEL, distance=1.6, detail=0.003, samples=3)
 _LIFTED = 0.02  # [m] a foot this high makes a better picture than the middle of the span
 _SETTLED = 0.7  # share of a span after which a slow behaviour has taken its shape
 _CANDIDATES = 60  # poses of a span that are looked at
@@ -62,10 +61,10 @@ def export_filmstrip(
             f"time {outside[0]:g} s is outside the recording; valid: 0 to {recording.duration:g} s"
         )
     frame_renderer = FrameRenderer(recording, _STYLE)
-    panels = []
-    for time in chosen:
-        caption = frame_renderer.caption(time, with_progress=False)
-        panels.append(Image.fromarray(draw_caption(frame_renderer.shoot(time), caption)))
+    panels = [
+        Image.fromarray(frame_renderer.shoot_captioned(time, with_progress=False))
+        for time in chosen
+    ]
     stream = io.BytesIO()
     _assemble(panels).save(stream, "PNG", optimize=True)
     return write_atomically(target, stream.getvalue())
@@ -81,12 +80,9 @@ def telling_times(recording: Recording) -> list[float]:
 def _interesting_spans(spans: Sequence[Span]) -> list[Span]:
     """The longest span of each label, at most ``_MOST_PANELS``, in order of time."""
     longest: dict[str, Span] = {}
-    for span in spans:
-        best = longest.get(span.label)
-        if best is None or span.end - span.start > best.end - best.start:
-            longest[span.label] = span
-    by_length = sorted(longest.values(), key=lambda span: span.start - span.end)
-    return sorted(by_length[:_MOST_PANELS], key=lambda span: span.start)
+    for span in sorted(spans, key=lambda span: span.start - span.end):
+        longest.setdefault(span.label, span)
+    return sorted(list(longest.values())[:_MOST_PANELS], key=lambda span: span.start)
 
 
 def _telling_time(recording: Recording, robot: PosedRobot, span: Span) -> float:
@@ -101,10 +97,8 @@ def _telling_time(recording: Recording, robot: PosedRobot, span: Span) -> float:
 
 def _assemble(panels: Sequence[Image.Image]) -> Image.Image:
     """Panels in rows of at most three, with round corners; a shorter last row is centred."""
-    columns = (
-        len(panels) if len(panels) <= _COLUMNS else -(-len(panels) // -(-len(panels) // _COLUMNS))
-    )
-    rows = -(-len(panels) // columns)
+    rows = math.ceil(len(panels) / _COLUMNS)
+    columns = math.ceil(len(panels) / rows)
     width, height = _PANEL
     size = (columns * width + (columns - 1) * _GAP, rows * height + (rows - 1) * _GAP)
     sheet = Image.new("RGBA", size, (255, 255, 255, 0))

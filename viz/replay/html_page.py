@@ -67,11 +67,12 @@ def page_text(title: str, scene: str, data: str, *, is_live: bool = False) -> st
         is_live: the page listens to the server that it came from.
     """
     scripts = (*_SCRIPTS, _LIVE_SCRIPT) if is_live else _SCRIPTS
+    bundle = Path(meshcat.viewer_assets_path()) / "dist" / "main.min.js"
     parts = {
         "TITLE": html.escape(title),
         "STYLE": _asset("replay.css"),
         "SCRIPT": "\n".join(_asset(name) for name in scripts),
-        "MESHCAT": compressed_text(_meshcat_bundle()),
+        "MESHCAT": compressed_text(bundle.read_bytes()),
         "SCENE": scene,
         "DATA": data,
     }
@@ -81,7 +82,3 @@ def page_text(title: str, scene: str, data: str, *, is_live: bool = False) -> st
 
 def _asset(name: str) -> str:
     return resources.files("viz.replay").joinpath("assets", name).read_text(encoding="utf-8")
-
-
-def _meshcat_bundle() -> bytes:
-    return (Path(meshcat.viewer_assets_path()) / "dist" / "main.min.js").read_bytes()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+from collections.abc import Mapping
 from typing import final
 
 import numpy as np
@@ -34,9 +35,16 @@ class Pack:
         self._entries: dict[str, dict[str, object]] = {}
         self._size = 0
 
-    def add(self, name: str, array: Shaped[np.ndarray, "..."]) -> None:
-        """Store an array of one of the types that a browser knows, as it is."""
-        self._append(name, array, {})
+    def add(
+        self, name: str, array: Shaped[np.ndarray, "..."], extra: Mapping[str, object] | None = None
+    ) -> None:
+        """Store an array of one of the types that a browser knows; ``extra`` is told with it."""
+        blob = np.ascontiguousarray(array).tobytes()
+        entry = {"type": _NAMES[array.dtype], "shape": array.shape, "offset": self._size}
+        self._entries[name] = {**entry, **(extra or {})}
+        blob += b"\0" * (-len(blob) % _ALIGNMENT)
+        self._blobs.append(blob)
+        self._size += len(blob)
 
     def add_quantised(self, name: str, array: Shaped[np.ndarray, "n k"]) -> None:
         """Store each column as 16-bit numbers between its own extremes."""
@@ -44,7 +52,7 @@ class Pack:
         span = np.maximum(array.max(axis=0, initial=0.0) - low, 1e-9)
         levels = np.round((array - low) / span * _QUANTISED_LEVELS).astype(np.uint16)
         scale = span / _QUANTISED_LEVELS
-        self._append(name, levels, {"low": low.tolist(), "scale": scale.tolist()})
+        self.add(name, levels, {"low": low.tolist(), "scale": scale.tolist()})
 
     def packed(self, header: dict[str, object]) -> str:
         """Everything, with ``header`` beside the table of the arrays."""
@@ -54,16 +62,6 @@ class Pack:
         padding = b"\0" * (-start % _ALIGNMENT)
         content = len(head).to_bytes(4, "little") + head + padding + b"".join(self._blobs)
         return compressed_text(content)
-
-    def _append(
-        self, name: str, array: Shaped[np.ndarray, "..."], extra: dict[str, object]
-    ) -> None:
-        blob = np.ascontiguousarray(array).tobytes()
-        entry = {"type": _NAMES[array.dtype], "shape": list(array.shape), "offset": self._size}
-        self._entries[name] = {**entry, **extra}
-        blob += b"\0" * (-len(blob) % _ALIGNMENT)
-        self._blobs.append(blob)
-        self._size += len(blob)
 
 
 def compressed_text(content: bytes) -> str:

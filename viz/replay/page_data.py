@@ -23,47 +23,34 @@ _LEAST_FORCE_SCALE = 50.0  # [N] a full row of the contact strip is at least thi
 def scene_text() -> str:
     """The robot and the markers, packed: the same for every page."""
     pack = Pack()
-    header = {
-        **robot_scene(load_robot_visuals(), pack),
-        "legs": [leg.name for leg in LEGS],
-        "leg_colors": list(LEG_COLORS),
-        "foot_radius": FOOT_RADIUS,
-    }
-    return pack.packed(header)
+    scene = robot_scene(load_robot_visuals(), pack)
+    legs = {"legs": [leg.name for leg in LEGS], "leg_colors": LEG_COLORS}
+    return pack.packed({**scene, **legs, "foot_radius": FOOT_RADIUS})
 
 
 def content_text(content: ReplayContent, title: str, version: str = "") -> str:
     """What happens, packed; ``version`` tells one text of a live page from the next."""
-    robot = PosedRobot(load_robot_visuals())
-    pack = Pack()
+    robot, pack = PosedRobot(load_robot_visuals()), Pack()
     frames = replay_frames(content.recording, robot)
+    highest = float(np.percentile(frames.foot_forces, _FORCE_PERCENTILE))
     header: dict[str, object] = {
         "title": title,
         "version": version,
         "is_plan": content.is_plan,
-        "rate": frames.rate,
-        "frames": len(frames.q),
+        **_add_frames(pack, "", frames),
         "labels": [[s.start, s.end, s.label] for s in content.recording.spans()],
-        "force_scale": _force_scale(frames),
+        "force_scale": max(highest, _LEAST_FORCE_SCALE),
         "verdict": None,
         "ghost": None,
     }
-    _add_frames(pack, "", frames)
     if content.verdict is not None:
         header["verdict"] = _add_verdict(pack, content.verdict)
     if content.ghost is not None:
-        ghost = replay_frames(content.ghost, robot)
-        header["ghost"] = {"rate": ghost.rate, "frames": len(ghost.q)}
-        _add_frames(pack, "ghost.", ghost)
+        header["ghost"] = _add_frames(pack, "ghost.", replay_frames(content.ghost, robot))
     return pack.packed(header)
 
 
-def _force_scale(frames: ReplayFrames) -> float:
-    highest = float(np.percentile(frames.foot_forces, _FORCE_PERCENTILE))
-    return max(highest, _LEAST_FORCE_SCALE)
-
-
-def _add_frames(pack: Pack, prefix: str, frames: ReplayFrames) -> None:
+def _add_frames(pack: Pack, prefix: str, frames: ReplayFrames) -> dict[str, object]:
     pack.add_quantised(f"{prefix}q", frames.q)
     pack.add_quantised(f"{prefix}feet", frames.p_world_feet)
     pack.add_quantised(f"{prefix}com", frames.p_world_com)
@@ -72,6 +59,7 @@ def _add_frames(pack: Pack, prefix: str, frames: ReplayFrames) -> None:
     pack.add(f"{prefix}stance", frames.stance.astype(np.uint8))
     pack.add(f"{prefix}margin", frames.support_margin.astype(np.float32))
     pack.add(f"{prefix}torque", frames.torque_ratio.astype(np.float32))
+    return {"rate": frames.rate, "frames": len(frames.q)}
 
 
 def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
@@ -80,17 +68,7 @@ def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
         pack.add(f"curve{k}.time", curve.time.astype(np.float32))
         pack.add(f"curve{k}.margin", curve.margin.astype(np.float32))
         pack.add(f"curve{k}.worst", curve.worst.astype(np.uint8))
-        curves.append(
-            {
-                "name": curve.name,
-                "unit": curve.unit,
-                "subjects": list(curve.subjects),
-                "tight": float(curve.tight),
-            }
-        )
-    return {
-        "ok": verdict.ok,
-        "text": verdict.text,
-        "annotations": [asdict(annotation) for annotation in verdict.annotations],
-        "curves": curves,
-    }
+        words = {"name": curve.name, "unit": curve.unit, "subjects": curve.subjects}
+        curves.append({**words, "tight": float(curve.tight)})
+    annotations = [asdict(annotation) for annotation in verdict.annotations]
+    return {"ok": verdict.ok, "text": verdict.text, "annotations": annotations, "curves": curves}

@@ -12,10 +12,9 @@ import logging
 import threading
 import uuid
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from types import TracebackType
 from typing import final
 
 from go2_wbc.errors import ConfigError
@@ -44,16 +43,25 @@ class _State:
 
     data: str
     version: str
-    error: str | None
+    error: str | None = None
+
+    def text(self) -> str:
+        """What a page is told of it, as JSON."""
+        return json.dumps({"version": self.version, "error": self.error})
 
 
 @final
-class PreviewServer:
+class PreviewServer(ThreadingHTTPServer):
     """A context manager that serves a page until its end.
+
+    Binds without stealing the port of another program; ends without waiting for pages.
 
     Attributes:
         url: address of the page.
     """
+
+    daemon_threads = True
+    block_on_close = False
 
     def __init__(self, content: ReplayContent, title: str, port: int) -> None:
         """Bind and serve in the background.
@@ -72,9 +80,17 @@ class PreviewServer:
         self._changed = threading.Condition()
         self._is_open = True
         self._state = self._packed(content)
-        self._http = _bind(port, self)
-        self.url = f"http://{LOOPBACK}:{self._http.server_port}/"
-        self._thread = threading.Thread(target=self._http.serve_forever, args=(0.05,), daemon=True)
+        try:
+            super().__init__((LOOPBACK, port), _Handler)
+        except OverflowError as error:
+            raise ConfigError(f"port {port} is not valid: 0 to 65535") from error
+        except OSError as error:
+            raise ConfigError(
+                f"cannot listen on port {port} of {LOOPBACK}: {error.strerror or error}; choose"
+                " another one, or 0 for any that is free"
+            ) from error
+        self.url = f"http://{LOOPBACK}:{self.server_port}/"
+        self._thread = threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True)
         self._thread.start()
 
     def publish(self, content: ReplayContent) -> None:
@@ -87,32 +103,23 @@ class PreviewServer:
 
     def publish_error(self, message: str) -> None:
         """Say what is wrong, and keep what was shown."""
-        self._set(_State(self._state.data, self._state.version, message))
+        self._set(replace(self._state, error=message))
 
     def close(self) -> None:
         """End; open pages say so."""
         with self._changed:
             self._is_open = False
             self._changed.notify_all()
-        self._http.shutdown()
+        self.shutdown()
         self._thread.join()
-        self._http.server_close()
+        self.server_close()
 
-    def __enter__(self) -> PreviewServer:
-        """The server itself."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """End."""
+    def __exit__(self, *_: object) -> None:
+        """Close."""
         self.close()
 
     def page(self) -> str:
-        """The live page."""
+        """The page with what it shows now."""
         return page_text(self._title, self._scene, self._state.data, is_live=True)
 
     def data(self) -> str:
@@ -127,20 +134,20 @@ class PreviewServer:
         """
         with self._changed:
             self._changed.wait_for(
-                lambda: not self._is_open or self._state_text() != seen, _HEARTBEAT
+                lambda: not self._is_open or self._state.text() != seen, _HEARTBEAT
             )
             if not self._is_open:
                 return None
-            state = self._state_text()
+            state = self._state.text()
         return "" if state == seen else state
 
-    def _state_text(self) -> str:
-        return json.dumps({"version": self._state.version, "error": self._state.error})
+    def handle_error(self, request: object, client_address: object) -> None:
+        """Log what went wrong in an answer; the page may have been closed meanwhile."""
+        _log.info("no answer to %s", client_address, exc_info=True)
 
     def _packed(self, content: ReplayContent) -> _State:
         version = uuid.uuid4().hex
-        checked = checked_content(content)
-        return _State(content_text(checked, self._title, version), version, None)
+        return _State(content_text(checked_content(content), self._title, version), version)
 
     def _set(self, state: _State) -> None:
         with self._changed:
@@ -148,49 +155,23 @@ class PreviewServer:
             self._changed.notify_all()
 
 
-class _Http(ThreadingHTTPServer):
-    """Binds without stealing the port of another program; ends without waiting for pages."""
-
-    daemon_threads = True
-    block_on_close = False
-    source: PreviewServer
-
-    def handle_error(self, request: object, client_address: object) -> None:
-        """Log what went wrong in an answer; the page may have been closed meanwhile."""
-        _log.info("no answer to %s", client_address, exc_info=True)
-
-
-def _bind(port: int, source: PreviewServer) -> _Http:
-    try:
-        http = _Http((LOOPBACK, port), _Handler)
-    except OverflowError as error:
-        raise ConfigError(f"port {port} is not valid: 0 to 65535") from error
-    except OSError as error:
-        raise ConfigError(
-            f"cannot listen on port {port} of {LOOPBACK}: {error.strerror or error}; choose another"
-            " one, or 0 for any that is free"
-        ) from error
-    http.source = source
-    return http
-
-
 @final
 class _Handler(BaseHTTPRequestHandler):
     """Answers GET of ``/``, ``/data`` and ``/events``, and nothing else."""
 
-    server: _Http  # type: ignore[reportIncompatibleVariableOverride]
+    server: PreviewServer  # type: ignore[reportIncompatibleVariableOverride]
 
     def do_GET(self) -> None:
         """Answer one request."""
-        source = self.server.source
-        if not _is_loopback(self.headers.get("Host", ""), self.server.server_port):
+        hosts = {f"{name}:{self.server.server_port}" for name in LOOPBACK_NAMES}
+        if self.headers.get("Host", "") not in hosts:
             self._answer("only for this machine\n", "text/plain", HTTPStatus.FORBIDDEN)
         elif self.path == "/":
-            self._answer(source.page(), "text/html")
+            self._answer(self.server.page(), "text/html")
         elif self.path == "/data":
-            self._answer(source.data(), "text/plain")
+            self._answer(self.server.data(), "text/plain")
         elif self.path == "/events":
-            self._stream(source)
+            self._stream()
         else:
             self._answer("not here\n", "text/plain", HTTPStatus.NOT_FOUND)
 
@@ -199,12 +180,12 @@ class _Handler(BaseHTTPRequestHandler):
         self._begin(status, kind, {"Content-Length": str(len(content))})
         self.wfile.write(content)
 
-    def _stream(self, source: PreviewServer) -> None:
+    def _stream(self) -> None:
         """Server-sent events until the page or the server ends."""
         self._begin(HTTPStatus.OK, "text/event-stream", {})
         seen: str | None = None
         try:
-            while (state := source.next_state(seen)) is not None:
+            while (state := self.server.next_state(seen)) is not None:
                 self.wfile.write(f"data: {state}\n\n".encode() if state else b":\n\n")
                 seen = state or seen
         except OSError:
@@ -218,7 +199,3 @@ class _Handler(BaseHTTPRequestHandler):
 
     def log_message(self, format: str, *args: object) -> None:
         """Log nothing: the terminal shows the verdicts."""
-
-
-def _is_loopback(host: str, port: int) -> bool:
-    return host in {f"{name}:{port}" for name in LOOPBACK_NAMES}

@@ -47,11 +47,6 @@ class ReplayFrames:
     support_margin: Float[np.ndarray, " n"]
     torque_ratio: Float[np.ndarray, " n"]
 
-    @property
-    def duration(self) -> float:
-        """Seconds from the first to the last frame."""
-        return (len(self.q) - 1) / self.rate
-
 
 def replay_frames(recording: Recording, robot: PosedRobot) -> ReplayFrames:
     """Resample a recording for the page.
@@ -64,10 +59,9 @@ def replay_frames(recording: Recording, robot: PosedRobot) -> ReplayFrames:
     count = max(2, int(np.floor(recording.duration * rate)) + 1)
     rate = (count - 1) / recording.duration
     wanted = recording.time[0] + np.arange(count) / rate
-    rows = np.clip(
-        np.searchsorted(recording.time, wanted - 0.25 / rate), 0, len(recording.time) - 1
-    )
-    rows[-1] = len(recording.time) - 1
+    last = len(recording.time) - 1
+    rows = np.minimum(np.searchsorted(recording.time, wanted - 0.25 / rate), last)
+    rows[-1] = last
     q = _continuous(recording.q[rows])
     limits = np.array(find_description().efforts)
     ratio = np.max(np.abs(recording.tau) / limits, axis=1)

@@ -6,8 +6,9 @@ raises ``MissingDependency``, which names the line that installs it.
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING
+
+from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from controller.bridges.ros2.client import GO2ControllerNode
@@ -15,11 +16,4 @@ if TYPE_CHECKING:
 
 __all__ = ["GO2ControllerNode", "serve"]
 
-_HOMES = {"GO2ControllerNode": "client", "serve": "server"}
-
-
-def __getattr__(name: str) -> object:
-    """Import ROS when it is first needed."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'controller.bridges.ros2' has no attribute {name!r}")
-    return getattr(importlib.import_module(f"controller.bridges.ros2.{_HOMES[name]}"), name)
+__getattr__ = lazy_exports(__name__, {"client": ("GO2ControllerNode",), "server": ("serve",)})

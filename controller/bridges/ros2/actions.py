@@ -5,13 +5,14 @@ Goals are rare, so it has a node and an executor of its own, which sleep while t
 
 from __future__ import annotations
 
+import concurrent.futures
 import logging
 import threading
 from typing import Any
 
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.behaviors import Jobs, motion_job
-from controller.bridges.ros2.names import MOTION_ACTION, MOTION_NODE, Rates, topic
+from controller.bridges.ros2.names import FEEDBACK_RATE, MOTION_ACTION, MOTION_NODE
 from controller.jobs import Answer, Job
 
 _log = logging.getLogger(__name__)
@@ -23,16 +24,16 @@ THREADS = 3
 class MotionActions:
     """Offers ``play_motion`` of a job server's robot."""
 
-    def __init__(self, context: Any, namespace: str, jobs: Jobs, rates: Rates) -> None:
+    def __init__(self, context: Any, namespace: str, jobs: Jobs) -> None:
         """Offer the action of the robot ``namespace`` in ``context``."""
-        self._jobs, self._period = jobs, 1.0 / rates.feedback
+        self._jobs = jobs
         self._node = ros.Node(
             MOTION_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
         self._server = ros.ActionServer(
             self._node,
             ros.PlayMotion,
-            topic(namespace, MOTION_ACTION),
+            MOTION_ACTION,
             execute_callback=self._execute,
             callback_group=ros.ReentrantCallbackGroup(),
             goal_callback=self._judge,
@@ -58,28 +59,20 @@ class MotionActions:
         return ros.GoalResponse.REJECT
 
     def _execute(self, handle: Any) -> Any:
-        answers: list[Answer] = []
-        answered = threading.Event()
-
-        def reply(answer: Answer) -> None:
-            answers.append(answer)
-            answered.set()
-
-        goal = handle.request
-        self._jobs.submit(motion_job(goal.motion, list(goal.settings), self._jobs.robot, reply))
-        while not answered.wait(self._period):
+        goal, answered = handle.request, concurrent.futures.Future[Answer]()
+        go2, reply = self._jobs.robot, answered.set_result
+        self._jobs.submit(motion_job(goal.motion, goal.settings, go2, reply))
+        while not concurrent.futures.wait([answered], 1.0 / FEEDBACK_RATE).done:
             if handle.is_cancel_requested:  # again and again: one that came early gets lost
                 self._jobs.cancel()
-            job = self._jobs.job
-            if job is not None:
+            if (job := self._jobs.job) is not None:
                 handle.publish_feedback(self._feedback(job))
-        return self._conclude(handle, answers[0])
+        return self._conclude(handle, answered.result())
 
     def _feedback(self, job: Job) -> Any:
-        feedback, go2 = ros.PlayMotion.Feedback(), self._jobs.robot
-        feedback.phase, feedback.progress = job.phase, float(go2.progress)
-        feedback.elapsed = float(go2.state.time - job.start)
-        return feedback
+        go2 = self._jobs.robot
+        progress, elapsed = float(go2.progress), float(go2.state.time - job.start)
+        return ros.PlayMotion.Feedback(phase=job.phase, progress=progress, elapsed=elapsed)
 
     def _conclude(self, handle: Any, answer: Answer) -> Any:
         if answer.success:

@@ -12,14 +12,15 @@ from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.names import (
     BEHAVIOR_SERVICE,
     CMD_VEL,
+    COMMAND_PERIOD,
     COMMAND_QUEUE,
     MOTION_ACTION,
     ODOM,
     topic,
 )
-from controller.bridges.ros2.repeater import Repeater
 from controller.bridges.ros2.states import state_of
 from controller.navigation import DriveStraight, Goal, TurnInPlace
+from controller.procedures import listed
 from go2_wbc.errors import BridgeError, MissingDependency
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.robot.state import RobotState
@@ -49,6 +50,7 @@ class GO2ControllerNode(ros.Node):
         True
 
     Attributes:
+        namespace: of the robot.
         last_message: what came of the last call, in plain words.
         progress: share of the motion that plays, 0 to 1.
     """
@@ -65,7 +67,7 @@ class GO2ControllerNode(ros.Node):
             MissingDependency: if the interfaces are not installed; names the line that builds them.
             BridgeError: if ``rclpy.init()`` has not been called.
         """
-        self._namespace = arguments.namespace(namespace)
+        self.namespace = arguments.namespace(namespace)
         if ros.RobotBehaviorCommand is None:
             raise MissingDependency(f"quadropted_msgs is not here; build it: {ros.BUILD}")
         if not ros.rclpy.ok():
@@ -83,9 +85,11 @@ class GO2ControllerNode(ros.Node):
             if ros.PlayMotion is not None
             else None
         )
-        self._state: RobotState | None = None
+        self._odometry = ros.Future()
         self.create_subscription(ros.Odometry, topic(namespace, ODOM), self._take_odometry, 1)
-        self._repeater = Repeater()
+        self._velocity: Any = None
+        self._velocity_lock, self._is_closed = threading.Lock(), threading.Event()
+        self._repeater = threading.Thread(target=self._repeat, name="go2-repeat", daemon=True)
         self._goal: Any = None
         self._spinner = ros.SingleThreadedExecutor()
         self._wait_for_service()
@@ -132,14 +136,27 @@ class GO2ControllerNode(ros.Node):
             CommandError: if a value is not a finite number.
         """
         message = _twist(VelocityCommand(linear_x, linear_y, angular_z))
-        self._repeater.stop()
-        self._cmd_vel_pub.publish(message)
-        self._repeater.start(lambda: self._cmd_vel_pub.publish(message))
+        with self._velocity_lock:
+            self._velocity = message
+            self._cmd_vel_pub.publish(message)
+        if not self._repeater.is_alive():
+            self._repeater.start()
 
     def stop(self) -> None:
         """Zero velocity: the robot comes to rest in walking mode."""
-        self._repeater.stop()
+        self._forget_velocity()
         self._cmd_vel_pub.publish(_twist(VelocityCommand()))
+
+    def _repeat(self) -> None:
+        while not self._is_closed.wait(COMMAND_PERIOD):
+            with self._velocity_lock:
+                if self._velocity is not None:
+                    self._cmd_vel_pub.publish(self._velocity)
+
+    def _forget_velocity(self) -> None:
+        """Repeat none any more; when this returns, none is being sent."""
+        with self._velocity_lock:
+            self._velocity = None
 
     def turn_left(self, angle: float) -> bool:
         """Turn left in place by ``angle`` [rad], closed on odometry; negative turns right."""
@@ -156,30 +173,26 @@ class GO2ControllerNode(ros.Node):
     def _run_goal(self, goal: Goal) -> bool:
         if not self.walk():
             return False
-        state = self._next_state()
+        state = self.state()
         if state is None:
             return self._conclude(goal.name, False, "no odometry")
         goal.begin(state)
         end = state.time + goal.time_limit
         while not goal.is_done(state) and state.time < end:
             self._cmd_vel_pub.publish(_twist(goal.command(state)))
-            newer = self._next_state()
-            if newer is None:
+            state = self.state()
+            if state is None:
                 self.stop()
                 return self._conclude(goal.name, False, "odometry has ceased")
-            state = newer
         state = self._come_to_rest(state)
-        figures = ", ".join(
-            f"{name} {value:.3f}" for name, value in goal.measurements(state).items()
-        )
+        figures = listed(goal.measurements(state))
         return self._conclude(goal.name, goal.is_within_tolerance(state), figures)
 
     def _come_to_rest(self, state: RobotState) -> RobotState:
         end, moved_at = state.time + REST_LIMIT, state.time
         while state.time < end and state.time - moved_at < REST_TIME:
             self.stop()
-            newer = self._next_state()
-            if newer is None:
+            if (newer := self.state()) is None:
                 break
             state = newer
             if max(map(abs, state.v[:2].tolist())) > REST_SPEED:
@@ -205,11 +218,11 @@ class GO2ControllerNode(ros.Node):
             settings: its parameters.
             on_progress: is told the share that is done, ten times a second.
         """
-        self._repeater.stop()
+        self._forget_velocity()
         if self._motion_client is None:
             return self._conclude(motion, False, f"PlayMotion is not here; build it: {ros.BUILD}")
         if not self._motion_client.wait_for_server(5.0):
-            return self._conclude(motion, False, self._absence())
+            return self._report(motion, None)
 
         def note(message: Any) -> None:
             self.progress = message.feedback.progress
@@ -219,23 +232,18 @@ class GO2ControllerNode(ros.Node):
         goal = ros.PlayMotion.Goal(motion=motion, settings=rows)
         sent = self._motion_client.send_goal_async(goal, feedback_callback=note)
         self._goal = self._result_of(sent, ANSWER_LIMIT)
-        if self._goal is None or not self._goal.accepted:
-            reason = "refused: the robot is busy" if self._goal is not None else self._absence()
-            return self._conclude(motion, False, reason)
-        return self._await_motion(motion)
-
-    def _await_motion(self, motion: str) -> bool:
-        goal = self._goal
+        if self._goal is None:
+            return self._report(motion, None)
+        if not self._goal.accepted:
+            return self._conclude(motion, False, "refused: the robot is busy")
         try:
-            answer = self._result_of(goal.get_result_async(), MOTION_LIMIT)
+            answer = self._result_of(self._goal.get_result_async(), MOTION_LIMIT)
         except BaseException:
-            goal.cancel_goal_async()
+            self.cancel()
             raise
         finally:
             self._goal = None
-        if answer is None:
-            return self._conclude(motion, False, self._absence())
-        return self._conclude(motion, bool(answer.result.success), answer.result.message)
+        return self._report(motion, None if answer is None else answer.result)
 
     def cancel(self) -> None:
         """Call off the motion that plays, from its ``on_progress`` or another thread."""
@@ -245,11 +253,6 @@ class GO2ControllerNode(ros.Node):
 
     # --- looking --------------------------------------------------------------------------
 
-    @property
-    def namespace(self) -> str:
-        """Namespace of the robot."""
-        return self._namespace
-
     def check_served(self) -> None:
         """Raise BridgeError, with the line that starts a server, if there is none."""
         if not self._behavior_client.service_is_ready():
@@ -257,18 +260,18 @@ class GO2ControllerNode(ros.Node):
 
     def state(self) -> RobotState | None:
         """The next state from odometry: base pose and velocity; None if there is none."""
-        return self._next_state()
+        self._odometry = ros.Future()
+        return self._result_of(self._odometry, ODOM_LIMIT)
+
+    def wait(self, seconds: float) -> None:
+        """Let ``seconds`` of the robot's time pass, or return at once if odometry ceases."""
+        start = state = self.state()
+        while start and state and state.time - start.time < seconds:
+            state = self.state()
 
     def _take_odometry(self, message: Any) -> None:
-        self._state = state_of(message)
-
-    def _next_state(self) -> RobotState | None:
-        before, end = self._state, time.monotonic() + ODOM_LIMIT
-        while self._state is before:
-            if time.monotonic() > end:
-                return None
-            self._spin_for(SLICE)
-        return self._state
+        if not self._odometry.done():
+            self._odometry.set_result(state_of(message))
 
     # --- talking to the server ------------------------------------------------------------
 
@@ -280,18 +283,16 @@ class GO2ControllerNode(ros.Node):
         return is_there
 
     def _behave(self, command: str) -> bool:
-        self._repeater.stop()
+        self._forget_velocity()
         return self._call_behavior(command)
 
     def _call_behavior(self, command: str) -> bool:
         """Send a behaviour and wait until it has happened; returns whether it has."""
         if not (self._behavior_client.service_is_ready() or self._wait_for_service()):
-            return self._conclude(command, False, self._absence())
+            return self._report(command, None)
         request = ros.RobotBehaviorCommand.Request(command=command)
         answer = self._result_of(self._behavior_client.call_async(request), ANSWER_LIMIT)
-        if answer is None:
-            return self._conclude(command, False, self._absence())
-        return self._conclude(command, bool(answer.success), answer.message)
+        return self._report(command, answer)
 
     def _result_of(self, future: Any, limit: float) -> Any:
         """What ``future`` comes to; None if the server goes, or says nothing for ``limit`` s."""
@@ -305,28 +306,30 @@ class GO2ControllerNode(ros.Node):
             return None
         return future.result()
 
-    def _spin_for(self, seconds: float, future: Any = None) -> None:
-        """Let messages in, or wait if somebody else spins this node."""
+    def _spin_for(self, seconds: float, future: Any) -> None:
+        """Let messages in until ``future`` is done, or wait if somebody else spins this node."""
         other = self.executor
         if other is not None and other is not self._spinner and self in other.get_nodes():
             arrived = threading.Event()
-            if future is not None:
-                future.add_done_callback(lambda _future: arrived.set())
+            future.add_done_callback(lambda _future: arrived.set())
             arrived.wait(seconds)
-            return
-        self._spinner.add_node(self)
-        if future is not None:
-            self._spinner.spin_until_future_complete(future, timeout_sec=seconds)
         else:
-            self._spinner.spin_once(timeout_sec=seconds)
+            self._spinner.add_node(self)
+            self._spinner.spin_until_future_complete(future, timeout_sec=seconds)
 
     def _absence(self) -> str:
         if self._behavior_client.service_is_ready():
-            return f"the server of /{self._namespace} has not answered in time"
+            return f"the server of /{self.namespace} has not answered in time"
         return (
-            f"no server of /{self._namespace}: start one with "
-            f"`go2-wbc ros2 --namespace {self._namespace}`, in the same ROS_DOMAIN_ID"
+            f"no server of /{self.namespace}: start one with "
+            f"`go2-wbc ros2 --namespace {self.namespace}`, in the same ROS_DOMAIN_ID"
         )
+
+    def _report(self, what: str, answer: Any) -> bool:
+        """Conclude by what the server has answered; None is no answer."""
+        if answer is None:
+            return self._conclude(what, False, self._absence())
+        return self._conclude(what, bool(answer.success), answer.message)
 
     def _conclude(self, what: str, done: bool, message: str) -> bool:
         self.last_message = message
@@ -338,7 +341,9 @@ class GO2ControllerNode(ros.Node):
 
     def destroy_node(self) -> None:
         """Release everything; the robot stops by itself."""
-        self._repeater.close()
+        self._is_closed.set()
+        if self._repeater.is_alive():
+            self._repeater.join()
         self._spinner.shutdown()
         super().destroy_node()
 

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.client import GO2ControllerNode
 from controller.checks import HEIGHT_TOLERANCE
-from controller.demo.report import Measurement as Figure
-from controller.demo.report import StepResult
-from controller.demo.steps import FORWARD_SPEED, FORWARD_TIME, HOLD_TIME, STOP_TIME, TURN_ANGLE
+from controller.demo.report import Measurement, StepResult
+from controller.demo.steps import DEMO_STEPS, FORWARD_SPEED, FORWARD_TIME, TURN_ANGLE, DemoStep
 from controller.navigation import HEADING_TOLERANCE
 from go2_wbc.robot.state import RobotState
 from motions.postures import SIT_POSE
@@ -21,76 +20,41 @@ STAND_HEIGHT = 0.31
 """Height [m] of the base when standing; the CoM is 2 cm lower."""
 WAY_TOLERANCE = 0.06
 """Accepted error [m] of the way: commands travel through two processes."""
+TURN_TOLERANCE = 2.0 * math.degrees(HEADING_TOLERANCE)
+"""Accepted error [deg] of the turn."""
 REST_SPEED = 0.05
 """Speed [m/s] below which the robot rests."""
 
-Measure = Callable[[RobotState, RobotState], tuple[Figure, ...]]
+
+def _height(_before: RobotState, after: RobotState) -> float:
+    return float(after.q[2])
 
 
-@dataclass(frozen=True, slots=True)
-class RosStep:
-    """One step: what is done, and what odometry must show of it (before, after)."""
-
-    name: str
-    label: str
-    act: Callable[[GO2ControllerNode], bool]
-    measure: Measure
+def _way(before: RobotState, after: RobotState) -> float:
+    return math.dist(after.p_world_base[:2].tolist(), before.p_world_base[:2].tolist())
 
 
-def _height(asked: float) -> Measure:
-    def measure(_before: RobotState, after: RobotState) -> tuple[Figure, ...]:
-        return (Figure("base height", float(after.q[2]), "m", asked, HEIGHT_TOLERANCE),)
-
-    return measure
+def _speed(_before: RobotState, after: RobotState) -> float:
+    return math.hypot(*after.v[:2].tolist())
 
 
-def _way(before: RobotState, after: RobotState) -> tuple[Figure, ...]:
-    way = math.dist(after.p_world_base[:2].tolist(), before.p_world_base[:2].tolist())
-    return (Figure("way", way, "m", FORWARD_SPEED * FORWARD_TIME, WAY_TOLERANCE),)
+def _turned(before: RobotState, after: RobotState) -> float:
+    return math.degrees(math.remainder(after.yaw - before.yaw, math.tau))
 
 
-def _rest(_before: RobotState, after: RobotState) -> tuple[Figure, ...]:
-    speed = math.hypot(*after.v[:2].tolist())
-    return (Figure("speed at the end", speed, "m/s", 0.0, REST_SPEED),)
-
-
-def _turned(before: RobotState, after: RobotState) -> tuple[Figure, ...]:
-    turned = math.degrees(math.remainder(after.yaw - before.yaw, math.tau))
-    tolerance = 2.0 * math.degrees(HEADING_TOLERANCE)
-    return (Figure("turned left", turned, "deg", math.degrees(TURN_ANGLE), tolerance),)
-
-
-def _walk_forward(go2: GO2ControllerNode) -> bool:
-    go2.move(linear_x=FORWARD_SPEED)
-    return _let_pass(go2, FORWARD_TIME)
-
-
-def _stop(go2: GO2ControllerNode) -> bool:
-    go2.stop()
-    return _let_pass(go2, STOP_TIME)
-
-
-def _let_pass(go2: GO2ControllerNode, seconds: float) -> bool:
-    """Let this much of the robot's time pass."""
-    state = start = go2.state()
-    while start is not None and state is not None and state.time - start.time < seconds:
-        state = go2.state()
-    return state is not None
-
-
-STEPS: tuple[RosStep, ...] = (
-    RosStep("stand", "stand up", lambda go2: go2.stand(), _height(STAND_HEIGHT)),
-    RosStep("sit", "sit", lambda go2: go2.sit(), _height(float(SIT_POSE[2]))),
-    RosStep("walk", "walking mode", lambda go2: go2.walk(), _height(STAND_HEIGHT)),
-    RosStep("forward", "forward 0.2 m/s, 2 s", _walk_forward, _way),
-    RosStep("stop", "stop", _stop, _rest),
-    RosStep("turn", "turn left 90 deg", lambda go2: go2.turn_left(TURN_ANGLE), _turned),
-    RosStep(
-        "high_five", "high five", lambda go2: go2.high_five(hold=HOLD_TIME), _height(STAND_HEIGHT)
-    ),
-    RosStep("sit_again", "sit", lambda go2: go2.sit(), _height(float(SIT_POSE[2]))),
-)
-"""Stand, sit, walk, forward, stop, turn, high five, sit."""
+_STANDING = ("base height", _height, "m", STAND_HEIGHT, HEIGHT_TOLERANCE)
+_SITTING = ("base height", _height, "m", float(SIT_POSE[2]), HEIGHT_TOLERANCE)
+_FIGURES: Mapping[str, tuple[str, Callable[[RobotState, RobotState], float], str, float, float]] = {
+    "stand": _STANDING,
+    "sit": _SITTING,
+    "walk": _STANDING,
+    "forward": ("way", _way, "m", FORWARD_SPEED * FORWARD_TIME, WAY_TOLERANCE),
+    "stop": ("speed at the end", _speed, "m/s", 0.0, REST_SPEED),
+    "turn": ("turned left", _turned, "deg", math.degrees(TURN_ANGLE), TURN_TOLERANCE),
+    "high_five": _STANDING,
+    "sit_again": _SITTING,
+}
+"""By step: the figure's name, how odometry before and after gives it, unit, what is asked, +-."""
 
 
 def run_ros_demo(
@@ -117,29 +81,21 @@ def run_steps(
 ) -> tuple[StepResult, ...]:
     """Run the steps on a client; the robot's server is asked, odometry is believed."""
     results = []
-    for step in STEPS:
+    for step in DEMO_STEPS:
         results.append(_run_step(go2, step))
         on_step(results[-1])
     return tuple(results)
 
 
-def _run_step(go2: GO2ControllerNode, step: RosStep) -> StepResult:
+def _run_step(go2: Any, step: DemoStep) -> StepResult:  # the client has the controller's methods
     before, wall = go2.state(), time.monotonic()
-    done = before is not None and step.act(go2)
+    done = before is not None and step.act(go2) is not False
     after = go2.state()
     if before is None or after is None:
         reason, start, duration = f"no odometry of /{go2.namespace}", 0.0, time.monotonic() - wall
         return StepResult(step.name, step.label, False, reason, start, duration)
-    figures = step.measure(before, after)
-    missed = "; ".join(str(figure) for figure in figures if not figure.is_met)
-    reason = missed if done else go2.last_message
-    duration = after.time - before.time
-    return StepResult(
-        step.name,
-        step.label,
-        done and not missed,
-        reason or "done",
-        before.time,
-        duration,
-        figures,
-    )
+    name, seen, unit, asked, tolerance = _FIGURES[step.name]
+    figure = Measurement(name, seen(before, after), unit, asked, tolerance)
+    reason = go2.last_message if not done else "done" if figure.is_met else str(figure)
+    ok, duration = done and figure.is_met, after.time - before.time
+    return StepResult(step.name, step.label, ok, reason, before.time, duration, (figure,))

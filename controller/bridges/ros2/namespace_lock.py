@@ -27,45 +27,35 @@ PERIOD = 5.0
 """Time [s] between two looks for a second server, which may have come at the same moment."""
 
 
-@final
-class NamespaceLock:
-    """Holds a namespace of a ROS domain, among the processes that share a loopback."""
+def lock_namespace(namespace: str, domain: int) -> socket.socket:
+    """A socket that holds ``namespace`` of the ROS domain number ``domain`` until it is closed.
 
-    def __init__(self, namespace: str, domain: int) -> None:
-        """Lock ``namespace`` in the ROS domain with the number ``domain``; writes nothing to disk.
+    It does so among the processes that share a loopback, and writes nothing to disk.
 
-        Raises:
-            BridgeError: if another process of this machine has it.
-        """
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        if not sys.platform.startswith("linux"):
-            return  # only Linux has names of sockets that are no files
-        try:
-            self._socket.bind(f"\0go2-wbc/ros2/{domain}/{namespace}")
-        except OSError as error:
-            self._socket.close()
-            if error.errno == errno.EADDRINUSE:
-                raise _already_served(namespace) from error
-            raise BridgeError(f"/{namespace} cannot be locked: {error}") from error
-
-    def close(self) -> None:
-        """Give it back."""
-        self._socket.close()
+    Raises:
+        BridgeError: if another process of this machine has it.
+    """
+    lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    if not sys.platform.startswith("linux"):
+        return lock  # only Linux has names of sockets that are no files
+    try:
+        lock.bind(f"\0go2-wbc/ros2/{domain}/{namespace}")
+    except OSError as error:
+        lock.close()
+        if error.errno == errno.EADDRINUSE:
+            raise _already_served(namespace) from error
+        raise BridgeError(f"/{namespace} cannot be locked: {error}") from error
+    return lock
 
 
 @final
 class GraphWatch:
-    """Looks for other servers of a namespace in the graph: two would answer every call.
-
-    Attributes:
-        has_clock: whether somebody else published /clock when this server started.
-    """
+    """Looks for other servers of a namespace in the graph: two would answer every call."""
 
     def __init__(self, node: Any, namespace: str) -> None:
         """Look by ``node``, which is not the server's own."""
         self._node, self._namespace = node, f"/{namespace}"
         self._next = time.monotonic() + PERIOD
-        self.has_clock = False
 
     def check(self) -> None:
         """Give the others time to be found, and a dead one to be forgotten.
@@ -73,17 +63,11 @@ class GraphWatch:
         Raises:
             BridgeError: if one of them serves this namespace.
         """
-        end = time.monotonic() + DISCOVERY
-        while time.monotonic() < end and not self._servers():
-            time.sleep(0.05)
-        end = time.monotonic() + LEASE
-        while self._servers():
-            if time.monotonic() > end:
+        began = time.monotonic()
+        while (passed := time.monotonic() - began) < DISCOVERY or self._servers():
+            if passed > LEASE:
                 raise _already_served(self._namespace.removeprefix("/"))
             time.sleep(0.05)
-        self.has_clock = self._node.count_publishers("/clock") > 0
-        if self.has_clock:
-            _log.warning("another process publishes /clock: this one does not; use --realtime")
 
     def look(self) -> None:
         """Report, once in a while, if a second server has come after all."""

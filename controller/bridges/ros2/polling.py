@@ -7,63 +7,53 @@ the version of rclpy.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from controller.bridges.ros2.names import COMMAND_QUEUE
+from controller.jobs import Answer, Reply
 
 
 class PolledSubscription:
-    """The messages of a topic, taken when asked."""
+    """Takes the messages of a topic when asked."""
 
-    def __init__(self, node: Any, kind: Any, name: str) -> None:
-        """Subscribe ``node`` to the topic ``name``."""
-        self._kind = kind
+    def __init__(self, node: Any, kind: Any, name: str, act: Callable[[Any], None]) -> None:
+        """Subscribe ``node`` to the topic ``name``; ``act`` is given each message."""
+        self._kind, self._act = kind, act
         self._handle = node.create_subscription(kind, name, _never, COMMAND_QUEUE).handle
 
-    def take(self) -> Iterator[Any]:
-        """The messages that have come since, at most one queue full."""
+    def poll(self) -> None:
+        """Take the messages that have come since, at most one queue full."""
         for _ in range(COMMAND_QUEUE):
             with self._handle:
                 taken = self._handle.take_message(self._kind, False)
             if taken is None:
                 return
-            yield taken[0]
-
-
-@dataclass(frozen=True, slots=True)
-class Call:
-    """A call of a service that waits for its answer."""
-
-    request: Any
-    _kind: Any
-    _service: Any
-    _header: Any
-
-    def answer(self, *, success: bool, message: str) -> None:
-        """Send the response; nobody minds if the caller has gone."""
-        response = self._kind.Response(success=success, message=message)
-        self._service.send_response(response, self._header)
+            self._act(taken[0])
 
 
 class PolledService:
-    """The calls of a service that answers ``success`` and ``message``, when their time has come."""
+    """Takes the calls of a service that answers ``success`` and ``message`` when asked."""
 
-    def __init__(self, node: Any, kind: Any, name: str) -> None:
-        """Offer the service ``name`` on ``node``."""
-        self._kind = kind
+    def __init__(self, node: Any, kind: Any, name: str, act: Callable[[Any, Reply], None]) -> None:
+        """Offer the service ``name`` on ``node``; ``act`` is given each request and its reply."""
+        self._kind, self._act = kind, act
         self._service = node.create_service(kind, name, _never)
 
-    def take(self) -> Iterator[Call]:
-        """The calls that have come since, at most one queue full."""
+    def poll(self) -> None:
+        """Take the calls that have come since, at most one queue full."""
         handle = self._service.handle
         for _ in range(COMMAND_QUEUE):
             with handle:
                 request, header = handle.service_take_request(self._kind.Request)
             if request is None:
                 return
-            yield Call(request, self._kind, self._service, header)
+            self._act(request, partial(self._answer, header))
+
+    def _answer(self, header: Any, answer: Answer) -> None:
+        response = self._kind.Response(success=answer.success, message=answer.message)
+        self._service.send_response(response, header)
 
 
 def _never(*_arguments: Any) -> None:

@@ -13,9 +13,9 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
 from typing import Any
@@ -24,25 +24,16 @@ from controller import arguments
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.actions import MotionActions
 from controller.bridges.ros2.behaviors import COMMANDS, order
-from controller.bridges.ros2.hooked_plant import HookedPlant
-from controller.bridges.ros2.names import (
-    BEHAVIOR_SERVICE,
-    CMD_VEL,
-    SERVER_NODE,
-    STATISTICS_SERVICE,
-    Rates,
-    topic,
-)
-from controller.bridges.ros2.namespace_lock import GraphWatch, NamespaceLock
-from controller.bridges.ros2.polling import Call, PolledService, PolledSubscription
+from controller.bridges.ros2.names import BEHAVIOR_SERVICE, CMD_VEL, SERVER_NODE, STATISTICS_SERVICE
+from controller.bridges.ros2.namespace_lock import GraphWatch, lock_namespace
+from controller.bridges.ros2.polling import PolledService, PolledSubscription
 from controller.bridges.ros2.states import StatePublisher
 from controller.bridges.ros2.velocity import VelocityInput
 from controller.go2_controller import GO2Controller
-from controller.jobs import Answer, JobServer
+from controller.jobs import Answer, JobServer, Reply
 from controller.pacing import SWITCH_INTERVAL, LogThrottle, Pacer
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.mujoco.viewer import open_viewer
 
 _log = logging.getLogger(__name__)
 
@@ -63,14 +54,12 @@ class ServerSettings:
         realtime: at the pace of the wall clock; otherwise as fast as the CPU allows, with /clock.
         viewer: open MuJoCo's window.
         config: numbers of the engine, or a TOML file.
-        rates: of the topics.
     """
 
     namespace: str = "robot1"
     realtime: bool = False
     viewer: bool = False
     config: Config | Path | None = None
-    rates: Rates = field(default_factory=Rates)
 
 
 def serve(
@@ -99,7 +88,7 @@ def serve(
         context = ros.Context()
         ros.rclpy.init(args=[], context=context, signal_handler_options=ros.SignalHandlerOptions.NO)
         stack.callback(ros.rclpy.shutdown, context=context)
-        stack.callback(NamespaceLock(namespace, context.get_domain_id()).close)
+        stack.enter_context(lock_namespace(namespace, context.get_domain_id()))
         graph_node = ros.Node(
             f"go2_wbc_graph_watch_{os.getpid()}",
             namespace=namespace,
@@ -110,14 +99,19 @@ def serve(
         stack.callback(graph_node.destroy_node)
         watch = GraphWatch(graph_node, namespace)
         watch.check()
-        has_clock = not (settings.realtime or watch.has_clock)
-        plant = HookedPlant(MujocoPlant(visuals=settings.viewer))
-        stack.callback(plant.close)
-        go2 = stack.enter_context(GO2Controller(namespace, plant=plant, config=config))
-        node = RobotNode(context, go2, plant, settings, config, has_clock=has_clock)
+        simulator = MujocoPlant(visuals=settings.viewer)
+        stack.callback(simulator.close)
+        go2 = stack.enter_context(
+            GO2Controller(
+                namespace,
+                plant=simulator,
+                viewer=settings.viewer,
+                config=config,
+                after_tick=lambda: node.serve(stop),
+            )
+        )
+        node = RobotNode(context, go2, simulator, config, realtime=settings.realtime)
         stack.callback(node.close)
-        stack.callback(plant.silence)
-        plant.after_write = lambda: node.serve(stop)
         on_ready(node.offer)
         node.run(stop, watch)
         _log.info("ending: the robot goes limp")
@@ -130,61 +124,47 @@ class RobotNode:
         self,
         context: Any,
         go2: GO2Controller,
-        plant: HookedPlant,
-        settings: ServerSettings,
+        simulator: MujocoPlant,
         config: Config,
         *,
-        has_clock: bool,
+        realtime: bool,
     ) -> None:
-        """Offer ``go2`` in ``context``."""
-        self._settings, self._go2, namespace = settings, go2, settings.namespace
-        self._node = ros.Node(
+        """Offer ``go2``, which drives ``simulator``, in ``context``."""
+        self._go2, namespace = go2, go2.namespace
+        self._node = node = ros.Node(
             SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
         self._jobs = JobServer(go2)
         self._velocity = VelocityInput(go2, config.envelope)
-        self._cmd_vel = PolledSubscription(self._node, ros.Twist, topic(namespace, CMD_VEL))
-        self._command = self._offer_command()
-        self._triggers = cycle(self._offer_triggers())
-        self._states = StatePublisher(
-            self._node,
-            namespace,
-            plant.inner,
-            settings.rates,
-            clock=has_clock,
-            realtime=settings.realtime,
-        )
-        self._actions = (
-            MotionActions(context, namespace, self._jobs, settings.rates)
-            if ros.PlayMotion is not None
+        self._twists = PolledSubscription(node, ros.Twist, CMD_VEL, self._take_twist)
+        self._commands = (
+            PolledService(node, ros.RobotBehaviorCommand, BEHAVIOR_SERVICE, self._take_command)
+            if ros.RobotBehaviorCommand is not None
             else None
         )
-        self._viewer = open_viewer(plant.inner) if settings.viewer else None
-        self._pacer = Pacer(plant.control_period, LATE) if settings.realtime else None
+        self._triggers = cycle(self._offer_triggers())
+        self._states = StatePublisher(node, simulator, realtime=realtime)
+        self._actions = (
+            MotionActions(context, namespace, self._jobs) if ros.PlayMotion is not None else None
+        )
+        self._pacer = Pacer(simulator.control_period, LATE) if realtime else None
         self._throttle, self._errors = LogThrottle(_log), 0
-        self._cpu, self._ticks, self._began = 0.0, 0, time.monotonic()
+        self._cpu, self._began = 0.0, time.monotonic()
 
-    def _offer_command(self) -> PolledService | None:
-        if ros.RobotBehaviorCommand is None:
-            return None
-        name = topic(self._settings.namespace, BEHAVIOR_SERVICE)
-        return PolledService(self._node, ros.RobotBehaviorCommand, name)
-
-    def _offer_triggers(self) -> list[tuple[PolledService, Callable[[Call], None]]]:
-        acts: dict[str, Callable[[Call], None]] = {
-            command: lambda call, name=command: self._order(name, call) for command in COMMANDS
-        }
-        acts[STATISTICS_SERVICE] = self._take_statistics
-        namespace = self._settings.namespace
-        return [
-            (PolledService(self._node, ros.Trigger, topic(namespace, name)), act)
-            for name, act in acts.items()
-        ]
+    def _offer_triggers(self) -> Iterator[PolledService]:
+        for name in COMMANDS:
+            yield PolledService(
+                self._node,
+                ros.Trigger,
+                name,
+                lambda _request, reply, name=name: self._order(name, reply),
+            )
+        yield PolledService(self._node, ros.Trigger, STATISTICS_SERVICE, self._tell_statistics)
 
     @property
     def offer(self) -> str:
         """What is offered, and what is missing with the line that brings it."""
-        namespace = self._settings.namespace
+        namespace = self._go2.namespace
         lines = [f"serving /{namespace}: " + ("real time" if self._pacer else "free-running")]
         missing = ros.missing_interfaces()
         if missing:
@@ -204,88 +184,70 @@ class RobotNode:
             watch.look()
 
     def serve(self, stop: threading.Event) -> None:
-        """One turn after a control period; called by the plant."""
-        began = time.thread_time()
-        self._ticks += 1
+        """One turn after a control period."""
         self._guarded(self._serve_once)
         if stop.is_set() and self._jobs.job is not None:
             self._guarded(self._jobs.damp)
-        self._cpu += time.thread_time() - began
         if self._pacer is not None and not stop.is_set():
-            self._pacer.wait(self._listen)
-        if self._viewer is not None:
-            self._viewer.show(self._go2.state.time)
+            self._pacer.wait(lambda: self._guarded(self._poll_commands))
 
     def _serve_once(self) -> None:
-        service, act = next(self._triggers)
-        for call in service.take():
-            act(call)
-        self._take_orders()
-        self._take_velocities()
+        next(self._triggers).poll()
+        self._poll_commands()
+        self._twists.poll()
         self._velocity.expire()
         self._states.publish_due()
 
-    def _listen(self) -> None:
-        began = time.thread_time()
-        self._guarded(self._take_orders)
-        self._cpu += time.thread_time() - began
+    def _poll_commands(self) -> None:
+        if self._commands is not None:
+            self._commands.poll()
 
     def _guarded(self, act: Callable[[], object]) -> None:
+        began = time.thread_time()
         try:
             act()
         except Exception as error:  # whatever it is: the robot must not fall for it
             self._errors += 1
             self._throttle.warn(type(error).__name__, f"{type(error).__name__}: {error}")
+        self._cpu += time.thread_time() - began
 
-    def _take_orders(self) -> None:
-        if self._command is not None:
-            for call in self._command.take():
-                self._order(call.request.command, call)
+    # --- what comes in --------------------------------------------------------------------
 
-    def _take_velocities(self) -> None:
-        is_busy = self._jobs.job is not None
-        for twist in self._cmd_vel.take():
-            linear, turn = twist.linear, twist.angular.z
-            self._velocity.accept(linear.x, linear.y, turn, is_busy=is_busy)
+    def _take_twist(self, twist: Any) -> None:
+        linear, is_busy = twist.linear, self._jobs.job is not None
+        self._velocity.accept(linear.x, linear.y, twist.angular.z, is_busy=is_busy)
 
-    # --- services -------------------------------------------------------------------------
+    def _take_command(self, request: Any, reply: Reply) -> None:
+        self._order(request.command, reply)
 
-    def _order(self, command: str, call: Call) -> None:
-        def reply(answer: Answer) -> None:
-            self._guarded(lambda: call.answer(success=answer.success, message=answer.message))
-
+    def _order(self, command: str, reply: Reply) -> None:
         order(self._jobs, command, reply)
         if self._jobs.job is not None:
             self._velocity.end()
 
-    def _take_statistics(self, call: Call) -> None:
-        call.answer(success=True, message=json.dumps(self.statistics()))
-
-    def statistics(self) -> dict[str, Any]:
+    def _tell_statistics(self, _request: Any, reply: Reply) -> None:
         """Counts and times since the start."""
         own, state = time.thread_time(), self._go2.state
-        return {
+        figures = {
             "mode": self._go2.mode.value,
             "robot_time": state.time,
             "position": state.p_world_base.tolist(),
             "heading": state.yaw,
             "wall_time": time.monotonic() - self._began,
-            "ticks": self._ticks,
             "paces_given_up": self._pacer.give_ups if self._pacer else 0,
             "ros_cpu_in_loop": self._cpu,
             "cpu_of_loop": own,
             "cpu_of_other_threads": time.process_time() - own,
-            "cmd_vel": asdict(self._velocity.counts),
-            "published": dict(self._states.counts),
+            "cmd_vel": self._velocity.counts,
+            "published": self._states.counts,
             "errors": self._errors,
         }
+        reply(Answer(True, json.dumps(figures)))
 
     def close(self) -> None:
         """Answer whoever waits and release everything."""
         self._jobs.abandon("the server is ending: the robot goes limp")
         if self._actions is not None:
             self._actions.close()
-        if self._viewer is not None:
-            self._viewer.close()
         time.sleep(LINGER)
         self._node.destroy_node()

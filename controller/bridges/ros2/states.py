@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from array import array
 from collections.abc import Callable
@@ -11,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from controller.bridges.ros2 import imports as ros
-from controller.bridges.ros2.names import ODOM, QUEUE, Rates, topic
+from controller.bridges.ros2.names import ODOM, QUEUE, STATE_RATE, TRANSFORM_RATE
 from go2_wbc.legs import JOINT_NAMES, Leg
-from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.robot.state import RobotState
+
+_log = logging.getLogger(__name__)
 
 FEET_ORDER = (Leg.FR, Leg.FL, Leg.RR, Leg.RL)
 """The order of the feet in ``RobotFootContact``."""
@@ -26,11 +28,17 @@ ORIENTATION_VARIANCE = 1e-6
 many filters take 0 for unknown."""
 
 
+Fill = Callable[[Any, RobotState, Any], None]
+"""Writes a state and its stamp into a message."""
+
+
 @dataclass(slots=True)
 class _Stream:
-    """One publisher, its period [s], and the robot time [s] at which it is due."""
+    """A topic: its message, who fills that in, and the robot time [s] at which it is due."""
 
-    publish: Callable[[RobotState, Any], None]
+    publisher: Any
+    message: Any
+    fill: Fill
     period: float
     due: float = 0.0
 
@@ -42,129 +50,95 @@ class StatePublisher:
         counts: messages published so far, by topic.
     """
 
-    def __init__(
-        self, node: Any, namespace: str, plant: Plant, rates: Rates, *, clock: bool, realtime: bool
-    ) -> None:
-        """Publish on ``node``; ``clock``: also /clock; ``realtime``: stamp with the wall clock."""
-        self._node, self._namespace, self._plant = node, namespace, plant
-        self._realtime = realtime
+    def __init__(self, node: Any, simulator: MujocoPlant, *, realtime: bool) -> None:
+        """Publish on ``node``; ``realtime``: stamp with the wall clock, and publish no /clock."""
+        self._node, self._simulator, self._realtime = node, simulator, realtime
         self.counts: dict[str, int] = {}
-        self._streams = [
-            _Stream(self._joints(), 1.0 / rates.states),
-            _Stream(self._odometry(), 1.0 / rates.states),
-        ]
-        if isinstance(plant, MujocoPlant):
-            self._streams.append(_Stream(self._imu(plant), 1.0 / rates.states))
+        self._streams: list[_Stream] = []
+        namespace = node.get_namespace().removeprefix("/")
+        base, odom = f"{namespace}/base_link", f"{namespace}/odom"
+        joints = ros.JointState(name=list(JOINT_NAMES))
+        self._add("joint_states", joints, _fill_joints)
+        self._add(
+            ODOM,
+            ros.Odometry(header=ros.Header(frame_id=odom), child_frame_id=base),
+            _fill_odometry,
+        )
+        self._add("imu", _imu(f"{namespace}/imu"), self._fill_imu)
         if ros.RobotFootContact is not None:
-            self._streams.append(_Stream(self._contacts(), 1.0 / rates.contacts))
+            self._add("foot_contact", ros.RobotFootContact(), _fill_contacts)
         if ros.TFMessage is not None:
-            self._streams.append(_Stream(self._transform(), 1.0 / rates.transforms))
-        if clock:
-            self._streams.append(_Stream(self._clock(), 1.0 / rates.clock))
+            transform = ros.TransformStamped(header=ros.Header(frame_id=odom), child_frame_id=base)
+            message = ros.TFMessage(transforms=[transform])
+            self._add("/tf", message, _fill_transform, TRANSFORM_RATE)
+        if not realtime and node.count_publishers("/clock") > 0:
+            _log.warning("another process publishes /clock: this one does not; use --realtime")
+        elif not realtime:
+            self._add("/clock", ros.Clock(), _fill_clock)
+
+    def _add(self, name: str, message: Any, fill: Fill, rate: float = STATE_RATE) -> None:
+        publisher = self._node.create_publisher(type(message), name, QUEUE)
+        self._streams.append(_Stream(publisher, message, fill, 1.0 / rate))
+        self.counts[publisher.topic_name] = 0
 
     def publish_due(self) -> None:
         """Publish whatever is due now."""
-        state = self._plant.read()
+        state = self._simulator.read()
         due = [stream for stream in self._streams if state.time >= stream.due - 1e-9]
         if not due:
             return
         stamp = _stamp(time.time() if self._realtime else state.time)
         for stream in due:
             stream.due = max(stream.due + stream.period, state.time)
-            stream.publish(state, stamp)
+            stream.fill(stream.message, state, stamp)
+            stream.publisher.publish(stream.message)
+            self.counts[stream.publisher.topic_name] += 1
 
-    def _publisher(self, kind: Any, name: str) -> Callable[[Any], None]:
-        publisher = self._node.create_publisher(kind, name, QUEUE)
-        self.counts[name] = 0
+    def _fill_imu(self, message: Any, _state: RobotState, stamp: Any) -> None:
+        sample = self._simulator.imu()
+        message.header.stamp = stamp
+        _set_quaternion(message.orientation, sample.quaternion.tolist())
+        _set_vector(message.angular_velocity, sample.gyro.tolist())
+        _set_vector(message.linear_acceleration, sample.accelerometer.tolist())
 
-        def publish(message: Any) -> None:
-            publisher.publish(message)
-            self.counts[name] += 1
 
-        return publish
+def _imu(frame: str) -> Any:
+    message = ros.Imu(header=ros.Header(frame_id=frame))
+    message.orientation_covariance[[0, 4, 8]] = ORIENTATION_VARIANCE
+    message.angular_velocity_covariance[[0, 4, 8]] = GYRO_VARIANCE
+    message.linear_acceleration_covariance[[0, 4, 8]] = ACCELERATION_VARIANCE
+    return message
 
-    def _joints(self) -> Callable[[RobotState, Any], None]:
-        publish = self._publisher(ros.JointState, topic(self._namespace, "joint_states"))
-        message = ros.JointState(name=list(JOINT_NAMES))
 
-        def send(state: RobotState, stamp: Any) -> None:
-            message.header.stamp = stamp
-            message.position = array("d", state.joint_positions.tobytes())
-            message.velocity = array("d", state.joint_velocities.tobytes())
-            message.effort = array("d", state.tau.tobytes())
-            publish(message)
+def _fill_joints(message: Any, state: RobotState, stamp: Any) -> None:
+    message.header.stamp = stamp
+    message.position = array("d", state.joint_positions.tobytes())
+    message.velocity = array("d", state.joint_velocities.tobytes())
+    message.effort = array("d", state.tau.tobytes())
 
-        return send
 
-    def _odometry(self) -> Callable[[RobotState, Any], None]:
-        publish = self._publisher(ros.Odometry, topic(self._namespace, ODOM))
-        message = ros.Odometry(child_frame_id=f"{self._namespace}/base_link")
-        message.header.frame_id = f"{self._namespace}/odom"
+def _fill_odometry(message: Any, state: RobotState, stamp: Any) -> None:
+    message.header.stamp = stamp
+    pose, twist = message.pose.pose, message.twist.twist
+    _set_vector(pose.position, state.q[:3].tolist())
+    _set_quaternion(pose.orientation, state.q[3:7].tolist())
+    _set_vector(twist.linear, state.v[:3].tolist())
+    _set_vector(twist.angular, state.v[3:6].tolist())
 
-        def send(state: RobotState, stamp: Any) -> None:
-            message.header.stamp = stamp
-            pose, twist = message.pose.pose, message.twist.twist
-            _set_vector(pose.position, state.q[:3].tolist())
-            _set_quaternion(pose.orientation, state.q[3:7].tolist())
-            _set_vector(twist.linear, state.v[:3].tolist())
-            _set_vector(twist.angular, state.v[3:6].tolist())
-            publish(message)
 
-        return send
+def _fill_contacts(message: Any, state: RobotState, _stamp: Any) -> None:
+    message.contacts = [bool(state.feet_in_contact[leg]) for leg in FEET_ORDER]
 
-    def _imu(self, plant: MujocoPlant) -> Callable[[RobotState, Any], None]:
-        publish = self._publisher(ros.Imu, topic(self._namespace, "imu"))
-        message = ros.Imu()
-        message.header.frame_id = f"{self._namespace}/imu"
-        for covariance, variance in (
-            (message.orientation_covariance, ORIENTATION_VARIANCE),
-            (message.angular_velocity_covariance, GYRO_VARIANCE),
-            (message.linear_acceleration_covariance, ACCELERATION_VARIANCE),
-        ):
-            covariance[[0, 4, 8]] = variance
 
-        def send(_state: RobotState, stamp: Any) -> None:
-            sample = plant.imu()
-            message.header.stamp = stamp
-            _set_quaternion(message.orientation, sample.quaternion.tolist())
-            _set_vector(message.angular_velocity, sample.gyro.tolist())
-            _set_vector(message.linear_acceleration, sample.accelerometer.tolist())
-            publish(message)
+def _fill_transform(message: Any, state: RobotState, stamp: Any) -> None:
+    (stamped,) = message.transforms
+    stamped.header.stamp = stamp
+    _set_vector(stamped.transform.translation, state.q[:3].tolist())
+    _set_quaternion(stamped.transform.rotation, state.q[3:7].tolist())
 
-        return send
 
-    def _contacts(self) -> Callable[[RobotState, Any], None]:
-        publish = self._publisher(ros.RobotFootContact, topic(self._namespace, "foot_contact"))
-        message = ros.RobotFootContact()
-
-        def send(state: RobotState, _stamp: Any) -> None:
-            touching = state.feet_in_contact
-            message.contacts = [bool(touching[leg]) for leg in FEET_ORDER]
-            publish(message)
-
-        return send
-
-    def _transform(self) -> Callable[[RobotState, Any], None]:
-        publish = self._publisher(ros.TFMessage, "/tf")
-        transform = ros.TransformStamped(child_frame_id=f"{self._namespace}/base_link")
-        transform.header.frame_id = f"{self._namespace}/odom"
-        message = ros.TFMessage(transforms=[transform])
-
-        def send(state: RobotState, stamp: Any) -> None:
-            transform.header.stamp = stamp
-            _set_vector(transform.transform.translation, state.q[:3].tolist())
-            _set_quaternion(transform.transform.rotation, state.q[3:7].tolist())
-            publish(message)
-
-        return send
-
-    def _clock(self) -> Callable[[RobotState, Any], None]:
-        publish = self._publisher(ros.Clock, "/clock")
-
-        def send(_state: RobotState, stamp: Any) -> None:
-            publish(ros.Clock(clock=stamp))
-
-        return send
+def _fill_clock(message: Any, _state: RobotState, stamp: Any) -> None:
+    message.clock = stamp
 
 
 def state_of(message: Any) -> RobotState:

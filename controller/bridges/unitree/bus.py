@@ -26,6 +26,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from cyclonedds.util import duration
 
+from controller.bridges.unitree.idl import type_of
 from go2_wbc.errors import CommandError, PlantError
 
 _ANY: Final = SampleState.Any | ViewState.Any | InstanceState.Any
@@ -49,11 +50,7 @@ class Writer:
         self._writer = writer
 
     def write(self, data: bytes) -> None:
-        """Send one encoded sample; never waits for its readers.
-
-        Raises:
-            PlantError: if the DDS library refuses it.
-        """
+        """Send one encoded sample, without waiting for readers; PlantError if it is refused."""
         if ddspy_write(self._writer._ref, data + bytes(-len(data) % 4)) < 0:
             raise PlantError("the DDS library refused to write a sample")
 
@@ -107,24 +104,21 @@ class Bus:
         with _lock:
             _open_domain(domain, interface)
             self._participant = DomainParticipant(domain)
-        self._owned: list[Any] = []
 
-    def writer(self, topic: str, kind: type) -> Writer:
+    def writer(self, topic: str) -> Writer:
         """A writer of ``topic``, with the quality of service that Unitree's SDK has."""
-        writer = DataWriter(self._participant, Topic(self._participant, topic, kind))
-        self._owned.append(writer)
-        return Writer(writer)
+        return Writer(DataWriter(self._participant, self._topic(topic)))
 
-    def reader(self, topic: str, kind: type, *, depth: int, reliable: bool = False) -> Reader:
+    def reader(self, topic: str, *, depth: int, reliable: bool = False) -> Reader:
         """A reader of ``topic`` that keeps the newest ``depth`` samples until they are taken."""
         policies = [Policy.History.KeepLast(depth)]
         if reliable:
             policies.append(Policy.Reliability.Reliable(duration(seconds=1)))
-        entity = DataReader(
-            self._participant, Topic(self._participant, topic, kind), Qos(*policies)
-        )
-        self._owned.append(entity)
-        return Reader(self._participant, entity, depth)
+        reader = DataReader(self._participant, self._topic(topic), Qos(*policies))
+        return Reader(self._participant, reader, depth)
+
+    def _topic(self, name: str) -> Topic[Any]:
+        return Topic(self._participant, name, type_of(name))
 
 
 def _open_domain(domain: int, interface: str) -> None:

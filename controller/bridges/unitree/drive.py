@@ -61,13 +61,9 @@ def drive(plant: UnitreePlant, names: list[str], trot: Trot) -> Iterator[Step]:
 
 
 def _do(go2: GO2Controller, name: str, trot: Trot) -> Step:
-    error = None
     try:
-        if name == "trot":
-            ok = go2.walk()
-            error = _trot(go2, trot) if ok else None
-        else:
-            ok = STEPS[name](go2)
+        ok = STEPS[name](go2)
+        error = _trot(go2, trot) if ok and name == "trot" else None
     except Go2WbcError as failure:
         return Step(name, False, str(failure))
     return Step(name, ok, go2.last_outcome.reason, error)
@@ -87,10 +83,10 @@ def _trot(go2: GO2Controller, trot: Trot) -> float:
 
 
 STEPS: Final[dict[str, Callable[[GO2Controller], bool]]] = {
-    "stand": lambda go2: go2.stand(),
-    "sit": lambda go2: go2.sit(),
-    "trot": lambda go2: go2.walk(),
-    "high_five": lambda go2: go2.high_five(),
-    "lie_down": lambda go2: go2.lie_down(),
+    "stand": GO2Controller.stand,
+    "sit": GO2Controller.sit,
+    "trot": GO2Controller.walk,
+    "high_five": GO2Controller.high_five,
+    "lie_down": GO2Controller.lie_down,
 }
 """What can be driven, by name."""

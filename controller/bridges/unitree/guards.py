@@ -20,7 +20,6 @@ _BOUNDS: Final = (
     ("kd", 0.0, layout.KD_MAX),
     ("v_des", -layout.SPEED_MAX, layout.SPEED_MAX),
 )
-_PARTS: Final = tuple(field.name for field in fields(JointCommand))
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +58,7 @@ def is_passive(command: JointCommand) -> bool:
 
 def require_sane(command: JointCommand) -> None:
     """Raise CommandError, naming the part, unless a command is finite and its gains are meant."""
-    for name in _PARTS:
+    for name in (field.name for field in fields(JointCommand)):
         values = getattr(command, name)
         if values.shape != (12,) or not np.isfinite(values).all():
             raise CommandError(f"{name} must be 12 finite numbers, got {values}")
@@ -96,10 +95,6 @@ class Guards:
             worst = int(beyond.argmax())
             return f"joint {worst} is {beyond[worst]:.2f} rad beyond its limit"
         return None
-
-    def is_lying(self, state: RobotState, height: float) -> bool:
-        """Whether the robot lies on its belly, the base ``height`` [m] above its lowest foot."""
-        return height < self._config.lying_height and state.tilt < self._config.lying_tilt
 
     def soften(self, command: JointCommand, state: RobotState) -> JointCommand:
         """``command`` within the motors' torque, not pushing past a joint's limit, ramped in."""

@@ -9,95 +9,61 @@ encoded by ``codec.py``.
 from __future__ import annotations
 
 import types
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from functools import cache
+from typing import Any, Final
 
-import numpy as np
 from cyclonedds.idl import IdlStruct, annotations
 from cyclonedds.idl import types as kinds
 
-from controller.bridges.unitree import layout
+from controller.bridges.unitree.layout import STRUCTS, fields_of
 
-_KINDS: Final = {
+_KINDS: Final[Mapping[str, Any]] = {
     "u1": kinds.byte,
     "u2": kinds.uint16,
     "u4": kinds.uint32,
     "i2": kinds.int16,
     "i4": kinds.int32,
+    "i8": kinds.int64,
     "f4": kinds.float32,
+    "bool": bool,
+    "string": str,
+    "octets": kinds.sequence[kinds.byte],
 }
-_NESTED: Final = {
-    "imu_state": "IMUState_",
-    "motor_state": "MotorState_",
-    "bms_state": "BmsState_",
-    "motor_cmd": "MotorCmd_",
-    "bms_cmd": "BmsCmd_",
-    "stamp": "TimeSpec_",
-    "path_point": "PathPoint_",
+_RPC_STRUCTS: Final[Mapping[str, str]] = {
+    "RequestIdentity_": "i8 id api_id",
+    "RequestLease_": "i8 id",
+    "RequestPolicy_": "i4 priority; bool noreply",
+    "RequestHeader_": "RequestIdentity_ identity; RequestLease_ lease; RequestPolicy_ policy",
+    "Request_": "RequestHeader_ header; string parameter; octets binary",
+    "ResponseStatus_": "i4 code",
+    "ResponseHeader_": "RequestIdentity_ identity; ResponseStatus_ status",
+    "Response_": "ResponseHeader_ header; string data; octets binary",
 }
-"""Unitree's name of the struct that a field holds."""
-_made: dict[str, type] = {}
+_STRUCT_OF_TOPIC: Final = {
+    "lowstate": "LowState_",
+    "lowcmd": "LowCmd_",
+    "sportmodestate": "SportModeState_",
+    "request": "Request_",
+    "response": "Response_",
+}
+"""By the last part of the topic's name; every service has its requests and responses."""
 
 
-def low_state() -> type:
-    """Type of ``rt/lowstate``."""
-    return _from_layout("LowState_", layout.LOW_STATE)
+def type_of(topic: str) -> type:
+    """The DDS type of a topic's samples."""
+    return _struct(_STRUCT_OF_TOPIC[topic.rpartition("/")[2]])
 
 
-def low_cmd() -> type:
-    """Type of ``rt/lowcmd``."""
-    return _from_layout("LowCmd_", layout.LOW_CMD)
-
-
-def sport_state() -> type:
-    """Type of ``rt/sportmodestate``."""
-    return _from_layout("SportModeState_", layout.SPORT_STATE)
-
-
-def request() -> type:
-    """Type of a service's requests."""
-    identity, lease, policy = _identity(), _api("RequestLease_", id=kinds.int64), _policy()
-    header = _api("RequestHeader_", identity=identity, lease=lease, policy=policy)
-    return _api("Request_", header=header, parameter=str, binary=kinds.sequence[kinds.byte])
-
-
-def response() -> type:
-    """Type of a service's responses."""
-    status = _api("ResponseStatus_", code=kinds.int32)
-    header = _api("ResponseHeader_", identity=_identity(), status=status)
-    return _api("Response_", header=header, data=str, binary=kinds.sequence[kinds.byte])
-
-
-def _identity() -> type:
-    return _api("RequestIdentity_", id=kinds.int64, api_id=kinds.int64)
-
-
-def _policy() -> type:
-    return _api("RequestPolicy_", priority=kinds.int32, noreply=bool)
-
-
-def _from_layout(name: str, struct: np.dtype[np.void]) -> type:
-    kinds_by_name = {key: _kind(key, struct[key]) for key in struct.names or ()}
-    return _made_once("unitree_go", name, kinds_by_name)
-
-
-def _kind(field: str, kind: np.dtype[np.generic]) -> object:
-    if kind.subdtype is not None:
-        item, shape = kind.subdtype
-        return kinds.array[_kind(field, item), shape[0]]
-    if kind.fields is not None:
-        return _from_layout(_NESTED[field], kind)  # type: ignore[arg-type]
-    return _KINDS[kind.str[1:]]
-
-
-def _api(name: str, **fields: object) -> type:
-    return _made_once("unitree_api", name, fields)
-
-
-def _made_once(module: str, name: str, fields: dict[str, object]) -> type:
-    if name not in _made:
-        body = {"__annotations__": fields, "__module__": __name__}
-        keywords = {"typename": f"{module}.msg.dds_.{name}"}
-        made = types.new_class(name, (IdlStruct,), keywords, lambda space: space.update(body))
-        _made[name] = annotations.final(annotations.autoid("sequential")(dataclass(made)))
-    return _made[name]
+@cache
+def _struct(name: str) -> type:
+    module, structs = ("api", _RPC_STRUCTS) if name in _RPC_STRUCTS else ("go", STRUCTS)
+    fields: dict[str, object] = {}
+    for field, kind, shape in fields_of(structs[name]):
+        item = _KINDS.get(kind) or _struct(kind)
+        fields[field] = kinds.array[item, shape[0]] if shape else item
+    body = {"__annotations__": fields, "__module__": __name__}
+    keywords = {"typename": f"unitree_{module}.msg.dds_.{name}"}
+    made = types.new_class(name, (IdlStruct,), keywords, lambda space: space.update(body))
+    return annotations.final(annotations.autoid("sequential")(dataclass(made)))

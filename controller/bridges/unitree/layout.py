@@ -1,30 +1,25 @@
 """Unitree's messages as they lie in memory: structured arrays with the layout of the C structs.
 
-Legs stand in Unitree's order FR, FL, RR, RL; the first
-twelve of the twenty motors are the legs', hip, thigh, calf. Field names are Unitree's (unitree_go
-IDL of unitree_sdk2), so that their documentation applies.
+Legs stand in Unitree's order FR, FL, RR, RL; the first twelve of the twenty motors are the legs',
+hip, thigh, calf. Names are Unitree's (unitree_go IDL of unitree_sdk2), so that their documentation
+applies.
 """
 
 from __future__ import annotations
 
 import zlib
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 import numpy as np
 from jaxtyping import Shaped
 
-from go2_wbc.legs import LEGS, Leg
+from go2_wbc.legs import Leg
 
-UNITREE_LEGS: Final = (Leg.FR, Leg.FL, Leg.RR, Leg.RL)
-"""Unitree's order of the legs."""
-FEET_TO_UNITREE: Final = np.array([int(leg) for leg in UNITREE_LEGS])
-"""Takes a per-leg array of ours into Unitree's order."""
-FEET_FROM_UNITREE: Final = np.array([UNITREE_LEGS.index(leg) for leg in LEGS])
-"""Takes a per-leg array of Unitree's into our order."""
-JOINTS_TO_UNITREE: Final = np.array([3 * leg + part for leg in UNITREE_LEGS for part in range(3)])
-"""Takes a (12,) joint array of ours into Unitree's order."""
-JOINTS_FROM_UNITREE: Final = np.argsort(JOINTS_TO_UNITREE)
-"""Takes a (12,) motor array of Unitree's into our order."""
+FEET_SWAPPED: Final = np.array([Leg.FR, Leg.FL, Leg.RR, Leg.RL])
+JOINTS_SWAPPED: Final = np.array([3 * leg + part for leg in FEET_SWAPPED for part in range(3)])
+"""Take a per-leg array, or one of twelve joints or motors, from our order into Unitree's, and back:
+both orders differ in left and right only."""
 MOTORS: Final = 12
 """Motors that exist; a message has room for twenty."""
 HEAD: Final = (0xFE, 0xEF)
@@ -36,116 +31,57 @@ SERVO: Final = 0x01
 POSITION_STOP: Final = 2.146e9
 """A desired angle that means: no position control (``PosStopF``)."""
 VELOCITY_STOP: Final = 16000.0
+"""A desired speed that means: no speed control (``VelStopF``)."""
 KP_MAX, KD_MAX = 500.0, 50.0
 TAU_MAX, SPEED_MAX = 100.0, 100.0
-"""A desired speed that means: no speed control (``VelStopF``)."""
 
-_U1, _U2, _U4, _I2, _I4, _F4 = "u1", "<u2", "<u4", "<i2", "<i4", "<f4"
+STRUCTS: Final[Mapping[str, str]] = {
+    "IMUState_": "f4 quaternion[4] gyroscope[3] accelerometer[3] rpy[3]; u1 temperature",
+    "MotorState_": "u1 mode; f4 q dq ddq tau_est q_raw dq_raw ddq_raw; u1 temperature;"
+    "u4 lost reserve[2]",
+    "BmsState_": "u1 version_high version_low status soc; i4 current; u2 cycle;"
+    "u1 bq_ntc[2] mcu_ntc[2]; u2 cell_vol[15]",
+    "LowState_": "u1 head[2] level_flag frame_reserve; u4 sn[2] version[2]; u2 bandwidth;"
+    "IMUState_ imu_state; MotorState_ motor_state[20]; BmsState_ bms_state;"
+    "i2 foot_force[4] foot_force_est[4]; u4 tick; u1 wireless_remote[40] bit_flag; f4 adc_reel;"
+    "u1 temperature_ntc1 temperature_ntc2; f4 power_v power_a; u2 fan_frequency[4];"
+    "u4 reserve crc",
+    "MotorCmd_": "u1 mode; f4 q dq tau kp kd; u4 reserve[3]",
+    "BmsCmd_": "u1 off reserve[3]",
+    "LowCmd_": "u1 head[2] level_flag frame_reserve; u4 sn[2] version[2]; u2 bandwidth;"
+    "MotorCmd_ motor_cmd[20]; BmsCmd_ bms_cmd; u1 wireless_remote[40] led[12] fan[2] gpio;"
+    "u4 reserve crc",
+    "TimeSpec_": "i4 sec; u4 nanosec",
+    "PathPoint_": "f4 t_from_start x y yaw vx vy vyaw",
+    "SportModeState_": "TimeSpec_ stamp; u4 error_code; IMUState_ imu_state; u1 mode; f4 progress;"
+    "u1 gait_type; f4 foot_raise_height position[3] body_height velocity[3] yaw_speed"
+    " range_obstacle[4]; i2 foot_force[4]; f4 foot_position_body[12] foot_speed_body[12];"
+    "PathPoint_ path_point[10]",
+}
+"""Their structs: a kind (NumPy's name of a number, or a struct) and its fields, kind by kind."""
 
 
-def _struct(*fields: tuple[object, ...]) -> np.dtype[np.void]:
-    return np.dtype(list(fields), align=True)
+def fields_of(struct: str) -> Iterator[tuple[str, str, tuple[int, ...]]]:
+    """Name, kind and shape of each field of a struct that is written as in ``STRUCTS``."""
+    for group in struct.split(";"):
+        kind, *names = group.split()
+        for name, _, length in (name.rstrip("]").partition("[") for name in names):
+            yield name, kind, (int(length),) if length else ()
 
 
-MOTOR_STATE: Final = _struct(
-    ("mode", _U1),
-    ("q", _F4),
-    ("dq", _F4),
-    ("ddq", _F4),
-    ("tau_est", _F4),
-    ("q_raw", _F4),
-    ("dq_raw", _F4),
-    ("ddq_raw", _F4),
-    ("temperature", _U1),
-    ("lost", _U4),
-    ("reserve", _U4, 2),
-)
-IMU_STATE: Final = _struct(
-    ("quaternion", _F4, 4),
-    ("gyroscope", _F4, 3),
-    ("accelerometer", _F4, 3),
-    ("rpy", _F4, 3),
-    ("temperature", _U1),
-)
-BMS_STATE: Final = _struct(
-    ("version_high", _U1),
-    ("version_low", _U1),
-    ("status", _U1),
-    ("soc", _U1),
-    ("current", _I4),
-    ("cycle", _U2),
-    ("bq_ntc", _U1, 2),
-    ("mcu_ntc", _U1, 2),
-    ("cell_vol", _U2, 15),
-)
-_HEAD_FIELDS: Final = (
-    ("head", _U1, 2),
-    ("level_flag", _U1),
-    ("frame_reserve", _U1),
-    ("sn", _U4, 2),
-    ("version", _U4, 2),
-    ("bandwidth", _U2),
-)
-LOW_STATE: Final = _struct(
-    *_HEAD_FIELDS,
-    ("imu_state", IMU_STATE),
-    ("motor_state", MOTOR_STATE, 20),
-    ("bms_state", BMS_STATE),
-    ("foot_force", _I2, 4),
-    ("foot_force_est", _I2, 4),
-    ("tick", _U4),
-    ("wireless_remote", _U1, 40),
-    ("bit_flag", _U1),
-    ("adc_reel", _F4),
-    ("temperature_ntc1", _U1),
-    ("temperature_ntc2", _U1),
-    ("power_v", _F4),
-    ("power_a", _F4),
-    ("fan_frequency", _U2, 4),
-    ("reserve", _U4),
-    ("crc", _U4),
-)
-MOTOR_CMD: Final = _struct(
-    ("mode", _U1),
-    ("q", _F4),
-    ("dq", _F4),
-    ("tau", _F4),
-    ("kp", _F4),
-    ("kd", _F4),
-    ("reserve", _U4, 3),
-)
-LOW_CMD: Final = _struct(
-    *_HEAD_FIELDS,
-    ("motor_cmd", MOTOR_CMD, 20),
-    ("bms_cmd", _struct(("off", _U1), ("reserve", _U1, 3))),
-    ("wireless_remote", _U1, 40),
-    ("led", _U1, 12),
-    ("fan", _U1, 2),
-    ("gpio", _U1),
-    ("reserve", _U4),
-    ("crc", _U4),
-)
-_PATH_POINT: Final = _struct(
-    *((name, _F4) for name in ("t_from_start", "x", "y", "yaw", "vx", "vy", "vyaw"))
-)
-SPORT_STATE: Final = _struct(
-    ("stamp", _struct(("sec", _I4), ("nanosec", _U4))),
-    ("error_code", _U4),
-    ("imu_state", IMU_STATE),
-    ("mode", _U1),
-    ("progress", _F4),
-    ("gait_type", _U1),
-    ("foot_raise_height", _F4),
-    ("position", _F4, 3),
-    ("body_height", _F4),
-    ("velocity", _F4, 3),
-    ("yaw_speed", _F4),
-    ("range_obstacle", _F4, 4),
-    ("foot_force", _I2, 4),
-    ("foot_position_body", _F4, 12),
-    ("foot_speed_body", _F4, 12),
-    ("path_point", _PATH_POINT, 10),
-)
+def _layout(name: str) -> np.dtype[np.void]:
+    return np.dtype(
+        [
+            (field, _layout(kind) if kind in STRUCTS else f"<{kind}", shape)
+            for field, kind, shape in fields_of(STRUCTS[name])
+        ],
+        align=True,
+    )
+
+
+LOW_STATE: Final = _layout("LowState_")
+LOW_CMD: Final = _layout("LowCmd_")
+SPORT_STATE: Final = _layout("SportModeState_")
 """``rt/sportmodestate``; it carries no checksum."""
 
 

@@ -17,16 +17,8 @@ from jaxtyping import Float, Shaped
 
 from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.codec import codec_of
-from controller.bridges.unitree.layout import (
-    FEET_FROM_UNITREE,
-    FEET_TO_UNITREE,
-    JOINTS_FROM_UNITREE,
-    JOINTS_TO_UNITREE,
-    MOTORS,
-    is_intact,
-    seal,
-)
+from controller.bridges.unitree.codec import decode_message
+from controller.bridges.unitree.layout import FEET_SWAPPED, JOINTS_SWAPPED, MOTORS
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError
 from go2_wbc.plant.sensors import ImuSample
@@ -45,44 +37,44 @@ REPORT_PERIOD: Final = 1.0
 """Time [s] between two reports of the same kind."""
 
 
+def intact_message(kind: np.dtype[np.void], data: bytes) -> Shaped[np.ndarray, "1"]:
+    """A low-level message of the wire's bytes; CommandError if it is none, or damaged."""
+    message = decode_message(kind, data)
+    if not layout.is_intact(message):
+        raise CommandError("wrong checksum")
+    return message
+
+
 def joint_command(
     message: Shaped[np.ndarray, "1"], lower: Float[np.ndarray, "12"], upper: Float[np.ndarray, "12"]
 ) -> JointCommand:
     """What a ``rt/lowcmd`` message asks of the motors, in our joint order.
 
     Raises:
-        CommandError: if the checksum is wrong or a value is not finite or out of limits.
+        CommandError: if a value is not finite or out of limits.
     """
-    if not is_intact(message):
-        raise CommandError("wrong checksum")
-    motors = message["motor_cmd"][0, :MOTORS][JOINTS_FROM_UNITREE]
+    motors = message["motor_cmd"][0, :MOTORS][JOINTS_SWAPPED]
     obeys = motors["mode"] == layout.SERVO
     q, dq, tau, kp, kd = (motors[name].astype(float) for name in ("q", "dq", "tau", "kp", "kd"))
-    for name, values in (("q", q), ("dq", dq), ("tau", tau), ("kp", kp), ("kd", kd)):
-        if not np.isfinite(values).all():
+    for name in ("q", "dq", "tau", "kp", "kd"):
+        if not np.isfinite(motors[name]).all():
             raise CommandError(f"{name} is not finite")
     kp = np.where(obeys & (np.abs(q) < 0.5 * layout.POSITION_STOP), kp, 0.0)
     kd, tau = np.where(obeys, kd, 0.0), np.where(obeys, tau, 0.0)
     dq = np.where(np.abs(dq) >= layout.VELOCITY_STOP, 0.0, dq)
     q = np.where(kp > 0.0, q, 0.0)
-    _require(kp, 0.0, layout.KP_MAX, "kp")
-    _require(kd, 0.0, layout.KD_MAX, "kd")
-    _require(tau, -layout.TAU_MAX, layout.TAU_MAX, "tau")
-    _require(dq, -layout.SPEED_MAX, layout.SPEED_MAX, "dq")
     held = kp > 0.0
-    _require(q[held], lower[held] - ANGLE_MARGIN, upper[held] + ANGLE_MARGIN, "q")
+    for name, values, least, greatest in (
+        ("kp", kp, 0.0, layout.KP_MAX),
+        ("kd", kd, 0.0, layout.KD_MAX),
+        ("tau", tau, -layout.TAU_MAX, layout.TAU_MAX),
+        ("dq", dq, -layout.SPEED_MAX, layout.SPEED_MAX),
+        ("q", q[held], lower[held] - ANGLE_MARGIN, upper[held] + ANGLE_MARGIN),
+    ):
+        outside = (values < least) | (values > greatest)
+        if outside.any():
+            raise CommandError(f"{name} out of limits: {values[outside][0]:.4g}")
     return JointCommand(tau, q, dq, kp, kd)
-
-
-def _require(
-    values: Float[np.ndarray, " n"],
-    least: float | Float[np.ndarray, " n"],
-    greatest: float | Float[np.ndarray, " n"],
-    name: str,
-) -> None:
-    outside = (values < least) | (values > greatest)
-    if outside.any():
-        raise CommandError(f"{name} out of limits: {values[outside][0]:.4g}")
 
 
 def low_state_message(state: RobotState, imu: ImuSample) -> Shaped[np.ndarray, "1"]:
@@ -92,12 +84,12 @@ def low_state_message(state: RobotState, imu: ImuSample) -> Shaped[np.ndarray, "
     fill_imu(message["imu_state"], imu, state)
     motors = message["motor_state"][0, :MOTORS]
     motors["mode"] = layout.SERVO
-    motors["q"] = state.joint_positions[JOINTS_TO_UNITREE]
-    motors["dq"] = state.joint_velocities[JOINTS_TO_UNITREE]
-    motors["tau_est"] = state.tau[JOINTS_TO_UNITREE]
-    message["foot_force"] = np.rint(state.foot_forces[FEET_TO_UNITREE])
+    motors["q"] = state.joint_positions[JOINTS_SWAPPED]
+    motors["dq"] = state.joint_velocities[JOINTS_SWAPPED]
+    motors["tau_est"] = state.tau[JOINTS_SWAPPED]
+    message["foot_force"] = np.rint(state.foot_forces[FEET_SWAPPED])
     message["tick"] = round(1000 * state.time)
-    seal(message)
+    layout.seal(message)
     return message
 
 
@@ -114,16 +106,16 @@ def low_cmd_message(command: JointCommand) -> Shaped[np.ndarray, "1"]:
     message["head"], message["level_flag"] = layout.HEAD, layout.LOW_LEVEL
     motors = message["motor_cmd"][0, :MOTORS]
     motors["mode"] = layout.SERVO
-    motors["q"], motors["dq"] = command.q_des[JOINTS_TO_UNITREE], command.v_des[JOINTS_TO_UNITREE]
-    motors["kp"], motors["kd"] = command.kp[JOINTS_TO_UNITREE], command.kd[JOINTS_TO_UNITREE]
-    motors["tau"] = command.tau[JOINTS_TO_UNITREE]
-    seal(message)
+    motors["q"], motors["dq"] = command.q_des[JOINTS_SWAPPED], command.v_des[JOINTS_SWAPPED]
+    motors["kp"], motors["kd"] = command.kp[JOINTS_SWAPPED], command.kd[JOINTS_SWAPPED]
+    motors["tau"] = command.tau[JOINTS_SWAPPED]
+    layout.seal(message)
     return message
 
 
 def sensor_reading(message: Shaped[np.ndarray, "1"]) -> SensorReading:
     """What a ``rt/lowstate`` message says, in our order of legs and joints."""
-    motors = message["motor_state"][0, :MOTORS][JOINTS_FROM_UNITREE]
+    motors = message["motor_state"][0, :MOTORS][JOINTS_SWAPPED]
     imu = message["imu_state"][0]
     return SensorReading(
         time=0.001 * float(message["tick"][0]),
@@ -133,7 +125,7 @@ def sensor_reading(message: Shaped[np.ndarray, "1"]) -> SensorReading:
         q_joints=motors["q"].astype(float),
         v_joints=motors["dq"].astype(float),
         tau=motors["tau_est"].astype(float),
-        foot_forces=message["foot_force"][0].astype(float)[FEET_FROM_UNITREE],
+        foot_forces=message["foot_force"][0].astype(float)[FEET_SWAPPED],
     )
 
 
@@ -158,7 +150,6 @@ class CommandGate:
         self.accepted = 0
         self.refused: Counter[str] = Counter()
         self._lower, self._upper, self._clock = lower, upper, clock
-        self._codec = codec_of(layout.LOW_CMD)
         self._last: JointCommand | None = None
         self._heard = -np.inf
         self._is_damping = False
@@ -171,10 +162,29 @@ class CommandGate:
 
     def hear(self, samples: list[bytes]) -> bool:
         """Take in what has come since the last call; whether a good command was among it."""
-        newest = self._newest(samples)
-        if newest is not None:
-            self._offer(newest)
-        return newest is not None
+        newest = None
+        for data in samples:
+            try:
+                message = intact_message(layout.LOW_CMD, data)
+                newest = joint_command(message, self._lower, self._upper)
+                self.accepted += 1
+            except CommandError as error:
+                kind = str(error).split(":")[0]
+                self.refused[kind] += 1
+                self._throttle.warn(kind, f"lowcmd refused, {self.refused[kind]} so far: {error}")
+        if newest is None:
+            return False
+        if not (self.is_open or self.is_active):
+            self._throttle.warn(
+                "ignored", "lowcmd ignored: the sport service has the robot; lie down or Damp first"
+            )
+            return True
+        if self._last is None:
+            _log.info("low-level commands have the robot")
+        elif self._is_damping:
+            _log.info("low-level commands go on")
+        self._last, self._heard, self._is_damping = newest, self._clock(), False
+        return True
 
     def choose(self, own: JointCommand) -> JointCommand:
         """The command of this tick: the newest good one that was heard, ``own``, or damping."""
@@ -190,28 +200,3 @@ class CommandGate:
             _log.info("low-level control has ended")
             self._last = None
         return JointCommand.damping(DAMPING)
-
-    def _offer(self, command: JointCommand) -> None:
-        if not (self.is_open or self.is_active):
-            self._throttle.warn(
-                "ignored", "lowcmd ignored: the sport service has the robot; lie down or Damp first"
-            )
-            return
-        if self._last is None:
-            _log.info("low-level commands have the robot")
-        elif self._is_damping:
-            _log.info("low-level commands go on")
-        self._last, self._heard, self._is_damping = command, self._clock(), False
-
-    def _newest(self, samples: list[bytes]) -> JointCommand | None:
-        found = None
-        for data in samples:
-            try:
-                message = self._codec.decode(data)
-                found = joint_command(message, self._lower, self._upper)
-                self.accepted += 1
-            except CommandError as error:
-                kind = str(error).split(":")[0]
-                self.refused[kind] += 1
-                self._throttle.warn(kind, f"lowcmd refused, {self.refused[kind]} so far: {error}")
-        return found

@@ -3,28 +3,38 @@
 from __future__ import annotations
 
 import atexit
+import json
 import logging
+import math
 import signal
 import sys
 import threading
 import time
-from types import FrameType
-from typing import Final, final
+from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 
 from controller.behaviours.joints import DAMPING
-from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.codec import encode_message
 from controller.bridges.unitree.extra import require_dds
 from controller.bridges.unitree.guards import GuardConfig, Guards, is_passive, require_sane
-from controller.bridges.unitree.layout import LOW_CMD, LOW_STATE, is_intact
-from controller.bridges.unitree.low_level import low_cmd_message, sensor_reading
+from controller.bridges.unitree.layout import LOW_STATE
+from controller.bridges.unitree.low_level import (
+    intact_message,
+    low_cmd_message,
+    sensor_reading,
+)
+from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Code, SwitcherApi
 from controller.pacing import SWITCH_INTERVAL
 from go2_wbc.errors import ClosedError, CommandError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.estimator import EstimatorConfig, StateEstimator
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, RobotState
+
+if TYPE_CHECKING:
+    from controller.bridges.unitree.bus import Bus
+    from controller.bridges.unitree.rpc import Client
 
 _log = logging.getLogger(__name__)
 
@@ -45,6 +55,10 @@ REPEAT, REPEATS = 0.01, 10
 """Silence [s] of the robot after which a command is sent again, and how often at most until the
 limit of stale states: it, or its answer, may be lost, and a simulator in lockstep waits for it. One
 that is only slow takes the repetition for the next command: where more is allowed, wait longer."""
+SWITCHER_LIMIT: Final = 1.0
+"""Time [s] in which the robot's motion switcher must be found."""
+RELEASE_LIMIT, RELEASE_PERIOD = 5.0, 0.2
+"""Time [s] in which its motion service must let go, and between two requests to."""
 LOOPBACK: Final = "lo"
 """Where simulators live, which need not have a motion switcher; a robot has one."""
 CONSENT: Final = (
@@ -60,6 +74,9 @@ class UnitreePlant(Plant):
 
     Every guard that trips damps the robot and ends the plant: a new one starts from lying again.
     Commands must not stop, so drive it with ``GO2Controller(plant=..., realtime=True)``.
+
+    Attributes:
+        bad_states: how many ``rt/lowstate`` were refused for their checksum or length.
 
     Example:
         >>> plant = UnitreePlant("lo", 1, i_have_the_remote_in_hand=True)  # go2-wbc unitree-sim
@@ -96,9 +113,7 @@ class UnitreePlant(Plant):
         if i_have_the_remote_in_hand is not True:
             raise CommandError(CONSENT)
         require_dds()
-        from controller.bridges.unitree import idl
         from controller.bridges.unitree.bus import Bus
-        from controller.bridges.unitree.takeover import release_sport
 
         model = RobotModel()
         self._config = guards or GuardConfig()
@@ -108,20 +123,19 @@ class UnitreePlant(Plant):
         self._model = model
         self._where = f"DDS domain {domain}, interface {interface}"
         bus = Bus(domain, interface)
-        self._states = bus.reader("rt/lowstate", idl.low_state(), depth=QUEUE)
-        self._commands = bus.writer("rt/lowcmd", idl.low_cmd())
-        self._decode, self._encode = codec_of(LOW_STATE).decode, codec_of(LOW_CMD).encode
-        self._bad_states = 0
+        self._states = bus.reader("rt/lowstate", depth=QUEUE)
+        self._commands = bus.writer("rt/lowcmd")
+        self.bad_states = 0
         self._tick = -1
         self._heard = time.monotonic()
-        self._written: float | None = None
+        self._written = math.inf  # when commands were last sent that must not stop
         self._failure: str | None = None
         self._is_closed = False
         self._sending = threading.RLock()
         self._is_taken_over = False
-        self._state = self._first_state()
+        self._find()
         self._require_lying()
-        release_sport(bus, self._require_lying, may_lack=interface == LOOPBACK)
+        self._release_sport(bus, interface)
         self._require_lying()
         self._take_over()
 
@@ -143,11 +157,6 @@ class UnitreePlant(Plant):
     def is_live(self) -> bool:
         """True: a robot does not wait."""
         return True
-
-    @property
-    def bad_states(self) -> int:
-        """How many ``rt/lowstate`` were refused for their checksum or length."""
-        return self._bad_states
 
     def read(self) -> RobotState:
         """The estimated state after the last ``write``, or at the start."""
@@ -199,8 +208,8 @@ class UnitreePlant(Plant):
 
     def _send(self, command: JointCommand) -> None:
         with self._sending:
-            self._commands.write(self._encode(low_cmd_message(command)))
-            self._written = None if is_passive(command) else time.monotonic()
+            self._commands.write(encode_message(low_cmd_message(command)))
+            self._written = math.inf if is_passive(command) else time.monotonic()
 
     def _damp_once(self) -> None:
         try:
@@ -229,7 +238,7 @@ class UnitreePlant(Plant):
                     return
                 if self._failure is not None:
                     self._damp_once()
-                elif self._is_hanging():
+                elif time.monotonic() - self._written > self._config.hang_limit:
                     reason = (
                         f"no command for {1000 * self._config.hang_limit:.0f} ms; a robot needs "
                         "one every 2 ms: GO2Controller(plant=..., realtime=True)"
@@ -237,28 +246,22 @@ class UnitreePlant(Plant):
                     _log.warning("damped: %s", reason)
                     self._stop(PlantTimeout(reason))
 
-    def _is_hanging(self) -> bool:
-        written = self._written
-        return written is not None and time.monotonic() - written > self._config.hang_limit
-
     # --- states ---------------------------------------------------------------------------
 
-    def _first_state(self) -> RobotState:
+    def _find(self) -> None:
         deadline = time.monotonic() + FIRST_STATE_LIMIT
-        while time.monotonic() < deadline:
+        while not self._take():
             self._states.wait(0.1)
-            state = self._take()
-            if state is not None:
-                return state
-        what = f"only {self._bad_states} broken ones" if self._bad_states else "none"
-        raise PlantTimeout(
-            f"no rt/lowstate on {self._where} within {FIRST_STATE_LIMIT:g} s ({what}): "
-            "is the robot, or go2-wbc unitree-sim, on, and the interface right?"
-        )
+            if time.monotonic() > deadline:
+                what = f"only {self.bad_states} broken ones" if self.bad_states else "none"
+                raise PlantTimeout(
+                    f"no rt/lowstate on {self._where} within {FIRST_STATE_LIMIT:g} s ({what}): "
+                    "is the robot, or go2-wbc unitree-sim, on, and the interface right?"
+                )
 
     def _hears_a_state(self) -> bool:
         """Take the next state; False if the robot is silent for a while."""
-        while (state := self._take()) is None:
+        while not self._take():
             silence = time.monotonic() - self._heard
             left = self._config.stale_limit - silence
             if left < 0.0:
@@ -266,7 +269,6 @@ class UnitreePlant(Plant):
                 raise self._stop(PlantTimeout(reason))
             if not self._states.wait(min(self._repeat, left + 0.001)):
                 return False
-        self._state = state
         return True
 
     def _synchronise(self) -> None:
@@ -285,40 +287,71 @@ class UnitreePlant(Plant):
         while time.monotonic() < end:
             if not self._states.wait(SYNC_SILENCE):
                 return True
-            self._state = self._take() or self._state
+            self._take()
         return False
 
-    def _take(self) -> RobotState | None:
-        """The state after all samples that have come, or None if there is no new one."""
-        state = None
+    def _take(self) -> bool:
+        """Take in all samples that have come; returns whether there is a new state."""
+        known = self._tick
         for data in self._states.take():
             try:
-                message = self._decode(data)
+                message = intact_message(LOW_STATE, data)
             except CommandError:
-                self._bad_states += 1
-                continue
-            if not is_intact(message):
-                self._bad_states += 1
+                self.bad_states += 1
                 continue
             tick = int(message["tick"][0])
             if tick < self._tick:
                 raise self._stop(PlantError("the robot's clock went back: it has started anew"))
             if tick > self._tick:
                 self._tick, self._heard = tick, time.monotonic()
-                state = self._estimator.update(sensor_reading(message))
-        return state
+                self._state = self._estimator.update(sensor_reading(message))
+        return self._tick > known
 
     # --- taking over ----------------------------------------------------------------------
 
     def _require_lying(self) -> None:
-        self._state = state = self._take() or self._state
+        self._take()
+        state = self._state
         _, p_feet = self._model.forward_kinematics(state.q)
         height = float(state.q[2] - p_feet[:, 2].min()) + self._model.foot_radius
-        if not self._guards.is_lying(state, height):
+        if not (height < self._config.lying_height and state.tilt < self._config.lying_tilt):
             raise PlantError(
                 f"the robot must lie on its belly at the start; its base is {height:.2f} m above "
                 f"its feet, tilted by {np.degrees(state.tilt):.0f} deg"
             )
+
+    def _release_sport(self, bus: Bus, interface: str) -> None:
+        """Release whatever motion service has the robot: it would fight the commands."""
+        from controller.bridges.unitree.rpc import Client
+
+        client = Client(bus, SWITCHER_SERVICE)
+        if not client.wait_for_server(SWITCHER_LIMIT):
+            if interface != LOOPBACK:
+                raise PlantError(
+                    "no motion switcher answers, so nobody can tell what else moves this robot"
+                )
+            _log.warning("no motion switcher answers: taking for granted that nobody has the robot")
+            return
+        deadline = time.monotonic() + RELEASE_LIMIT
+        while name := _active_service(client):
+            if time.monotonic() > deadline:
+                raise PlantError(
+                    f"the motion service {name!r} keeps the robot: lay it down and end what runs "
+                    "there"
+                )
+            self._require_lying()
+            client.call(SwitcherApi.RELEASE_MODE)
+            time.sleep(RELEASE_PERIOD)
+
+
+def _active_service(client: Client) -> str:
+    response = client.ask(SwitcherApi.CHECK_MODE)
+    if response.code != Code.OK:
+        raise PlantError(f"the motion switcher answered {response.code} to CheckMode")
+    try:
+        return str(json.loads(response.data).get("name") or "")
+    except (ValueError, AttributeError) as error:
+        raise PlantError(f"the motion switcher said {response.data!r}") from error
 
 
 def _exit_on_signals() -> None:
@@ -330,8 +363,4 @@ def _exit_on_signals() -> None:
         return
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is signal.SIG_DFL:
-            signal.signal(number, _exit)
-
-
-def _exit(number: int, frame: FrameType | None) -> None:
-    raise SystemExit(128 + number)
+            signal.signal(number, lambda number, _frame: sys.exit(128 + number))

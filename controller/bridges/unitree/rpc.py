@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import json
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Final, final
 
-from controller.bridges.unitree import idl
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import (
     Reply,
     Request,
     Response,
-    decode_request,
-    decode_response,
-    encode_request,
-    encode_response,
+    decode_call,
+    encode_call,
 )
 from controller.bridges.unitree.sport_api import API_VERSION, LEASE_TERM, Api, Code
 from go2_wbc.errors import CommandError
@@ -46,10 +45,8 @@ class Server:
     ) -> None:
         """Hand requests to ``handle``; call ``patrol`` in between, every ``PATROL`` seconds."""
         self._name, self._handle, self._patrol = service, handle, patrol
-        self._reader = bus.reader(
-            f"rt/api/{service}/request", idl.request(), depth=QUEUE, reliable=True
-        )
-        self._writer = bus.writer(f"rt/api/{service}/response", idl.response())
+        self._reader = bus.reader(f"rt/api/{service}/request", depth=QUEUE, reliable=True)
+        self._writer = bus.writer(f"rt/api/{service}/response")
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._serve, name=f"rpc-{service}", daemon=True)
         self._thread.start()
@@ -72,11 +69,11 @@ class Server:
 
     def _serve_one(self, data: bytes) -> None:
         try:
-            request = decode_request(data)
+            request = decode_call(Request, data)
         except CommandError as error:
             _log.warning("%s: ignored what is no request: %s", self._name, error)
             return
-        reply = self._reply_to(request)
+        reply = partial(self._reply, request)
         try:
             if request.api_id == Api.VERSION:
                 reply(Code.OK, API_VERSION)
@@ -89,50 +86,42 @@ class Server:
             _log.exception("%s: request %d failed", self._name, request.api_id)
             reply(Code.INTERNAL, "")
 
-    def _reply_to(self, request: Request) -> Reply:
-        def reply(code: int, data: str) -> None:
-            if request.wants_reply:
-                answer = Response(request.id, request.api_id, int(code), data)
-                self._writer.write(encode_response(answer))
-
-        return reply
+    def _reply(self, request: Request, code: int, data: str) -> None:
+        if not request.is_one_way:
+            answer = Response(request.id, request.api_id, int(code), data)
+            self._writer.write(encode_call(answer))
 
 
 @final
-class LeaseServer:
+class Lease:
     """Gives one client at a time the sole control of a service, as Unitree's servers do."""
 
-    def __init__(self, bus: Bus, service: str) -> None:
-        """Serve ``service``'s leases."""
-        self._id, self._renewed = 0, 0.0
-        self._server = Server(bus, f"{service}_lease", self._handle)
+    def __init__(self) -> None:
+        """Nobody has it."""
+        self._id, self._renewed = 0, -math.inf
 
     def allows(self, request: Request) -> bool:
         """Whether the client of ``request`` may control the service now."""
-        return self._id == 0 or self._is_expired() or request.lease_id == self._id
-
-    def close(self) -> None:
-        """Stop serving; idempotent."""
-        self._server.close()
+        return self._is_expired() or request.lease_id == self._id
 
     def _is_expired(self) -> bool:
         return time.monotonic() > self._renewed + LEASE_TERM
 
-    def _handle(self, request: Request, reply: Reply) -> None:
-        if request.api_id == Api.LEASE_APPLY:
-            if self._id and not self._is_expired():
-                reply(Code.LEASE_EXIST, "")
-                return
+    def handle(self, request: Request, reply: Reply) -> None:
+        """Answer a request for a lease."""
+        code, data = Code.OK, ""
+        if request.api_id == Api.LEASE_APPLY and self._is_expired():
             self._id, self._renewed = time.time_ns() // 1000, time.monotonic()
-            reply(Code.OK, json.dumps({"id": self._id, "term": round(1e6 * LEASE_TERM)}))
-        elif request.api_id == Api.LEASE_RENEWAL:
-            if self._id != request.lease_id or self._is_expired():
-                reply(Code.LEASE_NOT_EXIST, "")
-                return
-            self._renewed = time.monotonic()
-            reply(Code.OK, "")
+            data = json.dumps({"id": self._id, "term": round(1e6 * LEASE_TERM)})
+        elif request.api_id == Api.LEASE_APPLY:
+            code = Code.LEASE_EXIST
+        elif request.api_id != Api.LEASE_RENEWAL:
+            code = Code.NOT_SUPPORTED
+        elif self._id != request.lease_id or self._is_expired():
+            code = Code.LEASE_NOT_EXIST
         else:
-            reply(Code.NOT_SUPPORTED, "")
+            self._renewed = time.monotonic()
+        reply(code, data)
 
 
 @final
@@ -141,10 +130,8 @@ class Client:
 
     def __init__(self, bus: Bus, service: str) -> None:
         """Call ``service``."""
-        self._writer = bus.writer(f"rt/api/{service}/request", idl.request())
-        self._reader = bus.reader(
-            f"rt/api/{service}/response", idl.response(), depth=QUEUE, reliable=True
-        )
+        self._writer = bus.writer(f"rt/api/{service}/request")
+        self._reader = bus.reader(f"rt/api/{service}/response", depth=QUEUE, reliable=True)
 
     def wait_for_server(self, seconds: float) -> bool:
         """Wait until a server has been discovered, for ``seconds`` at most."""
@@ -158,12 +145,12 @@ class Client:
     def call(self, api_id: int, parameter: str = "{}", timeout: float = 1.0) -> Response:
         """Call and wait for the answer; code 3104 (``API_TIMEOUT``) if none comes."""
         request = Request(time.time_ns(), api_id, parameter=parameter)
-        self._writer.write(encode_request(request))
+        self._writer.write(encode_call(request))
         deadline = time.monotonic() + timeout
         while (remaining := deadline - time.monotonic()) > 0.0:
             self._reader.wait(remaining)
             for data in self._reader.take():
-                response = decode_response(data)
+                response = decode_call(Response, data)
                 if response.id == request.id:
                     return response
         return Response(request.id, api_id, Code.API_TIMEOUT)
@@ -178,5 +165,5 @@ class Client:
 
     def send(self, api_id: int, parameter: str = "{}") -> None:
         """Call without an answer."""
-        request = Request(time.time_ns(), api_id, wants_reply=False, parameter=parameter)
-        self._writer.write(encode_request(request))
+        request = Request(time.time_ns(), api_id, is_one_way=True, parameter=parameter)
+        self._writer.write(encode_call(request))

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import Final, final
 
 import numpy as np
 from jaxtyping import Shaped
 
-from controller.bridges.unitree import idl, layout
+from controller.bridges.unitree import layout
 from controller.bridges.unitree.bus import Bus
-from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.codec import encode_message
 from controller.bridges.unitree.low_level import CommandGate, fill_imu, low_state_message
-from controller.bridges.unitree.sport_api import SportMode
+from controller.bridges.unitree.sport_api import SportStatus
 from controller.pacing import Pacer
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.plant.sensors import ImuSample
@@ -31,30 +30,13 @@ CATCH_UP: Final = 0.9
 simulator that is late must not run ahead of its peer's commands to catch up."""
 
 
-@dataclass(slots=True)
-class SportStatus:
-    """What the sport service says of itself in ``rt/sportmodestate``.
-
-    Attributes:
-        mode: see ``SportMode``.
-        is_acting: whether an action is running.
-        is_trotting: whether the robot is in walking mode.
-        error_code: of the last action that failed, else 0.
-    """
-
-    mode: SportMode = SportMode.DAMPING
-    is_acting: bool = False
-    is_trotting: bool = False
-    error_code: int = 0
-
-
 @final
 class ServedPlant(Plant):
     """Hands everything on to a ``MujocoPlant``, publishes its state, obeys low-level commands.
 
     Attributes:
         gate: decides who has the motors.
-        status: what ``rt/sportmodestate`` says; written by the sport service.
+        status: what ``rt/sportmodestate`` says besides.
     """
 
     def __init__(
@@ -64,11 +46,9 @@ class ServedPlant(Plant):
         self._is_lockstep = lockstep
         self.gate, self.status = gate, SportStatus()
         self._inner = inner
-        self._commands = bus.reader("rt/lowcmd", idl.low_cmd(), depth=COMMAND_QUEUE)
-        self._states = bus.writer("rt/lowstate", idl.low_state())
-        self._sport_states = bus.writer("rt/sportmodestate", idl.sport_state())
-        self._encode_state = codec_of(layout.LOW_STATE).encode
-        self._encode_sport_state = codec_of(layout.SPORT_STATE).encode
+        self._commands = bus.reader("rt/lowcmd", depth=COMMAND_QUEUE)
+        self._states = bus.writer("rt/lowstate")
+        self._sport_states = bus.writer("rt/sportmodestate")
         self._ticks = 0
         self._pacer = Pacer(CATCH_UP * inner.control_period, late=0.0)
 
@@ -86,10 +66,10 @@ class ServedPlant(Plant):
         self._hear()
         self._inner.write(self.gate.choose(command))
         state, imu = self._inner.read(), self._inner.imu()
-        self._states.write(self._encode_state(low_state_message(state, imu)))
+        self._states.write(encode_message(low_state_message(state, imu)))
         if self._ticks % SPORT_STATE_TICKS == 0:
             message = sport_state_message(state, imu, self.status)
-            self._sport_states.write(self._encode_sport_state(message))
+            self._sport_states.write(encode_message(message))
         self._ticks += 1
 
     def close(self) -> None:
@@ -121,5 +101,5 @@ def sport_state_message(
     message["position"], message["body_height"] = state.q[:3], state.q[2]
     message["velocity"] = state.R_world_base @ state.v[:3]
     message["yaw_speed"] = imu.gyro[2]
-    message["foot_force"] = np.rint(state.foot_forces[layout.FEET_TO_UNITREE])
+    message["foot_force"] = np.rint(state.foot_forces[layout.FEET_SWAPPED])
     return message

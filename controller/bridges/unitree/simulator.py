@@ -9,12 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, final
 
-from controller.bridges.unitree import idl
 from controller.bridges.unitree.bus import Bus
 from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.low_level import CommandGate
-from controller.bridges.unitree.rpc import LeaseServer, Server
-from controller.bridges.unitree.served_plant import ServedPlant, SportStatus
+from controller.bridges.unitree.rpc import Lease, Server
+from controller.bridges.unitree.served_plant import ServedPlant
 from controller.bridges.unitree.sport_api import (
     SPORT_SERVICE,
     SWITCHER_SERVICE,
@@ -31,9 +30,6 @@ from go2_wbc.robot.model import RobotModel
 
 _log = logging.getLogger(__name__)
 
-SIMULATOR_DOMAIN: Final = 1
-"""DDS domain of simulators, as in ``unitree_mujoco``; the robot is on 0."""
-LOOPBACK: Final = "lo"
 DISCOVERY: Final = 0.5
 """Time [s] that another robot gets to be heard; some hundredths on an idle machine."""
 
@@ -43,7 +39,7 @@ class SimulatorSettings:
     """Where the simulator is found, and what it simulates.
 
     Attributes:
-        domain: DDS domain.
+        domain: DDS domain; 1 is that of simulators, as in ``unitree_mujoco``, 0 the robot's.
         interface: network interface.
         mjcf: a user's own Go2 model or scene.
         friction: of the feet; None is the model's.
@@ -54,8 +50,8 @@ class SimulatorSettings:
         lockstep: under low-level control let time pass only command by command.
     """
 
-    domain: int = SIMULATOR_DOMAIN
-    interface: str = LOOPBACK
+    domain: int = 1
+    interface: str = "lo"
     mjcf: Path | None = None
     friction: float | None = None
     payload: float = 0.0
@@ -67,7 +63,11 @@ class SimulatorSettings:
 
 @final
 class UnitreeSimulator:
-    """Serves a simulated robot until it is closed."""
+    """Serves a simulated robot until it is closed.
+
+    Attributes:
+        gate: who has the motors, with the counts of good and refused commands.
+    """
 
     def __init__(self, settings: SimulatorSettings) -> None:
         """Start serving.
@@ -88,14 +88,15 @@ class UnitreeSimulator:
             seed=settings.seed,
         )
         model = RobotModel()
-        self._gate = CommandGate(model.q_lower, model.q_upper)
-        self._plant = ServedPlant(inner, bus, self._gate, lockstep=settings.lockstep)
+        self.gate = CommandGate(model.q_lower, model.q_upper)
+        self._plant = ServedPlant(inner, bus, self.gate, lockstep=settings.lockstep)
         self._robot = SportRobot(self._plant, config)
         self._is_released = False
-        self._sport = SportService(self._robot, self._has_low_level)
-        self._lease = LeaseServer(bus, SPORT_SERVICE)
+        self._sport = SportService(self._robot, lambda: self._is_released or self.gate.is_active)
+        self._lease = Lease()
         self._servers = (
             Server(bus, SPORT_SERVICE, self._handle_sport, self._patrol),
+            Server(bus, f"{SPORT_SERVICE}_lease", self._lease.handle),
             Server(bus, SWITCHER_SERVICE, self._handle_switcher),
         )
 
@@ -104,35 +105,18 @@ class UnitreeSimulator:
         """Whether the simulation goes on."""
         return self._robot.is_alive
 
-    @property
-    def gate(self) -> CommandGate:
-        """Who has the motors, with the counts of good and refused commands."""
-        return self._gate
-
-    @property
-    def status(self) -> SportStatus:
-        """What the sport service says of itself."""
-        return self._plant.status
-
     def close(self) -> None:
         """Go limp and stop serving; idempotent."""
         for server in self._servers:
             server.close()
-        self._lease.close()
         self._sport.close()
         self._robot.close()
         self._plant.close()
 
-    def _has_low_level(self) -> bool:
-        return self._is_released or self._gate.is_active
-
     def _patrol(self) -> None:
         self._sport.patrol()
-        self._gate.is_open = self._is_released or self._sport.is_idle
-        status = self._plant.status
-        status.mode = self._sport.sport_mode()
-        status.is_acting, status.error_code = self._sport.is_acting, self._sport.error_code
-        status.is_trotting = self._robot.mode.value == "walking"
+        self.gate.is_open = self._is_released or self._sport.is_idle
+        self._plant.status = self._sport.status
 
     def _handle_sport(self, request: Request, reply: Reply) -> None:
         if self._lease.allows(request):
@@ -157,7 +141,7 @@ class UnitreeSimulator:
 
 def _require_no_robot(domain: int, interface: str) -> None:
     """Raise BridgeError if somebody publishes ``rt/lowstate``: two would answer every call."""
-    states = Bus(domain, interface).reader("rt/lowstate", idl.low_state(), depth=1)
+    states = Bus(domain, interface).reader("rt/lowstate", depth=1)
     if states.wait(DISCOVERY):  # not its writer: the C++ SDK has one and uses it for nothing
         raise BridgeError(
             f"a robot is already on DDS domain {domain}, interface {interface}; "

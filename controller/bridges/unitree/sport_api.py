@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import IntEnum
-from typing import Final
+from typing import Any, Final
 
 from go2_wbc.errors import CommandError
 
@@ -79,7 +80,24 @@ class SportMode(IntEnum):
     SIT = 10
 
 
-MOVE_RANGES: Final = ((-2.5, 3.8), (-1.0, 1.0), (-4.0, 4.0))
+@dataclass(frozen=True, slots=True)
+class SportStatus:
+    """What the sport service says of itself in ``rt/sportmodestate``.
+
+    Attributes:
+        mode: see ``SportMode``.
+        is_acting: whether an action is running.
+        is_trotting: whether the robot is in walking mode.
+        error_code: of the last action that failed, 0 since one was done.
+    """
+
+    mode: SportMode = SportMode.DAMPING
+    is_acting: bool = False
+    is_trotting: bool = False
+    error_code: int = 0
+
+
+MOVE_LEAST, MOVE_GREATEST = (-2.5, -1.0, -4.0), (3.8, 1.0, 4.0)
 """Of ``Move``: forward, left [m/s], turning left [rad/s]."""
 EULER_LIMITS: Final = (0.75, 0.75, 0.6)
 """Of ``Euler``: roll, pitch, yaw [rad], either way."""
@@ -88,44 +106,32 @@ SPEED_LEVELS: Final[Mapping[int, float]] = {-1: 0.4, 0: 0.7, 1: 1.0}
 
 
 def vector(parameter: str) -> tuple[float, float, float]:
-    """``x``, ``y`` and ``z`` of a parameter.
-
-    Raises:
-        CommandError: if there are no three finite numbers.
-    """
+    """``x``, ``y`` and ``z`` of a parameter; CommandError unless they are finite numbers."""
     fields = _fields(parameter)
-    values = tuple(fields.get(name) for name in "xyz")
-    numbers = [float(v) for v in values if isinstance(v, int | float) and not isinstance(v, bool)]
-    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+    values: list[Any] = [fields.get(name) for name in "xyz"]
+    if not all(type(value) in (int, float) and math.isfinite(value) for value in values):
         raise CommandError(f"x, y and z must be finite numbers, got {values}")
-    return numbers[0], numbers[1], numbers[2]
+    x, y, z = map(float, values)
+    return x, y, z
 
 
 def flag(parameter: str) -> bool:
-    """``data`` of a parameter as a truth value.
-
-    Raises:
-        CommandError: if it is none.
-    """
+    """``data`` of a parameter as a truth value; CommandError if it is none."""
     value = _fields(parameter).get("data")
-    if not isinstance(value, bool | int):
+    if not isinstance(value, int):
         raise CommandError(f"data must be true or false, got {value!r}")
     return bool(value)
 
 
 def level(parameter: str) -> int:
-    """``data`` of a parameter as a speed level.
-
-    Raises:
-        CommandError: if it is none.
-    """
+    """``data`` of a parameter as a speed level; CommandError if it is none."""
     value = _fields(parameter).get("data")
-    if isinstance(value, bool) or not isinstance(value, int) or value not in SPEED_LEVELS:
+    if type(value) is not int or value not in SPEED_LEVELS:
         raise CommandError(f"data must be one of {sorted(SPEED_LEVELS)}, got {value!r}")
     return value
 
 
-def _fields(parameter: str) -> Mapping[str, object]:
+def _fields(parameter: str) -> Mapping[str, Any]:
     try:
         fields = json.loads(parameter or "{}")
     except ValueError as error:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Final, final
 
 import numpy as np
-from jaxtyping import Float
 
 from controller.assembly import PilotSettings, build_pilot
 from controller.behaviours.plans import ChangePosture
@@ -17,8 +17,9 @@ from controller.procedures import ProcedureRunner
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant.base import Plant
-from go2_wbc.reference import MotionPlan, TrackedPoint
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.reference import TrackedPoint
+from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
 from motions.postures import lean
@@ -32,6 +33,7 @@ MOTIONS: Final[Mapping[int, str]] = {
     Api.SCRAPE: "shake_paw",
 }
 """The motion of the library that stands for each of Unitree's."""
+STANDING_UP: Final = frozenset({Api.STAND_UP, Api.BALANCE_STAND, Api.RECOVERY_STAND})
 POSE: Final = (0.12, -0.15, 0.2)
 """Roll, pitch, yaw [rad] of ``Pose``."""
 FINDINGS_TOLD: Final = 3
@@ -52,30 +54,29 @@ class SportRobot:
         pilot: runs the procedures.
     """
 
-    def __init__(
-        self, plant: Plant, config: Config, after_tick: Callable[[], None] = lambda: None
-    ) -> None:
-        """Take over a robot that lies on the ground; call ``after_tick`` after every tick."""
+    def __init__(self, plant: Plant, config: Config) -> None:
+        """Take over a robot that lies on the ground."""
         self._config = config
         self._checker = FeasibilityChecker()  # with a model of its own: the loop is another thread
-        self._plans: dict[int, MotionPlan] = {
+        plans = {
             api: compile_timeline(load_motion(name), self._checker.model)
             for api, name in MOTIONS.items()
         }
-        settings = PilotSettings(realtime=True, recorded_time=0.0, after_tick=after_tick)
+        settings = PilotSettings(realtime=True, recorded_time=0.0)
         self._assembly = build_pilot(plant, config, settings)
         self.pilot, self._runner = self._assembly.pilot, self._assembly.runner
         self._procedures = ProcedureRunner(self._runner)
         self.is_locked = False
         self.is_leaning = False
-        self._actions: Mapping[int, Callable[[], None]] = {
-            Api.BALANCE_STAND: self._balance_stand,
-            Api.STAND_UP: self._stand_up,
-            Api.STAND_DOWN: self._stand_down,
-            Api.RECOVERY_STAND: self._recover,
-            Api.SIT: self._sit,
-            Api.RISE_SIT: self._balance_stand,
-            Api.MOVE: self._start_walking,
+        self._actions: Mapping[int, Callable[[], object]] = {
+            Api.BALANCE_STAND: self.pilot.stand,
+            Api.STAND_UP: self.pilot.stand,
+            Api.RECOVERY_STAND: self.pilot.recover,
+            Api.RISE_SIT: self.pilot.stand,
+            Api.STAND_DOWN: self.pilot.lie_down,
+            Api.SIT: self.pilot.sit,
+            Api.MOVE: partial(self.pilot.walk, "trot"),
+            **{api: partial(self.pilot.play, plan) for api, plan in plans.items()},
         }
 
     @property
@@ -94,32 +95,20 @@ class SportRobot:
         return self._runner.is_alive
 
     def begin(self) -> None:
-        """Begin an action: whatever makes the robot limp from now on ends it.
-
-        Raises:
-            PlantError: if the control loop has ended.
-        """
+        """Begin an action: what makes the robot limp ends it; PlantError without a control loop."""
         self.pilot.begin()
 
     def perform(self, api: int) -> None:
-        """Do an action that has begun, or play the motion that stands for it.
-
-        Raises:
-            Aborted: if it was not done; says why.
-        """
-        if api in self._plans:
-            self._stand_if_leaning()
-            self.is_locked = False
-            self.pilot.play(self._plans[api])
-        else:
-            self._actions[api]()
+        """Do an action that has begun; ``Aborted`` says why it was not done."""
+        if api not in STANDING_UP:
+            if self.is_leaning:
+                self.pilot.stand()
+            self.is_locked = self.is_leaning = False
+        self._actions[api]()
+        self.is_locked, self.is_leaning = api == Api.STAND_UP, False
 
     def lean_to(self, rpy: tuple[float, float, float]) -> None:
-        """Turn the trunk to roll, pitch, yaw [rad] over the feet and hold it.
-
-        Raises:
-            Aborted: if it does not get there.
-        """
+        """Turn the trunk to roll, pitch, yaw [rad] over the feet and hold it, or ``Aborted``."""
         if self.mode is Mode.WALKING:
             self.pilot.square_up()
         target = np.array(rpy)
@@ -128,10 +117,12 @@ class SportRobot:
         )
         self.is_leaning = True
         self._procedures.run(behaviour, LEAN_LIMIT)
-        self._procedures.settle("lean", lambda snapshot, _: self._is_at(target, snapshot.state.rpy))
 
-    def _is_at(self, wanted: Float[np.ndarray, "3"], rpy: Float[np.ndarray, "3"]) -> bool:
-        return bool(np.abs(rpy[:2] - wanted[:2]).max() < ATTITUDE_TOLERANCE)
+        def is_there(snapshot: Snapshot, _model: RobotModel) -> bool:
+            missing = np.abs(snapshot.state.rpy[:2] - target[:2])
+            return bool(missing.max() < ATTITUDE_TOLERANCE)
+
+        self._procedures.settle("lean", is_there)
 
     def can_lean_to(self, rpy: tuple[float, float, float]) -> bool:
         """Whether the feasibility check finds nothing against this attitude."""
@@ -163,34 +154,3 @@ class SportRobot:
     def close(self) -> None:
         """Go limp and stop."""
         self._assembly.close()
-
-    def _balance_stand(self) -> None:
-        self.pilot.stand()
-        self.is_locked = self.is_leaning = False
-
-    def _stand_up(self) -> None:
-        self.pilot.stand()
-        self.is_locked, self.is_leaning = True, False
-
-    def _stand_down(self) -> None:
-        self._stand_if_leaning()
-        self.is_locked = False
-        self.pilot.lie_down()
-
-    def _recover(self) -> None:
-        self.pilot.recover()
-        self.is_locked = self.is_leaning = False
-
-    def _sit(self) -> None:
-        self._stand_if_leaning()
-        self.is_locked = False
-        self.pilot.sit()
-
-    def _start_walking(self) -> None:
-        self._stand_if_leaning()
-        self.pilot.walk("trot")
-
-    def _stand_if_leaning(self) -> None:
-        if self.is_leaning:
-            self.pilot.stand()
-            self.is_leaning = False

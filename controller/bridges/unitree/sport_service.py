@@ -13,10 +13,12 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Final, final
 
+import numpy as np
+
 from controller.bridges.unitree import sport_api
 from controller.bridges.unitree.codec import Reply, Request
-from controller.bridges.unitree.sport_api import Api, Code, SportMode
-from controller.bridges.unitree.sport_robot import MOTIONS, POSE, SportRobot
+from controller.bridges.unitree.sport_api import Api, Code, SportMode, SportStatus
+from controller.bridges.unitree.sport_robot import MOTIONS, POSE, STANDING_UP, SportRobot
 from controller.jobs import Answer, Job, JobServer
 from controller.modes import Mode
 from controller.procedures import Aborted, Measurements
@@ -32,7 +34,6 @@ HOLD: Final = 1.0
 WAITING: Final = 8
 """Requests that may wait for the running action."""
 _SUPPORTED: Final = frozenset(map(int, Api))
-_STANDING_UP: Final = frozenset({Api.STAND_UP, Api.BALANCE_STAND, Api.RECOVERY_STAND})
 _LIMP: Final = frozenset({Mode.LYING, Mode.DAMPED, Mode.FALLEN})
 _ON_FEET: Final = frozenset({Mode.STANDING, Mode.WALKING})
 _ENTRY: Final = {
@@ -41,6 +42,7 @@ _ENTRY: Final = {
     Api.EULER: _ON_FEET,
     Api.POSE: _ON_FEET,
     Api.MOVE: _ON_FEET,
+    Api.RECOVERY_STAND: frozenset(Mode),
     **dict.fromkeys(MOTIONS, _ON_FEET),
 }
 """Modes from which an action may begin; one that is not listed: from all but fallen."""
@@ -63,18 +65,16 @@ class SportService:
     # --- requests -------------------------------------------------------------------------
 
     def handle(self, request: Request, reply: Reply) -> None:
-        """Answer a request, now or later.
-
-        Raises:
-            CommandError: for a parameter that is not valid.
-        """
+        """Answer a request, now or later; CommandError for a parameter that is not valid."""
         if request.api_id not in _SUPPORTED:
             _log.warning("request %d is not supported", request.api_id)
             reply(Code.NOT_SUPPORTED, "")
             return
         api = Api(request.api_id)
         if api is Api.DAMP:
-            self._damp(reply)
+            self._wanted = ZERO_COMMAND
+            self._jobs.damp()
+            reply(Code.OK, "")
         elif self._is_released():
             reply(Code.NOT_READY, "")
         elif api is Api.STOP_MOVE:
@@ -99,7 +99,7 @@ class SportService:
             return lambda: robot.lean_to(POSE)
         if api is Api.POSE:
             return lambda: robot.perform(Api.BALANCE_STAND)
-        if api in _STANDING_UP:
+        if api in STANDING_UP:
             return lambda: self._rise(api)
         return lambda: robot.perform(api)
 
@@ -120,21 +120,16 @@ class SportService:
     def _joins(self, api: Api) -> bool:
         """Whether a robot that rises anyway needs no other action for ``api``."""
         with self._lock:
-            is_rising = self._rising is not None and api in _STANDING_UP
+            is_rising = self._rising is not None and api in STANDING_UP
             if is_rising and api is not Api.STAND_UP:
                 self._rising = api
         return is_rising
 
     def _lean(self, rpy: tuple[float, float, float]) -> None:
-        limits = zip(rpy, sport_api.EULER_LIMITS, strict=True)
-        if any(abs(angle) > limit for angle, limit in limits) or not self._robot.can_lean_to(rpy):
+        is_beyond = (np.abs(rpy) > sport_api.EULER_LIMITS).any()
+        if is_beyond or not self._robot.can_lean_to(rpy):
             raise _PoseRefused("the robot cannot take this attitude")
         self._robot.lean_to(rpy)
-
-    def _damp(self, reply: Reply) -> None:
-        self._wanted = ZERO_COMMAND
-        self._jobs.damp()
-        reply(Code.OK, "")
 
     def _submit(self, api: Api, perform: Callable[[], None], reply: Reply) -> None:
         def act(_job: Job) -> Measurements:
@@ -155,20 +150,16 @@ class SportService:
         mode = self._robot.mode
         if self._is_released():
             return f"{api.name}: low-level commands have the robot"
-        if mode not in _ENTRY.get(api, Mode) or (
-            mode is Mode.FALLEN and api is not Api.RECOVERY_STAND
-        ):
+        if mode not in _ENTRY.get(api, frozenset(Mode) - {Mode.FALLEN}):
             return f"{api.name}: not from {mode.value}"
         return ""
 
     # --- walking --------------------------------------------------------------------------
 
     def _move(self, velocity: tuple[float, float, float]) -> None:
-        clipped = [
-            min(max(value, low), high)
-            for value, (low, high) in zip(velocity, sport_api.MOVE_RANGES, strict=True)
-        ]
-        self._wanted = VelocityCommand(*clipped)
+        self._wanted = VelocityCommand(
+            *np.clip(velocity, sport_api.MOVE_LEAST, sport_api.MOVE_GREATEST)
+        )
         self._wanted_until = time.monotonic() + HOLD
         self._follow()
 
@@ -181,7 +172,7 @@ class SportService:
         if robot.mode is Mode.WALKING:
             robot.steer(self._wanted, self._share)
         elif not self._wanted.is_zero and robot.mode is Mode.STANDING and not robot.is_locked:
-            self._submit(Api.MOVE, lambda: robot.perform(Api.MOVE), _no_reply)
+            self._submit(Api.MOVE, lambda: robot.perform(Api.MOVE), lambda *_: None)
         elif not self._wanted.is_zero:
             what = "locked after StandUp" if robot.is_locked else robot.mode.value
             _log.warning("Move ignored: the robot is %s; BalanceStand first", what)
@@ -198,32 +189,25 @@ class SportService:
     # --- what it does ---------------------------------------------------------------------
 
     @property
-    def error_code(self) -> int:
-        """Of the last action that failed, 0 since one was done."""
-        last = self._jobs.last
-        return 0 if last is None else int(_code_of(last))
-
-    @property
     def is_idle(self) -> bool:
         """Whether no action runs or waits and the robot lies limp."""
         return self._robot.mode in _LIMP and self._jobs.job is None
 
     @property
-    def is_acting(self) -> bool:
-        """Whether an action is running."""
-        return self._jobs.job is not None
-
-    def sport_mode(self) -> SportMode:
-        """What ``rt/sportmodestate`` calls what the robot is doing."""
-        job, robot = self._jobs.job, self._robot
-        if robot.is_leaning and robot.mode not in _LIMP:
-            return SportMode.POSE
+    def status(self) -> SportStatus:
+        """What ``rt/sportmodestate`` says of what the robot is doing."""
+        job, last, robot = self._jobs.job, self._jobs.last, self._robot
         action = self._rising or (None if job is None else Api[job.name])
-        if action in _MODE_OF_ACTION:
-            return _MODE_OF_ACTION[action]
-        if robot.mode is Mode.STANDING and robot.is_locked:
-            return SportMode.JOINT_LOCK
-        return _MODE_OF_STATE.get(robot.mode, SportMode.IDLE)
+        if robot.is_leaning and robot.mode not in _LIMP:
+            mode = SportMode.POSE
+        elif action in _MODE_OF_ACTION:
+            mode = _MODE_OF_ACTION[action]
+        elif robot.mode is Mode.STANDING and robot.is_locked:
+            mode = SportMode.JOINT_LOCK
+        else:
+            mode = _MODE_OF_STATE.get(robot.mode, SportMode.IDLE)
+        code = Code.OK if last is None else _code_of(last)
+        return SportStatus(mode, job is not None, robot.mode is Mode.WALKING, code)
 
     def close(self) -> None:
         """Stop: who waits is answered; the action that runs ends when the robot is closed."""
@@ -256,7 +240,3 @@ def _code_of(answer: Answer) -> Code:
     if answer.is_refused:
         return Code.NOT_READY
     return _CODE_OF_ERROR.get(type(answer.error), Code.INTERNAL)
-
-
-def _no_reply(code: int, data: str) -> None:
-    """Nobody waits for it."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.layout import FOREIGN, ROBOT_BINS, MujocoLayout
@@ -20,12 +20,10 @@ class FootContacts:
     centre: a round foot that rolls has a moving centre and a resting contact point.
 
     Attributes:
-        touching: whether the foot touches anything that is not the robot.
         p_world_contact: the deepest contact point of each foot [m]; nan without contact.
         v_world_contact: tangential velocity of the foot's material there [m/s]; 0 without contact.
     """
 
-    touching: Bool[np.ndarray, "4"]
     p_world_contact: Float[np.ndarray, "4 3"]
     v_world_contact: Float[np.ndarray, "4 3"]
 
@@ -37,18 +35,12 @@ def ground_force_bins(
 
     Valid between ``mj_step2`` and the next ``mj_step1``: these forces acted over the last step.
     """
-    if data.ncon == 0:
-        return np.zeros(ROBOT_BINS)
-    contacts = data.contact
-    if layout.is_elliptic:
-        addresses = contacts.efc_address
-        normals = data.efc_force[addresses]
-        if addresses.min() < 0:  # a contact inside its gap, which carries no force
-            normals[addresses < 0] = 0.0
-    else:
-        normals = np.array([_normal_force(model, data, i) for i in range(data.ncon)])
-    sums = np.bincount(_pair_codes(contacts.geom, layout), normals, FOREIGN + ROBOT_BINS)
-    return sums[FOREIGN : FOREIGN + ROBOT_BINS]
+    forces, wrench = np.zeros(ROBOT_BINS), np.zeros(6)
+    for contact, which in enumerate((_pair_codes(data, layout) - FOREIGN).tolist()):
+        if 0 <= which < ROBOT_BINS:
+            mujoco.mj_contactForce(model, data, contact, wrench)
+            forces[which] += wrench[0]
+    return forces
 
 
 def foot_contacts(data: mujoco.MjData, layout: MujocoLayout) -> FootContacts:
@@ -56,35 +48,27 @@ def foot_contacts(data: mujoco.MjData, layout: MujocoLayout) -> FootContacts:
 
     Valid after ``mj_step1``: places and velocities belong to the present state.
     """
-    touching = np.zeros(4, dtype=bool)
     points, velocities = np.full((4, 3), np.nan), np.zeros((4, 3))
-    if data.ncon == 0:
-        return FootContacts(touching, points, velocities)
     contacts = data.contact
-    legs, depths = _pair_codes(contacts.geom, layout) - FOREIGN, contacts.dist
+    legs, depths = _pair_codes(data, layout) - FOREIGN, contacts.dist
     order = np.flatnonzero((legs >= 0) & (legs < len(LEGS)) & (depths <= 0.0))
     for i in order[np.argsort(-depths[order])]:  # the deepest of each foot comes last and stays
         leg, point, normal = int(legs[i]), contacts.pos[i], contacts.frame[i, :3]
         velocity = _point_velocity(data, layout, int(layout.foot_bodies[leg]), point)
-        touching[leg] = True
         points[leg] = point
         velocities[leg] = velocity - normal * normal.dot(velocity)
-    return FootContacts(touching, points, velocities)
+    return FootContacts(points, velocities)
 
 
 def touches_itself(data: mujoco.MjData, layout: MujocoLayout) -> bool:
     """Whether two links of the robot touch that its SRDF does not let touch."""
-    if data.ncon == 0:
-        return False
-    contacts = data.contact
-    is_own = _pair_codes(contacts.geom, layout) < FOREIGN
-    return bool((is_own & (contacts.dist <= 0.0)).any())
+    is_own = _pair_codes(data, layout) < FOREIGN
+    return bool((is_own & (data.contact.dist <= 0.0)).any())
 
 
-def _pair_codes(geoms: Int[np.ndarray, "n 2"], layout: MujocoLayout) -> Int[np.ndarray, " n"]:
+def _pair_codes(data: mujoco.MjData, layout: MujocoLayout) -> Int[np.ndarray, " n"]:
     """Sum of both geoms' codes: ``FOREIGN`` plus a bin if exactly one belongs to the robot."""
-    codes = layout.geom_codes[geoms]
-    return codes[:, 0] + codes[:, 1]
+    return layout.geom_codes[data.contact.geom].sum(axis=1)
 
 
 def _point_velocity(
@@ -94,9 +78,3 @@ def _point_velocity(
     wx, wy, wz, vx, vy, vz = data.cvel[body].tolist()
     x, y, z = (point - data.subtree_com[layout.base]).tolist()
     return np.array([vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x])
-
-
-def _normal_force(model: mujoco.MjModel, data: mujoco.MjData, contact: int) -> float:
-    wrench = np.zeros(6)
-    mujoco.mj_contactForce(model, data, contact, wrench)
-    return float(wrench[0])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -18,8 +17,6 @@ ROBOT_BINS = 6
 # Code of a geom that is not the robot's. The sum of two codes tells a robot-world pair (FOREIGN to
 # FOREIGN + 5) from robot-robot (at most 10) and world-world (2 FOREIGN).
 FOREIGN = 16
-
-Selector = slice | Int[np.ndarray, "12"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,86 +35,80 @@ class MujocoLayout:
         foot_bodies: the body that carries each foot's geom.
         geom_codes: for each geom its contact bin: 0 to 3 a foot, ``TRUNK_BIN``, ``LIMB_BIN``; or
             ``FOREIGN`` if it does not belong to the robot.
-        is_elliptic: whether the model has elliptic friction cones.
     """
 
     base: int
     base_q: slice
     base_v: slice
-    joint_q: Selector
-    joint_v: Selector
-    motors: Selector
+    joint_q: Int[np.ndarray, "12"]
+    joint_v: Int[np.ndarray, "12"]
+    motors: Int[np.ndarray, "12"]
     torque_limits: Float[np.ndarray, "12"]
     foot_geoms: Int[np.ndarray, "4"]
     foot_bodies: Int[np.ndarray, "4"]
     geom_codes: Int[np.ndarray, " ngeom"]
-    is_elliptic: bool
 
 
 def find_layout(
-    model: mujoco.MjModel,
-    foot_geoms: Sequence[Sequence[int]],
-    efforts: Float[np.ndarray, "12"],
+    spec: mujoco.MjSpec, model: mujoco.MjModel, efforts: tuple[float, ...]
 ) -> MujocoLayout:
-    """The index tables of ``model``, which must have the Go2's joints and one motor for each.
+    """The index tables of ``model``.
 
     Args:
-        model: a compiled model that was built or checked by this package.
-        foot_geoms: ids of the colliding geoms of each foot, in leg order.
+        spec: built or checked by this package: it has the Go2's joints and one motor for each.
+        model: what ``spec`` was compiled to.
         efforts: torque limits [N m] that apply unless the model's are tighter.
     """
     joints = np.array([model.joint(name).id for name in JOINT_NAMES])
     base = int(model.body_rootid[model.jnt_bodyid[joints[0]]])
     free = int(model.body_jntadr[base])
     q, v = int(model.jnt_qposadr[free]), int(model.jnt_dofadr[free])
-    motors = np.array([_motor_of(model, joint) for joint in joints.tolist()])
-    first = np.array([ids[0] for ids in foot_geoms])
+    drives = {motor.target: motor.id for motor in spec.actuators if is_on_joint(motor)}
+    motors = np.array([drives[name] for name in JOINT_NAMES])
+    feet = [[geom.id for geom in foot_geoms(spec, leg)] for leg in LEGS]
+    first = np.array([ids[0] for ids in feet])
+    body = model.geom_bodyid
+    on_trunk = model.body_weldid[body] == model.body_weldid[base]
+    codes = np.where(on_trunk, TRUNK_BIN, LIMB_BIN)
+    codes[model.body_rootid[body] != base] = FOREIGN
+    for leg, ids in zip(LEGS, feet, strict=True):
+        codes[ids] = int(leg)
     return MujocoLayout(
         base=base,
         base_q=slice(q, q + 7),
         base_v=slice(v, v + 6),
-        joint_q=_selector(model.jnt_qposadr[joints]),
-        joint_v=_selector(model.jnt_dofadr[joints]),
-        motors=_selector(motors),
+        joint_q=model.jnt_qposadr[joints].astype(int),
+        joint_v=model.jnt_dofadr[joints].astype(int),
+        motors=motors,
         torque_limits=_torque_limits(model, joints, motors, efforts),
         foot_geoms=first,
-        foot_bodies=model.geom_bodyid[first].copy(),
-        geom_codes=_geom_codes(model, base, foot_geoms),
-        is_elliptic=model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC,
+        foot_bodies=body[first],
+        geom_codes=codes,
     )
 
 
-def colliding_foot_geoms(model: mujoco.MjModel, leg: Leg) -> list[int]:
-    """Ids of the geoms that are the foot of ``leg`` and can collide; empty if there are none.
+def foot_geoms(spec: mujoco.MjSpec, leg: Leg) -> list[mujoco.MjsGeom]:
+    """The geoms that are the foot of ``leg`` and can collide; empty if there are none.
 
     They are the geoms of a body ``FL_foot``, else those named ``FL_foot`` or ``FL``.
     """
-    names = (leg.foot, leg.name)
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, leg.foot)
-    collides = (model.geom_contype | model.geom_conaffinity) != 0
-    inside = [i for i in range(model.ngeom) if model.geom_bodyid[i] == body and collides[i]]
-    named = [i for i in range(model.ngeom) if model.geom(i).name in names and collides[i]]
-    return inside or named
+    solid = [geom for geom in spec.geoms if geom.contype or geom.conaffinity]
+    inside = [geom for geom in solid if geom.parent.name == leg.foot]
+    return inside or [geom for geom in solid if geom.name in (leg.foot, leg.name)]
 
 
-def foot_geoms_of(model: mujoco.MjModel) -> list[list[int]]:
-    """The colliding geoms of each foot, in leg order."""
-    return [colliding_foot_geoms(model, leg) for leg in LEGS]
-
-
-def _motor_of(model: mujoco.MjModel, joint: int) -> int:
-    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-    on_joint = (model.actuator_trnid[:, 0] == joint) & np.isin(model.actuator_trntype, kinds)
-    return int(np.flatnonzero(on_joint)[0])
+def is_on_joint(actuator: mujoco.MjsActuator) -> bool:
+    """Whether an actuator drives a joint, and not a tendon, site or body."""
+    return actuator.trntype in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
 
 def _torque_limits(
     model: mujoco.MjModel,
     joints: Int[np.ndarray, "12"],
     motors: Int[np.ndarray, "12"],
-    efforts: Float[np.ndarray, "12"],
+    efforts: tuple[float, ...],
 ) -> Float[np.ndarray, "12"]:
-    limits = np.asarray(efforts, dtype=float).copy()
+    limits = np.array(efforts)
     for limited, ranges in (
         (model.actuator_ctrllimited[motors], model.actuator_ctrlrange[motors]),
         (model.actuator_forcelimited[motors], model.actuator_forcerange[motors]),
@@ -126,23 +117,3 @@ def _torque_limits(
         tightest = np.minimum(-ranges[:, 0], ranges[:, 1])
         limits = np.where(limited, np.minimum(limits, tightest), limits)
     return limits
-
-
-def _geom_codes(
-    model: mujoco.MjModel, base: int, foot_geoms: Sequence[Sequence[int]]
-) -> Int[np.ndarray, " ngeom"]:
-    body = model.geom_bodyid
-    on_robot = model.body_rootid[body] == base
-    on_trunk = model.body_weldid[body] == model.body_weldid[base]
-    codes = np.where(on_robot, np.where(on_trunk, TRUNK_BIN, LIMB_BIN), FOREIGN)
-    for leg, ids in zip(LEGS, foot_geoms, strict=True):
-        codes[list(ids)] = int(leg)
-    return codes
-
-
-def _selector(indices: Int[np.ndarray, "12"]) -> Selector:
-    """A slice when the indices are contiguous, because it reads without a copy."""
-    first = int(indices[0])
-    if np.array_equal(indices, np.arange(first, first + len(indices))):
-        return slice(first, first + len(indices))
-    return np.asarray(indices, dtype=np.int64)

@@ -89,7 +89,6 @@ def build_spec(
 
     Raises:
         DescriptionError: if MuJoCo cannot read the URDF or a mesh is missing.
-        MissingDependency: for ``visuals`` without trimesh or pycollada.
     """
     spec = _spec_from_urdf(description)
     spec.modelname = "go2"
@@ -106,7 +105,9 @@ def build_spec(
         geom.friction = [friction, _TORSIONAL, _ROLLING]
     if visuals:
         add_visuals(spec, description)
-    _set_options(spec)
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = _IMPRATIO
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     return spec
 
 
@@ -172,12 +173,11 @@ def add_motors(spec: mujoco.MjSpec, joints: Sequence[str], description: RobotDes
 def add_imu(spec: mujoco.MjSpec, base: str) -> None:
     """Adds the IMU's site to the body ``base`` with gyro, accelerometer and orientation."""
     spec.body(base).add_site(name=IMU_SITE, pos=list(IMU_POSITION), size=[0.005, 0.005, 0.005])
-    kinds = {
-        GYRO: mujoco.mjtSensor.mjSENS_GYRO,
-        ACCELEROMETER: mujoco.mjtSensor.mjSENS_ACCELEROMETER,
-        ORIENTATION: mujoco.mjtSensor.mjSENS_FRAMEQUAT,
-    }
-    for name, kind in kinds.items():
+    for name, kind in (
+        (GYRO, mujoco.mjtSensor.mjSENS_GYRO),
+        (ACCELEROMETER, mujoco.mjtSensor.mjSENS_ACCELEROMETER),
+        (ORIENTATION, mujoco.mjtSensor.mjSENS_FRAMEQUAT),
+    ):
         site = mujoco.mjtObj.mjOBJ_SITE
         spec.add_sensor(name=name, type=kind, objtype=site, objname=IMU_SITE)
 
@@ -185,7 +185,17 @@ def add_imu(spec: mujoco.MjSpec, base: str) -> None:
 def add_floor(spec: mujoco.MjSpec) -> None:
     """Adds an infinite chequered plane at z = 0, and a light."""
     if spec.material(_GRID) is None:
-        _add_grid(spec)
+        spec.add_texture(
+            name=_GRID,
+            type=mujoco.mjtTexture.mjTEXTURE_2D,
+            builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
+            rgb1=[0.42, 0.47, 0.53],
+            rgb2=[0.36, 0.41, 0.47],
+            width=256,
+            height=256,
+        )
+        grid = spec.add_material(name=_GRID, texrepeat=[2, 2], texuniform=True)
+        grid.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _GRID
     spec.worldbody.add_geom(
         name=FLOOR,
         type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -193,20 +203,6 @@ def add_floor(spec: mujoco.MjSpec) -> None:
         material=_GRID,
     )
     spec.worldbody.add_light(pos=[0, 0, 5], dir=[0, 0, -1], castshadow=False)
-
-
-def _add_grid(spec: mujoco.MjSpec) -> None:
-    spec.add_texture(
-        name=_GRID,
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
-        rgb1=[0.42, 0.47, 0.53],
-        rgb2=[0.36, 0.41, 0.47],
-        width=256,
-        height=256,
-    )
-    grid = spec.add_material(name=_GRID, texrepeat=[2, 2], texuniform=True)
-    grid.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _GRID
 
 
 def _add_boxes(spec: mujoco.MjSpec, terrain: Boxes) -> None:
@@ -220,13 +216,6 @@ def _add_boxes(spec: mujoco.MjSpec, terrain: Boxes) -> None:
             size=[half, half, 0.5 * height],
             rgba=[0.55, 0.45, 0.35, 1.0],
         )
-
-
-def _set_options(spec: mujoco.MjSpec) -> None:
-    option = spec.option
-    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    option.impratio = _IMPRATIO
-    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
 
 
 def add_payload(spec: mujoco.MjSpec, base: str, payload: float) -> None:

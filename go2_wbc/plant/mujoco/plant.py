@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +23,9 @@ from go2_wbc.plant.mujoco.contacts import (
     touches_itself,
 )
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN
-from go2_wbc.plant.mujoco.model import (
-    ACCELEROMETER,
-    GYRO,
-    ORIENTATION,
-    JointDynamics,
-)
+from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Push, Pushes
-from go2_wbc.plant.mujoco.setup import PlantSetup, prepare, settle
+from go2_wbc.plant.mujoco.setup import LYING_DAMPING, PlantSetup, prepare, settle
 from go2_wbc.plant.sensors import ImuSample, SensorNoise
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.state import JointCommand, RobotState
@@ -38,7 +34,6 @@ _logger = logging.getLogger(__name__)
 
 # N; a foot reads a contact above this. A standing foot carries about 40 N, so 1 N is "touching".
 FOOT_CONTACT_THRESHOLD = 1.0
-_IDEAL, _NOISY = "ideal", "noisy"
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +92,7 @@ class MujocoPlant(Plant):
         payload: float = 0.0,
         mass_scale: float = 1.0,
         terrain: Boxes | None = None,
-        sensors: str = _IDEAL,
+        sensors: str = "ideal",
         noise: SensorNoise | None = None,
         seed: int = 0,
         initial_yaw: float = 0.0,
@@ -106,11 +101,11 @@ class MujocoPlant(Plant):
         urdf: Path | str | None = None,
         visuals: bool = False,
     ) -> None:
-        if sensors not in (_IDEAL, _NOISY):
-            raise ConfigError(unknown_name("sensors", sensors, (_IDEAL, _NOISY)))
+        if sensors not in ("ideal", "noisy"):
+            raise ConfigError(unknown_name("sensors", sensors, ("ideal", "noisy")))
         setup = PlantSetup(
-            mjcf=Path(mjcf) if isinstance(mjcf, str) else mjcf,
-            urdf=Path(urdf) if isinstance(urdf, str) else urdf,
+            mjcf=mjcf,
+            urdf=urdf,
             timestep=timestep,
             control_period=control_period,
             friction=friction,
@@ -124,34 +119,23 @@ class MujocoPlant(Plant):
             seed=seed,
         )
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
-        mujoco.set_mju_user_warning(_log_warning)
+        # MuJoCo's warnings would otherwise go to a file in the working directory.
+        mujoco.set_mju_user_warning(partial(_logger.warning, "MuJoCo: %s"))
         self._model, self._layout = prepare(setup)
         self._data = mujoco.MjData(self._model)
-        self._noise = (noise or SensorNoise()) if sensors == _NOISY else None
-        self._period, self._substeps = control_period, setup.substeps
+        self._noise = (noise or SensorNoise()) if sensors == "noisy" else None
+        self._period, self._substeps = control_period, round(control_period / timestep)
         self._closed = False
         self._ticks = 0
         self._pushes = Pushes(self._model, self._data, self._layout)
-        self._state: RobotState | None = None
-        self._imu: ImuSample | None = None
-        self._bind()
-        settle(self._model, self._data, self._layout, setup, start_rng)
-        # One period in the lying state, so that the first read has forces and torques.
-        self.write(JointCommand.damping(setup.lying_damping))
-        self._ticks, self._data.time = 0, 0.0
-
-    def _bind(self) -> None:
-        """Views into MuJoCo's memory and work arrays, made once because making them is slow."""
+        # Views into MuJoCo's memory, made once because making them is slow.
         data, layout = self._data, self._layout
         self._base_q, self._base_v = data.qpos[layout.base_q], data.qvel[layout.base_v]
         self._R_world_base = data.xmat[layout.base].reshape(3, 3)
-        self._command = np.zeros((5, 12))
-        self._tau, self._work = np.zeros(12), np.zeros(12)
-        self._tau_max = layout.torque_limits.copy()
-        self._tau_min = -self._tau_max
-        self._gyro = data.sensor(GYRO).data
-        self._accelerometer = data.sensor(ACCELEROMETER).data
-        self._orientation = data.sensor(ORIENTATION).data
+        settle(self._model, data, layout, setup, start_rng)
+        # One period in the lying state, so that the first read has forces and torques.
+        self.write(JointCommand.damping(LYING_DAMPING))
+        self._ticks, self._data.time = 0, 0.0
 
     @property
     def control_period(self) -> float:
@@ -166,7 +150,7 @@ class MujocoPlant(Plant):
     @property
     def torque_limits(self) -> Float[np.ndarray, "12"]:
         """Largest torque of each joint [N m]."""
-        return self._tau_max.copy()
+        return self._layout.torque_limits.copy()
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -226,8 +210,10 @@ class MujocoPlant(Plant):
         """The inertial measurement unit's reading; its accelerometer lags by one physics step."""
         self._check_open()
         if self._imu is None:
-            quaternion = self._orientation[[1, 2, 3, 0]]
-            sample = ImuSample(quaternion, self._gyro.copy(), self._accelerometer.copy())
+            sensor = self._data.sensor
+            quaternion = sensor(ORIENTATION).data[[1, 2, 3, 0]]
+            gyro, accelerometer = sensor(GYRO).data.copy(), sensor(ACCELEROMETER).data.copy()
+            sample = ImuSample(quaternion, gyro, accelerometer)
             noise = self._noise
             self._imu = sample if noise is None else noise.corrupt_imu(sample, self._rng)
         return self._imu
@@ -284,11 +270,6 @@ class MujocoPlant(Plant):
         return foot_contacts(self._data, self._layout)
 
     @property
-    def foot_contact_velocities(self) -> Float[np.ndarray, "4 3"]:
-        """Tangential velocity in the world of each foot's contact point [m/s]; 0 in the air."""
-        return self.foot_contacts().v_world_contact
-
-    @property
     def base_contact_force(self) -> float:
         """Normal force between the trunk and anything that is not the robot [N]."""
         return float(self._forces[TRUNK_BIN])
@@ -313,8 +294,8 @@ class MujocoPlant(Plant):
             integration=integration,
             ticks=self._ticks,
             pushes=self._pushes.active,
-            tau=self._tau.copy(),
-            forces=self._forces.copy(),
+            tau=self._tau,
+            forces=self._forces,
             noise_state=self._rng.bit_generator.state,
             state=self._state,
             imu=self._imu,
@@ -328,8 +309,8 @@ class MujocoPlant(Plant):
         mujoco.mj_step1(self._model, self._data)
         self._data.warning.number[:] = 0
         self._ticks = saved.ticks
-        self._pushes.reset(saved.pushes)
-        self._tau, self._forces = saved.tau.copy(), saved.forces.copy()
+        self._pushes.active = saved.pushes
+        self._tau, self._forces = saved.tau, saved.forces
         self._rng.bit_generator.state = dict(saved.noise_state)
         self._state, self._imu = saved.state, saved.imu
 
@@ -343,41 +324,32 @@ class MujocoPlant(Plant):
 
     def _accept(self, command: JointCommand) -> None:
         """Copies ``command`` if it is good."""
-        rows = (command.tau, command.q_des, command.v_des, command.kp, command.kd)
-        for name, row in zip(_FIELDS, rows, strict=True):
+        rows = {name: getattr(command, name) for name in _FIELDS}
+        for name, row in rows.items():
             if row.shape != (12,):
                 raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
-        incoming = np.array(rows, dtype=float)
-        if not np.isfinite(incoming).all():
-            index = int(np.argwhere(~np.isfinite(incoming))[0, 0])
-            raise CommandError(f"command.{_FIELDS[index]} is not finite: {rows[index]}")
-        self._command = incoming
+            if not np.isfinite(row).all():
+                raise CommandError(f"command.{name} is not finite: {row}")
+        self._command = np.array(tuple(rows.values()), dtype=float)
 
     def _motor_law(self) -> Float[np.ndarray, "12"]:
         """Torque of every motor now, clipped to its limit."""
         tau, q_des, v_des, kp, kd = self._command
-        data, layout, work = self._data, self._layout, self._work
-        np.subtract(q_des, data.qpos[layout.joint_q], out=work)
-        work *= kp
-        work += tau
-        work += kd * (v_des - data.qvel[layout.joint_v])
-        np.minimum(work, self._tau_max, out=work)
-        return np.maximum(work, self._tau_min, out=work)
+        q, v = self._data.qpos[self._layout.joint_q], self._data.qvel[self._layout.joint_v]
+        limits = self._layout.torque_limits
+        wanted = kp * (q_des - q) + tau + kd * (v_des - v)
+        return np.maximum(np.minimum(wanted, limits), -limits)
 
     def _measure(self) -> RobotState:
         """The true state in Pinocchio's conventions."""
-        q, v = np.empty(19), np.empty(18)
         base_q, base_v = self._base_q, self._base_v
-        q[:3], q[3:6], q[6] = base_q[:3], base_q[4:7], base_q[3]
-        q[7:] = self._data.qpos[self._layout.joint_q]
-        v[:3] = base_v[:3] @ self._R_world_base
-        v[3:6] = base_v[3:6]
-        v[6:] = self._data.qvel[self._layout.joint_v]
+        q_joints = self._data.qpos[self._layout.joint_q]
+        v_joints = self._data.qvel[self._layout.joint_v]
         forces = self._forces[: len(LEGS)].copy()
         return RobotState(
             time=self.time,
-            q=q,
-            v=v,
+            q=np.concatenate([base_q[:3], base_q[[4, 5, 6, 3]], q_joints]),
+            v=np.concatenate([base_v[:3] @ self._R_world_base, base_v[3:], v_joints]),
             tau=self._tau.copy(),
             foot_forces=forces,
             feet_in_contact=forces > FOOT_CONTACT_THRESHOLD,
@@ -392,8 +364,3 @@ class MujocoPlant(Plant):
 
 
 _FIELDS = ("tau", "q_des", "v_des", "kp", "kd")
-
-
-def _log_warning(message: str) -> None:
-    """Takes MuJoCo's warnings, which would otherwise go to a file in the working directory."""
-    _logger.warning("MuJoCo: %s", message)

@@ -43,14 +43,9 @@ class Pushes:
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, layout: MujocoLayout) -> None:
         self._model, self._data, self._layout = model, data, layout
         self.active: tuple[Push, ...] = ()
-        self._is_applied = False
 
     def add(self, force: Float[np.ndarray, "3"], duration: float, at: str) -> None:
-        """Starts a push at the next physics step; see ``MujocoPlant.push``.
-
-        Raises:
-            CommandError: if a value is not finite, ``duration`` not positive, or ``at`` unknown.
-        """
+        """Starts a push at the next physics step; see ``MujocoPlant.push``."""
         f_world = np.array(force, dtype=float)
         if f_world.shape != (3,) or not np.isfinite(f_world).all():
             raise CommandError(f"push force must be three finite numbers [N], got {force!r}")
@@ -61,24 +56,14 @@ class Pushes:
         self.active = (*self.active, Push(body, point, f_world, steps))
 
     def apply(self) -> None:
-        """Writes the forces for one physics step, or clears them after the last one."""
-        if not (self.active or self._is_applied):
-            return
+        """Writes the forces for one physics step."""
         wrenches = self._data.xfrc_applied
         wrenches[:] = 0.0
         for push in self.active:
             wrenches[push.body, :3] += push.f_world
             wrenches[push.body, 3:] += np.cross(self._arm(push), push.f_world)
-        self._is_applied = bool(self.active)
-        self.active = tuple(
-            replace(push, steps_left=push.steps_left - 1)
-            for push in self.active
-            if push.steps_left > 1
-        )
-
-    def reset(self, active: tuple[Push, ...]) -> None:
-        """Replaces all pushes, as when a saved state is restored."""
-        self.active, self._is_applied = active, True
+        later = (replace(push, steps_left=push.steps_left - 1) for push in self.active)
+        self.active = tuple(push for push in later if push.steps_left > 0)
 
     def _arm(self, push: Push) -> Float[np.ndarray, "3"]:
         """From the body's centre of mass, where MuJoCo applies wrenches, to the push's point."""

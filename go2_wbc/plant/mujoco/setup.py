@@ -8,14 +8,14 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.errors import ConfigError, DescriptionError, ModelMismatch
-from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms_of
+from go2_wbc.legs import LEGS
+from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms
 from go2_wbc.plant.mujoco.model import JointDynamics, add_payload, build_spec, finish
 from go2_wbc.plant.mujoco.user_model import load_user_model
 from go2_wbc.plant.terrain import Boxes
-from go2_wbc.robot.description import BASE_LINK, RobotDescription, find_description
+from go2_wbc.robot.description import BASE_LINK, find_description
 from go2_wbc.validation import require_finite, require_not_negative, require_positive
 
 # Dry rubber on a hard floor; Unitree publishes none. The prototype's runs used it.
@@ -28,8 +28,7 @@ LYING_POSE = (
     *(0.372, 1.239, -2.722),
     *(-0.372, 1.239, -2.722),
 )
-
-_MULTIPLE_TOLERANCE = 1e-9  # relative; only rounding of the two decimal numbers
+LYING_DAMPING = 3.0  # N m s/rad of the joints while lying; the value of Unitree's damping mode
 _DROP_HEIGHT = 0.11  # m of the base above the ground; it rests at 0.085
 _SETTLE_LIMIT = 3.0  # s of simulation; it settles in well under one
 _SETTLED_SPEED = 1e-3  # rad/s and m/s, largest entry of the velocity
@@ -39,14 +38,10 @@ _FOOTPRINT = (-0.3, 0.0, 0.3)  # m; the grid, about the Go2's size, on which it 
 
 @dataclass(frozen=True, slots=True)
 class PlantSetup:
-    """The settings of a ``MujocoPlant``; its docstring says what they mean.
+    """The settings of a ``MujocoPlant``; its docstring says what they mean."""
 
-    Attributes:
-        lying_damping: joint damping while lying [N m s/rad]; the value of Unitree's damping mode.
-    """
-
-    mjcf: Path | None
-    urdf: Path | None
+    mjcf: Path | str | None
+    urdf: Path | str | None
     timestep: float
     control_period: float
     friction: float | None
@@ -58,12 +53,11 @@ class PlantSetup:
     joint_dynamics: JointDynamics | None
     visuals: bool
     seed: int
-    lying_damping: float = 3.0
 
     def __post_init__(self) -> None:
         for name in ("mjcf", "urdf"):
             path = getattr(self, name)
-            if path is not None and not isinstance(path, Path):
+            if path is not None and not isinstance(path, Path | str):
                 raise ConfigError(f"{name} must be a path, got {path!r}")
         if self.terrain is not None and not isinstance(self.terrain, Boxes):
             raise ConfigError(f"terrain must be Boxes(...) or None, got {self.terrain!r}")
@@ -73,18 +67,13 @@ class PlantSetup:
         require_not_negative(self, "payload", "initial_joint_noise", "seed")
         require_finite(self, "initial_yaw")
         ratio = self.control_period / self.timestep
-        if round(ratio) < 1 or abs(ratio - round(ratio)) > _MULTIPLE_TOLERANCE * ratio:
+        if not math.isclose(ratio, round(ratio)):  # only the two decimal numbers' rounding
             raise ConfigError(
                 f"control_period must be an integer multiple of timestep: "
                 f"{self.control_period!r} s is {ratio:.6g} times {self.timestep!r} s"
             )
         if self.mjcf is not None and self.terrain is not None:
             raise ConfigError("terrain is only for the built model; put it into the mjcf instead")
-
-    @property
-    def substeps(self) -> int:
-        """Physics steps in one control period."""
-        return round(self.control_period / self.timestep)
 
 
 def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout]:
@@ -96,42 +85,29 @@ def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout]:
     """
     description = find_description(setup.urdf)
     if setup.mjcf is None:
-        model = _compile_urdf(setup, description)
+        source, mistake = description.urdf_path, DescriptionError
+        base = BASE_LINK
+        spec = build_spec(
+            description,
+            setup.joint_dynamics or JointDynamics(),
+            friction=DEFAULT_FRICTION if setup.friction is None else setup.friction,
+            terrain=setup.terrain,
+            visuals=setup.visuals,
+        )
     else:
-        model = _compile_mjcf(setup, setup.mjcf, description)
-    return model, find_layout(model, foot_geoms_of(model), np.array(description.efforts))
-
-
-def _compile_urdf(setup: PlantSetup, description: RobotDescription) -> mujoco.MjModel:
-    spec = build_spec(
-        description,
-        setup.joint_dynamics or JointDynamics(),
-        friction=DEFAULT_FRICTION if setup.friction is None else setup.friction,
-        terrain=setup.terrain,
-        visuals=setup.visuals,
-    )
-    if setup.payload > 0.0:
-        add_payload(spec, BASE_LINK, setup.payload)
-    try:
-        return finish(spec, timestep=setup.timestep, mass_scale=setup.mass_scale)
-    except ValueError as error:
-        message = f"MuJoCo cannot compile {description.urdf_path}: {error}"
-        raise DescriptionError(message) from error
-
-
-def _compile_mjcf(setup: PlantSetup, mjcf: Path, description: RobotDescription) -> mujoco.MjModel:
-    spec, base = load_user_model(mjcf, description, setup.joint_dynamics)
+        source, mistake = setup.mjcf, ModelMismatch
+        spec, base = load_user_model(setup.mjcf, description, setup.joint_dynamics)
     if setup.payload > 0.0:
         add_payload(spec, base, setup.payload)
     try:
         model = finish(spec, timestep=setup.timestep, mass_scale=setup.mass_scale)
     except ValueError as error:
-        raise ModelMismatch(f"MuJoCo cannot compile {mjcf}: {error}") from error
-    if setup.friction is not None:
-        feet = np.concatenate(foot_geoms_of(model))
+        raise mistake(f"MuJoCo cannot compile {source}: {error}") from error
+    if setup.mjcf is not None and setup.friction is not None:
+        feet = [geom.id for leg in LEGS for geom in foot_geoms(spec, leg)]
         model.geom_friction[feet, 0] = setup.friction
         model.geom_priority[feet] = model.geom_priority.max() + 1
-    return model
+    return model, find_layout(spec, model, description.efforts)
 
 
 def settle(
@@ -147,12 +123,15 @@ def settle(
     """
     _place(model, data, layout, setup.initial_yaw)
     pose = np.array(LYING_POSE) + setup.initial_joint_noise * rng.standard_normal(12)
-    data.qpos[layout.joint_q] = _clip_to_range(model, layout, pose)
+    joints = model.dof_jntid[layout.joint_v]
+    is_limited, ranges = model.jnt_limited[joints, None], model.jnt_range[joints]
+    low, high = np.where(is_limited, ranges, (-np.inf, np.inf)).T
+    data.qpos[layout.joint_q] = np.clip(pose, low, high)
     data.ctrl[:] = 0.0
     limits = layout.torque_limits
     mujoco.mj_step1(model, data)
     for _ in range(round(_SETTLE_LIMIT / setup.timestep)):
-        tau = -setup.lying_damping * data.qvel[layout.joint_v]
+        tau = -LYING_DAMPING * data.qvel[layout.joint_v]
         data.ctrl[layout.motors] = np.clip(tau, -limits, limits)
         mujoco.mj_step2(model, data)
         mujoco.mj_step1(model, data)
@@ -161,30 +140,14 @@ def settle(
 
 
 def _place(model: mujoco.MjModel, data: mujoco.MjData, layout: MujocoLayout, yaw: float) -> None:
+    """Puts the base a little above the highest ground around the origin."""
     base_q = data.qpos[layout.base_q]
     base_q[:2] = 0.0
     base_q[2] = 2.0 * _RAY_TOP  # out of the rays' way
     base_q[3:] = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
     mujoco.mj_kinematics(model, data)
-    base_q[2] = _ground_height(model, data) + _DROP_HEIGHT
-
-
-def _ground_height(model: mujoco.MjModel, data: mujoco.MjData) -> float:
-    """Height of the highest ground under the robot at the origin; 0 if there is none."""
     geom, down = np.zeros(1, dtype=np.int32), np.array([0.0, 0.0, -1.0])
-    heights = [0.0]
-    for x in _FOOTPRINT:
-        for y in _FOOTPRINT:
-            top = np.array([x, y, _RAY_TOP])
-            distance = mujoco.mj_ray(model, data, top, down, None, True, -1, geom)
-            if distance >= 0.0:
-                heights.append(_RAY_TOP - distance)
-    return max(heights[1:], default=0.0)
-
-
-def _clip_to_range(
-    model: mujoco.MjModel, layout: MujocoLayout, pose: Float[np.ndarray, "12"]
-) -> Float[np.ndarray, "12"]:
-    joints = model.dof_jntid[layout.joint_v]
-    limited, ranges = model.jnt_limited[joints].astype(bool), model.jnt_range[joints]
-    return np.where(limited, np.clip(pose, ranges[:, 0], ranges[:, 1]), pose)
+    tops = [np.array([x, y, _RAY_TOP]) for x in _FOOTPRINT for y in _FOOTPRINT]
+    distances = [mujoco.mj_ray(model, data, top, down, None, True, -1, geom) for top in tops]
+    ground = max((_RAY_TOP - distance for distance in distances if distance >= 0.0), default=0.0)
+    base_q[2] = ground + _DROP_HEIGHT

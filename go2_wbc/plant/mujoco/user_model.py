@@ -14,7 +14,8 @@ from pathlib import Path
 import mujoco
 
 from go2_wbc.errors import ModelMismatch
-from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
+from go2_wbc.legs import JOINT_NAMES, LEGS
+from go2_wbc.plant.mujoco.layout import foot_geoms, is_on_joint
 from go2_wbc.plant.mujoco.model import (
     GYRO,
     JointDynamics,
@@ -29,7 +30,7 @@ _BASE_FALLBACK = "go2_wbc_base"
 
 
 def load_user_model(
-    mjcf: Path, description: RobotDescription, joint_dynamics: JointDynamics | None = None
+    mjcf: Path | str, description: RobotDescription, joint_dynamics: JointDynamics | None = None
 ) -> tuple[mujoco.MjSpec, str]:
     """Reads and checks a user's MJCF; returns the completed spec and the name of its base body.
 
@@ -50,7 +51,7 @@ def load_user_model(
         raise ModelMismatch(f"{mjcf} cannot be driven as a Go2:{listing}")
     base = _root(spec.joint(JOINT_NAMES[0]))
     base.name = base.name or _BASE_FALLBACK
-    driven = {actuator.target for actuator in spec.actuators if _is_on_joint(actuator)}
+    driven = {actuator.target for actuator in spec.actuators if is_on_joint(actuator)}
     add_motors(spec, [name for name in JOINT_NAMES if name not in driven], description)
     if all(sensor.name != GYRO for sensor in spec.sensors):  # else it is an export of our own
         add_imu(spec, base.name)
@@ -61,14 +62,13 @@ def load_user_model(
     return spec, base.name
 
 
-def _read(mjcf: Path) -> mujoco.MjSpec:
-    path = Path(mjcf)
-    if not path.is_file():
-        raise ModelMismatch(f"cannot read {path}: no such file")
+def _read(mjcf: Path | str) -> mujoco.MjSpec:
+    if not Path(mjcf).is_file():
+        raise ModelMismatch(f"cannot read {mjcf}: no such file")
     try:
-        return mujoco.MjSpec.from_file(str(path))
+        return mujoco.MjSpec.from_file(str(mjcf))
     except (ValueError, OSError) as error:
-        raise ModelMismatch(f"MuJoCo cannot read {path}: {error}") from error
+        raise ModelMismatch(f"MuJoCo cannot read {mjcf}: {error}") from error
 
 
 def _joint_problems(spec: mujoco.MjSpec) -> list[str]:
@@ -96,13 +96,8 @@ def _foot_problems(spec: mujoco.MjSpec) -> list[str]:
         f"no foot {leg.name}: need a colliding geom in a body {leg.foot}, "
         f"or one named {leg.foot} or {leg.name}"
         for leg in LEGS
-        if not any(_is_foot(geom, leg) for geom in spec.geoms)
+        if not foot_geoms(spec, leg)
     ]
-
-
-def _is_foot(geom: mujoco.MjsGeom, leg: Leg) -> bool:
-    named = geom.parent.name == leg.foot or geom.name in (leg.foot, leg.name)
-    return named and bool(geom.contype or geom.conaffinity)
 
 
 def _actuator_problems(spec: mujoco.MjSpec) -> list[str]:
@@ -110,7 +105,7 @@ def _actuator_problems(spec: mujoco.MjSpec) -> list[str]:
     seen: dict[str, str] = {}
     for actuator in spec.actuators:
         joint = actuator.target
-        if not _is_on_joint(actuator) or joint not in JOINT_NAMES:
+        if not is_on_joint(actuator) or joint not in JOINT_NAMES:
             continue
         label = f"actuator {actuator.name or '(unnamed)'} of {joint}"
         if joint in seen:
@@ -131,11 +126,6 @@ def _motor_faults(actuator: mujoco.MjsActuator) -> list[str]:
         return ["has internal dynamics; the controller needs a torque <motor>"]
     ratio = float(actuator.gear[0] * actuator.gainprm[0])
     return [] if ratio == 1.0 else [f"has gear times gain {ratio:g}; the controller needs 1"]
-
-
-def _is_on_joint(actuator: mujoco.MjsActuator) -> bool:
-    kinds = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
-    return actuator.trntype in kinds
 
 
 def _root(joint: mujoco.MjsJoint) -> mujoco.MjsBody:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import sys
-from collections.abc import Mapping
 from typing import Any, final
 
 import mujoco.viewer
@@ -18,19 +17,12 @@ _log = logging.getLogger(__name__)
 
 FRAME_RATE = 50.0
 """Frames per second of robot time that ``PlantViewer.show`` shows at most."""
-_DISPLAY_VARIABLES = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
-def display_problem(environment: Mapping[str, str] | None = None) -> str | None:
-    """Why no window can be opened here, in one sentence, or ``None`` if one can.
-
-    Args:
-        environment: the environment variables; ``None`` takes the process's own.
-    """
-    variables = os.environ if environment is None else environment
-    if not sys.platform.startswith("linux"):
-        return None
-    if any(variables.get(name) for name in _DISPLAY_VARIABLES):
+def display_problem() -> str | None:
+    """Why no window can be opened here, in one sentence, or ``None`` if one can."""
+    has_display = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if has_display or not sys.platform.startswith("linux"):
         return None
     return (
         "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set); "
@@ -40,7 +32,7 @@ def display_problem(environment: Mapping[str, str] | None = None) -> str | None:
 
 @final
 class PlantViewer:
-    """A window that shows a plant; call ``sync`` whenever it should catch up.
+    """A window that shows a plant.
 
     Args:
         plant: what to show; build it with ``visuals=True`` to see the robot's real shape.
@@ -56,20 +48,11 @@ class PlantViewer:
         self._handle: Any = mujoco.viewer.launch_passive(plant.model, plant.data)
         self._shown_at = plant.time
 
-    @property
-    def is_running(self) -> bool:
-        """Whether the window is still open."""
-        return bool(self._handle.is_running())
-
     def show(self, time: float) -> None:
         """Shows the plant's state at ``time`` [s], unless the last frame is still recent."""
         if time - self._shown_at >= 1.0 / FRAME_RATE:
             self._shown_at = time
-            self.sync()
-
-    def sync(self) -> None:
-        """Shows the plant's present state."""
-        self._handle.sync()
+            self._handle.sync()
 
     def close(self) -> None:
         """Closes the window; idempotent."""

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
 
-from go2_wbc.errors import MissingDependency
 from go2_wbc.robot.description import RobotDescription
+from go2_wbc.robot.mesh_file import read_mesh
 
 VISUAL_GROUP = 2  # MuJoCo's usual group of visual geoms; collision geoms go to 3, hidden at first
 COLLISION_GROUP = 3
-_INSTALL_LINE = "pip install trimesh pycollada"
 
 
 def add_visuals(spec: mujoco.MjSpec, description: RobotDescription) -> None:
@@ -25,73 +22,48 @@ def add_visuals(spec: mujoco.MjSpec, description: RobotDescription) -> None:
     Collision meshes of the robot move to ``COLLISION_GROUP``, which viewers hide.
 
     Raises:
-        MissingDependency: if trimesh or pycollada is not installed.
-        DescriptionError: if a mesh file is missing.
+        DescriptionError: if a mesh file is missing or cannot be read.
     """
     for geom in spec.geoms:
         if geom.parent.name != "world":
             geom.group = COLLISION_GROUP
-    parts: dict[Path, list[tuple[str, tuple[float, ...]]]] = {}
+    colors: dict[Path, dict[str, tuple[float, ...]]] = {}
     for link in ET.parse(description.urdf_path).getroot().findall("link"):
         for visual in link.findall("visual"):
             mesh = visual.find("geometry/mesh")
             if mesh is None:
                 continue
             path = description.mesh_path(mesh.get("filename", ""))
-            if path not in parts:
-                parts[path] = _add_meshes(spec, path)
-            _add_geoms(spec.body(link.get("name", "")), parts[path], visual.find("origin"))
+            if path not in colors:
+                colors[path] = _add_meshes(spec, path)
+            _add_geoms(spec.body(link.get("name", "")), colors[path], visual.find("origin"))
 
 
-def _add_meshes(spec: mujoco.MjSpec, path: Path) -> list[tuple[str, tuple[float, ...]]]:
-    """Names and colours of the mesh assets that one file becomes."""
-    added: list[tuple[str, tuple[float, ...]]] = []
-    for index, part in enumerate(_load_parts(path)):
+def _add_meshes(spec: mujoco.MjSpec, path: Path) -> dict[str, tuple[float, ...]]:
+    """The colours of the mesh assets that one file becomes, by name."""
+    colors = {}
+    for index, part in enumerate(read_mesh(path)):
         name = f"visual_{path.stem}_{index}"
         spec.add_mesh(
             name=name,
-            uservert=part.vertices.ravel(),
-            userface=part.faces.ravel(),
+            uservert=part.points.ravel(),
+            userface=part.triangles.astype(np.int32).ravel(),
             inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
         )
-        added.append((name, part.rgba))
-    return added
-
-
-@dataclass(frozen=True, slots=True)
-class _Part:
-    """One mesh of a file, of one colour."""
-
-    vertices: Float[np.ndarray, "v 3"]
-    faces: Int[np.ndarray, "f 3"]
-    rgba: tuple[float, ...]
-
-
-def _load_parts(path: Path) -> list[_Part]:
-    try:
-        import collada  # noqa: F401 - trimesh reads .dae through it
-        import trimesh
-    except ImportError as error:
-        raise MissingDependency(f"showing the robot's meshes needs: {_INSTALL_LINE}") from error
-    scene: Any = trimesh.load_scene(path)
-    return [
-        _Part(
-            vertices=np.asarray(mesh.vertices, dtype=float),
-            faces=np.asarray(mesh.faces, dtype=np.int32),
-            rgba=tuple(float(value) / 255.0 for value in mesh.visual.material.main_color),
-        )
-        for mesh in scene.dump()
-        if len(mesh.faces)
-    ]
+        colors[name] = part.rgba
+    return colors
 
 
 def _add_geoms(
-    body: mujoco.MjsBody, parts: list[tuple[str, tuple[float, ...]]], origin: ET.Element | None
+    body: mujoco.MjsBody, colors: Mapping[str, tuple[float, ...]], origin: ET.Element | None
 ) -> None:
-    position = _triple(origin, "xyz")
+    place = {} if origin is None else origin.attrib
+    position, angles = (
+        np.array(place.get(name, "0 0 0").split(), dtype=float) for name in ("xyz", "rpy")
+    )
     quaternion = np.empty(4)
-    mujoco.mju_euler2Quat(quaternion, _triple(origin, "rpy"), "XYZ")  # capitals: fixed axes
-    for name, rgba in parts:
+    mujoco.mju_euler2Quat(quaternion, angles, "XYZ")  # capitals: fixed axes
+    for name, rgba in colors.items():
         body.add_geom(
             type=mujoco.mjtGeom.mjGEOM_MESH,
             meshname=name,
@@ -103,8 +75,3 @@ def _add_geoms(
             group=VISUAL_GROUP,
             mass=0.0,
         )
-
-
-def _triple(origin: ET.Element | None, attribute: str) -> Float[np.ndarray, "3"]:
-    text = None if origin is None else origin.get(attribute)
-    return np.zeros(3) if text is None else np.array(text.split(), dtype=float)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable, Iterator
+from contextlib import closing
 
 import pytest
 
@@ -34,9 +35,8 @@ def server(graph: None) -> Iterator[Process]:
 
 @pytest.fixture
 def probe(graph: None) -> Iterator[Probe]:
-    node = Probe()
-    yield node
-    node.close()
+    with closing(Probe()) as node:
+        yield node
 
 
 @pytest.fixture

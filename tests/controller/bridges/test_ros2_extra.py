@@ -9,10 +9,8 @@ from pathlib import Path
 import pytest
 
 import controller.bridges.ros2 as bridge
-from controller.behaviours.joints import DAMPING
-from controller.bridges.ros2.hooked_plant import HookedPlant
 from controller.cli.common import ExitCode
-from go2_wbc.robot.state import JointCommand
+from controller.go2_controller import GO2Controller
 from tests.controller.plants import StillPlant, is_limp
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -51,20 +49,15 @@ def test_importing_the_bridge_imports_no_ros() -> None:
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
 
 
-def test_the_hook_follows_every_write_but_not_its_own() -> None:
-    inner = StillPlant()
-    plant, turns = HookedPlant(inner), []
+def test_what_follows_every_tick_may_make_the_robot_limp_and_follows_nothing_else() -> None:
+    plant, turns = StillPlant(), []
 
     def turn() -> None:
-        turns.append(inner.read().time)
-        plant.write(JointCommand.damping(DAMPING))
+        turns.append(len(plant.commands))
+        go2.damp()
 
-    plant.after_write = turn
-    for _ in range(3):
-        plant.write(JointCommand.damping(DAMPING))
-    assert len(turns) == 3
-    assert len(inner.commands) == 6
-    assert all(map(is_limp, inner.commands))
-    plant.silence()
-    plant.write(JointCommand.damping(DAMPING))
-    assert len(turns) == 3
+    with GO2Controller(plant=plant, after_tick=turn) as go2:
+        before = len(plant.commands)
+        go2.wait(3 * plant.control_period)
+    assert turns == [before + 1, before + 3, before + 5]
+    assert all(map(is_limp, plant.commands))

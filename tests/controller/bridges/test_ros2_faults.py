@@ -5,30 +5,21 @@ The scenarios are those of ``python -m benchmarks bridges ros2-faults``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pytest
 
 from benchmarks.bridges.faults import TILT_LIMIT, Fault
-from benchmarks.bridges.ros2_faults import FAULTS, Scene
+from benchmarks.bridges.ros2_faults import FAULTS, tilt_during
 from benchmarks.trials import TrialFailed
 from tests.controller.bridges.ros2_graph import needs_ros2
 
 
-@pytest.fixture(scope="module")
-def scene(graph: None) -> Iterator[Scene]:
-    scene = Scene("faults")
-    yield scene
-    scene.close()
-
-
 @needs_ros2
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name.removeprefix("ros2."))
-def test_no_fault_makes_a_robot_fall_and_somebody_is_told(scene: Scene, fault: Fault) -> None:
-    assert scene.tilt_during(fault) <= TILT_LIMIT
+def test_no_fault_makes_a_robot_fall_and_somebody_is_told(graph: None, fault: Fault) -> None:
+    assert tilt_during(fault) <= TILT_LIMIT
 
 
 @needs_ros2
 def test_a_scenario_in_which_the_robot_was_not_seen_is_no_success(graph: None) -> None:
     with pytest.raises(TrialFailed, match="no odometry"):
-        Scene("nowhere").tilt_during(Fault("nothing", "nothing", lambda _scene: None))
+        tilt_during(Fault("nothing", "nothing", lambda _scene: None))

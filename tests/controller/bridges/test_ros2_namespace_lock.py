@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from benchmarks.bridges.processes import Process
-from controller.bridges.ros2.namespace_lock import NamespaceLock
+from controller.bridges.ros2.namespace_lock import lock_namespace
 from go2_wbc.errors import BridgeError
 
 pytestmark = pytest.mark.skipif(
@@ -17,26 +17,26 @@ pytestmark = pytest.mark.skipif(
 NAMESPACE = f"locked_{os.getpid()}"
 HOLDER = f"""
 import time
-from controller.bridges.ros2.namespace_lock import NamespaceLock
-lock = NamespaceLock("{NAMESPACE}_far", 7)
+from controller.bridges.ros2.namespace_lock import lock_namespace
+lock = lock_namespace("{NAMESPACE}_far", 7)
 print("locked", flush=True)
 time.sleep(60)
 """
 
 
 def test_a_namespace_is_locked_once_and_can_be_given_back() -> None:
-    first = NamespaceLock(NAMESPACE, 7)
+    first = lock_namespace(NAMESPACE, 7)
     with pytest.raises(BridgeError, match=f"/{NAMESPACE} is already served.*--namespace"):
-        NamespaceLock(NAMESPACE, 7)
+        lock_namespace(NAMESPACE, 7)
     first.close()
-    NamespaceLock(NAMESPACE, 7).close()
+    lock_namespace(NAMESPACE, 7).close()
 
 
 def test_other_namespaces_and_other_domains_are_free() -> None:
     locks = [
-        NamespaceLock(NAMESPACE, 7),
-        NamespaceLock(f"{NAMESPACE}_b", 7),
-        NamespaceLock(NAMESPACE, 8),
+        lock_namespace(NAMESPACE, 7),
+        lock_namespace(f"{NAMESPACE}_b", 7),
+        lock_namespace(NAMESPACE, 8),
     ]
     for lock in locks:
         lock.close()
@@ -46,6 +46,6 @@ def test_the_lock_of_a_process_that_is_killed_ends_with_it() -> None:
     with Process([sys.executable, "-c", HOLDER]) as holder:
         holder.wait_for("locked")
         with pytest.raises(BridgeError, match="already served"):
-            NamespaceLock(f"{NAMESPACE}_far", 7)
+            lock_namespace(f"{NAMESPACE}_far", 7)
         holder.kill()
-    NamespaceLock(f"{NAMESPACE}_far", 7).close()
+    lock_namespace(f"{NAMESPACE}_far", 7).close()

@@ -7,13 +7,13 @@ import re
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from typing import Any
 
 import pytest
 
 from benchmarks.bridges.processes import Process, wait_until
-from benchmarks.bridges.ros2_processes import DISCOVERY, Place, Probe, serving, without
+from benchmarks.bridges.ros2_processes import ANSWER, DISCOVERY, Place, Probe, serving, without
 from tests.controller.bridges.ros2_graph import needs_ros2
 
 pytestmark = needs_ros2
@@ -131,7 +131,7 @@ def drive_until_counted(probe: Probe, x: float, kind: str) -> None:
         probe.drive(0.5, x)
         return probe.statistics()["cmd_vel"][kind] > before
 
-    probe.wait_until(is_counted, kind)
+    assert wait_until(is_counted, ANSWER), kind
 
 
 def test_the_triggers_do_the_same_as_the_command(server: Process, probe: Probe) -> None:
@@ -225,7 +225,7 @@ def test_a_motion_has_feedback_with_progress_and_a_result(server: Process, probe
 def test_a_high_five_that_is_cancelled_ends_standing(server: Process, probe: Probe) -> None:
     assert probe.call("up").success
     handle, feedback = goal_of(probe, "high_five", "hold=5.0")
-    probe.wait_until(lambda: bool(feedback) and feedback[-1].progress >= 0.4, "40 % of a motion")
+    assert wait_until(lambda: bool(feedback) and feedback[-1].progress >= 0.4, ANSWER)
     busy, _ = goal_of(probe, "nod")
     assert not busy.accepted
     probe.result(handle.cancel_goal_async())
@@ -262,17 +262,10 @@ def free_runners(
         yield rich, second
 
 
-@contextmanager
-def probing(namespace: str) -> Iterator[Probe]:
-    probe = Probe(namespace)
-    yield probe
-    probe.close()
-
-
 def test_free_running_time_is_the_clock(free_runners: tuple[Process, Process]) -> None:
     from rosgraph_msgs.msg import Clock
 
-    with probing("robot3") as probe:
+    with closing(Probe("robot3")) as probe:
         assert probe.call("up").success
         first = listen(probe, {"clock": (Clock, "/clock")})["clock"].clock
         probe.let_pass(0.5)
@@ -286,7 +279,7 @@ def test_the_clock_is_left_to_the_first_of_two_servers(
     free_runners: tuple[Process, Process],
 ) -> None:
     first, second = free_runners
-    with probing("robot3") as one, probing("robot4") as other:
+    with closing(Probe("robot3")) as one, closing(Probe("robot4")) as other:
         assert one.trigger("up").success
         assert other.trigger("up").success
         assert "another process publishes /clock" in second.text
@@ -310,7 +303,7 @@ def test_without_the_interfaces_the_triggers_remain_and_the_server_says_so(
     free_runners: tuple[Process, Process],
 ) -> None:
     _, second = free_runners
-    with probing("robot4") as probe:
+    with closing(Probe("robot4")) as probe:
         assert probe.trigger("up").success
         assert "without quadropted_msgs and tf2_msgs" in second.text
         assert "ros2/build_interfaces.sh" in second.text
@@ -327,7 +320,7 @@ def test_a_free_running_server_ends_well_too(free_runners: tuple[Process, Proces
 
 
 def test_two_robots_live_side_by_side(server: Process, probe: Probe) -> None:
-    with serving(namespace="robot2") as second, probing("robot2") as other:
+    with serving(namespace="robot2") as second, closing(Probe("robot2")) as other:
         assert other.call("up").success
         assert probe.call("sit").success
         assert other.height() > 0.29

@@ -8,12 +8,13 @@ import trimesh
 from viz.render.mesh import simplify, smooth_surface
 
 _CREASE = np.deg2rad(40.0)
+_RED = np.array([1.0, 0.0, 0.0])
 
 
 def test_a_cube_given_as_a_soup_keeps_its_sharp_edges() -> None:
     box = trimesh.creation.box((0.2, 0.2, 0.2))
     soup = box.vertices[box.faces].reshape(-1, 3)
-    surface = smooth_surface(soup, np.arange(36).reshape(12, 3), crease=_CREASE)
+    surface = smooth_surface(soup, np.arange(36).reshape(12, 3), _RED, crease=_CREASE)
     assert len(surface.points) == 24
     np.testing.assert_allclose(np.abs(surface.normals).max(axis=1), 1.0)
     assert np.all(np.sum(surface.points * surface.normals, axis=1) > 0.09)
@@ -22,7 +23,7 @@ def test_a_cube_given_as_a_soup_keeps_its_sharp_edges() -> None:
 def test_a_sphere_given_as_a_soup_becomes_smooth() -> None:
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.1)
     soup = ball.vertices[ball.faces].reshape(-1, 3)
-    surface = smooth_surface(soup, np.arange(len(soup)).reshape(-1, 3), crease=_CREASE)
+    surface = smooth_surface(soup, np.arange(len(soup)).reshape(-1, 3), _RED, crease=_CREASE)
     assert len(surface.points) == len(ball.vertices)
     radial = surface.points / np.linalg.norm(surface.points, axis=1, keepdims=True)
     assert np.min(np.sum(radial * surface.normals, axis=1)) > 0.999
@@ -30,9 +31,10 @@ def test_a_sphere_given_as_a_soup_becomes_smooth() -> None:
 
 def test_simplification_drops_triangles_and_keeps_the_shape() -> None:
     ball = trimesh.creation.icosphere(subdivisions=5, radius=0.1)
-    fine = smooth_surface(ball.vertices, ball.faces, crease=_CREASE)
+    fine = smooth_surface(ball.vertices, ball.faces, _RED, crease=_CREASE)
     coarse = simplify(fine, cell=0.012, crease=_CREASE)
     assert len(coarse.triangles) < len(fine.triangles) / 5
+    np.testing.assert_array_equal(coarse.colors, [_RED] * len(coarse.triangles))
     radii = np.linalg.norm(coarse.points, axis=1)
     np.testing.assert_allclose(radii, 0.1, atol=0.001)
 
@@ -40,7 +42,7 @@ def test_simplification_drops_triangles_and_keeps_the_shape() -> None:
 def test_a_thin_sheet_keeps_both_of_its_sides_when_simplified() -> None:
     sheet = trimesh.creation.box((0.3, 0.3, 0.002)).subdivide().subdivide().subdivide()
     coarse = simplify(
-        smooth_surface(sheet.vertices, sheet.faces, crease=_CREASE), cell=0.05, crease=_CREASE
+        smooth_surface(sheet.vertices, sheet.faces, _RED, crease=_CREASE), cell=0.05, crease=_CREASE
     )
     corners = coarse.points[coarse.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

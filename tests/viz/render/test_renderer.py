@@ -8,10 +8,11 @@ import pytest
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import FOOT_RADIUS
 from viz.render.camera import Camera
-from viz.render.floor import FloorStyle, paint_floor
-from viz.render.posed_robot import PosedRobot, WorldTriangles
+from viz.render.floor import paint_floor
+from viz.render.mesh import Surface
+from viz.render.posed_robot import PosedRobot
 from viz.render.rasterizer import rasterize
-from viz.render.renderer import Lighting, RenderStyle, render
+from viz.render.renderer import render, towards_lights
 from viz.render.robot_meshes import load_robot_visuals
 
 _TOUCH = 2.5  # [px] sole in the picture against the projected contact point
@@ -46,20 +47,20 @@ def test_each_foot_meets_the_floor_where_its_contact_point_is(leg: int) -> None:
 
 def test_the_floor_is_darker_under_the_robot_than_beside_it() -> None:
     robot, q = _standing()
-    style, light = FloorStyle(tile=100.0), Lighting().towards_key
+    light = towards_lights()[0]
     camera = _camera()
-    with_shadow = paint_floor(camera, robot.at(q), light, style)
-    nothing = WorldTriangles(
+    with_shadow = paint_floor(camera, robot.at(q), light)
+    nothing = Surface(
         robot.at(q).points, robot.at(q).normals, np.zeros((0, 3), dtype=int), np.zeros((0, 3))
     )
-    without = paint_floor(camera, nothing, light, style)
+    without = paint_floor(camera, nothing, light)
     column, row = (round(value) for value in camera.project(np.array([[0.0, 0.05, 0.0]]))[0, :2])
     assert with_shadow[row, column].max() < 0.7 * without[row, column].max()
     np.testing.assert_allclose(with_shadow[0], without[0], atol=1e-6)
 
 
 def test_the_shadow_falls_away_from_the_light() -> None:
-    tower = WorldTriangles(
+    tower = Surface(
         np.array([[-0.02, 0.0, 0.3], [0.02, 0.0, 0.3], [0.0, 0.03, 0.3]]),
         np.tile([0.0, 0.0, 1.0], (3, 1)),
         np.array([[0, 1, 2]]),
@@ -67,13 +68,11 @@ def test_the_shadow_falls_away_from_the_light() -> None:
     )
     light = np.array([0.6, 0.0, 0.8])
     camera = _camera()
-    style = FloorStyle(tile=100.0)
-    picture = paint_floor(camera, tower, light, style)
+    picture = paint_floor(camera, tower, light)
     bare = paint_floor(
         camera,
-        WorldTriangles(tower.points, tower.normals, tower.triangles[:0], tower.colors[:0]),
+        Surface(tower.points, tower.normals, tower.triangles[:0], tower.colors[:0]),
         light,
-        style,
     )
     row, column = np.unravel_index(np.argmin((picture / bare)[:, :, 0]), picture.shape[:2])
     darkest = camera.H_floor_picture @ [column + 0.5, row + 0.5, 1.0]
@@ -84,8 +83,8 @@ def test_the_robot_covers_a_good_part_of_the_picture_with_its_own_colours() -> N
     robot, q = _standing()
     camera = _camera()
     surface = robot.at(q)
-    picture = render(camera, surface, RenderStyle())
-    empty = render(camera, _raised(robot, q, 50.0), RenderStyle())
+    picture = render(camera, surface)
+    empty = render(camera, _raised(robot, q, 50.0))
     changed = np.any(picture != empty, axis=2).mean()
     assert picture.shape == (300, 480, 3)
     assert 0.12 < changed < 0.6
@@ -93,18 +92,16 @@ def test_the_robot_covers_a_good_part_of_the_picture_with_its_own_colours() -> N
     assert np.abs(picture[0].astype(int) - empty[0]).max() == 0
 
 
-def _raised(robot: PosedRobot, q: np.ndarray, height: float) -> WorldTriangles:
+def _raised(robot: PosedRobot, q: np.ndarray, height: float) -> Surface:
     """The robot far behind the camera's back: out of the picture."""
     away = robot.at(q)
-    return WorldTriangles(
-        away.points - [0.0, 0.0, height], away.normals, away.triangles, away.colors
-    )
+    return Surface(away.points - [0.0, 0.0, height], away.normals, away.triangles, away.colors)
 
 
 def test_more_samples_only_smooth_the_edges() -> None:
     robot, q = _standing()
     surface = robot.at(q)
-    coarse = render(_camera(), surface, RenderStyle(samples=1)).astype(float)
-    fine = render(_camera(), surface, RenderStyle(samples=3)).astype(float)
+    coarse = render(_camera(), surface, samples=1).astype(float)
+    fine = render(_camera(), surface, samples=3).astype(float)
     assert np.abs(coarse - fine).mean() < 3.0
     assert np.abs(coarse - fine).max() > 20.0

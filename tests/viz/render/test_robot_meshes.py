@@ -6,12 +6,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import FOOT_RADIUS
 from viz.render.posed_robot import PosedRobot, arrow
-from viz.render.robot_meshes import load_mesh_file, load_robot_visuals
+from viz.render.robot_meshes import load_robot_visuals
 
 _MESH_ERROR = 0.002  # [m] the foot's mesh is not exactly the sphere of the contact model
 _STAND = np.concatenate([[0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], np.tile([0.0, 0.8, -1.5], 4)])
@@ -21,17 +20,19 @@ def _points_of(link: str) -> np.ndarray:
     visuals = load_robot_visuals()
     data = visuals.model.createData()
     pin.forwardKinematics(visuals.model, data, _STAND)
-    visual = next(visual for visual in visuals.visuals if visual.name == link)
-    T = data.oMi[visual.joint].homogeneous @ visual.T_joint_visual
-    local = np.vstack([part.surface.points for part in visuals.meshes[visual.mesh]])
+    frame = visuals.model.getFrameId(link)
+    (item,) = [item for item in visuals.geometry.geometryObjects if item.parentFrame == frame]
+    T = (data.oMi[item.parentJoint] * item.placement).homogeneous
+    local = np.vstack([part.points for part in visuals.meshes[item.meshPath]])
     return local @ T[:3, :3].T + T[:3, 3]
 
 
 def test_each_mesh_is_loaded_once_and_shared_by_the_legs() -> None:
     visuals = load_robot_visuals()
-    assert len(visuals.visuals) == 17
+    shown = [item.meshPath for item in visuals.geometry.geometryObjects]
+    assert len(shown) == 17
     assert len(visuals.meshes) == 7
-    assert sum(visual.mesh == "hip" for visual in visuals.visuals) == 4
+    assert sum(path.endswith("hip.dae") for path in shown) == 4
 
 
 def test_every_mesh_lies_as_in_pinocchios_own_loader() -> None:
@@ -42,10 +43,10 @@ def test_every_mesh_lies_as_in_pinocchios_own_loader() -> None:
     pin.buildGeomFromUrdf(
         visuals.model, str(description.urdf_path), pin.GeometryType.VISUAL, geometry, folders
     )
-    for item, visual in zip(geometry.geometryObjects, visuals.visuals, strict=True):
+    for item in geometry.geometryObjects:
         item.geometry.computeLocalAABB()
         box = item.geometry.aabb_local
-        points = np.vstack([part.surface.points for part in visuals.meshes[visual.mesh]])
+        points = np.vstack([part.points for part in visuals.meshes[item.meshPath]])
         np.testing.assert_allclose(points.min(axis=0), box.min_.ravel(), atol=2e-5)
         np.testing.assert_allclose(points.max(axis=0), box.max_.ravel(), atol=2e-5)
 
@@ -67,7 +68,7 @@ def test_the_sole_of_each_foot_is_where_the_contact_model_puts_it() -> None:
 
 def test_normals_are_unit_and_point_out_of_the_faces() -> None:
     for parts in load_robot_visuals().meshes.values():
-        for surface in (part.surface for part in parts):
+        for surface in parts:
             np.testing.assert_allclose(np.linalg.norm(surface.normals, axis=1), 1.0)
             corners = surface.points[surface.triangles]
             faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -95,8 +96,3 @@ def test_an_arrow_is_as_long_as_asked_and_faces_outward() -> None:
     assert volume > 0
     agree = np.sum(faces * made.normals[made.triangles].mean(axis=1), axis=1)
     assert np.all(agree[solid] > 0)
-
-
-def test_a_missing_mesh_file_is_named(tmp_path) -> None:  # noqa: ANN001 - pytest's own
-    with pytest.raises(DescriptionError, match=r"nowhere\.dae"):
-        load_mesh_file(tmp_path / "nowhere.dae")

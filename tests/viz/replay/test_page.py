@@ -84,7 +84,7 @@ def test_each_mesh_is_stored_once_and_every_link_refers_to_it(page: str) -> None
 
 def test_stored_meshes_are_those_of_the_robot(page: str) -> None:
     _, arrays = read_data(page)
-    surfaces = [part.surface for parts in load_robot_visuals().meshes.values() for part in parts]
+    surfaces = [part for parts in load_robot_visuals().meshes.values() for part in parts]
     for k, surface in enumerate(surfaces):
         np.testing.assert_allclose(arrays[f"mesh{k}.points"], surface.points, atol=1e-5)
         np.testing.assert_array_equal(arrays[f"mesh{k}.triangles"], surface.triangles)
@@ -105,10 +105,13 @@ def test_the_scene_tree_moves_every_link_as_pinocchio_does(page: str, seed: int)
         for command in header["commands"]
         if command["type"] == "set_object" and "/robot/" in command["path"]
     ]
-    for visual in visuals.visuals:
-        node = next(node for node in nodes if node.endswith(f"/{visual.name}_0"))
-        T_world_visual = data.oMi[visual.joint].homogeneous @ visual.T_joint_visual
-        np.testing.assert_allclose(placement(header, node, q), T_world_visual, atol=1e-9)
+    for item in visuals.geometry.geometryObjects:
+        link = visuals.model.frames[item.parentFrame].name
+        node = next(node for node in nodes if node.endswith(f"/{link}_0"))
+        T_world_visual = data.oMi[item.parentJoint] * item.placement
+        np.testing.assert_allclose(
+            placement(header, node, q), T_world_visual.homogeneous, atol=1e-9
+        )
 
 
 def test_the_motion_in_the_page_is_the_recorded_one(page: str, recording: Recording) -> None:

@@ -23,7 +23,7 @@ def robot() -> PosedRobot:
 def test_frames_are_even_and_cover_the_recording(recording: Recording, robot: PosedRobot) -> None:
     frames = replay_frames(recording, robot)
     assert frames.rate == pytest.approx(50.0, rel=0.02)
-    assert frames.duration == pytest.approx(recording.duration)
+    assert (len(frames.q) - 1) / frames.rate == pytest.approx(recording.duration)
     np.testing.assert_array_equal(frames.q[0], recording.q[0])
     np.testing.assert_allclose(np.abs(frames.q[-1]), np.abs(recording.q[-1]))
 

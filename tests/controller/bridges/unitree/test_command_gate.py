@@ -9,7 +9,7 @@ import pytest
 
 from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.codec import encode_message
 from controller.bridges.unitree.low_level import RELEASE, SILENCE, CommandGate
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
@@ -42,7 +42,7 @@ def sample(
     layout.seal(message)
     if not sealed:
         change(message)
-    return codec_of(layout.LOW_CMD).encode(message)
+    return encode_message(message)
 
 
 def setting(name: str, motor: int, value: float) -> Callable[[np.ndarray], None]:

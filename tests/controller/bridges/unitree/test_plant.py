@@ -15,10 +15,11 @@ import pytest
 from benchmarks.bridges.processes import wait_until
 from controller import GO2Controller
 from controller.bridges.unitree import layout
-from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.codec import decode_message, encode_message
 from controller.bridges.unitree.guards import GuardConfig
 from controller.bridges.unitree.layout import seal
 from controller.bridges.unitree.low_level import low_cmd_message, low_state_message
+from controller.bridges.unitree.plant import UnitreePlant
 from go2_wbc.errors import CommandError, ConfigError, PlantError, PlantTimeout
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.base import Plant
@@ -51,10 +52,10 @@ class Robot:
         self.commands: list[np.ndarray] = []
         self.writers = self.readers = 1
 
-    def reader(self, topic: str, kind: type, *, depth: int) -> Robot:
+    def reader(self, topic: str, *, depth: int) -> Robot:
         return self
 
-    def writer(self, topic: str, kind: type) -> Robot:
+    def writer(self, topic: str) -> Robot:
         return self
 
     def wait(self, seconds: float) -> bool:
@@ -70,10 +71,10 @@ class Robot:
         message["tick"] = self.tick
         self.change(message)
         seal(message)
-        return [codec_of(layout.LOW_STATE).encode(message)]
+        return [encode_message(message)]
 
     def write(self, data: bytes) -> None:
-        self.commands.append(codec_of(layout.LOW_CMD).decode(data))
+        self.commands.append(decode_message(layout.LOW_CMD, data))
 
     def is_damped_since(self, start: int) -> bool:
         """Whether many commands come from then on, and all of them brake."""
@@ -87,19 +88,13 @@ def is_damping(command: np.ndarray) -> bool:
 
 @pytest.fixture
 def robot(monkeypatch: pytest.MonkeyPatch) -> Robot:
-    import controller.bridges.unitree.takeover  # noqa: F401  (it must see the real bus's type)
-
     robot = Robot()
     monkeypatch.setattr("controller.bridges.unitree.bus.Bus", lambda domain, interface: robot)
-    monkeypatch.setattr(
-        "controller.bridges.unitree.takeover.release_sport", lambda *args, **options: None
-    )
+    monkeypatch.setattr(UnitreePlant, "_release_sport", lambda *args: None)
     return robot
 
 
 def driven(guards: GuardConfig) -> Plant:
-    from controller.bridges.unitree.plant import UnitreePlant
-
     return UnitreePlant("lo", 1, i_have_the_remote_in_hand=True, guards=guards)
 
 
@@ -228,13 +223,20 @@ def test_a_robot_that_does_not_lie_is_sent_nothing(robot: Robot) -> None:
     assert robot.commands == []
 
 
+def test_a_robot_that_measures_no_finite_joint_angle_is_sent_nothing(robot: Robot) -> None:
+    robot.change = broken
+    with pytest.raises(PlantError, match="must lie on its belly"):
+        driven(PATIENT)
+    assert robot.commands == []
+
+
 def test_a_robot_that_gets_up_while_it_is_taken_over_is_let_go(
     robot: Robot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def get_up(*args: object, **options: object) -> None:
+    def get_up(*args: object) -> None:
         robot.change = tilted
 
-    monkeypatch.setattr("controller.bridges.unitree.takeover.release_sport", get_up)
+    monkeypatch.setattr(UnitreePlant, "_release_sport", get_up)
     with pytest.raises(PlantError, match="must lie on its belly"):
         driven(PATIENT)
     assert robot.commands == []

@@ -90,10 +90,10 @@ def test_an_action_that_was_not_done_is_answered_why(
 ) -> None:
     stage.robot.perform.side_effect = error
     assert stage.code(Api.SIT) == code
-    assert stage.service.error_code == code
+    assert stage.service.status.error_code == code
     stage.robot.perform.side_effect = None
     assert stage.code(Api.SIT) == Code.OK
-    assert stage.service.error_code == 0
+    assert stage.service.status.error_code == 0
 
 
 def test_a_robot_whose_loop_has_ended_cannot_begin(stage: Stage) -> None:
@@ -172,7 +172,7 @@ def test_after_the_patience_a_running_action_has_begun_and_a_waiting_one_is_refu
     stage.ask(Api.HELLO)
     stage.service.patrol()
     assert stage.answers(2) == [("DANCE1", Code.OK), ("HELLO", Code.NOT_READY)]
-    assert stage.service.is_acting
+    assert stage.service.status.is_acting
     is_over.set()
     assert sport_service.PATIENCE < 1.0  # s; Unitree's clients wait so long
 
@@ -202,12 +202,12 @@ def test_so_many_requests_may_wait_and_damp_answers_all_of_them(stage: Stage) ->
 
 def test_the_mode_is_that_of_the_action_that_runs(stage: Stage) -> None:
     modes: list[SportMode] = []
-    stage.acting(Api.SIT, lambda: modes.append(stage.service.sport_mode()))
+    stage.acting(Api.SIT, lambda: modes.append(stage.service.status.mode))
     stage.answers(1)
     assert modes == [SportMode.SIT]
-    assert stage.service.sport_mode() == SportMode.BALANCE_STAND
+    assert stage.service.status.mode == SportMode.BALANCE_STAND
     stage.robot.is_locked = True
-    assert stage.service.sport_mode() == SportMode.JOINT_LOCK
+    assert stage.service.status.mode == SportMode.JOINT_LOCK
 
 
 def test_a_move_that_meets_a_standing_robot_starts_to_walk_first(stage: Stage) -> None:

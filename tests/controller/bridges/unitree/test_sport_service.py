@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.bridges.processes import wait_until
-from benchmarks.bridges.unitree_faults import Scene, scene
-from benchmarks.bridges.unitree_processes import client_of
+from benchmarks.bridges.unitree_processes import Scene, client_of, scene
 from controller.bridges.unitree.sport_api import (
     LEASE_TERM,
     SWITCHER_SERVICE,
@@ -45,7 +44,7 @@ def at(simulated: Scene) -> Scene:
 
 
 def progress(at: Scene) -> float:
-    return float(at.observer.now()["progress"][0])
+    return float(at.now()["progress"][0])
 
 
 def while_acting(at: Scene) -> Iterator[None]:
@@ -65,12 +64,12 @@ def passing(at: Scene, seconds: float) -> Iterator[None]:
 
 
 def robot_time(at: Scene) -> float:
-    stamp = at.observer.now()["stamp"][0]
+    stamp = at.now()["stamp"][0]
     return float(stamp["sec"]) + 1e-9 * float(stamp["nanosec"])
 
 
 def rpy(at: Scene) -> np.ndarray:
-    return np.array(at.observer.now()["imu_state"]["rpy"][0])
+    return np.array(at.now()["imu_state"]["rpy"][0])
 
 
 def begin(at: Scene, api: Api) -> None:
@@ -82,26 +81,26 @@ def begin(at: Scene, api: Api) -> None:
 def test_after_stand_up_it_does_not_walk_until_balance_stand(simulated: Scene) -> None:
     at = simulated
     assert at.call(Api.STAND_UP) == Code.OK
-    at.observer.wait_for_rest()
-    assert at.observer.mode == SportMode.JOINT_LOCK
+    at.wait_for_rest()
+    assert at.mode == SportMode.JOINT_LOCK
     assert at.call(Api.MOVE, FAST) == Code.OK
     for _ in passing(at, 0.5):
-        assert at.observer.speed < 0.05
+        assert at.speed < 0.05
     assert at.call(Api.BALANCE_STAND) == Code.OK
-    at.observer.wait_for_rest()
-    assert at.observer.mode == SportMode.BALANCE_STAND
+    at.wait_for_rest()
+    assert at.mode == SportMode.BALANCE_STAND
 
 
 def test_sit_and_rise(at: Scene) -> None:
     assert at.call(Api.RISE_SIT) == Code.NOT_READY  # it does not sit
     assert at.call(Api.SIT) == Code.OK
-    at.observer.wait_for_rest()
-    assert at.observer.mode == SportMode.SIT
+    at.wait_for_rest()
+    assert at.mode == SportMode.SIT
     assert rpy(at)[1] < -0.4
     assert at.call(Api.HELLO) == Code.NOT_READY
     assert at.call(Api.EULER, '{"x": 0, "y": 0, "z": 0}') == Code.NOT_READY
     assert at.call(Api.RISE_SIT) == Code.OK
-    at.observer.wait_for_rest()
+    at.wait_for_rest()
     at.require_standing()
 
 
@@ -110,10 +109,10 @@ def test_a_front_paw_is_raised_and_put_back(at: Scene, api: Api) -> None:
     begin(at, api)
     least = np.inf
     for _ in while_acting(at):
-        least = min(least, float(at.observer.now()["foot_force"][0, FRONT].min()))
+        least = min(least, float(at.now()["foot_force"][0, FRONT].min()))
     assert least == 0.0
     at.require_standing()
-    assert at.observer.now()["error_code"][0] == Code.OK
+    assert at.now()["error_code"][0] == Code.OK
 
 
 def test_stretch_bows_and_comes_back(at: Scene) -> None:
@@ -127,12 +126,12 @@ def test_stretch_bows_and_comes_back(at: Scene) -> None:
 
 def test_pose_is_held_until_it_is_taken_back(at: Scene) -> None:
     assert at.call(Api.POSE, '{"data": true}') == Code.OK
-    at.observer.wait_for_rest()
-    assert at.observer.mode == SportMode.POSE
+    at.wait_for_rest()
+    assert at.mode == SportMode.POSE
     assert rpy(at)[:2] == pytest.approx(POSE[:2], abs=0.05)
     assert at.call(Api.POSE, '{"data": false}') == Code.OK
-    at.observer.wait_for_rest()
-    assert at.observer.mode == SportMode.BALANCE_STAND
+    at.wait_for_rest()
+    assert at.mode == SportMode.BALANCE_STAND
     assert rpy(at)[:2] == pytest.approx([0.0, 0.0], abs=0.03)
 
 
@@ -149,7 +148,7 @@ def test_an_attitude_is_taken_or_refused(
 ) -> None:
     before = rpy(at)
     assert at.call(Api.EULER, json.dumps(dict(zip("xyz", angles, strict=True)))) == code
-    at.observer.wait_for_rest()
+    at.wait_for_rest()
     there = angles if code == Code.OK else before
     assert rpy(at)[:2] == pytest.approx(there[:2], abs=0.06)
 
@@ -159,7 +158,7 @@ def test_the_speed_level_bounds_move(at: Scene, level: int, speed: float) -> Non
     assert at.call(Api.SPEED_LEVEL, json.dumps({"data": level})) == Code.OK
     for _ in passing(at, 3.0):
         at.client.send(Api.MOVE, FAST)
-    assert at.observer.speed == pytest.approx(speed, abs=0.1)
+    assert at.speed == pytest.approx(speed, abs=0.1)
     assert at.call(Api.STOP_MOVE) == Code.OK
     assert at.call(Api.SPEED_LEVEL, '{"data": 0}') == Code.OK
 
@@ -172,11 +171,11 @@ def test_an_action_that_meets_a_long_one_waits_a_while_then_is_refused(at: Scene
     assert progress(at) == 1
     assert at.call(Api.DAMP) == Code.OK
     at.require_lying()
-    assert at.observer.now()["error_code"][0] == Code.ACTION_TIMEOUT
+    assert at.now()["error_code"][0] == Code.ACTION_TIMEOUT
 
 
 def test_damp_ends_an_action_whose_caller_hears_that_it_was_not_done(at: Scene) -> None:
-    caller = client_of(at.observer.bus, "sport")
+    caller = client_of(at.bus, "sport")
     codes: list[int] = []
     call = threading.Thread(target=lambda: codes.append(caller.call(Api.HELLO, timeout=5.0).code))
     call.start()
@@ -194,11 +193,11 @@ def test_damp_wins_against_an_attitude_that_is_still_being_checked(at: Scene) ->
     at.require_lying()
     for _ in passing(at, 1.0):
         at.require_lying()
-    assert at.observer.mode == SportMode.DAMPING
+    assert at.mode == SportMode.DAMPING
 
 
 def test_who_has_the_lease_has_the_robot_until_it_ends(at: Scene) -> None:
-    lease = client_of(at.observer.bus, "sport_lease")
+    lease = client_of(at.bus, "sport_lease")
 
     def codes_during_a_lease() -> list[int]:
         """Of a stop and another lease; none if the machine paused for as long as the lease."""
@@ -215,11 +214,11 @@ def test_who_has_the_lease_has_the_robot_until_it_ends(at: Scene) -> None:
 
 
 def test_the_switcher_releases_a_robot_that_lies_only(at: Scene) -> None:
-    switcher = client_of(at.observer.bus, SWITCHER_SERVICE)
+    switcher = client_of(at.bus, SWITCHER_SERVICE)
     assert json.loads(switcher.call(SwitcherApi.CHECK_MODE).data)["name"] == "normal"
     assert switcher.call(SwitcherApi.RELEASE_MODE).code == Code.NOT_READY
     assert at.call(Api.STAND_DOWN) == Code.OK
-    at.observer.wait_for_rest()
+    at.wait_for_rest()
     assert wait_until(lambda: switcher.call(SwitcherApi.RELEASE_MODE).code == Code.OK, LIMIT)
     assert json.loads(switcher.call(SwitcherApi.CHECK_MODE).data)["name"] == ""
     assert at.call(Api.STAND_UP) == Code.NOT_READY

@@ -60,7 +60,6 @@ def test_the_feet_of_a_standing_robot_carry_its_whole_weight(plant: MujocoPlant)
 def test_the_contact_of_each_foot_is_below_its_own_centre(plant: MujocoPlant) -> None:
     stand_up(plant)
     contacts = plant.foot_contacts()
-    assert contacts.touching.all()
     below = contacts.p_world_contact - plant.p_world_feet
     assert below == pytest.approx(np.tile([0.0, 0.0, -FOOT_RADIUS], (4, 1)), abs=SINKING)
 
@@ -71,9 +70,8 @@ def test_in_the_air_nothing_touches(plant: MujocoPlant) -> None:
     assert not plant.read().foot_forces.any()
     assert not plant.read().feet_in_contact.any()
     contacts = plant.foot_contacts()
-    assert not contacts.touching.any()
     assert np.isnan(contacts.p_world_contact).all()
-    assert not plant.foot_contact_velocities.any()
+    assert not contacts.v_world_contact.any()
 
 
 @pytest.mark.parametrize("settings", [{"payload": 4.0}, {"mass_scale": 1.2}])
@@ -93,11 +91,12 @@ def test_contact_velocity_is_that_of_the_feets_material(
     for _ in range(60):
         plant.write(JointCommand.servo(STAND, np.zeros(12), 60.0, 3.0))
     state, contacts = plant.read(), plant.foot_contacts()
-    assert contacts.touching.any()
+    touching = np.isfinite(contacts.p_world_contact[:, 0])
+    assert touching.any()
     data = robot.createData()
     pin.forwardKinematics(robot, data, state.q, state.v)
     pin.updateFramePlacements(robot, data)
-    for leg in np.flatnonzero(contacts.touching):
+    for leg in np.flatnonzero(touching):
         frame = robot.getFrameId(FOOT_NAMES[leg])
         twist = pin.getFrameVelocity(robot, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         arm = contacts.p_world_contact[leg] - data.oMf[frame].translation

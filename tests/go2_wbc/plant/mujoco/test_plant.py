@@ -294,4 +294,5 @@ def test_the_viewer_without_a_display_says_so_instead_of_ending_the_process(
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     with pytest.raises(PlantError, match="no display"):
         PlantViewer(plant)
-    assert display_problem({"WAYLAND_DISPLAY": "wayland-0"}) is None
+    monkeypatch.setenv("WAYLAND_DISPLAY", "wayland-0")
+    assert display_problem() is None

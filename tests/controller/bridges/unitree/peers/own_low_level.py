@@ -12,9 +12,9 @@ import time
 
 import numpy as np
 
-from controller.bridges.unitree import idl, layout
+from controller.bridges.unitree import layout
 from controller.bridges.unitree.bus import Bus
-from controller.bridges.unitree.codec import codec_of
+from controller.bridges.unitree.codec import decode_message, encode_message
 from controller.bridges.unitree.layout import is_intact, seal
 from controller.bridges.unitree.low_level import low_cmd_message
 from go2_wbc.robot.state import JointCommand
@@ -27,10 +27,9 @@ def main() -> None:
     """Write both messages at 500 Hz, count the states that came."""
     wanted, mask = int(sys.argv[1]), int(sys.argv[2])
     bus = Bus(0, "lo")
-    reader = bus.reader("rt/lowstate", idl.low_state(), depth=64)
-    commands = bus.writer("rt/lowcmd", idl.low_cmd())
-    states = bus.writer("rt/lowstate", idl.low_state())
-    command_codec, state_codec = codec_of(layout.LOW_CMD), codec_of(layout.LOW_STATE)
+    reader = bus.reader("rt/lowstate", depth=64)
+    commands = bus.writer("rt/lowcmd")
+    states = bus.writer("rt/lowstate")
     command = low_cmd_message(JointCommand.servo(ANGLES, np.zeros(12), 20.0, 1.0))
     state = layout.new_message(layout.LOW_STATE)
     state["head"], state["foot_force"] = layout.HEAD, 77
@@ -41,9 +40,10 @@ def main() -> None:
     deadline = time.monotonic() + LIMIT
     while min(written, sum(counts.values())) < wanted and time.monotonic() < deadline:
         written += 1
-        commands.write(command_codec.encode(command))
-        states.write(state_codec.encode(state))
-        for message in map(state_codec.decode, reader.take()):
+        commands.write(encode_message(command))
+        states.write(encode_message(state))
+        for data in reader.take():
+            message = decode_message(layout.LOW_STATE, data)
             if message["foot_force"][0, 0] != 77:  # the peer's, not our own
                 counts["intact" if is_intact(message) else "broken"] += 1
         time.sleep(PERIOD)
