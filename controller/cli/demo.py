@@ -19,7 +19,7 @@ go2-wbc demo --ros2                  on the robot of `go2-wbc ros2 --realtime`
 """
 DEFAULT_FOLDER = Path("out/demo")
 BACKENDS = ("condensed", "full", "placo")
-SOLVERS = ("daqp", "proxqp", "quadprog")
+SOLVERS = ("active_set", "daqp", "proxqp", "quadprog")
 
 
 def register(subparsers: Subparsers) -> None:

@@ -47,6 +47,8 @@ LIBRARIES: Mapping[str, str | None] = {
     "qpsolvers": "qpsolvers",
     "daqp": "daqp",
     "quadprog": "quadprog",
+    "numba": "numba",
+    "llvmlite": "llvmlite",
     "meshcat": "meshcat",
     "matplotlib": "matplotlib",
     "jaxtyping": "jaxtyping",

@@ -124,10 +124,10 @@ def _solve_by_active_set(qp: DenseQp) -> QpSolution:
 
     n, k = len(qp.g), 0 if qp.e is None else len(qp.e)
     E, e = (np.empty((0, n)), np.empty(0)) if qp.E is None or qp.e is None else (qp.E, qp.e)
-    rows = [np.ascontiguousarray(part, float) for part in (E, e, qp.C, qp.lower, qp.upper)]
     x, y = np.empty(n), np.empty(k + len(qp.lower))
-    H, g = np.ascontiguousarray(qp.H, float), np.ascontiguousarray(qp.g, float)
-    outcome = solve_qp(H, g, *rows, x, y)
+    arrays = (qp.H, qp.g, E, e, qp.C, qp.lower, qp.upper)
+    H, g, E, e, C, lower, upper = (np.ascontiguousarray(array, float) for array in arrays)
+    outcome = solve_qp(H, g, E, e, C, lower, upper, x, y)
     if outcome != SOLVED:
         raise QpInfeasible("active_set", MESSAGES[outcome])
     return QpSolution(x, _one_sided(qp, y[k:]), y[:k])

@@ -23,7 +23,7 @@ from tests.engine_helpers import cases, holding_reference, random_state, standin
 
 AGREEMENT = 1e-6  # [N m] between two solvers; measured 2.3e-8
 COUNT = 1040  # 80 of every contact mode
-SATURATING = {"speed_share": 0.15, "torque_share": 0.4}  # bounds bind in most of the random states
+SATURATING = WbcConfig(speed_share=0.15, torque_share=0.4)  # bounds bind in most states
 ODD_NUMBERS = WbcConfig(
     body_position=Gains((31.0, 32.0, 33.0), (11.0, 12.0, 13.0)),
     body_orientation=Gains((101.0, 102.0, 103.0), (14.0, 15.0, 16.0)),
@@ -54,7 +54,7 @@ def solve_or_none(
 
 @pytest.mark.parametrize(
     "config",
-    [WbcConfig(), WbcConfig(**SATURATING), ODD_NUMBERS],
+    [WbcConfig(), SATURATING, ODD_NUMBERS],
     ids=["default", "saturating", "odd numbers"],
 )
 def test_torques_are_those_of_the_full_problem(config: WbcConfig) -> None:

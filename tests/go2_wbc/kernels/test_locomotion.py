@@ -88,7 +88,7 @@ def test_references_are_those_of_the_readable_planner(gait: Gait, config: Locomo
         GAITS["trot"],
         ODD,
         Gait("walk", 0.5, 0.75, (0.0, 0.5, 0.75, 0.25)),
-        Gait("all", 0.4, 1.0, (0.0,) * 4),
+        Gait("all", 0.4, 1.0, (0.0, 0.0, 0.0, 0.0)),
     ],
     ids=lambda gait: gait.name,
 )
@@ -99,9 +99,10 @@ def test_the_gait_is_that_of_the_contact_schedule(gait: Gait) -> None:
     schedule = gait.schedule()
     events = [event + shift for event in schedule.times for shift in (-2e-9, 0.0, 1e-10)]
     for t in (*np.arange(0.0, 3 * gait.period, 0.0007), *events, *np.add(events, gait.period)):
-        phase: ContactPhase = schedule.at(max(t, 0.0))
+        time = max(float(t), 0.0)
+        phase: ContactPhase = schedule.at(time)
         for leg in range(4):
-            stance, elapsed, remaining = foot_phase(max(t, 0.0), gait.offsets[leg], numbers)
+            stance, elapsed, remaining = foot_phase(time, gait.offsets[leg], numbers)
             assert stance == phase.stance[leg], (t, leg)
             assert elapsed == pytest.approx(phase.elapsed[leg], abs=2e-9)
             assert remaining == pytest.approx(phase.remaining[leg], abs=2e-9)

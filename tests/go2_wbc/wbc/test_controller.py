@@ -299,7 +299,9 @@ def test_an_uninstalled_solver_is_refused_before_the_first_tick(
     model: RobotModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(qpsolvers, "available_solvers", ["quadprog"])
-    with pytest.raises(SolverUnavailable, match="pip install daqp; installed: active_set, quadprog"):
+    with pytest.raises(
+        SolverUnavailable, match="pip install daqp; installed: active_set, quadprog"
+    ):
         WholeBodyController(model, config=WbcConfig(solver="daqp"))
 
 
