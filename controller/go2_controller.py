@@ -19,7 +19,7 @@ from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError
 from go2_wbc.legs import front_leg
-from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
@@ -82,11 +82,12 @@ class GO2Controller:
             PlantError: if the plant does not answer.
         """
         self._namespace = arguments.namespace(namespace)
-        viewer = arguments.flag("viewer", viewer)
+        viewer = arguments.checked("viewer", viewer, bool, "True or False")
         self._config = arguments.config(config)
-        plant = arguments.plant_or_none(plant)
+        plant = arguments.checked("plant", plant, Plant | None, "a Plant")
         realtime = arguments.pace(realtime, plant)
-        description = find_description(arguments.path_or_none("urdf", urdf))
+        urdf = arguments.checked("urdf", urdf, Path | str | None, "a path")
+        description = find_description(None if urdf is None else Path(urdf))
         settings = PilotSettings(realtime=realtime, viewer=viewer, description=description)
         with ExitStack() as opened:
             if plant is None:
@@ -137,7 +138,7 @@ class GO2Controller:
         Raises:
             CommandError: for an unknown gait; lists the valid ones.
         """
-        gait = gait if isinstance(gait, Gait) else arguments.word("gait", gait)
+        gait = arguments.checked("gait", gait, Gait | str, "a Gait or its name", CommandError)
         return self._call("walk", lambda: self._pilot.walk(gait))
 
     def move(self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0) -> None:
@@ -176,12 +177,12 @@ class GO2Controller:
 
         Ends at rest in walking mode.
         """
-        angle = arguments.finite("angle", angle)
+        angle = finite_number("angle", angle)
         return self._call("turn_left", lambda: self._pilot.turn(angle))
 
     def turn_right(self, angle: float) -> bool:
         """Turn right in place by ``angle`` [rad], measured on the heading."""
-        angle = arguments.finite("angle", angle)
+        angle = finite_number("angle", angle)
         return self._call("turn_right", lambda: self._pilot.turn(-angle))
 
     def move_forward(self, distance: float) -> bool:
@@ -189,7 +190,7 @@ class GO2Controller:
 
         Ends at rest in walking mode.
         """
-        distance = arguments.finite("distance", distance)
+        distance = finite_number("distance", distance)
         return self._call("move_forward", lambda: self._pilot.drive(distance))
 
     # --- motions --------------------------------------------------------------------------
@@ -208,7 +209,8 @@ class GO2Controller:
         Raises:
             CommandError: for another side or time.
         """
-        leg, hold = front_leg(arguments.word("side", side)), arguments.finite("hold", hold)
+        leg = front_leg(arguments.checked("side", side, str, "a string", CommandError))
+        hold = finite_number("hold", hold)
         if not 0.5 <= hold <= 30.0:
             raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
         if plan is None:
@@ -256,7 +258,7 @@ class GO2Controller:
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
         self._check_open()
-        seconds = arguments.finite("seconds", seconds)
+        seconds = finite_number("seconds", seconds)
         if seconds < 0:
             raise CommandError(f"seconds must not be negative, got {seconds}")
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
