@@ -13,6 +13,7 @@ from types import TracebackType
 from controller import arguments
 from controller.assembly import PilotSettings, build_pilot
 from controller.modes import Mode, Outcome
+from controller.navigation import DriveStraight, TurnInPlace
 from controller.procedures import Aborted, Measurements
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
@@ -178,12 +179,12 @@ class GO2Controller:
         Ends at rest in walking mode.
         """
         angle = finite_number("angle", angle)
-        return self._call("turn_left", lambda: self._pilot.turn(angle))
+        return self._call("turn_left", lambda: self._pilot.run_goal(TurnInPlace(angle)))
 
     def turn_right(self, angle: float) -> bool:
         """Turn right in place by ``angle`` [rad], measured on the heading."""
         angle = finite_number("angle", angle)
-        return self._call("turn_right", lambda: self._pilot.turn(-angle))
+        return self._call("turn_right", lambda: self._pilot.run_goal(TurnInPlace(-angle)))
 
     def move_forward(self, distance: float) -> bool:
         """Walk ``distance`` [m] straight ahead, measured; negative is backward.
@@ -191,7 +192,7 @@ class GO2Controller:
         Ends at rest in walking mode.
         """
         distance = finite_number("distance", distance)
-        return self._call("move_forward", lambda: self._pilot.drive(distance))
+        return self._call("move_forward", lambda: self._pilot.run_goal(DriveStraight(distance)))
 
     # --- motions --------------------------------------------------------------------------
 

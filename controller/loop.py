@@ -72,7 +72,7 @@ class ControlLoop:
         """
         self.plant, self.model, self.wbc, self.telemetry = plant, model, wbc, telemetry
         self._safety = safety
-        self._falls = FallDetector(safety, model.foot_radius)
+        self._falls = FallDetector(safety)
         self._sag = self._lean = 0.0
         self.fault: Fault | None = None
         self.state: RobotState = plant.read()

@@ -7,17 +7,24 @@ procedures into calls.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from statistics import fmean
 
 import numpy as np
+from jaxtyping import Float
 
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.walking import Walking
-from controller.checks import LYING_HEIGHT, ground_height, is_lying, is_sitting, is_standing
+from controller.checks import (
+    LYING_HEIGHT,
+    base_height,
+    ground_height,
+    is_lying,
+    is_sitting,
+    is_standing,
+)
 from controller.modes import Mode
-from controller.navigation import DriveStraight, Goal, TurnInPlace
+from controller.navigation import Goal
 from controller.procedures import Aborted, Measurements, ProcedureRunner, listed
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
@@ -27,7 +34,7 @@ from go2_wbc.errors import ModeError, StanceMismatch
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionPlanner
-from go2_wbc.reference import MotionPlan, Posture, TrackedPoint
+from go2_wbc.reference import MotionPlan, Posture
 from motions.compiler import CompiledPlan
 from motions.postures import lie_down, rise, sit_down
 
@@ -59,7 +66,7 @@ class Pilot:
         self._goal: Goal | None = None
         self.playing: PlayPlan | None = None
         self._must_return = False
-        self._mode = Mode.LYING if self.is_on_the_ground else Mode.DAMPED
+        self._mode = Mode.LYING if self._is_on_the_ground else Mode.DAMPED
 
     @property
     def mode(self) -> Mode:
@@ -89,35 +96,29 @@ class Pilot:
         mode = self.mode
         if mode is Mode.WALKING:
             self.rest()
-        if mode in (Mode.LYING, Mode.DAMPED) or self.is_on_the_ground:
+        if mode in (Mode.LYING, Mode.DAMPED) or self._is_on_the_ground:
             self._mode = Mode.MOVING
             tuck(self._procedures)
         entry = {Mode.SITTING: Posture.SIT, Mode.LYING: Posture.LIE}.get(mode, Posture.STAND)
         duration = 0.4 if mode in (Mode.STANDING, Mode.WALKING) else 1.2
-        self._take_posture("stand", lambda pose: rise(pose, entry, duration), TrackedPoint.COM)
-        self._procedures.settle("stand", is_standing)
-        self._mode = Mode.STANDING
-        return self._procedures.measurements()
+        self._take_posture(lambda pose: rise(pose, entry, duration))
+        return self._settle(Posture.STAND, "stand")
 
     def sit(self) -> Measurements:
         """Sit like a dog, from any mode but fallen."""
-        if self.mode is Mode.SITTING:
-            self._procedures.settle("sit", is_sitting)
-            return self._procedures.measurements()
-        self._ensure_standing()
-        self._take_posture("sit", sit_down, TrackedPoint.BASE)
-        self._procedures.settle("sit", is_sitting)
-        self._mode = Mode.SITTING
-        return self._procedures.measurements()
+        if self.mode is not Mode.SITTING:
+            self._ensure_standing()
+            self._take_posture(sit_down)
+        return self._settle(Posture.SIT, "sit")
 
     def lie_down(self) -> Measurements:
         """Lie down and go limp."""
-        if self.mode in (Mode.LYING, Mode.DAMPED) or self.is_on_the_ground:
-            return self._go_limp()
-        if self.mode is not Mode.MOVING:  # a stand that failed need not succeed to lie down
-            self._ensure_standing()
-        self._take_posture("lie down", lie_down, TrackedPoint.BASE)
-        return self._go_limp()
+        if self.mode not in (Mode.LYING, Mode.DAMPED) and not self._is_on_the_ground:
+            if self.mode is not Mode.MOVING:  # a stand that failed need not succeed to lie down
+                self._ensure_standing()
+            self._take_posture(lie_down)
+        lie_limp(self._procedures)
+        return self._settle(Posture.LIE, "lie down")
 
     def recover(self) -> Measurements:
         """Get up after a fall onto the belly, a side or the back."""
@@ -128,9 +129,14 @@ class Pilot:
         self._mode = Mode.LYING
         return self.stand()
 
-    def _go_limp(self) -> Measurements:
-        lie_limp(self._procedures)
-        self._mode = Mode.LYING
+    def _take_posture(self, make_plan: Callable[[Float[np.ndarray, "6"]], MotionPlan]) -> None:
+        self._mode = Mode.MOVING
+        self._procedures.run(ChangePosture(make_plan), 5.0)
+
+    def _settle(self, posture: Posture, what: str) -> Measurements:
+        mode, check = _RESTING[posture]
+        self._procedures.settle(what, check)
+        self._mode = mode
         return self._procedures.measurements()
 
     def _ensure_standing(self) -> None:
@@ -216,14 +222,6 @@ class Pilot:
             self._walking.command = ZERO_COMMAND
         return had_goal
 
-    def turn(self, angle: float) -> Measurements:
-        """Turn left by ``angle`` [rad]."""
-        return self.run_goal(TurnInPlace(angle))
-
-    def drive(self, distance: float) -> Measurements:
-        """Walk ``distance`` [m] straight ahead; negative is backward."""
-        return self.run_goal(DriveStraight(distance))
-
     def _start_walking(self, gait: str | Gait) -> Walking:
         self._gait = find_gait(gait)
         walking = Walking(LocomotionPlanner(self._model, self._gait, self._config.locomotion))
@@ -245,7 +243,7 @@ class Pilot:
                 f"{plan.name} was cancelled before it began", self._procedures.measurements()
             )
         self._mode = Mode.MOVING
-        behaviour = PlayPlan(plan, self._model.foot_radius)
+        behaviour = PlayPlan(plan)
         self._procedures.engage(behaviour)
         start, self.playing = self._loop.state.time, behaviour
 
@@ -258,11 +256,10 @@ class Pilot:
             self._procedures.until(finished, plan.duration + 1.0, plan.name)
             if self._must_return:
                 raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
-            self._procedures.settle(plan.name, _CHECK_OF_POSTURE[plan.exit])
+            at_rest = self._settle(plan.exit, plan.name)
         finally:
             self.playing = None
-        self._mode = _MODE_OF_POSTURE[plan.exit]
-        measured = {**self._procedures.measurements(), **behaviour.deviation.measurements()}
+        measured = {**at_rest, **behaviour.deviation.measurements()}
         if not behaviour.deviation.is_small:
             raise Aborted(f"{plan.name} went another way: {listed(measured)}", measured)
         return measured
@@ -274,11 +271,8 @@ class Pilot:
             playing.return_safely()
 
     def _meet_entry(self, plan: MotionPlan) -> None:
-        mode = self.mode
-        if mode is Mode.WALKING and plan.entry is Posture.STAND:
-            self.square_up()
-            mode = self.mode
-        if _MODE_OF_POSTURE[plan.entry] is not mode:
+        mode, (entry, _) = self.mode, _RESTING[plan.entry]
+        if mode is not entry and (mode, entry) != (Mode.WALKING, Mode.STANDING):
             raise StanceMismatch(
                 f"motion {plan.name!r} starts from {plan.entry.value}, the robot is {mode.value}"
             )
@@ -299,7 +293,7 @@ class Pilot:
 
         def watch(t: float) -> None:
             if hold_start <= t <= hold_end:
-                ground = ground_height(loop.snapshot, self._model)
+                ground = ground_height(loop.snapshot)
                 heights.append(float(loop.snapshot.p_world_feet[leg, 2]) - ground)
 
         measured = self.play(plan, watch)
@@ -315,8 +309,7 @@ class Pilot:
 
     def square_up(self) -> None:
         """Stand with the feet below the hips, stepping in place if need be."""
-        if self.mode is not Mode.STANDING:
-            self._ensure_standing()
+        self._ensure_standing()
         walking = self._start_walking("trot")
         loop = self._loop
         with self._runner.lock():  # the planner may be at work in another thread
@@ -344,27 +337,14 @@ class Pilot:
             raise Aborted(fault.reason, self._procedures.measurements())
         return self._procedures.measurements()
 
-    def _take_posture(
-        self,
-        label: str,
-        make_plan: Callable[[np.ndarray], MotionPlan],
-        point: TrackedPoint,
-    ) -> None:
-        behaviour = ChangePosture(label, make_plan, point, self._model.foot_radius)
-        self._mode = Mode.MOVING
-        self._procedures.run(behaviour, 5.0)
-
     @property
-    def is_on_the_ground(self) -> bool:
-        """Whether the trunk is so low that the robot lies."""
-        snapshot = self._loop.snapshot
-        height = float(snapshot.state.q[2]) - ground_height(snapshot, self._model)
-        return math.isfinite(height) and height < LYING_HEIGHT
+    def _is_on_the_ground(self) -> bool:
+        return base_height(self._loop.snapshot) < LYING_HEIGHT
 
 
-_MODE_OF_POSTURE = {
-    Posture.LIE: Mode.LYING,
-    Posture.SIT: Mode.SITTING,
-    Posture.STAND: Mode.STANDING,
+_RESTING = {
+    Posture.LIE: (Mode.LYING, is_lying),
+    Posture.SIT: (Mode.SITTING, is_sitting),
+    Posture.STAND: (Mode.STANDING, is_standing),
 }
-_CHECK_OF_POSTURE = {Posture.LIE: is_lying, Posture.SIT: is_sitting, Posture.STAND: is_standing}
+"""The mode of a robot that rests in a posture, and whether it does."""

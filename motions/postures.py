@@ -33,7 +33,7 @@ SPLAYED_JOINTS = TUCKED_JOINTS + np.tile([0.3, 0.0, 0.0, -0.3, 0.0, 0.0], 2)
 def rise(start: Float[np.ndarray, "6"], entry: Posture, duration: float = 1.2) -> KeyframePlan:
     """From a CoM pose (6,) to standing."""
     return _posture_plan(
-        "rise", entry, Posture.STAND, TrackedPoint.COM, (start, STAND_POSE), duration
+        "stand", entry, Posture.STAND, TrackedPoint.COM, (start, STAND_POSE), duration
     )
 
 

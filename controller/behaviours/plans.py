@@ -11,7 +11,8 @@ from jaxtyping import Float
 from controller.behaviours.base import Behaviour
 from controller.behaviours.safe_return import SafeReturn
 from go2_wbc.planning.correction import SteadyStateCorrection, tracked_position
-from go2_wbc.reference import Anchor, LegTask, MotionPlan, Posture, Reference, TrackedPoint
+from go2_wbc.reference import Anchor, LegTask, MotionPlan, Posture, Reference
+from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.rotations import log_rotation, wrap_angle, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -76,12 +77,11 @@ class PlayPlan(Behaviour):
         deviation: how far the robot has been off the plan.
     """
 
-    def __init__(self, plan: MotionPlan, foot_radius: float) -> None:
-        """Play ``plan``; ``foot_radius`` [m] tells where the ground is."""
+    def __init__(self, plan: MotionPlan) -> None:
+        """Play ``plan``."""
         self.label = plan.name
         self.plan = plan
         self.deviation = Deviation()
-        self._foot_radius = foot_radius
         self._start = self._last = 0.0
         self._anchor = Anchor(np.zeros(3), 0.0)
         self._correction = SteadyStateCorrection()
@@ -94,7 +94,7 @@ class PlayPlan(Behaviour):
         self._must_return, self._return = False, None
         self._correction = SteadyStateCorrection()
         self.deviation = Deviation()
-        self._anchor = Anchor.of_feet(snapshot.p_world_feet, self._foot_radius)
+        self._anchor = Anchor.of_feet(snapshot.p_world_feet, FOOT_RADIUS)
 
     def return_safely(self) -> None:
         """Leave the plan: go to its nearest instant on four loaded feet; any thread may call."""
@@ -131,18 +131,11 @@ class PlayPlan(Behaviour):
 class ChangePosture(PlayPlan):
     """Play a plan that starts from the measured pose of the body."""
 
-    def __init__(
-        self,
-        label: str,
-        make_plan: Callable[[Float[np.ndarray, "6"]], MotionPlan],
-        point: TrackedPoint,
-        foot_radius: float,
-    ) -> None:
-        """Args: make_plan: from the pose (6,) of ``point`` in the feet's frame to the plan."""
-        super().__init__(make_plan(np.zeros(6)), foot_radius)  # until ``start`` has measured
-        self.label = label
+    def __init__(self, make_plan: Callable[[Float[np.ndarray, "6"]], MotionPlan]) -> None:
+        """Args: make_plan: from the pose (6,) of its point in the feet's frame to the plan."""
+        super().__init__(make_plan(np.zeros(6)))  # until ``start`` has measured
         self._make_plan = make_plan
-        self._point = point
+        self._point = self.plan.at(0.0).body.point
 
     def start(self, snapshot: Snapshot) -> None:
         """Make the plan from the measured pose."""

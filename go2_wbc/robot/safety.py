@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_positive
 
@@ -66,9 +67,9 @@ class SafetyConfig:
 class FallDetector:
     """Says whether a robot that balances has fallen; asked once per tick."""
 
-    def __init__(self, config: SafetyConfig, foot_radius: float) -> None:
-        """Judge by ``config``; ``foot_radius`` [m] tells where the ground is."""
-        self._config, self._foot_radius = config, foot_radius
+    def __init__(self, config: SafetyConfig) -> None:
+        """Judge by ``config``."""
+        self._config = config
         self.begin()
 
     def begin(self) -> None:
@@ -94,7 +95,7 @@ class FallDetector:
         low = f"base {100 * height:.0f} cm above the feet"
         if not may_lie and height < config.height_limit:
             return f"{when}: {low}"
-        clearance = trunk_clearance(snapshot, lowest_foot - self._foot_radius)
+        clearance = trunk_clearance(snapshot, lowest_foot - FOOT_RADIUS)
         is_touching = not may_lie and clearance < TOUCH
         if self._lasts("touch", config.touch_limit, state.time, holds=is_touching):
             return f"{when}: trunk on the ground, {low}"

@@ -12,8 +12,6 @@ import pytest
 from controller import GO2Controller, Mode
 from controller.behaviours.plans import ChangePosture
 from controller.procedures import ProcedureRunner
-from go2_wbc.reference import TrackedPoint
-from go2_wbc.robot.model import FOOT_RADIUS
 from motions.postures import lean
 from tests.controller.plants import WatchedPlant
 
@@ -84,9 +82,7 @@ def _trot_ready(go2: GO2Controller) -> None:
 
 
 def _lean(go2: GO2Controller) -> None:
-    posture = ChangePosture(
-        "lean", lambda pose: lean(pose, np.array(LEANING)), TrackedPoint.COM, FOOT_RADIUS
-    )
+    posture = ChangePosture(lambda pose: lean(pose, np.array(LEANING)))
     ProcedureRunner(go2._runner).run(posture, 2.0)
 
 

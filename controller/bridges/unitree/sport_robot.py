@@ -17,8 +17,7 @@ from controller.procedures import ProcedureRunner
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant.base import Plant
-from go2_wbc.reference import MotionPlan, TrackedPoint
-from go2_wbc.robot.model import FOOT_RADIUS
+from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.state import RobotState
 from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
 from motions.postures import lean
@@ -123,12 +122,10 @@ class SportRobot:
         if self.mode is Mode.WALKING:
             self.pilot.square_up()
         target = np.array(rpy)
-        behaviour = ChangePosture(
-            "lean", lambda pose: lean(pose, target, LEAN_TIME), TrackedPoint.COM, FOOT_RADIUS
-        )
         self.is_leaning = True
+        behaviour = ChangePosture(lambda pose: lean(pose, target, LEAN_TIME))
         self._procedures.run(behaviour, LEAN_LIMIT)
-        self._procedures.settle("lean", lambda snapshot, _: self._is_at(target, snapshot.state.rpy))
+        self._procedures.settle("lean", lambda snapshot: self._is_at(target, snapshot.state.rpy))
 
     def _is_at(self, wanted: Float[np.ndarray, "3"], rpy: Float[np.ndarray, "3"]) -> bool:
         return bool(np.abs(rpy[:2] - wanted[:2]).max() < ATTITUDE_TOLERANCE)

@@ -11,7 +11,7 @@ import pytest
 from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.description import BASE_LINK
-from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.safety import TRUNK_UNDERSIDE, FallDetector, SafetyConfig, trunk_clearance
 from go2_wbc.robot.snapshot import Snapshot
 from tests.engine_helpers import standing_q, state_of
@@ -30,7 +30,7 @@ def model() -> RobotModel:
 
 @pytest.fixture
 def falls() -> FallDetector:
-    return FallDetector(SafetyConfig(), FOOT_RADIUS)
+    return FallDetector(SafetyConfig())
 
 
 def standing(model: RobotModel, time: float = 0.0) -> Snapshot:
