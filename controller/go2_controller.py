@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 
 from controller import arguments
 from controller.assembly import PilotSettings, build_pilot
@@ -26,13 +25,7 @@ from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
-from motions import (
-    CompiledPlan,
-    FeasibilityChecker,
-    Playable,
-    compile_timeline,
-    load_motion,
-)
+from motions import CompiledPlan, FeasibilityChecker, Playable, compile_timeline, load_motion
 from motions.library.high_five import HEIGHT as HIGH_FIVE_HEIGHT
 
 _log = logging.getLogger(__name__)
@@ -84,7 +77,7 @@ class GO2Controller:
         """
         self._namespace = arguments.namespace(namespace)
         viewer = arguments.checked("viewer", viewer, bool, "True or False")
-        self._config = arguments.config(config)
+        config = arguments.config(config)
         plant = arguments.checked("plant", plant, Plant | None, "a Plant")
         realtime = arguments.pace(realtime, plant)
         urdf = arguments.checked("urdf", urdf, Path | str | None, "a path")
@@ -95,7 +88,7 @@ class GO2Controller:
                 plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer)
                 opened.callback(plant.close)
             self._plant = plant
-            self._assembly = build_pilot(plant, self._config, settings)
+            self._assembly = build_pilot(plant, config, settings)
             opened.callback(self._assembly.close)
             self._resources = opened.pop_all()
         self._runner, self._pilot = self._assembly.runner, self._assembly.pilot
@@ -323,12 +316,7 @@ class GO2Controller:
     def __enter__(self) -> GO2Controller:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     # --- how calls are made ---------------------------------------------------------------
@@ -339,44 +327,33 @@ class GO2Controller:
         self._check_open()
         if self._pilot.mode is Mode.FALLEN and not allow_fallen:
             raise ModeError(f"{name}() needs a robot that has not fallen: call recover() first")
-        with self._occupied(name):
-            self._pilot.begin()
-            start = self.state.time
-            try:
-                measured = procedure()
-                ok, reason = True, "done"
-            except Aborted as aborted:
-                measured, ok, reason = aborted.measured, False, str(aborted)
-            except Go2WbcError as error:
-                self._note(False, str(error), start)
-                raise
-            except BaseException as error:
-                reason = _interruption(name, error)
-                self._pilot.collapse(reason)
-                self._note(False, f"{reason}, damped", start)
-                raise
-            self._note(ok, reason, start, measured)
-        return ok
-
-    def _note(
-        self, ok: bool, reason: str, start: float, measured: Measurements | None = None
-    ) -> None:
-        duration = self.state.time - start
-        self._last_outcome = Outcome(ok, reason, duration, dict(measured or {}))
-        fault = self._runner.loop.fault
-        is_known = fault is not None and fault.reason in reason  # the loop has logged it
-        if not (ok or is_known):
-            _log.warning("%s", reason)
-
-    @contextmanager
-    def _occupied(self, name: str) -> Iterator[None]:
         if not self._busy.acquire(blocking=False):
             raise ModeError(f"{name}() while {self._busy_with}() is still running")
-        self._busy_with = name
+        self._busy_with, start = name, self.state.time
+        ok, reason = False, ""
+        measured: Measurements = {}
         try:
-            yield
+            self._pilot.begin()
+            measured = procedure()
+            ok, reason = True, "done"
+        except Aborted as aborted:
+            reason, measured = str(aborted), aborted.measured
+        except Go2WbcError as error:
+            reason = str(error)
+            raise
+        except BaseException as error:
+            reason = _interruption(name, error)
+            self._pilot.collapse(reason)
+            reason = f"{reason}, damped"
+            raise
         finally:
+            self._last_outcome = Outcome(ok, reason, self.state.time - start, dict(measured))
+            fault = self._runner.loop.fault
+            is_known = fault is not None and fault.reason in reason  # the loop has logged it
+            if not (ok or is_known):
+                _log.warning("%s", reason)
             self._busy.release()
+        return ok
 
     def _check_open(self) -> None:
         if self._closed:
