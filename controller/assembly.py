@@ -42,23 +42,17 @@ class PilotSettings:
 
 @dataclass(frozen=True, slots=True)
 class Assembly:
-    """A pilot and what it is made of; ``close`` it in the end.
-
-    The loop's robot model belongs to the thread that ticks: it is not here, and whoever plans makes
-    a ``RobotModel`` from ``description``.
+    """A pilot and its runner; ``close`` them in the end.
 
     Attributes:
         pilot: runs procedures.
-        runner: lets time pass; ``runner.loop`` has the newest state.
-        telemetry: what the loop records.
-        description: of the robot that the loop controls.
+        runner: lets time pass; ``runner.loop`` has the newest state and the telemetry. Its robot
+            model belongs to the thread that ticks: whoever plans needs another one.
         close: go limp, stop and close the window; the plant stays open. Idempotent.
     """
 
     pilot: Pilot
     runner: Runner
-    telemetry: Telemetry
-    description: RobotDescription
     close: Callable[[], None]
 
 
@@ -96,4 +90,4 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
         runner = Runner(loop, realtime=settings.realtime, after_tick=after_tick)
         opened.callback(runner.close)
         pilot = Pilot(runner, config)
-        return Assembly(pilot, runner, telemetry, model.description, opened.pop_all().close)
+        return Assembly(pilot, runner, opened.pop_all().close)

@@ -88,10 +88,10 @@ class GO2Controller:
                 plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer)
                 opened.callback(plant.close)
             self._plant = plant
-            self._assembly = build_pilot(plant, config, settings)
-            opened.callback(self._assembly.close)
+            built = build_pilot(plant, config, settings)
+            opened.callback(built.close)
             self._resources = opened.pop_all()
-        self._runner, self._pilot = self._assembly.runner, self._assembly.pilot
+        self._runner, self._pilot, self._description = built.runner, built.pilot, description
         self._closed = False
         self._busy = threading.Lock()
         self._busy_with = ""
@@ -247,7 +247,7 @@ class GO2Controller:
     @cached_property
     def _checker(self) -> FeasibilityChecker:
         """Plans on a model of its own: the control loop's belongs to the thread that ticks."""
-        return FeasibilityChecker(RobotModel(self._assembly.description))
+        return FeasibilityChecker(RobotModel(self._description))
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
@@ -292,12 +292,12 @@ class GO2Controller:
     @property
     def telemetry(self) -> Telemetry:
         """Peaks and counts of the run so far."""
-        return self._assembly.telemetry
+        return self._runner.loop.telemetry
 
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""
         with self._runner.lock():
-            samples = self._assembly.telemetry.samples(rate)
+            samples = self.telemetry.samples(rate)
         return samples.recording()
 
     # --- ending ---------------------------------------------------------------------------

@@ -33,7 +33,6 @@ from go2_wbc.contacts import Gait, find_gait
 from go2_wbc.errors import ModeError, StanceMismatch
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.locomotion import LocomotionPlanner
 from go2_wbc.reference import MotionPlan, Posture
 from motions.compiler import CompiledPlan
 from motions.postures import lie_down, rise, sit_down
@@ -61,8 +60,7 @@ class Pilot:
         self._model = runner.loop.model
         self._config = config
         self._procedures = ProcedureRunner(runner)
-        self._walking: Walking | None = None
-        self._gait: Gait | None = None
+        self._walking = self._make_walking("trot")
         self._goal: Goal | None = None
         self.playing: PlayPlan | None = None
         self._must_return = False
@@ -79,9 +77,7 @@ class Pilot:
     @property
     def command(self) -> VelocityCommand:
         """The velocity command that is being followed."""
-        if self._walking is None or self.mode is not Mode.WALKING:
-            return ZERO_COMMAND
-        return self._walking.command
+        return self._walking.command if self.mode is Mode.WALKING else ZERO_COMMAND
 
     def begin(self) -> None:
         """Begin a procedure: the mode is from now on what the last fault, if any, has made it."""
@@ -151,7 +147,7 @@ class Pilot:
         if self.mode is not Mode.WALKING:
             self._ensure_standing()
             self._start_walking(wanted)
-        elif wanted != self._gait:
+        elif wanted != self._walking.gait:
             self.rest()
             self._start_walking(wanted)
         self.wait(READY_TIME)
@@ -166,20 +162,16 @@ class Pilot:
         """
         if self._goal is not None:
             raise ModeError(f"move() during a goal ({self._goal.name}): end it by stop()")
-        if self.mode is not Mode.WALKING or self._walking is None:
+        if self.mode is not Mode.WALKING:
             raise ModeError(f"move() needs walking mode, not {self.mode.value}: call walk() first")
         self._walking.command = self._config.envelope.clip(command)
         return self._walking.command
 
     def rest(self) -> Measurements:
         """Zero the command and let the walking robot come to rest."""
-        walking = self._walking
-        if self.mode is Mode.WALKING and walking is not None:
-            walking.command = ZERO_COMMAND
-            loop = self._loop
-            self._procedures.until(
-                lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "come to rest"
-            )
+        if self.mode is Mode.WALKING:
+            self._walking.command = ZERO_COMMAND
+            self._finish_steps("come to rest")
         return self._procedures.measurements()
 
     def run_goal(self, goal: Goal) -> Measurements:
@@ -189,12 +181,11 @@ class Pilot:
             if self.mode is not Mode.WALKING:
                 self.walk("trot")
             self.rest()
-            walking = self._walking or self._start_walking("trot")
 
             def is_over() -> bool:
                 if self._goal is None:
                     return True
-                walking.command = self._config.envelope.clip(goal.command(loop.state))
+                self._walking.command = self._config.envelope.clip(goal.command(loop.state))
                 return goal.is_done(loop.state)
 
             goal.begin(loop.state)
@@ -202,9 +193,7 @@ class Pilot:
             self.rest()
             was_halted = self._goal is None
         finally:
-            self._goal = None
-            if self._walking is not None:
-                self._walking.command = ZERO_COMMAND
+            self.halt()
         measured = goal.measurements(loop.state)
         if was_halted:
             raise Aborted(f"{goal.name} ended by stop()", measured)
@@ -218,16 +207,20 @@ class Pilot:
         The goal's own call then brings the robot to rest.
         """
         had_goal, self._goal = self._goal is not None, None
-        if self._walking is not None:
-            self._walking.command = ZERO_COMMAND
+        self._walking.command = ZERO_COMMAND
         return had_goal
 
-    def _start_walking(self, gait: str | Gait) -> Walking:
-        self._gait = find_gait(gait)
-        walking = Walking(LocomotionPlanner(self._model, self._gait, self._config.locomotion))
+    def _make_walking(self, gait: str | Gait) -> Walking:
+        return Walking(self._model, find_gait(gait), self._config.locomotion)
+
+    def _start_walking(self, gait: str | Gait) -> None:
+        walking = self._make_walking(gait)
         self._procedures.engage(walking)
         self._walking = walking
-        return walking
+
+    def _finish_steps(self, what: str) -> None:
+        walking, loop = self._walking, self._loop
+        self._procedures.until(lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, what)
 
     # --- motions --------------------------------------------------------------------------
 
@@ -310,15 +303,12 @@ class Pilot:
     def square_up(self) -> None:
         """Stand with the feet below the hips, stepping in place if need be."""
         self._ensure_standing()
-        walking = self._start_walking("trot")
-        loop = self._loop
+        self._start_walking("trot")
         with self._runner.lock():  # the planner may be at work in another thread
-            is_square = walking.square_up(loop.snapshot)
+            is_square = self._walking.square_up(self._loop.snapshot)
         if not is_square:
             self._mode = Mode.WALKING
-            self._procedures.until(
-                lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "square the feet"
-            )
+            self._finish_steps("square the feet")
             self._mode = Mode.STANDING
         self.stand()
 

@@ -224,7 +224,9 @@ class Runner:
                     self._failure = error
                     return
                 finally:
-                    self._announce()
+                    with self._changed:
+                        self._ticks += 1
+                        self._changed.notify_all()
             lag = pacer.wait()
             if lag:
                 _log.warning("the loop is %.0f ms behind the wall clock", 1000 * lag)
@@ -242,8 +244,3 @@ class Runner:
             self._thread.join(HANG_LIMIT)
             if self._thread.is_alive():
                 _log.warning("%s; left behind", self._hanging())
-
-    def _announce(self) -> None:
-        with self._changed:
-            self._ticks += 1
-            self._changed.notify_all()

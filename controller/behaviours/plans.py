@@ -79,7 +79,7 @@ class PlayPlan(Behaviour):
 
     def __init__(self, plan: MotionPlan) -> None:
         """Play ``plan``."""
-        self.label = plan.name
+        self.label, self.duration = plan.name, plan.duration
         self.plan = plan
         self.deviation = Deviation()
         self._start = self._last = 0.0
@@ -90,7 +90,8 @@ class PlayPlan(Behaviour):
 
     def start(self, snapshot: Snapshot) -> None:
         """Anchor the plan at the feet."""
-        self._start = self._last = snapshot.state.time
+        super().start(snapshot)
+        self._last = self._start
         self._must_return, self._return = False, None
         self._correction = SteadyStateCorrection()
         self.deviation = Deviation()
@@ -125,7 +126,7 @@ class PlayPlan(Behaviour):
         """Whether the plan is over, or the way back from it."""
         if self._return is not None:
             return self._return.is_over
-        return snapshot.state.time - self._start >= self.plan.duration
+        return super().is_finished(snapshot)
 
 
 class ChangePosture(PlayPlan):
@@ -146,6 +147,7 @@ class ChangePosture(PlayPlan):
         position = yaw_rotation(anchor.yaw).T @ (p - anchor.p_world)
         pose = np.array([*position, roll, pitch, wrap_angle(float(yaw) - anchor.yaw)])
         self.plan = self._make_plan(pose)
+        self.duration = self.plan.duration
         self.may_lie = bool(pose[2] < LOW) or self.plan.exit is Posture.LIE
 
     def update(self, snapshot: Snapshot) -> Reference:
