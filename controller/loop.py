@@ -159,12 +159,10 @@ class ControlLoop:
             return
         may_lie = self.behaviour.may_lie
         reason = self._falls.reason(self.snapshot, self._sag, self._lean, may_lie=may_lie)
-        if reason is None:
+        if reason is None or (fault is not None and fault.is_fall):
             return
-        if fault is None:
-            self.abandon(Fault(reason, is_fall=True))
-        elif not fault.is_fall:
-            self.abandon(Fault(f"{reason}, after: {fault.reason}", is_fall=True))
+        told = reason if fault is None else f"{reason}, after: {fault.reason}"
+        self.abandon(Fault(told, is_fall=True))
 
     def _command(self, target: Reference | JointReference) -> JointCommand:
         if isinstance(target, JointReference):

@@ -174,9 +174,8 @@ class Runner:
         seen = self._ticks
         while True:
             with self._changed:
-                news = self._changed.wait_for(lambda seen=seen: self._has_news(seen), HANG_LIMIT)
-            if not news:
-                raise self._hanging()
+                if not self._changed.wait_for(lambda seen=seen: self._has_news(seen), HANG_LIMIT):
+                    raise self._hanging()
             with self.lock():
                 self._obey()
                 if self._failure is not None:

@@ -83,7 +83,6 @@ class PlayPlan(Behaviour):
         self.plan = plan
         self.deviation = Deviation()
         self._start = self._last = 0.0
-        self._anchor = Anchor(np.zeros(3), 0.0)
         self._correction = SteadyStateCorrection()
         self._must_return = False
         self._return: SafeReturn | None = None
@@ -92,9 +91,6 @@ class PlayPlan(Behaviour):
         """Anchor the plan at the feet."""
         super().start(snapshot)
         self._last = self._start
-        self._must_return, self._return = False, None
-        self._correction = SteadyStateCorrection()
-        self.deviation = Deviation()
         self._anchor = Anchor.of_feet(snapshot.p_world_feet, FOOT_RADIUS)
 
     def return_safely(self) -> None:
