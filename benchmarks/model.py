@@ -125,7 +125,7 @@ def measure_solutions(trial: Trial) -> Measurement:
                 _exercise(robot.pilot, plant)
             except Aborted as aborted:
                 raise TrialFailed(f"driven by {driver}: {aborted}") from aborted
-            worst["wbc.failures"] += robot.telemetry.qp_failures
+            worst["wbc.failures"] += loop.telemetry.qp_failures
     return Measurement(worst)
 
 

@@ -2,54 +2,29 @@
 
 from __future__ import annotations
 
-import math
 import re
-from numbers import Real
 from pathlib import Path
+from types import UnionType
+from typing import TypeVar
 
 from go2_wbc.config import Config, load_config
-from go2_wbc.errors import CommandError, ConfigError
+from go2_wbc.errors import ConfigError, Go2WbcError
 from go2_wbc.plant.base import Plant
 
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+_Value = TypeVar("_Value")
 
 
-def finite(name: str, value: float) -> float:
-    """``value`` as a float.
-
-    Raises:
-        CommandError: if it is not a finite number.
-    """
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise CommandError(f"{name} must be a number, got {value!r}")
-    try:
-        number = float(value)
-    except OverflowError:  # an integer beyond every float
-        number = math.inf
-    if not math.isfinite(number):
-        raise CommandError(f"{name} must be finite, got {value}")
-    return number
-
-
-def word(name: str, value: str) -> str:
-    """``value``.
-
-    Raises:
-        CommandError: if it is not a string.
-    """
-    if not isinstance(value, str):
-        raise CommandError(f"{name} must be a string, got {value!r}")
-    return value
-
-
-def flag(name: str, value: bool) -> bool:
-    """``value``.
-
-    Raises:
-        ConfigError: if it is neither True nor False.
-    """
-    if not isinstance(value, bool):
-        raise ConfigError(f"{name} must be True or False, got {value!r}")
+def checked(
+    name: str,
+    value: _Value,
+    kinds: type | UnionType,
+    what: str,
+    error: type[Go2WbcError] = ConfigError,
+) -> _Value:
+    """``value``, if it is one of ``kinds``; else raise ``error``: it must be ``what``."""
+    if not isinstance(value, kinds):
+        raise error(f"{name} must be {what}, got {value!r}")
     return value
 
 
@@ -59,7 +34,11 @@ def pace(realtime: bool, plant: Plant | None) -> bool:
     Raises:
         ConfigError: if it is neither True nor False, or False though ``plant`` needs it.
     """
-    if not flag("realtime", realtime) and plant is not None and plant.is_live:
+    if (
+        not checked("realtime", realtime, bool, "True or False")
+        and plant is not None
+        and plant.is_live
+    ):
         raise ConfigError(
             f"{type(plant).__name__} must get commands without a break: give "
             "GO2Controller(plant=..., realtime=True)"
@@ -68,11 +47,7 @@ def pace(realtime: bool, plant: Plant | None) -> bool:
 
 
 def namespace(value: str) -> str:
-    """``value``.
-
-    Raises:
-        ConfigError: if it is not a name.
-    """
+    """``value``; raise ConfigError if it is not a name."""
     if not isinstance(value, str) or not NAMESPACE.match(value):
         raise ConfigError(
             f"namespace must be letters, digits and underscores, a letter first; got {value!r}"
@@ -90,28 +65,5 @@ def config(value: Config | Path | str | None) -> Config:
         return Config()
     if isinstance(value, Config):
         return value
-    if not isinstance(value, Path | str):
-        raise ConfigError(f"config must be a Config or the path of a TOML file, got {value!r}")
-    return load_config(value)
-
-
-def path_or_none(name: str, value: Path | str | None) -> Path | None:
-    """``value`` as a path.
-
-    Raises:
-        ConfigError: if it is none.
-    """
-    if value is not None and not isinstance(value, Path | str):
-        raise ConfigError(f"{name} must be a path, got {value!r}")
-    return None if value is None else Path(value)
-
-
-def plant_or_none(value: Plant | None) -> Plant | None:
-    """``value``.
-
-    Raises:
-        ConfigError: if it is neither a plant nor None.
-    """
-    if value is not None and not isinstance(value, Plant):
-        raise ConfigError(f"plant must be a Plant, got {value!r}")
-    return value
+    what = "a Config or the path of a TOML file"
+    return load_config(checked("config", value, Path | str, what))

@@ -12,7 +12,7 @@ from controller.runner import Runner
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.plant.base import Plant
-from go2_wbc.plant.mujoco.viewer import PlantViewer, open_viewer
+from go2_wbc.plant.mujoco.viewer import open_viewer
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.controller import WholeBodyController
@@ -42,30 +42,18 @@ class PilotSettings:
 
 @dataclass(frozen=True, slots=True)
 class Assembly:
-    """A pilot and what it is made of; ``close`` it in the end.
-
-    The loop's robot model belongs to the thread that ticks: it is not here, and whoever plans makes
-    a ``RobotModel`` from ``description``.
+    """A pilot and its runner; ``close`` them in the end.
 
     Attributes:
         pilot: runs procedures.
-        runner: lets time pass; ``runner.loop`` has the newest state.
-        telemetry: what the loop records.
-        description: of the robot that the loop controls.
-        viewer: the open window, or None.
+        runner: lets time pass; ``runner.loop`` has the newest state and the telemetry. Its robot
+            model belongs to the thread that ticks: whoever plans needs another one.
+        close: go limp, stop and close the window; the plant stays open. Idempotent.
     """
 
     pilot: Pilot
     runner: Runner
-    telemetry: Telemetry
-    description: RobotDescription
-    viewer: PlantViewer | None
-
-    def close(self) -> None:
-        """Go limp, stop and close the window; the plant stays open. Idempotent."""
-        self.runner.close()
-        if self.viewer is not None:
-            self.viewer.close()
+    close: Callable[[], None]
 
 
 def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = None) -> Assembly:
@@ -89,22 +77,17 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
     wbc = WholeBodyController(model, config.backend, config.wbc)
     telemetry = Telemetry(model, max(1, round(settings.recorded_time / plant.control_period)))
     loop = ControlLoop(plant, model, wbc, telemetry, config.safety)
-    with ExitStack() as undo:
+    with ExitStack() as opened:
         viewer = open_viewer(plant) if settings.viewer else None
-        after_tick = settings.after_tick
         if viewer is not None:
-            undo.callback(viewer.close)
-            after_tick = _in_turn(lambda: viewer.show(loop.state.time), settings.after_tick)
+            opened.callback(viewer.close)
+
+        def after_tick() -> None:
+            if viewer is not None:
+                viewer.show(loop.state.time)
+            settings.after_tick()
+
         runner = Runner(loop, realtime=settings.realtime, after_tick=after_tick)
-        undo.callback(runner.close)
+        opened.callback(runner.close)
         pilot = Pilot(runner, config)
-        undo.pop_all()
-    return Assembly(pilot, runner, telemetry, model.description, viewer)
-
-
-def _in_turn(first: Callable[[], None], then: Callable[[], None]) -> Callable[[], None]:
-    def both() -> None:
-        first()
-        then()
-
-    return both
+        return Assembly(pilot, runner, opened.pop_all().close)

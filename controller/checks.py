@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
 from motions.postures import SIT_POSE, STAND_HEIGHT, TUCKED_JOINTS
 
@@ -31,9 +31,19 @@ def unfolded_legs(snapshot: Snapshot) -> list[Leg]:
     return [leg for leg in LEGS if off[leg.joints].max() > FOLD_TOLERANCE]
 
 
-def ground_height(snapshot: Snapshot, model: RobotModel) -> float:
+def ground_height(snapshot: Snapshot) -> float:
     """Height [m] of the ground below the lowest foot."""
-    return float(snapshot.p_world_feet[:, 2].min()) - model.foot_radius
+    return float(snapshot.p_world_feet[:, 2].min()) - FOOT_RADIUS
+
+
+def base_height(snapshot: Snapshot) -> float:
+    """Height [m] of the base above the ground."""
+    return float(snapshot.state.q[2]) - ground_height(snapshot)
+
+
+def com_height(snapshot: Snapshot) -> float:
+    """Height [m] of the centre of mass above the ground."""
+    return float(snapshot.p_world_com[2]) - ground_height(snapshot)
 
 
 def is_still(snapshot: Snapshot) -> bool:
@@ -42,47 +52,41 @@ def is_still(snapshot: Snapshot) -> bool:
     return bool(np.abs(v[:3]).max() < STILL_SPEED and np.abs(v[6:]).max() < STILL_JOINTS)
 
 
-def is_standing(snapshot: Snapshot, model: RobotModel) -> bool:
+def _is_on_its_feet(snapshot: Snapshot, height_error: float, pitch: float) -> bool:
+    roll, measured_pitch, _ = snapshot.state.rpy
+    return bool(
+        snapshot.state.feet_in_contact.all()
+        and abs(height_error) < HEIGHT_TOLERANCE
+        and max(abs(roll), abs(measured_pitch - pitch)) < ANGLE_TOLERANCE
+        and is_still(snapshot)
+    )
+
+
+def is_standing(snapshot: Snapshot) -> bool:
     """Whether the robot stands still on four feet, level, at the standing height."""
-    roll, pitch, _ = snapshot.state.rpy
-    height = snapshot.p_world_com[2] - ground_height(snapshot, model)
-    return bool(
-        snapshot.state.feet_in_contact.all()
-        and abs(height - STAND_HEIGHT) < HEIGHT_TOLERANCE
-        and max(abs(roll), abs(pitch)) < ANGLE_TOLERANCE
-        and is_still(snapshot)
-    )
+    return _is_on_its_feet(snapshot, com_height(snapshot) - STAND_HEIGHT, 0.0)
 
 
-def is_sitting(snapshot: Snapshot, model: RobotModel) -> bool:
+def is_sitting(snapshot: Snapshot) -> bool:
     """Whether the robot sits still: rump down, trunk up, four feet on the ground."""
-    roll, pitch, _ = snapshot.state.rpy
-    height = snapshot.state.q[2] - ground_height(snapshot, model)
-    return bool(
-        snapshot.state.feet_in_contact.all()
-        and abs(height - SIT_POSE[2]) < HEIGHT_TOLERANCE
-        and abs(pitch - SIT_POSE[4]) < ANGLE_TOLERANCE
-        and abs(roll) < ANGLE_TOLERANCE
-        and is_still(snapshot)
-    )
+    return _is_on_its_feet(snapshot, base_height(snapshot) - SIT_POSE[2], SIT_POSE[4])
 
 
-def is_lying(snapshot: Snapshot, model: RobotModel) -> bool:
+def is_lying(snapshot: Snapshot) -> bool:
     """Whether the robot lies still on its belly."""
-    height = snapshot.state.q[2] - ground_height(snapshot, model)
-    return bool(height < BELLY_HEIGHT and snapshot.state.tilt < 0.5 and is_still(snapshot))
+    is_down = base_height(snapshot) < BELLY_HEIGHT
+    return bool(is_down and snapshot.state.tilt < 0.5 and is_still(snapshot))
 
 
-def posture_measurements(snapshot: Snapshot, model: RobotModel) -> dict[str, float]:
+def posture_measurements(snapshot: Snapshot) -> dict[str, float]:
     """The measured quantities behind the verdicts above, by name with unit."""
-    roll, pitch, yaw = np.degrees(snapshot.state.rpy)
-    ground = ground_height(snapshot, model)
+    roll, pitch, yaw = np.degrees(snapshot.state.rpy).tolist()
     return {
-        "base height [m]": float(snapshot.state.q[2]) - ground,
-        "CoM height [m]": float(snapshot.p_world_com[2]) - ground,
-        "roll [deg]": float(roll),
-        "pitch [deg]": float(pitch),
-        "yaw [deg]": float(yaw),
+        "base height [m]": base_height(snapshot),
+        "CoM height [m]": com_height(snapshot),
+        "roll [deg]": roll,
+        "pitch [deg]": pitch,
+        "yaw [deg]": yaw,
         "feet in contact": float(snapshot.state.feet_in_contact.sum()),
         "base speed [m/s]": float(np.linalg.norm(snapshot.state.v[:3])),
     }

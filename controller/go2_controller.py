@@ -4,34 +4,28 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable
+from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
-from types import TracebackType
 
 from controller import arguments
 from controller.assembly import PilotSettings, build_pilot
 from controller.modes import Mode, Outcome
+from controller.navigation import DriveStraight, TurnInPlace
 from controller.procedures import Aborted, Measurements
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError
 from go2_wbc.legs import front_leg
-from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
-from motions import (
-    CompiledPlan,
-    FeasibilityChecker,
-    Playable,
-    compile_timeline,
-    load_motion,
-)
+from motions import CompiledPlan, FeasibilityChecker, Playable, compile_timeline, load_motion
 from motions.library.high_five import HEIGHT as HIGH_FIVE_HEIGHT
 
 _log = logging.getLogger(__name__)
@@ -84,11 +78,12 @@ class GO2Controller:
             PlantError: if the plant does not answer.
         """
         self._namespace = arguments.namespace(namespace)
-        viewer = arguments.flag("viewer", viewer)
-        self._config = arguments.config(config)
-        plant = arguments.plant_or_none(plant)
+        viewer = arguments.checked("viewer", viewer, bool, "True or False")
+        config = arguments.config(config)
+        plant = arguments.checked("plant", plant, Plant | None, "a Plant")
         realtime = arguments.pace(realtime, plant)
-        description = find_description(arguments.path_or_none("urdf", urdf))
+        urdf = arguments.checked("urdf", urdf, Path | str | None, "a path")
+        description = find_description(None if urdf is None else Path(urdf))
         settings = PilotSettings(
             realtime=realtime, viewer=viewer, description=description, after_tick=after_tick
         )
@@ -97,10 +92,10 @@ class GO2Controller:
                 plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer)
                 opened.callback(plant.close)
             self._plant = plant
-            self._assembly = build_pilot(plant, self._config, settings)
-            opened.callback(self._assembly.close)
+            built = build_pilot(plant, config, settings)
+            opened.callback(built.close)
             self._resources = opened.pop_all()
-        self._runner, self._pilot = self._assembly.runner, self._assembly.pilot
+        self._runner, self._pilot, self._description = built.runner, built.pilot, description
         self._closed = False
         self._busy = threading.Lock()
         self._busy_with = ""
@@ -141,7 +136,7 @@ class GO2Controller:
         Raises:
             CommandError: for an unknown gait; lists the valid ones.
         """
-        gait = gait if isinstance(gait, Gait) else arguments.word("gait", gait)
+        gait = arguments.checked("gait", gait, Gait | str, "a Gait or its name", CommandError)
         return self._call("walk", lambda: self._pilot.walk(gait))
 
     def move(self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0) -> None:
@@ -180,21 +175,21 @@ class GO2Controller:
 
         Ends at rest in walking mode.
         """
-        angle = arguments.finite("angle", angle)
-        return self._call("turn_left", lambda: self._pilot.turn(angle))
+        angle = finite_number("angle", angle)
+        return self._call("turn_left", lambda: self._pilot.run_goal(TurnInPlace(angle)))
 
     def turn_right(self, angle: float) -> bool:
         """Turn right in place by ``angle`` [rad], measured on the heading."""
-        angle = arguments.finite("angle", angle)
-        return self._call("turn_right", lambda: self._pilot.turn(-angle))
+        angle = finite_number("angle", angle)
+        return self._call("turn_right", lambda: self._pilot.run_goal(TurnInPlace(-angle)))
 
     def move_forward(self, distance: float) -> bool:
         """Walk ``distance`` [m] straight ahead, measured; negative is backward.
 
         Ends at rest in walking mode.
         """
-        distance = arguments.finite("distance", distance)
-        return self._call("move_forward", lambda: self._pilot.drive(distance))
+        distance = finite_number("distance", distance)
+        return self._call("move_forward", lambda: self._pilot.run_goal(DriveStraight(distance)))
 
     # --- motions --------------------------------------------------------------------------
 
@@ -212,7 +207,8 @@ class GO2Controller:
         Raises:
             CommandError: for another side or time.
         """
-        leg, hold = front_leg(arguments.word("side", side)), arguments.finite("hold", hold)
+        leg = front_leg(arguments.checked("side", side, str, "a string", CommandError))
+        hold = finite_number("hold", hold)
         if not 0.5 <= hold <= 30.0:
             raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
         if plan is None:
@@ -255,12 +251,12 @@ class GO2Controller:
     @cached_property
     def _checker(self) -> FeasibilityChecker:
         """Plans on a model of its own: the control loop's belongs to the thread that ticks."""
-        return FeasibilityChecker(RobotModel(self._assembly.description))
+        return FeasibilityChecker(RobotModel(self._description))
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
         self._check_open()
-        seconds = arguments.finite("seconds", seconds)
+        seconds = finite_number("seconds", seconds)
         if seconds < 0:
             raise CommandError(f"seconds must not be negative, got {seconds}")
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
@@ -300,12 +296,12 @@ class GO2Controller:
     @property
     def telemetry(self) -> Telemetry:
         """Peaks and counts of the run so far."""
-        return self._assembly.telemetry
+        return self._runner.loop.telemetry
 
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""
         with self._runner.lock():
-            samples = self._assembly.telemetry.samples(rate)
+            samples = self.telemetry.samples(rate)
         return samples.recording()
 
     # --- ending ---------------------------------------------------------------------------
@@ -324,12 +320,7 @@ class GO2Controller:
     def __enter__(self) -> GO2Controller:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     # --- how calls are made ---------------------------------------------------------------
@@ -340,44 +331,33 @@ class GO2Controller:
         self._check_open()
         if self._pilot.mode is Mode.FALLEN and not allow_fallen:
             raise ModeError(f"{name}() needs a robot that has not fallen: call recover() first")
-        with self._occupied(name):
-            self._pilot.begin()
-            start = self.state.time
-            try:
-                measured = procedure()
-                ok, reason = True, "done"
-            except Aborted as aborted:
-                measured, ok, reason = aborted.measured, False, str(aborted)
-            except Go2WbcError as error:
-                self._note(False, str(error), start)
-                raise
-            except BaseException as error:
-                reason = _interruption(name, error)
-                self._pilot.collapse(reason)
-                self._note(False, f"{reason}, damped", start)
-                raise
-            self._note(ok, reason, start, measured)
-        return ok
-
-    def _note(
-        self, ok: bool, reason: str, start: float, measured: Measurements | None = None
-    ) -> None:
-        duration = self.state.time - start
-        self._last_outcome = Outcome(ok, reason, duration, dict(measured or {}))
-        fault = self._runner.loop.fault
-        is_known = fault is not None and fault.reason in reason  # the loop has logged it
-        if not (ok or is_known):
-            _log.warning("%s", reason)
-
-    @contextmanager
-    def _occupied(self, name: str) -> Iterator[None]:
         if not self._busy.acquire(blocking=False):
             raise ModeError(f"{name}() while {self._busy_with}() is still running")
-        self._busy_with = name
+        self._busy_with, start = name, self.state.time
+        ok, reason = False, ""
+        measured: Measurements = {}
         try:
-            yield
+            self._pilot.begin()
+            measured = procedure()
+            ok, reason = True, "done"
+        except Aborted as aborted:
+            reason, measured = str(aborted), aborted.measured
+        except Go2WbcError as error:
+            reason = str(error)
+            raise
+        except BaseException as error:
+            reason = _interruption(name, error)
+            self._pilot.collapse(reason)
+            reason = f"{reason}, damped"
+            raise
         finally:
+            self._last_outcome = Outcome(ok, reason, self.state.time - start, dict(measured))
+            fault = self._runner.loop.fault
+            is_known = fault is not None and fault.reason in reason  # the loop has logged it
+            if not (ok or is_known):
+                _log.warning("%s", reason)
             self._busy.release()
+        return ok
 
     def _check_open(self) -> None:
         if self._closed:

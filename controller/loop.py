@@ -72,8 +72,8 @@ class ControlLoop:
         """
         self.plant, self.model, self.wbc, self.telemetry = plant, model, wbc, telemetry
         self._safety = safety
-        self._falls = FallDetector(safety, model.foot_radius)
-        self._sag = 0.0
+        self._falls = FallDetector(safety)
+        self._sag = self._lean = 0.0
         self.fault: Fault | None = None
         self.state: RobotState = plant.read()
         if not _is_finite(self.state):
@@ -100,7 +100,7 @@ class ControlLoop:
         self.fault = None
         self._qp_failures_in_a_row = 0
         self._falls.begin()
-        self._sag = 0.0
+        self._sag = self._lean = 0.0
         behaviour.start(self.snapshot)
         self.behaviour = behaviour
 
@@ -127,7 +127,7 @@ class ControlLoop:
             self._observe()
             self._guard()
             target = self.behaviour.update(self.snapshot)
-            self._sag = _sag(target, self.snapshot)
+            self._sag, self._lean = _sag_and_lean(target, self.snapshot)
             command = self._command(target)
             self._last_command = command
             self.plant.write(command)
@@ -157,13 +157,12 @@ class ControlLoop:
         is_tipping = fault is not None and self.state.tilt > self._safety.tilt_limit
         if not (self.behaviour.needs_balance or is_tipping):
             return
-        reason = self._falls.reason(self.snapshot, self._sag, may_lie=self.behaviour.may_lie)
-        if reason is None:
+        may_lie = self.behaviour.may_lie
+        reason = self._falls.reason(self.snapshot, self._sag, self._lean, may_lie=may_lie)
+        if reason is None or (fault is not None and fault.is_fall):
             return
-        if fault is None:
-            self.abandon(Fault(reason, is_fall=True))
-        elif not fault.is_fall:
-            self.abandon(Fault(f"{reason}, after: {fault.reason}", is_fall=True))
+        told = reason if fault is None else f"{reason}, after: {fault.reason}"
+        self.abandon(Fault(told, is_fall=True))
 
     def _command(self, target: Reference | JointReference) -> JointCommand:
         if isinstance(target, JointReference):
@@ -192,12 +191,17 @@ class ControlLoop:
         return JointCommand.damping(DAMPING)
 
 
-def _sag(target: Reference | JointReference, snapshot: Snapshot) -> float:
-    """Depth [m] of the trunk below where it shall be; 0 if nothing is asked of it."""
+def _sag_and_lean(target: Reference | JointReference, snapshot: Snapshot) -> tuple[float, float]:
+    """Depth [m] of the trunk below where it shall be, and its tilt [rad] from how it shall be.
+
+    0 if nothing is asked of it.
+    """
     if isinstance(target, JointReference):
-        return 0.0
+        return 0.0, 0.0
     body = target.body
-    return float(body.p_world[2] - tracked_position(snapshot, body.point)[2])
+    sag = body.p_world[2] - tracked_position(snapshot, body.point)[2]
+    between_verticals = body.R_world_base[2] @ snapshot.R_world_base[2]
+    return float(sag), float(np.arccos(np.clip(between_verticals, -1.0, 1.0)))
 
 
 def _is_finite(state: RobotState) -> bool:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 
-import numpy as np
-
 from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.robot.rotations import wrap_angle
@@ -27,10 +25,17 @@ GREATEST_DISTANCE = 100.0
 
 
 class Goal(ABC):
-    """A walk with a measured goal."""
+    """A walk with a measured goal.
 
-    name: str
-    time_limit: float
+    Attributes:
+        name: says what is walked.
+        time_limit: time [s] in which it must end: three times as long as at full speed.
+    """
+
+    def __init__(self, name: str, asked: float, speed: float) -> None:
+        """Args: asked: way or angle, walked at ``speed`` per second."""
+        self.name, self._asked = name, asked
+        self.time_limit = 3.0 * abs(asked) / speed + 8.0
 
     def begin(self, state: RobotState) -> None:
         """Note where it starts."""
@@ -39,11 +44,14 @@ class Goal(ABC):
     def command(self, state: RobotState) -> VelocityCommand:
         """The velocity that leads to the goal; ask at least twice in every turn of the robot."""
         self._odometer.update(state)
-        return self._command(state)
+        turned = self._odometer.turned(state)
+        x, y, turn = self._velocity(*self._odometer.displacement(state), turned)
+        c, s = math.cos(turned), math.sin(turned)
+        return VelocityCommand(c * x + s * y, -s * x + c * y, turn)
 
     @abstractmethod
-    def _command(self, state: RobotState) -> VelocityCommand:
-        """The velocity that leads to the goal."""
+    def _velocity(self, ahead: float, left: float, turned: float) -> tuple[float, float, float]:
+        """Velocity [m/s] in the frame of the start and turning rate [rad/s] to the goal."""
 
     @abstractmethod
     def is_done(self, state: RobotState) -> bool:
@@ -93,35 +101,25 @@ class TurnInPlace(Goal):
         """
         if abs(angle) > GREATEST_TURN:
             raise CommandError(f"angle must be within +-{GREATEST_TURN:.1f} rad, got {angle}")
-        self.name = f"turn by {math.degrees(angle):.1f} deg"
-        self._angle = angle
-        self.time_limit = 3.0 * abs(angle) / TURN_RATE + 8.0
+        super().__init__(f"turn by {math.degrees(angle):.1f} deg", angle, TURN_RATE)
 
-    def _command(self, state: RobotState) -> VelocityCommand:
-        """Turn towards the goal, slower as it comes near, and hold the place."""
-        turned = self._odometer.turned(state)
-        remaining = self._angle - turned
-        ahead, left = self._odometer.displacement(state)
-        c, s = math.cos(turned), math.sin(turned)
-        return VelocityCommand(
-            float(np.clip(-0.5 * (c * ahead + s * left), -0.1, 0.1)),
-            float(np.clip(-0.5 * (-s * ahead + c * left), -0.1, 0.1)),
-            float(np.clip(APPROACH * remaining, -TURN_RATE, TURN_RATE)),
-        )
+    def _velocity(self, ahead: float, left: float, turned: float) -> tuple[float, float, float]:
+        turn = _clipped(APPROACH * (self._asked - turned), TURN_RATE)
+        return _clipped(-0.5 * ahead, 0.1), _clipped(-0.5 * left, 0.1), turn
 
     def is_done(self, state: RobotState) -> bool:
         """Whether less than a third of a degree is left and the robot hardly turns."""
-        remaining = self._angle - self._odometer.turned(state)
+        remaining = self._asked - self._odometer.turned(state)
         return abs(remaining) < math.radians(0.3) and abs(float(state.v[5])) < 0.15
 
     def is_within_tolerance(self, state: RobotState) -> bool:
         """Whether the heading is right to 1.5 deg."""
-        return abs(self._angle - self._odometer.turned(state)) < HEADING_TOLERANCE
+        return abs(self._asked - self._odometer.turned(state)) < HEADING_TOLERANCE
 
     def measurements(self, state: RobotState) -> dict[str, float]:
         """Angle asked and turned."""
         return {
-            "asked [deg]": math.degrees(self._angle),
+            "asked [deg]": math.degrees(self._asked),
             "turned [deg]": math.degrees(self._odometer.turned(state)),
         }
 
@@ -138,40 +136,33 @@ class DriveStraight(Goal):
         if abs(distance) > GREATEST_DISTANCE:
             limit = f"+-{GREATEST_DISTANCE:.0f} m"
             raise CommandError(f"distance must be within {limit}, got {distance}")
-        self.name = f"walk {distance:.3f} m"
-        self._distance = distance
-        self.time_limit = 3.0 * abs(distance) / WALK_SPEED + 8.0
+        super().__init__(f"walk {distance:.3f} m", distance, WALK_SPEED)
 
-    def _command(self, state: RobotState) -> VelocityCommand:
-        """Walk towards the goal, slower as it comes near, and hold the line and the heading."""
-        ahead, left = self._odometer.displacement(state)
-        turned = self._odometer.turned(state)
-        speed = float(np.clip(APPROACH * (self._distance - ahead), -WALK_SPEED, WALK_SPEED))
-        sideways = float(np.clip(-1.0 * left, -0.15, 0.15))
-        c, s = math.cos(turned), math.sin(turned)
-        return VelocityCommand(
-            c * speed + s * sideways,
-            -s * speed + c * sideways,
-            float(np.clip(-APPROACH * turned, -0.5, 0.5)),
-        )
+    def _velocity(self, ahead: float, left: float, turned: float) -> tuple[float, float, float]:
+        speed = _clipped(APPROACH * (self._asked - ahead), WALK_SPEED)
+        return speed, _clipped(-left, 0.15), _clipped(-APPROACH * turned, 0.5)
 
     def is_done(self, state: RobotState) -> bool:
         """Whether less than 4 mm are left and the robot hardly moves on."""
         ahead, _ = self._odometer.displacement(state)
-        return abs(self._distance - ahead) < 0.004 and abs(float(state.v[0])) < 0.06
+        return abs(self._asked - ahead) < 0.004 and abs(float(state.v[0])) < 0.06
 
     def is_within_tolerance(self, state: RobotState) -> bool:
         """Whether the robot is within 20 mm of the goal and 1.5 deg of the heading."""
         ahead, left = self._odometer.displacement(state)
-        miss = math.hypot(self._distance - ahead, left)
+        miss = math.hypot(self._asked - ahead, left)
         return miss < DISTANCE_TOLERANCE and abs(self._odometer.turned(state)) < HEADING_TOLERANCE
 
     def measurements(self, state: RobotState) -> dict[str, float]:
         """Distance asked and walked, and the heading error."""
         ahead, left = self._odometer.displacement(state)
         return {
-            "asked [m]": self._distance,
+            "asked [m]": self._asked,
             "walked [m]": ahead,
             "aside [m]": left,
             "heading error [deg]": math.degrees(self._odometer.turned(state)),
         }
+
+
+def _clipped(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))

@@ -7,17 +7,24 @@ procedures into calls.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from statistics import fmean
 
 import numpy as np
+from jaxtyping import Float
 
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.walking import Walking
-from controller.checks import LYING_HEIGHT, ground_height, is_lying, is_sitting, is_standing
+from controller.checks import (
+    LYING_HEIGHT,
+    base_height,
+    ground_height,
+    is_lying,
+    is_sitting,
+    is_standing,
+)
 from controller.modes import Mode
-from controller.navigation import DriveStraight, Goal, TurnInPlace
+from controller.navigation import Goal
 from controller.procedures import Aborted, Measurements, ProcedureRunner, listed
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
@@ -26,8 +33,7 @@ from go2_wbc.contacts import Gait, find_gait
 from go2_wbc.errors import ModeError, StanceMismatch
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.compiled import CompiledPlanner
-from go2_wbc.reference import MotionPlan, Posture, TrackedPoint
+from go2_wbc.reference import MotionPlan, Posture
 from motions.compiler import CompiledPlan
 from motions.postures import lie_down, rise, sit_down
 
@@ -54,12 +60,11 @@ class Pilot:
         self._model = runner.loop.model
         self._config = config
         self._procedures = ProcedureRunner(runner)
-        self._walking: Walking | None = None
-        self._gait: Gait | None = None
+        self._walking = self._make_walking("trot")
         self._goal: Goal | None = None
         self.playing: PlayPlan | None = None
         self._must_return = False
-        self._mode = Mode.LYING if self.is_on_the_ground else Mode.DAMPED
+        self._mode = Mode.LYING if self._is_on_the_ground else Mode.DAMPED
 
     @property
     def mode(self) -> Mode:
@@ -72,9 +77,7 @@ class Pilot:
     @property
     def command(self) -> VelocityCommand:
         """The velocity command that is being followed."""
-        if self._walking is None or self.mode is not Mode.WALKING:
-            return ZERO_COMMAND
-        return self._walking.command
+        return self._walking.command if self.mode is Mode.WALKING else ZERO_COMMAND
 
     def begin(self) -> None:
         """Begin a procedure: the mode is from now on what the last fault, if any, has made it."""
@@ -89,35 +92,29 @@ class Pilot:
         mode = self.mode
         if mode is Mode.WALKING:
             self.rest()
-        if mode in (Mode.LYING, Mode.DAMPED) or self.is_on_the_ground:
+        if mode in (Mode.LYING, Mode.DAMPED) or self._is_on_the_ground:
             self._mode = Mode.MOVING
             tuck(self._procedures)
         entry = {Mode.SITTING: Posture.SIT, Mode.LYING: Posture.LIE}.get(mode, Posture.STAND)
         duration = 0.4 if mode in (Mode.STANDING, Mode.WALKING) else 1.2
-        self._take_posture("stand", lambda pose: rise(pose, entry, duration), TrackedPoint.COM)
-        self._procedures.settle("stand", is_standing)
-        self._mode = Mode.STANDING
-        return self._procedures.measurements()
+        self._take_posture(lambda pose: rise(pose, entry, duration))
+        return self._settle(Posture.STAND, "stand")
 
     def sit(self) -> Measurements:
         """Sit like a dog, from any mode but fallen."""
-        if self.mode is Mode.SITTING:
-            self._procedures.settle("sit", is_sitting)
-            return self._procedures.measurements()
-        self._ensure_standing()
-        self._take_posture("sit", sit_down, TrackedPoint.BASE)
-        self._procedures.settle("sit", is_sitting)
-        self._mode = Mode.SITTING
-        return self._procedures.measurements()
+        if self.mode is not Mode.SITTING:
+            self._ensure_standing()
+            self._take_posture(sit_down)
+        return self._settle(Posture.SIT, "sit")
 
     def lie_down(self) -> Measurements:
         """Lie down and go limp."""
-        if self.mode in (Mode.LYING, Mode.DAMPED) or self.is_on_the_ground:
-            return self._go_limp()
-        if self.mode is not Mode.MOVING:  # a stand that failed need not succeed to lie down
-            self._ensure_standing()
-        self._take_posture("lie down", lie_down, TrackedPoint.BASE)
-        return self._go_limp()
+        if self.mode not in (Mode.LYING, Mode.DAMPED) and not self._is_on_the_ground:
+            if self.mode is not Mode.MOVING:  # a stand that failed need not succeed to lie down
+                self._ensure_standing()
+            self._take_posture(lie_down)
+        lie_limp(self._procedures)
+        return self._settle(Posture.LIE, "lie down")
 
     def recover(self) -> Measurements:
         """Get up after a fall onto the belly, a side or the back."""
@@ -128,9 +125,14 @@ class Pilot:
         self._mode = Mode.LYING
         return self.stand()
 
-    def _go_limp(self) -> Measurements:
-        lie_limp(self._procedures)
-        self._mode = Mode.LYING
+    def _take_posture(self, make_plan: Callable[[Float[np.ndarray, "6"]], MotionPlan]) -> None:
+        self._mode = Mode.MOVING
+        self._procedures.run(ChangePosture(make_plan), 5.0)
+
+    def _settle(self, posture: Posture, what: str) -> Measurements:
+        mode, check = _RESTING[posture]
+        self._procedures.settle(what, check)
+        self._mode = mode
         return self._procedures.measurements()
 
     def _ensure_standing(self) -> None:
@@ -145,7 +147,7 @@ class Pilot:
         if self.mode is not Mode.WALKING:
             self._ensure_standing()
             self._start_walking(wanted)
-        elif wanted != self._gait:
+        elif wanted != self._walking.gait:
             self.rest()
             self._start_walking(wanted)
         self.wait(READY_TIME)
@@ -160,20 +162,16 @@ class Pilot:
         """
         if self._goal is not None:
             raise ModeError(f"move() during a goal ({self._goal.name}): end it by stop()")
-        if self.mode is not Mode.WALKING or self._walking is None:
+        if self.mode is not Mode.WALKING:
             raise ModeError(f"move() needs walking mode, not {self.mode.value}: call walk() first")
         self._walking.command = self._config.envelope.clip(command)
         return self._walking.command
 
     def rest(self) -> Measurements:
         """Zero the command and let the walking robot come to rest."""
-        walking = self._walking
-        if self.mode is Mode.WALKING and walking is not None:
-            walking.command = ZERO_COMMAND
-            loop = self._loop
-            self._procedures.until(
-                lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "come to rest"
-            )
+        if self.mode is Mode.WALKING:
+            self._walking.command = ZERO_COMMAND
+            self._finish_steps("come to rest")
         return self._procedures.measurements()
 
     def run_goal(self, goal: Goal) -> Measurements:
@@ -183,12 +181,11 @@ class Pilot:
             if self.mode is not Mode.WALKING:
                 self.walk("trot")
             self.rest()
-            walking = self._walking or self._start_walking("trot")
 
             def is_over() -> bool:
                 if self._goal is None:
                     return True
-                walking.command = self._config.envelope.clip(goal.command(loop.state))
+                self._walking.command = self._config.envelope.clip(goal.command(loop.state))
                 return goal.is_done(loop.state)
 
             goal.begin(loop.state)
@@ -196,9 +193,7 @@ class Pilot:
             self.rest()
             was_halted = self._goal is None
         finally:
-            self._goal = None
-            if self._walking is not None:
-                self._walking.command = ZERO_COMMAND
+            self.halt()
         measured = goal.measurements(loop.state)
         if was_halted:
             raise Aborted(f"{goal.name} ended by stop()", measured)
@@ -212,24 +207,20 @@ class Pilot:
         The goal's own call then brings the robot to rest.
         """
         had_goal, self._goal = self._goal is not None, None
-        if self._walking is not None:
-            self._walking.command = ZERO_COMMAND
+        self._walking.command = ZERO_COMMAND
         return had_goal
 
-    def turn(self, angle: float) -> Measurements:
-        """Turn left by ``angle`` [rad]."""
-        return self.run_goal(TurnInPlace(angle))
+    def _make_walking(self, gait: str | Gait) -> Walking:
+        return Walking(self._model, find_gait(gait), self._config.locomotion)
 
-    def drive(self, distance: float) -> Measurements:
-        """Walk ``distance`` [m] straight ahead; negative is backward."""
-        return self.run_goal(DriveStraight(distance))
-
-    def _start_walking(self, gait: str | Gait) -> Walking:
-        self._gait = find_gait(gait)
-        walking = Walking(CompiledPlanner(self._model, self._gait, self._config.locomotion))
+    def _start_walking(self, gait: str | Gait) -> None:
+        walking = self._make_walking(gait)
         self._procedures.engage(walking)
         self._walking = walking
-        return walking
+
+    def _finish_steps(self, what: str) -> None:
+        walking, loop = self._walking, self._loop
+        self._procedures.until(lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, what)
 
     # --- motions --------------------------------------------------------------------------
 
@@ -245,7 +236,7 @@ class Pilot:
                 f"{plan.name} was cancelled before it began", self._procedures.measurements()
             )
         self._mode = Mode.MOVING
-        behaviour = PlayPlan(plan, self._model.foot_radius)
+        behaviour = PlayPlan(plan)
         self._procedures.engage(behaviour)
         start, self.playing = self._loop.state.time, behaviour
 
@@ -258,11 +249,10 @@ class Pilot:
             self._procedures.until(finished, plan.duration + 1.0, plan.name)
             if self._must_return:
                 raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
-            self._procedures.settle(plan.name, _CHECK_OF_POSTURE[plan.exit])
+            at_rest = self._settle(plan.exit, plan.name)
         finally:
             self.playing = None
-        self._mode = _MODE_OF_POSTURE[plan.exit]
-        measured = {**self._procedures.measurements(), **behaviour.deviation.measurements()}
+        measured = {**at_rest, **behaviour.deviation.measurements()}
         if not behaviour.deviation.is_small:
             raise Aborted(f"{plan.name} went another way: {listed(measured)}", measured)
         return measured
@@ -274,11 +264,8 @@ class Pilot:
             playing.return_safely()
 
     def _meet_entry(self, plan: MotionPlan) -> None:
-        mode = self.mode
-        if mode is Mode.WALKING and plan.entry is Posture.STAND:
-            self.square_up()
-            mode = self.mode
-        if _MODE_OF_POSTURE[plan.entry] is not mode:
+        mode, (entry, _) = self.mode, _RESTING[plan.entry]
+        if mode is not entry and (mode, entry) != (Mode.WALKING, Mode.STANDING):
             raise StanceMismatch(
                 f"motion {plan.name!r} starts from {plan.entry.value}, the robot is {mode.value}"
             )
@@ -299,7 +286,7 @@ class Pilot:
 
         def watch(t: float) -> None:
             if hold_start <= t <= hold_end:
-                ground = ground_height(loop.snapshot, self._model)
+                ground = ground_height(loop.snapshot)
                 heights.append(float(loop.snapshot.p_world_feet[leg, 2]) - ground)
 
         measured = self.play(plan, watch)
@@ -315,17 +302,13 @@ class Pilot:
 
     def square_up(self) -> None:
         """Stand with the feet below the hips, stepping in place if need be."""
-        if self.mode is not Mode.STANDING:
-            self._ensure_standing()
-        walking = self._start_walking("trot")
-        loop = self._loop
+        self._ensure_standing()
+        self._start_walking("trot")
         with self._runner.lock():  # the planner may be at work in another thread
-            is_square = walking.square_up(loop.snapshot)
+            is_square = self._walking.square_up(self._loop.snapshot)
         if not is_square:
             self._mode = Mode.WALKING
-            self._procedures.until(
-                lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, "square the feet"
-            )
+            self._finish_steps("square the feet")
             self._mode = Mode.STANDING
         self.stand()
 
@@ -344,27 +327,14 @@ class Pilot:
             raise Aborted(fault.reason, self._procedures.measurements())
         return self._procedures.measurements()
 
-    def _take_posture(
-        self,
-        label: str,
-        make_plan: Callable[[np.ndarray], MotionPlan],
-        point: TrackedPoint,
-    ) -> None:
-        behaviour = ChangePosture(label, make_plan, point, self._model.foot_radius)
-        self._mode = Mode.MOVING
-        self._procedures.run(behaviour, 5.0)
-
     @property
-    def is_on_the_ground(self) -> bool:
-        """Whether the trunk is so low that the robot lies."""
-        snapshot = self._loop.snapshot
-        height = float(snapshot.state.q[2]) - ground_height(snapshot, self._model)
-        return math.isfinite(height) and height < LYING_HEIGHT
+    def _is_on_the_ground(self) -> bool:
+        return base_height(self._loop.snapshot) < LYING_HEIGHT
 
 
-_MODE_OF_POSTURE = {
-    Posture.LIE: Mode.LYING,
-    Posture.SIT: Mode.SITTING,
-    Posture.STAND: Mode.STANDING,
+_RESTING = {
+    Posture.LIE: (Mode.LYING, is_lying),
+    Posture.SIT: (Mode.SITTING, is_sitting),
+    Posture.STAND: (Mode.STANDING, is_standing),
 }
-_CHECK_OF_POSTURE = {Posture.LIE: is_lying, Posture.SIT: is_sitting, Posture.STAND: is_standing}
+"""The mode of a robot that rests in a posture, and whether it does."""

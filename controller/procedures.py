@@ -9,7 +9,6 @@ from controller.behaviours.base import Behaviour
 from controller.checks import posture_measurements
 from controller.loop import Fault
 from controller.runner import Runner
-from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 
 SETTLE_LIMIT = 3.0
@@ -46,7 +45,6 @@ class ProcedureRunner:
         """Run on ``runner``."""
         self._runner = runner
         self.loop = runner.loop
-        self._model = runner.loop.model
 
     def engage(self, behaviour: Behaviour) -> None:
         """Switch to ``behaviour``."""
@@ -59,13 +57,13 @@ class ProcedureRunner:
         self.engage(behaviour)
         self.until(lambda: behaviour.is_finished(self.loop.snapshot), limit, behaviour.label)
 
-    def settle(self, what: str, check: Callable[[Snapshot, RobotModel], bool]) -> None:
+    def settle(self, what: str, check: Callable[[Snapshot], bool]) -> None:
         """Let time pass until ``check`` has held for a while."""
-        loop, model = self.loop, self._model
+        loop = self.loop
         calm_since: list[float] = []
 
         def calm() -> bool:
-            if not check(loop.snapshot, model):
+            if not check(loop.snapshot):
                 calm_since.clear()
                 return False
             calm_since.append(loop.state.time)
@@ -99,7 +97,7 @@ class ProcedureRunner:
 
     def measurements(self) -> Measurements:
         """What is measured now."""
-        return posture_measurements(self.loop.snapshot, self._model)
+        return posture_measurements(self.loop.snapshot)
 
     def _aborted(self, reason: str) -> Aborted:
         return Aborted(reason, self.measurements())

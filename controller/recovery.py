@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from controller.behaviours.base import Behaviour
 from controller.behaviours.joints import Damped, ServoJoints
-from controller.checks import is_lying, unfolded_legs
+from controller.checks import unfolded_legs
 from controller.loop import ControlLoop
 from controller.procedures import Aborted, ProcedureRunner
 from go2_wbc.legs import LEGS, Leg
@@ -59,12 +59,11 @@ def tuck(procedures: ProcedureRunner) -> None:
 
 
 def lie_limp(procedures: ProcedureRunner) -> None:
-    """Spread the folded legs, go limp and wait until the robot lies still."""
+    """Spread the folded legs and go limp."""
     if procedures.loop.state.tilt < ON_BELLY:  # or it would rest on folded legs, belly in the air
         splay = ServoJoints("splay", ((SPLAY_TIME, SPLAYED_JOINTS),))
         procedures.run(splay, SPLAY_TIME + GRACE)
     procedures.run(Damped("lie", LIMP_TIME), LIMP_TIME + GRACE)
-    procedures.settle("lie down", is_lying)
 
 
 def get_onto_belly(procedures: ProcedureRunner) -> None:

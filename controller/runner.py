@@ -174,9 +174,8 @@ class Runner:
         seen = self._ticks
         while True:
             with self._changed:
-                news = self._changed.wait_for(lambda seen=seen: self._has_news(seen), HANG_LIMIT)
-            if not news:
-                raise self._hanging()
+                if not self._changed.wait_for(lambda seen=seen: self._has_news(seen), HANG_LIMIT):
+                    raise self._hanging()
             with self.lock():
                 self._obey()
                 if self._failure is not None:
@@ -224,7 +223,9 @@ class Runner:
                     self._failure = error
                     return
                 finally:
-                    self._announce()
+                    with self._changed:
+                        self._ticks += 1
+                        self._changed.notify_all()
             lag = pacer.wait()
             if lag:
                 _log.warning("the loop is %.0f ms behind the wall clock", 1000 * lag)
@@ -242,8 +243,3 @@ class Runner:
             self._thread.join(HANG_LIMIT)
             if self._thread.is_alive():
                 _log.warning("%s; left behind", self._hanging())
-
-    def _announce(self) -> None:
-        with self._changed:
-            self._ticks += 1
-            self._changed.notify_all()

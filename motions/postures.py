@@ -59,7 +59,7 @@ class PosturePlan(MotionPlan):
 def rise(start: Float[np.ndarray, "6"], entry: Posture, duration: float = 1.2) -> PosturePlan:
     """From a CoM pose (6,) to standing."""
     way = Segment(start, STAND_POSE, duration)
-    return PosturePlan("rise", entry, Posture.STAND, TrackedPoint.COM, way)
+    return PosturePlan("stand", entry, Posture.STAND, TrackedPoint.COM, way)
 
 
 def lean(

@@ -13,22 +13,24 @@ class Behaviour(ABC):
 
     Attributes:
         label: what is written in recordings.
+        duration: time [s] that it takes, unless it says otherwise by ``is_finished``.
         needs_balance: whether a large tilt means that the robot has fallen.
         may_lie: whether the belly may be on the ground.
     """
 
     label: str = "?"
+    duration: float = 0.0
     needs_balance: bool = True
     may_lie: bool = False
 
-    @abstractmethod
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state."""
+        self._start = snapshot.state.time
 
     @abstractmethod
     def update(self, snapshot: Snapshot) -> Reference | JointReference:
         """What to track now."""
 
-    @abstractmethod
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether it has nothing more to do; it goes on holding its end until replaced."""
+        return snapshot.state.time - self._start >= self.duration

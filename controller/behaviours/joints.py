@@ -21,21 +21,16 @@ class Damped(Behaviour):
 
     def __init__(self, label: str = "damped", duration: float = 0.0) -> None:
         """Go limp for ``duration`` seconds before counting as finished."""
-        self.label = label
-        self._duration = duration
+        self.label, self.duration = label, duration
 
     def start(self, snapshot: Snapshot) -> None:
-        """Note the time."""
-        self._start = snapshot.state.time
+        """Note the time and the joints."""
+        super().start(snapshot)
         self._joints = snapshot.state.joint_positions.copy()
 
     def update(self, snapshot: Snapshot) -> JointReference:
         """Zero stiffness."""
         return JointReference(self._joints, np.zeros(12), 0.0, DAMPING)
-
-    def is_finished(self, snapshot: Snapshot) -> bool:
-        """Whether the time is over."""
-        return snapshot.state.time - self._start >= self._duration
 
 
 class ServoJoints(Behaviour):
@@ -57,16 +52,13 @@ class ServoJoints(Behaviour):
 
     def start(self, snapshot: Snapshot) -> None:
         """Plan from the measured joints."""
-        self._start = snapshot.state.time
+        super().start(snapshot)
         times = np.cumsum([0.0, *(duration for duration, _ in self._targets)]).tolist()
         values = [snapshot.state.joint_positions.copy(), *(q for _, q in self._targets)]
         self._curve: Curve = keyframes(times, values)
+        self.duration = self._curve.duration
 
     def update(self, snapshot: Snapshot) -> JointReference:
         """The point of the way that belongs to this instant."""
         point = self._curve.at(snapshot.state.time - self._start)
         return JointReference(point.value, point.rate, self._kp, self._kd)
-
-    def is_finished(self, snapshot: Snapshot) -> bool:
-        """Whether the way is at its end."""
-        return snapshot.state.time - self._start >= self._curve.duration

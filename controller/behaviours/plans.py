@@ -11,7 +11,8 @@ from jaxtyping import Float
 from controller.behaviours.base import Behaviour
 from controller.behaviours.safe_return import SafeReturn
 from go2_wbc.planning.correction import SteadyStateCorrection, tracked_position
-from go2_wbc.reference import Anchor, LegTask, MotionPlan, Posture, Reference, TrackedPoint
+from go2_wbc.reference import Anchor, LegTask, MotionPlan, Posture, Reference
+from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.rotations import log_rotation, wrap_angle, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -76,25 +77,21 @@ class PlayPlan(Behaviour):
         deviation: how far the robot has been off the plan.
     """
 
-    def __init__(self, plan: MotionPlan, foot_radius: float) -> None:
-        """Play ``plan``; ``foot_radius`` [m] tells where the ground is."""
-        self.label = plan.name
+    def __init__(self, plan: MotionPlan) -> None:
+        """Play ``plan``."""
+        self.label, self.duration = plan.name, plan.duration
         self.plan = plan
         self.deviation = Deviation()
-        self._foot_radius = foot_radius
         self._start = self._last = 0.0
-        self._anchor = Anchor(np.zeros(3), 0.0)
         self._correction = SteadyStateCorrection()
         self._must_return = False
         self._return: SafeReturn | None = None
 
     def start(self, snapshot: Snapshot) -> None:
         """Anchor the plan at the feet."""
-        self._start = self._last = snapshot.state.time
-        self._must_return, self._return = False, None
-        self._correction = SteadyStateCorrection()
-        self.deviation = Deviation()
-        self._anchor = Anchor.of_feet(snapshot.p_world_feet, self._foot_radius)
+        super().start(snapshot)
+        self._last = self._start
+        self._anchor = Anchor.of_feet(snapshot.p_world_feet, FOOT_RADIUS)
 
     def return_safely(self) -> None:
         """Leave the plan: go to its nearest instant on four loaded feet; any thread may call."""
@@ -125,24 +122,17 @@ class PlayPlan(Behaviour):
         """Whether the plan is over, or the way back from it."""
         if self._return is not None:
             return self._return.is_over
-        return snapshot.state.time - self._start >= self.plan.duration
+        return super().is_finished(snapshot)
 
 
 class ChangePosture(PlayPlan):
     """Play a plan that starts from the measured pose of the body."""
 
-    def __init__(
-        self,
-        label: str,
-        make_plan: Callable[[Float[np.ndarray, "6"]], MotionPlan],
-        point: TrackedPoint,
-        foot_radius: float,
-    ) -> None:
-        """Args: make_plan: from the pose (6,) of ``point`` in the feet's frame to the plan."""
-        super().__init__(make_plan(np.zeros(6)), foot_radius)  # until ``start`` has measured
-        self.label = label
+    def __init__(self, make_plan: Callable[[Float[np.ndarray, "6"]], MotionPlan]) -> None:
+        """Args: make_plan: from the pose (6,) of its point in the feet's frame to the plan."""
+        super().__init__(make_plan(np.zeros(6)))  # until ``start`` has measured
         self._make_plan = make_plan
-        self._point = point
+        self._point = self.plan.at(0.0).body.point
 
     def start(self, snapshot: Snapshot) -> None:
         """Make the plan from the measured pose."""
@@ -153,6 +143,7 @@ class ChangePosture(PlayPlan):
         position = yaw_rotation(anchor.yaw).T @ (p - anchor.p_world)
         pose = np.array([*position, roll, pitch, wrap_angle(float(yaw) - anchor.yaw)])
         self.plan = self._make_plan(pose)
+        self.duration = self.plan.duration
         self.may_lie = bool(pose[2] < LOW) or self.plan.exit is Posture.LIE
 
     def update(self, snapshot: Snapshot) -> Reference:

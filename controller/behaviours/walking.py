@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from controller.behaviours.base import Behaviour
+from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.locomotion import GaitPlanner
+from go2_wbc.planning.compiled import CompiledPlanner
+from go2_wbc.planning.locomotion import GaitPlanner, LocomotionConfig
 from go2_wbc.reference import Reference
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 
 
 class Walking(Behaviour):
-    """Follow ``command``; stand ready while it is zero."""
+    """Walk with ``gait`` and follow ``command``; stand ready while it is zero."""
 
     label = "walk"
 
-    def __init__(self, planner: GaitPlanner) -> None:
-        """Walk with ``planner``."""
-        self._planner = planner
+    def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
+        """Walk with ``gait``."""
+        self.gait = gait
         self.command: VelocityCommand = ZERO_COMMAND
+        self._planner: GaitPlanner = CompiledPlanner(model, gait, config)
 
     def start(self, snapshot: Snapshot) -> None:
         """Start from the measured state, standing."""

@@ -13,11 +13,17 @@ ROUNDING = 1e-12
 """Share of the envelope by which a command on its surface may seem to lie outside."""
 
 
-def _as_float(value: Real) -> float:
+def finite_number(name: str, value: float) -> float:
+    """``value`` as a float; raise CommandError if it is not a finite number."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise CommandError(f"{name} must be a number, got {value!r}")
     try:
-        return float(value)
+        number = float(value)
     except OverflowError:  # an integer beyond every float
-        return math.inf
+        number = math.inf
+    if not math.isfinite(number):
+        raise CommandError(f"{name} must be finite, got {value}")
+    return number
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,13 +37,7 @@ class VelocityCommand:
     def __post_init__(self) -> None:
         """Make every component a float; raise CommandError unless it is a finite number."""
         for name in ("linear_x", "linear_y", "angular_z"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, Real):
-                raise CommandError(f"{name} must be a number, got {value!r}")
-            number = _as_float(value)
-            if not math.isfinite(number):
-                raise CommandError(f"{name} must be finite, got {value}")
-            object.__setattr__(self, name, number)
+            object.__setattr__(self, name, finite_number(name, getattr(self, name)))
 
     @property
     def is_zero(self) -> bool:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_positive
 
@@ -40,6 +41,10 @@ class SafetyConfig:
         sink_limit: depth [m] of the trunk below where it shall be, beyond which it has sunk; in
             simulation 0.01 at most in every motion, 0.07 with a payload of 8 kg.
         sink_limit_time: time [s] for which it may; after pushes that a trot withstood 0.16 at most.
+        lean_limit: angle [rad] between the trunk's attitude and the wanted one, heading left out,
+            beyond which it leans away; in simulation 0.10 at most in every motion, 0.16 after
+            pushes that the robot withstood, 1.0 at rest on a limb.
+        lean_limit_time: time [s] for which it may.
         stale_limit: time [s] without news from the plant after which it counts as silent.
         qp_patience: QP failures in a row after which the robot is damped for good.
     """
@@ -49,34 +54,35 @@ class SafetyConfig:
     touch_limit: float = 0.1
     sink_limit: float = 0.12
     sink_limit_time: float = 0.3
+    lean_limit: float = 0.52
+    lean_limit_time: float = 0.3
     stale_limit: float = 0.03
     qp_patience: int = 10
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a limit that is not positive."""
-        require_positive(self, "tilt_limit", "height_limit", "touch_limit")
-        require_positive(self, "sink_limit", "sink_limit_time", "stale_limit", "qp_patience")
+        require_positive(self, *(field.name for field in fields(self)))
 
 
 class FallDetector:
     """Says whether a robot that balances has fallen; asked once per tick."""
 
-    def __init__(self, config: SafetyConfig, foot_radius: float) -> None:
-        """Judge by ``config``; ``foot_radius`` [m] tells where the ground is."""
-        self._config, self._foot_radius = config, foot_radius
+    def __init__(self, config: SafetyConfig) -> None:
+        """Judge by ``config``."""
+        self._config = config
         self.begin()
 
     def begin(self) -> None:
         """Forget what was measured: another behaviour begins."""
-        self._touching_since: float | None = None
-        self._sunk_since: float | None = None
+        self._since: dict[str, float] = {}
 
-    def reason(self, snapshot: Snapshot, sag: float, *, may_lie: bool) -> str | None:
+    def reason(self, snapshot: Snapshot, sag: float, lean: float, *, may_lie: bool) -> str | None:
         """Why the robot counts as fallen, or None.
 
         Args:
             snapshot: of this tick.
             sag: depth [m] of the trunk below where it shall be.
+            lean: angle [rad] between the trunk's attitude and the wanted one, heading left out.
             may_lie: whether the belly may be on the ground.
         """
         state, config = snapshot.state, self._config
@@ -84,35 +90,32 @@ class FallDetector:
         if state.tilt > config.tilt_limit:
             roll, pitch, _ = (round(angle) for angle in np.degrees(state.rpy).tolist())
             return f"{when}: roll {roll} deg, pitch {pitch} deg"
-        if may_lie:
-            self.begin()
-            return None
         lowest_foot = float(snapshot.p_world_feet[:, 2].min())
         height = float(state.q[2]) - lowest_foot
-        if height < config.height_limit:
-            return f"{when}: base {100 * height:.0f} cm above the feet"
-        ground = lowest_foot - self._foot_radius
-        is_touching = trunk_clearance(snapshot, ground) < TOUCH
-        self._touching_since = _since(self._touching_since, state.time, holds=is_touching)
-        if (
-            self._touching_since is not None
-            and state.time - self._touching_since > config.touch_limit
-        ):
-            return f"{when}: trunk on the ground, base {100 * height:.0f} cm above the feet"
-        self._sunk_since = _since(self._sunk_since, state.time, holds=sag > config.sink_limit)
-        if self._sunk_since is not None and state.time - self._sunk_since > config.sink_limit_time:
+        low = f"base {100 * height:.0f} cm above the feet"
+        if not may_lie and height < config.height_limit:
+            return f"{when}: {low}"
+        clearance = trunk_clearance(snapshot, lowest_foot - FOOT_RADIUS)
+        is_touching = not may_lie and clearance < TOUCH
+        if self._lasts("touch", config.touch_limit, state.time, holds=is_touching):
+            return f"{when}: trunk on the ground, {low}"
+        has_sunk = not may_lie and sag > config.sink_limit
+        if self._lasts("sink", config.sink_limit_time, state.time, holds=has_sunk):
             return f"{when}: trunk {100 * sag:.0f} cm below where it should be"
+        leans = lean > config.lean_limit
+        if self._lasts("lean", config.lean_limit_time, state.time, holds=leans):
+            return f"{when}: trunk tilted {np.degrees(lean):.0f} deg from where it should be"
         return None
+
+    def _lasts(self, what: str, limit: float, now: float, *, holds: bool) -> bool:
+        """Whether ``what`` has held without a break for longer than ``limit`` [s]."""
+        if not holds:
+            self._since.pop(what, None)
+            return False
+        return now - self._since.setdefault(what, now) > limit
 
 
 def trunk_clearance(snapshot: Snapshot, ground: float) -> float:
     """Height [m] of the trunk's lowest point over flat ground at height ``ground`` [m]."""
     z_axis: Float[np.ndarray, "3"] = snapshot.R_world_base[2]
     return float(snapshot.state.q[2] + (TRUNK_UNDERSIDE @ z_axis).min()) - ground
-
-
-def _since(began: float | None, now: float, *, holds: bool) -> float | None:
-    """Since when [s] a condition has held without a break, or None."""
-    if not holds:
-        return None
-    return now if began is None else began

@@ -98,4 +98,4 @@ def test_the_last_ticks_are_recorded_for_as_long_as_is_asked() -> None:
     built = build_pilot(plant, Config(), PilotSettings(recorded_time=10 * plant.control_period))
     built.pilot.wait(30 * plant.control_period)
     built.close()
-    assert len(built.telemetry.samples(1e6).unfinished.time) == 10
+    assert len(built.runner.loop.telemetry.samples(1e6).unfinished.time) == 10

@@ -9,7 +9,7 @@ from controller.behaviours.plans import PlayPlan
 from controller.behaviours.safe_return import SafeReturn, nearest_safe_instant, retimed
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
-from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
 from motions.compiler import CompiledPlan
 from tests.controller.plants import WatchedPlant
@@ -52,7 +52,7 @@ def test_a_motion_that_is_cancelled_before_it_begins_is_not_played() -> None:
 
 def test_a_plan_that_has_not_begun_has_made_no_progress(plan: CompiledPlan) -> None:
     # It had no attribute to tell it by.
-    playing = PlayPlan(plan, FOOT_RADIUS)
+    playing = PlayPlan(plan)
     assert playing.progress == 0.0
     playing.return_safely()
     assert playing.progress == 0.0

@@ -21,7 +21,7 @@ from tests.engine_helpers import state_of
 MODEL = RobotModel()
 HOME = home_poses(MODEL)
 LYING = 0.085  # m; of the base over the ground, on its belly
-CHECKS: dict[Posture, Callable[[Snapshot, RobotModel], bool]] = {
+CHECKS: dict[Posture, Callable[[Snapshot], bool]] = {
     Posture.STAND: is_standing,
     Posture.SIT: is_sitting,
     Posture.LIE: is_lying,
@@ -49,15 +49,15 @@ def test_a_posture_is_known_whatever_the_height_of_the_ground(
     posture: Posture, ground: float
 ) -> None:
     snapshot = at_rest(posture, ground)
-    assert [name for name, check in CHECKS.items() if check(snapshot, MODEL)] == [posture]
-    level = posture_measurements(at_rest(posture), MODEL)
-    assert posture_measurements(snapshot, MODEL) == pytest.approx(level, abs=1e-9)
+    assert [name for name, check in CHECKS.items() if check(snapshot)] == [posture]
+    level = posture_measurements(at_rest(posture))
+    assert posture_measurements(snapshot) == pytest.approx(level, abs=1e-9)
 
 
 @pytest.mark.parametrize("posture", Posture)
 def test_a_robot_that_still_moves_is_in_no_posture(posture: Posture) -> None:
     moving = at_rest(posture, speed=0.06)
-    assert not any(check(moving, MODEL) for check in CHECKS.values())
+    assert not any(check(moving) for check in CHECKS.values())
 
 
 @pytest.mark.parametrize("posture", [Posture.STAND, Posture.SIT])
@@ -65,4 +65,4 @@ def test_a_foot_in_the_air_is_no_posture_on_four_feet(posture: Posture) -> None:
     snapshot = at_rest(posture)
     touching = np.array([True, True, False, True])
     raised = replace(snapshot, state=replace(snapshot.state, feet_in_contact=touching))
-    assert not CHECKS[posture](raised, MODEL)
+    assert not CHECKS[posture](raised)

@@ -1,7 +1,8 @@
-"""Whatever the robot is doing: when its trunk comes to rest on the ground, it says so at once."""
+"""Whatever the robot does: when its trunk comes to rest on the ground or aslant, it says so."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -11,8 +12,6 @@ import pytest
 from controller import GO2Controller, Mode
 from controller.behaviours.plans import ChangePosture
 from controller.procedures import ProcedureRunner
-from go2_wbc.reference import TrackedPoint
-from go2_wbc.robot.model import FOOT_RADIUS
 from motions.postures import lean
 from tests.controller.plants import WatchedPlant
 
@@ -26,6 +25,10 @@ TOUCH = 1.0
 STUMBLE = 0.05
 # s; in which a collapse must be noticed.
 NOTICED = 0.2
+# s; in which a robot that was tipped onto a limb must have noticed.
+TIPPED = 1.2
+# deg; more than that off its posture no robot was that withstood a push.
+MUCH = 30.0
 # rad; roll and pitch of a robot that leans, as for a command from outside.
 LEANING = (0.1, 0.15, 0.0)
 
@@ -79,9 +82,7 @@ def _trot_ready(go2: GO2Controller) -> None:
 
 
 def _lean(go2: GO2Controller) -> None:
-    posture = ChangePosture(
-        "lean", lambda pose: lean(pose, np.array(LEANING)), TrackedPoint.COM, FOOT_RADIUS
-    )
+    posture = ChangePosture(lambda pose: lean(pose, np.array(LEANING)))
     ProcedureRunner(go2._runner).run(posture, 2.0)
 
 
@@ -144,6 +145,30 @@ def test_a_robot_whose_trunk_comes_to_rest_on_the_ground_says_so_at_once(name: s
         assert not go2.last_outcome
         assert go2.mode in (Mode.FALLEN, Mode.DAMPED)
     assert noticed[0] < plant.came_to_rest + NOTICED
+
+
+@pytest.mark.parametrize("impulse", [22.0, -22.0, 23.0])
+def test_a_sitting_robot_that_comes_to_rest_on_a_limb_says_so_at_once(impulse: float) -> None:
+    # Tipped aside it rested on a knee, 42 deg from its posture, its trunk off the ground, and was
+    # said to sit.
+    plant = PushedPlant()
+    plant.impulse = np.array([0.0, impulse, 0.0])
+    with GO2Controller(plant=plant) as go2:
+        assert go2.sit()
+        plant.is_down.clear()
+        plant.push_at = pushed = go2.state.time
+        go2.wait(TIPPED)
+        assert go2.mode is Mode.FALLEN
+        match = re.fullmatch(
+            r"fell at t=(.*) s: trunk tilted (.*) deg from where it should be",
+            go2.last_outcome.reason,
+        )
+        assert match
+        fell, tilt = (float(number) for number in match.groups())
+        assert pushed < fell < pushed + TIPPED
+        assert tilt > MUCH
+        assert plant.came_to_rest > fell
+        assert go2.recover()
 
 
 @pytest.mark.parametrize("before", [_nothing, _sit, _walk])

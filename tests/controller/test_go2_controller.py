@@ -196,13 +196,11 @@ POSTURES = {"stand": is_standing, "sit": is_sitting, "lie down": is_lying}
 def test_a_posture_is_told_from_the_others_and_from_a_robot_in_motion(day: Day, name: str) -> None:
     model = RobotModel()
     state = day[name].after
-    assert [other for other, check in POSTURES.items() if check(model.snapshot(state), model)] == [
-        name
-    ]
+    assert [other for other, check in POSTURES.items() if check(model.snapshot(state))] == [name]
     for moving in (0, 8):  # base, a joint
         v = state.v.copy()
         v[moving] = 1.0
-        assert not POSTURES[name](model.snapshot(replace(state, v=v)), model)
+        assert not POSTURES[name](model.snapshot(replace(state, v=v)))
 
 
 @pytest.mark.parametrize("name", ["stand", "sit"])
@@ -210,7 +208,7 @@ def test_a_robot_with_a_foot_in_the_air_neither_stands_nor_sits(day: Day, name: 
     model = RobotModel()
     contacts = np.array([True, True, False, True])
     state = replace(day[name].after, feet_in_contact=contacts)
-    assert not POSTURES[name](model.snapshot(state), model)
+    assert not POSTURES[name](model.snapshot(state))
 
 
 # --- the beginning ----------------------------------------------------------------------------

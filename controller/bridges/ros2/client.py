@@ -22,7 +22,7 @@ from controller.bridges.ros2.states import state_of
 from controller.navigation import DriveStraight, Goal, TurnInPlace
 from controller.procedures import listed
 from go2_wbc.errors import BridgeError, MissingDependency
-from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.robot.state import RobotState
 
 ANSWER_LIMIT = 30.0
@@ -160,15 +160,15 @@ class GO2ControllerNode(ros.Node):
 
     def turn_left(self, angle: float) -> bool:
         """Turn left in place by ``angle`` [rad], closed on odometry; negative turns right."""
-        return self._run_goal(TurnInPlace(arguments.finite("angle", angle)))
+        return self._run_goal(TurnInPlace(finite_number("angle", angle)))
 
     def turn_right(self, angle: float) -> bool:
         """Turn right in place by ``angle`` [rad], closed on odometry."""
-        return self._run_goal(TurnInPlace(-arguments.finite("angle", angle)))
+        return self._run_goal(TurnInPlace(-finite_number("angle", angle)))
 
     def move_forward(self, distance: float) -> bool:
         """Walk ``distance`` [m] straight ahead, closed on odometry; negative is backward."""
-        return self._run_goal(DriveStraight(arguments.finite("distance", distance)))
+        return self._run_goal(DriveStraight(finite_number("distance", distance)))
 
     def _run_goal(self, goal: Goal) -> bool:
         if not self.walk():
@@ -203,7 +203,7 @@ class GO2ControllerNode(ros.Node):
 
     def high_five(self, side: str = "right", hold: float = 2.0) -> bool:
         """Raise a front paw, hold it for ``hold`` seconds, tap, and come back to standing."""
-        return self.play("high_five", {"side": side, "hold": arguments.finite("hold", hold)})
+        return self.play("high_five", {"side": side, "hold": finite_number("hold", hold)})
 
     def play(
         self,

@@ -17,8 +17,6 @@ from controller.procedures import ProcedureRunner
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant.base import Plant
-from go2_wbc.reference import TrackedPoint
-from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
@@ -112,13 +110,11 @@ class SportRobot:
         if self.mode is Mode.WALKING:
             self.pilot.square_up()
         target = np.array(rpy)
-        behaviour = ChangePosture(
-            "lean", lambda pose: lean(pose, target, LEAN_TIME), TrackedPoint.COM, FOOT_RADIUS
-        )
         self.is_leaning = True
+        behaviour = ChangePosture(lambda pose: lean(pose, target, LEAN_TIME))
         self._procedures.run(behaviour, LEAN_LIMIT)
 
-        def is_there(snapshot: Snapshot, _model: RobotModel) -> bool:
+        def is_there(snapshot: Snapshot) -> bool:
             missing = np.abs(snapshot.state.rpy[:2] - target[:2])
             return bool(missing.max() < ATTITUDE_TOLERANCE)
 

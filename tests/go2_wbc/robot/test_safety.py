@@ -1,4 +1,4 @@
-"""What counts as a fall: tilt at once, a trunk on the ground or far too low after a while."""
+"""What counts as a fall: tilt at once, a trunk on the ground, too low or aslant after a while."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.description import BASE_LINK
-from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.safety import TRUNK_UNDERSIDE, FallDetector, SafetyConfig, trunk_clearance
 from go2_wbc.robot.snapshot import Snapshot
 from tests.engine_helpers import standing_q, state_of
@@ -30,7 +30,7 @@ def model() -> RobotModel:
 
 @pytest.fixture
 def falls() -> FallDetector:
-    return FallDetector(SafetyConfig(), FOOT_RADIUS)
+    return FallDetector(SafetyConfig())
 
 
 def standing(model: RobotModel, time: float = 0.0) -> Snapshot:
@@ -76,7 +76,7 @@ def test_the_points_of_the_trunk_lie_where_its_mesh_does_however_it_is_tilted() 
 
 def test_a_standing_robot_has_not_fallen(falls: FallDetector, model: RobotModel) -> None:
     snapshot = standing(model)
-    assert falls.reason(snapshot, 0.0, may_lie=False) is None
+    assert falls.reason(snapshot, 0.0, 0.0, may_lie=False) is None
     assert trunk_clearance(snapshot, 0.0) == pytest.approx(0.3 - 0.107, abs=1e-6)
 
 
@@ -85,8 +85,8 @@ def test_a_tilted_trunk_is_a_fall_at_once_even_where_the_belly_may_be_down(
 ) -> None:
     limit = SafetyConfig().tilt_limit
     for may_lie in (False, True):
-        assert falls.reason(tilted(model, limit - 0.01), 0.0, may_lie=may_lie) is None
-        reason = falls.reason(tilted(model, limit + 0.01), 0.0, may_lie=may_lie)
+        assert falls.reason(tilted(model, limit - 0.01), 0.0, 0.0, may_lie=may_lie) is None
+        reason = falls.reason(tilted(model, limit + 0.01), 0.0, 0.0, may_lie=may_lie)
         assert reason == "fell at t=0.00 s: roll 61 deg, pitch 0 deg"
 
 
@@ -96,7 +96,7 @@ def test_a_trunk_on_the_ground_is_a_fall_after_the_limit(
     limit = SafetyConfig().touch_limit
     first = None
     for time in np.arange(1.0, 1.5, TICK).tolist():
-        reason = falls.reason(on_the_belly(model, time), 0.0, may_lie=False)
+        reason = falls.reason(on_the_belly(model, time), 0.0, 0.0, may_lie=False)
         first = time if reason and first is None else first
     assert first == pytest.approx(1.0 + limit, abs=1.5 * TICK)
 
@@ -104,16 +104,16 @@ def test_a_trunk_on_the_ground_is_a_fall_after_the_limit(
 def test_touches_that_end_in_between_are_stumbles(falls: FallDetector, model: RobotModel) -> None:
     limit = SafetyConfig().touch_limit
     for time in np.arange(0.0, 1.0, 0.8 * limit).tolist():
-        assert falls.reason(on_the_belly(model, time), 0.0, may_lie=False) is None
-        assert falls.reason(standing(model, time + 0.01), 0.0, may_lie=False) is None
+        assert falls.reason(on_the_belly(model, time), 0.0, 0.0, may_lie=False) is None
+        assert falls.reason(standing(model, time + 0.01), 0.0, 0.0, may_lie=False) is None
 
 
 def test_where_the_belly_may_be_down_it_may_lie_for_ever(
     falls: FallDetector, model: RobotModel
 ) -> None:
     for time in np.arange(0.0, 2.0, 0.1).tolist():
-        assert falls.reason(on_the_belly(model, time), 0.5, may_lie=True) is None
-    assert falls.reason(on_the_belly(model, 2.0), 0.5, may_lie=False) is None
+        assert falls.reason(on_the_belly(model, time), 0.5, 0.0, may_lie=True) is None
+    assert falls.reason(on_the_belly(model, 2.0), 0.5, 0.0, may_lie=False) is None
 
 
 def test_a_trunk_far_below_where_it_should_be_is_a_fall_after_the_limit(
@@ -121,15 +121,35 @@ def test_a_trunk_far_below_where_it_should_be_is_a_fall_after_the_limit(
 ) -> None:
     config = SafetyConfig()
     sag, just_less = config.sink_limit + 0.01, config.sink_limit - 0.01
-    assert falls.reason(standing(model, 0.0), sag, may_lie=False) is None
-    assert falls.reason(standing(model, 0.2), just_less, may_lie=False) is None
-    assert falls.reason(standing(model, 0.3), sag, may_lie=False) is None
-    assert falls.reason(standing(model, 0.3 + config.sink_limit_time), sag, may_lie=False) is None
+    assert falls.reason(standing(model, 0.0), sag, 0.0, may_lie=False) is None
+    assert falls.reason(standing(model, 0.2), just_less, 0.0, may_lie=False) is None
+    assert falls.reason(standing(model, 0.3), sag, 0.0, may_lie=False) is None
+    assert (
+        falls.reason(standing(model, 0.3 + config.sink_limit_time), sag, 0.0, may_lie=False) is None
+    )
     late = standing(model, 0.31 + config.sink_limit_time)
-    reason = falls.reason(late, sag, may_lie=False)
+    reason = falls.reason(late, sag, 0.0, may_lie=False)
     assert reason == "fell at t=0.61 s: trunk 13 cm below where it should be"
     falls.begin()
-    assert falls.reason(late, sag, may_lie=False) is None
+    assert falls.reason(late, sag, 0.0, may_lie=False) is None
+
+
+@pytest.mark.parametrize("may_lie", [False, True])
+def test_a_trunk_that_leans_from_where_it_should_be_is_a_fall_after_the_limit(
+    falls: FallDetector, model: RobotModel, *, may_lie: bool
+) -> None:
+    config = SafetyConfig()
+    lean, just_less = config.lean_limit + 0.01, config.lean_limit - 0.01
+    for time in np.arange(0.0, 1.0, 0.1).tolist():
+        assert falls.reason(standing(model, time), 0.0, just_less, may_lie=may_lie) is None
+    assert falls.reason(standing(model, 1.0), 0.0, lean, may_lie=may_lie) is None
+    assert falls.reason(standing(model, 1.2), 0.0, just_less, may_lie=may_lie) is None
+    assert falls.reason(standing(model, 1.3), 0.0, lean, may_lie=may_lie) is None
+    late = standing(model, 1.31 + config.lean_limit_time)
+    reason = falls.reason(late, 0.0, lean, may_lie=may_lie)
+    assert reason == "fell at t=1.61 s: trunk tilted 30 deg from where it should be"
+    falls.begin()
+    assert falls.reason(late, 0.0, lean, may_lie=may_lie) is None
 
 
 @pytest.mark.parametrize("name", [name for name in SafetyConfig.__slots__])
