@@ -93,7 +93,7 @@ def test_a_qp_that_stays_infeasible_ends_in_a_limp_robot_that_says_why(
             assert not go2.stand()
         assert go2.mode is Mode.DAMPED
         assert "damped after 10 QP failures in a row" in go2.last_outcome.reason
-        assert "daqp found no solution" in go2.last_outcome.reason
+        assert "active_set found no solution" in go2.last_outcome.reason
         assert go2.telemetry.qp_failures == 10
         assert is_limp(plant.commands[-1])
         assert "contact forces" in caplog.text
