@@ -15,7 +15,7 @@ SEEDS = (1, 2)  # the trot stays up there, and the hard QP has no solution in 26
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_trot_over_boxes_is_never_damped_while_it_is_upright(seed: int) -> None:
     plant = MujocoPlant(terrain=Boxes(height=0.08, seed=seed), seed=seed)
-    with plant, GO2Controller(plant=plant) as go2:
+    with GO2Controller(plant=plant) as go2:
         assert go2.stand()
         assert go2.walk()
         go2.move(1.0)
