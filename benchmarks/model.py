@@ -79,9 +79,11 @@ class AuditedController(WholeBodyController):
         self._ticks = 0
         self._worst = worst
 
-    def solve(self, snapshot: Snapshot, reference: Reference) -> WbcSolution:
+    def solve(
+        self, snapshot: Snapshot, reference: Reference, *, relax: bool = False
+    ) -> WbcSolution:
         """Solve one tick and audit the solution."""
-        solution = super().solve(snapshot, reference)
+        solution = super().solve(snapshot, reference, relax=relax)
         self._audit(snapshot, solution)
         if self._ticks % ORACLE_PERIOD == 0:
             for controller in self._others:

@@ -1,7 +1,9 @@
 """The control loop: one tick is read, check, snapshot, behaviour, whole-body QP, write, record.
 
-Only here a QP failure is caught: the last good torque is held for one tick, then the robot is
-damped while the failure lasts, and for good after ``qp_patience`` ticks; every one is counted.
+Where the QP's constraints contradict each other, the nearest answer is followed
+(``wbc.relaxation``) and the tick is counted. Only here a QP failure is caught: the last good torque
+is held for one tick, then the robot is damped while the failure lasts, and for good after
+``qp_patience`` ticks; every one is counted.
 A plant that fails, gives no new state, or gives one that is not finite, ends the behaviour too.
 """
 
@@ -25,6 +27,8 @@ from go2_wbc.robot.safety import FallDetector, SafetyConfig
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import JointCommand, RobotState
 from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.relaxation import is_grave
+from go2_wbc.wbc.solution import WbcSolution
 
 _log = logging.getLogger(__name__)
 
@@ -168,11 +172,29 @@ class ControlLoop:
         if isinstance(target, JointReference):
             return JointCommand.servo(target.q_joints, target.v_joints, target.kp, target.kd)
         try:
-            solution = self.wbc.solve(self.snapshot, target)
+            solution = self.wbc.solve(self.snapshot, target, relax=True)
         except QpInfeasible as error:
             return self._without_solution(error)
+        if solution.is_relaxed:
+            return self._relaxed(solution)
         self._qp_failures_in_a_row = 0
         return solution.command
+
+    def _relaxed(self, solution: WbcSolution) -> JointCommand:
+        """Follow a solution whose constraints gave way, unless they do gravely for too long."""
+        self.telemetry.relaxed_ticks += 1
+        if not is_grave(solution.violations):
+            self._qp_failures_in_a_row = 0
+            return solution.command
+        self.telemetry.grave_ticks += 1
+        self._qp_failures_in_a_row += 1
+        streak = self._qp_failures_in_a_row
+        if streak < self._safety.qp_patience:
+            return solution.command
+        worst = ", ".join(f"{row.name} {row.norm:.0f} {row.unit}" for row in solution.violations)
+        reason = f"damped after {streak} ticks that break their constraints: {worst}"
+        self.abandon(Fault(reason, may_fall=True))
+        return JointCommand.damping(DAMPING)
 
     def _without_solution(self, error: QpInfeasible) -> JointCommand:
         self.telemetry.qp_failures += 1

@@ -21,6 +21,8 @@ class Telemetry:
         peak_torque_ratio: greatest |tau| / limit of any joint so far.
         peak_speed_ratio: greatest |joint velocity| / limit of any joint so far.
         qp_failures: ticks in which the QP had no solution, over the whole run.
+        relaxed_ticks: ticks in which constraints of the QP had to give way.
+        grave_ticks: those of them in which they gave way by more than ``wbc.relaxation.LIMITS``.
     """
 
     def __init__(self, model: RobotModel, capacity: int) -> None:
@@ -36,7 +38,7 @@ class Telemetry:
         self._count = 0
         self.peak_torque_ratio = 0.0
         self.peak_speed_ratio = 0.0
-        self.qp_failures = 0
+        self.qp_failures = self.relaxed_ticks = self.grave_ticks = 0
 
     def record(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"], label: str) -> None:
         """Add one tick."""

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
+from jaxtyping import Float
 
-from go2_wbc.errors import ConfigError, unknown_name
+from go2_wbc.errors import ConfigError, QpInfeasible, unknown_name
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -25,6 +26,7 @@ from go2_wbc.wbc.constraints import (
 )
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, Bounds, Problem, Rows
 from go2_wbc.wbc.program import Program
+from go2_wbc.wbc.relaxation import solve_relaxed
 from go2_wbc.wbc.solution import WbcSolution
 from go2_wbc.wbc.solvers import check_solver
 from go2_wbc.wbc.tasks import (
@@ -119,19 +121,42 @@ class WholeBodyController:
         """Whether ticks are solved by the compiled kernel: condensed, and by ``active_set``."""
         return self._program is not None
 
-    def solve(self, snapshot: Snapshot, reference: Reference) -> WbcSolution:
+    def solve(
+        self, snapshot: Snapshot, reference: Reference, *, relax: bool = False
+    ) -> WbcSolution:
         """Solve one tick.
 
+        Args:
+            snapshot: of this tick.
+            reference: what to do.
+            relax: if the constraints contradict each other, let those give way that reality can
+                contradict (see ``relaxation``); the solution's ``violations`` say how far.
+
         Raises:
-            QpInfeasible: if no torque meets the constraints; carries the residual table.
+            QpInfeasible: if no torque meets the constraints; carries the residual table. With
+                ``relax`` only for a reference that no robot could meet.
         """
         solution = self.solve_compiled(snapshot, reference)
         if solution is not None:
             return solution
         start = time.perf_counter()  # thread_time costs a tenth of a tick on some machines
         problem = self.formulate(snapshot, reference)
-        z = self._backend.solve(problem)
-        return WbcSolution.from_decision(z, problem, time.perf_counter() - start, self.backend_name)
+        try:
+            z, is_relaxed = self._backend.solve(problem), False
+        except QpInfeasible as error:
+            if not relax:
+                raise
+            z, is_relaxed = self._relaxed(problem, error), True
+        spent = time.perf_counter() - start
+        return WbcSolution.from_decision(
+            z, problem, spent, self.backend_name, is_relaxed=is_relaxed
+        )
+
+    def _relaxed(self, problem: Problem, error: QpInfeasible) -> Float[np.ndarray, "30"]:
+        try:
+            return solve_relaxed(problem, self.config.solver)
+        except QpInfeasible as contradiction:
+            raise error from contradiction
 
     def solve_compiled(self, snapshot: Snapshot, reference: Reference) -> WbcSolution | None:
         """Solve one tick by the kernel; None if it is not used here or finds no solution."""

@@ -11,6 +11,7 @@ from jaxtyping import Float
 from go2_wbc.errors import ResidualRow
 from go2_wbc.robot.state import JointCommand
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, Problem
+from go2_wbc.wbc.tasks import Task
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,7 @@ class WbcSolution:
         forces: contact force [N] of each foot in the world frame; zero for legs in the air.
         solve_time: seconds of assembly and solution.
         backend: which back end solved it.
+        is_relaxed: whether constraints had to give way, see ``violations``.
     """
 
     tau: Float[np.ndarray, "12"]
@@ -33,6 +35,7 @@ class WbcSolution:
     backend: str
     _formulate: Callable[[], Problem]
     _z: Float[np.ndarray, "30"]
+    is_relaxed: bool = False
 
     @staticmethod
     def from_decision(
@@ -40,18 +43,28 @@ class WbcSolution:
         problem: Problem,
         solve_time: float,
         backend: str,
+        *,
+        is_relaxed: bool = False,
     ) -> WbcSolution:
         """Torques from the joint rows of M a + h = tau + J' f."""
         snapshot = problem.snapshot
         qdd, forces = z[ACCELERATION], z[FORCES]
         J_joints = snapshot.J_contacts[:, :, 6:].reshape(12, 12)
         tau = snapshot.mass_matrix[6:] @ qdd + snapshot.bias[6:] - J_joints.T @ forces
-        return WbcSolution(tau, qdd, forces.reshape(4, 3), solve_time, backend, lambda: problem, z)
+        feet = forces.reshape(4, 3)
+        return WbcSolution(tau, qdd, feet, solve_time, backend, lambda: problem, z, is_relaxed)
 
     @property
     def residuals(self) -> tuple[ResidualRow, ...]:
         """Error of every task and violation of every constraint, in its own unit."""
         return self._formulate().residuals(self._z)
+
+    @property
+    def violations(self) -> tuple[ResidualRow, ...]:
+        """By how much each constraint is broken, in its own unit; rounding, unless relaxed."""
+        problem = self._formulate()
+        constraints = len(problem.sources) - sum(isinstance(s, Task) for s in problem.sources)
+        return problem.residuals(self._z)[-constraints:]
 
     @property
     def command(self) -> JointCommand:

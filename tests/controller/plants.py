@@ -112,11 +112,13 @@ def break_qp(monkeypatch: pytest.MonkeyPatch, is_broken: Callable[[int], bool]) 
     """Asks the impossible of the n-th QP for which ``is_broken(n)``: more force than is allowed."""
     real, count = WholeBodyController.solve, itertools.count()
 
-    def solve(self: WholeBodyController, snapshot: Snapshot, reference: Reference) -> WbcSolution:
+    def solve(
+        self: WholeBodyController, snapshot: Snapshot, reference: Reference, *, relax: bool = False
+    ) -> WbcSolution:
         if is_broken(next(count)):
             least = reference.normal_force_max + 100.0
             reference = replace(reference, normal_force_min=least)
-        return real(self, snapshot, reference)
+        return real(self, snapshot, reference, relax=relax)
 
     monkeypatch.setattr(WholeBodyController, "solve", solve)
 

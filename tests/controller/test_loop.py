@@ -14,7 +14,7 @@ from controller.behaviours.joints import Damped, ServoJoints
 from controller.loop import ControlLoop, Fault
 from controller.telemetry import Telemetry
 from go2_wbc.contacts import find_gait
-from go2_wbc.errors import PlantError, PlantTimeout
+from go2_wbc.errors import PlantError, PlantTimeout, ResidualRow
 from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.reference import JointReference, Reference
@@ -23,6 +23,8 @@ from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.relaxation import LIMITS
+from go2_wbc.wbc.solution import WbcSolution
 from motions.postures import TUCKED_JOINTS
 from tests.controller.plants import PERIOD, StillPlant, break_qp, is_limp
 
@@ -170,6 +172,55 @@ def test_a_new_behaviour_has_the_whole_patience_again(
         loop.tick()
         assert loop.fault is not None
     assert loop.telemetry.qp_failures == 3 * SAFETY.qp_patience
+
+
+# --- constraints that give way ----------------------------------------------------------------
+
+
+def relax(monkeypatch: pytest.MonkeyPatch, stance: float) -> None:
+    """Make every solution a relaxed one, the stance feet violated by ``stance`` [m/s^2]."""
+    real = WholeBodyController.solve
+
+    def solve(
+        self: WholeBodyController, snapshot: Snapshot, reference: Reference, *, relax: bool = False
+    ) -> WbcSolution:
+        assert relax, "the loop must always ask for an answer"
+        return replace(real(self, snapshot, reference), is_relaxed=True)
+
+    rows = (ResidualRow("stance feet", stance, "m/s^2"),)
+    monkeypatch.setattr(WholeBodyController, "solve", solve)
+    monkeypatch.setattr(WbcSolution, "violations", property(lambda _: rows))
+
+
+def test_a_relaxed_answer_is_followed_and_counted(
+    loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    relax(monkeypatch, 0.9 * LIMITS["stance feet"])
+    loop.engage(Balance(loop.model))
+    run(loop, 3 * SAFETY.qp_patience)
+    assert loop.fault is None
+    assert not any(is_limp(command) for command in plant.commands)
+    counts = (loop.telemetry.relaxed_ticks, loop.telemetry.grave_ticks, loop.telemetry.qp_failures)
+    assert counts == (3 * SAFETY.qp_patience, 0, 0)
+
+
+def test_grave_violations_damp_the_robot_only_when_they_last(
+    loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loop.engage(Balance(loop.model))
+    with monkeypatch.context() as patch:
+        relax(patch, 1.1 * LIMITS["stance feet"])
+        run(loop, SAFETY.qp_patience - 1)
+    run(loop, 1)
+    assert loop.fault is None
+    assert not any(is_limp(command) for command in plant.commands)
+    relax(monkeypatch, 1.1 * LIMITS["stance feet"])
+    run(loop, SAFETY.qp_patience)
+    assert loop.fault is not None
+    assert "break their constraints" in loop.fault.reason
+    assert "stance feet 33 m/s^2" in loop.fault.reason
+    assert is_limp(plant.commands[-1])
+    assert loop.telemetry.grave_ticks == 2 * SAFETY.qp_patience - 1
 
 
 # --- plants that fail -------------------------------------------------------------------------
