@@ -12,8 +12,7 @@ from __future__ import annotations
 import logging
 from contextlib import suppress
 from dataclasses import dataclass
-
-import numpy as np
+from math import acos, isfinite, sqrt
 
 from controller.behaviours.base import Behaviour
 from controller.behaviours.joints import DAMPING, Damped
@@ -222,12 +221,12 @@ def _sag_and_lean(target: Reference | JointReference, snapshot: Snapshot) -> tup
         return 0.0, 0.0
     body = target.body
     sag = body.p_world[2] - tracked_position(snapshot, body.point)[2]
-    between_verticals = body.R_world_base[2] @ snapshot.R_world_base[2]
-    return float(sag), float(np.arccos(np.clip(between_verticals, -1.0, 1.0)))
+    between_verticals = float(body.R_world_base[2] @ snapshot.R_world_base[2])
+    return float(sag), acos(min(max(between_verticals, -1.0), 1.0))
 
 
 def _is_finite(state: RobotState) -> bool:
-    measured = (state.q, state.v, state.tau, state.foot_forces)
-    if not all(np.isfinite(values).all() for values in measured):
-        return False
-    return abs(float(np.linalg.norm(state.q[3:7])) - 1.0) < UNIT_TOLERANCE
+    # A sum of squares is finite only if every number is.
+    squares = sum(float(a @ a) for a in (state.q, state.v, state.tau, state.foot_forces))
+    quaternion = state.q[3:7]
+    return isfinite(squares) and abs(sqrt(quaternion @ quaternion) - 1.0) < UNIT_TOLERANCE

@@ -18,8 +18,6 @@ class Telemetry:
     """Records ticks; the oldest are dropped when the ring is full.
 
     Attributes:
-        peak_torque_ratio: greatest |tau| / limit of any joint so far.
-        peak_speed_ratio: greatest |joint velocity| / limit of any joint so far.
         qp_failures: ticks in which the QP had no solution, over the whole run.
         relaxed_ticks: ticks in which constraints of the QP had to give way.
         grave_ticks: those of them in which they gave way by more than ``wbc.relaxation.LIMITS``.
@@ -36,8 +34,7 @@ class Telemetry:
         self._com, self._feet = np.empty((capacity, 3)), np.empty((capacity, 4, 3))
         self._labels = np.empty(capacity, dtype=object)
         self._count = 0
-        self.peak_torque_ratio = 0.0
-        self.peak_speed_ratio = 0.0
+        self._peak_torque, self._peak_speed = np.zeros(12), np.zeros(12)
         self.qp_failures = self.relaxed_ticks = self.grave_ticks = 0
 
     def record(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"], label: str) -> None:
@@ -49,10 +46,18 @@ class Telemetry:
         self._stance[i], self._labels[i] = stance, label
         self._com[i], self._feet[i] = snapshot.p_world_com, snapshot.p_world_feet
         self._count += 1
-        torque = float(np.max(np.abs(state.tau) / self._model.torque_limits))
-        speed = float(np.max(np.abs(state.v[6:]) / self._model.speed_limits))
-        self.peak_torque_ratio = max(self.peak_torque_ratio, torque)
-        self.peak_speed_ratio = max(self.peak_speed_ratio, speed)
+        np.maximum(self._peak_torque, np.abs(state.tau), out=self._peak_torque)
+        np.maximum(self._peak_speed, np.abs(state.v[6:]), out=self._peak_speed)
+
+    @property
+    def peak_torque_ratio(self) -> float:
+        """Greatest |tau| / limit of any joint so far."""
+        return float(np.max(self._peak_torque / self._model.torque_limits))
+
+    @property
+    def peak_speed_ratio(self) -> float:
+        """Greatest |joint velocity| / limit of any joint so far."""
+        return float(np.max(self._peak_speed / self._model.speed_limits))
 
     def samples(self, rate: float = 100.0) -> Samples:
         """What the ring holds, thinned to about ``rate`` samples a second.

@@ -86,26 +86,24 @@ class FallDetector:
             may_lie: whether the belly may be on the ground.
         """
         state, config = snapshot.state, self._config
-        when = f"fell at t={state.time:.2f} s"
+        lowest_foot = min(snapshot.p_world_feet[:, 2].tolist())
+        height = float(state.q[2]) - lowest_foot
+        is_touching = not may_lie and trunk_clearance(snapshot, lowest_foot - FOOT_RADIUS) < TOUCH
+        has_sunk = not may_lie and sag > config.sink_limit
+        leans = lean > config.lean_limit
+        what = None
         if state.tilt > config.tilt_limit:
             roll, pitch, _ = (round(angle) for angle in np.degrees(state.rpy).tolist())
-            return f"{when}: roll {roll} deg, pitch {pitch} deg"
-        lowest_foot = float(snapshot.p_world_feet[:, 2].min())
-        height = float(state.q[2]) - lowest_foot
-        low = f"base {100 * height:.0f} cm above the feet"
-        if not may_lie and height < config.height_limit:
-            return f"{when}: {low}"
-        clearance = trunk_clearance(snapshot, lowest_foot - FOOT_RADIUS)
-        is_touching = not may_lie and clearance < TOUCH
-        if self._lasts("touch", config.touch_limit, state.time, holds=is_touching):
-            return f"{when}: trunk on the ground, {low}"
-        has_sunk = not may_lie and sag > config.sink_limit
-        if self._lasts("sink", config.sink_limit_time, state.time, holds=has_sunk):
-            return f"{when}: trunk {100 * sag:.0f} cm below where it should be"
-        leans = lean > config.lean_limit
-        if self._lasts("lean", config.lean_limit_time, state.time, holds=leans):
-            return f"{when}: trunk tilted {np.degrees(lean):.0f} deg from where it should be"
-        return None
+            what = f"roll {roll} deg, pitch {pitch} deg"
+        elif not may_lie and height < config.height_limit:
+            what = f"base {100 * height:.0f} cm above the feet"
+        elif self._lasts("touch", config.touch_limit, state.time, holds=is_touching):
+            what = f"trunk on the ground, base {100 * height:.0f} cm above the feet"
+        elif self._lasts("sink", config.sink_limit_time, state.time, holds=has_sunk):
+            what = f"trunk {100 * sag:.0f} cm below where it should be"
+        elif self._lasts("lean", config.lean_limit_time, state.time, holds=leans):
+            what = f"trunk tilted {np.degrees(lean):.0f} deg from where it should be"
+        return None if what is None else f"fell at t={state.time:.2f} s: {what}"
 
     def _lasts(self, what: str, limit: float, now: float, *, holds: bool) -> bool:
         """Whether ``what`` has held without a break for longer than ``limit`` [s]."""

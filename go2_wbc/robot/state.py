@@ -64,8 +64,8 @@ class RobotState:
     @property
     def tilt(self) -> float:
         """Angle [rad] between the base's z axis and the vertical, 0 to pi."""
-        x, y = self.q[3], self.q[4]
-        return float(np.arccos(np.clip(1 - 2 * (x * x + y * y), -1.0, 1.0)))
+        x, y = self.q[3:5].tolist()
+        return math.acos(min(max(1 - 2 * (x * x + y * y), -1.0), 1.0))
 
     @property
     def joint_positions(self) -> Float[np.ndarray, "12"]:

@@ -324,13 +324,17 @@ class MujocoPlant(Plant):
 
     def _accept(self, command: JointCommand) -> None:
         """Copies ``command`` if it is good."""
-        rows = {name: getattr(command, name) for name in _FIELDS}
-        for name, row in rows.items():
+        rows = (command.tau, command.q_des, command.v_des, command.kp, command.kd)
+        for name, row in zip(_FIELDS, rows, strict=True):
             if row.shape != (12,):
                 raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
-            if not np.isfinite(row).all():
-                raise CommandError(f"command.{name} is not finite: {row}")
-        self._command = np.array(tuple(rows.values()), dtype=float)
+        accepted = np.array(rows, dtype=float)
+        if not np.isfinite(accepted).all():
+            name, row = next(
+                (n, r) for n, r in zip(_FIELDS, rows, strict=True) if not np.isfinite(r).all()
+            )
+            raise CommandError(f"command.{name} is not finite: {row}")
+        self._command = accepted
 
     def _motor_law(self) -> Float[np.ndarray, "12"]:
         """Torque of every motor now, clipped to its limit."""
