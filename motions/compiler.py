@@ -80,12 +80,16 @@ class CompiledPlan(MotionPlan):
         share = phase.load_share(self.ramp)
         return reference(TrackedPoint.COM, body, joints, phase.stance, share)
 
-    def _curves_at(self, t: float) -> tuple[Float[np.ndarray, "18"], ...]:
-        inside = min(max(t, 0.0), self.duration)
-        value = self.curves(inside)
+    def _curves_at(self, t: float) -> Float[np.ndarray, "3 18"]:
+        """Values, rates and accelerations of all curves: a cubic and its two derivatives."""
+        knots, end = self.curves.x, self.duration
+        inside = min(max(t, 0.0), end)
+        piece = min(int(np.searchsorted(knots, inside, side="right")), len(knots) - 1) - 1
+        s = inside - float(knots[piece])
+        powers = np.array([[s**3, s * s, s, 1], [3 * s * s, 2 * s, 1, 0], [6 * s, 2, 0, 0]])
         if inside != t:
-            return value, np.zeros(18), np.zeros(18)
-        return value, self.curves(t, 1), self.curves(t, 2)
+            powers[1:] = 0.0  # the ends are held
+        return powers @ self.curves.c[:, piece]
 
 
 def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
