@@ -113,7 +113,7 @@ PUSHES = {
     "sitting, forward": Push(_sit, (42.0, 0.0, 0.0)),
     "sitting, aslant": Push(_sit, (21.0, 21.0, 0.0)),
     "ready to walk": Push(_trot_ready, (29.4, 29.4, 0.0)),
-    "walking, forward": Push(_walk, (45.0, 0.0, 0.0)),
+    "walking, forward": Push(_walk, (55.0, 0.0, 0.0)),
     "walking, aslant": Push(_walk, (29.4, 29.4, 0.0)),
     "turning": Push(_trot_ready, (-45.0, 0.0, 0.0), lambda go2: go2.turn_left(1.5)),
     "push-ups": Push(_nothing, (26.0, 0.0, 0.0), lambda go2: go2.play("push_ups"), 3.0),
