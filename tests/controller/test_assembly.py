@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -99,3 +101,18 @@ def test_the_last_ticks_are_recorded_for_as_long_as_is_asked() -> None:
     built.pilot.wait(30 * plant.control_period)
     built.close()
     assert len(built.runner.loop.telemetry.samples(1e6).unfinished.time) == 10
+
+
+def test_nothing_is_left_to_compile_when_the_robot_has_been_taken_over() -> None:
+    """A loop that waited for a compiler in the middle of standing up would be taken for dead."""
+    script = (
+        "import sys\n"
+        "from controller import GO2Controller\n"
+        "go2 = GO2Controller()\n"
+        "before = set(sys.modules)\n"
+        "assert go2.stand() and go2.walk() and go2.sit()\n"
+        "late = set(sys.modules) - before\n"
+        "print(sorted(name for name in late if name.startswith('go2_wbc.kernels')))\n"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"

@@ -1,0 +1,14 @@
+"""All kernels at once, before a robot is taken over: a loop must not wait for a compiler."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+KERNELS = ("derivation", "condensed", "locomotion")
+"""Modules of this package whose import compiles, or loads what was compiled."""
+
+
+def load_kernels() -> None:
+    """Compile every kernel, or load it: half a second, or about 20 s the first time."""
+    for name in KERNELS:
+        import_module(f"go2_wbc.kernels.{name}")
