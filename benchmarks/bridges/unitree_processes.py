@@ -46,6 +46,8 @@ FLOOD: Final = 5000.0
 """Samples per second."""
 DOMAINS: Final = range(100, 230)
 """DDS domains of which each scene takes one."""
+DISCOVERY_PORTS: Final = (7400, 7401)
+"""UDP ports that a participant of domain 0 shares; 250 more for each domain (RTPS 2.5, 9.6.1)."""
 _LOCK_PORT: Final = 27000
 """TCP port on the loopback that stands for domain 0: who has bound it has the domain."""
 _tries = itertools.count(os.getpid())
@@ -59,6 +61,9 @@ def own_domain() -> Iterator[int]:
         with socket.socket() as lock:
             try:
                 lock.bind(("127.0.0.1", _LOCK_PORT + domain))
+                for port in DISCOVERY_PORTS:  # which any program's outgoing socket may hold
+                    with socket.socket(type=socket.SOCK_DGRAM) as probe:
+                        probe.bind(("", port + 250 * domain))
             except OSError:
                 continue
             yield domain

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+import socket
 import subprocess
 import sys
 from collections.abc import Iterator
 
 import pytest
 
+from benchmarks.bridges import unitree_processes
 from benchmarks.bridges.processes import wait_until
 from benchmarks.bridges.unitree import measure_drive
 from benchmarks.bridges.unitree_faults import DAMPED, garbage
@@ -89,3 +92,16 @@ def test_without_consent_nothing_is_touched() -> None:
 
     with pytest.raises(CommandError, match="--i-have-the-remote-in-hand"):
         UnitreePlant("lo", 1)
+
+
+def test_a_domain_whose_port_another_program_holds_is_not_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Any program's outgoing socket may get it: a simulator could not join, and 20 tests failed.
+    first, second = 200, 201
+    monkeypatch.setattr(unitree_processes, "DOMAINS", (first, second))
+    monkeypatch.setattr(unitree_processes, "_tries", itertools.count())
+    with socket.socket(type=socket.SOCK_DGRAM) as other:
+        other.bind(("127.0.0.1", 7400 + 250 * first))
+        with own_domain() as domain:
+            assert domain == second
