@@ -98,7 +98,8 @@ def test_a_domain_whose_port_another_program_holds_is_not_taken(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # Any program's outgoing socket may get it: a simulator could not join, and 20 tests failed.
-    first, second = 200, 201
+    with own_domain() as first, own_domain() as second:
+        pass
     monkeypatch.setattr(unitree_processes, "DOMAINS", (first, second))
     monkeypatch.setattr(unitree_processes, "_tries", itertools.count())
     with socket.socket(type=socket.SOCK_DGRAM) as other:
