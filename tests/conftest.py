@@ -11,6 +11,7 @@ from pathlib import Path
 
 from jaxtyping import install_import_hook
 
+from go2_wbc.kernels.loading import load_kernels
 from tests import typechecker
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -25,6 +26,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.active_set",  # compiled: a kernel cannot be wrapped
         "go2_wbc.kernels.condensed",
         "go2_wbc.kernels.derivation",
+        "go2_wbc.kernels.loading",  # loaded here
         "go2_wbc.kernels.locomotion",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",
@@ -49,3 +51,6 @@ def checked_modules() -> list[str]:
 
 if IS_CHECKING:
     install_import_hook(checked_modules(), f"{typechecker.__name__}.checked")
+
+# Compiled before any test, so that none of them, nor a script it starts, says that it compiles.
+load_kernels()
