@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.legs import LEGS, Leg
+from go2_wbc.planning.playback import Deviation
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
 from motions.postures import SIT_POSE, STAND_HEIGHT, TUCKED_JOINTS
@@ -23,6 +24,12 @@ BELLY_HEIGHT = 0.095
 """Height [m] of the base above the lowest foot below which the belly is down: 0.085 at rest."""
 FOLD_TOLERANCE = 0.5
 """Angle [rad] from the tucked legs' joints that still counts as folded."""
+PLACE_DEVIATION = 0.03
+"""Distance [m] that the tracked point may be off its plan, on the average."""
+ATTITUDE_DEVIATION = 0.1
+"""Angle [rad] that the trunk may be off its plan, on the average."""
+JOINT_DEVIATION = 0.2
+"""Angle [rad] that the worst joint of a raised leg may be off its plan, on the average."""
 
 
 def unfolded_legs(snapshot: Snapshot) -> list[Leg]:
@@ -89,4 +96,22 @@ def posture_measurements(snapshot: Snapshot) -> dict[str, float]:
         "yaw [deg]": yaw,
         "feet in contact": float(snapshot.state.feet_in_contact.sum()),
         "base speed [m/s]": float(np.linalg.norm(snapshot.state.v[:3])),
+    }
+
+
+def is_small(deviation: Deviation) -> bool:
+    """Whether the robot can be said to have done what was planned."""
+    return (
+        deviation.place < PLACE_DEVIATION
+        and deviation.attitude < ATTITUDE_DEVIATION
+        and deviation.joints < JOINT_DEVIATION
+    )
+
+
+def deviation_measurements(deviation: Deviation) -> dict[str, float]:
+    """By name with unit."""
+    return {
+        "mean place off plan [m]": deviation.place,
+        "mean attitude off plan [deg]": float(np.degrees(deviation.attitude)),
+        "mean joints off plan [deg]": float(np.degrees(deviation.joints)),
     }

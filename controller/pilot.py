@@ -18,9 +18,11 @@ from controller.behaviours.walking import Walking
 from controller.checks import (
     LYING_HEIGHT,
     base_height,
+    deviation_measurements,
     ground_height,
     is_lying,
     is_sitting,
+    is_small,
     is_standing,
 )
 from controller.modes import Mode
@@ -252,8 +254,9 @@ class Pilot:
             at_rest = self._settle(plan.exit, plan.name)
         finally:
             self.playing = None
-        measured = {**at_rest, **behaviour.deviation.measurements()}
-        if not behaviour.deviation.is_small:
+        deviation = behaviour.deviation
+        measured = {**at_rest, **deviation_measurements(deviation)}
+        if not is_small(deviation):
             raise Aborted(f"{plan.name} went another way: {listed(measured)}", measured)
         return measured
 

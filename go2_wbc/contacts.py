@@ -60,12 +60,16 @@ class ContactSchedule:
         times: event times [s]; ``times[0]`` is the start (0 for a periodic schedule).
         modes: (n, 4) feet in stance from each event on.
         period: seconds after which a gait repeats, or None.
+        since: (n, 4) when each foot's contact changed last, between an event and the next [s];
+            -inf if never.
+        until: (n, 4) when it changes next [s]; inf if never.
     """
 
     times: tuple[float, ...]
     modes: Bool[np.ndarray, "n 4"]
     period: float | None = None
-    _changes: tuple[Float[np.ndarray, " k"], ...] = field(init=False, repr=False)
+    since: Float[np.ndarray, "n 4"] = field(init=False, repr=False)
+    until: Float[np.ndarray, "n 4"] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the order of the events and find each foot's changes."""
@@ -77,8 +81,11 @@ class ContactSchedule:
                 f"periodic contact events must start at 0 and end before the period of "
                 f"{self.period} s, got {self.times}"
             )
-        changes = tuple(self._changes_of(leg) for leg in LEGS)
-        object.__setattr__(self, "_changes", changes)
+        changes = [self._changes_of(leg) for leg in LEGS]
+        upcoming = [np.searchsorted(times, self.times, side="right") for times in changes]
+        pairs = list(zip(changes, upcoming, strict=True))
+        object.__setattr__(self, "since", np.column_stack([times[i - 1] for times, i in pairs]))
+        object.__setattr__(self, "until", np.column_stack([times[i] for times, i in pairs]))
 
     def _changes_of(self, leg: int) -> Float[np.ndarray, " k"]:
         """When the foot's contact changes, with the last time before these and the next after."""
@@ -98,12 +105,8 @@ class ContactSchedule:
             t = (t + TIE) % self.period
             t = max(t - TIE, 0.0)
         index = max(bisect_right(self.times, t + TIE) - 1, 0)
-        elapsed, remaining = np.empty(4), np.empty(4)
-        for leg, changes in zip(LEGS, self._changes, strict=True):
-            upcoming = bisect_right(changes, t + TIE)
-            elapsed[leg] = max(t - changes[upcoming - 1], 0.0)
-            remaining[leg] = changes[upcoming] - t
-        return ContactPhase(self.modes[index].copy(), elapsed, remaining)
+        elapsed = np.maximum(t - self.since[index], 0.0)
+        return ContactPhase(self.modes[index].copy(), elapsed, self.until[index] - t)
 
 
 @dataclass(frozen=True, slots=True)

@@ -206,6 +206,10 @@ class MotionPlan(ABC):
     def at(self, t: float) -> Reference:
         """The reference ``t`` seconds after the start; the ends are held outside [0, duration]."""
 
+    def row_at(self, t: float) -> Float[np.ndarray, " size"]:
+        """The numbers of ``at(t)`` in one row; a plan that can fill it by a kernel does so."""
+        return self.at(t).row
+
 
 @dataclass(frozen=True, slots=True)
 class JointReference:

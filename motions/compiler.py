@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
@@ -20,12 +20,13 @@ from scipy.interpolate import CubicSpline
 from go2_wbc.contacts import ContactSchedule
 from go2_wbc.curves import CurvePoint
 from go2_wbc.errors import TimelineError
+from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from motions.balance import Balancer, Problem
 from motions.keys import Mark
-from motions.plan import reference
+from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, reference
 from motions.timeline import Timeline
 from motions.tracks import (
     LegTracks,
@@ -65,6 +66,14 @@ class CompiledPlan(MotionPlan):
     ramp: float
     problems: tuple[Problem, ...]
     spans: Mapping[str, tuple[float, float]]
+    _tables: tuple[Float[np.ndarray, "..."], ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Bind what the kernel reads."""
+        contacts, curves = self.contacts, self.curves
+        modes, events = contacts.modes.astype(float), np.array(contacts.times)
+        tables = (curves.x, curves.c, events, modes, contacts.since, contacts.until)
+        object.__setattr__(self, "_tables", tables)
 
     @property
     def duration(self) -> float:  # type: ignore[override]
@@ -73,6 +82,18 @@ class CompiledPlan(MotionPlan):
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""
+        return Reference.of_row(self.row_at(t))
+
+    def row_at(self, t: float) -> Float[np.ndarray, " size"]:
+        """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
+        from go2_wbc.kernels.playing import planned_at
+
+        row = np.empty(REFERENCE.size)
+        planned_at(*self._tables, self.ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, t, row)
+        return row
+
+    def readable_at(self, t: float) -> Reference:
+        """The same as ``at``, step by step: what the kernel is held to."""
         curves, phase = self._curves_at(t), self.contacts.at(t)
         body, joints = (
             CurvePoint(*(curve[part] for curve in curves)) for part in (slice(6), slice(6, None))

@@ -1,4 +1,7 @@
-"""References of a trunk that moves over feet that stand."""
+"""References of a trunk that moves over feet that stand.
+
+``reference`` says what they are; ``reference_row`` is its compiled form.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.curves import CurvePoint
+from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.reference import BodyTarget, LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import angular_velocity_from_rpy, rotation_from_rpy
 
@@ -54,3 +58,17 @@ def reference(
         v_joints=joints.rate,
         a_joints=joints.acceleration,
     )
+
+
+def reference_row(point: TrackedPoint, body: CurvePoint) -> Float[np.ndarray, " size"]:
+    """The row of ``reference`` for four feet that stand, by a kernel."""
+    from go2_wbc.kernels.playing import planned
+
+    row, curves = np.empty(REFERENCE.size), np.zeros((3, 18))
+    curves[0, :6], curves[1, :6], curves[2, :6] = body.value, body.rate, body.acceleration
+    is_com = 1.0 if point is TrackedPoint.COM else 0.0
+    planned(is_com, curves, _ALL, _ALL, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, row)
+    return row
+
+
+_ALL = np.ones(4)

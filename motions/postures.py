@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from go2_wbc.curves import CurvePoint, Segment
 from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
-from motions.plan import reference
+from motions.plan import reference, reference_row
 
 STAND_HEIGHT = 0.29
 """Height [m] of the CoM above the ground when standing."""
@@ -53,6 +53,14 @@ class PosturePlan(MotionPlan):
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""
+        return Reference.of_row(self.row_at(t))
+
+    def row_at(self, t: float) -> Float[np.ndarray, " size"]:
+        """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
+        return reference_row(self.point, self.body.at(t))
+
+    def readable_at(self, t: float) -> Reference:
+        """The same as ``at``, step by step: what the kernel is held to."""
         return reference(self.point, self.body.at(t), _STILL, np.ones(4, dtype=bool), np.ones(4))
 
 

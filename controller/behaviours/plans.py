@@ -3,87 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from controller.behaviours.base import Behaviour
 from controller.behaviours.safe_return import SafeReturn
-from go2_wbc.planning.correction import SteadyStateCorrection, tracked_position
-from go2_wbc.reference import Anchor, LegTask, MotionPlan, Posture, Reference
+from go2_wbc.planning.correction import tracked_position
+from go2_wbc.planning.playback import Deviation, PlanFollower, Playback
+from go2_wbc.reference import Anchor, MotionPlan, Posture, Reference
 from go2_wbc.robot.model import FOOT_RADIUS
-from go2_wbc.robot.rotations import log_rotation, wrap_angle, yaw_rotation
+from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
 
 LOW = 0.15
 """Height [m] of the trunk over the ground below which a posture may begin on the belly."""
 RISEN = 0.22
 """Height [m] of the tracked point over the ground from which on the robot has left its belly."""
-PLACE_TOLERANCE = 0.03
-"""Distance [m] that the tracked point may be off its plan, on the average."""
-ATTITUDE_TOLERANCE = 0.1
-"""Angle [rad] that the trunk may be off its plan, on the average."""
-JOINT_TOLERANCE = 0.2
-"""Angle [rad] that the worst joint of a raised leg may be off its plan, on the average."""
-
-
-@dataclass(slots=True)
-class Deviation:
-    """How far a robot has been off its plan, on the average: place [m], attitude, joints [rad]."""
-
-    place: float = 0.0
-    attitude: float = 0.0
-    joints: float = 0.0
-    _ticks: int = 0
-    _raised_ticks: int = 0
-
-    def note(self, snapshot: Snapshot, reference: Reference) -> None:
-        """Add one tick; ``reference`` is in the world."""
-        body = reference.body
-        place = np.linalg.norm(body.p_world - tracked_position(snapshot, body.point))
-        attitude = np.linalg.norm(log_rotation(body.R_world_base @ snapshot.R_world_base.T))
-        self._ticks += 1
-        self.place += (float(place) - self.place) / self._ticks
-        self.attitude += (float(attitude) - self.attitude) / self._ticks
-        raised = np.repeat([task is LegTask.JOINTS for task in reference.legs], 3)
-        if raised.any():
-            off = np.abs(reference.q_joints - snapshot.state.joint_positions)[raised].max()
-            self._raised_ticks += 1
-            self.joints += (float(off) - self.joints) / self._raised_ticks
-
-    @property
-    def is_small(self) -> bool:
-        """Whether the robot can be said to have done what was planned."""
-        return (
-            self.place < PLACE_TOLERANCE
-            and self.attitude < ATTITUDE_TOLERANCE
-            and self.joints < JOINT_TOLERANCE
-        )
-
-    def measurements(self) -> dict[str, float]:
-        """By name with unit."""
-        return {
-            "mean place off plan [m]": self.place,
-            "mean attitude off plan [deg]": float(np.degrees(self.attitude)),
-            "mean joints off plan [deg]": float(np.degrees(self.joints)),
-        }
 
 
 class PlayPlan(Behaviour):
-    """Play a plan where the robot stands.
+    """Play a plan where the robot stands."""
 
-    Attributes:
-        deviation: how far the robot has been off the plan.
-    """
+    _anchor: Anchor
+    _follower: PlanFollower
 
     def __init__(self, plan: MotionPlan) -> None:
         """Play ``plan``."""
         self.label, self.duration = plan.name, plan.duration
         self.plan = plan
-        self.deviation = Deviation()
         self._start = self._last = 0.0
-        self._correction = SteadyStateCorrection()
         self._must_return = False
         self._return: SafeReturn | None = None
 
@@ -92,6 +41,7 @@ class PlayPlan(Behaviour):
         super().start(snapshot)
         self._last = self._start
         self._anchor = Anchor.of_feet(snapshot.p_world_feet, FOOT_RADIUS)
+        self._follower = Playback(self._anchor)
 
     def return_safely(self) -> None:
         """Leave the plan: go to its nearest instant on four loaded feet; any thread may call."""
@@ -102,21 +52,25 @@ class PlayPlan(Behaviour):
         """Share of the plan that has been played, 0 to 1; 0 before ``start``."""
         return min(1.0, (self._last - self._start) / self.plan.duration)
 
+    @property
+    def deviation(self) -> Deviation:
+        """How far the robot has been off the plan since ``start``."""
+        return self._follower.deviation
+
     def update(self, snapshot: Snapshot) -> Reference:
         """The plan's reference of this instant, in the world."""
         now = snapshot.state.time
-        reference = self._planned(now).placed(self._anchor)
-        self.deviation.note(snapshot, reference)
-        body = self._correction.corrected(reference.body, snapshot, now - self._last)
+        row = self._planned(now)
+        reference = self._follower.follow(row, snapshot, now - self._last)
         self._last = now
-        return replace(reference, body=body)
+        return reference
 
-    def _planned(self, now: float) -> Reference:
+    def _planned(self, now: float) -> Float[np.ndarray, " size"]:
         if self._must_return and self._return is None:
             self._return = SafeReturn(self.plan, self._last - self._start)
         if self._return is not None:
-            return self._return.advance(now - self._last)
-        return self.plan.at(now - self._start)
+            return self._return.advance(now - self._last).row
+        return self.plan.row_at(now - self._start)
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the plan is over, or the way back from it."""

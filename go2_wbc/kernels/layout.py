@@ -150,3 +150,9 @@ LOCOMOTION = Layout(
     p_base_feet_nominal=(4, 3),
 )
 """Numbers of the locomotion planner: gait, configuration, robot."""
+
+CORRECTION = Layout(rate=(), window=(6,), limit=(6,))
+"""Numbers of the steady-state correction."""
+
+PLAYBACK = Layout(offset=(6,), place=(), attitude=(), joints=(), ticks=(), raised_ticks=())
+"""State of a playback: the correction, and how far the robot has been off its plan."""

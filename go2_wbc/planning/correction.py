@@ -47,6 +47,16 @@ class CorrectionConfig:
         """Raise ConfigError for a negative number."""
         require_not_negative(self, *(f.name for f in fields(self)))
 
+    @property
+    def window(self) -> Float[np.ndarray, "6"]:
+        """Of position, three times, and angle."""
+        return np.repeat([self.position_window, self.angle_window], 3)
+
+    @property
+    def limit(self) -> Float[np.ndarray, "6"]:
+        """Of position, three times, and angle."""
+        return np.repeat([self.position_limit, self.angle_limit], 3)
+
 
 class SteadyStateCorrection:
     """Integrates the body's pose error."""
@@ -55,9 +65,7 @@ class SteadyStateCorrection:
         """Start without correction."""
         self._config = config or CorrectionConfig()
         self._offset = np.zeros(6)
-        config = self._config
-        self._window = np.repeat([config.position_window, config.angle_window], 3)
-        self._limit = np.repeat([config.position_limit, config.angle_limit], 3)
+        self._window, self._limit = self._config.window, self._config.limit
 
     def update(self, error: Float[np.ndarray, "6"], dt: float) -> Float[np.ndarray, "6"]:
         """The offset to add to the reference, after ``dt`` seconds of ``error``.

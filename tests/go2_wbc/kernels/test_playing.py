@@ -1,0 +1,108 @@
+"""The kernels of play are held to the readable plans and the readable playback."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from go2_wbc.contacts import ContactSchedule
+from go2_wbc.curves import Ease, Segment
+from go2_wbc.kernels.playing import exp_rotation, log_rotation
+from go2_wbc.planning.correction import CorrectionConfig
+from go2_wbc.planning.playback import Playback, ReadablePlayback
+from go2_wbc.reference import Anchor, BodyTarget, LegTask, Posture, Reference, TrackedPoint
+from go2_wbc.robot import rotations
+from go2_wbc.robot.model import RobotModel
+from motions import compile_motion
+from motions.postures import PosturePlan
+from tests.engine_helpers import random_rotation, random_state
+
+MODEL = RobotModel()
+TICK = 0.002
+ROUNDING = 1e-10
+ODD = CorrectionConfig(
+    rate=1.7, position_limit=0.013, position_window=0.31, angle_limit=0.11, angle_window=0.47
+)
+"""No two numbers alike, so that one in another's place is seen."""
+
+
+@pytest.mark.parametrize("name", ["high_five", "dance", "wave", "sit_pretty", "tap_dance"])
+def test_a_plan_is_the_readable_one_at_every_instant(name: str) -> None:
+    plan, rng = compile_motion(name, MODEL), np.random.default_rng(3)
+    instants = rng.uniform(-0.3, plan.duration + 0.3, size=400)
+    events = np.add.outer(plan.contacts.times, [-2e-9, -5e-10, 0.0, 5e-10, 2e-9]).ravel()
+    for t in (*instants.tolist(), *events.tolist(), *plan.curves.x[:50].tolist(), plan.duration):
+        ours, theirs = plan.row_at(t), plan.readable_at(t).row
+        np.testing.assert_allclose(ours, theirs, atol=1e-9, rtol=0, err_msg=f"t={t}")
+
+
+@pytest.mark.parametrize("point", TrackedPoint)
+def test_a_posture_is_the_readable_one_at_every_instant(point: TrackedPoint) -> None:
+    rng = np.random.default_rng(4)
+    start, end = rng.normal(size=(2, 6))
+    plan = PosturePlan("odd", Posture.LIE, Posture.SIT, point, Segment(start, end, 0.7, Ease.CUBIC))
+    for t in rng.uniform(-0.2, 0.9, size=200).tolist():
+        theirs = plan.readable_at(t)
+        np.testing.assert_allclose(plan.row_at(t), theirs.row, atol=ROUNDING, rtol=0)
+        assert plan.at(t).legs == theirs.legs
+
+
+def random_reference(rng: np.random.Generator, near: np.ndarray | None) -> Reference:
+    """Every number another one; the attitude anything, or close to ``near``."""
+    R = random_rotation(rng) if near is None else near @ rotations.exp_rotation(
+        rng.normal(scale=0.2, size=3)
+    )
+    vectors = rng.normal(scale=0.3, size=(5, 3))
+    p, v, a, w, dw = vectors
+    point = TrackedPoint.COM if rng.random() < 0.5 else TrackedPoint.BASE
+    legs = tuple(LegTask(int(task)) for task in rng.integers(3, size=4))
+    loads, feet, joints = rng.uniform(size=(2, 4)), rng.normal(size=(3, 4, 3)), rng.normal(size=(3, 12))
+    return Reference(BodyTarget(point, p, v, a, R, w, dw), legs, *loads, *feet, *joints)
+
+
+@pytest.mark.parametrize("config", [CorrectionConfig(), ODD], ids=["default", "odd"])
+def test_a_playback_is_the_readable_one_tick_by_tick(config: CorrectionConfig) -> None:
+    rng = np.random.default_rng(5)
+    anchor = Anchor(np.array([0.31, -0.17, 0.043]), 1.3)
+    ours, theirs = Playback(anchor, config), ReadablePlayback(anchor, config)
+    turn = rotations.yaw_rotation(-anchor.yaw)
+    corrected = 0
+    for tick in range(600):
+        state = random_state(rng, tilt=0.3)
+        near = turn @ state.R_world_base if tick % 3 else None
+        reference = random_reference(rng, near)
+        q = state.q.copy()
+        q[:3] = anchor.p_world + turn.T @ reference.body.p_world + rng.normal(scale=0.03, size=3)
+        snapshot = MODEL.snapshot(replace(state, q=q))
+        plan = reference.row.copy()
+        tracked = ours.follow(plan, snapshot, 0.02)
+        expected = theirs.follow(plan, snapshot, 0.02)
+        np.testing.assert_allclose(tracked.row, expected.row, atol=ROUNDING, rtol=0)
+        np.testing.assert_array_equal(plan, reference.row, "the plan's own row is changed")
+        corrected += bool(np.abs(tracked.row - reference.placed(anchor).row).max() > 1e-6)
+        found, wanted = ours.deviation, theirs.deviation
+        assert found.place == pytest.approx(wanted.place, abs=ROUNDING)
+        assert found.attitude == pytest.approx(wanted.attitude, abs=1e-8)
+        assert found.joints == pytest.approx(wanted.joints, abs=ROUNDING)
+    assert corrected > 500
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 0.3, 2.0, 3.1, np.pi - 1e-7])
+def test_logarithm_and_exponential_are_pinocchios(angle: float) -> None:
+    rng = np.random.default_rng(6)
+    for axis in (*np.eye(3), *-np.eye(3), *rng.normal(size=(20, 3))):
+        vector = angle * axis / np.linalg.norm(axis)
+        R, found = np.empty((3, 3)), np.empty(3)
+        exp_rotation(vector, R)
+        np.testing.assert_allclose(R, rotations.exp_rotation(vector), atol=1e-14)
+        log_rotation(R, found)
+        np.testing.assert_allclose(found, vector, atol=1e-8)
+
+
+def test_a_schedule_holds_its_ends() -> None:
+    schedule = ContactSchedule((0.0, 1.0), np.array([[1, 1, 1, 1], [1, 0, 1, 1]], dtype=bool))
+    assert np.isneginf(schedule.since[0]).all()
+    np.testing.assert_array_equal(schedule.until[0], [np.inf, 1.0, np.inf, np.inf])
+    np.testing.assert_array_equal(schedule.since[1], [-np.inf, 1.0, -np.inf, -np.inf])
