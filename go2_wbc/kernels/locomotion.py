@@ -154,9 +154,9 @@ def integrate(snapshot, s, c, dt, command):
         s[_POSITION] = snapshot[_P_COM] + x * c[_LEASH] / distance
         s[_POSITION + 1] = snapshot[_P_COM + 1] + y * c[_LEASH] / distance
     sag = s[_GROUND] + c[_HEIGHT] - snapshot[_P_COM + 2]
-    if abs(sag) < c[_WINDOW]:
-        offset = s[_HEIGHT_OFFSET] + c[_RATE] * dt * sag
-        s[_HEIGHT_OFFSET] = min(max(offset, -c[_LIMIT]), c[_LIMIT])
+    counted = min(max(sag, -c[_WINDOW]), c[_WINDOW])
+    offset = s[_HEIGHT_OFFSET] + c[_RATE] * dt * counted
+    s[_HEIGHT_OFFSET] = min(max(offset, -c[_LIMIT]), c[_LIMIT])
 
 
 @kernel("void(f8[::1], f8[::1], f8[::1], b1[::1])")

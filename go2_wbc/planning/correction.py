@@ -4,12 +4,13 @@ A task of the whole-body QP is a proportional-derivative law: under an unknown p
 friction its error settles at a value that is not zero. The correction adds the integral of the
 error to the reference,
 
-    o' = rate * e  where |e| < window, else 0;   |o| <= limit,
+    o' = rate * clip(e, -window, window);   |o| <= limit,
 
-per axis in the world, so that the measured body settles where it was asked to be. The window is an
-anti-windup (conditional integration: Astrom & Hagglund, PID Controllers, 1995, sec. 3.5): while the
-body is on its way the error is no steady-state error. The limit bounds what a contact that gives
-way can store up.
+per axis in the world, so that the measured body settles where it was asked to be. The window bounds
+how fast the correction grows. An error beyond it still counts: a body that a load or dry friction
+holds far off would otherwise stay there for good. The limit bounds what is stored up (anti-windup
+by saturation: Astrom & Hagglund, PID Controllers, 1995, sec. 3.5), for instance while the body is
+on its way, or by a contact that gives way.
 """
 
 from __future__ import annotations
@@ -29,19 +30,23 @@ from go2_wbc.validation import require_not_negative
 class CorrectionConfig:
     """Numbers of the correction.
 
+    The angles were found on the simulated robot: a load of 4 kg, 5 cm beside its middle, leans it
+    by 15 deg where errors beyond 0.1 rad are dropped, by 9 with a limit of 0.15 rad, by 2 with
+    these.
+
     Attributes:
         rate: share of the remaining error that is added per second [1/s].
         position_limit: greatest correction [m] per axis.
-        position_window: errors [m] beyond this are no steady-state errors and do not count.
+        position_window: an error [m] beyond this counts as this.
         angle_limit: greatest correction [rad] per axis.
-        angle_window: errors [rad] beyond this do not count.
+        angle_window: an error [rad] beyond this counts as this.
     """
 
     rate: float = 2.0
     position_limit: float = 0.06
     position_window: float = 0.04
-    angle_limit: float = 0.15
-    angle_window: float = 0.1
+    angle_limit: float = 0.3
+    angle_window: float = 0.3
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a negative number."""
@@ -74,7 +79,7 @@ class SteadyStateCorrection:
             error: reference minus measured: position [m], rotation vector [rad], in the world.
             dt: [s].
         """
-        counted = np.where(np.abs(error) < self._window, error, 0.0)
+        counted = np.clip(error, -self._window, self._window)
         self._offset = np.clip(
             self._offset + self._config.rate * dt * counted, -self._limit, self._limit
         )
