@@ -25,9 +25,7 @@ _BODY_R, _BODY_W, _BODY_DW, _LEGS = (_T[n] for n in ("R_world_base", "w_world", 
 _F_MIN, _F_MAX = _T["normal_force_min"], _T["normal_force_max"]
 _FOOT_P, _FOOT_V, _FOOT_A = (_T[n] for n in ("p_world_feet", "v_world_feet", "a_world_feet"))
 _JOINT_Q, _JOINT_V, _JOINT_A = (_T[n] for n in ("q_joints", "v_joints", "a_joints"))
-_OFFSET, _PLACE, _ATTITUDE, _OFF_JOINTS = (
-    _S[n] for n in ("offset", "place", "attitude", "joints")
-)
+_OFFSET, _PLACE, _ATTITUDE, _OFF_JOINTS = (_S[n] for n in ("offset", "place", "attitude", "joints"))
 _TICKS, _RAISED_TICKS = _S["ticks"], _S["raised_ticks"]
 _RATE, _WINDOW, _LIMIT = _C["rate"], _C["window"], _C["limit"]
 
@@ -215,10 +213,9 @@ def follow(plan, snapshot, anchor, dt, correction, state, row):
     note(row, snapshot, error, state)
     offset = state[_OFFSET : _OFFSET + 6]
     for i in range(6):
-        if abs(error[i]) < correction[_WINDOW + i]:
-            value = offset[i] + correction[_RATE] * dt * error[i]
-            limit = correction[_LIMIT + i]
-            offset[i] = min(max(value, -limit), limit)
+        window, limit = correction[_WINDOW + i], correction[_LIMIT + i]
+        counted = min(max(error[i], -window), window)
+        offset[i] = min(max(offset[i] + correction[_RATE] * dt * counted, -limit), limit)
     exp_rotation(offset[3:], turn)
     planned_attitude = wanted.copy()
     for i in range(3):

@@ -37,9 +37,7 @@ class PlanFollower(ABC):
     """Turns a plan's references, one a tick, into what is tracked in the world."""
 
     @abstractmethod
-    def follow(
-        self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float
-    ) -> Reference:
+    def follow(self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float) -> Reference:
         """The reference in the world.
 
         Args:
@@ -64,9 +62,7 @@ class Playback(PlanFollower):
         self._correction = CORRECTION.pack([config.rate, config.window, config.limit])
         self._state = np.zeros(PLAYBACK.size)
 
-    def follow(
-        self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float
-    ) -> Reference:
+    def follow(self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float) -> Reference:
         """See ``PlanFollower.follow``."""
         from go2_wbc.kernels.playing import follow
 
@@ -92,9 +88,7 @@ class ReadablePlayback(PlanFollower):
         self._attitudes: list[float] = []
         self._joints: list[float] = []
 
-    def follow(
-        self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float
-    ) -> Reference:
+    def follow(self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float) -> Reference:
         """See ``PlanFollower.follow``."""
         reference = Reference.of_row(plan).placed(self._anchor)
         self._note(reference, snapshot)
