@@ -12,13 +12,11 @@ from __future__ import annotations
 import logging
 from contextlib import suppress
 from dataclasses import dataclass
-from math import acos, isfinite, sqrt
 
 from controller.behaviours.base import Behaviour
 from controller.behaviours.joints import DAMPING, Damped
 from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
-from go2_wbc.planning.correction import tracked_position
 from go2_wbc.plant.base import Plant
 from go2_wbc.reference import JointReference, Reference
 from go2_wbc.robot.model import RobotModel
@@ -74,12 +72,15 @@ class ControlLoop:
             PlantError: if the plant does not answer, or its state is not finite.
         """
         self.plant, self.model, self.wbc, self.telemetry = plant, model, wbc, telemetry
+        from go2_wbc.kernels import supervision  # compiled; importing this module is not
+
+        self._kernels = supervision
         self._safety = safety
         self._falls = FallDetector(safety)
         self._sag = self._lean = 0.0
         self.fault: Fault | None = None
         self.state: RobotState = plant.read()
-        if not _is_finite(self.state):
+        if not self._is_plausible(self.state):
             raise PlantError(f"the first state of the plant is not finite: q={self.state.q}")
         self.snapshot: Snapshot = model.snapshot(self.state)
         self._last_command = JointCommand.damping(DAMPING)
@@ -130,7 +131,7 @@ class ControlLoop:
             self._observe()
             self._guard()
             target = self.behaviour.update(self.snapshot)
-            self._sag, self._lean = _sag_and_lean(target, self.snapshot)
+            self._sag, self._lean = self._sag_and_lean(target)
             command = self._command(target)
             self._last_command = command
             self.plant.write(command)
@@ -144,7 +145,7 @@ class ControlLoop:
 
     def _observe(self) -> None:
         state = self.plant.read()
-        is_finite = _is_finite(state)
+        is_finite = self._is_plausible(state)
         if is_finite and state.time > self.state.time:
             self._unanswered = 0
             self.state = state
@@ -166,6 +167,19 @@ class ControlLoop:
             return
         told = reason if fault is None else f"{reason}, after: {fault.reason}"
         self.abandon(Fault(told, is_fall=True))
+
+    def _sag_and_lean(self, target: Reference | JointReference) -> tuple[float, float]:
+        """Depth [m] of the trunk below where it shall be, and its tilt [rad] from how it shall be.
+
+        0 if nothing is asked of it.
+        """
+        if isinstance(target, JointReference):
+            return 0.0, 0.0
+        return self._kernels.sag_and_lean(target.row, self.snapshot.row)
+
+    def _is_plausible(self, state: RobotState) -> bool:
+        q, v, tau, forces = state.q, state.v, state.tau, state.foot_forces
+        return self._kernels.is_plausible(q, v, tau, forces, UNIT_TOLERANCE)
 
     def _command(self, target: Reference | JointReference) -> JointCommand:
         if isinstance(target, JointReference):
@@ -210,23 +224,3 @@ class ControlLoop:
             _log.warning("QP failure at t=%.3f s, holding the last torque: %s", time, what)
             return self._last_command
         return JointCommand.damping(DAMPING)
-
-
-def _sag_and_lean(target: Reference | JointReference, snapshot: Snapshot) -> tuple[float, float]:
-    """Depth [m] of the trunk below where it shall be, and its tilt [rad] from how it shall be.
-
-    0 if nothing is asked of it.
-    """
-    if isinstance(target, JointReference):
-        return 0.0, 0.0
-    body = target.body
-    sag = body.p_world[2] - tracked_position(snapshot, body.point)[2]
-    between_verticals = float(body.R_world_base[2] @ snapshot.R_world_base[2])
-    return float(sag), acos(min(max(between_verticals, -1.0), 1.0))
-
-
-def _is_finite(state: RobotState) -> bool:
-    # A sum of squares is finite only if every number is.
-    squares = sum(float(a @ a) for a in (state.q, state.v, state.tau, state.foot_forces))
-    quaternion = state.q[3:7]
-    return isfinite(squares) and abs(sqrt(quaternion @ quaternion) - 1.0) < UNIT_TOLERANCE

@@ -10,12 +10,16 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.robot.rotations import yaw_rotation
+
+_set = object.__setattr__  # of a frozen value that is being made
 
 
 class Posture(Enum):
@@ -39,6 +43,7 @@ class LegTask(IntEnum):
 
 
 _LEG_TASKS = tuple(LegTask)
+_BODY_PARTS = ("p_world", "v_world", "a_world", "R_world_base", "w_world", "dw_world")
 
 
 class TrackedPoint(Enum):
@@ -105,17 +110,38 @@ class Reference:
     def __post_init__(self) -> None:
         """Find the feet in stance."""
         stance = np.array([task is LegTask.STANCE for task in self.legs])
-        object.__setattr__(self, "stance", stance)
+        _set(self, "stance", stance)
 
     @staticmethod
     def of_row(row: Float[np.ndarray, " size"]) -> Reference:
-        """The reference whose numbers ``row`` holds (see ``kernels.layout.REFERENCE``)."""
-        is_com, p, v, a, R, w, dw, legs, *rest = REFERENCE.views(row)
-        point = TrackedPoint.COM if is_com else TrackedPoint.BASE
-        body = BodyTarget(point, p, v, a, R, w, dw)
-        reference = Reference(body, tuple(_LEG_TASKS[int(task)] for task in legs.tolist()), *rest)
-        object.__setattr__(reference, "_row", row)
+        """The reference whose numbers ``row`` holds (see ``kernels.layout.REFERENCE``).
+
+        Each array is made at its first use: a tick needs few of them outside the kernels.
+        """
+        reference = object.__new__(Reference)
+        _set(reference, "_row", row)
         return reference
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> object:
+            """What nobody has asked ``of_row`` for yet."""
+            if name not in Reference.__slots__ or name == "_row":
+                raise AttributeError(f"a Reference has no attribute {name!r}")
+            value = self._unpacked(name)
+            _set(self, name, value)
+            return value
+
+    def _unpacked(self, name: str) -> object:
+        view = partial(REFERENCE.view, self._row)
+        if name == "body":
+            point = TrackedPoint.COM if view("is_com") else TrackedPoint.BASE
+            return BodyTarget(point, *(view(part) for part in _BODY_PARTS))
+        if name == "stance":
+            return view("legs") == LegTask.STANCE
+        if name == "legs":
+            return tuple(_LEG_TASKS[int(task)] for task in view("legs").tolist())
+        return view(name)
 
     @property
     def row(self) -> Float[np.ndarray, " size"]:
@@ -142,7 +168,7 @@ class Reference:
                 self.a_joints,
             ]
             row = REFERENCE.pack(values)
-            object.__setattr__(self, "_row", row)
+            _set(self, "_row", row)
         return row
 
     def placed(self, anchor: Anchor) -> Reference:

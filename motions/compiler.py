@@ -12,6 +12,7 @@ from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -66,7 +67,7 @@ class CompiledPlan(MotionPlan):
     ramp: float
     problems: tuple[Problem, ...]
     spans: Mapping[str, tuple[float, float]]
-    _tables: tuple[Float[np.ndarray, "..."], ...] = field(init=False, repr=False)
+    _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Bind what the kernel reads."""

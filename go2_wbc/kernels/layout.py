@@ -24,19 +24,24 @@ class Layout:
         ends = np.cumsum(lengths).tolist()
         self.start = {n: e - k for n, e, k in zip(shapes, ends, lengths, strict=True)}
         self.size = ends[-1]
-        self._views = [
-            (slice(end - length, end), shape)
-            for end, length, shape in zip(ends, lengths, shapes.values(), strict=True)
-        ]
+        self._places = {
+            name: (slice(end - length, end), shape)
+            for end, length, (name, shape) in zip(ends, lengths, shapes.items(), strict=True)
+        }
+
+    def view(self, row: Float[np.ndarray, " size"], name: str) -> Float[np.ndarray, "..."]:
+        """One of the arrays that ``row`` holds; changing it changes the row."""
+        place, shape = self._places[name]
+        return row[place] if len(shape) == 1 else row[place].reshape(shape)
 
     def views(self, row: Float[np.ndarray, " size"]) -> list[Float[np.ndarray, "..."]]:
         """The arrays that ``row`` holds, in order; changing one changes the row."""
-        return [row[place].reshape(shape) for place, shape in self._views]
+        return [row[place].reshape(shape) for place, shape in self._places.values()]
 
     def pack(self, values: Sequence[Any]) -> Float[np.ndarray, " size"]:
         """A new row that holds ``values``, arrays and numbers, given in order."""
         row = np.empty(self.size)
-        for (place, shape), value in zip(self._views, values, strict=True):
+        for (place, shape), value in zip(self._places.values(), values, strict=True):
             row[place] = value if len(shape) < 2 else value.ravel()
         return row
 

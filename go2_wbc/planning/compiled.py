@@ -26,6 +26,9 @@ class CompiledPlanner(GaitPlanner):
 
     def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
         """Prepare a planner; ``start`` sets it on its way."""
+        from go2_wbc.kernels.locomotion import is_square, plan
+
+        self._plan, self._is_square = plan, is_square
         self._foot_radius = model.foot_radius
         self._numbers = _numbers(model, gait, config)
         self._state = np.zeros(PLANNER.size)
@@ -61,20 +64,16 @@ class CompiledPlanner(GaitPlanner):
 
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""
-        from go2_wbc.kernels.locomotion import is_square
-
-        stands = bool(is_square(snapshot.row, self._numbers))
+        stands = bool(self._is_square(snapshot.row, self._numbers))
         self._state[_STATE["is_stepping"]] = not stands
         self._state[_STATE["phase_time"]] = 0.0
         return stands
 
     def update(self, snapshot: Snapshot, command: VelocityCommand) -> Reference:
         """The reference of this tick for the wanted ``command`` (already inside the envelope)."""
-        from go2_wbc.kernels.locomotion import plan
-
         wanted, row = self._command, np.empty(REFERENCE.size)
         wanted[0], wanted[1], wanted[2] = command.linear_x, command.linear_y, command.angular_z
-        plan(snapshot.row, snapshot.state.time, self._state, self._numbers, wanted, row)
+        self._plan(snapshot.row, snapshot.state.time, self._state, self._numbers, wanted, row)
         return Reference.of_row(row)
 
 

@@ -57,17 +57,18 @@ class Playback(PlanFollower):
 
     def __init__(self, anchor: Anchor, config: CorrectionConfig | None = None) -> None:
         """Follow a plan at ``anchor``, without correction at first."""
+        from go2_wbc.kernels.playing import follow
+
         config = config or CorrectionConfig()
+        self._follow = follow
         self._anchor = np.array([*anchor.p_world, anchor.yaw])
         self._correction = CORRECTION.pack([config.rate, config.window, config.limit])
         self._state = np.zeros(PLAYBACK.size)
 
     def follow(self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float) -> Reference:
         """See ``PlanFollower.follow``."""
-        from go2_wbc.kernels.playing import follow
-
         row = np.empty(REFERENCE.size)
-        follow(plan, snapshot.row, self._anchor, dt, self._correction, self._state, row)
+        self._follow(plan, snapshot.row, self._anchor, dt, self._correction, self._state, row)
         return Reference.of_row(row)
 
     @property

@@ -8,6 +8,8 @@ linear momentum (Wieber, Tedrake & Kuindersma 2016, eq. 48.16).
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -110,15 +112,19 @@ class RobotModel:
 
     def snapshot(self, state: RobotState) -> Snapshot:
         """Every dynamic quantity of ``state``, computed once."""
-        from go2_wbc.kernels.derivation import derive  # compiled; only who needs it waits for it
-
         model, data = self.pin_model, self._data
         pin.crba(model, data, state.q, pin.Convention.WORLD)  # M, J and the poses
         pin.nonLinearEffects(model, data, state.q, state.v)  # h, velocities and accelerations
         row = np.empty(SNAPSHOT.size)
         row[:19], row[19:37] = state.q, state.v
-        derive(*self._views, row)
+        self._derive(*self._views, row)
         return Snapshot.of_row(state, row)
+
+    @cached_property
+    def _derive(self) -> Callable[..., None]:
+        from go2_wbc.kernels.derivation import derive  # compiled; only who needs it waits for it
+
+        return derive
 
     def readable_snapshot(self, state: RobotState) -> Snapshot:
         """The same as ``snapshot``, by Pinocchio's own functions: what the kernel is held to."""

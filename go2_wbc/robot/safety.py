@@ -69,7 +69,9 @@ class FallDetector:
 
     def __init__(self, config: SafetyConfig) -> None:
         """Judge by ``config``."""
-        self._config = config
+        from go2_wbc.kernels.supervision import heights
+
+        self._config, self._heights = config, heights
         self.begin()
 
     def begin(self) -> None:
@@ -86,9 +88,8 @@ class FallDetector:
             may_lie: whether the belly may be on the ground.
         """
         state, config = snapshot.state, self._config
-        lowest_foot = min(snapshot.p_world_feet[:, 2].tolist())
-        height = float(state.q[2]) - lowest_foot
-        is_touching = not may_lie and trunk_clearance(snapshot, lowest_foot - FOOT_RADIUS) < TOUCH
+        height, clearance = self._heights(snapshot.row, TRUNK_UNDERSIDE, FOOT_RADIUS)
+        is_touching = not may_lie and clearance < TOUCH
         has_sunk = not may_lie and sag > config.sink_limit
         leans = lean > config.lean_limit
         what = None

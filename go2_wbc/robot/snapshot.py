@@ -10,12 +10,15 @@ to the material point.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.kernels.layout import SNAPSHOT
 from go2_wbc.robot.state import RobotState
+
+_set = object.__setattr__  # of a frozen value that is being made
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +57,24 @@ class Snapshot:
 
     @staticmethod
     def of_row(state: RobotState, row: Float[np.ndarray, " size"]) -> Snapshot:
-        """The snapshot whose arrays ``row`` holds (see ``kernels.layout.SNAPSHOT``)."""
-        snapshot = Snapshot(state, *SNAPSHOT.views(row)[2:])
-        object.__setattr__(snapshot, "_row", row)
+        """The snapshot whose arrays ``row`` holds (see ``kernels.layout.SNAPSHOT``).
+
+        Each is made at its first use: a tick needs few of them outside the kernels.
+        """
+        snapshot = object.__new__(Snapshot)
+        _set(snapshot, "state", state)
+        _set(snapshot, "_row", row)
         return snapshot
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Float[np.ndarray, "..."]:
+            """An array of ``of_row`` that nobody has asked for yet."""
+            if name not in Snapshot.__slots__ or name == "_row":
+                raise AttributeError(f"a Snapshot has no attribute {name!r}")
+            view = SNAPSHOT.view(self._row, name)
+            _set(self, name, view)
+            return view
 
     @property
     def row(self) -> Float[np.ndarray, " size"]:
@@ -66,7 +83,7 @@ class Snapshot:
         if row is None:
             arrays = [getattr(self, name) for name in list(SNAPSHOT.start)[2:]]
             row = SNAPSHOT.pack([self.state.q, self.state.v, *arrays])
-            object.__setattr__(self, "_row", row)
+            _set(self, "_row", row)
         return row
 
     @staticmethod

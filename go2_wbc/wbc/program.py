@@ -45,6 +45,10 @@ class Program:
 
     def __init__(self, tasks: Sequence[Task], constraints: Sequence[Equality | Inequality]) -> None:
         """Read the numbers of the built-in tasks, which come first, and of the constraints."""
+        from go2_wbc.kernels.active_set import SOLVED
+        from go2_wbc.kernels.condensed import solve_condensed
+
+        self._solve, self._solved = solve_condensed, SOLVED
         position, orientation = _first(BodyPosition, tasks), _first(BodyOrientation, tasks)
         swing, posture = _first(SwingFoot, tasks), _first(LegPosture, tasks)
         force, still = _first(ForceRegularisation, tasks), _first(StanceFeetStill, constraints)
@@ -76,13 +80,10 @@ class Program:
         self, snapshot: Snapshot, reference: Reference
     ) -> tuple[Float[np.ndarray, "30"], Float[np.ndarray, "12"]] | None:
         """Decision z (see ``problem``) and torques [N m]; None if the kernel finds no solution."""
-        from go2_wbc.kernels.active_set import SOLVED
-        from go2_wbc.kernels.condensed import solve_condensed
-
         A, b, weights = self._extra_rows(snapshot, reference)
         z, tau = np.empty(SIZE), np.empty(12)
-        outcome = solve_condensed(snapshot.row, reference.row, self._numbers, A, b, weights, z, tau)
-        return (z, tau) if outcome == SOLVED else None
+        outcome = self._solve(snapshot.row, reference.row, self._numbers, A, b, weights, z, tau)
+        return (z, tau) if outcome == self._solved else None
 
     def _extra_rows(
         self, snapshot: Snapshot, reference: Reference

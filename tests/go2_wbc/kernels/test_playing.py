@@ -16,6 +16,7 @@ from go2_wbc.reference import Anchor, BodyTarget, LegTask, Posture, Reference, T
 from go2_wbc.robot import rotations
 from go2_wbc.robot.model import RobotModel
 from motions import compile_motion
+from motions.compiler import CompiledPlan
 from motions.postures import PosturePlan
 from tests.engine_helpers import random_state
 
@@ -31,6 +32,7 @@ ODD = CorrectionConfig(
 @pytest.mark.parametrize("name", ["high_five", "dance", "wave", "sit_pretty", "tap_dance"])
 def test_a_plan_is_the_readable_one_at_every_instant(name: str) -> None:
     plan, rng = compile_motion(name, MODEL), np.random.default_rng(3)
+    assert isinstance(plan, CompiledPlan)
     instants = rng.uniform(-0.3, plan.duration + 0.3, size=400)
     events = np.add.outer(plan.contacts.times, [-2e-9, -5e-10, 0.0, 5e-10, 2e-9]).ravel()
     for t in (*instants.tolist(), *events.tolist(), *plan.curves.x[:50].tolist(), plan.duration):
