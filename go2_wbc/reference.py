@@ -133,7 +133,7 @@ class Reference:
             return value
 
     def _unpacked(self, name: str) -> object:
-        view = partial(REFERENCE.view, self._row)
+        view = partial(REFERENCE.view, self.row)
         if name == "body":
             point = TrackedPoint.COM if view("is_com") else TrackedPoint.BASE
             return BodyTarget(point, *(view(part) for part in _BODY_PARTS))
