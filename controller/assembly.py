@@ -75,7 +75,7 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
     """
     settings = settings or PilotSettings()
     load_kernels()
-    model = RobotModel(settings.description)
+    model = RobotModel(settings.description, motor=config.motor)
     wbc = WholeBodyController(model, config.backend, config.wbc)
     telemetry = Telemetry(model, max(1, round(settings.recorded_time / plant.control_period)))
     loop = ControlLoop(plant, model, wbc, telemetry, config.safety)

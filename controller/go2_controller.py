@@ -89,13 +89,16 @@ class GO2Controller:
         )
         with ExitStack() as opened:
             if plant is None:
-                plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer)
+                plant = MujocoPlant(
+                    urdf=description.urdf_path, visuals=viewer, motor=config.motor
+                )
                 opened.callback(plant.close)
             self._plant = plant
             built = build_pilot(plant, config, settings)
             opened.callback(built.close)
             self._resources = opened.pop_all()
         self._runner, self._pilot, self._description = built.runner, built.pilot, description
+        self._motor = config.motor
         self._closed = False
         self._busy = threading.Lock()
         self._busy_with = ""
@@ -251,7 +254,7 @@ class GO2Controller:
     @cached_property
     def _checker(self) -> FeasibilityChecker:
         """Plans on a model of its own: the control loop's belongs to the thread that ticks."""
-        return FeasibilityChecker(RobotModel(self._description))
+        return FeasibilityChecker(RobotModel(self._description, motor=self._motor))
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""

@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.planning.command import VelocityEnvelope
 from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.robot.motor import TORQUE_SPEED, require_motor
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.validation import is_finite_number
 from go2_wbc.wbc.config import WbcConfig
@@ -40,6 +41,8 @@ class Config:
         envelope: velocity commands that are followed.
         safety: when to give up.
         backend: whole-body back end: condensed, full or placo.
+        motor: what the motors are taken for: "torque-speed", or "ideal" for the peak torque at
+            every speed.
     """
 
     wbc: WbcConfig = field(default_factory=WbcConfig)
@@ -47,6 +50,11 @@ class Config:
     envelope: VelocityEnvelope = field(default_factory=VelocityEnvelope)
     safety: SafetyConfig = field(default_factory=SafetyConfig)
     backend: str = "condensed"
+    motor: str = TORQUE_SPEED
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for an unknown motor."""
+        require_motor(self.motor)
 
 
 def load_config(path: Path | str) -> Config:

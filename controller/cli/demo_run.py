@@ -105,6 +105,7 @@ def _controller(args: argparse.Namespace) -> GO2Controller:
         mass_scale=args.mass_scale,
         seed=args.seed or 0,
         initial_joint_noise=0.0 if args.seed is None else START_NOISE,
+        motor=config.motor,
         visuals=viewer,
     )
     return GO2Controller(plant=plant, realtime=args.realtime, viewer=viewer, config=config)

@@ -44,14 +44,16 @@ def run(args: argparse.Namespace) -> int:
     """Read keys until the last one, or Ctrl-C; the robot ends limp."""
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise CommandError("teleop reads keys from a terminal; standard input or output is none")
+    from controller.arguments import config
     from controller.go2_controller import GO2Controller
     from controller.teleop import Teleop, keys_help
     from go2_wbc.plant import MujocoPlant
 
     print(keys_help())
+    numbers = config(args.config)
     with (
-        closing(MujocoPlant(args.mjcf)) as plant,
-        GO2Controller(plant=plant, realtime=True, viewer=args.viewer, config=args.config) as go2,
+        closing(MujocoPlant(args.mjcf, motor=numbers.motor)) as plant,
+        GO2Controller(plant=plant, realtime=True, viewer=args.viewer, config=numbers) as go2,
     ):
         teleop = Teleop(go2)
         try:

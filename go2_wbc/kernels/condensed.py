@@ -13,6 +13,7 @@ import numpy as np
 from go2_wbc.kernels.active_set import solve_qp
 from go2_wbc.kernels.compilation import kernel
 from go2_wbc.kernels.layout import PROGRAM, REFERENCE, SNAPSHOT
+from go2_wbc.kernels.motor import available
 
 STANCE, SWING, JOINTS = 0, 1, 2
 """The values of ``reference.LegTask``."""
@@ -41,7 +42,8 @@ _POSITION, _ORIENTATION, _SWING, _POSTURE = (
     _P[n] for n in ("position_kp", "orientation_kp", "swing_kp", "posture_kp")
 )
 _FORCE_WEIGHT, _WEIGHT_OF_ROBOT = _P["force_weight"], _P["weight_of_robot"]
-_DAMPING, _FRICTION, _TORQUE = _P["stance_damping"], _P["friction"], _P["torque_limits"]
+_DAMPING, _FRICTION = _P["stance_damping"], _P["friction"]
+_PEAK, _KNEE, _NO_LOAD = _P["peak_torque"], _P["knee_speed"], _P["no_load_speed"]
 _Q_LOWER, _Q_UPPER, _SPEED = _P["q_lower"], _P["q_upper"], _P["speed"]
 _BRAKING, _HORIZON, _SINGULAR = _P["braking"], _P["horizon"], _P["singular_determinant"]
 
@@ -311,11 +313,13 @@ def bound_joints(q, v, snapshot, program, affine, count, C, lower, upper):
             J = snapshot[_J_CONTACTS + 54 * leg + 18 * i + 6 + n]
             for k in range(13):
                 row[k] -= J * affine[18 + 3 * leg + i, k]
-        limit, offset = program[_TORQUE + n], snapshot[_H + 6 + n] + row[12]
-        C[count + n] = row[:12]
-        lower[count + n], upper[count + n] = -limit - offset, limit - offset
-        last = count + 12 + n
         speed, most = v[6 + n], program[_SPEED + n]
+        peak, knee, no_load = program[_PEAK + n], program[_KNEE + n], program[_NO_LOAD + n]
+        offset = snapshot[_H + 6 + n] + row[12]
+        C[count + n] = row[:12]
+        lower[count + n] = -available(-speed, peak, knee, no_load) - offset
+        upper[count + n] = available(speed, peak, knee, no_load) - offset
+        last = count + 12 + n
         fast = viable_speed(program[_Q_UPPER + n] - q[7 + n], speed, braking, horizon)
         slow = viable_speed(q[7 + n] - program[_Q_LOWER + n], -speed, braking, horizon)
         offset = affine[6 + n, 12]

@@ -20,6 +20,7 @@ from go2_wbc.errors import DescriptionError
 from go2_wbc.kernels.layout import SNAPSHOT
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.robot.description import RobotDescription, find_description
+from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 
@@ -40,7 +41,8 @@ class RobotModel:
         foot_radius: radius [m] of the spherical feet.
         mass: total mass [kg].
         gravity: 9.81 [m/s^2].
-        torque_limits: (12,) [N m].
+        motor: what the motors give at which speed.
+        torque_limits: (12,) [N m], the motors' peak.
         speed_limits: (12,) [rad/s].
         q_lower, q_upper: (12,) joint limits [rad], the tighter of URDF and published ones.
         p_base_hips: (4, 3) hip abduction axes' origins in the base frame [m].
@@ -55,6 +57,7 @@ class RobotModel:
         *,
         armature: Float[np.ndarray, "12"] = ROTOR_ARMATURE,
         foot_radius: float = FOOT_RADIUS,
+        motor: str = TORQUE_SPEED,
     ) -> None:
         """Load the robot.
 
@@ -62,11 +65,14 @@ class RobotModel:
             description: the robot's files; by default those of the installed package.
             armature: reflected rotor inertias [kg m^2].
             foot_radius: radius [m] of the spherical feet; 0 puts contacts at the foot frames.
+            motor: "torque-speed", or "ideal" for the peak torque at every speed.
 
         Raises:
+            ConfigError: for an unknown motor.
             DescriptionError: if the files are missing, broken, or not a Go2's.
         """
         self.description = description or find_description()
+        self.motor = MotorModel.named(motor, self.description)
         self.foot_radius = foot_radius
         self.pin_model = _load(self.description.urdf_path)
         self.pin_model.armature = np.concatenate([np.zeros(6), armature])
@@ -80,7 +86,7 @@ class RobotModel:
         model = self.pin_model
         self.gravity = float(-model.gravity.linear[2])
         self.mass = float(pin.computeTotalMass(model))
-        self.torque_limits = np.array(model.effortLimit[6:])
+        self.torque_limits = self.motor.peak.copy()
         self.speed_limits = np.array(model.velocityLimit[6:])
         self.q_lower = np.array(model.lowerPositionLimit[7:])
         self.q_upper = np.array(model.upperPositionLimit[7:])

@@ -28,7 +28,7 @@ class WbcConfig:
         position_weight, orientation_weight, swing_weight, posture_weight: task weights.
         force_weight: of the force regularisation; at least 1e-6, or accuracy is lost.
         friction: mu of the friction pyramid.
-        torque_share: share of the URDF's torque limit that may be used.
+        torque_share: share of the motors' torque that may be used, at every speed.
         speed_share: share of the URDF's joint speed limit that may be used.
         stance_damping: [1/s] on the velocity of stance contact points.
         braking: joint deceleration [rad/s^2] that the limits count on.

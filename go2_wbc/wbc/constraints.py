@@ -2,7 +2,7 @@
 
 Equalities: the six base rows of M a + h = S' tau + J' f (no actuator there), and stance feet that
 roll without sliding. Inequalities: friction pyramid and normal force of each stance foot, torque
-limits, and joint position and speed limits as bounds on the acceleration.
+limits at the measured speeds, and joint position and speed limits as bounds on the acceleration.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.reference import Reference
+from go2_wbc.robot.motor import MotorModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.problem import FORCES, SIZE, Bounds, Rows
 
@@ -113,16 +114,23 @@ class FrictionPyramid(Inequality):
 
 @dataclass(frozen=True, slots=True)
 class TorqueLimits(Inequality):
-    """|tau| within the limits, tau being the joint rows of M a + h - J' f."""
+    """tau within what the motors give, tau being the joint rows of M a + h - J' f.
 
-    limits: Float[np.ndarray, "12"]
+    The limits are those at the measured joint speeds. Without torque they are always met.
+
+    Attributes:
+        motor: the motors, at the share of their torque that may be used.
+    """
+
+    motor: MotorModel
     name: str = "torque limits"
     unit: str = "N m"
 
     def bounds(self, snapshot: Snapshot, reference: Reference) -> Bounds:
         """Twelve rows, one per joint."""
         A, offset = torque_map(snapshot)
-        return Bounds(A, -self.limits - offset, self.limits - offset)
+        lower, upper = self.motor.limits(snapshot.state.joint_velocities)
+        return Bounds(A, lower - offset, upper - offset)
 
 
 @dataclass(frozen=True, slots=True)

@@ -193,7 +193,7 @@ def _inequalities(model: RobotModel, config: WbcConfig) -> tuple[Inequality, ...
         raise ConfigError(f"WbcConfig.joint_margin leaves no range: {config.joint_margin} rad")
     return (
         FrictionPyramid(config.friction),
-        TorqueLimits(model.torque_limits * config.torque_share),
+        TorqueLimits(model.motor.scaled(config.torque_share)),
         JointLimits(
             model.q_lower + config.joint_margin,
             model.q_upper - config.joint_margin,

@@ -11,10 +11,11 @@ gains are not per axis. Where PlaCo's formulation differs from ours it is aligne
 - Costs. ``torque_cost`` (1e-3 by default) is 0, and the regularisation of the QP is 1e-12.
 - Force regularisation. PlaCo regularises around zero. Half of the weight stays there and half is
   added around 2 f0, since |f|^2 / 2 + |f - 2 f0|^2 / 2 = |f - f0|^2 + const.
-- Normal force bounds and joint limits. PlaCo knows no bounds on a contact's normal force. Its joint
-  limits are ours with dt = ``limit_horizon`` and safe acceleration = ``braking`` inside the limits,
+- Normal force bounds, joint limits and the motors' line. PlaCo knows no bounds on a contact's
+  normal force, and one torque limit for both directions: the motors' peak; where a fast joint has
+  less, our row joins in. Its joint limits are ours with dt = ``limit_horizon`` and safe acceleration = ``braking`` inside the limits,
   but outside them they ask for qdd <= -braking, and elsewhere for more than ``braking``, which can
-  make the QP infeasible. Both limits are therefore added as rows of ours to the QP that PlaCo has
+  make the QP infeasible. These limits are therefore added as rows of ours to the QP that PlaCo has
   assembled, and the QP is solved again: a tick costs two solutions.
 
 Without any stance foot the QP is a free fall and has a solution, as for the other back ends.
@@ -32,11 +33,12 @@ from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.inverse_kinematics import load_placo_robot
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation
+from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.backends import QpBackend
 from go2_wbc.wbc.config import WbcConfig
-from go2_wbc.wbc.constraints import JointLimits
-from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Problem
+from go2_wbc.wbc.constraints import JointLimits, TorqueLimits
+from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem
 from go2_wbc.wbc.tasks import Gains
 
 REGULARISATION = 1e-12
@@ -241,8 +243,16 @@ class _Mode:
     def _add_bounds(self, problem: Problem) -> None:
         columns = [*range(18), *self._force_columns]
         snapshot, reference = problem.snapshot, problem.reference
-        limits = [source for source in problem.sources if isinstance(source, JointLimits)]
-        joints = [limit.bounds(snapshot, reference) for limit in limits]
+        joints = [
+            source.bounds(snapshot, reference)
+            for source in problem.sources
+            if isinstance(source, JointLimits)
+        ]
+        joints += [
+            _on_the_line(source, snapshot, reference)
+            for source in problem.sources
+            if isinstance(source, TorqueLimits)
+        ]
         normals = np.eye(len(columns))[[20 + 3 * i for i in range(len(self._stance))]]
         C = np.concatenate([*(bound.C[:, columns] for bound in joints), normals])
         least, greatest = reference.normal_force_min, reference.normal_force_max
@@ -253,6 +263,14 @@ class _Mode:
         excess.A = np.concatenate([C[has_upper], -C[has_lower]])
         excess.b = np.concatenate([-upper[has_upper], lower[has_lower]])
         self._solver.problem.add_constraint(excess <= 0.0)
+
+
+def _on_the_line(limits: TorqueLimits, snapshot: Snapshot, reference: Reference) -> Bounds:
+    """The torque limits that are tighter than the peak; infinite where PlaCo's own are enough."""
+    C, lower, upper = limits.bounds(snapshot, reference)
+    least, greatest = limits.motor.limits(snapshot.state.joint_velocities)
+    lower = np.where(least > -limits.motor.peak, lower, -np.inf)
+    return Bounds(C, lower, np.where(greatest < limits.motor.peak, upper, np.inf))
 
 
 def _acceleration(

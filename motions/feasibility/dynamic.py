@@ -91,16 +91,13 @@ def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
 def torque(
     motion: Trajectory, forces: Forces, model: RobotModel, limits: FeasibilityLimits
 ) -> tuple[Series, Series]:
-    """Torques against the motors' limits, and against what they give at that speed.
+    """Torques against the motors' peak, and against what ``model.motor`` gives at that speed.
 
-    At its greatest voltage a DC motor's torque falls linearly with its speed and is gone at the
-    greatest one, tau <= tau_max (1 - |v| / v_max) / (1 - knee); below the knee the current is the
-    limit, tau_max. Only a driving motor, tau v > 0, meets that line; one that brakes is helped.
+    Only a driving motor, tau v > 0, meets the line of torque and speed.
     """
     asked, most = np.abs(forces.tau), limits.torque_share * model.torque_limits
-    share = np.abs(motion.v[:, 6:]) / model.speed_limits
-    fade = np.clip((1.0 - share) / (1.0 - limits.knee_speed_share), 0.0, 1.0)
-    at_speed = fade * model.torque_limits
+    lower, upper = model.motor.limits(motion.v[:, 6:])
+    at_speed = np.where(forces.tau < 0.0, -lower, upper)
     drives = forces.tau * motion.v[:, 6:] > 0.0
     tight = TIGHT_TORQUE * float(model.torque_limits.min())
     what = ("N m", JOINTS, motion.times, asked)

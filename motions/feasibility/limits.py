@@ -15,8 +15,6 @@ class FeasibilityLimits:
         reach: distance [m] by which a foot's place may be out of the leg's reach: what rounding of
             the trunk's place makes of one at the end of the reach.
         torque_share: share of the torque limit that a plan may use; 15 % are for feedback.
-        knee_speed_share: share of a joint's greatest speed above which its torque falls linearly
-            to nothing at the greatest speed, as in a DC motor at its greatest voltage.
         friction: friction coefficient that the ground is counted on for; the floor of the
             benchmark, on which verdicts were compared, has 0.5.
         foot_load: least normal force [N] of a foot that stands: 6 % of the weight.
@@ -41,7 +39,6 @@ class FeasibilityLimits:
 
     reach: float = 0.002
     torque_share: float = 0.85
-    knee_speed_share: float = 0.5
     friction: float = 0.45
     foot_load: float = 10.0
     support: float = 0.015

@@ -99,7 +99,7 @@ def serve(
         stack.callback(graph_node.destroy_node)
         watch = GraphWatch(graph_node, namespace)
         watch.check()
-        simulator = MujocoPlant(visuals=settings.viewer)
+        simulator = MujocoPlant(visuals=settings.viewer, motor=config.motor)
         stack.callback(simulator.close)
         go2 = stack.enter_context(
             GO2Controller(

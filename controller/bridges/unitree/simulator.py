@@ -86,6 +86,7 @@ class UnitreeSimulator:
             payload=settings.payload,
             sensors=settings.sensors,
             seed=settings.seed,
+            motor=config.motor,
         )
         model = RobotModel()
         self.gate = CommandGate(model.q_lower, model.q_upper)

@@ -79,8 +79,12 @@ class TruthRecording:
         return np.column_stack([c * x + s * y, c * y - s * x, z])
 
     def torque_shares(self, model: RobotModel) -> Float[np.ndarray, " n"]:
-        """Largest |tau| / limit of any joint, at every tick."""
-        return (np.abs(self.tau) / model.torque_limits).max(axis=1)
+        """Largest |tau| of any joint at every tick, as a share of what ``model.motor`` gives.
+
+        That depends on the joint's speed and direction at the start of the tick.
+        """
+        v = np.vstack([self.v[:1], self.v[:-1]])[:, 6:]
+        return model.motor.share(self.tau, v).max(axis=1)
 
     def peak_speed_share(self, model: RobotModel) -> float:
         """Largest |joint velocity| / limit of any joint."""

@@ -28,6 +28,7 @@ from go2_wbc.plant.mujoco.pushes import Push, Pushes
 from go2_wbc.plant.mujoco.setup import LYING_DAMPING, PlantSetup, prepare, settle
 from go2_wbc.plant.sensors import ImuSample, SensorNoise
 from go2_wbc.plant.terrain import Boxes
+from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.state import JointCommand, RobotState
 
 _logger = logging.getLogger(__name__)
@@ -53,7 +54,8 @@ class SavedPhysics:
 class MujocoPlant(Plant):
     """A Go2 in MuJoCo, driven by torques only; lies on the ground, folded and damped, at time 0.
 
-    The motor law is evaluated at every physics step. Contact forces and torques that ``read``
+    The motor law is evaluated at every physics step, and cut to what the motors give at the joints'
+    speeds then. Contact forces and torques that ``read``
     reports acted over the last physics step and the last control period, respectively; positions
     and velocities are those of this instant.
 
@@ -73,6 +75,7 @@ class MujocoPlant(Plant):
         initial_joint_noise: standard deviation [rad] of the joint angles from which it settles.
         joint_dynamics: friction, damping, armature; ``None`` is ``JointDynamics()``, or what
             ``mjcf`` says.
+        motor: ``"torque-speed"``, or ``"ideal"`` for the peak torque at every speed.
         urdf: another URDF instead of the installed one.
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
 
@@ -98,6 +101,7 @@ class MujocoPlant(Plant):
         initial_yaw: float = 0.0,
         initial_joint_noise: float = 0.0,
         joint_dynamics: JointDynamics | None = None,
+        motor: str = TORQUE_SPEED,
         urdf: Path | str | None = None,
         visuals: bool = False,
     ) -> None:
@@ -115,13 +119,14 @@ class MujocoPlant(Plant):
             initial_yaw=initial_yaw,
             initial_joint_noise=initial_joint_noise,
             joint_dynamics=joint_dynamics,
+            motor=motor,
             visuals=visuals,
             seed=seed,
         )
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
         # MuJoCo's warnings would otherwise go to a file in the working directory.
         mujoco.set_mju_user_warning(partial(_logger.warning, "MuJoCo: %s"))
-        self._model, self._layout = prepare(setup)
+        self._model, self._layout, self._motor = prepare(setup)
         self._data = mujoco.MjData(self._model)
         self._noise = (noise or SensorNoise()) if sensors == "noisy" else None
         self._period, self._substeps = control_period, round(control_period / timestep)
@@ -132,6 +137,7 @@ class MujocoPlant(Plant):
         data, layout = self._data, self._layout
         self._base_q, self._base_v = data.qpos[layout.base_q], data.qvel[layout.base_v]
         self._R_world_base = data.xmat[layout.base].reshape(3, 3)
+        self._bind_motors()
         settle(self._model, data, layout, setup, start_rng)
         # One period in the lying state, so that the first read has forces and torques.
         self.write(JointCommand.damping(LYING_DAMPING))
@@ -151,6 +157,11 @@ class MujocoPlant(Plant):
     def torque_limits(self) -> Float[np.ndarray, "12"]:
         """Largest torque of each joint [N m]."""
         return self._layout.torque_limits.copy()
+
+    @property
+    def motor(self) -> MotorModel:
+        """What the motors give at which speed."""
+        return self._motor
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -193,9 +204,7 @@ class MujocoPlant(Plant):
         model, data, layout = self._model, self._data, self._layout
         total = np.zeros(12)
         for remaining in range(self._substeps, 0, -1):
-            tau = self._motor_law()
-            data.ctrl[layout.motors] = tau
-            total += tau
+            self._drive(self._command, *self._motors, total)
             self._pushes.apply()
             mujoco.mj_step2(model, data)
             if remaining == 1:
@@ -336,13 +345,14 @@ class MujocoPlant(Plant):
             raise CommandError(f"command.{name} is not finite: {row}")
         self._command = accepted
 
-    def _motor_law(self) -> Float[np.ndarray, "12"]:
-        """Torque of every motor now, clipped to its limit."""
-        tau, q_des, v_des, kp, kd = self._command
-        q, v = self._data.qpos[self._layout.joint_q], self._data.qvel[self._layout.joint_v]
-        limits = self._layout.torque_limits
-        wanted = kp * (q_des - q) + tau + kd * (v_des - v)
-        return np.maximum(np.minimum(wanted, limits), -limits)
+    def _bind_motors(self) -> None:
+        """Binds the compiled ``MotorModel.torque`` and the arrays that it reads and fills."""
+        from go2_wbc.kernels.motor import drive  # compiled; only who needs it waits for it
+
+        motor, data, layout = self._motor, self._data, self._layout
+        numbers = np.array([motor.peak, motor.knee_speed, motor.no_load_speed])
+        places = np.array([layout.joint_q, layout.joint_v, layout.motors], dtype=np.int64)
+        self._drive, self._motors = drive, (numbers, places, data.qpos, data.qvel, data.ctrl)
 
     def _measure(self) -> RobotState:
         """The true state in Pinocchio's conventions."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -16,6 +16,7 @@ from go2_wbc.plant.mujoco.model import JointDynamics, add_payload, build_spec, f
 from go2_wbc.plant.mujoco.user_model import load_user_model
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.description import BASE_LINK, find_description
+from go2_wbc.robot.motor import MotorModel, require_motor
 from go2_wbc.validation import require_finite, require_not_negative, require_positive
 
 # Dry rubber on a hard floor; Unitree publishes none. The prototype's runs used it.
@@ -51,6 +52,7 @@ class PlantSetup:
     initial_yaw: float
     initial_joint_noise: float
     joint_dynamics: JointDynamics | None
+    motor: str
     visuals: bool
     seed: int
 
@@ -66,6 +68,7 @@ class PlantSetup:
             require_positive(self, "friction")
         require_not_negative(self, "payload", "initial_joint_noise", "seed")
         require_finite(self, "initial_yaw")
+        require_motor(self.motor)
         ratio = self.control_period / self.timestep
         if not math.isclose(ratio, round(ratio)):  # only the two decimal numbers' rounding
             raise ConfigError(
@@ -76,8 +79,8 @@ class PlantSetup:
             raise ConfigError("terrain is only for the built model; put it into the mjcf instead")
 
 
-def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout]:
-    """The compiled model and its index tables.
+def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel]:
+    """The compiled model, its index tables and its motors.
 
     Raises:
         ModelMismatch: if the user's MJCF cannot be used.
@@ -107,7 +110,9 @@ def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout]:
         feet = [geom.id for leg in LEGS for geom in foot_geoms(spec, leg)]
         model.geom_friction[feet, 0] = setup.friction
         model.geom_priority[feet] = model.geom_priority.max() + 1
-    return model, find_layout(spec, model, description.efforts)
+    layout = find_layout(spec, model, description.efforts)
+    motor = replace(MotorModel.named(setup.motor, description), peak=layout.torque_limits)
+    return model, layout, motor
 
 
 def settle(

@@ -1,0 +1,33 @@
+"""The motors: what they can give at a speed, and what they give for a command.
+
+``robot.motor.MotorModel`` says what is computed here and where its numbers come from.
+"""
+
+from __future__ import annotations
+
+from go2_wbc.kernels.compilation import kernel
+
+
+@kernel("f8(f8, f8, f8, f8)")
+def available(v, peak, knee_speed, no_load_speed):
+    """Greatest torque at velocity v; the least one is -available(-v)."""
+    if not v > knee_speed:
+        return peak
+    return peak * max(1.0 - (v - knee_speed) / (no_load_speed - knee_speed), 0.0)
+
+
+@kernel("void(f8[:,::1], f8[:,::1], i8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def drive(command, motor, places, qpos, qvel, ctrl, total):
+    """``MotorModel.torque`` now, into ctrl, and added to ``total`` (12,).
+
+    ``command`` (5, 12) holds tau, q_des, v_des, kp and kd; ``motor`` (3, 12) the fields of a
+    ``MotorModel``; ``places`` (3, 12) where each joint's angle, velocity and control are.
+    """
+    for n in range(12):
+        q, v = qpos[places[0, n]], qvel[places[1, n]]
+        tau = command[3, n] * (command[1, n] - q) + command[0, n]
+        tau += command[4, n] * (command[2, n] - v)
+        tau = min(tau, available(v, motor[0, n], motor[1, n], motor[2, n]))
+        tau = max(tau, -available(-v, motor[0, n], motor[1, n], motor[2, n]))
+        ctrl[places[2, n]] = tau
+        total[n] += tau

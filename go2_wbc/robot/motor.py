@@ -1,0 +1,115 @@
+"""What the motors give: one model for plant, whole-body QP, feasibility check and planners.
+
+The torque of a motor that drives (torque and speed in the same direction) is limited twice: by the
+current, up to the knee of the line, and beyond it by the voltage, of which the turning motor uses
+up ever more itself. From the knee on it falls linearly, to nothing at the speed without load:
+
+    tau <= peak min(1, max(0, (v_0 - v) / (v_0 - v_knee)))        for v > 0, mirrored for v < 0
+
+A motor that brakes is helped by that voltage; its limit stays the peak. The power that it gives is
+greatest at the greater of v_knee and v_0 / 2.
+
+Where the numbers come from:
+
+- Peak torques and speeds without load are the URDF's: 23.7 N m and 30.1 rad/s of hips and thighs,
+  45.43 N m and 15.7 rad/s of the calves. Both have the same motor: 45.43 / 23.7 = 30.1 / 15.7 =
+  1.917 is the ratio of the calf's linkage, and 23.7 x 30.1 = 45.43 x 15.7 = 713 W, which no motor
+  gives. The line leaves 324 W at half the speed without load.
+- The knee is what Unitree's own simulation of the Go2's motor says (its repository unitree_rl_lab,
+  ``UnitreeActuatorCfg_Go2HV``): full torque up to 13.5 rad/s, no load at 30 rad/s. The calves' knee
+  is at the same share, because of the same motor: 7.0 rad/s.
+- The same source gives a driving motor 20.2 N m at most and a braking one 23.4, the friction of the
+  gears being on its side. The peak here is the URDF's both ways: own choice, for friction belongs
+  to the plant, and planned motions keep 15 % of the peak for feedback in any case.
+
+Neither the battery's voltage, which moves the line, nor the windings' temperature is modelled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.errors import ConfigError, unknown_name
+from go2_wbc.robot.description import RobotDescription
+from go2_wbc.robot.state import JointCommand
+
+TORQUE_SPEED, IDEAL = "torque-speed", "ideal"
+MOTORS = (TORQUE_SPEED, IDEAL)
+"""Names of the models: with the torque-speed line, and with the peak torque at every speed."""
+KNEE_SHARE = 13.5 / 30.0
+"""Speed of the knee as a share of the speed without load; see above."""
+LEAST_SHARE = 0.05
+"""Share of the peak below which ``share`` counts no torque as available, or it would not be finite
+near the speed without load; own choice."""
+
+
+@dataclass(frozen=True, slots=True)
+class MotorModel:
+    """Torques that the twelve motors can give, in the order of ``JOINT_NAMES``.
+
+    Attributes:
+        peak: torque limits [N m] up to the knee, and of a braking motor.
+        knee_speed: speeds [rad/s] from which the torque of a driving motor falls.
+        no_load_speed: speeds [rad/s] at which it is gone; infinite for an ideal motor.
+    """
+
+    peak: Float[np.ndarray, "12"]
+    knee_speed: Float[np.ndarray, "12"]
+    no_load_speed: Float[np.ndarray, "12"]
+
+    @staticmethod
+    def named(name: str, description: RobotDescription) -> MotorModel:
+        """The model ``name``, one of ``MOTORS``, of the robot of ``description``.
+
+        Raises:
+            ConfigError: for an unknown name; lists the valid ones.
+        """
+        require_motor(name)
+        speeds = np.array(description.speeds)
+        zero_torque = speeds if name == TORQUE_SPEED else np.full(12, np.inf)
+        return MotorModel(np.array(description.efforts), KNEE_SHARE * speeds, zero_torque)
+
+    def scaled(self, share: float) -> MotorModel:
+        """The motors at ``share`` of their torque."""
+        return replace(self, peak=share * self.peak)
+
+    def limits(
+        self, v: Float[np.ndarray, "*n 12"]
+    ) -> tuple[Float[np.ndarray, "*n 12"], Float[np.ndarray, "*n 12"]]:
+        """(lower, upper) torque limits [N m] at velocities ``v`` [rad/s]; lower <= 0 <= upper."""
+        return -self.peak * self._line(-v), self.peak * self._line(v)
+
+    def torque(
+        self, command: JointCommand, q: Float[np.ndarray, "12"], v: Float[np.ndarray, "12"]
+    ) -> Float[np.ndarray, "12"]:
+        """Torques [N m] that the motors give for ``command`` at angles ``q`` and velocities ``v``.
+
+        What a plant applies at every physics step, compiled in ``kernels.motor``.
+        """
+        wanted = command.kp * (command.q_des - q) + command.tau + command.kd * (command.v_des - v)
+        return np.clip(wanted, *self.limits(v))
+
+    def share(
+        self, tau: Float[np.ndarray, "*n 12"], v: Float[np.ndarray, "*n 12"]
+    ) -> Float[np.ndarray, "*n 12"]:
+        """|tau| over what the motors can give at velocities ``v`` in the direction of ``tau``.
+
+        What is available counts as at least ``LEAST_SHARE`` of the peak.
+        """
+        lower, upper = self.limits(v)
+        available = np.where(tau < 0.0, -lower, upper)
+        return np.abs(tau) / np.maximum(available, LEAST_SHARE * self.peak)
+
+    def _line(self, v: Float[np.ndarray, "*n 12"]) -> Float[np.ndarray, "*n 12"]:
+        """Share of the peak that a positive torque can have at velocities ``v``."""
+        beyond = np.maximum(v - self.knee_speed, 0.0)
+        return np.maximum(1.0 - beyond / (self.no_load_speed - self.knee_speed), 0.0)
+
+
+def require_motor(name: str) -> None:
+    """Raise ConfigError, listing the valid names, unless ``name`` is one of ``MOTORS``."""
+    if name not in MOTORS:
+        raise ConfigError(unknown_name("motor", name, MOTORS))
