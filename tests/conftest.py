@@ -30,6 +30,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.locomotion",
         "go2_wbc.kernels.motor",
         "go2_wbc.kernels.playing",
+        "go2_wbc.kernels.simulation",
         "go2_wbc.kernels.supervision",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",

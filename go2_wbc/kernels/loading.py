@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from importlib import import_module
 
-KERNELS = ("derivation", "condensed", "locomotion", "motor", "playing", "supervision")
+KERNELS = (
+    "derivation",
+    "condensed",
+    "locomotion",
+    "motor",
+    "playing",
+    "simulation",
+    "supervision",
+)
 """Modules of this package whose import compiles, or loads what was compiled."""
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from go2_wbc.legs import LEGS
-from go2_wbc.plant.mujoco.layout import FOREIGN, ROBOT_BINS, MujocoLayout
+from go2_wbc.plant.mujoco.layout import FOREIGN, MujocoLayout
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,21 +26,6 @@ class FootContacts:
 
     p_world_contact: Float[np.ndarray, "4 3"]
     v_world_contact: Float[np.ndarray, "4 3"]
-
-
-def ground_force_bins(
-    model: mujoco.MjModel, data: mujoco.MjData, layout: MujocoLayout
-) -> Float[np.ndarray, "6"]:
-    """Normal forces [N] of contacts with anything but the robot, summed per bin of ``layout``.
-
-    Valid between ``mj_step2`` and the next ``mj_step1``: these forces acted over the last step.
-    """
-    forces, wrench = np.zeros(ROBOT_BINS), np.zeros(6)
-    for contact, which in enumerate((_pair_codes(data, layout) - FOREIGN).tolist()):
-        if 0 <= which < ROBOT_BINS:
-            mujoco.mj_contactForce(model, data, contact, wrench)
-            forces[which] += wrench[0]
-    return forces
 
 
 def foot_contacts(data: mujoco.MjData, layout: MujocoLayout) -> FootContacts:

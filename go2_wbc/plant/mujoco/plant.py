@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -19,7 +20,6 @@ from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.contacts import (
     FootContacts,
     foot_contacts,
-    ground_force_bins,
     touches_itself,
 )
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN
@@ -137,7 +137,8 @@ class MujocoPlant(Plant):
         data, layout = self._data, self._layout
         self._base_q, self._base_v = data.qpos[layout.base_q], data.qvel[layout.base_v]
         self._R_world_base = data.xmat[layout.base].reshape(3, 3)
-        self._bind_motors()
+        self._warnings = data.warning.number
+        self._bind_kernels()
         settle(self._model, data, layout, setup, start_rng)
         # One period in the lying state, so that the first read has forces and torques.
         self.write(JointCommand.damping(LYING_DAMPING))
@@ -201,14 +202,14 @@ class MujocoPlant(Plant):
         """
         self._check_open()
         self._accept(command)
-        model, data, layout = self._model, self._data, self._layout
+        model, data = self._model, self._data
         total = np.zeros(12)
         for remaining in range(self._substeps, 0, -1):
             self._drive(self._command, *self._motors, total)
             self._pushes.apply()
             mujoco.mj_step2(model, data)
             if remaining == 1:
-                self._forces = ground_force_bins(model, data, layout)
+                self._forces = self._ground_forces()
             mujoco.mj_step1(model, data)
         self._tau = total / self._substeps
         self._ticks += 1
@@ -316,7 +317,7 @@ class MujocoPlant(Plant):
         kind = mujoco.mjtState.mjSTATE_INTEGRATION
         mujoco.mj_setState(self._model, self._data, saved.integration, kind)
         mujoco.mj_step1(self._model, self._data)
-        self._data.warning.number[:] = 0
+        self._warnings[:] = 0
         self._ticks = saved.ticks
         self._pushes.active = saved.pushes
         self._tau, self._forces = saved.tau, saved.forces
@@ -338,32 +339,47 @@ class MujocoPlant(Plant):
             if row.shape != (12,):
                 raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
         accepted = np.array(rows, dtype=float)
-        if not np.isfinite(accepted).all():
-            name, row = next(
-                (n, r) for n, r in zip(_FIELDS, rows, strict=True) if not np.isfinite(r).all()
-            )
-            raise CommandError(f"command.{name} is not finite: {row}")
+        if not math.isfinite(np.vdot(accepted, accepted)):  # cheap, but huge numbers overflow
+            for name, row in zip(_FIELDS, rows, strict=True):
+                if not np.isfinite(row).all():
+                    raise CommandError(f"command.{name} is not finite: {row}")
         self._command = accepted
 
-    def _bind_motors(self) -> None:
-        """Binds the compiled ``MotorModel.torque`` and the arrays that it reads and fills."""
-        from go2_wbc.kernels.motor import drive  # compiled; only who needs it waits for it
+    def _bind_kernels(self) -> None:
+        """Binds the kernels of a tick and the arrays of MuJoCo's that they read and fill."""
+        from go2_wbc.kernels import motor, simulation  # compiled; only who needs them waits
 
-        motor, data, layout = self._motor, self._data, self._layout
-        numbers = np.array([motor.peak, motor.knee_speed, motor.no_load_speed])
+        motors, data, layout = self._motor, self._data, self._layout
+        numbers = np.array([motors.peak, motors.knee_speed, motors.no_load_speed])
         places = np.array([layout.joint_q, layout.joint_v, layout.motors], dtype=np.int64)
-        self._drive, self._motors = drive, (numbers, places, data.qpos, data.qvel, data.ctrl)
+        self._drive, self._motors = motor.drive, (numbers, places, data.qpos, data.qvel, data.ctrl)
+        base = (layout.base_q.start, layout.base_v.start)
+        self._read_joints = partial(
+            simulation.measure, data.qpos, data.qvel, self._R_world_base, *base, places
+        )
+        self._bin_forces = simulation.ground_forces
+        self._is_elliptic = bool(self._model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC)
+
+    def _ground_forces(self) -> Float[np.ndarray, "6"]:
+        """Normal forces [N] of contacts with anything but the robot, summed per bin of the layout.
+
+        Valid between ``mj_step2`` and the next ``mj_step1``: they acted over the last step.
+        """
+        data, forces = self._data, np.empty(ROBOT_BINS)
+        contact, codes = data.contact, self._layout.geom_codes
+        rows = (contact.geom, contact.efc_address, contact.dim, data.efc_force)
+        self._bin_forces(*rows, codes, self._is_elliptic, forces)
+        return forces
 
     def _measure(self) -> RobotState:
         """The true state in Pinocchio's conventions."""
-        base_q, base_v = self._base_q, self._base_v
-        q_joints = self._data.qpos[self._layout.joint_q]
-        v_joints = self._data.qvel[self._layout.joint_v]
+        q, v = np.empty(19), np.empty(18)
+        self._read_joints(q, v)
         forces = self._forces[: len(LEGS)].copy()
         return RobotState(
             time=self.time,
-            q=np.concatenate([base_q[:3], base_q[[4, 5, 6, 3]], q_joints]),
-            v=np.concatenate([base_v[:3] @ self._R_world_base, base_v[3:], v_joints]),
+            q=q,
+            v=v,
             tau=self._tau.copy(),
             foot_forces=forces,
             feet_in_contact=forces > FOOT_CONTACT_THRESHOLD,
@@ -371,8 +387,8 @@ class MujocoPlant(Plant):
 
     def _check_physics(self) -> None:
         """Raises ``PlantError`` if MuJoCo warned about anything."""
-        counts = self._data.warning.number
-        if counts.any():
+        counts = self._warnings
+        if np.count_nonzero(counts):
             raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(counts)]
             raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
 

@@ -42,6 +42,7 @@ class Pushes:
 
     def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, layout: MujocoLayout) -> None:
         self._model, self._data, self._layout = model, data, layout
+        self._wrenches = data.xfrc_applied  # a view, made once because making it is slow
         self.active: tuple[Push, ...] = ()
 
     def add(self, force: Float[np.ndarray, "3"], duration: float, at: str) -> None:
@@ -57,8 +58,10 @@ class Pushes:
 
     def apply(self) -> None:
         """Writes the forces for one physics step."""
-        wrenches = self._data.xfrc_applied
+        wrenches = self._wrenches
         wrenches[:] = 0.0
+        if not self.active:
+            return
         for push in self.active:
             wrenches[push.body, :3] += push.f_world
             wrenches[push.body, 3:] += np.cross(self._arm(push), push.f_world)
