@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
 
+import motions  # what is named motions.X below is imported when it is used, scipy with it
 from controller import arguments
 from controller.assembly import PilotSettings, build_pilot
 from controller.modes import Mode, Outcome
@@ -25,7 +26,6 @@ from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
-from motions import CompiledPlan, FeasibilityChecker, Playable, compile_timeline, load_motion
 from motions.library.high_five import HEIGHT as HIGH_FIVE_HEIGHT
 
 _log = logging.getLogger(__name__)
@@ -195,7 +195,7 @@ class GO2Controller:
     # --- motions --------------------------------------------------------------------------
 
     def high_five(
-        self, side: str = "right", hold: float = 2.0, *, plan: CompiledPlan | None = None
+        self, side: str = "right", hold: float = 2.0, *, plan: motions.CompiledPlan | None = None
     ) -> bool:
         """Raise a front paw on three legs, hold it, tap, and come back to standing.
 
@@ -213,12 +213,13 @@ class GO2Controller:
         if not 0.5 <= hold <= 30.0:
             raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
         if plan is None:
-            timeline = load_motion("high_five", side=side, hold=hold, height=HIGH_FIVE_HEIGHT)
+            height = HIGH_FIVE_HEIGHT
+            timeline = motions.load_motion("high_five", side=side, hold=hold, height=height)
             with self._planning:
-                plan = compile_timeline(timeline, self._checker.model)
+                plan = motions.compile_timeline(timeline, self._checker.model)
         return self._call("high_five", lambda: self._pilot.high_five(plan, leg, HIGH_FIVE_HEIGHT))
 
-    def play(self, motion: Playable, *, check: bool = True) -> bool:
+    def play(self, motion: motions.Playable, *, check: bool = True) -> bool:
         """Play a motion: a name of the library, a timeline, a compiled plan, or a checked motion.
 
         With ``check=False`` also one that the robot cannot do, to see what happens. What
@@ -250,9 +251,9 @@ class GO2Controller:
         return 0.0 if playing is None else playing.progress
 
     @cached_property
-    def _checker(self) -> FeasibilityChecker:
+    def _checker(self) -> motions.FeasibilityChecker:
         """Plans on a model of its own: the control loop's belongs to the thread that ticks."""
-        return FeasibilityChecker(RobotModel(self._description, motor=self._motor))
+        return motions.FeasibilityChecker(RobotModel(self._description, motor=self._motor))
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""

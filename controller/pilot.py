@@ -13,6 +13,7 @@ from statistics import fmean
 import numpy as np
 from jaxtyping import Float
 
+import motions
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.walking import Walking
 from controller.checks import (
@@ -36,7 +37,6 @@ from go2_wbc.errors import ModeError, StanceMismatch
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.reference import MotionPlan, Posture
-from motions.compiler import CompiledPlan
 from motions.postures import lie_down, rise, sit_down
 
 READY_TIME = 0.2
@@ -275,7 +275,7 @@ class Pilot:
         if plan.entry is Posture.STAND:
             self.square_up()
 
-    def high_five(self, plan: CompiledPlan, leg: Leg, height: float) -> Measurements:
+    def high_five(self, plan: motions.CompiledPlan, leg: Leg, height: float) -> Measurements:
         """Give a high five, from any mode but fallen, and measure how high the paw was held.
 
         Args:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.kernels.compilation import kernel
+from go2_wbc.kernels.compilation import kernel, subroutine
 
 SOLVED, INFEASIBLE, SINGULAR, UNFINISHED, BAD_BOUNDS = range(5)
 MESSAGES = (
@@ -37,7 +37,7 @@ MAX_STEPS = 400
 FREE, AT_LOWER, AT_UPPER = 0, -1, 1
 
 
-@kernel("b1(f8[:,::1], f8[:,::1])")
+@subroutine("b1(f8[:,::1], f8[:,::1])")
 def factorise(H, J):
     """J = L^-T of H = L L'; False if H is not positive definite."""
     n = H.shape[0]
@@ -66,7 +66,7 @@ def factorise(H, J):
     return True
 
 
-@kernel("void(f8[:,::1], f8[:,::1], f8[::1], i8)")
+@subroutine("void(f8[:,::1], f8[:,::1], f8[::1], i8)")
 def take_in(J, R, d, q):
     """Add the normal n with d = J'n as column q of R: rotate d so that nothing lies below q."""
     n = len(d)
@@ -85,7 +85,7 @@ def take_in(J, R, d, q):
         R[i, q] = d[i]
 
 
-@kernel("void(f8[:,::1], f8[:,::1], i8, i8)")
+@subroutine("void(f8[:,::1], f8[:,::1], i8, i8)")
 def drop(J, R, place, q):
     """Remove column ``place`` of the q columns of R, and make R upper triangular again."""
     n = J.shape[0]
@@ -109,7 +109,7 @@ def drop(J, R, place, q):
             J[k, j + 1] = c * second - s * first
 
 
-@kernel("void(f8[:,::1], f8[::1], f8[::1])")
+@subroutine("void(f8[:,::1], f8[::1], f8[::1])")
 def minimise(J, g, x):
     """x = -H^-1 g = -J J'g, for the upper triangular J of ``factorise``."""
     n = len(g)
@@ -122,7 +122,7 @@ def minimise(J, g, x):
             x[i] -= J[i, j] * value
 
 
-@kernel("Tuple((i8, f8, f8))(f8[::1], f8[:,::1], f8[::1], f8[::1], i8[::1])")
+@subroutine("Tuple((i8, f8, f8))(f8[::1], f8[:,::1], f8[::1], f8[::1], i8[::1])")
 def most_violated(x, C, lower, upper, side):
     """The free row that is violated most, or -1; 1 for its lower side, else -1; by how much."""
     found, sign, worst = -1, 1.0, 0.0
@@ -141,7 +141,7 @@ def most_violated(x, C, lower, upper, side):
     return found, sign, worst
 
 
-@kernel("Tuple((f8, f8))(f8[:,::1], f8[:,::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
+@subroutine("Tuple((f8, f8))(f8[:,::1], f8[:,::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
 def directions(J, R, normal, q, d, z, r):
     """Fill d = J'n, the primal direction z and the dual one r; returns |d outside|^2, |d|^2."""
     n = len(normal)
@@ -167,7 +167,7 @@ def directions(J, R, normal, q, d, z, r):
     return outside, whole
 
 
-@kernel("Tuple((f8, i8))(f8[::1], f8[::1], i8[::1], i8)")
+@subroutine("Tuple((f8, i8))(f8[::1], f8[::1], i8[::1], i8)")
 def partial_step(u, r, rows, q):
     """The step at which the first multiplier of a bound reaches zero, and its place; inf and -1."""
     step, leaving = np.inf, -1
@@ -177,7 +177,7 @@ def partial_step(u, r, rows, q):
     return step, leaving
 
 
-@kernel("i8(f8[:,::1], f8[:,::1], f8[::1], f8, f8, i8, i8[::1], i8, i8[::1], f8[::1], f8[::1])")
+@subroutine("i8(f8[:,::1], f8[:,::1], f8[::1], f8, f8, i8, i8[::1], i8, i8[::1], f8[::1], f8[::1])")
 def meet(J, R, normal, violation, slack, row, rows, q, side, u, x):
     """Move x until a row is met, dropping others on the way; returns q, the new working set's size.
 
@@ -217,7 +217,7 @@ def meet(J, R, normal, violation, slack, row, rows, q, side, u, x):
     return -2
 
 
-@kernel("i8(i8[::1], f8[::1], i8, i8[::1], f8[::1], f8[::1], i8)")
+@subroutine("i8(i8[::1], f8[::1], i8, i8[::1], f8[::1], f8[::1], i8)")
 def finish(rows, u, q, side, x, y, k):
     """Put the working set's multipliers in their places in y; an equality's sign waits there."""
     signs = y[:k].copy()

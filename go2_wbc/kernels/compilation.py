@@ -5,6 +5,10 @@ announced by one line of the log. The machine code is kept in a folder named by 
 kernel's source, the versions and the processor, so that it never outlives them: numba itself looks
 at the file that defines a function, not at those it calls. A folder that cannot be read is emptied
 and filled anew; where no folder can be written, the kernels are compiled in every process.
+
+Loading is part of every start, so it must not take long. Only what Python calls is loaded, a
+``kernel``; a ``subroutine`` is part of the machine code of the kernels that call it. And loading
+needs nothing of Numba's compiler: see ``_KernelCache``.
 """
 
 from __future__ import annotations
@@ -23,6 +27,9 @@ from typing import Any, TypeVar
 import llvmlite.binding
 import numba
 import numpy as np
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.environment import Environment
+from numba.core.runtime.nrt import rtsys
 
 _log = logging.getLogger(__name__)
 
@@ -56,13 +63,77 @@ def kernel(signature: str) -> Callable[[F], F]:
     return compiled
 
 
+def subroutine(signature: str) -> Callable[[F], F]:
+    """Compile a function for one signature when a kernel that calls it is compiled.
+
+    A process that loads the kernel does not need it. Called from Python, as by a test, it is
+    compiled for the arguments that it is given.
+    """
+
+    def deferred(function: F) -> F:
+        dispatcher = numba.njit(error_model="numpy")(function)
+        template_for = dispatcher.get_call_template
+
+        def get_call_template(args: Any, kws: Any) -> Any:
+            if not dispatcher.overloads:
+                dispatcher.compile(signature)
+                dispatcher.disable_compile()
+            return template_for(args, kws)
+
+        dispatcher.get_call_template = get_call_template
+        return dispatcher
+
+    return deferred
+
+
 def _compiled(function: F, signature: str, folder: Path | None) -> F:
+    dispatcher = numba.njit(error_model="numpy")(function)
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = "" if folder is None else str(folder)
     try:
-        return numba.njit(signature, cache=folder is not None, error_model="numpy")(function)
+        if folder is not None:
+            dispatcher._cache = _KernelCache(function)
+        dispatcher.compile(signature)
     finally:
         numba.config.CACHE_DIR = before
+    dispatcher.disable_compile()
+    return dispatcher
+
+
+class _MachineCode(CompileResultCacheImpl):
+    """What is kept of a compiled function.
+
+    With it Numba keeps an environment for each of its own functions that was compiled along
+    (``np.zeros``, ``min``), and loading one imports that function's module, scipy.linalg at last.
+    Compiled code takes nothing from that module: any other will do.
+    """
+
+    def reduce(self, cres: Any) -> tuple[Any, ...]:
+        *rest, environments = cres._reduce()
+        return (*rest, [_light(environment) for environment in environments])
+
+
+def _light(environment: Environment) -> Environment:
+    """The same environment, of a module that is there already if it is one of Numba's."""
+    if not str(environment.globals["__name__"]).startswith("numba."):
+        return environment
+    light = Environment(vars(numba))
+    light.env_name, light.consts[:] = environment.env_name, environment.consts
+    return light
+
+
+class _KernelCache(FunctionCache):
+    """Numba's cache, but loading does not import the compiler's library of functions.
+
+    That is 0.2 s of processor time, and compiling imports it where it is needed.
+    """
+
+    _impl_class = _MachineCode
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 @cache

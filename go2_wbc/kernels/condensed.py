@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.kernels.active_set import solve_qp
-from go2_wbc.kernels.compilation import kernel
+from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.layout import PROGRAM, REFERENCE, SNAPSHOT
 from go2_wbc.kernels.motor import available
 
@@ -48,7 +48,7 @@ _Q_LOWER, _Q_UPPER, _SPEED = _P["q_lower"], _P["q_upper"], _P["speed"]
 _BRAKING, _HORIZON, _SINGULAR = _P["braking"], _P["horizon"], _P["singular_determinant"]
 
 
-@kernel("b1(f8[::1], f8[::1], f8[::1], i8, f8[:,::1])")
+@subroutine("b1(f8[::1], f8[::1], f8[::1], i8, f8[:,::1])")
 def stance_leg(snapshot, target, program, leg, legs_map):
     """(3): fill a_l = legs_map (a_b, 1), rows 3 leg to 3 leg + 2; False if the leg is singular."""
     J = snapshot[_J_CONTACTS + 54 * leg : _J_CONTACTS + 54 * leg + 54].reshape(3, 18)
@@ -80,7 +80,7 @@ def stance_leg(snapshot, target, program, leg, legs_map):
     return True
 
 
-@kernel("b1(f8[:,::1], i8)")
+@subroutine("b1(f8[:,::1], i8)")
 def solve_linear(A, n):
     """Gauss-Jordan with pivoting: the columns from n on become (A[:, :n])^-1 A[:, n:]."""
     columns = A.shape[1]
@@ -104,7 +104,7 @@ def solve_linear(A, n):
     return True
 
 
-@kernel("b1(f8[::1], f8[::1], f8[::1], f8[:,::1])")
+@subroutine("b1(f8[::1], f8[::1], f8[::1], f8[:,::1])")
 def eliminate(snapshot, target, program, affine):
     """(3) and (4): fill z = affine (u, 1), which meets every equality; False if singular."""
     M = snapshot[_M : _M + 324].reshape(18, 18)
@@ -153,7 +153,7 @@ def eliminate(snapshot, target, program, affine):
     return True
 
 
-@kernel("void(f8[:,::1], f8[::1], f8[::1], f8, f8)")
+@subroutine("void(f8[:,::1], f8[::1], f8[::1], f8, f8)")
 def add_goal(H, g, row, b, weight):
     """Add weight |row (u, 1) - b|^2 / 2 to u'Hu/2 + g'u; fills the lower triangle of H only."""
     rest = weight * (row[12] - b)
@@ -166,7 +166,7 @@ def add_goal(H, g, row, b, weight):
             H[i, k] += scaled * row[k]
 
 
-@kernel("void(f8[::1], f8[:,::1], i8, f8[::1])")
+@subroutine("void(f8[::1], f8[:,::1], i8, f8[::1])")
 def times_affine(J, affine, leg, row):
     """row = J affine[:18], for a J (18,) of which only the base's and one leg's columns count."""
     row[:] = 0.0
@@ -177,7 +177,7 @@ def times_affine(J, affine, leg, row):
             row[i] += value * affine[k, i]
 
 
-@kernel("b1(f8[::1], f8[::1], f8[::1])")
+@subroutine("b1(f8[::1], f8[::1], f8[::1])")
 def orientation_error(snapshot, target, error):
     """Fill log(R' R_des); False if the angle is too near pi."""
     R = snapshot[_R : _R + 9].reshape(3, 3)
@@ -200,7 +200,7 @@ def orientation_error(snapshot, target, error):
     return True
 
 
-@kernel("b1(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[::1])")
+@subroutine("b1(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[::1])")
 def add_body_goals(q, v, snapshot, target, program, affine, H, g):
     """Rows of ``BodyPosition`` and ``BodyOrientation``."""
     R = snapshot[_R : _R + 9].reshape(3, 3)
@@ -243,7 +243,7 @@ def add_body_goals(q, v, snapshot, target, program, affine, H, g):
     return True
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[::1])")
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[::1])")
 def add_leg_goals(q, v, snapshot, target, program, affine, H, g):
     """Rows of ``SwingFoot``, ``LegPosture`` and ``ForceRegularisation``."""
     row = np.empty(13)
@@ -271,7 +271,7 @@ def add_leg_goals(q, v, snapshot, target, program, affine, H, g):
                 add_goal(H, g, affine[18 + n], share, program[_FORCE_WEIGHT])
 
 
-@kernel("i8(f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1])")
+@subroutine("i8(f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1])")
 def bound_forces(target, program, C, lower, upper):
     """Rows of ``FrictionPyramid``; returns how many."""
     mu = program[_FRICTION]
@@ -292,7 +292,7 @@ def bound_forces(target, program, C, lower, upper):
     return count
 
 
-@kernel("f8(f8, f8, f8, f8)")
+@subroutine("f8(f8, f8, f8, f8)")
 def viable_speed(distance, speed, braking, horizon):
     """v' of (1) in ``JointLimits``."""
     half = braking * horizon / 2
@@ -300,7 +300,7 @@ def viable_speed(distance, speed, braking, horizon):
     return np.sqrt(max(radicand, 0.0)) - half
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], i8, f8[:,::1], f8[::1], f8[::1])")
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], i8, f8[:,::1], f8[::1], f8[::1])")
 def bound_joints(q, v, snapshot, program, affine, count, C, lower, upper):
     """Rows of ``TorqueLimits`` and ``JointLimits``, from row ``count`` on."""
     row = np.empty(13)
@@ -328,7 +328,7 @@ def bound_joints(q, v, snapshot, program, affine, count, C, lower, upper):
         lower[last] = min((-min(most, slow) - speed) / horizon, braking) - offset
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1])")
+@subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1])")
 def torques(snapshot, affine, z, tau):
     """Joint rows of M a + h - J'f."""
     for n in range(12):

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.kernels.compilation import kernel
+from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.layout import SNAPSHOT
 
 _R, _M, _H = (SNAPSHOT.start[n] for n in ("R_world_base", "mass_matrix", "bias"))
@@ -28,7 +28,7 @@ _J_CONTACTS, _DRIFT_CONTACTS, _V_CONTACTS = (
 )
 
 
-@kernel("void(f8, f8, f8, f8, f8[:,::1])")
+@subroutine("void(f8, f8, f8, f8, f8[:,::1])")
 def rotation_of(x, y, z, w, R):
     """Fill the rotation matrix of a unit quaternion."""
     R[0, 0], R[0, 1], R[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
@@ -36,7 +36,7 @@ def rotation_of(x, y, z, w, R):
     R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
 
 
-@kernel("void(f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+@subroutine("void(f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
 def derive_com(R, M, h, v, constants, row):
     """Fill the CoM's terms: the first rows of M and h are the robot's linear momentum."""
     mass, gravity = constants[0], constants[1]
@@ -51,9 +51,7 @@ def derive_com(R, M, h, v, constants, row):
     row[_DRIFT_COM + 2] -= gravity
 
 
-@kernel(
-    "void(i8, f8[::1], f8[::1,:], f8[::1,:], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])"
-)
+@subroutine("void(i8, f8[::1], f8[::1,:], f8[:,:], f8[:], f8[:], f8[:], f8[::1], f8[::1], f8[::1])")
 def derive_foot(leg, v, J_pin, R, p_calf, v_calf, a_calf, p_calf_foot, constants, row):
     """Fill one foot's place, velocity, Jacobians and drifts, of its centre and its contact."""
     gravity, radius = constants[1], constants[2]
@@ -99,15 +97,16 @@ def derive_foot(leg, v, J_pin, R, p_calf, v_calf, a_calf, p_calf_foot, constants
 
 
 @kernel(
-    "void(f8[::1,:], f8[::1], f8[::1,:], UniTuple(f8[::1,:],4), "
-    "UniTuple(f8[::1],4), UniTuple(f8[::1],4), UniTuple(f8[::1],4), f8[:,::1], f8[::1], f8[::1])"
+    "void(f8[::1,:], f8[::1], f8[::1,:], f8[:,:,:], f8[:,:], f8[:,:], f8[:,:], f8[:,::1], "
+    "f8[::1], f8[::1])"
 )
 def derive(
     M_pin, h_pin, J_pin, R_calves, p_calves, v_calves, a_calves, p_calf_feet, constants, row
 ):
     """Fill the row of a snapshot, which begins with q and v.
 
-    ``constants``: mass [kg], gravity [m/s^2], foot radius [m].
+    ``R_calves`` (4, 3, 3), ``p_calves`` (4, 3), ``v_calves``, ``a_calves`` (4, 6) and ``J_pin`` are
+    Pinocchio's; ``constants``: mass [kg], gravity [m/s^2], foot radius [m].
     """
     q, v = row[:19], row[19:37]
     R = row[_R : _R + 9].reshape(3, 3)

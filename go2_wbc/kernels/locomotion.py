@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.kernels.compilation import kernel
+from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.layout import LOCOMOTION, PLANNER, REFERENCE, SNAPSHOT
 
 TIE = 1e-9
@@ -40,14 +40,14 @@ _FOOT_P, _FOOT_V, _FOOT_A = (_T[n] for n in ("p_world_feet", "v_world_feet", "a_
 _JOINT_Q = _T["q_joints"]
 
 
-@kernel("f8(f8[::1])")
+@subroutine("f8(f8[::1])")
 def yaw_of(q):
     """Heading of the quaternion in a configuration."""
     x, y, z, w = q[3], q[4], q[5], q[6]
     return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-@kernel("Tuple((b1, f8, f8))(f8, f8, f8[::1])")
+@subroutine("Tuple((b1, f8, f8))(f8, f8, f8[::1])")
 def foot_phase(t, offset, c):
     """Whether a foot is in stance at ``t`` of the gait, since when, and for how long yet [s]."""
     period, duty = c[_PERIOD], c[_DUTY]
@@ -60,7 +60,7 @@ def foot_phase(t, offset, c):
     return False, max(elapsed - stance_time, 0.0), period - elapsed
 
 
-@kernel("void(f8[::1], f8[::1], f8[:,::1])")
+@subroutine("void(f8[::1], f8[::1], f8[:,::1])")
 def nominal_feet(snapshot, c, feet):
     """Points below the hips of a level trunk with the measured heading."""
     q = snapshot[_Q : _Q + 19]
@@ -87,7 +87,7 @@ def is_square(snapshot, c):
     return True
 
 
-@kernel("b1(f8[::1], f8[::1])")
+@subroutine("b1(f8[::1], f8[::1])")
 def must_step(snapshot, c):
     """Whether the capture point is too far from the feet's middle."""
     omega = np.sqrt(c[_GRAVITY] / c[_HEIGHT])
@@ -100,7 +100,7 @@ def must_step(snapshot, c):
     return np.hypot(offset[0], offset[1]) > c[_CAPTURE]
 
 
-@kernel("b1(f8[::1], f8[::1])")
+@subroutine("b1(f8[::1], f8[::1])")
 def is_landing(s, c):
     """Whether feet touch down at this tick and no other one is in the air."""
     has_landed = False
@@ -113,7 +113,7 @@ def is_landing(s, c):
     return has_landed
 
 
-@kernel("b1(f8[::1], f8[::1], f8[::1])")
+@subroutine("b1(f8[::1], f8[::1], f8[::1])")
 def may_stop(snapshot, s, c):
     """Whether the robot is slow, no longer commanded, and stands squarely."""
     for i in range(3):
@@ -123,7 +123,7 @@ def may_stop(snapshot, s, c):
     return slow and is_square(snapshot, c)
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
 def advance_phase(snapshot, s, c, dt, command):
     """Start, go on, or come to rest."""
     is_zero = command[0] == 0.0 and command[1] == 0.0 and command[2] == 0.0
@@ -135,7 +135,7 @@ def advance_phase(snapshot, s, c, dt, command):
         s[_STEPPING], s[_PHASE_TIME] = 1.0, 0.0
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
 def integrate(snapshot, s, c, dt, command):
     """Ramp the velocity, integrate it to the pose, apply the leash, correct the height."""
     for i in range(3):
@@ -159,7 +159,7 @@ def integrate(snapshot, s, c, dt, command):
     s[_HEIGHT_OFFSET] = min(max(offset, -c[_LIMIT]), c[_LIMIT])
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1], b1[::1])")
+@subroutine("void(f8[::1], f8[::1], f8[::1], b1[::1])")
 def note_liftoffs(snapshot, s, c, stance):
     """Remember where feet leave the ground; low-pass the ground's height where they land."""
     landed, height = 0, 0.0
@@ -176,13 +176,13 @@ def note_liftoffs(snapshot, s, c, stance):
         s[_GROUND] += c[_GROUND_SHARE] * (height / landed - c[_RADIUS] - s[_GROUND])
 
 
-@kernel("Tuple((f8, f8, f8))(f8)")
+@subroutine("Tuple((f8, f8, f8))(f8)")
 def cubic(x):
     """As ``curves.Ease.CUBIC``."""
     return x * x * (3 - 2 * x), 6 * x * (1 - x), 6 - 12 * x
 
 
-@kernel("void(i8, f8[::1], f8[::1], f8, f8[::1], f8[::1])")
+@subroutine("void(i8, f8[::1], f8[::1], f8, f8[::1], f8[::1])")
 def swing(leg, s, c, progress, goal, target):
     """As ``planning.swing.swing_foot``, from the foot's lift-off to ``goal`` (3,)."""
     duration = (1.0 - c[_DUTY]) * c[_PERIOD]
@@ -204,7 +204,7 @@ def swing(leg, s, c, progress, goal, target):
     target[_FOOT_A + k + 2] = ddx * delta * 4.0 / duration**2
 
 
-@kernel("void(i8, f8[::1], f8[::1], f8[::1], f8[:,::1], f8, f8[::1])")
+@subroutine("void(i8, f8[::1], f8[::1], f8[::1], f8[:,::1], f8, f8[::1])")
 def foothold(leg, snapshot, s, c, nominal, remaining, goal):
     """Touchdown point: p_hip + v t + v T / 2 + k (v - v_ref), the last two within reach."""
     cosine, sine = np.cos(s[_YAW]), np.sin(s[_YAW])
@@ -222,7 +222,7 @@ def foothold(leg, snapshot, s, c, nominal, remaining, goal):
     goal[2] = s[_GROUND] + c[_RADIUS]
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1])")
+@subroutine("void(f8[::1], f8[::1], f8[::1])")
 def fill_body(s, c, target):
     """The trunk's reference: integrated pose, commanded velocity, level."""
     cosine, sine = np.cos(s[_YAW]), np.sin(s[_YAW])

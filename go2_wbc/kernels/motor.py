@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
-from go2_wbc.kernels.compilation import kernel
+from go2_wbc.kernels.compilation import kernel, subroutine
 
 
-@kernel("f8(f8, f8, f8, f8)")
+@subroutine("f8(f8, f8, f8, f8)")
 def available(v, peak, knee_speed, no_load_speed):
     """Greatest torque at velocity v; the least one is -available(-v)."""
     if not v > knee_speed:

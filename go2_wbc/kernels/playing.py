@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.kernels.compilation import kernel
+from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.derivation import rotation_of
 from go2_wbc.kernels.layout import CORRECTION, PLAYBACK, REFERENCE, SNAPSHOT
 
@@ -112,7 +112,7 @@ def planned_at(knots, pieces, events, modes, since, until, ramp, least, greatest
 # --- where it is followed -------------------------------------------------------------------
 
 
-@kernel("void(f8[:,::1], f8[::1])")
+@subroutine("void(f8[:,::1], f8[::1])")
 def quaternion_of(R, q):
     """Fill the quaternion x y z w of ``R``, from its largest component (Shepperd 1978)."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
@@ -131,7 +131,7 @@ def quaternion_of(R, q):
     q /= np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
 
 
-@kernel("void(f8[:,::1], f8[::1])")
+@subroutine("void(f8[:,::1], f8[::1])")
 def log_rotation(R, vector):
     """Fill the rotation vector of ``R``, of length 0 to pi."""
     q = np.empty(4)
@@ -145,7 +145,7 @@ def log_rotation(R, vector):
         vector[i] = factor * q[i]
 
 
-@kernel("void(f8[::1], f8[:,::1])")
+@subroutine("void(f8[::1], f8[:,::1])")
 def exp_rotation(vector, R):
     """Fill the rotation by a rotation vector."""
     angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
@@ -154,7 +154,7 @@ def exp_rotation(vector, R):
     rotation_of(x, y, z, np.cos(angle / 2), R)
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1])")
+@subroutine("void(f8[::1], f8[::1], f8[::1])")
 def place(plan, anchor, row):
     """Fill ``row`` with ``plan`` in the world: turned by the anchor's yaw and moved to its place.
 
@@ -179,7 +179,7 @@ def place(plan, anchor, row):
             row[_FOOT_P + 3 * leg + i] += anchor[i]
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1], f8[::1])")
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1])")
 def note(row, snapshot, error, state):
     """Bring the averages of how far the robot is off its plan up to this tick."""
     state[_TICKS] += 1.0

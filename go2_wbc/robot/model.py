@@ -8,7 +8,7 @@ linear momentum (Wieber, Tedrake & Kuindersma 2016, eq. 48.16).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -108,10 +108,10 @@ class RobotModel:
             data.M,
             data.nle,
             data.J,
-            tuple(data.oMi[calf].rotation for calf in calves),
-            tuple(data.oMi[calf].translation for calf in calves),
-            tuple(data.v[calf].vector for calf in calves),
-            tuple(data.a_gf[calf].vector for calf in calves),
+            _one_view([data.oMi[calf].rotation for calf in calves]),
+            _one_view([data.oMi[calf].translation for calf in calves]),
+            _one_view([data.v[calf].vector for calf in calves]),
+            _one_view([data.a_gf[calf].vector for calf in calves]),
             np.array([frame.placement.translation for frame in frames]),
             np.array(self._constants),
         )
@@ -170,6 +170,20 @@ class RobotModel:
     ) -> Float[np.ndarray, "18"]:
         """Generalised force M(q) a + h(q, v) [N, N m]."""
         return np.array(pin.rnea(self.pin_model, self._data, q, v, a))
+
+
+def _one_view(views: Sequence[Float[np.ndarray, "..."]]) -> Float[np.ndarray, "..."]:
+    """Views of arrays that lie in memory one after the other, as one view of all.
+
+    A kernel takes one array in a sixth of the time that it takes four in.
+    """
+    places = [view.__array_interface__["data"][0] for view in views]
+    steps = set(np.diff(places).tolist())
+    if len(steps) != 1:
+        raise RuntimeError(f"Pinocchio's joint data do not lie at equal distances: {places}")
+    first = views[0]
+    shape, strides = (len(views), *first.shape), (steps.pop(), *first.strides)
+    return np.lib.stride_tricks.as_strided(first, shape, strides)
 
 
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED

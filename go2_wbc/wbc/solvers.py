@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import qpsolvers
 from jaxtyping import Float
 
 from go2_wbc.errors import QpInfeasible, SolverUnavailable, unknown_name
@@ -84,6 +83,10 @@ def check_solver(name: str) -> str:
     Raises:
         SolverUnavailable: otherwise; lists the names that would work.
     """
+    if name == "active_set":
+        return name
+    import qpsolvers  # scipy with it: only for who uses it
+
     installed = [s for s in SOLVERS if s == "active_set" or s in qpsolvers.available_solvers]
     if name not in SOLVERS:
         raise SolverUnavailable(unknown_name("QP solver", name, installed))
@@ -112,7 +115,7 @@ def solve_dense_qp(qp: DenseQp, solver: str) -> QpSolution:
             solution = _solve_proxqp(qp)
         else:
             solution = _solve_by_qpsolvers(qp, solver)
-    except (qpsolvers.exceptions.QPError, ValueError, RuntimeError) as error:
+    except (ValueError, RuntimeError) as error:
         raise QpInfeasible(solver, str(error)) from error
     if solution is None or not np.isfinite(solution.x).all():
         raise QpInfeasible(solver, "no feasible point found")
@@ -140,9 +143,14 @@ def _one_sided(qp: DenseQp, multipliers: Float[np.ndarray, " m"]) -> Float[np.nd
 
 
 def _solve_by_qpsolvers(qp: DenseQp, solver: str) -> QpSolution | None:
+    import qpsolvers
+
     G, h = qp.one_sided()
-    problem = qpsolvers.Problem(qp.H, qp.g, G, h, qp.E, qp.e)
-    solution = qpsolvers.solve_problem(problem, solver, **QPSOLVERS_OPTIONS[solver])
+    try:
+        problem = qpsolvers.Problem(qp.H, qp.g, G, h, qp.E, qp.e)
+        solution = qpsolvers.solve_problem(problem, solver, **QPSOLVERS_OPTIONS[solver])
+    except qpsolvers.exceptions.QPError as error:
+        raise QpInfeasible(solver, str(error)) from error
     if not solution.found or solution.x is None:
         return None
     equality = solution.y if solution.y is not None else np.zeros(0)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from go2_wbc.kernels import compilation
-from go2_wbc.kernels.compilation import kernel, kernel_folder
+from go2_wbc.kernels.compilation import kernel, kernel_folder, subroutine
 
 SCRIPT = """
 from go2_wbc.kernels.compilation import kernel
@@ -23,6 +23,34 @@ def cube(x):
 
 assert cube(2.0) == 8.0
 print(sum(cube.stats.cache_hits.values()))
+"""
+
+
+LOADING = """
+import sys
+import numpy as np
+from go2_wbc.kernels.compilation import kernel, subroutine
+
+@subroutine("f8(f8[::1])")
+def smallest(x):
+    least = x[0]
+    for value in x:
+        least = min(least, value)
+    return least
+
+@kernel("f8(f8[::1], i8)")
+def spread(x, n):
+    copy = np.zeros(n)
+    copy[:] = x
+    return np.max(copy) - smallest(x)
+
+assert spread(np.array([1.0, 5.0, 2.0]), 3) == 4.0
+try:
+    spread(np.zeros(3), 2)
+except ValueError as error:
+    print(error)
+print(sum(spread.stats.cache_hits.values()), sum(smallest.stats.cache_hits.values()))
+print([name for name in ("scipy.linalg", "numba.np.linalg") if name in sys.modules])
 """
 
 
@@ -132,3 +160,39 @@ def test_what_is_kept_lies_in_the_named_folder(folder: Path) -> None:
     logging.getLogger("numba").setLevel(logging.WARNING)
     compile_square()
     assert any(folder.rglob("*.nbc"))
+
+
+def run_script(folder: Path, script: str) -> list[str]:
+    """Lines that a process prints whose kernels are kept below ``folder``."""
+    path = folder / "script.py"
+    path.write_text(script)
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(Path(__file__).resolve().parents[3]),
+        compilation.CACHE_VARIABLE: str(folder / "kept"),
+    }
+    command = [sys.executable, str(path)]
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
+    return done.stdout.splitlines()
+
+
+def test_loading_takes_the_kernels_alone_and_nothing_of_the_compiler(tmp_path: Path) -> None:
+    compiled, loaded = run_script(tmp_path, LOADING), run_script(tmp_path, LOADING)
+    assert compiled[1:] == ["0 0", "['scipy.linalg', 'numba.np.linalg']"]
+    assert loaded[1:] == ["1 0", "[]"]
+    assert "cannot assign slice" in loaded[0]  # numba's own errors, too
+    assert loaded[0] == compiled[0]
+    assert len(list((tmp_path / "kept").rglob("*.nbc"))) == 1
+
+
+def test_a_subroutine_is_compiled_for_its_signature_whoever_calls_it() -> None:
+    @subroutine("f8(f8)")
+    def half(x):  # noqa: ANN001, ANN202
+        return x / 2
+
+    @kernel("f8(i8)")
+    def half_of_whole(n):  # noqa: ANN001, ANN202
+        return half(n)
+
+    assert half_of_whole(3) == 1.5
+    assert [str(s) for s in half.signatures] == ["(float64,)"]  # pyright: ignore[reportFunctionMemberAccess]
