@@ -89,9 +89,7 @@ class GO2Controller:
         )
         with ExitStack() as opened:
             if plant is None:
-                plant = MujocoPlant(
-                    urdf=description.urdf_path, visuals=viewer, motor=config.motor
-                )
+                plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer, motor=config.motor)
                 opened.callback(plant.close)
             self._plant = plant
             built = build_pilot(plant, config, settings)
