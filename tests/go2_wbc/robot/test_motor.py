@@ -94,7 +94,8 @@ def test_a_share_scales_the_whole_line() -> None:
 
 def test_a_torque_is_that_of_the_servo_cut_to_the_line() -> None:
     rng = np.random.default_rng(1)
-    command = JointCommand(*rng.normal(size=(3, 12)), np.full(12, 7.0), np.full(12, 0.5))
+    tau, q_des, v_des = rng.normal(size=(3, 12))
+    command = JointCommand(tau, q_des, v_des, np.full(12, 7.0), np.full(12, 0.5))
     q, v = rng.normal(size=12), rng.normal(size=12)
     wanted = command.tau + 7.0 * (command.q_des - q) + 0.5 * (command.v_des - v)
     np.testing.assert_allclose(LINE.torque(command, q, v), wanted)

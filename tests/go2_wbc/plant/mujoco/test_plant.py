@@ -15,6 +15,7 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.viewer import PlantViewer, display_problem
 from go2_wbc.plant.sensors import SensorNoise
 from go2_wbc.robot.description import find_description
+from go2_wbc.robot.motor import TORQUE_SPEED
 from go2_wbc.robot.state import JointCommand, RobotState
 from tests.go2_wbc.plant.contract import DAMPED, PlantContract, same
 from tests.go2_wbc.plant.helpers import GRAVITY, STAND, fly, stand_up
@@ -113,9 +114,9 @@ def test_torques_are_clipped_to_the_urdfs_efforts(plant: MujocoPlant) -> None:
     assert np.array_equal(plant.read().tau, signs * np.tile([23.7, 23.7, 45.43], 4))
 
 
-def spinning(share: float, **settings: Any) -> tuple[MujocoPlant, np.ndarray]:
+def spinning(share: float, motor: str = TORQUE_SPEED) -> tuple[MujocoPlant, np.ndarray]:
     """A plant in the air whose joints turn at ``share`` of their speed, and that speed."""
-    plant = MujocoPlant(**settings)
+    plant = MujocoPlant(motor=motor)
     speeds = share * np.array(find_description().speeds)
     q = np.concatenate([[0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 1.0], STAND])
     plant.place(q, np.concatenate([np.zeros(6), speeds]))
