@@ -125,6 +125,7 @@ def test_a_controller_takes_a_file_a_path_or_a_config(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("[envelope]\nforward = 0", "VelocityEnvelope.forward must be positive, got 0.0"),
+        ("motor = 'perfect'", "unknown motor 'perfect'; valid: ideal, torque-speed"),
         ("[wbc]\nfriction = -0.6", "WbcConfig.friction must be positive, got -0.6"),
         ("[wbc]\ntorque_share = 1.5", "WbcConfig.torque_share must be above 0 and at most 1"),
         ("[wbc]\nswing_weight = -1", "WbcConfig.swing_weight must be at least 0, got -1.0"),

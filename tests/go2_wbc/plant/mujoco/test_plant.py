@@ -15,6 +15,7 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.viewer import PlantViewer, display_problem
 from go2_wbc.plant.sensors import SensorNoise
 from go2_wbc.robot.description import find_description
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import TORQUE_SPEED
 from go2_wbc.robot.state import JointCommand, RobotState
 from tests.go2_wbc.plant.contract import DAMPED, PlantContract, same
@@ -167,7 +168,7 @@ def test_no_motor_drives_its_joint_beyond_its_speed_without_load(
 def test_a_servo_meets_the_line_too() -> None:
     plant, speeds = spinning(0.8)
     plant.write(JointCommand.servo(STAND + 10.0, np.zeros(12), 60.0, 0.0))
-    assert np.array_equal(plant.read().tau, plant.motor.limits(speeds)[1])
+    assert np.array_equal(plant.read().tau, RobotModel().motor.limits(speeds)[1])
 
 
 def test_the_motor_law_is_evaluated_at_every_physics_step() -> None:
