@@ -131,6 +131,32 @@ def cases(model: RobotModel, count: int, seed: int) -> Iterator[tuple[Snapshot, 
         yield snapshot, random_reference(snapshot, legs, effort, rng)
 
 
+def fast_cases(model: RobotModel, count: int, seed: int) -> Iterator[tuple[Snapshot, Reference]]:
+    """Problems whose joints turn so fast that the motors' line counts.
+
+    The trunk rises and turns fast over standing feet that do not move, and is asked for more of it;
+    raised legs turn at up to 0.8 of their speed.
+    """
+    rng = np.random.default_rng(seed)
+    for index in range(count):
+        legs = MODES[index % len(MODES)]
+        state = random_state(rng)
+        v = np.concatenate([rng.normal(scale=0.3, size=6), state.v[6:]])
+        v[2] = rng.uniform(-1.0, 2.5)
+        J = model.snapshot(state).J_contacts
+        for leg, task in enumerate(legs):
+            joints = slice(6 + 3 * leg, 9 + 3 * leg)
+            fast = rng.uniform(-0.8, 0.8, size=3) * model.speed_limits[:3]
+            still = np.linalg.solve(J[leg][:, joints], -J[leg][:, :6] @ v[:6])
+            v[joints] = still if task is LegTask.STANCE else fast
+        snapshot = model.snapshot(replace(state, v=v))
+        reference = random_reference(snapshot, legs, 15.0, rng)
+        body = replace(reference.body, v_world=snapshot.R_world_base @ v[:3])
+        body = replace(body, a_world=np.array([0.0, 0.0, rng.uniform(0.0, 60.0)]))
+        force = np.full(4, 400.0)
+        yield snapshot, replace(reference, body=body, normal_force_max=force)
+
+
 def moved(model: RobotModel, state: RobotState, a: np.ndarray, dt: float) -> RobotState:
     """The state ``dt`` later under the constant generalised acceleration ``a``, to second order."""
     q = pin.integrate(model.pin_model, state.q, state.v * dt + a * dt * dt / 2)

@@ -19,6 +19,7 @@ from go2_wbc.config import Config, load_config
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.reference import Posture
+from go2_wbc.robot.motor import KNEE_SHARE
 from go2_wbc.wbc.tasks import Gains
 from motions import FeasibilityChecker, Timeline, check, compile_timeline, load_motion
 from motions.feasibility import FeasibilityLimits
@@ -234,7 +235,7 @@ def test_the_limits_in_the_table_are_those_of_the_checker() -> None:
     shown = {
         "reach": f"<= {1000 * limits.reach:g} mm",
         "torque": f"{limits.torque_share:g} tau_max",
-        "torque at speed": f"min(1, {1 / (1 - limits.knee_speed_share):g} (1",
+        "torque at speed": f"min(1, (1 - abs(v) / v_max) / {1 - KNEE_SHARE:g})",
         "support": f">= {1000 * limits.support:g} mm",
         "support of ZMP": f">= {1000 * limits.zero_moment:g} mm",
         "contact wrench": f"<= {limits.wrench:g} N, <= {0.2 * limits.wrench:g} N m",

@@ -12,11 +12,12 @@ gains are not per axis. Where PlaCo's formulation differs from ours it is aligne
 - Force regularisation. PlaCo regularises around zero. Half of the weight stays there and half is
   added around 2 f0, since |f|^2 / 2 + |f - 2 f0|^2 / 2 = |f - f0|^2 + const.
 - Normal force bounds, joint limits and the motors' line. PlaCo knows no bounds on a contact's
-  normal force, and one torque limit for both directions: the motors' peak; where a fast joint has
-  less, our row joins in. Its joint limits are ours with dt = ``limit_horizon`` and safe acceleration = ``braking`` inside the limits,
-  but outside them they ask for qdd <= -braking, and elsewhere for more than ``braking``, which can
-  make the QP infeasible. These limits are therefore added as rows of ours to the QP that PlaCo has
-  assembled, and the QP is solved again: a tick costs two solutions.
+  normal force, and one torque limit for both directions: the motors' peak. Its joint limits are
+  ours with dt = ``limit_horizon`` and safe acceleration = ``braking`` inside the limits, but
+  outside them they ask for qdd <= -braking, and elsewhere for more than ``braking``, which can make
+  the QP infeasible. These limits, of the torques where a fast joint has less than its peak, are
+  therefore added as rows of ours to the QP that PlaCo has assembled, and the QP is solved again: a
+  tick costs two solutions.
 
 Without any stance foot the QP is a free fall and has a solution, as for the other back ends.
 """

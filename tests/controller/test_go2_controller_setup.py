@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import qpsolvers
 
@@ -22,6 +23,7 @@ from go2_wbc.errors import (
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.motor import MOTORS
 from go2_wbc.wbc.config import WbcConfig
 from motions.postures import STAND_HEIGHT
 from tests.controller.plants import WatchedPlant
@@ -121,3 +123,13 @@ def test_a_urdf_of_ones_own_makes_the_model_and_the_robot(tmp_path: Path) -> Non
 def test_a_urdf_that_does_not_exist_is_named(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"nowhere\.urdf"):
         GO2Controller(urdf=tmp_path / "nowhere.urdf")
+
+
+@pytest.mark.parametrize("motor", MOTORS)
+def test_the_motor_is_the_same_for_robot_controller_and_check(motor: str) -> None:
+    expected = RobotModel(motor=motor).motor.no_load_speed
+    with GO2Controller(config=Config(motor=motor)) as go2:
+        assert isinstance(go2._plant, MujocoPlant)
+        models = (go2._runner.loop.model, go2._checker.model)
+        for found in (go2._plant.motor, *(model.motor for model in models)):
+            assert np.array_equal(found.no_load_speed, expected)

@@ -26,6 +26,7 @@ def test_an_empty_file_changes_nothing(tmp_path: Path) -> None:
 def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path: Path) -> None:
     text = """
     backend = "full"
+    motor = "ideal"
     [locomotion]
     height = 0.27
     [wbc]
@@ -36,6 +37,7 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path: Path) -> None
     """
     config, default = load_config(written(tmp_path, text)), Config()
     assert config.backend == "full"
+    assert (config.motor, default.motor) == ("ideal", "torque-speed")
     assert config.locomotion.height == 0.27
     assert config.wbc.solver == "proxqp"
     assert config.wbc.swing_foot.kp == (400.0, 401.0, 402.5)
@@ -55,7 +57,7 @@ def test_one_half_of_a_nested_table_may_be_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("speed = 1", r"unknown key 'speed'; valid: backend, envelope, locomotion, safety, wbc"),
+        ("speed = 1", r"unknown key 'speed'; valid: backend, envelope, locomotion, motor, safety"),
         ("[wbc]\nsolvr = 'daqp'", r"mine\.toml: wbc: unknown key 'solvr'; valid: .*solver"),
         ("[wbc.swing_foot]\nki = [1, 1, 1]", r"wbc: swing_foot: unknown key 'ki'; valid: kd, kp"),
         ("wbc = 3", r"wbc must be a table, got 3"),
@@ -123,6 +125,7 @@ def test_a_controller_takes_a_file_a_path_or_a_config(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("[envelope]\nforward = 0", "VelocityEnvelope.forward must be positive, got 0.0"),
+        ("motor = 'perfect'", "unknown motor 'perfect'; valid: ideal, torque-speed"),
         ("[wbc]\nfriction = -0.6", "WbcConfig.friction must be positive, got -0.6"),
         ("[wbc]\ntorque_share = 1.5", "WbcConfig.torque_share must be above 0 and at most 1"),
         ("[wbc]\nswing_weight = -1", "WbcConfig.swing_weight must be at least 0, got -1.0"),

@@ -19,10 +19,18 @@ from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.solution import WbcSolution
 from go2_wbc.wbc.tasks import Gains, Task
-from tests.engine_helpers import cases, holding_reference, random_state, standing_q, state_of
+from tests.engine_helpers import (
+    cases,
+    fast_cases,
+    holding_reference,
+    random_state,
+    standing_q,
+    state_of,
+)
 
 AGREEMENT = 1e-6  # [N m] between two solvers; measured 2.3e-8
 COUNT = 1040  # 80 of every contact mode
+FAST_COUNT = 208  # 16 of every contact mode
 SATURATING = WbcConfig(speed_share=0.15, torque_share=0.4)  # bounds bind in most states
 ODD_NUMBERS = WbcConfig(
     body_position=Gains((31.0, 32.0, 33.0), (11.0, 12.0, 13.0)),
@@ -73,6 +81,35 @@ def test_torques_are_those_of_the_full_problem(config: WbcConfig) -> None:
         np.testing.assert_allclose(ours.forces, theirs.forces, atol=1e-4, rtol=0)
         np.testing.assert_allclose(ours.qdd, theirs.qdd, atol=1e-4, rtol=0)
     assert refused < COUNT / 4
+
+
+@pytest.mark.parametrize("share", [1.0, 0.4])
+def test_torques_of_fast_joints_keep_to_the_motors_line(share: float) -> None:
+    model, config = RobotModel(), WbcConfig(torque_share=share)
+    compiled = WholeBodyController(model, "condensed", config)
+    readable = WholeBodyController(model, "full", replace(config, solver="daqp"))
+    blind = WholeBodyController(RobotModel(motor="ideal"), "condensed", config)
+    motor, refused, on_the_line, blindly_beyond = model.motor.scaled(share), 0, 0, 0
+    for snapshot, reference in fast_cases(model, FAST_COUNT, seed=25):
+        lower, upper = motor.limits(snapshot.state.joint_velocities)
+        other = blind.solve_compiled(snapshot, reference)
+        if other is not None:
+            excess = np.maximum(other.tau - upper, lower - other.tau)
+            blindly_beyond += int(excess.max() > AGREEMENT)
+        ours = compiled.solve_compiled(snapshot, reference)
+        theirs = solve_or_none(readable, snapshot, reference)
+        assert (ours is None) == (theirs is None)
+        if ours is None or theirs is None:
+            refused += 1
+            continue
+        np.testing.assert_allclose(ours.tau, theirs.tau, atol=AGREEMENT, rtol=0)
+        excess = np.maximum(ours.tau - upper, lower - ours.tau)
+        assert excess.max() < AGREEMENT
+        is_cut = np.where(ours.tau < 0.0, -lower, upper) < motor.peak
+        on_the_line += int((is_cut & (excess > -AGREEMENT)).any())
+    assert refused < FAST_COUNT / 8
+    assert on_the_line > FAST_COUNT / 12
+    assert blindly_beyond > FAST_COUNT / 12
 
 
 @dataclass(frozen=True, slots=True)

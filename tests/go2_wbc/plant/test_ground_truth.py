@@ -109,6 +109,15 @@ def test_shares_and_distances_are_those_of_the_worst_joint() -> None:
     assert recorded.joint_distance(model) == pytest.approx(-0.1)
 
 
+def test_a_torque_counts_against_what_its_motor_gives_at_the_start_of_the_tick() -> None:
+    model, ideal = RobotModel(), RobotModel(motor="ideal")
+    recorded = empty_recording(3, np.zeros((3, 4, 3)))
+    recorded.v[0, 6 + 4] = 0.725 * model.speed_limits[4]  # half way from the knee to no load
+    recorded.tau[1:, 4] = 0.25 * model.torque_limits[4]
+    assert recorded.torque_shares(model) == pytest.approx([0.0, 0.5, 0.25])
+    assert recorded.torque_shares(ideal) == pytest.approx([0.0, 0.25, 0.25])
+
+
 def test_part_and_since_keep_every_column_in_step() -> None:
     recorded = empty_recording(10, np.zeros((10, 4, 3)))
     assert recorded.since(0.0041).time == pytest.approx(0.002 * np.arange(3, 10))

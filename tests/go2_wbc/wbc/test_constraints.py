@@ -95,11 +95,25 @@ def test_stance_rows_ask_the_contact_velocity_to_decay(seed: int, damping: float
 
 def test_torque_limits_bound_the_torque_on_both_sides() -> None:
     snapshot, reference, z = scene(1)
-    bounds = TorqueLimits(MODEL.torque_limits).bounds(snapshot, reference)
+    bounds = TorqueLimits(MODEL.motor).bounds(snapshot, reference)
     A, offset = torque_map(snapshot)
     tau, value = A @ z + offset, bounds.C @ z
     np.testing.assert_allclose(bounds.upper - value, MODEL.torque_limits - tau, atol=EXACT)
     np.testing.assert_allclose(value - bounds.lower, MODEL.torque_limits + tau, atol=EXACT)
+
+
+@pytest.mark.parametrize("share", [-1.2, -0.7, 0.7, 1.2])
+def test_torque_limits_follow_the_motors_line_at_the_measured_speed(share: float) -> None:
+    snapshot, reference, z = scene(1)
+    v = np.concatenate([snapshot.state.v[:6], share * MODEL.speed_limits])
+    fast = MODEL.snapshot(replace(snapshot.state, v=v))
+    bounds = TorqueLimits(MODEL.motor).bounds(fast, reference)
+    A, offset = torque_map(fast)
+    tau, value = A @ z + offset, bounds.C @ z
+    lower, upper = MODEL.motor.limits(v[6:])
+    np.testing.assert_allclose(bounds.upper - value, upper - tau, atol=EXACT)
+    np.testing.assert_allclose(value - bounds.lower, tau - lower, atol=EXACT)
+    assert ((upper if share > 0 else -lower) < 0.6 * MODEL.torque_limits).all()
 
 
 # --- contact forces -------------------------------------------------------------------------------

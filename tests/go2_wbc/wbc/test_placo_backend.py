@@ -18,6 +18,7 @@ from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.controller import WbcConfig, WholeBodyController
 from go2_wbc.wbc.solution import WbcSolution
+from tests.engine_helpers import fast_cases
 
 STATES = 120
 TORQUE_TOLERANCE = 1e-5  # [N m]; measured 1.4e-7 at force_weight 1e-4
@@ -115,6 +116,33 @@ def test_both_back_ends_find_the_same_torques_forces_and_accelerations(foot_radi
         np.testing.assert_allclose(a.qdd, b.qdd, atol=FORCE_TOLERANCE, rtol=1e-6)
         assert motion_error(snapshot, a) < MOTION_TOLERANCE
         assert motion_error(snapshot, b) < MOTION_TOLERANCE
+
+
+def solved(
+    wbc: WholeBodyController, snapshot: Snapshot, reference: Reference
+) -> WbcSolution | None:
+    try:
+        return wbc.solve(snapshot, reference)
+    except QpInfeasible:
+        return None
+
+
+def test_both_back_ends_keep_to_the_motors_line_where_joints_are_fast() -> None:
+    model = RobotModel()
+    ours, oracle = WholeBodyController(model), WholeBodyController(model, "placo")
+    on_the_line = 0
+    for snapshot, reference in fast_cases(model, 104, seed=7):
+        a, b = solved(ours, snapshot, reference), solved(oracle, snapshot, reference)
+        assert (a is None) == (b is None)
+        if a is None or b is None:
+            continue
+        np.testing.assert_allclose(a.tau, b.tau, atol=TORQUE_TOLERANCE, rtol=0)
+        lower, upper = model.motor.limits(snapshot.state.joint_velocities)
+        excess = np.maximum(b.tau - upper, lower - b.tau)
+        assert excess.max() < TORQUE_TOLERANCE
+        is_cut = np.where(b.tau < 0.0, -lower, upper) < model.motor.peak
+        on_the_line += int((is_cut & (excess > -TORQUE_TOLERANCE)).any())
+    assert on_the_line > 5
 
 
 def test_the_compared_problems_run_into_every_kind_of_limit() -> None:

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from scipy.linalg import null_space
 
+from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
-from motions import Timeline, compile_timeline
-from motions.feasibility.dynamic import forces_of
+from motions import FeasibilityChecker, Timeline, compile_timeline
+from motions.feasibility.dynamic import Forces, forces_of, torque
+from motions.feasibility.limits import FeasibilityLimits
 from motions.trajectory import Trajectory, trajectory_of
 from tests.engine_helpers import state_of
 
@@ -41,3 +43,33 @@ def test_what_the_wrench_leaves_open_is_shared_as_the_loads_are(
     even = np.zeros((4, 3))
     even[:, 2] = model.mass * model.gravity * np.array(share) / np.sum(share)
     assert internal.T @ forces.ravel() == pytest.approx(internal.T @ even.ravel(), abs=EXACT)
+
+
+def test_the_torque_at_speed_is_what_the_motors_of_the_plant_give(
+    model: RobotModel, resting: Trajectory
+) -> None:
+    rng, count = np.random.default_rng(4), len(resting.times)
+    v = np.hstack([np.zeros((count, 6)), rng.uniform(-1.2, 1.2, (count, 12)) * model.speed_limits])
+    tau = rng.uniform(-1.2, 1.2, (count, 12)) * model.torque_limits
+    zeros = np.zeros((count, 4, 3)), np.zeros((count, 2)), np.zeros((count, 2))
+    forces = Forces(zeros[0], tau, *zeros[1:])
+    _, at_speed = torque(replace(resting, v=v), forces, model, FeasibilityLimits())
+    lower, upper = MujocoPlant().motor.limits(v[:, 6:])
+    drives = tau * v[:, 6:] > 0.0
+    assert (np.isfinite(at_speed.margins) == drives).all()
+    is_refused = np.maximum(tau - upper, lower - tau) > 0.0
+    assert ((at_speed.margins < 0.0) == (is_refused & drives)).all()
+    assert np.array_equal(at_speed.limits, np.where(tau < 0.0, -lower, upper))
+
+
+def test_a_fast_rise_is_judged_by_the_line_of_its_calves() -> None:
+    line = Timeline().body(z=-0.1, over=0.6).body(z=0.05, over=0.12).home(over=0.6)
+    limits = {}
+    for motor in ("torque-speed", "ideal"):
+        report = FeasibilityChecker(RobotModel(motor=motor)).check(line)
+        found = [
+            f for f in report.failures if (f.check, f.subject) == ("torque at speed", "FL_calf")
+        ]
+        limits[motor] = min(finding.limit for finding in found)
+    assert limits["ideal"] == pytest.approx(45.43)
+    assert limits["torque-speed"] < 35.0

@@ -15,6 +15,8 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.viewer import PlantViewer, display_problem
 from go2_wbc.plant.sensors import SensorNoise
 from go2_wbc.robot.description import find_description
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.motor import TORQUE_SPEED
 from go2_wbc.robot.state import JointCommand, RobotState
 from tests.go2_wbc.plant.contract import DAMPED, PlantContract, same
 from tests.go2_wbc.plant.helpers import GRAVITY, STAND, fly, stand_up
@@ -95,6 +97,7 @@ def test_initial_joint_noise_moves_the_joints_by_the_seed() -> None:
         ({"initial_yaw": np.inf}, "initial_yaw"),
         ({"initial_joint_noise": -0.1}, "initial_joint_noise"),
         ({"sensors": "perfect"}, "ideal, noisy"),
+        ({"motor": "perfect"}, "ideal, torque-speed"),
     ],
 )
 def test_a_wrong_setting_is_refused_by_name(settings: dict[str, Any], word: str) -> None:
@@ -110,6 +113,62 @@ def test_torques_are_clipped_to_the_urdfs_efforts(plant: MujocoPlant) -> None:
     signs = np.where(np.arange(12) % 2, 1.0, -1.0)
     plant.write(JointCommand.torque(1000.0 * signs))
     assert np.array_equal(plant.read().tau, signs * np.tile([23.7, 23.7, 45.43], 4))
+
+
+def spinning(share: float, motor: str = TORQUE_SPEED) -> tuple[MujocoPlant, np.ndarray]:
+    """A plant in the air whose joints turn at ``share`` of their speed, and that speed."""
+    plant = MujocoPlant(motor=motor)
+    speeds = share * np.array(find_description().speeds)
+    q = np.concatenate([[0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 1.0], STAND])
+    plant.place(q, np.concatenate([np.zeros(6), speeds]))
+    return plant, speeds
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9, 1.2, -0.6])
+def test_a_driving_torque_is_cut_to_what_the_motor_gives_at_that_speed(share: float) -> None:
+    direction = np.sign(share)
+    plant, speeds = spinning(share)
+    plant.write(JointCommand.torque(np.full(12, 1000.0 * direction)))
+    available = direction * np.tile([23.7, 23.7, 45.43], 4)
+    available *= np.clip((1.0 - abs(share)) / (1.0 - 0.45), 0.0, 1.0)
+    assert plant.read().tau == pytest.approx(available, abs=0.1)  # the knee is at 0.4485
+    lower, upper = plant.motor.limits(speeds)
+    assert np.array_equal(plant.read().tau, upper if share > 0 else lower)
+
+
+def test_a_braking_torque_is_cut_at_the_peak_only() -> None:
+    plant, _ = spinning(0.9)
+    plant.write(JointCommand.torque(np.full(12, -1000.0)))
+    assert np.array_equal(plant.read().tau, -plant.torque_limits)
+
+
+def test_an_ideal_motor_gives_its_peak_at_any_speed() -> None:
+    plant, _ = spinning(0.9, motor="ideal")
+    plant.write(JointCommand.torque(np.full(12, 1000.0)))
+    assert np.array_equal(plant.read().tau, plant.torque_limits)
+
+
+@pytest.mark.parametrize(("motor", "is_passed"), [("torque-speed", False), ("ideal", True)])
+def test_no_motor_drives_its_joint_beyond_its_speed_without_load(
+    motor: str, is_passed: bool
+) -> None:
+    """The line is evaluated at every physics step, at the speed of that step."""
+    plant = MujocoPlant(control_period=0.01, motor=motor)
+    q = np.concatenate([[0.0, 0.0, 5.0, 0.0, 0.0, 0.0, 1.0], STAND])
+    q[7 + 4] = -1.5  # the thigh has the longest way
+    plant.place(q)
+    fastest = 0.0
+    while plant.read().joint_positions[4] < 3.0:
+        plant.write(JointCommand.torque(23.7 * np.eye(12)[4]))
+        fastest = max(fastest, plant.read().joint_velocities[4])
+    assert fastest > 20.0
+    assert (fastest > 30.1) == is_passed
+
+
+def test_a_servo_meets_the_line_too() -> None:
+    plant, speeds = spinning(0.8)
+    plant.write(JointCommand.servo(STAND + 10.0, np.zeros(12), 60.0, 0.0))
+    assert np.array_equal(plant.read().tau, RobotModel().motor.limits(speeds)[1])
 
 
 def test_the_motor_law_is_evaluated_at_every_physics_step() -> None:

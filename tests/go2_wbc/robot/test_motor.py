@@ -1,0 +1,120 @@
+"""The motors' line: continuous, falling, mirrored; a braking motor keeps its peak."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from go2_wbc.errors import ConfigError
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.motor import KNEE_SHARE, LEAST_SHARE, MotorModel
+from go2_wbc.robot.state import JointCommand
+
+MODEL, IDEAL = RobotModel(), RobotModel(motor="ideal")
+LINE = MODEL.motor
+SPEEDS = np.linspace(-1.3, 1.3, 2601)[:, None] * MODEL.speed_limits
+"""(n, 12) velocities of every joint, beyond the speed without load on both sides."""
+ROUNDING = 1e-9
+
+shares = st.floats(-2.0, 2.0)
+
+
+@given(shares)
+def test_no_torque_is_always_within_the_limits(share: float) -> None:
+    """A motor must not make the whole-body QP infeasible: falling limp stays allowed."""
+    lower, upper = LINE.limits(share * MODEL.speed_limits)
+    assert (lower <= 0.0).all()
+    assert (upper >= 0.0).all()
+
+
+@given(shares)
+def test_the_limits_of_the_other_direction_are_the_mirror_image(share: float) -> None:
+    v = share * MODEL.speed_limits
+    lower, upper = LINE.limits(v)
+    mirrored_lower, mirrored_upper = LINE.limits(-v)
+    np.testing.assert_array_equal(lower, -mirrored_upper)
+    np.testing.assert_array_equal(upper, -mirrored_lower)
+
+
+@given(shares)
+def test_a_braking_motor_keeps_its_peak(share: float) -> None:
+    lower, upper = LINE.limits(abs(share) * MODEL.speed_limits)
+    np.testing.assert_array_equal(lower, -LINE.peak)
+    assert (upper <= LINE.peak).all()
+
+
+def test_the_line_falls_without_a_jump() -> None:
+    _, upper = LINE.limits(SPEEDS)
+    steps, widths = np.diff(upper, axis=0), np.diff(SPEEDS, axis=0)
+    slope = LINE.peak / (LINE.no_load_speed - LINE.knee_speed)
+    assert (steps <= 0.0).all()
+    assert (steps >= -slope * widths - ROUNDING).all()
+
+
+def test_the_line_is_full_up_to_the_knee_and_gone_without_load() -> None:
+    np.testing.assert_array_equal(LINE.limits(LINE.knee_speed)[1], LINE.peak)
+    middle = (LINE.knee_speed + LINE.no_load_speed) / 2
+    np.testing.assert_allclose(LINE.limits(middle)[1], LINE.peak / 2)
+    np.testing.assert_array_equal(LINE.limits(LINE.no_load_speed)[1], np.zeros(12))
+    np.testing.assert_array_equal(LINE.limits(1.5 * LINE.no_load_speed)[1], np.zeros(12))
+
+
+def test_no_motor_gives_more_power_than_at_half_its_speed_without_load() -> None:
+    _, upper = LINE.limits(SPEEDS)
+    most = LINE.limits(LINE.no_load_speed / 2)[1] * LINE.no_load_speed / 2
+    assert ((upper * SPEEDS).max(axis=0) <= most + ROUNDING).all()
+    np.testing.assert_allclose(most, 324.2, atol=0.1)  # of hip, thigh and calf alike
+
+
+def test_the_numbers_are_those_of_the_description() -> None:
+    np.testing.assert_array_equal(LINE.peak, MODEL.description.efforts)
+    np.testing.assert_array_equal(LINE.no_load_speed, MODEL.description.speeds)
+    np.testing.assert_allclose(LINE.knee_speed, KNEE_SHARE * MODEL.speed_limits)
+    np.testing.assert_array_equal(MODEL.torque_limits, LINE.peak)
+
+
+def test_the_calf_is_the_hips_motor_behind_a_linkage() -> None:
+    """The module's docstring says so: the ratio of torques is that of speeds."""
+    by_torque, by_speed = LINE.peak[2] / LINE.peak[0], LINE.no_load_speed[0] / LINE.no_load_speed[2]
+    assert by_torque == pytest.approx(by_speed, rel=1e-3)
+
+
+def test_an_ideal_motor_gives_its_peak_at_every_speed() -> None:
+    lower, upper = IDEAL.motor.limits(SPEEDS)
+    assert (lower == -LINE.peak).all()
+    assert (upper == LINE.peak).all()
+
+
+def test_a_share_scales_the_whole_line() -> None:
+    for whole, part in zip(LINE.limits(SPEEDS), LINE.scaled(0.4).limits(SPEEDS), strict=True):
+        np.testing.assert_allclose(part, 0.4 * whole)
+
+
+def test_a_torque_is_that_of_the_servo_cut_to_the_line() -> None:
+    rng = np.random.default_rng(1)
+    tau, q_des, v_des = rng.normal(size=(3, 12))
+    command = JointCommand(tau, q_des, v_des, np.full(12, 7.0), np.full(12, 0.5))
+    q, v = rng.normal(size=12), rng.normal(size=12)
+    wanted = command.tau + 7.0 * (command.q_des - q) + 0.5 * (command.v_des - v)
+    np.testing.assert_allclose(LINE.torque(command, q, v), wanted)
+    strong = JointCommand.torque(np.full(12, 1000.0))
+    fast = 0.9 * MODEL.speed_limits
+    np.testing.assert_array_equal(LINE.torque(strong, q, fast), LINE.limits(fast)[1])
+    np.testing.assert_array_equal(LINE.torque(strong, q, -fast), LINE.peak)
+
+
+def test_a_share_is_one_on_the_line_and_finite_beyond_it() -> None:
+    v = 0.7 * MODEL.speed_limits
+    lower, upper = LINE.limits(v)
+    np.testing.assert_allclose(LINE.share(upper, v), 1.0)
+    np.testing.assert_allclose(LINE.share(lower / 2, v), 0.5)
+    np.testing.assert_allclose(LINE.share(LINE.peak, LINE.no_load_speed), 1 / LEAST_SHARE)
+
+
+def test_an_unknown_motor_is_refused_with_the_names_that_exist() -> None:
+    with pytest.raises(ConfigError, match=r"unknown motor 'perfect'; valid: ideal, torque-speed"):
+        MotorModel.named("perfect", MODEL.description)
+    with pytest.raises(ConfigError, match="valid: ideal, torque-speed"):
+        RobotModel(motor="perfect")
