@@ -22,6 +22,7 @@ class Pacer:
 
     Attributes:
         give_ups: how often the pace had to be taken up anew.
+        missed: how many waits began when their period was over already.
     """
 
     def __init__(self, period: float, late: float, rest: float = 0.0) -> None:
@@ -34,7 +35,7 @@ class Pacer:
         """
         self._period, self._late, self._rest = period, late, rest
         self._due = time.monotonic()
-        self.give_ups = 0
+        self.give_ups = self.missed = 0
 
     def wait(self, meanwhile: Callable[[], None] | None = None) -> float:
         """Sleep until the next period is due; ``meanwhile`` is called again and again.
@@ -44,6 +45,7 @@ class Pacer:
         """
         self._due += self._period
         lag = time.monotonic() - self._due
+        self.missed += lag > 0.0
         is_given_up = lag > self._late
         if is_given_up:
             self._due += lag

@@ -6,6 +6,7 @@ ticks the loop all the time and calls wait for what they want to see.
 
 from __future__ import annotations
 
+import gc
 import logging
 import threading
 import time
@@ -209,6 +210,13 @@ class Runner:
             self.loop.abandon(Fault(reason, is_fall=fault is not None and fault.is_fall))
 
     def _keep_pace(self) -> None:
+        gc.freeze()  # else a collection looks through all that was imported, for tens of ms
+        try:
+            self._tick_at_pace()
+        finally:
+            gc.unfreeze()
+
+    def _tick_at_pace(self) -> None:
         pacer = Pacer(self.loop.plant.control_period, GREATEST_LAG, LEAST_PAUSE)
         while True:
             with self._lock:
@@ -227,6 +235,7 @@ class Runner:
                         self._ticks += 1
                         self._changed.notify_all()
             lag = pacer.wait()
+            self.loop.telemetry.missed_deadlines = pacer.missed
             if lag:
                 _log.warning("the loop is %.0f ms behind the wall clock", 1000 * lag)
 

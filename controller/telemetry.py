@@ -21,6 +21,7 @@ class Telemetry:
         qp_failures: ticks in which the QP had no solution, over the whole run.
         relaxed_ticks: ticks in which constraints of the QP had to give way.
         grave_ticks: those of them in which they gave way by more than ``wbc.relaxation.LIMITS``.
+        missed_deadlines: ticks that were not done when the next was due, at the wall clock's pace.
     """
 
     def __init__(self, model: RobotModel, capacity: int) -> None:
@@ -35,7 +36,7 @@ class Telemetry:
         self._labels = np.empty(capacity, dtype=object)
         self._count = 0
         self._peak_torque, self._peak_speed = np.zeros(12), np.zeros(12)
-        self.qp_failures = self.relaxed_ticks = self.grave_ticks = 0
+        self.qp_failures = self.relaxed_ticks = self.grave_ticks = self.missed_deadlines = 0
 
     def record(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"], label: str) -> None:
         """Add one tick."""

@@ -26,7 +26,11 @@ FENCES: dict[str, tuple[str, ...]] = {
     ),
     "meshcat": ("viz/*",),
     "matplotlib": ("viz/*",),
-    "placo": ("go2_wbc/wbc/placo_backend.py", "go2_wbc/robot/inverse_kinematics.py"),
+    "placo": (
+        "go2_wbc/wbc/placo_backend.py",
+        "go2_wbc/robot/inverse_kinematics.py",
+        "benchmarks/speed_placo.py",
+    ),
     "rclpy": ("controller/bridges/*",),
     "cyclonedds": ("controller/bridges/*",),
 }

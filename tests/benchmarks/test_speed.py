@@ -2,23 +2,84 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
-from benchmarks import speed
+from benchmarks import speed_realtime, speed_solves, speed_startup, speed_ticks
+from benchmarks.scenario import Measurement, Metric
+from benchmarks.speed_placo import BarePlaco
 from benchmarks.trials import Trial
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.controller import WholeBodyController
+
+KNEE_DIFFERENCE = 0.2
+"""Torque [N m] of 6 by which the knees differ in standing. The hips differ by more: PlaCo also
+weighs torques, and so prefers other forces between the feet."""
 
 
-def test_every_controller_solves_the_same_problems_in_every_contact_mode(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr(speed, "ROUNDS", 3)
-    monkeypatch.setattr(speed, "WARM_UP", 1)
-    measured = speed.measure_solves(Trial(0))
-    assert set(measured.values) == {metric.name for metric in speed.SOLVE_METRICS}
+@pytest.fixture(autouse=True)
+def few_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed_solves, "ROUNDS", 3)
+    monkeypatch.setattr(speed_solves, "WARM_UP", 1)
+
+
+def assert_complete(measured: Measurement, metrics: tuple[Metric, ...]) -> None:
+    assert set(measured.values) == {metric.name for metric in metrics}
+
+
+def test_both_solve_the_same_ticks_in_every_contact_mode() -> None:
+    measured = speed_solves.measure_solves(Trial(0))
+    assert_complete(measured, speed_solves.METRICS)
     assert min(measured.values.values()) > 0.0
+
+
+def test_placo_is_asked_for_the_same_torques(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed_solves, "ROUNDS", 700)
+    standing = speed_solves.recorded_ticks(Trial(0))[4][-1]
+    model, config = RobotModel(), WbcConfig()
+    tau = BarePlaco(model, config).tick(standing.state, standing.reference)
+    ours = WholeBodyController(model).solve(standing.snapshot, standing.reference)
+    assert np.abs((tau - ours.tau)[2::3]).max() < KNEE_DIFFERENCE
+
+
+def test_a_reference_is_packed_again_for_every_measurement_if_it_came_unpacked() -> None:
+    ticks = speed_solves.recorded_ticks(Trial(0))
+    for tick in (tick for kept in ticks.values() for tick in kept):
+        assert (tick.asked()._row is not None) == tick.is_packed
 
 
 def test_a_tick_is_timed_in_every_mode() -> None:
-    measured = speed.measure_ticks(Trial(0))
-    assert set(measured.values) == {metric.name for metric in speed.TICK_METRICS}
+    measured = speed_ticks.measure_ticks(Trial(0))
+    assert_complete(measured, speed_ticks.TICK_METRICS)
     assert min(measured.values.values()) > 0.0
+
+
+def test_the_worst_tick_of_random_commands_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed_ticks, "COMMAND_TIME", 2.0)
+    monkeypatch.setattr(speed_ticks, "TRACED_TICKS", 20)
+    measured = speed_ticks.measure_commands(Trial(0))
+    assert_complete(measured, speed_ticks.COMMAND_METRICS)
+    assert measured.values["commands.worst"] >= measured.values["commands.p99"] >= 1.0
+    assert measured.values["commands.peak"] > 0.0
+
+
+def test_a_start_is_measured_in_a_process_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed_startup, "PROCESSES", 1)
+    starts = {
+        name: (what, "sum(range(10**6))", 1.0)
+        for name, (what, _, _) in speed_startup.STARTS.items()
+    }
+    monkeypatch.setattr(speed_startup, "STARTS", starts)
+    measured = speed_startup.measure_startup(Trial(0))
+    assert_complete(measured, speed_startup.METRICS)
+    assert min(measured.values.values()) > 0.0
+
+
+def test_late_ticks_are_counted_at_the_pace_of_the_wall_clock(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(speed_realtime, "DURATION", 0.2)
+    measured = speed_realtime.measure_realtime(Trial(0))
+    assert_complete(measured, speed_realtime.METRICS)
+    assert measured.values["realtime.ticks"] > 0.0

@@ -42,6 +42,15 @@ def test_a_pace_is_kept_on_the_average_although_sleeps_take_too_long(clock: Cloc
     assert len(clock.naps) == 10
 
 
+def test_a_tick_that_is_done_after_its_period_has_missed_its_deadline(clock: Clock) -> None:
+    pacer = Pacer(0.002, late=0.1)
+    for work in (0.001, 0.003, 0.0015, 0.0):  # the third makes up for half a millisecond only
+        clock.now += work
+        pacer.wait()
+    assert pacer.missed == 2
+    assert clock.now == pytest.approx(100.008)
+
+
 def test_meanwhile_others_have_their_turn_between_short_sleeps(clock: Clock) -> None:
     pacer, turns = Pacer(0.004, late=0.25), []
     for _ in range(10):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 from collections.abc import Callable, Iterator
 
 import pytest
 
+import controller.runner
 from controller.behaviours.joints import Damped, ServoJoints
 from controller.loop import ControlLoop
 from controller.runner import Runner
@@ -204,6 +206,32 @@ def test_in_realtime_a_call_waits_for_what_it_wants_to_see(
     runner = make_runner(realtime=True)
     assert runner.advance_until(lambda: plant.state.time > 0.1, FOREVER)
     assert not runner.advance_until(lambda: False, 0.02)
+
+
+def test_in_realtime_late_ticks_are_counted_in_the_telemetry(
+    make_runner: MakeRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class LatePacer:
+        def __init__(self, *_: float) -> None:
+            self.missed = 0
+
+        def wait(self) -> float:
+            self.missed += 1
+            return 0.0
+
+    monkeypatch.setattr(controller.runner, "Pacer", LatePacer)
+    runner = make_runner(realtime=True)
+    assert runner.advance_until(lambda: runner.loop.telemetry.missed_deadlines >= 3, FOREVER)
+
+
+def test_garbage_is_looked_for_in_new_objects_only_while_a_loop_keeps_pace(
+    make_runner: MakeRunner,
+) -> None:
+    runner = make_runner(realtime=True)
+    assert runner.advance_until(lambda: True, FOREVER)
+    assert gc.get_freeze_count() > 0
+    close(runner)
+    assert gc.get_freeze_count() == 0
 
 
 @pytest.mark.parametrize("error", [PlantTimeout("no answer"), ValueError("a bug")])

@@ -1,0 +1,175 @@
+"""What one solution costs, by us and by PlaCo, on the same states in turn."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from benchmarks.scenario import Direction, Measurement, Metric
+from benchmarks.speed_placo import BarePlaco
+from benchmarks.trials import Trial, TrialFailed
+from controller.assembly import build_pilot
+from controller.procedures import Aborted
+from go2_wbc.config import Config
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.reference import Reference
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import RobotState
+from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.solution import WbcSolution
+from motions import compile_motion
+
+ROUNDS = 500
+"""Ticks of each contact mode that are solved."""
+WARM_UP = 50
+"""Rounds before the measurement."""
+FASTER = {4: 3.5, 3: 3.5, 2: 3.0}
+"""By number of stance feet (standing, high five, trot): how many times faster than PlaCo we are to
+be."""
+PLACO_TIME = {4: 60.0, 3: 55.0, 2: 43.0}
+"""Time [us] of PlaCo's tick on the machine for which other bars are meant; see ``slowness``."""
+READABLE = {"condensed": ("condensed", "daqp"), "full": ("full", "daqp")}
+"""Back end and solver of the readable forms."""
+
+_ITEM = "tick of the QP, {} stance feet"
+
+
+def _metrics(feet: int) -> tuple[Metric, ...]:
+    name, item, best = f"solve.{feet}", _ITEM.format(feet), Direction.AT_LEAST
+    return (
+        Metric(f"{name}.ours", item, "ours, median", "us", None),
+        Metric(f"{name}.placo", item, "bare PlaCo, median", "us", None),
+        Metric(f"{name}.faster", item, "median: times faster", "", FASTER[feet], best),
+        Metric(f"{name}.ours_p99", item, "ours, 99 of 100", "us", None),
+        Metric(f"{name}.placo_p99", item, "bare PlaCo, 99 of 100", "us", None),
+        Metric(f"{name}.tail", item, "99 of 100: ours by PlaCo's", "", 1.0),
+        *(Metric(f"{name}.{form}", item, f"readable: {form}", "us", None) for form in READABLE),
+    )
+
+
+METRICS = tuple(metric for feet in FASTER for metric in _metrics(feet))
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """What the QP was asked in one tick of a run.
+
+    Attributes:
+        state: measured.
+        snapshot: of it.
+        reference: what was asked for.
+        is_packed: whether it came as the row of numbers that the kernel reads.
+    """
+
+    state: RobotState
+    snapshot: Snapshot
+    reference: Reference
+    is_packed: bool
+
+    def asked(self) -> Reference:
+        """The reference as it came: a copy that is not packed yet if it was not."""
+        return self.reference if self.is_packed else replace(self.reference)
+
+
+Ticks = Mapping[int, Sequence[Tick]]
+"""By number of stance feet."""
+
+
+class Recorder(WholeBodyController):
+    """Solves, and keeps ``ROUNDS`` ticks for each number of stance feet."""
+
+    def __init__(self, model: RobotModel) -> None:
+        """Begin with none."""
+        super().__init__(model)
+        self.ticks: dict[int, list[Tick]] = {feet: [] for feet in FASTER}
+
+    def solve(
+        self, snapshot: Snapshot, reference: Reference, *, relax: bool = False
+    ) -> WbcSolution:
+        """Solve one tick and keep it if there is room."""
+        kept = self.ticks.get(int(reference.stance.sum()), [])
+        if len(kept) < ROUNDS:
+            is_packed = reference._row is not None
+            kept.append(Tick(snapshot.state, snapshot, reference, is_packed))
+        return super().solve(snapshot, reference, relax=relax)
+
+
+def measure_solves(trial: Trial) -> Measurement:
+    """The tick of the QP from the measured state to torques, ours and PlaCo's in turn."""
+    model, config = RobotModel(), WbcConfig()
+    ours, placo = WholeBodyController(model, config=config), BarePlaco(model, config)
+    values: dict[str, float] = {}
+    for feet, ticks in recorded_ticks(trial).items():
+        spent = interleaved(
+            ticks,
+            {
+                "ours": lambda tick, asked: ours.solve(model.snapshot(tick.state), asked),
+                "placo": lambda tick, asked: placo.tick(tick.state, asked),
+            },
+        )
+        median = {name: float(np.median(times)) for name, times in spent.items()}
+        p99 = {name: float(np.quantile(times, 0.99)) for name, times in spent.items()}
+        for name in spent:
+            values |= {f"solve.{feet}.{name}": median[name], f"solve.{feet}.{name}_p99": p99[name]}
+        values[f"solve.{feet}.faster"] = median["placo"] / median["ours"]
+        values[f"solve.{feet}.tail"] = p99["ours"] / p99["placo"]
+        for name, (backend, solver) in READABLE.items():
+            form = WholeBodyController(model, backend, replace(config, solver=solver))
+            spent = interleaved(
+                ticks, {name: lambda tick, asked, form=form: form.solve(tick.snapshot, asked)}
+            )
+            values[f"solve.{feet}.{name}"] = float(np.median(spent[name]))
+    return Measurement(values)
+
+
+def interleaved(
+    ticks: Sequence[Tick], solvers: Mapping[str, Callable[[Tick, Reference], object]]
+) -> dict[str, list[float]]:
+    """Thread time [us] of each solver in each tick; A B A B, so that all meet the same machine."""
+    spent: dict[str, list[float]] = {name: [] for name in solvers}
+    for tick in [*ticks[:WARM_UP], *ticks]:
+        for name, solve in solvers.items():
+            asked = tick.asked()
+            start = time.thread_time_ns()
+            solve(tick, asked)
+            spent[name].append((time.thread_time_ns() - start) / 1e3)
+    return {name: times[-len(ticks) :] for name, times in spent.items()}
+
+
+def slowness(trotting: Sequence[Tick]) -> float:
+    """How many times slower this machine is now than the one for which bars in us are meant.
+
+    By PlaCo's tick on two feet: the rest of the machine slows it as it slows us.
+    """
+    placo = BarePlaco(RobotModel(), WbcConfig())
+    spent = interleaved(trotting, {"placo": lambda tick, asked: placo.tick(tick.state, asked)})
+    return float(np.median(spent["placo"])) / PLACO_TIME[2]
+
+
+def recorded_ticks(trial: Trial) -> Ticks:
+    """Ticks of a run: standing, trotting, giving a high five.
+
+    Raises:
+        TrialFailed: if the robot falls.
+    """
+    with closing(trial.plant()) as plant, closing(build_pilot(plant, Config())) as robot:
+        loop = robot.runner.loop
+        recorder = Recorder(loop.model)
+        loop.wbc = recorder
+        try:
+            robot.pilot.stand()
+            robot.pilot.walk("trot")
+            robot.pilot.set_command(VelocityCommand(0.5))
+            robot.pilot.wait(2.0)
+            robot.pilot.rest()
+            robot.pilot.stand()
+            robot.pilot.play(compile_motion("high_five", RobotModel()))
+        except Aborted as aborted:
+            raise TrialFailed(str(aborted)) from aborted
+        return recorder.ticks

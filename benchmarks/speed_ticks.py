@@ -1,0 +1,174 @@
+"""What whole control ticks cost, 2 ms of physics included: by mode, at worst, and in memory."""
+
+from __future__ import annotations
+
+import gc
+import sys
+import time
+import tracemalloc
+from collections.abc import Callable
+from contextlib import closing
+
+import numpy as np
+
+from benchmarks.scenario import Direction, Measurement, Metric
+from benchmarks.speed_solves import recorded_ticks, slowness
+from benchmarks.trials import Trial, TrialFailed
+from controller.go2_controller import GO2Controller
+from go2_wbc.plant import MujocoPlant
+
+PERIOD = 2000.0
+"""Robot time [us] of a tick."""
+MODES = ("stand", "trot", "high five", "bow", "sit", "lie down")
+TROT_TIME = 100.0
+"""Time [us] that a tick of the trot may take."""
+FACTORS = dict.fromkeys(MODES, 15.0) | {"trot": 18.0}
+"""Real-time factor to be reached in each mode."""
+COMMAND_TIME = 60.0
+"""Robot time [s] of random velocity commands, a new one each second."""
+FASTEST = (1.0, 0.4, 1.5)
+"""Ahead and sideways [m/s], turning [rad/s]: the greatest of these commands."""
+TRACED_TICKS = 500
+"""Ticks whose memory is traced."""
+
+_ITEM = "whole tick, 2 ms of physics: {}"
+_SCALED = "as on a machine where PlaCo's takes 43 us"
+
+
+def _tick_metrics(mode: str) -> tuple[Metric, ...]:
+    item, least = _ITEM.format(mode), Direction.AT_LEAST
+    most = TROT_TIME if mode == "trot" else None
+    return (
+        Metric(f"tick.{mode}.median", item, "median", "us", None),
+        Metric(f"tick.{mode}.p99", item, "99 of 100", "us", None),
+        Metric(f"tick.{mode}.scaled", item, "median, scaled", "us", most),
+        Metric(f"tick.{mode}.factor", item, "real-time factor, scaled", "", FACTORS[mode], least),
+    )
+
+
+TICK_METRICS = (
+    Metric("tick.slowness", "scale: PlaCo's tick on two feet", "of 43 us", "", None),
+    *(metric for mode in MODES for metric in _tick_metrics(mode)),
+)
+_COMMANDS = "60 s of random velocity commands"
+COMMAND_METRICS = (
+    Metric("commands.median", _COMMANDS, "tick, median", "us", None),
+    Metric("commands.p99", _COMMANDS, "99 of 100, by median", "", None),
+    Metric("commands.worst", _COMMANDS, "worst by median", "", 5.0),
+    Metric("commands.collections", _COMMANDS, "garbage collections", "", None),
+    Metric("commands.peak", _COMMANDS, "allocated in a tick", "kB", None),
+    Metric("commands.kept", _COMMANDS, "blocks kept of a tick", "", None),
+)
+
+
+def measure_ticks(trial: Trial) -> Measurement:
+    """From the end of one tick to the end of the next, everything included."""
+    slow = slowness(recorded_ticks(trial)[2])
+    values = {"tick.slowness": slow}
+    ends: list[int] = []
+    with (
+        closing(trial.plant()) as plant,
+        GO2Controller(plant=plant, after_tick=lambda: ends.append(time.thread_time_ns())) as go2,
+    ):
+        for mode in MODES:
+            act = _prepared(go2, mode)
+            ends.clear()
+            if act() is False:
+                raise TrialFailed(go2.last_outcome.reason)
+            spent = np.diff(ends) / 1e3
+            median = float(np.median(spent))
+            values |= {
+                f"tick.{mode}.median": median,
+                f"tick.{mode}.p99": float(np.quantile(spent, 0.99)),
+                f"tick.{mode}.scaled": median / slow,
+                f"tick.{mode}.factor": PERIOD / float(spent.mean()) * slow,
+            }
+            if mode == "trot":
+                go2.stop()
+    return Measurement(values)
+
+
+def _prepared(go2: GO2Controller, mode: str) -> Callable[[], object]:
+    """What is measured in ``mode``; what it needs before is done."""
+    if mode == "trot":
+        go2.walk()
+        go2.move(0.5)
+        return lambda: go2.wait(4.0)
+    if mode in ("high five", "bow"):
+        go2.stand()
+    acts: dict[str, Callable[[], object]] = {
+        "stand": go2.stand,
+        "high five": go2.high_five,
+        "bow": lambda: go2.play("bow"),
+        "sit": go2.sit,
+        "lie down": go2.lie_down,
+    }
+    return acts[mode]
+
+
+def measure_commands(trial: Trial) -> Measurement:
+    """The worst tick of a walk with a new command each second, and the memory that ticks take."""
+    ends: list[int] = []
+    passes: list[str] = []
+
+    def note(phase: str, info: dict[str, int]) -> None:
+        if phase == "start":
+            passes.append(str(info["generation"]))
+
+    plant, random = trial.plant(), np.random.default_rng(trial.seed)
+    with (
+        closing(plant),
+        GO2Controller(plant=plant, after_tick=lambda: ends.append(time.thread_time_ns())) as go2,
+    ):
+        go2.walk()
+        gc.callbacks.append(note)
+        spent = _walk(go2, random, ends)
+        gc.callbacks.remove(note)
+        median = float(np.median(spent))
+        peak, kept = _memory(plant, go2)
+    return Measurement(
+        {
+            "commands.median": median,
+            "commands.p99": float(np.quantile(spent, 0.99)) / median,
+            "commands.worst": float(spent.max()) / median,
+            "commands.collections": float(len(passes)),
+            "commands.peak": peak / 1e3,
+            "commands.kept": kept,
+        }
+    )
+
+
+def _walk(go2: GO2Controller, random: np.random.Generator, ends: list[int]) -> np.ndarray:
+    """Time [us] of each tick; what happens between two commands belongs to none."""
+    spent = []
+    for _ in range(round(COMMAND_TIME)):
+        ahead, aside, turn = random.uniform(-1.0, 1.0, 3) * FASTEST
+        go2.move(float(ahead), float(turn), linear_y=float(aside))
+        ends.clear()
+        go2.wait(1.0)
+        if not go2.last_outcome.ok:
+            raise TrialFailed(go2.last_outcome.reason)
+        spent.append(np.diff(ends) / 1e3)
+    return np.concatenate(spent)
+
+
+def _memory(plant: MujocoPlant, go2: GO2Controller) -> tuple[float, float]:
+    """Bytes that a tick allocates at most at a time, and blocks that it leaves, on the average.
+
+    The former by ``tracemalloc``, the latter by ``sys.getallocatedblocks``.
+    """
+    go2.wait(0.1)
+    before = sys.getallocatedblocks()
+    go2.wait(TRACED_TICKS * plant.control_period)
+    kept = (sys.getallocatedblocks() - before) / TRACED_TICKS
+    peaks = list[int]()
+    tracemalloc.start()
+    try:
+        for _ in range(TRACED_TICKS // 10):
+            tracemalloc.reset_peak()
+            held = tracemalloc.get_traced_memory()[0]
+            go2.wait(plant.control_period)
+            peaks.append(tracemalloc.get_traced_memory()[1] - held)
+    finally:
+        tracemalloc.stop()
+    return float(np.median(peaks)), kept
