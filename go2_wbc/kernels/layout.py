@@ -119,6 +119,7 @@ PLANNER = Layout(
     height_offset=(),
     liftoff=(4, 3),
     was_stance=(4,),
+    is_awaited=(4,),
 )
 """State of the locomotion planner from tick to tick."""
 

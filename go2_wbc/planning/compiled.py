@@ -30,6 +30,7 @@ class CompiledPlanner(GaitPlanner):
         self._numbers = _numbers(model, gait, config)
         self._state = np.zeros(PLANNER.size)
         self._command = np.zeros(3)
+        self._contact = np.zeros(4)
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state, standing."""
@@ -46,6 +47,7 @@ class CompiledPlanner(GaitPlanner):
                 0.0,
                 feet,
                 np.ones(4),
+                np.zeros(4),
             ]
         )
 
@@ -74,7 +76,9 @@ class CompiledPlanner(GaitPlanner):
 
         wanted, row = self._command, np.empty(REFERENCE.size)
         wanted[0], wanted[1], wanted[2] = command.linear_x, command.linear_y, command.angular_z
-        plan(snapshot.row, snapshot.state.time, self._state, self._numbers, wanted, row)
+        state = snapshot.state
+        self._contact[:] = state.feet_in_contact
+        plan(snapshot.row, state.time, self._contact, self._state, self._numbers, wanted, row)
         return Reference.of_row(row)
 
 
