@@ -151,3 +151,12 @@ LOCOMOTION = Layout(
     p_base_feet_nominal=(4, 3),
 )
 """Numbers of the locomotion planner: gait, configuration, robot."""
+
+FRICTION = Layout(
+    dry=(12,),
+    viscous=(12,),
+    transition=(),
+    lookahead=(),
+    torque_limits=(12,),
+)
+"""Of ``robot.joint_friction.JointFriction``, and the torques that no motor may exceed."""
