@@ -26,6 +26,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.active_set",  # compiled: a kernel cannot be wrapped
         "go2_wbc.kernels.condensed",
         "go2_wbc.kernels.derivation",
+        "go2_wbc.kernels.friction",
         "go2_wbc.kernels.loading",  # loaded here
         "go2_wbc.kernels.locomotion",
         "go2_wbc.kernels.motor",

@@ -126,6 +126,7 @@ PLANNER = Layout(
     height_offset=(),
     liftoff=(4, 3),
     was_stance=(4,),
+    is_awaited=(4,),
 )
 """State of the locomotion planner from tick to tick."""
 
@@ -163,3 +164,12 @@ CORRECTION = Layout(rate=(), window=(6,), limit=(6,))
 
 PLAYBACK = Layout(offset=(6,), place=(), attitude=(), joints=(), ticks=(), raised_ticks=())
 """State of a playback: the correction, and how far the robot has been off its plan."""
+
+FRICTION = Layout(
+    dry=(12,),
+    viscous=(12,),
+    transition=(),
+    lookahead=(),
+    torque_limits=(12,),
+)
+"""Of ``robot.joint_friction.JointFriction``, and the torques that no motor may exceed."""

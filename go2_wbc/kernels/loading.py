@@ -6,6 +6,7 @@ from importlib import import_module
 
 KERNELS = (
     "derivation",
+    "friction",
     "condensed",
     "locomotion",
     "motor",

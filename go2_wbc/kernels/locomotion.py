@@ -21,7 +21,7 @@ _Q, _P_COM, _V_COM, _P_FEET = (_N[n] for n in ("q", "p_world_com", "v_world_com"
 _YAW, _POSITION, _VELOCITY = (_S[n] for n in ("yaw", "position", "velocity"))
 _STEPPING, _PHASE_TIME, _TIME = (_S[n] for n in ("is_stepping", "phase_time", "time"))
 _GROUND, _HEIGHT_OFFSET = _S["ground"], _S["height_offset"]
-_LIFTOFF, _WAS_STANCE = _S["liftoff"], _S["was_stance"]
+_LIFTOFF, _WAS_STANCE, _AWAITED = (_S[n] for n in ("liftoff", "was_stance", "is_awaited"))
 _PERIOD, _DUTY, _OFFSETS, _HEIGHT = (_C[n] for n in ("period", "duty", "offsets", "height"))
 _ACCELERATION, _FEEDBACK = _C["acceleration"], _C["velocity_feedback"]
 _LEASH, _YAW_LEASH, _REACH = (_C[n] for n in ("position_leash", "yaw_leash", "foothold_reach"))
@@ -159,18 +159,23 @@ def integrate(snapshot, s, c, dt, command):
     s[_HEIGHT_OFFSET] = min(max(offset, -c[_LIMIT]), c[_LIMIT])
 
 
-@subroutine("void(f8[::1], f8[::1], f8[::1], b1[::1])")
-def note_liftoffs(snapshot, s, c, stance):
-    """Remember where feet leave the ground; low-pass the ground's height where they land."""
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], b1[::1])")
+def note_liftoffs(snapshot, contact, s, c, stance):
+    """Remember where feet leave the ground; low-pass its height where they meet it."""
     landed, height = 0, 0.0
     for leg in range(4):
         was_stance = s[_WAS_STANCE + leg] != 0.0
         if was_stance and not stance[leg]:
             for i in range(3):
                 s[_LIFTOFF + 3 * leg + i] = snapshot[_P_FEET + 3 * leg + i]
-        elif stance[leg] and not was_stance:
+        if not stance[leg]:
+            s[_AWAITED + leg] = 0.0
+        elif not was_stance:
+            s[_AWAITED + leg] = 1.0
+        if s[_AWAITED + leg] != 0.0 and contact[leg] != 0.0:
             landed += 1
             height += snapshot[_P_FEET + 3 * leg + 2]
+            s[_AWAITED + leg] = 0.0
         s[_WAS_STANCE + leg] = 1.0 if stance[leg] else 0.0
     if landed:
         s[_GROUND] += c[_GROUND_SHARE] * (height / landed - c[_RADIUS] - s[_GROUND])
@@ -237,9 +242,12 @@ def fill_body(s, c, target):
     target[_BODY_W + 2] = s[_VELOCITY + 2]
 
 
-@kernel("void(f8[::1], f8, f8[::1], f8[::1], f8[::1], f8[::1])")
-def plan(snapshot, time, s, c, command, target):
-    """Bring the state to ``time`` and fill the reference of this tick."""
+@kernel("void(f8[::1], f8, f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def plan(snapshot, time, contact, s, c, command, target):
+    """Bring the state to ``time`` and fill the reference of this tick.
+
+    ``contact`` is not 0 for the feet in measured contact.
+    """
     dt = time - s[_TIME]
     s[_TIME] = time
     advance_phase(snapshot, s, c, dt, command)
@@ -251,7 +259,7 @@ def plan(snapshot, time, s, c, command, target):
             stance[leg], elapsed[leg], remaining[leg] = foot_phase(
                 s[_PHASE_TIME], c[_OFFSETS + leg], c
             )
-    note_liftoffs(snapshot, s, c, stance)
+    note_liftoffs(snapshot, contact, s, c, stance)
     target[:] = 0.0
     fill_body(s, c, target)
     nominal, goal = np.empty((4, 2)), np.empty(3)

@@ -33,6 +33,7 @@ class CompiledPlanner(GaitPlanner):
         self._numbers = _numbers(model, gait, config)
         self._state = np.zeros(PLANNER.size)
         self._command = np.zeros(3)
+        self._contact = np.zeros(4)
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state, standing."""
@@ -49,6 +50,7 @@ class CompiledPlanner(GaitPlanner):
                 0.0,
                 feet,
                 np.ones(4),
+                np.zeros(4),
             ]
         )
 
@@ -73,7 +75,11 @@ class CompiledPlanner(GaitPlanner):
         """The reference of this tick for the wanted ``command`` (already inside the envelope)."""
         wanted, row = self._command, np.empty(REFERENCE.size)
         wanted[0], wanted[1], wanted[2] = command.linear_x, command.linear_y, command.angular_z
-        self._plan(snapshot.row, snapshot.state.time, self._state, self._numbers, wanted, row)
+        state = snapshot.state
+        self._contact[:] = state.feet_in_contact
+        self._plan(
+            snapshot.row, state.time, self._contact, self._state, self._numbers, wanted, row
+        )
         return Reference.of_row(row)
 
 

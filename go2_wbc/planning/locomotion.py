@@ -9,6 +9,9 @@ frame (z up, x along the reference's yaw).
 - Body: the command is integrated to a pose. A body that only followed a velocity would keep a
   steady error of place and heading. The pose is held within reach (a leash) of the measured one,
   so that a robot that is held does not store up a way to jump afterwards.
+- Ground: its height is learnt from the feet that should stand, each where its contact is first
+  measured. A foot that comes down late has no contact yet when it should; taken for landed, it
+  would raise the ground, and with it the trunk, step by step.
 - Stepping without a command: the capture point (Pratt et al., Capture Point, Humanoids 2006),
   ``p + v / omega`` with ``omega = sqrt(g / h)``, is where an inverted pendulum of height ``h``
   would come to rest above its foot; too far from the feet's middle, they must be moved there.
@@ -150,6 +153,7 @@ class LocomotionPlanner(GaitPlanner):
         self._ground = float(np.mean(snapshot.p_world_feet[:, 2])) - self._model.foot_radius
         self._liftoff = snapshot.p_world_feet.copy()
         self._was_stance = np.ones(4, dtype=bool)
+        self._is_awaited = np.zeros(4, dtype=bool)
         self._correction = SteadyStateCorrection()
         self._height_offset = 0.0
 
@@ -270,13 +274,15 @@ class LocomotionPlanner(GaitPlanner):
         )
 
     def _note_liftoffs(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"]) -> None:
-        """Remember where feet leave the ground; low-pass the ground's height where they land."""
+        """Remember where feet leave the ground; low-pass its height where they meet it."""
         lifted = self._was_stance & ~stance
         self._liftoff[lifted] = snapshot.p_world_feet[lifted]
-        landed = ~self._was_stance & stance
+        self._is_awaited = (self._is_awaited | ~self._was_stance) & stance
+        landed = self._is_awaited & snapshot.state.feet_in_contact
         if landed.any():
             height = float(np.mean(snapshot.p_world_feet[landed, 2])) - self._model.foot_radius
             self._ground += GROUND_SHARE * (height - self._ground)
+        self._is_awaited &= ~landed
         self._was_stance = stance.copy()
 
     def _nominal_feet(self, snapshot: Snapshot) -> Float[np.ndarray, "4 2"]:

@@ -25,12 +25,14 @@ class SwingConfig:
     """Shape of a swing.
 
     Attributes:
-        apex: height [m] of the foot above the higher of lift-off and touchdown.
+        apex: height [m] of the foot above the higher of lift-off and touchdown. Over boxes of up
+            to 8 cm at 1.0 m/s the trot fell in 5 of 20 runs with 6 cm, in none with 9 or 10; on
+            the flat, 10 cm takes a third more torque at 1.5 m/s than 9.
         touchdown_depth: distance [m] below the ground at which touchdown is aimed, so that the
             foot arrives with certainty.
     """
 
-    apex: float = 0.06
+    apex: float = 0.09
     touchdown_depth: float = 0.008
 
     def __post_init__(self) -> None:

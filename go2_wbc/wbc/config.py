@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from go2_wbc.errors import ConfigError
+from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.validation import require_not_negative, require_positive, require_share
 from go2_wbc.wbc.tasks import Gains
 
@@ -34,6 +35,7 @@ class WbcConfig:
         braking: joint deceleration [rad/s^2] that the limits count on.
         limit_horizon: time [s] in which a joint-limit bound must be met.
         joint_margin: distance [rad] that the joints keep from their position limits.
+        joint_friction: friction of the joints, fed forward.
     """
 
     solver: str = "active_set"
@@ -53,6 +55,7 @@ class WbcConfig:
     braking: float = 200.0
     limit_horizon: float = 0.02
     joint_margin: float = 0.0
+    joint_friction: JointFriction = field(default_factory=JointFriction)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a number that is out of range."""

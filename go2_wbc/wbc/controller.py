@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -11,6 +12,7 @@ from jaxtyping import Float
 
 from go2_wbc.errors import ConfigError, QpInfeasible, unknown_name
 from go2_wbc.reference import Reference
+from go2_wbc.robot.joint_friction import FrictionFeedForward
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.backends import CondensedBackend, FullBackend, QpBackend
@@ -74,6 +76,7 @@ class WholeBodyController:
             StanceFeetStill(self.config.stance_damping),
         )
         self.inequalities = _inequalities(model, self.config)
+        self._friction = _friction(model, self.config)
         self._task_weights = np.array([task.weight for task in self.tasks])
         self.backend_name = backend
         self._backend = self._make_backend(backend)
@@ -148,9 +151,13 @@ class WholeBodyController:
                 raise
             z, is_relaxed = self._relaxed(problem, error), True
         spent = time.perf_counter() - start
-        return WbcSolution.from_decision(
+        solution = WbcSolution.from_decision(
             z, problem, spent, self.backend_name, is_relaxed=is_relaxed
         )
+        if self._friction is None:
+            return solution
+        motors = self._friction.motor_torques(snapshot, solution.qdd, solution.tau)
+        return replace(solution, tau_motors=motors)
 
     def _relaxed(self, problem: Problem, error: QpInfeasible) -> Float[np.ndarray, "30"]:
         try:
@@ -167,8 +174,10 @@ class WholeBodyController:
         if found is None:
             return None
         z, tau = found
+        friction = self._friction
         return WbcSolution(
             tau=tau,
+            tau_motors=tau if friction is None else friction.compiled(snapshot, z, tau),
             qdd=z[ACCELERATION],
             forces=z[FORCES].reshape(4, 3),
             solve_time=time.perf_counter() - start,
@@ -186,6 +195,12 @@ def _tasks(model: RobotModel, config: WbcConfig) -> tuple[Task, ...]:
         LegPosture(*config.leg_posture.arrays, config.posture_weight),
         ForceRegularisation(model.mass * model.gravity, config.force_weight),
     )
+
+
+def _friction(model: RobotModel, config: WbcConfig) -> FrictionFeedForward | None:
+    if config.joint_friction.is_zero:
+        return None
+    return FrictionFeedForward(config.joint_friction, model.torque_limits * config.torque_share)
 
 
 def _inequalities(model: RobotModel, config: WbcConfig) -> tuple[Inequality, ...]:

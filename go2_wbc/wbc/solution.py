@@ -19,7 +19,9 @@ class WbcSolution:
     """One solution of the whole-body QP.
 
     Attributes:
-        tau: joint torques [N m].
+        tau: joint torques [N m] of the dynamics, without friction: M qdd + h = S' tau + J' f.
+        tau_motors: what the motors are told [N m]: ``tau`` and the friction of the joints, within
+            the torque limits.
         qdd: generalised acceleration (Pinocchio's spatial base acceleration in the base frame
             [m/s^2, rad/s^2], then the joints [rad/s^2]).
         forces: contact force [N] of each foot in the world frame; zero for legs in the air.
@@ -29,6 +31,7 @@ class WbcSolution:
     """
 
     tau: Float[np.ndarray, "12"]
+    tau_motors: Float[np.ndarray, "12"]
     qdd: Float[np.ndarray, "18"]
     forces: Float[np.ndarray, "4 3"]
     solve_time: float
@@ -46,13 +49,13 @@ class WbcSolution:
         *,
         is_relaxed: bool = False,
     ) -> WbcSolution:
-        """Torques from the joint rows of M a + h = tau + J' f."""
+        """Torques from the joint rows of M a + h = tau + J' f; no friction is fed forward."""
         snapshot = problem.snapshot
         qdd, forces = z[ACCELERATION], z[FORCES]
         J_joints = snapshot.J_contacts[:, :, 6:].reshape(12, 12)
         tau = snapshot.mass_matrix[6:] @ qdd + snapshot.bias[6:] - J_joints.T @ forces
         feet = forces.reshape(4, 3)
-        return WbcSolution(tau, qdd, feet, solve_time, backend, lambda: problem, z, is_relaxed)
+        return WbcSolution(tau, tau, qdd, feet, solve_time, backend, lambda: problem, z, is_relaxed)
 
     @property
     def residuals(self) -> tuple[ResidualRow, ...]:
@@ -68,5 +71,5 @@ class WbcSolution:
 
     @property
     def command(self) -> JointCommand:
-        """The torques as a joint command."""
-        return JointCommand.torque(self.tau)
+        """The motors' torques as a joint command."""
+        return JointCommand.torque(self.tau_motors)

@@ -48,7 +48,10 @@ def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.nda
     if tick % 700 >= 350:
         q[3:] = standing_q()[3:]
     pace = 0.02 if tick % 1400 >= 700 else 1.0
-    return model.snapshot(replace(state, time=tick * TICK, q=q, v=pace * state.v))
+    contact = rng.random(4) < 0.1  # so that feet are met early, late and never
+    return model.snapshot(
+        replace(state, time=tick * TICK, q=q, v=pace * state.v, feet_in_contact=contact)
+    )
 
 
 @pytest.mark.parametrize(

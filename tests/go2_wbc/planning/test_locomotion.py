@@ -12,7 +12,12 @@ import pytest
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.compiled import CompiledPlanner
-from go2_wbc.planning.locomotion import GaitPlanner, LocomotionConfig, LocomotionPlanner
+from go2_wbc.planning.locomotion import (
+    GROUND_SHARE,
+    GaitPlanner,
+    LocomotionConfig,
+    LocomotionPlanner,
+)
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
@@ -356,12 +361,46 @@ def test_it_goes_on_stepping_while_the_robot_still_drifts() -> None:
     assert not planner.is_stepping
 
 
+def touching(snapshot: Snapshot, *, is_touching: bool = True) -> Snapshot:
+    contact = np.full(4, is_touching)
+    return replace(snapshot, state=replace(snapshot.state, feet_in_contact=contact))
+
+
 def test_a_foot_that_lands_higher_raises_the_reference() -> None:
     """A step up: the body's height and the touchdown height follow the feet."""
-    start = resting()
+    start = touching(resting())
     raised = replace(start, p_world_feet=start.p_world_feet + np.array([0.0, 0.0, 0.05]))
     planner = started(start)
     before = planner.update(start, VelocityCommand(0.2))
     after = hold(planner, at(raised, TICK), VelocityCommand(0.2), 2.0)
     rise = after.body.p_world[2] - before.body.p_world[2]
     assert rise > 0.04
+
+
+def test_a_foot_without_contact_says_nothing_about_the_ground() -> None:
+    """Feet that came down late used to lift the trunk by 7 cm on joints with much friction."""
+    start = resting()
+    raised = replace(start, p_world_feet=start.p_world_feet + np.array([0.0, 0.0, 0.02]))
+    planner = started(start)
+    before = planner.update(start, VelocityCommand(0.2))
+    after = hold(planner, at(raised, TICK), VelocityCommand(0.2), 2.0)
+    assert after.body.p_world[2] == pytest.approx(before.body.p_world[2], abs=EXACT)
+
+
+def test_the_ground_is_where_a_foot_is_first_touched_not_where_it_goes_on_to() -> None:
+    """Front right and rear left swing first; both are late, touch 3 cm up, and then slide down."""
+    start = resting()
+    planner = started(start)
+    command = VelocityCommand(0.2)
+    before = hold(planner, start, command, TROT.swing_time + 5 * TICK)  # both are awaited
+
+    def lifted(height: float, tick: int) -> Snapshot:
+        feet = start.p_world_feet + np.array([0.0, 0.0, height])
+        time = TROT.swing_time + tick * TICK
+        return touching(replace(at(start, time), p_world_feet=feet))
+
+    heights = [
+        planner.update(snapshot, command).body.p_world[2] - before.body.p_world[2]
+        for snapshot in (lifted(0.03, 6), lifted(-0.03, 7))
+    ]
+    np.testing.assert_allclose(heights, GROUND_SHARE * 0.03, atol=2e-4)  # the correction's tick

@@ -1,0 +1,94 @@
+"""Friction fed forward: what the model says, within the limits, and the kernel says the same."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from go2_wbc.errors import ConfigError
+from go2_wbc.robot.joint_friction import FrictionFeedForward, JointFriction
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.controller import WholeBodyController
+from tests.engine_helpers import cases, random_state
+
+MODEL = RobotModel()
+ROUNDING = 1e-12  # [N m] of sums below 50
+ODD = JointFriction(
+    dry=tuple(0.1 * (n + 1) for n in range(12)),
+    viscous=tuple(0.05 * (12 - n) for n in range(12)),
+    transition=0.17,
+    lookahead=0.013,
+)
+"""No two numbers alike, so that one in another's place is seen."""
+
+
+def test_friction_opposes_the_motion_and_is_fed_forward_with_it() -> None:
+    v = np.array([5.0, -5.0] * 6)
+    expected = np.sign(v) * np.array(ODD.dry) + np.array(ODD.viscous) * v
+    np.testing.assert_allclose(ODD.torque(v, np.zeros(12)), expected, atol=1e-9)
+
+
+def test_a_joint_at_rest_gets_friction_only_if_it_shall_move() -> None:
+    friction, rest = JointFriction(), np.zeros(12)
+    assert not friction.torque(rest, rest).any()
+    started = friction.torque(rest, np.full(12, 20.0))
+    assert (started > 0.9 * np.array(friction.dry)).all()
+
+
+def test_by_part_repeats_hip_thigh_and_calf_for_every_leg() -> None:
+    friction = JointFriction.by_part((0.1, 0.2, 0.9), (0.0, 0.1, 0.3))
+    assert friction.dry == (0.1, 0.2, 0.9) * 4
+    assert friction.viscous == (0.0, 0.1, 0.3) * 4
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"dry": (0.2, 0.2, 0.2)}, r"JointFriction\.dry must be 12 numbers, got 3"),
+        ({"viscous": (-0.1,) * 12}, r"JointFriction\.viscous must be at least 0"),
+        ({"dry": (float("nan"),) * 12}, r"JointFriction\.dry must be at least 0"),
+        ({"transition": 0.0}, r"JointFriction\.transition must be positive"),
+        ({"lookahead": -0.01}, r"JointFriction\.lookahead must be at least 0"),
+    ],
+)
+def test_a_number_out_of_range_is_refused(wrong: dict[str, object], message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
+        replace(JointFriction(), **wrong)
+
+
+def test_the_kernel_says_what_the_readable_form_says() -> None:
+    rng = np.random.default_rng(31)
+    feed_forward = FrictionFeedForward(ODD, MODEL.torque_limits)
+    saturated = 0
+    for _ in range(300):
+        snapshot = MODEL.snapshot(random_state(rng))
+        z, tau = rng.normal(scale=20.0, size=30), rng.normal(scale=20.0, size=12)
+        readable = feed_forward.motor_torques(snapshot, z[:18], tau)
+        np.testing.assert_allclose(feed_forward.compiled(snapshot, z, tau), readable, atol=ROUNDING)
+        assert (np.abs(readable) <= MODEL.torque_limits).all()
+        saturated += int((np.abs(readable) == MODEL.torque_limits).sum())
+    assert saturated > 100, "or the limits are not tested"
+
+
+@pytest.mark.parametrize("backend", ["condensed", "full", "placo"])
+def test_every_back_end_feeds_the_same_friction_forward(backend: str) -> None:
+    wbc = WholeBodyController(MODEL, backend, replace(WbcConfig(), joint_friction=ODD))
+    for snapshot, reference in cases(MODEL, 20, seed=32):
+        solution = wbc.solve(snapshot, reference, relax=True)
+        friction = ODD.torque(snapshot.state.joint_velocities, solution.qdd[6:])
+        limits = MODEL.torque_limits
+        expected = np.clip(solution.tau + friction, -limits, limits)
+        np.testing.assert_allclose(solution.tau_motors, expected, atol=ROUNDING)
+        np.testing.assert_array_equal(solution.command.tau, solution.tau_motors)
+
+
+@pytest.mark.parametrize("backend", ["condensed", "full"])
+def test_without_friction_the_motors_get_the_torques_of_the_dynamics(backend: str) -> None:
+    config = replace(WbcConfig(), joint_friction=JointFriction.none())
+    wbc = WholeBodyController(MODEL, backend, config)
+    for snapshot, reference in cases(MODEL, 5, seed=33):
+        solution = wbc.solve(snapshot, reference, relax=True)
+        assert solution.tau_motors is solution.tau
