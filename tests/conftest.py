@@ -26,7 +26,9 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.active_set",  # compiled: a kernel cannot be wrapped
         "go2_wbc.kernels.condensed",
         "go2_wbc.kernels.derivation",
+        "go2_wbc.kernels.kinematics",
         "go2_wbc.kernels.loading",  # loaded here
+        "go2_wbc.kernels.loads",
         "go2_wbc.kernels.locomotion",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",

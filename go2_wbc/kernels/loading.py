@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-KERNELS = ("derivation", "condensed", "locomotion")
+KERNELS = ("derivation", "condensed", "locomotion", "kinematics", "loads")
 """Modules of this package whose import compiles, or loads what was compiled."""
 
 
