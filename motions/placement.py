@@ -69,12 +69,22 @@ def place(wanted: Wanted, steps: int, model: RobotModel) -> Placed:
     """
     from go2_wbc.kernels.kinematics import settle  # compiled; only who needs it waits for it
 
-    given = (wanted.p, wanted.is_com, wanted.raised, wanted.R, wanted.p_feet)
-    own = [np.array(array, order="C") for array in given]  # a kernel takes no other layout
-    tables = [leg_table(model), link_table(model)]
-    p, joints = (np.array(array, order="C") for array in (wanted.p, wanted.q_joints))
+    p, joints = _own(wanted.p), _own(wanted.q_joints)
     miss, com = np.empty((len(p), 4)), np.empty((len(p), 3))
-    settle(*own, *tables, steps, p, joints, miss, com)
+    settle(
+        _own(wanted.p),
+        _own(wanted.is_com),
+        _own(wanted.raised),
+        _own(wanted.R),
+        _own(wanted.p_feet),
+        leg_table(model),
+        link_table(model),
+        steps,
+        p,
+        joints,
+        miss,
+        com,
+    )
     return Placed(p, joints, com, miss)
 
 
@@ -102,7 +112,7 @@ def attitudes(rpy: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
     from go2_wbc.kernels.kinematics import rotations  # compiled, as above
 
     R = np.empty((len(rpy), 3, 3))
-    rotations(np.array(rpy, float, order="C"), R)
+    rotations(_own(rpy), R)
     return R
 
 
@@ -125,7 +135,7 @@ def configurations(
     from go2_wbc.kernels.kinematics import quaternions  # compiled, as above
 
     xyzw = np.empty((len(poses), 4))
-    quaternions(np.array(poses[:, 3:], float, order="C"), xyzw)
+    quaternions(_own(poses[:, 3:]), xyzw)
     return np.hstack([poses[:, :3], xyzw, joints])
 
 
@@ -136,6 +146,10 @@ def centres_of_mass(
     from go2_wbc.kernels import kinematics  # compiled, as above
 
     com, R = np.empty((len(poses), 3)), attitudes(poses[:, 3:])
-    p, own_joints = (np.array(array, float, order="C") for array in (poses[:, :3], joints))
-    kinematics.centres_of_mass(link_table(model), p, R, own_joints, com)
+    kinematics.centres_of_mass(link_table(model), _own(poses[:, :3]), R, _own(joints), com)
     return com
+
+
+def _own(array: np.ndarray) -> np.ndarray:
+    """A copy in the one layout that kernels take."""
+    return np.array(array, order="C")

@@ -69,7 +69,7 @@ def solve_leg(leg, x, y, z, q):
     q[2] = knee
     near = np.sqrt(-across) if across < 0.0 else 0.0
     far = max(reach - thigh - calf, abs(thigh - calf) - reach)
-    return np.hypot(near, far) if far > 0.0 else near
+    return near if far <= 0.0 else np.hypot(near, far)
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1])")
@@ -113,7 +113,7 @@ def turns_to(leg, x, y, z, turns):
     a, b = thigh + calf * cosine, calf * sine
     length = reach * np.sqrt(a * a + b * b)
     if length == 0.0:
-        a, b, length = 1.0, 0.0, reach
+        a, b, length = 0.0, -1.0, reach
     ct, st = (down * a - x * b) / length, (-x * a - down * b) / length
     turns[2], turns[3] = ct, st
     turns[4], turns[5] = ct * cosine - st * sine, st * cosine + ct * sine
