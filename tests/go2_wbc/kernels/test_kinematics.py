@@ -68,7 +68,8 @@ def test_cosines_and_sines_are_those_of_the_angles(model: RobotModel, leg: Leg) 
     geometry = LegGeometry.of(model, leg)
     fast, slow = np.empty(6), np.empty(6)
     for row, place in enumerate(places(geometry, 10 + int(leg))):
-        kinematics.turns_to(geometry.row, *place.tolist(), fast)
+        x, y, z = place.tolist()
+        kinematics.turns_to(geometry.row, x, y, z, fast)
         kinematics.turns_of(leg_angles(geometry, place[None]).q[0], slow)
         assert np.abs(fast - slow).max() < (ROUNDING if row < COUNT else STEEP), place
 
