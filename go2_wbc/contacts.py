@@ -23,7 +23,7 @@ TIE = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class ContactPhase:
-    """The contacts at one instant.
+    """The contacts at one instant, or (n, 4) at many.
 
     Attributes:
         stance: feet in stance.
@@ -31,18 +31,18 @@ class ContactPhase:
         remaining: seconds until each foot's next change (inf if it never changes).
     """
 
-    stance: Bool[np.ndarray, "4"]
-    elapsed: Float[np.ndarray, "4"]
-    remaining: Float[np.ndarray, "4"]
+    stance: Bool[np.ndarray, "*n 4"]
+    elapsed: Float[np.ndarray, "*n 4"]
+    remaining: Float[np.ndarray, "*n 4"]
 
     @property
-    def progress(self) -> Float[np.ndarray, "4"]:
+    def progress(self) -> Float[np.ndarray, "*n 4"]:
         """Elapsed share of each foot's present interval, in [0, 1); 0 where it has no end."""
         total = self.elapsed + self.remaining
         finite = np.isfinite(total) & (total > 0)
         return np.where(finite, self.elapsed / np.where(finite, total, 1.0), 0.0)
 
-    def load_share(self, ramp: float) -> Float[np.ndarray, "4"]:
+    def load_share(self, ramp: float) -> Float[np.ndarray, "*n 4"]:
         """Share of its load that each foot may bear: 1 in stance, 0 in the air.
 
         It rises over ``ramp`` seconds after a touchdown and falls over as long before a lift-off,
@@ -107,6 +107,14 @@ class ContactSchedule:
         index = max(bisect_right(self.times, t + TIE) - 1, 0)
         elapsed = np.maximum(t - self.since[index], 0.0)
         return ContactPhase(self.modes[index].copy(), elapsed, self.until[index] - t)
+
+    def at_times(self, times: Float[np.ndarray, " n"]) -> ContactPhase:
+        """The contacts at many instants [s], (n, 4): those that ``at`` gives for each."""
+        if self.period is not None:
+            times = np.maximum((times + TIE) % self.period - TIE, 0.0)
+        index = np.maximum(np.searchsorted(self.times, times + TIE, side="right") - 1, 0)
+        elapsed = np.maximum(times[:, None] - self.since[index], 0.0)
+        return ContactPhase(self.modes[index], elapsed, self.until[index] - times[:, None])
 
 
 @dataclass(frozen=True, slots=True)

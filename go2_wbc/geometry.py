@@ -12,7 +12,7 @@ def convex_hull(points: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "h 2"]:
     Source: monotone chain (Andrew 1979, "Another efficient algorithm for convex hulls in two
     dimensions"). Fewer than three corners come back if all points lie on a line.
     """
-    ordered = np.unique(points, axis=0)
+    ordered = np.array(sorted(set(map(tuple, points.tolist())))).reshape(-1, 2)
     if len(ordered) <= 2:
         return ordered
     return np.array(_chain(ordered)[:-1] + _chain(ordered[::-1])[:-1])

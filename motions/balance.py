@@ -18,8 +18,9 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.inverse_kinematics import PoseTargets, solve_pose
 from go2_wbc.robot.model import RobotModel
 from motions.keys import BalanceShift
+from motions.placement import configurations
 from motions.timeline import SAME, Timeline
-from motions.tracks import LegTracks, Poses, Times, configurations, followed
+from motions.tracks import LegTracks, Poses, Times, followed
 
 MARGINS = (0.08, 0.065, 0.05, 0.035, 0.02)
 """Distances [m] of the CoM to the edges of the support polygon that are tried, best first.
@@ -93,7 +94,7 @@ class Balancer:
     ) -> Float[np.ndarray, "2"]:
         if not raised:
             return np.zeros(2)
-        index = int(np.abs(self._times - t).argmin())
+        index = nearest(self._times, t)
         pose = self._body[index].copy()
         pose[:2] += guess
         instant = self._times[index : index + 1]
@@ -131,3 +132,10 @@ class Balancer:
             except IkError as error:
                 best = error
         raise IkError(f"no pose balances without foot {leg.name}: {best}")
+
+
+def nearest(times: Times, t: float) -> int:
+    """Index of the one of the increasing ``times`` that is nearest to ``t``, the first of two."""
+    after = min(int(np.searchsorted(times, t)), len(times) - 1)
+    before = max(after - 1, 0)
+    return before if abs(float(times[before]) - t) <= abs(float(times[after]) - t) else after

@@ -27,12 +27,13 @@ from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from motions.balance import Balancer, Problem
 from motions.keys import Mark
+from motions.placement import attitudes, centres_of_mass
 from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, reference
+from motions.samples import PlanSamples
 from motions.timeline import Timeline
 from motions.tracks import (
     LegTracks,
     body_path,
-    configurations,
     flights,
     home_poses,
     sample_times,
@@ -113,6 +114,21 @@ class CompiledPlan(MotionPlan):
             powers[1:] = 0.0  # the ends are held
         return powers @ self.curves.c[:, piece]
 
+    def samples(self, times: Float[np.ndarray, " n"]) -> PlanSamples:
+        """What the references at ``times`` ask for; ``at`` gives the same one by one."""
+        values = self.curves(np.clip(times, 0.0, self.duration))
+        phase = self.contacts.at_times(times)
+        return PlanSamples(
+            times=times,
+            p_world=values[:, :3],
+            is_com=np.ones(len(times), dtype=bool),
+            R_world_base=attitudes(values[:, 3:6]),
+            q_joints=values[:, 6:],
+            stance=phase.stance,
+            raised=~phase.stance,
+            normal_force_max=NORMAL_FORCE_MAX * phase.load_share(self.ramp),
+        )
+
 
 def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
     """The plan of ``timeline``, in the frame of the motion.
@@ -140,7 +156,7 @@ def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
     body[:, :2] += offsets
     paths = [tracks.path(leg, times, body) for leg in LEGS]
     joints = np.hstack([path.q for path in paths])
-    com = np.array([model.center_of_mass(q) for q in configurations(body, joints)])
+    com = centres_of_mass(body, joints, model)
     for leg, path in zip(LEGS, paths, strict=True):
         worst = int(np.argmax(path.miss))
         if path.miss[worst] > REACH_TOLERANCE:

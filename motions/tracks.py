@@ -9,16 +9,17 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from itertools import pairwise, starmap
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from motions.keys import BODY_CHANNELS, BodyKey, Frame, Key, LegKey, LegTarget, PostureKey
+from motions.placement import Wanted, attitudes, place, turned_back
 from motions.postures import LIE_POSE, SIT_POSE, STAND_POSE
 from motions.timeline import Timeline
 
@@ -30,8 +31,7 @@ LOW = 0.08
 """A foot that stays this far [m] below its hip's axis moves along straight lines; a higher one in
 joint space, since the way of a foot past its hip crosses a singularity of the leg."""
 SETTLING_STEPS = 10
-"""Steps that find the place of the base below which the CoM stands; each leaves an eighth of the
-error (measured), since the legs, whose feet stay, follow the base only in part."""
+"""Steps that find the place of the base below which the CoM stands; see ``place``."""
 
 Times = Float[np.ndarray, " n"]
 Poses = Float[np.ndarray, "n 6"]
@@ -114,7 +114,7 @@ class LegTracks:
             self._keys[key.leg].append(key)
         self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
         self.p_feet = standing_feet(model)
-        self._p_base_feet_home = (self.p_feet - home[:3]) @ attitudes(home[None, 3:]).as_matrix()[0]
+        self._p_base_feet_home = (self.p_feet - home[:3]) @ attitudes(home[None, 3:])[0]
 
     def path(self, leg: Leg, times: Times, body: Poses) -> LegAngles:
         """Joint angles of ``leg`` at increasing ``times``, at which the trunk is at ``body``.
@@ -158,7 +158,7 @@ class LegTracks:
         offset = np.array(target.values)
         if target.frame is Frame.BODY:
             return np.tile(self._p_base_feet_home[leg] + offset, (len(body), 1))
-        return attitudes(body[:, 3:]).apply(self.p_feet[leg] + offset - body[:, :3], inverse=True)
+        return turned_back(attitudes(body[:, 3:]), self.p_feet[leg] + offset - body[:, :3])
 
 
 def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
@@ -168,24 +168,27 @@ def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
     return p_feet
 
 
-def attitudes(rpy: Float[np.ndarray, "n 3"]) -> Rotation:
-    """R_world_base = Rz(yaw) Ry(pitch) Rx(roll) of every row [rad]."""
-    return Rotation.from_euler("ZYX", rpy[:, ::-1])
-
-
-def configurations(poses: Poses, joints: Float[np.ndarray, "n 12"]) -> Float[np.ndarray, "n 19"]:
-    """q of a trunk at ``poses`` (position, then roll, pitch, yaw) with these joint angles."""
-    return np.hstack([poses[:, :3], attitudes(poses[:, 3:]).as_quat(), joints])
-
-
-def home_poses(model: RobotModel) -> dict[Posture, Float[np.ndarray, "6"]]:
+def home_poses(model: RobotModel) -> Mapping[Posture, Float[np.ndarray, "6"]]:
     """Pose of the base in every resting posture, on four feet below the hips.
 
-    Standing is given by its CoM c*; p <- p + (c* - c(p)) finds the place p of the base.
+    Standing is given by its CoM. They are found once for each model.
     """
-    stand = STAND_POSE.copy()[None]
-    tracks = LegTracks(Timeline(), model, STAND_POSE)
-    for _ in range(SETTLING_STEPS):
-        joints = np.hstack([tracks.path(leg, np.zeros(1), stand).q for leg in LEGS])
-        stand[0, :3] += STAND_POSE[:3] - model.center_of_mass(configurations(stand, joints)[0])
-    return {Posture.STAND: stand[0], Posture.SIT: SIT_POSE, Posture.LIE: LIE_POSE}
+    home = _HOMES.get(model)
+    if home is None:
+        wanted = Wanted(
+            p=STAND_POSE[None, :3],
+            is_com=np.ones(1, dtype=bool),
+            R=attitudes(STAND_POSE[None, 3:]),
+            q_joints=np.zeros((1, 12)),
+            raised=np.zeros((1, 4), dtype=bool),
+            p_feet=standing_feet(model),
+        )
+        p_base = place(wanted, SETTLING_STEPS, model).p_base[0]
+        stand = np.concatenate([p_base, STAND_POSE[3:]])
+        home = {Posture.STAND: stand, Posture.SIT: SIT_POSE, Posture.LIE: LIE_POSE}
+        _HOMES[model] = home
+    return home
+
+
+_HOMES: WeakKeyDictionary[RobotModel, Mapping[Posture, np.ndarray]] = WeakKeyDictionary()
+"""The resting postures of every living model for which they were asked."""

@@ -13,20 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
 from go2_wbc.errors import MotionError
-from go2_wbc.legs import LEGS
-from go2_wbc.reference import LegTask, MotionPlan, Reference, TrackedPoint
-from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
+from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import angular_velocity_from_rpy, rpy_from_rotation
-from motions.tracks import attitudes, sample_times, standing_feet
+from motions.compiler import CompiledPlan
+from motions.placement import Wanted, attitudes, configurations, place, turned, turned_back
+from motions.samples import PlanSamples
+from motions.tracks import sample_times, standing_feet
 
 CENTRING_STEPS = 5
-"""Steps that put the CoM in its place; each leaves an eighth of the error (measured).
-
-The legs are solved once more after the last one, so that the feet are exactly in theirs."""
+"""Steps that put the CoM in its place; see ``place``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +55,7 @@ class Trajectory:
 
     def placed(self, p_base: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """Points of the base [m], one an instant, in the frame of the motion."""
-        return self.q[:, :3] + attitudes(self.rpy).apply(p_base)
+        return self.q[:, :3] + turned(attitudes(self.rpy), p_base)
 
 
 def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
@@ -68,66 +65,64 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
         MotionError: if the plan is not finite.
     """
     times = sample_times(plan.duration)
-    references = [plan.at(float(t)) for t in times]
-    for t, reference in zip(times, references, strict=True):
-        parts = (reference.body.p_world, reference.body.R_world_base.ravel(), reference.q_joints)
-        if not np.isfinite(np.concatenate(parts)).all():
-            raise MotionError(f"the plan is not finite at t={t:.2f} s")
-    R = [reference.body.R_world_base for reference in references]
-    rpy = np.unwrap(np.array([rpy_from_rotation(rotation) for rotation in R]), axis=0)
-    attitude, p_feet = attitudes(rpy), standing_feet(model)
-    q, miss = _configurations(references, attitude, p_feet, model)
-    v, a = _rates(times, q, rpy, attitude)
-    greatest = np.array([reference.normal_force_max for reference in references])
+    is_compiled = isinstance(plan, CompiledPlan)
+    asked = plan.samples(times) if is_compiled else PlanSamples.one_by_one(plan, times)
+    _require_finite(asked)
+    rpy = np.unwrap(_rpy_of(asked.R_world_base), axis=0)
+    R, p_feet = attitudes(rpy), standing_feet(model)
+    wanted = Wanted(
+        p=asked.p_world,
+        is_com=asked.is_com,
+        R=R,
+        q_joints=asked.q_joints,
+        raised=asked.raised,
+        p_feet=p_feet,
+    )
+    placed = place(wanted, CENTRING_STEPS, model)
+    q = configurations(np.hstack([placed.p_base, rpy]), placed.q_joints)
+    v, a = _rates(times, q, rpy, R)
+    greatest = asked.normal_force_max
     return Trajectory(
         times=times,
         q=q,
         v=v,
         a=a,
         rpy=rpy,
-        p_com=np.array([model.center_of_mass(row) for row in q]),
-        stance=np.array([reference.stance for reference in references]),
+        p_com=placed.p_com,
+        stance=asked.stance,
         load_share=greatest / max(float(greatest.max()), 1e-9),
         p_feet=p_feet,
-        miss=miss,
+        miss=placed.miss,
     )
 
 
-def _configurations(
-    references: list[Reference],
-    attitude: Rotation,
-    p_feet: Float[np.ndarray, "4 3"],
-    model: RobotModel,
-) -> tuple[Float[np.ndarray, "n 19"], Float[np.ndarray, "n 4"]]:
-    """Configurations whose CoM is as asked, and what standing legs miss [m].
+def _require_finite(asked: PlanSamples) -> None:
+    count = len(asked.times)
+    parts = (asked.p_world, asked.R_world_base.reshape(count, 9), asked.q_joints)
+    is_finite = np.isfinite(np.hstack(parts)).all(axis=1)
+    if not is_finite.all():
+        t = float(asked.times[int(np.argmin(is_finite))])
+        raise MotionError(f"the plan is not finite at t={t:.2f} s")
 
-    With the feet in their places and the attitude given, the CoM c is a function of the base's
-    place p alone; p <- p + (c* - c(p)) converges, since the legs follow the base only in part.
+
+def _rpy_of(R: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "n 3"]:
+    """Roll, pitch, yaw [rad] of every rotation, the pitch within a quarter turn.
+
+    The roll is that of Rz(-yaw) R, which is well defined where the trunk stands on its end and yaw
+    and roll are not told apart.
     """
-    wanted = np.array([reference.body.p_world for reference in references])
-    is_com = np.array([[r.body.point is TrackedPoint.COM] for r in references])
-    raised = np.array([[task is LegTask.JOINTS for task in r.legs] for r in references])
-    q = np.hstack([wanted, attitude.as_quat(), np.array([r.q_joints for r in references])])
-    base, joints = q[:, :3], q[:, 7:]  # views: q follows them
-    miss = np.zeros((len(references), 4))
-    for step in range(CENTRING_STEPS + 1):
-        for leg in LEGS:
-            places = attitude.apply(p_feet[leg] - base, inverse=True)
-            found = leg_angles(LegGeometry.of(model, leg), places)
-            stands = ~raised[:, leg]
-            joints[stands, leg.joints] = found.q[stands]
-            miss[:, leg] = np.where(stands, found.miss, 0.0)
-        if step < CENTRING_STEPS:
-            com = np.array([model.center_of_mass(row) for row in q])
-            base += np.where(is_com, wanted - com, 0.0)
-    return q, miss
+    yaw = np.arctan2(R[:, 1, 0], R[:, 0, 0])
+    pitch = np.arctan2(-R[:, 2, 0], np.hypot(R[:, 0, 0], R[:, 1, 0]))
+    s, c = np.sin(yaw), np.cos(yaw)
+    roll = np.arctan2(s * R[:, 0, 2] - c * R[:, 1, 2], c * R[:, 1, 1] - s * R[:, 0, 1])
+    return np.column_stack([roll, pitch, yaw])
 
 
 def _rates(
     times: Float[np.ndarray, " n"],
     q: Float[np.ndarray, "n 19"],
     rpy: Float[np.ndarray, "n 3"],
-    attitude: Rotation,
+    R: Float[np.ndarray, "n 3 3"],
 ) -> tuple[Float[np.ndarray, "n 18"], Float[np.ndarray, "n 18"]]:
     """Velocity and acceleration (n, 18) as Pinocchio counts them: the base's in its own frame.
 
@@ -137,8 +132,26 @@ def _rates(
     """
     spline = CubicSpline(times, np.hstack([q[:, :3], rpy, q[:, 7:]]), bc_type="clamped")
     rate, acceleration = spline(times, 1), spline(times, 2)
-    turns = zip(rpy, rate[:, 3:6], acceleration[:, 3:6], strict=True)
-    w_world, dw_world = np.swapaxes([angular_velocity_from_rpy(*turn) for turn in turns], 0, 1)
-    worlds = (rate[:, :3], w_world, acceleration[:, :3], dw_world)
-    v, w, a, dw = (attitude.apply(vectors, inverse=True) for vectors in worlds)
+    turning = _angular_rates(rpy, rate[:, 3:6], acceleration[:, 3:6])
+    v, a = turned_back(R, rate[:, :3]), turned_back(R, acceleration[:, :3])
+    w, dw = (turned_back(R, vectors) for vectors in turning)
     return np.hstack([v, w, rate[:, 6:]]), np.hstack([a - np.cross(w, v), dw, acceleration[:, 6:]])
+
+
+def _angular_rates(
+    rpy: Float[np.ndarray, "n 3"],
+    rate: Float[np.ndarray, "n 3"],
+    acceleration: Float[np.ndarray, "n 3"],
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+    """World-frame w [rad/s] and dw [rad/s^2] of every row; see ``angular_velocity_from_rpy``."""
+    _, p, y = rpy.T
+    cp, sp, cy, sy = np.cos(p), np.sin(p), np.cos(y), np.sin(y)
+    ahead, aside = np.column_stack([cy, sy, 0.0 * y]), np.column_stack([-sy, cy, 0.0 * y])
+    up, (dr, dp, dy) = np.array([0.0, 0.0, 1.0]), rate.T[:, :, None]
+    cp, sp = cp[:, None], sp[:, None]
+    # w = dr e_roll + dp e_pitch + dy e_yaw; the first two axes turn
+    roll_axis, d_roll_axis = cp * ahead - sp * up, cp * dy * aside - sp * dp * ahead - cp * dp * up
+    w = roll_axis * dr + aside * dp + up * dy
+    ddr, ddp, ddy = acceleration.T[:, :, None]
+    dw = roll_axis * ddr + aside * ddp + up * ddy + d_roll_axis * dr - ahead * dy * dp
+    return w, dw

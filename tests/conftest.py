@@ -27,7 +27,9 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.condensed",
         "go2_wbc.kernels.derivation",
         "go2_wbc.kernels.friction",
+        "go2_wbc.kernels.kinematics",
         "go2_wbc.kernels.loading",  # loaded here
+        "go2_wbc.kernels.loads",
         "go2_wbc.kernels.locomotion",
         "go2_wbc.kernels.motor",
         "go2_wbc.kernels.playing",

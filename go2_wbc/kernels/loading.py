@@ -8,6 +8,8 @@ KERNELS = (
     "derivation",
     "friction",
     "condensed",
+    "kinematics",
+    "loads",
     "locomotion",
     "motor",
     "playing",

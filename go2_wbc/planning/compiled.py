@@ -77,9 +77,7 @@ class CompiledPlanner(GaitPlanner):
         wanted[0], wanted[1], wanted[2] = command.linear_x, command.linear_y, command.angular_z
         state = snapshot.state
         self._contact[:] = state.feet_in_contact
-        self._plan(
-            snapshot.row, state.time, self._contact, self._state, self._numbers, wanted, row
-        )
+        self._plan(snapshot.row, state.time, self._contact, self._state, self._numbers, wanted, row)
         return Reference.of_row(row)
 
 

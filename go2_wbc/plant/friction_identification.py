@@ -233,9 +233,7 @@ class _Sweep:
         self._require_followed(joints, v, speed)
         return np.column_stack([v, friction])
 
-    def _shift(
-        self, centre: Float[np.ndarray, "12"], joints: np.ndarray, offset: float
-    ) -> None:
+    def _shift(self, centre: Float[np.ndarray, "12"], joints: np.ndarray, offset: float) -> None:
         target = centre.copy()
         target[joints] += offset
         self.go_to(0.4, target)

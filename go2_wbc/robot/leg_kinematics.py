@@ -20,11 +20,13 @@ plane, the law of cosines on l2, l3 and the reach sqrt(x^2 + down^2) gives q3, a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.legs import JOINT_NAMES, Leg
+from go2_wbc.errors import DescriptionError
+from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
 from go2_wbc.robot.model import RobotModel
 
 
@@ -47,11 +49,63 @@ class LegGeometry:
     @staticmethod
     def of(model: RobotModel, leg: Leg) -> LegGeometry:
         """The lengths of ``leg``, read from the robot's description."""
+        known = _KNOWN.setdefault(model, {})
+        if leg not in known:
+            known[leg] = LegGeometry._read(model, leg)
+        return known[leg]
+
+    @staticmethod
+    def _read(model: RobotModel, leg: Leg) -> LegGeometry:
         pin_model = model.pin_model
         joints = [pin_model.getJointId(name) for name in JOINT_NAMES[leg.joints]]
         hip, thigh, calf = (pin_model.jointPlacements[joint].translation for joint in joints)
         foot = pin_model.frames[pin_model.getFrameId(leg.foot)].placement.translation
         return LegGeometry(np.array(hip), float(thigh[1]), float(-calf[2]), float(-foot[2]))
+
+    @property
+    def row(self) -> Float[np.ndarray, "6"]:
+        """Its numbers one after the other, for the kernels."""
+        return np.array([*self.p_base_hip, self.width, self.thigh, self.calf])
+
+
+def leg_table(model: RobotModel) -> Float[np.ndarray, "4 6"]:
+    """The geometry of each leg, for the kernels."""
+    return np.array([LegGeometry.of(model, leg).row for leg in LEGS])
+
+
+def link_table(model: RobotModel) -> Float[np.ndarray, "13 7"]:
+    """Of the trunk and the legs' links, for the kernels: share of the mass, CoM, joint's place.
+
+    The CoM [m] is given in the frame of the link's joint, the joint's place [m] in that of the link
+    before it. The trunk's joint is its own.
+
+    Raises:
+        DescriptionError: if a leg's joints do not turn about x, y and y.
+    """
+    pin_model = model.pin_model
+    table = np.zeros((13, 7))
+    for row, (inertia, place) in enumerate(
+        zip(pin_model.inertias[1:], pin_model.jointPlacements[1:], strict=True)
+    ):
+        table[row, 0] = inertia.mass / model.mass
+        table[row, 1:4] = inertia.lever
+        if row == 0:
+            continue
+        table[row, 4:] = place.translation
+        axis = pin_model.joints[row + 1].shortname()
+        if axis != _AXES[(row - 1) % 3] or not np.array_equal(place.rotation, np.eye(3)):
+            raise DescriptionError(
+                f"{JOINT_NAMES[row - 1]} is a {axis}; expected {_AXES[(row - 1) % 3]}, not tilted"
+            )
+    return table
+
+
+_AXES = ("JointModelRX", "JointModelRY", "JointModelRY")
+"""What Pinocchio calls the joints of a leg."""
+
+
+_KNOWN: WeakKeyDictionary[RobotModel, dict[Leg, LegGeometry]] = WeakKeyDictionary()
+"""The legs of every living model that were asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +123,15 @@ class LegAngles:
 
 def leg_angles(geometry: LegGeometry, p_base_foot: Float[np.ndarray, "n 3"]) -> LegAngles:
     """Joint angles for foot centres (n, 3) in the base frame [m]."""
+    from go2_wbc.kernels.kinematics import solve_legs  # compiled; only who needs it waits for it
+
+    found = LegAngles(np.empty((len(p_base_foot), 3)), np.empty(len(p_base_foot)))
+    solve_legs(geometry.row, np.ascontiguousarray(p_base_foot, float), found.q, found.miss)
+    return found
+
+
+def readable_leg_angles(geometry: LegGeometry, p_base_foot: Float[np.ndarray, "n 3"]) -> LegAngles:
+    """The same as ``leg_angles``, in numpy: what the kernel is held to."""
     x, y, z = (p_base_foot - geometry.p_base_hip).T
     width, thigh, calf = geometry.width, geometry.thigh, geometry.calf
     across = y * y + z * z - width * width

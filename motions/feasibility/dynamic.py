@@ -22,6 +22,7 @@ from jaxtyping import Float
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.geometry import support_margins
 from go2_wbc.legs import LEGS
+from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
@@ -31,8 +32,8 @@ from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from motions.feasibility.kinematic import FEET, JOINTS
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
+from motions.placement import attitudes, turned
 from motions.plan import NORMAL_FORCE_MAX
-from motions.tracks import attitudes
 from motions.trajectory import Trajectory
 
 ARM = 0.2
@@ -75,6 +76,22 @@ class Forces:
 
 def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     """Contact forces and torques along ``motion``."""
+    from go2_wbc.kernels.loads import share_loads  # compiled; only who needs it waits for it
+
+    rows = zip(motion.q, motion.v, motion.a, strict=True)
+    needed = np.array([model.inverse_dynamics(*row) for row in rows])
+    contact, tau = np.zeros((len(needed), 4, 3)), needed[:, 6:].copy()
+    missing = np.empty((len(needed), 2))
+    joints, load_share = (np.array(a, order="C") for a in (motion.q[:, 7:], motion.load_share))
+    numbers = np.array([EVENNESS, model.mass * model.gravity, NORMAL_FORCE_MAX, model.foot_radius])
+    given = (joints, attitudes(motion.rpy), needed, load_share)
+    tables = (leg_table(model), friction_pyramid(PYRAMID), _SCALE, numbers)
+    share_loads(*given, *tables, contact, tau, missing)
+    return Forces(contact, tau, missing, _zero_moment_points(motion, needed[:, :6]))
+
+
+def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:
+    """The same as ``forces_of``, one snapshot and one QP after the other: what it is held to."""
     count = len(motion.times)
     contact, tau = np.zeros((count, 4, 3)), np.zeros((count, 12))
     missing, wrench = np.zeros((count, 2)), np.zeros((count, 6))
@@ -138,10 +155,12 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
     than three feet have no inside, none at all count as 1 m outside.
     """
     values = np.full((len(motion.times), 2), -NO_SUPPORT)
-    for stands in np.unique(motion.stance, axis=0):
-        if not stands.any():
+    modes = motion.stance @ np.array([1, 2, 4, 8])
+    for mode in np.unique(modes).tolist():
+        if not mode:
             continue
-        rows = (motion.stance == stands).all(axis=1)
+        rows = modes == mode
+        stands = motion.stance[int(np.argmax(rows))]
         feet = motion.p_feet[stands, :2]
         for column, points in enumerate((motion.p_com[:, :2], forces.zmp)):
             values[rows, column] = support_margins(feet, points[rows])
@@ -209,9 +228,9 @@ def _zero_moment_points(
     ground, F = R F_b and N = R N_b + p x F; there is no moment about the level axes at the point
     x = -N_y / F_z, y = N_x / F_z. Where the feet hardly press, F_z counts as ``LEAST_WEIGHT``.
     """
-    attitude = attitudes(motion.rpy)
-    force = attitude.apply(wrench[:, :3])
-    moment = attitude.apply(wrench[:, 3:]) + np.cross(motion.q[:, :3], force)
+    R = attitudes(motion.rpy)
+    force = turned(R, wrench[:, :3])
+    moment = turned(R, wrench[:, 3:]) + np.cross(motion.q[:, :3], force)
     vertical = np.maximum(force[:, 2], LEAST_WEIGHT)
     return np.column_stack([-moment[:, 1], moment[:, 0]]) / vertical[:, None]
 

@@ -90,14 +90,14 @@ class Series:
 
     def findings(self) -> list[Finding]:
         """The worst instant of every subject that was checked."""
+        is_checked = ~np.isnan(self.margins)
+        rows = np.where(is_checked, self.margins, np.inf).argmin(axis=0).tolist()
         found = []
-        for column, subject in enumerate(self.subjects):
-            if np.isnan(self.margins[:, column]).all():
-                continue
-            row = int(np.nanargmin(self.margins[:, column]))
+        for column in np.flatnonzero(is_checked.any(axis=0)).tolist():
+            row = rows[column]
             tables = (self.values, self.limits, self.margins)
             value, limit, margin = (float(table[row, column]) for table in tables)
-            at = (float(self.times[row]), subject, value, limit, margin)
+            at = (float(self.times[row]), self.subjects[column], value, limit, margin)
             found.append(Finding(self.check, *at, self.unit, self.note))
         return found
 

@@ -17,6 +17,7 @@ from go2_wbc.robot import inverse_kinematics
 from go2_wbc.robot.model import RobotModel
 from motions import (
     CheckedMotion,
+    CompiledPlan,
     FeasibilityChecker,
     Timeline,
     balance,
@@ -26,6 +27,7 @@ from motions import (
     load_motion,
     tracks,
 )
+from motions.feasibility import collision
 from motions.keys import Mark
 
 CHECK = import_module("motions.feasibility.check")  # the package has a function of that name
@@ -117,6 +119,28 @@ def test_the_work_of_compiling_grows_as_the_motion_does(
         growth = durations[seconds] / durations[10]
         for what in ("leg_angles", "eased", "solve_pose"):
             assert work[seconds][what] <= SPARE * growth * work[10][what], (seconds, what)
+
+
+def test_the_work_of_checking_grows_as_the_motion_does(
+    monkeypatch: pytest.MonkeyPatch, checker: FeasibilityChecker
+) -> None:
+    work: dict[int, Counter[str]] = {}
+    samples: dict[int, int] = {}
+    for seconds in (10, 40):
+        plan = compile_timeline(long_motion(seconds), checker.model)
+        counts = work[seconds] = Counter()
+        with monkeypatch.context() as patch:
+            counted(patch, counts, CompiledPlan, "at", lambda *_: 1)
+            counted(patch, counts, checker.model, "inverse_dynamics", lambda *_: 1)
+            counted(patch, counts, checker.model, "snapshot", lambda *_: 1)
+            counted(patch, counts, checker.model, "center_of_mass", lambda *_: 1)
+            counted(patch, counts, collision.pin, "computeDistance", lambda *_: 1)
+            samples[seconds] = len(checker.evaluate(plan).path.times)
+        assert counts["inverse_dynamics"] == samples[seconds]
+        # Nothing else is asked for one instant after the other.
+        assert counts["at"] == counts["snapshot"] == counts["center_of_mass"] == 0
+    growth = samples[40] / samples[10]
+    assert work[40]["computeDistance"] <= SPARE * growth * work[10]["computeDistance"]
 
 
 def test_moves_in_turn_lead_from_goal_to_goal() -> None:

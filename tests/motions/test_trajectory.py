@@ -9,7 +9,8 @@ import pytest
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation
 from motions import Timeline, compile_timeline, deg
-from motions.tracks import SAMPLE_PERIOD, attitudes
+from motions.placement import attitudes, configurations
+from motions.tracks import SAMPLE_PERIOD
 from motions.trajectory import _rates, trajectory_of
 
 STEP = 1e-3  # s; of the differences
@@ -26,9 +27,9 @@ def angles(t: float) -> np.ndarray:
 def test_angular_velocity_and_acceleration_are_those_of_the_turning_trunk() -> None:
     times = np.arange(0.0, 3.0, STEP)
     rpy = np.array([angles(float(t)) for t in times])
-    attitude, still = attitudes(rpy), np.zeros((len(times), 15))
-    v, a = _rates(times, np.hstack([still[:, :3], attitude.as_quat(), still[:, 3:]]), rpy, attitude)
-    R = attitude.as_matrix()
+    R, still = attitudes(rpy), np.zeros((len(times), 12))
+    poses = np.hstack([0.0 * rpy, rpy])
+    v, a = _rates(times, configurations(poses, still), rpy, R)
     for row in range(100, len(times) - 100, 100):
         w = log_rotation(R[row - 1].T @ R[row + 1]) / (2.0 * STEP)
         assert v[row, 3:6] == pytest.approx(w, abs=FINE_W)

@@ -11,8 +11,9 @@ from scipy.linalg import null_space
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, compile_timeline
-from motions.feasibility.dynamic import Forces, forces_of, torque
+from motions.feasibility.dynamic import Forces, forces_of, readable_forces_of, torque
 from motions.feasibility.limits import FeasibilityLimits
+from motions.placement import configurations
 from motions.trajectory import Trajectory, trajectory_of
 from tests.engine_helpers import state_of
 
@@ -73,3 +74,36 @@ def test_a_fast_rise_is_judged_by_the_line_of_its_calves() -> None:
         limits[motor] = min(finding.limit for finding in found)
     assert limits["ideal"] == pytest.approx(45.43)
     assert limits["torque-speed"] < 35.0
+
+
+def random_trajectory(model: RobotModel, count: int, *, pace: float, seed: int) -> Trajectory:
+    """States, accelerations and loads at random, as far from any motion as ``pace`` says."""
+    rng = np.random.default_rng(seed)
+    rpy = rng.normal(scale=0.3 * pace, size=(count, 3))
+    joints = np.tile([0.0, 0.8, -1.6], 4) + rng.normal(scale=0.4 * pace, size=(count, 12))
+    poses = np.hstack([rng.normal(scale=0.05, size=(count, 3)) + [0.0, 0.0, 0.27], rpy])
+    load_share = rng.choice([0.0, 0.3, 1.0], p=[0.2, 0.2, 0.6], size=(count, 4))
+    return Trajectory(
+        times=0.01 * np.arange(count),
+        q=configurations(poses, joints),
+        v=rng.normal(scale=pace, size=(count, 18)),
+        a=rng.normal(scale=10.0 * pace, size=(count, 18)),
+        rpy=rpy,
+        p_com=poses[:, :3],
+        stance=load_share > 0.0,
+        load_share=load_share,
+        p_feet=np.zeros((4, 3)),
+        miss=np.zeros((count, 4)),
+    )
+
+
+@pytest.mark.parametrize(("pace", "radius"), [(0.1, 0.022), (1.0, 0.022), (1.0, 0.0), (3.0, 0.022)])
+def test_the_forces_are_those_of_the_readable_form(pace: float, radius: float) -> None:
+    model = RobotModel(foot_radius=radius)
+    motion = random_trajectory(model, 250, pace=pace, seed=round(10 * pace))
+    found, expected = forces_of(motion, model), readable_forces_of(motion, model)
+    for name in ("contact", "tau", "missing", "zmp"):
+        difference = np.abs(getattr(found, name) - getattr(expected, name))
+        assert difference.max() < EXACT * max(1.0, pace), name
+    if pace > 0.5:
+        assert (np.abs(expected.missing) > 1.0).any()

@@ -1,0 +1,97 @@
+"""Self-collision along a motion: what is left out cannot have been the nearest pair."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from go2_wbc.robot.model import RobotModel
+from motions import compile_timeline, load_motion
+from motions.feasibility import collision
+from motions.feasibility.collision import SLACK, STRIDE, SelfCollision
+from motions.trajectory import trajectory_of
+from tests.engine_helpers import standing_q
+
+TOLERANCE = 2e-6  # m; twice what GJK and EPA leave: where they stop depends on where they start
+
+
+@pytest.fixture(scope="module")
+def model() -> RobotModel:
+    return RobotModel()
+
+
+@pytest.fixture(scope="module")
+def bodies(model: RobotModel) -> SelfCollision:
+    return SelfCollision(model)
+
+
+def random_configurations(model: RobotModel, count: int, seed: int) -> np.ndarray:
+    """Joint angles anywhere within their limits: links far apart, and deep in each other."""
+    rng = np.random.default_rng(seed)
+    q = np.tile(standing_q(), (count, 1))
+    q[:, 7:] = rng.uniform(model.q_lower, model.q_upper, size=(count, 12))
+    return q
+
+
+def all_distances(bodies: SelfCollision, q: np.ndarray) -> np.ndarray:
+    """Distance [m] of every pair, by looking at every pair."""
+    parts = (bodies._model, bodies._data, bodies._geometry, bodies._results)
+    pin.updateGeometryPlacements(*parts, q)
+    pin.computeDistances(bodies._geometry, bodies._results)
+    return np.array([result.min_distance for result in bodies._results.distanceResults])
+
+
+@pytest.mark.parametrize("size", [3.0, 0.3, 0.03])
+def test_no_distance_falls_below_its_bound(
+    model: RobotModel, bodies: SelfCollision, size: float
+) -> None:
+    rng = np.random.default_rng(1)
+    tightest = np.inf
+    for q in random_configurations(model, 150, seed=2):
+        moved = q.copy()
+        moved[7:] += rng.uniform(-size, size, 12) * (rng.random(12) < 0.5)
+        before, after = all_distances(bodies, q), all_distances(bodies, moved)
+        bounds = before - (bodies.levers * np.abs(moved[7:] - q[7:])).sum(axis=1)
+        assert (after >= bounds - SLACK).all()
+        moves = bounds < before - 1e-3
+        left = (after - bounds)[moves] / (before - bounds)[moves]
+        tightest = min(tightest, float(left.min(initial=np.inf)))
+    assert tightest < 0.6  # the bound is not idle: some pair comes as near as half of it allows
+
+
+def test_the_nearest_pair_is_that_of_looking_at_all(
+    model: RobotModel, bodies: SelfCollision
+) -> None:
+    far = random_configurations(model, 40, seed=3)
+    walk = np.tile(standing_q(), (200, 1))
+    walk[:, 7:] += np.cumsum(np.random.default_rng(4).normal(scale=0.03, size=(200, 12)), axis=0)
+    depths = []
+    for q in (far, walk):
+        for (distance, name), row in zip(bodies.nearest_along(q), q, strict=True):
+            distances = all_distances(bodies, row)
+            assert distance == pytest.approx(distances.min(), abs=TOLERANCE)
+            close = np.flatnonzero(distances <= distances.min() + 2.0 * TOLERANCE)
+            assert name in {bodies._name(int(pair)) for pair in close}
+            depths.append(distance)
+    assert min(depths) < -0.01 < 0.01 < max(depths)
+
+
+def test_few_pairs_are_looked_at_along_a_motion(
+    model: RobotModel, bodies: SelfCollision, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked: Counter[str] = Counter()
+    compute = pin.computeDistance
+
+    def counted(*arguments: object) -> object:
+        looked["pairs"] += 1
+        return compute(*arguments)
+
+    monkeypatch.setattr(collision.pin, "computeDistance", counted)
+    for name in ("dance", "high_five"):
+        q = trajectory_of(compile_timeline(load_motion(name), model), model).q[::STRIDE]
+        looked.clear()
+        bodies.nearest_along(q)
+        assert looked["pairs"] < 10 * len(q) + len(bodies.names)  # of 145
