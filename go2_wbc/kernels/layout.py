@@ -24,6 +24,7 @@ class Layout:
         ends = np.cumsum(lengths).tolist()
         self.start = {n: e - k for n, e, k in zip(shapes, ends, lengths, strict=True)}
         self.size = ends[-1]
+        self._names = tuple(shapes)
         self._views = [
             (slice(end - length, end), shape)
             for end, length, shape in zip(ends, lengths, shapes.values(), strict=True)
@@ -34,11 +35,27 @@ class Layout:
         return [row[place].reshape(shape) for place, shape in self._views]
 
     def pack(self, values: Sequence[Any]) -> Float[np.ndarray, " size"]:
-        """A new row that holds ``values``, arrays and numbers, given in order."""
+        """A new row that holds ``values``, arrays and numbers, given in order.
+
+        Raises:
+            ValueError: for a value of another shape, or one that is not made of numbers.
+        """
         row = np.empty(self.size)
-        for (place, shape), value in zip(self._views, values, strict=True):
-            row[place] = value if len(shape) < 2 else value.ravel()
+        for name, (place, shape), value in zip(self._names, self._views, values, strict=True):
+            if np.shape(value) != shape:
+                raise ValueError(f"{name} must have the shape {shape}, got {np.shape(value)}")
+            try:
+                row[place] = np.ravel(value)
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"{name} must hold numbers: {error}") from error
         return row
+
+    def place(self, index: int) -> tuple[str, str]:
+        """The array in which the number at ``index`` of a row lies, and where in it: [1, 2]."""
+        which = max(i for i, name in enumerate(self._names) if self.start[name] <= index)
+        name, shape = self._names[which], self._views[which][1]
+        inside = [str(i) for i in np.unravel_index(index - self.start[name], shape)]
+        return name, f"[{', '.join(inside)}]" if inside else ""
 
 
 SNAPSHOT = Layout(

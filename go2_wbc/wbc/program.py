@@ -24,6 +24,7 @@ from go2_wbc.wbc.constraints import (
     StanceFeetStill,
     TorqueLimits,
 )
+from go2_wbc.wbc.inputs import stacked
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import (
     BodyOrientation,
@@ -80,6 +81,8 @@ class Program:
         from go2_wbc.kernels.condensed import solve_condensed
 
         A, b, weights = self._extra_rows(snapshot, reference)
+        if self._extra_tasks and not (np.isfinite(A).all() and np.isfinite(b).all()):
+            return None
         z, tau = np.empty(SIZE), np.empty(12)
         outcome = solve_condensed(snapshot.row, reference.row, self._numbers, A, b, weights, z, tau)
         return (z, tau) if outcome == SOLVED else None
@@ -90,9 +93,9 @@ class Program:
         if not self._extra_tasks:
             return _NO_ROWS
         rows: list[Rows] = [task.rows(snapshot, reference) for task in self._extra_tasks]
+        A, b = stacked(rows, self._extra_tasks)
         counts = [len(part.b) for part in rows]
         weights = np.repeat([task.weight for task in self._extra_tasks], counts)
-        A, b = np.concatenate([r.A for r in rows]), np.concatenate([r.b for r in rows])
         return np.ascontiguousarray(A, float), b.astype(float), weights.astype(float)
 
 
