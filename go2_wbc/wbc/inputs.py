@@ -34,10 +34,11 @@ def check_extra_tasks(tasks: Sequence[Task]) -> None:
         ConfigError: for a weight that is no number from 0 to ``GREATEST_EXTRA_WEIGHT``.
     """
     for task in tasks:
-        if not (is_finite_number(task.weight) and 0.0 <= task.weight <= GREATEST_EXTRA_WEIGHT):
+        weight = task.weight
+        if not (is_finite_number(weight) and 0.0 <= float(weight) <= GREATEST_EXTRA_WEIGHT):
             raise ConfigError(
                 f"the weight of the task {task.name!r} must be between 0 and "
-                f"{GREATEST_EXTRA_WEIGHT:g}, got {task.weight!r}"
+                f"{GREATEST_EXTRA_WEIGHT:g}, got {weight!r}"
             )
 
 
