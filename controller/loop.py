@@ -229,4 +229,8 @@ def _is_finite(state: RobotState) -> bool:
     # A sum of squares is finite only if every number is.
     squares = sum(float(a @ a) for a in (state.q, state.v, state.tau, state.foot_forces))
     quaternion = state.q[3:7]
-    return isfinite(squares) and abs(sqrt(quaternion @ quaternion) - 1.0) < UNIT_TOLERANCE
+    return (
+        isfinite(state.time)
+        and isfinite(squares)
+        and abs(sqrt(quaternion @ quaternion) - 1.0) < UNIT_TOLERANCE
+    )
