@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
+from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.robot.rotations import yaw_rotation
@@ -80,11 +81,11 @@ class TrialRobot:
         truth: what MuJoCo says.
     """
 
-    def __init__(self, trial: Trial | MujocoPlant) -> None:
+    def __init__(self, trial: Trial | MujocoPlant, config: Config | None = None) -> None:
         """Set up a robot under the conditions of ``trial``, or the one given."""
         self.plant = trial.plant() if isinstance(trial, Trial) else trial
         self.truth = GroundTruth(self.plant)
-        self.go2 = GO2Controller(plant=self.truth)
+        self.go2 = GO2Controller(plant=self.truth, config=config)
 
     def close(self) -> None:
         """End the robot; idempotent."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 import logging
 from contextlib import suppress
 from dataclasses import dataclass
+from math import isfinite
 
 from controller.behaviours.base import Behaviour
 from controller.behaviours.joints import DAMPING, Damped
@@ -179,7 +180,8 @@ class ControlLoop:
 
     def _is_plausible(self, state: RobotState) -> bool:
         q, v, tau, forces = state.q, state.v, state.tau, state.foot_forces
-        return self._kernels.is_plausible(q, v, tau, forces, UNIT_TOLERANCE)
+        is_plausible = self._kernels.is_plausible(q, v, tau, forces, UNIT_TOLERANCE)
+        return is_plausible and isfinite(state.time)
 
     def _command(self, target: Reference | JointReference) -> JointCommand:
         if isinstance(target, JointReference):

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.errors import CommandError
 from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.robot.rotations import yaw_rotation
 
@@ -145,10 +146,18 @@ class Reference:
 
     @property
     def row(self) -> Float[np.ndarray, " size"]:
-        """Everything that is asked for, one number after the other, for the kernels."""
+        """Everything that is asked for, one number after the other, for the kernels.
+
+        Raises:
+            CommandError: for an array of another shape than it should have, or other legs.
+        """
         row = self._row
         if row is None:
             body = self.body
+            if len(self.legs) != 4 or not all(isinstance(task, LegTask) for task in self.legs):
+                raise CommandError(
+                    f"reference: legs must be four of {list(LegTask)}, got {self.legs!r}"
+                )
             values = [
                 body.point is TrackedPoint.COM,
                 body.p_world,
@@ -167,7 +176,10 @@ class Reference:
                 self.v_joints,
                 self.a_joints,
             ]
-            row = REFERENCE.pack(values)
+            try:
+                row = REFERENCE.pack(values)
+            except ValueError as error:
+                raise CommandError(f"reference: {error}") from error
             _set(self, "_row", row)
         return row
 

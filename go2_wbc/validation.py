@@ -25,6 +25,12 @@ def require_finite(config: object, *names: str) -> None:
     _require(config, "finite", lambda _: True, *names)
 
 
+def require_between(config: object, low: float, high: float, *names: str) -> None:
+    """Raise ConfigError unless each named field of ``config`` is in [``low``, ``high``]."""
+    what = f"between {low:g} and {high:g}"
+    _require(config, what, lambda value: low <= value <= high, *names)
+
+
 def require_share(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is in (0, 1]."""
     _require(config, "above 0 and at most 1", lambda value: 0.0 < value <= 1.0, *names)

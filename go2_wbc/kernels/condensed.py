@@ -20,7 +20,8 @@ STANCE, SWING, JOINTS = 0, 1, 2
 LARGEST_ERROR = 3.0
 """Orientation error [rad] beyond which this logarithm of a rotation is not accurate."""
 UNSUITED = 10
-"""Outcome, beside those of ``active_set``: a singular leg or a rotation by pi; for the full QP."""
+"""Outcome, beside those of ``active_set``: a singular leg or a rotation by pi, which are for the
+full QP, or numbers that are not finite."""
 
 _S, _T, _P = SNAPSHOT.start, REFERENCE.start, PROGRAM.start
 _R, _M, _H = _S["R_world_base"], _S["mass_matrix"], _S["bias"]
@@ -46,6 +47,34 @@ _DAMPING, _FRICTION = _P["stance_damping"], _P["friction"]
 _PEAK, _KNEE, _NO_LOAD = _P["peak_torque"], _P["knee_speed"], _P["no_load_speed"]
 _Q_LOWER, _Q_UPPER, _SPEED = _P["q_lower"], _P["q_upper"], _P["speed"]
 _BRAKING, _HORIZON, _SINGULAR = _P["braking"], _P["horizon"], _P["singular_determinant"]
+
+
+@subroutine("b1(f8[::1], i8, i8)")
+def is_finite(row, start, end):
+    """Whether every number of row[start:end] is finite: 0 x is 0 then, and a nan otherwise."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0  # four sums, so that none waits for the one before
+    last = end - (end - start) % 4
+    for i in range(start, last, 4):
+        a += 0.0 * row[i]
+        b += 0.0 * row[i + 1]
+        c += 0.0 * row[i + 2]
+        d += 0.0 * row[i + 3]
+    for i in range(last, end):
+        a += 0.0 * row[i]
+    return a + b + c + d == 0.0
+
+
+@subroutine("b1(f8[::1], f8[::1])")
+def are_valid(snapshot, target):
+    """What ``wbc.inputs`` demands: finite numbers, bounds of forces that are open or finite."""
+    for leg in range(4):
+        if not (target[_F_MIN + leg] < np.inf and target[_F_MAX + leg] > -np.inf):
+            return False
+    return (
+        is_finite(snapshot, 0, len(snapshot))
+        and is_finite(target, 0, _F_MIN)
+        and is_finite(target, _F_MAX + 4, len(target))
+    )
 
 
 @subroutine("b1(f8[::1], f8[::1], f8[::1], i8, f8[:,::1])")
@@ -349,6 +378,8 @@ def solve_condensed(snapshot, target, program, A_extra, b_extra, w_extra, z, tau
     """
     q, v = snapshot[:19], snapshot[19:37]
     affine = np.empty((30, 13))
+    if not are_valid(snapshot, target):
+        return UNSUITED
     if not eliminate(snapshot, target, program, affine):
         return UNSUITED
     H, g = np.zeros((12, 12)), np.zeros(12)

@@ -39,11 +39,27 @@ class Layout:
         return [row[place].reshape(shape) for place, shape in self._places.values()]
 
     def pack(self, values: Sequence[Any]) -> Float[np.ndarray, " size"]:
-        """A new row that holds ``values``, arrays and numbers, given in order."""
+        """A new row that holds ``values``, arrays and numbers, given in order.
+
+        Raises:
+            ValueError: for a value of another shape, or one that is not made of numbers.
+        """
         row = np.empty(self.size)
-        for (place, shape), value in zip(self._places.values(), values, strict=True):
-            row[place] = value if len(shape) < 2 else value.ravel()
+        for (name, (place, shape)), value in zip(self._places.items(), values, strict=True):
+            if np.shape(value) != shape:
+                raise ValueError(f"{name} must have the shape {shape}, got {np.shape(value)}")
+            try:
+                row[place] = np.ravel(value)
+            except (TypeError, ValueError) as error:
+                raise ValueError(f"{name} must hold numbers: {error}") from error
         return row
+
+    def place(self, index: int) -> tuple[str, str]:
+        """The array in which the number at ``index`` of a row lies, and where in it: [1, 2]."""
+        name = max((n for n in self.start if self.start[n] <= index), key=lambda n: self.start[n])
+        shape = self._places[name][1]
+        inside = [str(i) for i in np.unravel_index(index - self.start[name], shape)]
+        return name, f"[{', '.join(inside)}]" if inside else ""
 
 
 SNAPSHOT = Layout(

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.errors import CommandError
 from go2_wbc.kernels.layout import SNAPSHOT
 from go2_wbc.robot.state import RobotState
 
@@ -78,11 +79,18 @@ class Snapshot:
 
     @property
     def row(self) -> Float[np.ndarray, " size"]:
-        """The state's q and v and every array, one after the other, for the kernels."""
+        """The state's q and v and every array, one after the other, for the kernels.
+
+        Raises:
+            CommandError: for an array of another shape than it should have.
+        """
         row = self._row
         if row is None:
             arrays = [getattr(self, name) for name in list(SNAPSHOT.start)[2:]]
-            row = SNAPSHOT.pack([self.state.q, self.state.v, *arrays])
+            try:
+                row = SNAPSHOT.pack([self.state.q, self.state.v, *arrays])
+            except ValueError as error:
+                raise CommandError(f"snapshot: {error}") from error
             _set(self, "_row", row)
         return row
 

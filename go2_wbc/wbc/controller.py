@@ -26,7 +26,8 @@ from go2_wbc.wbc.constraints import (
     StanceFeetStill,
     TorqueLimits,
 )
-from go2_wbc.wbc.problem import ACCELERATION, FORCES, Bounds, Problem, Rows
+from go2_wbc.wbc.inputs import check_extra_tasks, check_inputs, check_problem, stacked
+from go2_wbc.wbc.problem import ACCELERATION, FORCES, Bounds, Problem
 from go2_wbc.wbc.program import Program
 from go2_wbc.wbc.relaxation import solve_relaxed
 from go2_wbc.wbc.solution import WbcSolution
@@ -65,11 +66,13 @@ class WholeBodyController:
             extra_tasks: tasks of your own, beside the built-in ones.
 
         Raises:
-            ConfigError: for an unknown back end, or extra tasks with one that cannot take them.
+            ConfigError: for an unknown back end, extra tasks with one that cannot take them, or
+                a weight of theirs that is out of range.
             SolverUnavailable: for an unknown or uninstalled solver.
         """
         self.model = model
         self.config = config or WbcConfig()
+        check_extra_tasks(extra_tasks)
         self.tasks = (*_tasks(model, self.config), *extra_tasks)
         self.equalities: tuple[Equality, ...] = (
             FloatingBaseDynamics(),
@@ -107,9 +110,9 @@ class WholeBodyController:
         return Problem(
             snapshot=snapshot,
             reference=reference,
-            tasks=_stack(task_rows),
+            tasks=stacked(task_rows, self.tasks),
             weights=np.repeat(self._task_weights, task_counts),
-            equalities=_stack(equality_rows),
+            equalities=stacked(equality_rows, self.equalities),
             bounds=Bounds(*(np.concatenate(parts) for parts in zip(*bounds, strict=True))),
             sources=(*self.tasks, *self.equalities, *self.inequalities),
             counts=(
@@ -137,13 +140,17 @@ class WholeBodyController:
 
         Raises:
             QpInfeasible: if no torque meets the constraints; carries the residual table. With
-                ``relax`` only for a reference that no robot could meet.
+                ``relax`` only for a reference that no robot could meet. Also for numbers that are
+                not finite; names the array.
+            CommandError: for an array of another shape than it should have.
         """
         solution = self.solve_compiled(snapshot, reference)
         if solution is not None:
             return solution
         start = time.perf_counter()  # thread_time costs a tenth of a tick on some machines
+        check_inputs(snapshot, reference, self._backend.solver)
         problem = self.formulate(snapshot, reference)
+        check_problem(problem, self._backend.solver)
         try:
             z, is_relaxed = self._backend.solve(problem), False
         except QpInfeasible as error:
@@ -217,7 +224,3 @@ def _inequalities(model: RobotModel, config: WbcConfig) -> tuple[Inequality, ...
             config.limit_horizon,
         ),
     )
-
-
-def _stack(rows: Sequence[Rows]) -> Rows:
-    return Rows(np.concatenate([r.A for r in rows]), np.concatenate([r.b for r in rows]))

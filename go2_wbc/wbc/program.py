@@ -24,6 +24,7 @@ from go2_wbc.wbc.constraints import (
     StanceFeetStill,
     TorqueLimits,
 )
+from go2_wbc.wbc.inputs import stacked
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import (
     BodyOrientation,
@@ -83,6 +84,8 @@ class Program:
     ) -> tuple[Float[np.ndarray, "30"], Float[np.ndarray, "12"]] | None:
         """Decision z (see ``problem``) and torques [N m]; None if the kernel finds no solution."""
         A, b, weights = self._extra_rows(snapshot, reference)
+        if self._extra_tasks and not (np.isfinite(A).all() and np.isfinite(b).all()):
+            return None
         z, tau = np.empty(SIZE), np.empty(12)
         outcome = self._solve(snapshot.row, reference.row, self._numbers, A, b, weights, z, tau)
         return (z, tau) if outcome == self._solved else None
@@ -93,9 +96,9 @@ class Program:
         if not self._extra_tasks:
             return _NO_ROWS
         rows: list[Rows] = [task.rows(snapshot, reference) for task in self._extra_tasks]
+        A, b = stacked(rows, self._extra_tasks)
         counts = [len(part.b) for part in rows]
         weights = np.repeat([task.weight for task in self._extra_tasks], counts)
-        A, b = np.concatenate([r.A for r in rows]), np.concatenate([r.b for r in rows])
         return np.ascontiguousarray(A, float), b.astype(float), weights.astype(float)
 
 

@@ -19,6 +19,10 @@ from jaxtyping import Float
 
 from go2_wbc.errors import QpInfeasible, SolverUnavailable, unknown_name
 
+TOLERANCE = 1e-4
+"""By how much a solution may break a bound, relative to 1 + |bound|: a tenth of a newton, where the
+solvers leave 1e-6 at most; daqp has returned 1e300 as solved."""
+
 
 @dataclass(frozen=True, slots=True)
 class DenseQp:
@@ -31,6 +35,24 @@ class DenseQp:
     upper: Float[np.ndarray, " m"]
     E: Float[np.ndarray, "k n"] | None = None
     e: Float[np.ndarray, " k"] | None = None
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether every number is finite, open sides aside."""
+        parts = [part for part in (self.H, self.g, self.C, self.E, self.e) if part is not None]
+        are_bounds = (self.lower < np.inf).all() and (self.upper > -np.inf).all()
+        return bool(are_bounds) and all(np.isfinite(part).all() for part in parts)
+
+    def is_met_by(self, x: Float[np.ndarray, " n"]) -> bool:
+        """Whether ``x`` meets the constraints, with ``TOLERANCE`` relative to each bound."""
+        value, E = self.C @ x, self.E
+        is_inside = (value >= self.lower - TOLERANCE * (1 + np.abs(self.lower))) & (
+            value <= self.upper + TOLERANCE * (1 + np.abs(self.upper))
+        )
+        if E is None or self.e is None:
+            return bool(is_inside.all())
+        error = np.abs(E @ x - self.e)
+        return bool(is_inside.all() and (error <= TOLERANCE * (1 + np.abs(self.e))).all())
 
     def one_sided(self) -> tuple[Float[np.ndarray, "r n"], Float[np.ndarray, " r"]]:
         """The inequality rows as G x <= h, infinite sides left out."""
@@ -102,12 +124,12 @@ def solve_dense_qp(qp: DenseQp, solver: str) -> QpSolution:
     """Solve ``qp`` with the solver of that name.
 
     Raises:
-        QpInfeasible: if the problem holds a nan, the solver finds no solution, or it returns one
-            that is not finite.
+        QpInfeasible: if the problem holds a nan or an infinite number that is no open side, the
+            solver finds no solution, or it returns one that is not finite or breaks the bounds.
     """
-    if np.isnan(np.concatenate((qp.g, qp.lower, qp.upper))).any():
+    if not qp.is_valid:
         # ProxQP ponders over a nan for seconds, and a nan bound would count as an open side.
-        raise QpInfeasible(solver, "the problem holds a nan")
+        raise QpInfeasible(solver, "the problem holds a nan or an infinite number")
     try:
         if solver == "active_set":
             solution = _solve_by_active_set(qp)
@@ -119,6 +141,8 @@ def solve_dense_qp(qp: DenseQp, solver: str) -> QpSolution:
         raise QpInfeasible(solver, str(error)) from error
     if solution is None or not np.isfinite(solution.x).all():
         raise QpInfeasible(solver, "no feasible point found")
+    if not qp.is_met_by(solution.x):
+        raise QpInfeasible(solver, "what it returned breaks the constraints")
     return solution
 
 

@@ -18,9 +18,11 @@ from go2_wbc.legs import LEGS
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import cross, log_rotation
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import require_not_negative
+from go2_wbc.validation import require_between
 from go2_wbc.wbc.problem import FORCES, SIZE, Rows
 
+GREATEST_GAIN = 1e6
+"""(2 / dt)^2 [1/s^2] at 500 ticks a second: a loop with more than that swings itself up."""
 _EYE = np.eye(3)
 
 
@@ -32,8 +34,8 @@ class Gains:
     kd: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a negative gain."""
-        require_not_negative(self, "kp", "kd")
+        """Raise ConfigError for a gain that is negative or above ``GREATEST_GAIN``."""
+        require_between(self, 0.0, GREATEST_GAIN, "kp", "kd")
 
     @staticmethod
     def uniform(kp: float, kd: float) -> Gains:

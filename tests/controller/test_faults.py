@@ -142,6 +142,21 @@ def test_a_clock_that_stands_still_ends_the_call(plant: WatchedPlant) -> None:
         assert is_limp(plant.commands[-1])
 
 
+@pytest.mark.parametrize(
+    ("wrong", "lack"), [(np.nan, "finite"), (np.inf, "finite"), (-1.0, "new"), (0.5, "new")]
+)
+def test_a_clock_that_goes_backwards_or_says_no_time_ends_the_call(
+    plant: WatchedPlant, wrong: float, lack: str
+) -> None:
+    """An infinite time would end every wait at once, and the gait's phase with it."""
+    plant.on_read = lambda s: s if s.time < MID_RISE else replace(s, time=wrong)
+    with GO2Controller(plant=plant) as go2:
+        with pytest.raises(PlantTimeout, match=f"no {lack} state from the plant for 3[26] ms"):
+            go2.stand()
+        assert go2.mode is Mode.DAMPED
+        assert is_limp(plant.commands[-1])
+
+
 @pytest.mark.parametrize("name", ["q", "v"])
 def test_states_that_are_not_finite_end_the_call(plant: WatchedPlant, name: str) -> None:
     def corrupt(state: RobotState) -> RobotState:
