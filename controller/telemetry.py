@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,8 +60,8 @@ class Telemetry:
         """Greatest |joint velocity| / limit of any joint so far."""
         return float(np.max(self._peak_speed / self._model.speed_limits))
 
-    def samples(self, rate: float = 100.0) -> Samples:
-        """What the ring holds, thinned to about ``rate`` samples a second.
+    def samples(self, rate: float = 100.0, since: float = -math.inf) -> Samples:
+        """What the ring holds from ``since`` [s] on, thinned to about ``rate`` samples a second.
 
         Raises:
             CommandError: if ``rate`` is not a positive number.
@@ -69,6 +70,7 @@ class Telemetry:
             raise CommandError(f"rate must be positive, got {rate}")
         order = np.arange(max(0, self._count - self._capacity), self._count)
         rows = order % self._capacity
+        rows = rows[np.searchsorted(self._time[rows], since) :]
         if len(rows) > 1:
             span = float(self._time[rows[-1]] - self._time[rows[0]])
             rows = rows[:: max(1, round((len(rows) - 1) / max(rate * span, 1.0)))]
