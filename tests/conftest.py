@@ -1,6 +1,7 @@
 """Switches on the run-time checks of array shapes (jaxtyping with beartype) before any import.
 
-The checks cost time in every call of a checked function, so they run under pytest only.
+The checks cost time in every call of a checked function, so they run under pytest only, and the
+repetitions in long loops are checked now and again only (see ``tests/typechecker.py``).
 ``GO2_WBC_TYPECHECK=0`` switches them off. pytest-xdist workers load this file too.
 """
 
@@ -49,8 +50,19 @@ def checked_modules() -> list[str]:
     return [name for name in our_modules() if name not in UNCHECKED]
 
 
+def pytest_runtest_setup() -> None:
+    """Checks the first calls of every test's fixtures."""
+    typechecker.renew()
+
+
+def pytest_runtest_call() -> None:
+    """Checks the first calls of every test."""
+    typechecker.renew()
+
+
 if IS_CHECKING:
     install_import_hook(checked_modules(), f"{typechecker.__name__}.checked")
+    typechecker.ration()
 
 # Compiled before any test, so that none of them, nor a script it starts, says that it compiles.
 load_kernels()
