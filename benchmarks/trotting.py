@@ -142,7 +142,7 @@ def _push(robot: TrialRobot, force: np.ndarray, phase: int) -> None:
     robot.wait(max(target - elapsed, 0.0))
     robot.push(force, PUSH_TIME)
     robot.wait(RECOVERY_TIME)
-    strides = robot.truth.recording().since(robot.plant.time - 2.0 * period)
+    strides = robot.truth.recording(since=robot.plant.time - 2.0 * period)
     speed = float(strides.com_velocity[:, 0].mean())
     if abs(speed - PUSHED_SPEED) > SPEED_TOLERANCE:
         raise TrialFailed(f"walks at {speed:.2f} m/s two seconds after the push")

@@ -111,9 +111,8 @@ def measure_motion(
 
 def _during_motion(go2: GO2Controller, truth: GroundTruth, name: str) -> TruthRecording:
     """The ticks in which the plan was played."""
-    telemetry, recorded = go2.recording(rate=1.0 / truth.control_period), truth.recording()
-    times = telemetry.time[np.array(telemetry.labels) == name]
-    times = times[times >= truth.start]
+    ticks = go2.telemetry.samples(1.0 / truth.control_period, since=truth.start).unfinished
+    recorded, times = truth.recording(), ticks.time[np.array(ticks.labels) == name]
     if len(times) == 0:
         return recorded
     first, last = np.searchsorted(recorded.time, [times[0], times[-1] + 1e-9])

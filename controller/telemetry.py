@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.errors import CommandError
-from go2_wbc.geometry import moving_support_margins
+from go2_wbc.geometry import stance_margins
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -60,8 +61,8 @@ class Telemetry:
         """Greatest |joint velocity| / limit of any joint so far."""
         return float(np.max(self._peak_speed / self._model.speed_limits))
 
-    def samples(self, rate: float = 100.0) -> Samples:
-        """What the ring holds, thinned to about ``rate`` samples a second.
+    def samples(self, rate: float = 100.0, since: float = -math.inf) -> Samples:
+        """What the ring holds from ``since`` [s] on, thinned to about ``rate`` samples a second.
 
         Raises:
             CommandError: if ``rate`` is not a positive number.
@@ -70,6 +71,7 @@ class Telemetry:
             raise CommandError(f"rate must be positive, got {rate}")
         order = np.arange(max(0, self._count - self._capacity), self._count)
         rows = order % self._capacity
+        rows = rows[np.searchsorted(self._time[rows], since) :]
         if len(rows) > 1:
             span = float(self._time[rows[-1]] - self._time[rows[0]])
             rows = rows[:: max(1, round((len(rows) - 1) / max(rate * span, 1.0)))]
@@ -102,10 +104,9 @@ class Samples:
 
     def recording(self) -> Recording:
         """The finished recording."""
-        stance, p_com = self.unfinished.stance, self.unfinished.p_world_com[:, :2]
-        margins = np.full(len(stance), np.nan)
-        for feet in (mode for mode in np.unique(stance, axis=0) if mode.sum() >= 3):
-            rows = (stance == feet).all(axis=1)
-            p_feet = self.p_world_feet[rows][:, feet, :2]
-            margins[rows] = moving_support_margins(p_feet, p_com[rows])
+        margins = stance_margins(
+            self.p_world_feet[:, :, :2],
+            self.unfinished.stance,
+            self.unfinished.p_world_com[:, :2],
+        )
         return replace(self.unfinished, support_margin=margins)

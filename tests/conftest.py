@@ -1,6 +1,7 @@
 """Switches on the run-time checks of array shapes (jaxtyping with beartype) before any import.
 
-The checks cost time in every call of a checked function, so they run under pytest only.
+The checks cost time in every call of a checked function, so they run under pytest only, and the
+repetitions in long loops are checked now and again only (see ``tests/typechecker.py``).
 ``GO2_WBC_TYPECHECK=0`` switches them off. pytest-xdist workers load this file too.
 """
 
@@ -9,12 +10,15 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import pytest
 from jaxtyping import install_import_hook
 
 from go2_wbc.kernels.loading import load_kernels
 from tests import typechecker
 
 ROOT = Path(__file__).resolve().parent.parent
+SCENARIOS = ROOT / "tests" / "scenarios"
+"""Where the longest tests are."""
 PACKAGES = ("go2_wbc", "controller", "motions", "viz")
 # Small functions and values that the control loop uses many times in a tick: checking these five
 # modules as well makes a tick half as slow again. Their callers are checked.
@@ -56,8 +60,25 @@ def checked_modules() -> list[str]:
     return [name for name in our_modules() if name not in UNCHECKED]
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files with long tests first, so that no worker is left with one when the others are done."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: (SCENARIOS not in item.path.parents, item.path not in slow))
+
+
+def pytest_runtest_setup() -> None:
+    """Checks the first calls of every test's fixtures."""
+    typechecker.renew()
+
+
+def pytest_runtest_call() -> None:
+    """Checks the first calls of every test."""
+    typechecker.renew()
+
+
 if IS_CHECKING:
     install_import_hook(checked_modules(), f"{typechecker.__name__}.checked")
+    typechecker.ration()
 
 # Compiled before any test, so that none of them, nor a script it starts, says that it compiles.
 load_kernels()

@@ -10,7 +10,7 @@ from jaxtyping import TypeCheckError
 
 from go2_wbc.errors import unknown_name
 from go2_wbc.robot.state import JointCommand
-from tests import conftest
+from tests import conftest, typechecker
 
 checking = pytest.mark.skipif(
     not conftest.IS_CHECKING, reason="GO2_WBC_TYPECHECK=0 switches the checks off"
@@ -28,6 +28,21 @@ def test_an_array_of_the_wrong_shape_is_refused() -> None:
 def test_an_argument_of_the_wrong_type_is_refused() -> None:
     with pytest.raises(TypeCheckError):
         unknown_name("side", 3, ("left", "right"))  # pyright: ignore[reportArgumentType]
+
+
+@checking
+def test_of_the_repetitions_in_a_long_loop_some_are_checked_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert typechecker.Ration.calls < typechecker.CHECKED_CALLS, "or a test would begin unchecked"
+    monkeypatch.setattr(typechecker.Ration, "calls", typechecker.CHECKED_CALLS)
+    refused = 0
+    for _ in range(10 * typechecker.STRIDE):
+        try:
+            unknown_name("side", 3, ("left", "right"))  # pyright: ignore[reportArgumentType]
+        except TypeCheckError:
+            refused += 1
+    assert refused == 10
 
 
 @checking

@@ -53,6 +53,16 @@ def test_a_recording_is_thinned_evenly_to_about_the_rate(
     assert np.ptp(np.diff(time)) < 1e-9
 
 
+@pytest.mark.parametrize("ticks", [CAPACITY // 2, 2 * CAPACITY + 3])
+def test_a_recording_may_begin_at_a_time(model: RobotModel, ticks: int) -> None:
+    telemetry = recorded(model, ticks)
+    whole = telemetry.samples(rate=1 / PERIOD).recording()
+    part = telemetry.samples(rate=1 / PERIOD, since=float(whole.time[4])).recording()
+    assert np.array_equal(part.time, whole.time[4:])
+    assert np.array_equal(part.q, whole.q[4:])
+    assert part.labels == whole.labels[4:]
+
+
 def test_a_plant_that_was_silent_for_some_ticks_can_be_recorded(model: RobotModel) -> None:
     telemetry = Telemetry(model, CAPACITY)
     snapshot = model.snapshot(lying_state(1.0))

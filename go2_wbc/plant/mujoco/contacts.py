@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.layout import FOREIGN, MujocoLayout
@@ -28,38 +29,79 @@ class FootContacts:
     v_world_contact: Float[np.ndarray, "4 3"]
 
 
-def foot_contacts(data: mujoco.MjData, layout: MujocoLayout) -> FootContacts:
-    """Contact points of the feet and their material velocities.
+@dataclass(frozen=True, slots=True)
+class Contacts:
+    """All contacts of one instant as MuJoCo holds them, copied: quick to take, evaluated later.
 
-    Valid after ``mj_step1``: places and velocities belong to the present state.
+    Taken after ``mj_step1``: places and velocities belong to that state.
+
+    Attributes:
+        codes: sum of both geoms' codes: ``FOREIGN`` plus a bin if exactly one is the robot's.
+        distances: of the surfaces [m]; they touch from 0 on.
+        points: of contact in the world [m].
+        normals: of each contact.
+        p_world_com: the robot's centre of mass [m].
+        twists: velocities of the feet's bodies about it, angular first, along world axes.
     """
-    points, velocities = np.full((4, 3), np.nan), np.zeros((4, 3))
-    contacts = data.contact
-    legs, depths = _pair_codes(data, layout) - FOREIGN, contacts.dist
-    order = np.flatnonzero((legs >= 0) & (legs < len(LEGS)) & (depths <= 0.0))
-    for i in order[np.argsort(-depths[order])]:  # the deepest of each foot comes last and stays
-        leg, point, normal = int(legs[i]), contacts.pos[i], contacts.frame[i, :3]
-        velocity = _point_velocity(data, layout, int(layout.foot_bodies[leg]), point)
-        points[leg] = point
-        velocities[leg] = velocity - normal * normal.dot(velocity)
-    return FootContacts(points, velocities)
+
+    codes: Int[np.ndarray, " n"]
+    distances: Float[np.ndarray, " n"]
+    points: Float[np.ndarray, "n 3"]
+    normals: Float[np.ndarray, "n 3"]
+    p_world_com: Float[np.ndarray, "3"]
+    twists: Float[np.ndarray, "4 6"]
+
+    @staticmethod
+    def of(data: mujoco.MjData, layout: MujocoLayout) -> Contacts:
+        """The present ones."""
+        contacts = data.contact
+        return Contacts(
+            _pair_codes(data, layout),
+            contacts.dist.copy(),
+            contacts.pos.copy(),
+            contacts.frame[:, :3].copy(),
+            data.subtree_com[layout.base].copy(),
+            data.cvel[layout.foot_bodies],
+        )
 
 
-def touches_itself(data: mujoco.MjData, layout: MujocoLayout) -> bool:
-    """Whether two links of the robot touch that its SRDF does not let touch."""
-    is_own = _pair_codes(data, layout) < FOREIGN
-    return bool((is_own & (data.contact.dist <= 0.0)).any())
+def foot_contacts(
+    instants: Sequence[Contacts],
+) -> tuple[Float[np.ndarray, "t 4 3"], Float[np.ndarray, "t 4 3"]]:
+    """Points and velocities as in ``FootContacts``, at each of the instants."""
+    points, velocities = np.full((len(instants), 4, 3), np.nan), np.zeros((len(instants), 4, 3))
+    when, codes, distances = _gathered(instants)
+    legs = codes - FOREIGN
+    rows = np.flatnonzero((legs >= 0) & (legs < len(LEGS)) & (distances <= 0.0))
+    rows = rows[np.argsort(-distances[rows], kind="stable")]  # a foot's deepest is written last
+    place = (when[rows], legs[rows])
+    point = np.concatenate([contacts.points for contacts in instants])[rows]
+    normal = np.concatenate([contacts.normals for contacts in instants])[rows]
+    com = np.array([contacts.p_world_com for contacts in instants])
+    twist = np.array([contacts.twists for contacts in instants])[place]
+    velocity = twist[:, 3:] + np.cross(twist[:, :3], point - com[place[0]])
+    along_normal = (normal * velocity).sum(axis=1, keepdims=True)
+    points[place], velocities[place] = point, velocity - along_normal * normal
+    return points, velocities
+
+
+def touches_itself(instants: Sequence[Contacts]) -> Bool[np.ndarray, " t"]:
+    """Whether two links of the robot touch that its SRDF does not let touch, at each instant."""
+    when, codes, distances = _gathered(instants)
+    touches = np.zeros(len(instants), dtype=bool)
+    touches[when[(codes < FOREIGN) & (distances <= 0.0)]] = True
+    return touches
+
+
+def _gathered(
+    instants: Sequence[Contacts],
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+    """Of all contacts of all instants: the instant, the code and the distance."""
+    when = np.repeat(np.arange(len(instants)), [len(contacts.codes) for contacts in instants])
+    codes = np.concatenate([contacts.codes for contacts in instants])
+    return when, codes, np.concatenate([contacts.distances for contacts in instants])
 
 
 def _pair_codes(data: mujoco.MjData, layout: MujocoLayout) -> Int[np.ndarray, " n"]:
     """Sum of both geoms' codes: ``FOREIGN`` plus a bin if exactly one belongs to the robot."""
     return layout.geom_codes[data.contact.geom].sum(axis=1)
-
-
-def _point_velocity(
-    data: mujoco.MjData, layout: MujocoLayout, body: int, point: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "3"]:
-    """World velocity of the material of ``body`` at a world point; cvel is about the tree's CoM."""
-    wx, wy, wz, vx, vy, vz = data.cvel[body].tolist()
-    x, y, z = (point - data.subtree_com[layout.base]).tolist()
-    return np.array([vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x])

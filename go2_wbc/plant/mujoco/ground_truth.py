@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.plant.base import Plant
+from go2_wbc.plant.mujoco.contacts import Contacts, foot_contacts, touches_itself
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.robot.description import BASE_LINK
 from go2_wbc.robot.model import RobotModel
@@ -108,7 +110,7 @@ class GroundTruth(Plant):
 
     Attributes:
         start: plant time [s] of the last ``clear``.
-        cpu_time: processor time [s] that recording has taken, from a sample of the ticks.
+        cpu_time: processor time [s] that recording has taken; the ticks' from a sample of them.
         on_tick: called after every tick, for events in the middle of a call; or None.
     """
 
@@ -143,7 +145,7 @@ class GroundTruth(Plant):
     def clear(self) -> None:
         """Forget what was recorded; begin again with the present state."""
         self.start = self._plant.time
-        self._rows: list[tuple[np.ndarray | float, ...]] = []
+        self._instants: list[_Instant] = []
         self._record()
 
     def fall(self) -> str | None:
@@ -160,33 +162,55 @@ class GroundTruth(Plant):
         """Centre of mass [m] now, by MuJoCo."""
         return self._plant.data.subtree_com[self._base].copy()
 
-    def recording(self) -> TruthRecording:
-        """Everything since the last ``clear``."""
-        columns = [np.array(column) for column in zip(*self._rows, strict=True)]
-        columns[3][:, 2] = np.unwrap(columns[3][:, 2])
-        return TruthRecording(*columns)
+    def recording(self, since: float = -math.inf) -> TruthRecording:
+        """The ticks since the last ``clear``, or after a time [s]; at least the last one."""
+        began = time.thread_time()
+        first = bisect_right(self._instants, since, key=lambda instant: instant.state.time)
+        recorded = _recording(self._instants[first:] or self._instants[-1:])
+        self.cpu_time += time.thread_time() - began
+        return recorded
 
     def _record(self) -> None:
-        is_timed = len(self._rows) % TIMED_EVERY == 0  # asking is a slow call on some machines
+        is_timed = len(self._instants) % TIMED_EVERY == 0  # asking is a slow call on some machines
         began = time.thread_time() if is_timed else 0.0
-        plant, state = self._plant, self._plant.read()
-        contacts = plant.foot_contacts()
-        self._rows.append(
-            (
-                state.time,
-                state.q,
-                state.v,
-                state.rpy,
-                state.tau,
-                state.foot_forces,
-                self.p_world_com,
-                plant.p_world_feet,
-                contacts.p_world_contact,
-                contacts.v_world_contact,
-                plant.base_contact_force,
-                plant.limb_contact_force,
-                plant.touches_itself,
-            )
-        )
+        plant = self._plant
+        forces = plant.base_contact_force, plant.limb_contact_force
+        feet = plant.p_world_feet
+        self._instants.append(_Instant(plant.read(), feet, forces, plant.contacts()))
         if is_timed:
             self.cpu_time += TIMED_EVERY * (time.thread_time() - began)
+
+
+class _Instant(NamedTuple):
+    """What a tick leaves behind: copies only, so that recording it takes little of the tick.
+
+    ``forces`` are those of trunk and limbs [N].
+    """
+
+    state: RobotState
+    p_world_feet: Float[np.ndarray, "4 3"]
+    forces: tuple[float, float]
+    contacts: Contacts
+
+
+def _recording(instants: Sequence[_Instant]) -> TruthRecording:
+    """What ``instants`` say, evaluated together."""
+    states, contacts = [i.state for i in instants], [i.contacts for i in instants]
+    rpy = np.array([state.rpy for state in states])
+    rpy[:, 2] = np.unwrap(rpy[:, 2])
+    points, velocities = foot_contacts(contacts)
+    return TruthRecording(
+        time=np.array([state.time for state in states]),
+        q=np.array([state.q for state in states]),
+        v=np.array([state.v for state in states]),
+        rpy=rpy,
+        tau=np.array([state.tau for state in states]),
+        foot_forces=np.array([state.foot_forces for state in states]),
+        p_world_com=np.array([contact.p_world_com for contact in contacts]),
+        p_world_feet=np.array([i.p_world_feet for i in instants]),
+        p_world_contacts=points,
+        v_world_contacts=velocities,
+        trunk_force=np.array([i.forces[0] for i in instants]),
+        limb_force=np.array([i.forces[1] for i in instants]),
+        touches_itself=touches_itself(contacts),
+    )

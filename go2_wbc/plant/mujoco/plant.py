@@ -18,9 +18,9 @@ from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, u
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.contacts import (
+    Contacts,
     FootContacts,
     foot_contacts,
-    touches_itself,
 )
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
@@ -276,8 +276,13 @@ class MujocoPlant(Plant):
 
     def foot_contacts(self) -> FootContacts:
         """Contact points of the feet and the velocities of their material there."""
+        points, velocities = foot_contacts([self.contacts()])
+        return FootContacts(points[0], velocities[0])
+
+    def contacts(self) -> Contacts:
+        """Every contact now, to be evaluated later."""
         self._check_open()
-        return foot_contacts(self._data, self._layout)
+        return Contacts.of(self._data, self._layout)
 
     @property
     def base_contact_force(self) -> float:
@@ -288,11 +293,6 @@ class MujocoPlant(Plant):
     def limb_contact_force(self) -> float:
         """Normal force between the legs, feet excepted, and anything that is not the robot [N]."""
         return float(self._forces[LIMB_BIN])
-
-    @property
-    def touches_itself(self) -> bool:
-        """Whether two links touch that must not."""
-        return touches_itself(self._data, self._layout)
 
     def save(self) -> SavedPhysics:
         """Everything that decides what happens next; ``restore`` goes on from there, bit by bit."""

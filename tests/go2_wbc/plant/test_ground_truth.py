@@ -52,6 +52,32 @@ def test_a_cleared_recording_begins_with_the_present_state() -> None:
     assert truth.start == truth.read().time
 
 
+def test_a_recording_may_begin_at_a_time() -> None:
+    truth = GroundTruth(MujocoPlant())
+    for _ in range(TICKS):
+        truth.write(SERVO)
+    whole, middle = truth.recording(), 0.5 * TICKS * truth.control_period
+    part, late = truth.recording(middle), whole.since(middle)
+    for name in part.__slots__:
+        assert np.array_equal(getattr(part, name), getattr(late, name), equal_nan=name[1:3] == "_w")
+    assert truth.recording(math.inf).time.tolist() == [whole.time[-1]]
+
+
+def test_what_was_recorded_is_what_the_plant_said_at_that_tick() -> None:
+    plant = MujocoPlant()
+    truth = GroundTruth(plant)
+    said = [plant.foot_contacts()]
+    for _ in range(TICKS):
+        truth.write(JointCommand.torque(np.full(12, 8.0)))
+        said.append(plant.foot_contacts())
+    recorded = truth.recording()
+    points = np.array([contacts.p_world_contact for contacts in said])
+    velocities = np.array([contacts.v_world_contact for contacts in said])
+    assert np.array_equal(recorded.p_world_contacts, points, equal_nan=True)
+    assert np.array_equal(recorded.v_world_contacts, velocities)
+    assert len(np.unique(velocities, axis=0)) > TICKS // 2
+
+
 def test_what_shall_happen_in_a_call_is_called_after_every_tick() -> None:
     truth, times = GroundTruth(MujocoPlant()), list[float]()
     truth.on_tick = lambda: times.append(truth.read().time)
