@@ -31,6 +31,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.condensed",
         "go2_wbc.kernels.derivation",
         "go2_wbc.kernels.friction",
+        "go2_wbc.kernels.inputs",
         "go2_wbc.kernels.kinematics",
         "go2_wbc.kernels.loading",  # loaded here
         "go2_wbc.kernels.loads",

@@ -370,7 +370,7 @@ def test_a_solution_is_commanded_as_pure_torque(
     model: RobotModel, stand: tuple[Snapshot, Reference]
 ) -> None:
     solution = WholeBodyController(model).solve(*stand)
-    np.testing.assert_array_equal(solution.command.tau, solution.tau)
+    np.testing.assert_array_equal(solution.command.tau, solution.tau_motors)
     assert not solution.command.kp.any()
     assert not solution.command.kd.any()
     assert solution.backend == "condensed"
