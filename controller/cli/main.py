@@ -43,6 +43,9 @@ COMMANDS: tuple[Command, ...] = (
     Command("demo", "controller.cli.demo", "stand, sit, walk, turn, high five; measured, in 3D"),
     Command("doctor", "controller.cli.doctor", "check this installation, say what is missing"),
     Command("export", "controller.cli.motion_export", "a motion's trajectory as NumPy or CSV"),
+    Command(
+        "identify-friction", "controller.cli.identify_friction", "measure the joints' friction"
+    ),
     Command("list", "controller.cli.motion_list", "the motions, and what can be set"),
     Command("new", "controller.cli.motion_new", "write a small motion to start from"),
     Command("preview", "controller.cli.motion_preview", "watch a motion, live in the browser"),

