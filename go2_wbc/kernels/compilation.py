@@ -39,26 +39,28 @@ CACHE_VARIABLE = "GO2_WBC_CACHE_DIR"
 """Environment variable that names the folder for compiled kernels; by default the user's cache."""
 
 
-def kernel(signature: str) -> Callable[[F], F]:
+def kernel(signature: str, *, nogil: bool = False) -> Callable[[F], F]:
     """Compile a function for one signature (numba's notation) now, or load what was compiled.
 
     No fast-math flag is set: the bits of a result depend on the inputs only, not on the processor.
+    With ``nogil`` other threads run meanwhile: for one that works long enough to delay a control
+    loop, on arrays that no other thread changes.
     """
 
     def compiled(function: F) -> F:
         folder = kernel_folder()
         if folder is None:
-            return _compiled(function, signature, None)
+            return _compiled(function, signature, None, nogil)
         try:
-            return _compiled(function, signature, folder)
+            return _compiled(function, signature, folder, nogil)
         except Exception as error:  # whatever unpickling a damaged file, or a full disk, raises
             what = f"{type(error).__name__}: {error}"
             _log.warning("the compiled kernels in %s are of no use (%s)", folder, what)
         shutil.rmtree(folder, ignore_errors=True)
         try:
-            return _compiled(function, signature, folder)
+            return _compiled(function, signature, folder, nogil)
         except OSError:
-            return _compiled(function, signature, None)
+            return _compiled(function, signature, None, nogil)
 
     return compiled
 
@@ -86,8 +88,8 @@ def subroutine(signature: str) -> Callable[[F], F]:
     return deferred
 
 
-def _compiled(function: F, signature: str, folder: Path | None) -> F:
-    dispatcher = numba.njit(error_model="numpy")(function)
+def _compiled(function: F, signature: str, folder: Path | None, nogil: bool) -> F:
+    dispatcher = numba.njit(error_model="numpy", nogil=nogil)(function)
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = "" if folder is None else str(folder)
     try:

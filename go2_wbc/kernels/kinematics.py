@@ -12,7 +12,7 @@ import numpy as np
 from go2_wbc.kernels.compilation import kernel, subroutine
 
 
-@kernel("void(f8[:,::1], f8[:,:,::1])")
+@kernel("void(f8[:,::1], f8[:,:,::1])", nogil=True)
 def rotations(rpy, R):
     """Fill R = Rz(yaw) Ry(pitch) Rx(roll) of every row."""
     for i in range(len(rpy)):
@@ -23,7 +23,7 @@ def rotations(rpy, R):
         R[i, 2, 0], R[i, 2, 1], R[i, 2, 2] = -sp, cp * sr, cp * cr
 
 
-@kernel("void(f8[:,::1], f8[:,::1])")
+@kernel("void(f8[:,::1], f8[:,::1])", nogil=True)
 def quaternions(rpy, xyzw):
     """Fill the quaternions x y z w of the same rotations."""
     for i in range(len(rpy)):
@@ -72,7 +72,7 @@ def solve_leg(leg, x, y, z, q):
     return near if far <= 0.0 else np.hypot(near, far)
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1])")
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1])", nogil=True)
 def solve_legs(leg, places, q, miss):
     """Fill angles and misses for foot centres in the base frame."""
     for i in range(len(places)):
@@ -155,7 +155,7 @@ def add_up(links, moments, R, p, com):
         com[i] = p[i] + R[i, 0] * x + R[i, 1] * y + R[i, 2] * z
 
 
-@kernel("void(f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1])")
+@kernel("void(f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1])", nogil=True)
 def centres_of_mass(links, p, R, joints, com):
     """Fill the CoM in the world of every configuration."""
     moments, turns = np.empty((4, 3)), np.empty(6)
@@ -176,7 +176,8 @@ def see_foot(R, p, p_foot, seen):
 
 @kernel(
     "void(f8[:,::1], b1[::1], b1[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8, "
-    "f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1])"
+    "f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1])",
+    nogil=True,
 )
 def settle(wanted, is_com, raised, R, p_feet, legs, links, steps, p, joints, miss, com):
     """Put every trunk where its CoM, or its base, is wanted, with standing feet in their places.

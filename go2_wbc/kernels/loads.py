@@ -96,7 +96,8 @@ def relieve(points, R, f, tau):
 
 @kernel(
     "void(f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], "
-    "f8[:,:,::1], f8[:,::1], f8[:,::1])"
+    "f8[:,:,::1], f8[:,::1], f8[:,::1])",
+    nogil=True,
 )
 def share_loads(
     joints, R, needed, load_share, legs, pyramid, scale, numbers, contact, tau, missing

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from types import ModuleType
+
 import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
 from go2_wbc.errors import DescriptionError
-from go2_wbc.kernels import kinematics
+from go2_wbc.kernels import kinematics, loads
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.leg_kinematics import (
     LegGeometry,
@@ -100,3 +102,21 @@ def test_a_robot_with_tilted_joints_is_refused() -> None:
     other.pin_model.jointPlacements[3] = tilted
     with pytest.raises(DescriptionError, match="FL_thigh_joint"):
         link_table(other)
+
+
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [
+        (kinematics, "rotations"),
+        (kinematics, "quaternions"),
+        (kinematics, "solve_legs"),
+        (kinematics, "centres_of_mass"),
+        (kinematics, "settle"),
+        (loads, "share_loads"),
+    ],
+)
+def test_a_control_loop_need_not_wait_for_the_check_of_a_long_motion(
+    module: ModuleType, name: str
+) -> None:
+    """Plans are made beside a loop that ticks; for 60 s of motion a kernel takes many ticks."""
+    assert getattr(module, name).targetoptions["nogil"]
