@@ -10,12 +10,15 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import pytest
 from jaxtyping import install_import_hook
 
 from go2_wbc.kernels.loading import load_kernels
 from tests import typechecker
 
 ROOT = Path(__file__).resolve().parent.parent
+SCENARIOS = ROOT / "tests" / "scenarios"
+"""Where the longest tests are."""
 PACKAGES = ("go2_wbc", "controller", "motions", "viz")
 # Small functions and values that the control loop uses many times in a tick: checking these five
 # modules as well makes a tick half as slow again. Their callers are checked.
@@ -48,6 +51,12 @@ def our_modules() -> list[str]:
 def checked_modules() -> list[str]:
     """Dotted names of every module that is checked."""
     return [name for name in our_modules() if name not in UNCHECKED]
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files with long tests first, so that no worker is left with one when the others are done."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: (SCENARIOS not in item.path.parents, item.path not in slow))
 
 
 def pytest_runtest_setup() -> None:
