@@ -13,7 +13,6 @@ from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.kernels.loading import load_kernels
 from go2_wbc.plant.base import Plant
-from go2_wbc.plant.mujoco.viewer import open_viewer
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.controller import WholeBodyController
@@ -80,7 +79,11 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
     telemetry = Telemetry(model, max(1, round(settings.recorded_time / plant.control_period)))
     loop = ControlLoop(plant, model, wbc, telemetry, config.safety)
     with ExitStack() as opened:
-        viewer = open_viewer(plant) if settings.viewer else None
+        viewer = None
+        if settings.viewer:
+            from go2_wbc.plant.mujoco.viewer import open_viewer  # MuJoCo's window with it
+
+            viewer = open_viewer(plant)
         if viewer is not None:
             opened.callback(viewer.close)
 

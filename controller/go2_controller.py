@@ -26,7 +26,6 @@ from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
-from motions.library.high_five import HEIGHT as HIGH_FIVE_HEIGHT
 
 _log = logging.getLogger(__name__)
 
@@ -208,16 +207,17 @@ class GO2Controller:
         Raises:
             CommandError: for another side or time.
         """
+        from motions.library.high_five import HEIGHT
+
         leg = front_leg(arguments.checked("side", side, str, "a string", CommandError))
         hold = finite_number("hold", hold)
         if not 0.5 <= hold <= 30.0:
             raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
         if plan is None:
-            height = HIGH_FIVE_HEIGHT
-            timeline = motions.load_motion("high_five", side=side, hold=hold, height=height)
+            timeline = motions.load_motion("high_five", side=side, hold=hold, height=HEIGHT)
             with self._planning:
                 plan = motions.compile_timeline(timeline, self._checker.model)
-        return self._call("high_five", lambda: self._pilot.high_five(plan, leg, HIGH_FIVE_HEIGHT))
+        return self._call("high_five", lambda: self._pilot.high_five(plan, leg, HEIGHT))
 
     def play(self, motion: motions.Playable, *, check: bool = True) -> bool:
         """Play a motion: a name of the library, a timeline, a compiled plan, or a checked motion.

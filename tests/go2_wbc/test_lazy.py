@@ -1,0 +1,50 @@
+"""Public names are imported when they are first used, without collecting garbage meanwhile."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from go2_wbc.lazy import lazy_exports
+
+MODULE = """
+import gc
+was_collecting = gc.isenabled()
+"""
+
+
+@pytest.fixture(params=[True, False], ids=["collecting", "not collecting"])
+def is_collecting(request: pytest.FixtureRequest) -> Iterator[bool]:
+    """Whether garbage is collected before the import."""
+    before = gc.isenabled()
+    (gc.enable if request.param else gc.disable)()
+    yield request.param
+    (gc.enable if before else gc.disable)()
+
+
+def test_no_garbage_is_looked_for_during_an_import(
+    is_collecting: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / f"lazy_package_{is_collecting}"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "home.py").write_text(MODULE)
+    monkeypatch.syspath_prepend(tmp_path)
+    load = lazy_exports(folder.name, {"home": ("was_collecting",)})
+    assert load("was_collecting") is False
+    assert gc.isenabled() is is_collecting
+
+
+def test_an_import_that_fails_leaves_the_collector_as_it_was(is_collecting: bool) -> None:
+    load = lazy_exports("go2_wbc", {"no_such_module": ("Anything",)})
+    with pytest.raises(ModuleNotFoundError, match="no_such_module"):
+        load("Anything")
+    assert gc.isenabled() is is_collecting
+
+
+def test_an_unknown_name_is_refused() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'Other'"):
+        lazy_exports("go2_wbc", {"legs": ("Leg",)})("Other")
