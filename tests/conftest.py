@@ -28,9 +28,12 @@ UNCHECKED = frozenset(
         "go2_wbc.contacts",
         "go2_wbc.curves",
         "go2_wbc.kernels.active_set",  # compiled: a kernel cannot be wrapped
+        "go2_wbc.kernels.bounds",
         "go2_wbc.kernels.condensed",
         "go2_wbc.kernels.derivation",
+        "go2_wbc.kernels.elimination",
         "go2_wbc.kernels.friction",
+        "go2_wbc.kernels.goals",
         "go2_wbc.kernels.inputs",
         "go2_wbc.kernels.kinematics",
         "go2_wbc.kernels.loading",  # loaded here

@@ -38,24 +38,46 @@ FREE, AT_LOWER, AT_UPPER = 0, -1, 1
 
 
 @subroutine("b1(f8[:,::1], f8[:,::1])")
-def factorise(H, J):
-    """J = L^-T of H = L L'; False if H is not positive definite."""
-    n = H.shape[0]
-    L = np.empty((n, n))
-    for j in range(n):
+def factorise(H, L):
+    """The lower triangle of L in H = L L', from that of H; False if H is not positive definite."""
+    for j in range(H.shape[0]):
         pivot = H[j, j]
         for k in range(j):
             pivot -= L[j, k] * L[j, k]
         if not pivot > DEFINITE * H[j, j]:  # a nan fails too
             return False
         root = np.sqrt(pivot)
+        inverse = 1.0 / root
         L[j, j] = root
-        for i in range(j + 1, n):
+        for i in range(j + 1, H.shape[0]):
             value = H[i, j]
             for k in range(j):
                 value -= L[i, k] * L[j, k]
-            L[i, j] = value / root
-    for c in range(n):  # column c of L^-1 is row c of J
+            L[i, j] = value * inverse
+    return True
+
+
+@subroutine("void(f8[:,::1], f8[::1], f8[::1])")
+def solve_factorised(L, g, x):
+    """x = -(L L')^-1 g."""
+    n = len(g)
+    for i in range(n):
+        value = -g[i]
+        for k in range(i):
+            value -= L[i, k] * x[k]
+        x[i] = value / L[i, i]
+    for i in range(n - 1, -1, -1):
+        value = x[i]
+        for k in range(i + 1, n):
+            value -= L[k, i] * x[k]
+        x[i] = value / L[i, i]
+
+
+@subroutine("void(f8[:,::1], f8[:,::1])")
+def invert(L, J):
+    """J = L^-T: column c of L^-1 is row c of J."""
+    n = L.shape[0]
+    for c in range(n):
         J[c, :c] = 0.0
         J[c, c] = 1.0 / L[c, c]
         for i in range(c + 1, n):
@@ -63,7 +85,6 @@ def factorise(H, J):
             for k in range(c, i):
                 value -= L[i, k] * J[c, k]
             J[c, i] = value / L[i, i]
-    return True
 
 
 @subroutine("void(f8[:,::1], f8[:,::1], f8[::1], i8)")
@@ -107,19 +128,6 @@ def drop(J, R, place, q):
             first, second = J[k, j], J[k, j + 1]
             J[k, j] = c * first + s * second
             J[k, j + 1] = c * second - s * first
-
-
-@subroutine("void(f8[:,::1], f8[::1], f8[::1])")
-def minimise(J, g, x):
-    """x = -H^-1 g = -J J'g, for the upper triangular J of ``factorise``."""
-    n = len(g)
-    x[:] = 0.0
-    for j in range(n):
-        value = 0.0
-        for i in range(j + 1):
-            value += J[i, j] * g[i]
-        for i in range(j + 1):
-            x[i] -= J[i, j] * value
 
 
 @subroutine("Tuple((i8, f8, f8))(f8[::1], f8[:,::1], f8[::1], f8[::1], i8[::1])")
@@ -241,10 +249,11 @@ def solve_qp(H, g, E, e, C, lower, upper, x, y):
     for i in range(m):
         if not lower[i] <= upper[i]:
             return BAD_BOUNDS
-    J, R = np.empty((n, n)), np.zeros((n, n))
-    if not factorise(H, J):
+    L, J, R = np.empty((n, n)), np.empty((n, n)), np.zeros((n, n))
+    if not factorise(H, L):
         return SINGULAR
-    minimise(J, g, x)
+    solve_factorised(L, g, x)
+    invert(L, J)
     rows, u = np.empty(n, dtype=np.int64), np.empty(n)  # working set: rows and multipliers
     side = np.zeros(m, dtype=np.int64)
     normal = np.empty(n)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.kernels.compilation import kernel
+from go2_wbc.kernels.compilation import subroutine
 from go2_wbc.kernels.layout import FRICTION, SNAPSHOT
 
 _V = SNAPSHOT.start["v"] + 6
@@ -12,7 +12,7 @@ _DRY, _VISCOUS, _LIMITS = (FRICTION.start[n] for n in ("dry", "viscous", "torque
 _TRANSITION, _LOOKAHEAD = FRICTION.start["transition"], FRICTION.start["lookahead"]
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
 def motor_torques(snapshot, z, tau, c, out):
     """Fill ``out`` (12,): ``tau`` and the friction of the joints, within the torque limits.
 

@@ -6,7 +6,6 @@ from importlib import import_module
 
 KERNELS = (
     "derivation",
-    "friction",
     "condensed",
     "kinematics",
     "loads",

@@ -72,11 +72,6 @@ class JointFriction:
         """The same for every leg: of hip, thigh and calf."""
         return JointFriction(dry=dry * 4, viscous=viscous * 4)
 
-    @property
-    def is_zero(self) -> bool:
-        """Whether nothing is fed forward."""
-        return not (any(self.dry) or any(self.viscous))
-
     def torque(
         self, v: Float[np.ndarray, "12"], a: Float[np.ndarray, "12"]
     ) -> Float[np.ndarray, "12"]:
@@ -89,12 +84,16 @@ class JointFriction:
 
 
 class FrictionFeedForward:
-    """Turns the torques of the dynamics into the motors', within their limits."""
+    """Turns the torques of the dynamics into the motors', within their limits.
+
+    Attributes:
+        numbers: the same for ``kernels.friction``.
+    """
 
     def __init__(self, friction: JointFriction, torque_limits: Float[np.ndarray, "12"]) -> None:
         """Feed ``friction`` forward, up to ``torque_limits`` [N m]."""
         self._friction, self._limits = friction, torque_limits
-        self._numbers = FRICTION.pack(
+        self.numbers = FRICTION.pack(
             [
                 friction.dry,
                 friction.viscous,
@@ -107,16 +106,6 @@ class FrictionFeedForward:
     def motor_torques(
         self, snapshot: Snapshot, qdd: Float[np.ndarray, "18"], tau: Float[np.ndarray, "12"]
     ) -> Float[np.ndarray, "12"]:
-        """``tau`` [N m] and the friction at the acceleration ``qdd``, as ``compiled`` does."""
+        """``tau`` [N m] and the friction at the acceleration ``qdd``."""
         friction = self._friction.torque(snapshot.state.joint_velocities, qdd[6:])
         return np.clip(tau + friction, -self._limits, self._limits)
-
-    def compiled(
-        self, snapshot: Snapshot, z: Float[np.ndarray, "30"], tau: Float[np.ndarray, "12"]
-    ) -> Float[np.ndarray, "12"]:
-        """``motor_torques`` by its kernel, from the decision ``z`` of the QP."""
-        from go2_wbc.kernels.friction import motor_torques
-
-        motors = np.empty(12)
-        motor_torques(snapshot.row, z, tau, self._numbers, motors)
-        return motors

@@ -27,7 +27,7 @@ from go2_wbc.wbc.constraints import (
     TorqueLimits,
 )
 from go2_wbc.wbc.inputs import check_extra_tasks, check_inputs, check_problem, stacked
-from go2_wbc.wbc.problem import ACCELERATION, FORCES, Bounds, Problem
+from go2_wbc.wbc.problem import Bounds, Problem
 from go2_wbc.wbc.program import Program
 from go2_wbc.wbc.relaxation import solve_relaxed
 from go2_wbc.wbc.solution import WbcSolution
@@ -79,13 +79,14 @@ class WholeBodyController:
             StanceFeetStill(self.config.stance_damping),
         )
         self.inequalities = _inequalities(model, self.config)
-        self._friction = _friction(model, self.config)
+        limits = model.torque_limits * self.config.torque_share
+        self._friction = FrictionFeedForward(self.config.joint_friction, limits)
         self._task_weights = np.array([task.weight for task in self.tasks])
         self.backend_name = backend
         self._backend = self._make_backend(backend)
         constraints = (*self.equalities, *self.inequalities)
         is_compiled = backend == "condensed" and self.config.solver == "active_set"
-        self._program = Program(self.tasks, constraints) if is_compiled else None
+        self._program = Program(self.tasks, constraints, self._friction) if is_compiled else None
         if extra_tasks and backend == "placo":
             raise ConfigError("the placo back end has tasks of its own and takes no extra ones")
 
@@ -161,8 +162,6 @@ class WholeBodyController:
         solution = WbcSolution.from_decision(
             z, problem, spent, self.backend_name, is_relaxed=is_relaxed
         )
-        if self._friction is None:
-            return solution
         motors = self._friction.motor_torques(snapshot, solution.qdd, solution.tau)
         return replace(solution, tau_motors=motors)
 
@@ -180,18 +179,9 @@ class WholeBodyController:
         found = self._program.solve(snapshot, reference)
         if found is None:
             return None
-        z, tau = found
-        friction = self._friction
-        return WbcSolution(
-            tau=tau,
-            tau_motors=tau if friction is None else friction.compiled(snapshot, z, tau),
-            qdd=z[ACCELERATION],
-            forces=z[FORCES].reshape(4, 3),
-            solve_time=time.perf_counter() - start,
-            backend=self.backend_name,
-            _formulate=partial(self.formulate, snapshot, reference),
-            _z=z,
-        )
+        z, tau, motors = found
+        spent, formulate = time.perf_counter() - start, partial(self.formulate, snapshot, reference)
+        return WbcSolution(tau, motors, spent, self.backend_name, formulate, z)
 
 
 def _tasks(model: RobotModel, config: WbcConfig) -> tuple[Task, ...]:
@@ -202,12 +192,6 @@ def _tasks(model: RobotModel, config: WbcConfig) -> tuple[Task, ...]:
         LegPosture(*config.leg_posture.arrays, config.posture_weight),
         ForceRegularisation(model.mass * model.gravity, config.force_weight),
     )
-
-
-def _friction(model: RobotModel, config: WbcConfig) -> FrictionFeedForward | None:
-    if config.joint_friction.is_zero:
-        return None
-    return FrictionFeedForward(config.joint_friction, model.torque_limits * config.torque_share)
 
 
 def _inequalities(model: RobotModel, config: WbcConfig) -> tuple[Inequality, ...]:

@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from go2_wbc.kernels.layout import PROGRAM
 from go2_wbc.reference import Reference
+from go2_wbc.robot.joint_friction import FrictionFeedForward
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.backends import SINGULAR_DETERMINANT
 from go2_wbc.wbc.constraints import (
@@ -44,7 +45,12 @@ T = TypeVar("T")
 class Program:
     """What ``WholeBodyController`` formulates, in the form of ``kernels.condensed``."""
 
-    def __init__(self, tasks: Sequence[Task], constraints: Sequence[Equality | Inequality]) -> None:
+    def __init__(
+        self,
+        tasks: Sequence[Task],
+        constraints: Sequence[Equality | Inequality],
+        friction: FrictionFeedForward,
+    ) -> None:
         """Read the numbers of the built-in tasks, which come first, and of the constraints."""
         from go2_wbc.kernels.active_set import SOLVED
         from go2_wbc.kernels.condensed import solve_condensed
@@ -77,24 +83,26 @@ class Program:
                 SINGULAR_DETERMINANT,
             ]
         )
+        self._friction = friction.numbers
         self._extra_tasks = tasks[BUILT_IN_TASKS:]
 
     def solve(
         self, snapshot: Snapshot, reference: Reference
-    ) -> tuple[Float[np.ndarray, "30"], Float[np.ndarray, "12"]] | None:
-        """Decision z (see ``problem``) and torques [N m]; None if the kernel finds no solution."""
-        A, b, weights = self._extra_rows(snapshot, reference)
+    ) -> tuple[Float[np.ndarray, "30"], Float[np.ndarray, "12"], Float[np.ndarray, "12"]] | None:
+        """Decision z (see ``problem``), torques [N m] without and with the joints' friction.
+
+        None if the kernel finds no solution.
+        """
+        A, b, weights = self._extra_rows(snapshot, reference) if self._extra_tasks else _NO_ROWS
         if self._extra_tasks and not (np.isfinite(A).all() and np.isfinite(b).all()):
             return None
-        z, tau = np.empty(SIZE), np.empty(12)
-        outcome = self._solve(snapshot.row, reference.row, self._numbers, A, b, weights, z, tau)
-        return (z, tau) if outcome == self._solved else None
+        found = np.empty(SIZE), np.empty(12), np.empty(12)
+        rows = (snapshot.row, reference.row, self._numbers, self._friction, A, b, weights)
+        return found if self._solve(*rows, *found) == self._solved else None
 
     def _extra_rows(
         self, snapshot: Snapshot, reference: Reference
     ) -> tuple[Float[np.ndarray, "k 30"], Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-        if not self._extra_tasks:
-            return _NO_ROWS
         rows: list[Rows] = [task.rows(snapshot, reference) for task in self._extra_tasks]
         A, b = stacked(rows, self._extra_tasks)
         counts = [len(part.b) for part in rows]

@@ -22,9 +22,6 @@ class WbcSolution:
         tau: joint torques [N m] of the dynamics, without friction: M qdd + h = S' tau + J' f.
         tau_motors: what the motors are told [N m]: ``tau`` and the friction of the joints, within
             the torque limits.
-        qdd: generalised acceleration (Pinocchio's spatial base acceleration in the base frame
-            [m/s^2, rad/s^2], then the joints [rad/s^2]).
-        forces: contact force [N] of each foot in the world frame; zero for legs in the air.
         solve_time: seconds of assembly and solution.
         backend: which back end solved it.
         is_relaxed: whether constraints had to give way, see ``violations``.
@@ -32,8 +29,6 @@ class WbcSolution:
 
     tau: Float[np.ndarray, "12"]
     tau_motors: Float[np.ndarray, "12"]
-    qdd: Float[np.ndarray, "18"]
-    forces: Float[np.ndarray, "4 3"]
     solve_time: float
     backend: str
     _formulate: Callable[[], Problem]
@@ -54,8 +49,21 @@ class WbcSolution:
         qdd, forces = z[ACCELERATION], z[FORCES]
         J_joints = snapshot.J_contacts[:, :, 6:].reshape(12, 12)
         tau = snapshot.mass_matrix[6:] @ qdd + snapshot.bias[6:] - J_joints.T @ forces
-        feet = forces.reshape(4, 3)
-        return WbcSolution(tau, tau, qdd, feet, solve_time, backend, lambda: problem, z, is_relaxed)
+        return WbcSolution(tau, tau, solve_time, backend, lambda: problem, z, is_relaxed)
+
+    @property
+    def qdd(self) -> Float[np.ndarray, "18"]:
+        """Generalised acceleration.
+
+        Pinocchio's spatial base acceleration in the base frame [m/s^2, rad/s^2], then the joints
+        [rad/s^2].
+        """
+        return self._z[ACCELERATION]
+
+    @property
+    def forces(self) -> Float[np.ndarray, "4 3"]:
+        """Contact force [N] of each foot in the world frame; zero for legs in the air."""
+        return self._z[FORCES].reshape(4, 3)
 
     @property
     def residuals(self) -> tuple[ResidualRow, ...]:
