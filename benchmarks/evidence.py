@@ -110,8 +110,8 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "evidence",
-        "Fill the page's table from what `behaviour --out` or `speed --out` wrote; a metric\n"
-        "that is in several files is taken from the last.",
+        "Fill the page's table from what `behaviour --out` or `speed --out` wrote; a\n"
+        "metric that is in several files is taken from the last.",
         examples=EXAMPLES,
     )
     parser.add_argument("page", metavar="PAGE", type=Path)

@@ -37,9 +37,9 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "speed",
-        "Processor time of the whole-body QP beside PlaCo's on the same states in turn, of\n"
-        "whole ticks with 2 ms of physics, of starts; and ticks late at the pace of the\n"
-        "wall clock. Wants an idle machine.",
+        "Processor time of the whole-body QP beside PlaCo's on the same states in turn,\n"
+        "of whole ticks with 2 ms of physics, of starts; and ticks late at the pace of\n"
+        "the wall clock. Wants an idle machine.",
         examples=EXAMPLES,
     )
     names = ", ".join(scenario.name for scenario in SCENARIOS)
