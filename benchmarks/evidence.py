@@ -1,4 +1,4 @@
-"""``python -m benchmarks evidence``: fills the table of evidence from the results."""
+"""``python -m benchmarks evidence``: fills a table of the documentation from the results."""
 
 from __future__ import annotations
 
@@ -11,17 +11,20 @@ from pathlib import Path
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from go2_wbc.errors import ConfigError
 
-BEGIN, END = "<!-- evidence:begin", "<!-- evidence:end -->"
+BEGIN, SPEED_BEGIN, END = "<!-- evidence:begin", "<!-- evidence:speed", "<!-- evidence:end -->"
+"""What a table stands between: the first for the behaviour, the second for the speed."""
 HEAD = "| what | n | mean | worst | closest peer |\n|---|---|---|---|---|"
+SPEED_HEAD = "| what | runs | mean | worst | before |\n|---|---|---|---|---|"
 EXAMPLES = """
 python -m benchmarks evidence docs/evidence.md behaviour.json
+python -m benchmarks evidence docs/explanation/speed.md speed.json
 python -m benchmarks evidence docs/evidence.md behaviour.json more.json
 """
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A line of the table: a metric, what to call it, how to print it, the closest peer's value."""
+    """A line of a table: a metric, what to call it, how to print it, a value to compare it with."""
 
     metric: str
     what: str
@@ -64,14 +67,51 @@ LINES: tuple[Line, ...] = (
     Line("demo.pace", "whole run, real-time factor (processor time)", "{:.1f}", "1.2 to 1.6"),
 )
 
+SPEED_LINES: tuple[Line, ...] = (
+    Line("solve.4.ours", "tick of the QP, 4 stance feet", "{:.1f} us", "350 us"),
+    Line("solve.4.placo", "the same in PlaCo", "{:.1f} us"),
+    Line("solve.4.faster", "times faster than PlaCo", "{:.2f}", "0.17"),
+    Line("solve.3.ours", "tick of the QP, 3 stance feet", "{:.1f} us", "352 us"),
+    Line("solve.3.placo", "the same in PlaCo", "{:.1f} us"),
+    Line("solve.3.faster", "times faster than PlaCo", "{:.2f}", "0.16"),
+    Line("solve.2.ours", "tick of the QP, 2 stance feet", "{:.1f} us", "342 us"),
+    Line("solve.2.placo", "the same in PlaCo", "{:.1f} us"),
+    Line("solve.2.faster", "times faster than PlaCo", "{:.2f}", "0.13"),
+    Line("solve.4.tail", "99 of 100 ticks, 4 stance feet, by PlaCo's", "{:.2f}"),
+    Line("solve.3.tail", "the same, 3 stance feet", "{:.2f}"),
+    Line("solve.2.tail", "the same, 2 stance feet", "{:.2f}"),
+    Line("tick.trot.median", "whole tick, trot at 0.5 m/s, 2 ms of physics", "{:.0f} us", "740 us"),
+    Line("tick.stand.median", "the same, standing up", "{:.0f} us", "727 us"),
+    Line("tick.high five.median", "the same, high five", "{:.0f} us", "782 us"),
+    Line("tick.bow.median", "the same, a motion of the library", "{:.0f} us"),
+    Line("tick.sit.median", "the same, sitting down", "{:.0f} us"),
+    Line("tick.lie down.median", "the same, lying down", "{:.0f} us"),
+    Line("tick.trot.factor", "real-time factor of the trot, one core", "{:.1f}", "2.7"),
+    Line("part.read", "part of the trot's tick: read the plant", "{:.1f} us", "13 us"),
+    Line("part.snapshot", "part: dynamics of the state", "{:.1f} us", "74 us"),
+    Line("part.update", "part: planner", "{:.1f} us", "171 us"),
+    Line("part.solve", "part: QP", "{:.1f} us", "305 us"),
+    Line("part.write", "part: write, with 2 ms of physics", "{:.1f} us", "89 us"),
+    Line("part.record", "part: telemetry", "{:.1f} us", "17 us"),
+    Line("part.rest", "part: the rest (checks, glue)", "{:.1f} us", "71 us"),
+    Line("commands.worst", "60 s of random commands: worst tick by the median", "{:.1f}"),
+    Line("commands.peak", "memory allocated in a tick, at most at a time", "{:.1f} kB"),
+    Line("startup.robot.cpu", "`GO2Controller()`, with its import", "{:.2f} s", "1.17 s"),
+    Line("startup.stand.cpu", "the same, and the first `stand()`", "{:.2f} s", "1.54 s"),
+    Line("startup.demo.cpu", "`go2-wbc demo --no-media`", "{:.1f} s"),
+    Line("realtime.missed", "500 Hz at the wall clock's pace: late ticks", "{:.2f} %"),
+)
+TABLES = {BEGIN: (HEAD, LINES), SPEED_BEGIN: (SPEED_HEAD, SPEED_LINES)}
+"""Head and lines by the mark above the table."""
+
 
 def register(subparsers: Subparsers) -> None:
     """Add the arguments of ``evidence``."""
     parser = add_parser(
         subparsers,
         "evidence",
-        "Fill the page's table from what `behaviour --out` wrote; a metric that is in\n"
-        "several files is taken from the last.",
+        "Fill the page's table from what `behaviour --out` or `speed --out` wrote; a\n"
+        "metric that is in several files is taken from the last.",
         examples=EXAMPLES,
     )
     parser.add_argument("page", metavar="PAGE", type=Path)
@@ -88,17 +128,19 @@ def run(args: argparse.Namespace) -> int:
     return ExitCode.OK
 
 
-def table(rows: Mapping[str, Mapping[str, float]]) -> str:
+def table(rows: Mapping[str, Mapping[str, float]], mark: str = BEGIN) -> str:
     """The table as Markdown.
 
     Args:
         rows: results of the benchmark, by metric.
+        mark: what stands above it, a key of ``TABLES``.
 
     Raises:
         ConfigError: if a metric is missing or has no value.
     """
-    lines = [HEAD]
-    for line in LINES:
+    head, content = TABLES[mark]
+    lines = [head]
+    for line in content:
         found = rows.get(line.metric)
         if found is None or found["mean"] is None or found["worst"] is None:
             raise ConfigError(f"the results have no value for {line.metric}")
@@ -113,9 +155,10 @@ def filled(text: str, rows: Mapping[str, Mapping[str, float]]) -> str:
     Raises:
         ConfigError: if the marks are missing, or a metric is.
     """
-    begin = text.find(BEGIN)
+    mark = next((mark for mark in TABLES if mark in text), BEGIN)
+    begin = text.find(mark)
     end = text.find(END, begin)
     if begin < 0 or end < 0:
         raise ConfigError(f"the text has no {BEGIN} ... {END}")
     start = text.index("\n", begin) + 1
-    return f"{text[:start]}{table(rows)}\n{text[end:]}"
+    return f"{text[:start]}{table(rows, mark)}\n{text[end:]}"

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 
-from benchmarks import speed_realtime, speed_solves, speed_startup, speed_ticks
+from benchmarks import speed_parts, speed_realtime, speed_solves, speed_startup, speed_ticks
 from benchmarks.scenario import Scenario, chosen_scenarios
 from benchmarks.session import add_options, positive, run_and_report, tasks_of
 from controller.cli.common import Subparsers, add_parser
@@ -25,6 +25,7 @@ python -m benchmarks evidence docs/explanation/speed.md speed.json
 SCENARIOS = (
     Scenario("solves", speed_solves.METRICS, speed_solves.measure_solves),
     Scenario("ticks", speed_ticks.TICK_METRICS, speed_ticks.measure_ticks),
+    Scenario("parts", speed_parts.METRICS, speed_parts.measure_parts),
     Scenario("commands", speed_ticks.COMMAND_METRICS, speed_ticks.measure_commands),
     Scenario("startup", speed_startup.METRICS, speed_startup.measure_startup),
     Scenario("realtime", speed_realtime.METRICS, speed_realtime.measure_realtime),
@@ -36,9 +37,9 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "speed",
-        "Processor time of the whole-body QP beside PlaCo's on the same states in turn, of\n"
-        "whole ticks with 2 ms of physics, of starts; and ticks late at the pace of the\n"
-        "wall clock. Wants an idle machine.",
+        "Processor time of the whole-body QP beside PlaCo's on the same states in turn,\n"
+        "of whole ticks with 2 ms of physics, of starts; and ticks late at the pace of\n"
+        "the wall clock. Wants an idle machine.",
         examples=EXAMPLES,
     )
     names = ", ".join(scenario.name for scenario in SCENARIOS)

@@ -125,7 +125,7 @@ def measure_commands(trial: Trial) -> Measurement:
         spent = _walk(go2, random, ends)
         gc.callbacks.remove(note)
         median = float(np.median(spent))
-        peak, kept = _memory(plant, go2)
+        peak, kept = _memory(plant, go2, ends)
     return Measurement(
         {
             "commands.median": median,
@@ -152,7 +152,7 @@ def _walk(go2: GO2Controller, random: np.random.Generator, ends: list[int]) -> n
     return np.concatenate(spent)
 
 
-def _memory(plant: MujocoPlant, go2: GO2Controller) -> tuple[float, float]:
+def _memory(plant: MujocoPlant, go2: GO2Controller, ends: list[int]) -> tuple[float, float]:
     """Bytes that a tick allocates at most at a time, and blocks that it leaves, on the average.
 
     The former by ``tracemalloc``, the latter by ``sys.getallocatedblocks``.
@@ -160,6 +160,7 @@ def _memory(plant: MujocoPlant, go2: GO2Controller) -> tuple[float, float]:
     go2.wait(0.1)
     before = sys.getallocatedblocks()
     go2.wait(TRACED_TICKS * plant.control_period)
+    ends.clear()  # ours, not the robot's
     kept = (sys.getallocatedblocks() - before) / TRACED_TICKS
     peaks = list[int]()
     tracemalloc.start()

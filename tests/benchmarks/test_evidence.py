@@ -7,19 +7,43 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import speed
 from benchmarks.__main__ import main
 from benchmarks.behaviour import SCENARIOS
-from benchmarks.evidence import BEGIN, END, LINES, filled, table
+from benchmarks.evidence import (
+    BEGIN,
+    END,
+    LINES,
+    SPEED_BEGIN,
+    SPEED_LINES,
+    Line,
+    filled,
+    table,
+)
+from benchmarks.scenario import Scenario
 from controller.cli.common import ExitCode
 from go2_wbc.errors import ConfigError
 
-PAGE = Path(__file__).resolve().parents[2] / "docs/evidence.md"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGE, SPEED_PAGE = DOCS / "evidence.md", DOCS / "explanation/speed.md"
 ROWS = {line.metric: {"n": 20, "mean": 0.5, "worst": 0.25} for line in LINES}
 
 
-def test_every_line_is_a_metric_of_the_benchmark() -> None:
-    names = {metric.name for scenario in SCENARIOS for metric in scenario.metrics}
-    assert {line.metric for line in LINES} <= names
+@pytest.mark.parametrize(
+    ("lines", "scenarios"), [(LINES, SCENARIOS), (SPEED_LINES, speed.SCENARIOS)]
+)
+def test_every_line_is_a_metric_of_the_benchmark(
+    lines: tuple[Line, ...], scenarios: tuple[Scenario, ...]
+) -> None:
+    names = {metric.name for scenario in scenarios for metric in scenario.metrics}
+    assert {line.metric for line in lines} <= names
+
+
+def test_the_mark_says_which_table_a_page_has() -> None:
+    rows = {line.metric: {"n": 3, "mean": 0.5, "worst": 0.25} for line in SPEED_LINES}
+    page = filled(f"{SPEED_BEGIN}: x -->\nold\n{END}\n", rows)
+    assert page == f"{SPEED_BEGIN}: x -->\n{table(rows, SPEED_BEGIN)}\n{END}\n"
+    assert "| before |" in page
 
 
 def test_the_table_is_put_between_the_marks_and_nothing_else_changes() -> None:
@@ -47,10 +71,13 @@ def test_a_missing_metric_or_mark_is_named() -> None:
         filled("nothing here", ROWS)
 
 
-def test_no_figure_of_the_page_is_blank() -> None:
-    text = PAGE.read_text(encoding="utf-8")
-    block = text[text.index(BEGIN) : text.index(END)]
+@pytest.mark.parametrize(
+    ("page", "mark", "content"), [(PAGE, BEGIN, LINES), (SPEED_PAGE, SPEED_BEGIN, SPEED_LINES)]
+)
+def test_no_figure_of_the_page_is_blank(page: Path, mark: str, content: tuple[Line, ...]) -> None:
+    text = page.read_text(encoding="utf-8")
+    block = text[text.index(mark) : text.index(END)]
     lines = [line for line in block.splitlines() if line.startswith("|")][2:]
-    assert len(lines) == len(LINES)
+    assert len(lines) == len(content)
     for line in lines:
         assert all(cell.strip() for cell in line.split("|")[1:5]), line

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import speed_realtime, speed_solves, speed_startup, speed_ticks
+from benchmarks import speed_parts, speed_realtime, speed_solves, speed_startup, speed_ticks
 from benchmarks.scenario import Measurement, Metric
 from benchmarks.speed_placo import BarePlaco
 from benchmarks.trials import Trial
@@ -52,6 +52,13 @@ def test_a_reference_is_packed_again_for_every_measurement_if_it_came_unpacked()
 def test_a_tick_is_timed_in_every_mode() -> None:
     measured = speed_ticks.measure_ticks(Trial(0))
     assert_complete(measured, speed_ticks.TICK_METRICS)
+    assert min(measured.values.values()) > 0.0
+
+
+def test_the_parts_make_up_a_tick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed_parts, "DURATION", 0.1)
+    measured = speed_parts.measure_parts(Trial(0))
+    assert_complete(measured, speed_parts.METRICS)
     assert min(measured.values.values()) > 0.0
 
 
