@@ -8,13 +8,15 @@ from controller import GO2Controller, Mode
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.terrain import Boxes
 
-SEEDS = (1, 2)  # the trot stays up there, and the hard QP has no solution in 26 and 28 ticks
+LAYOUTS = ((0.08, 3), (0.10, 305))
+"""Height [m] and seed of boxes where the trot stays up, and the hard QP has no solution in 3 and 13
+ticks."""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", SEEDS)
-def test_a_trot_over_boxes_is_never_damped_while_it_is_upright(seed: int) -> None:
-    plant = MujocoPlant(terrain=Boxes(height=0.08, seed=seed), seed=seed)
+@pytest.mark.parametrize(("height", "seed"), LAYOUTS)
+def test_a_trot_over_boxes_is_never_damped_while_it_is_upright(height: float, seed: int) -> None:
+    plant = MujocoPlant(terrain=Boxes(height=height, seed=seed), seed=seed)
     with GO2Controller(plant=plant) as go2:
         assert go2.stand()
         assert go2.walk()
