@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from go2_wbc.plant.friction_identification import FrictionEstimate
 
 EXAMPLES = """
-go2-wbc identify-friction                       the simulated robot's, as a test
+go2-wbc identify-friction     of the simulated robot
 go2-wbc identify-friction --mjcf my_go2.xml --out friction.toml
-go2-wbc identify-friction --interface lo --domain 1 --i-have-the-remote-in-hand
+go2-wbc identify-friction --interface eth0 --i-have-the-remote-in-hand
 """
 
 
@@ -28,8 +28,8 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "identify-friction",
-        "Move every joint of a robot that lies on its belly, for about a minute, legs over\n"
-        "its back, and print the friction of its joints as a part of the configuration.\n"
+        "Move every joint of a robot that lies on its belly, legs over its back, for a\n"
+        "minute, and print the friction of its joints for the configuration file.\n"
         "With --interface that of a Go2, or go2-wbc unitree-sim: read docs/real_robot.md\n"
         "first, and leave half a metre around it.",
         examples=EXAMPLES,

@@ -96,19 +96,27 @@ def derive_foot(leg, v, J_pin, R, p_calf, v_calf, a_calf, p_calf_foot, constants
     row[_DRIFT_CONTACTS + 3 * leg + 1] += radius * turn[0]
 
 
+_MEASURED = "Array(f8, 1, 'A', readonly=True)"
+
+
 @kernel(
-    "void(f8[::1,:], f8[::1], f8[::1,:], f8[:,:,:], f8[:,:], f8[:,:], f8[:,:], f8[:,::1], "
-    "f8[::1], f8[::1])"
+    f"void({_MEASURED}, {_MEASURED}, f8[::1,:], f8[::1], f8[::1,:], f8[:,:,:], f8[:,:], f8[:,:], "
+    "f8[:,:], f8[:,::1], f8[::1], f8[::1])"
 )
 def derive(
-    M_pin, h_pin, J_pin, R_calves, p_calves, v_calves, a_calves, p_calf_feet, constants, row
-):
-    """Fill the row of a snapshot, which begins with q and v.
+    q_measured, v_measured, M_pin, h_pin, J_pin, R_calves, p_calves, v_calves, a_calves,
+    p_calf_feet, constants, row,
+):  # fmt: skip
+    """Fill the row of a snapshot, which begins with the measured q and v.
 
     ``R_calves`` (4, 3, 3), ``p_calves`` (4, 3), ``v_calves``, ``a_calves`` (4, 6) and ``J_pin`` are
     Pinocchio's; ``constants``: mass [kg], gravity [m/s^2], foot radius [m].
     """
     q, v = row[:19], row[19:37]
+    for i in range(19):
+        q[i] = q_measured[i]
+    for i in range(18):
+        v[i] = v_measured[i]
     R = row[_R : _R + 9].reshape(3, 3)
     rotation_of(q[3], q[4], q[5], q[6], R)
     M, h = row[_M : _M + 324].reshape(18, 18), row[_H : _H + 18]

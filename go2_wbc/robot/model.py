@@ -122,8 +122,7 @@ class RobotModel:
         pin.crba(model, data, state.q, pin.Convention.WORLD)  # M, J and the poses
         pin.nonLinearEffects(model, data, state.q, state.v)  # h, velocities and accelerations
         row = np.empty(SNAPSHOT.size)
-        row[:19], row[19:37] = state.q, state.v
-        self._derive(*self._views, row)
+        self._derive(state.q, state.v, *self._views, row)
         return Snapshot.of_row(state, row)
 
     @cached_property

@@ -30,7 +30,7 @@ STICKY = JointDynamics(damping=(2.0, 2.0, 2.0))
 
 
 def fed(dry: tuple[float, float, float], viscous: float = 0.0) -> Config:
-    friction = JointFriction.by_part(dry, (viscous,) * 3)
+    friction = JointFriction.by_part(dry, (viscous, viscous, viscous))
     return replace(Config(), wbc=replace(Config().wbc, joint_friction=friction))
 
 

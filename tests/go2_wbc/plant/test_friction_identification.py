@@ -42,22 +42,27 @@ class Doctored(Plant):
         self._inner.close()
 
 
-@pytest.mark.parametrize(
-    ("dry", "viscous", "options"),
-    [
-        ((0.1, 0.5, 0.3), (2.0, 0.0, 0.5), {"sensors": "noisy", "payload": 3.0, "seed": 4}),
-        ((0.4, 0.2, 1.4), (0.1, 2.0, 1.0), {"mass_scale": 1.1}),
-    ],
-    ids=["noisy", "heavy"],
-)
+def noisy(dynamics: JointDynamics) -> MujocoPlant:
+    return MujocoPlant(
+        joint_dynamics=dynamics, control_period=0.004, sensors="noisy", payload=3.0, seed=4
+    )
+
+
+def heavy(dynamics: JointDynamics) -> MujocoPlant:
+    return MujocoPlant(joint_dynamics=dynamics, control_period=0.004, mass_scale=1.1)
+
+
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("make", "dry", "viscous"),
+    [(noisy, (0.1, 0.5, 0.3), (2.0, 0.0, 0.5)), (heavy, (0.4, 0.2, 1.4), (0.1, 2.0, 1.0))],
+)
 def test_the_friction_of_every_joint_is_found(
+    make: Callable[[JointDynamics], MujocoPlant],
     dry: tuple[float, float, float],
     viscous: tuple[float, float, float],
-    options: dict[str, object],
 ) -> None:
-    dynamics = JointDynamics(damping=viscous, friction_loss=dry)
-    plant = MujocoPlant(joint_dynamics=dynamics, control_period=0.004, **options)
+    plant = make(JointDynamics(damping=viscous, friction_loss=dry))
     shares: list[float] = []
     found = identify_friction(plant, on_progress=shares.append)
     np.testing.assert_allclose(found.dry, dry * 4, atol=DRY_ERROR)
