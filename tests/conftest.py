@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 from jaxtyping import install_import_hook
 
 from go2_wbc.kernels.loading import load_kernels
@@ -83,6 +84,10 @@ def pytest_runtest_call() -> None:
 if IS_CHECKING:
     install_import_hook(checked_modules(), f"{typechecker.__name__}.checked")
     typechecker.ration()
+
+# A property must hold, however busy the machine is: its time is no part of it.
+settings.register_profile("go2_wbc", deadline=None)
+settings.load_profile("go2_wbc")
 
 # Compiled before any test, so that none of them, nor a script it starts, says that it compiles.
 load_kernels()

@@ -121,7 +121,7 @@ def test_margins_of_many_instants_are_those_of_each() -> None:
     feet, p = rng.uniform(-0.3, 0.3, (400, 4, 2)), rng.uniform(-0.2, 0.2, (400, 2))
     stance = rng.random((400, 4)) < 0.7
     feet[:20, 3] = 0.5 * (feet[:20, 0] + feet[:20, 1])  # on an edge, or almost
-    feet[20:30, :, 1] = 0.0  # all on a line
+    feet[20:40, :, 1] = p[20:30, 1] = 0.0  # all feet on a line, the place on it or beside it
     found = stance_margins(feet, stance, p)
     rows = zip(feet, stance, p, strict=True)
     nan = float("nan")

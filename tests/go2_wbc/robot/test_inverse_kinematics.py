@@ -126,7 +126,7 @@ def test_the_same_targets_give_the_same_pose() -> None:
 small = st.floats(-0.15, 0.15)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(small, small, small, st.floats(0.24, 0.32))
 def test_any_moderate_trunk_pose_is_met_or_refused(
     roll: float, pitch: float, yaw: float, height: float
