@@ -1,7 +1,7 @@
 """The cost of the whole-body QP in its unknowns, u'Hu/2 + g'u, as kernels.
 
 ``wbc.tasks`` says which rows each task has; ``elimination`` what ``base`` is. A row of a task
-becomes 13 numbers, the last of which goes to its right side. Of H only the lower triangle is filled.
+becomes 13 numbers, the last of which goes to its right side. Only the lower half of H is filled.
 """
 
 from __future__ import annotations
