@@ -28,6 +28,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.derivation",
         "go2_wbc.kernels.loading",  # loaded here
         "go2_wbc.kernels.locomotion",
+        "go2_wbc.kernels.validity",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",
         "go2_wbc.robot.rotations",

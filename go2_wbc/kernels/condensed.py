@@ -13,6 +13,7 @@ import numpy as np
 from go2_wbc.kernels.active_set import solve_qp
 from go2_wbc.kernels.compilation import kernel
 from go2_wbc.kernels.layout import PROGRAM, REFERENCE, SNAPSHOT
+from go2_wbc.kernels.validity import are_valid
 
 STANCE, SWING, JOINTS = 0, 1, 2
 """The values of ``reference.LegTask``."""
@@ -45,34 +46,6 @@ _FORCE_WEIGHT, _WEIGHT_OF_ROBOT = _P["force_weight"], _P["weight_of_robot"]
 _DAMPING, _FRICTION, _TORQUE = _P["stance_damping"], _P["friction"], _P["torque_limits"]
 _Q_LOWER, _Q_UPPER, _SPEED = _P["q_lower"], _P["q_upper"], _P["speed"]
 _BRAKING, _HORIZON, _SINGULAR = _P["braking"], _P["horizon"], _P["singular_determinant"]
-
-
-@kernel("b1(f8[::1], i8, i8)")
-def is_finite(row, start, end):
-    """Whether every number of row[start:end] is finite: 0 x is 0 then, and a nan otherwise."""
-    a, b, c, d = 0.0, 0.0, 0.0, 0.0  # four sums, so that none waits for the one before
-    last = end - (end - start) % 4
-    for i in range(start, last, 4):
-        a += 0.0 * row[i]
-        b += 0.0 * row[i + 1]
-        c += 0.0 * row[i + 2]
-        d += 0.0 * row[i + 3]
-    for i in range(last, end):
-        a += 0.0 * row[i]
-    return a + b + c + d == 0.0
-
-
-@kernel("b1(f8[::1], f8[::1])")
-def are_valid(snapshot, target):
-    """What ``wbc.inputs`` demands: finite numbers, bounds of forces that are open or finite."""
-    for leg in range(4):
-        if not (target[_F_MIN + leg] < np.inf and target[_F_MAX + leg] > -np.inf):
-            return False
-    return (
-        is_finite(snapshot, 0, len(snapshot))
-        and is_finite(target, 0, _F_MIN)
-        and is_finite(target, _F_MAX + 4, len(target))
-    )
 
 
 @kernel("b1(f8[::1], f8[::1], f8[::1], i8, f8[:,::1])")
