@@ -6,7 +6,8 @@ from importlib import import_module
 
 import pytest
 
-from controller import GO2Controller, go2_controller
+import motions
+from controller import GO2Controller
 from go2_wbc.errors import MotionInfeasible
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
@@ -33,7 +34,7 @@ def test_a_high_five_takes_the_plan_of_a_caller_who_has_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     plan = compile_timeline(load_motion("high_five", side="left", hold=0.5), RobotModel())
-    monkeypatch.setattr(go2_controller, "compile_timeline", lambda *_: pytest.fail("done twice"))
+    monkeypatch.setattr(motions, "compile_timeline", lambda *_: pytest.fail("done twice"))
     with GO2Controller() as go2:
         assert go2.stand()
         assert go2.high_five("left", hold=0.5, plan=plan), go2.last_outcome.reason

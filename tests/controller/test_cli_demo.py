@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import viz
 from controller.cli import demo, demo_run, main
 from controller.cli.common import ExitCode
 from controller.cli.main import high_five_demo
@@ -50,7 +51,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
         return path
 
     for name in ("export_html", "export_filmstrip", "export_animation"):
-        monkeypatch.setattr(demo_run, name, draw)
+        monkeypatch.setattr(viz, name, draw)
 
 
 # --- the command --------------------------------------------------------------------------------
@@ -126,7 +127,7 @@ def test_a_picture_that_cannot_be_made_is_a_runtime_error_after_the_table(
         raise ConfigError("the page would have 9 bytes")
 
     pretend(FakeGo2())
-    monkeypatch.setattr(demo_run, "export_html", refuse)
+    monkeypatch.setattr(viz, "export_html", refuse)
     assert main.main(["demo", "--out", str(tmp_path)]) == ExitCode.RUNTIME
     captured = capsys.readouterr()
     assert "All 8 steps done" in captured.out
