@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.errors import CommandError
-from go2_wbc.geometry import stance_margins
+from go2_wbc.geometry import support_margin
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -103,9 +103,11 @@ class Samples:
 
     def recording(self) -> Recording:
         """The finished recording."""
-        margins = stance_margins(
-            self.p_world_feet[:, :, :2],
-            self.unfinished.stance,
-            self.unfinished.p_world_com[:, :2],
-        )
-        return replace(self.unfinished, support_margin=margins)
+        margins = [self._margin(row) for row in range(len(self.unfinished.time))]
+        return replace(self.unfinished, support_margin=np.array(margins))
+
+    def _margin(self, row: int) -> float:
+        feet = self.p_world_feet[row][self.unfinished.stance[row], :2]
+        if len(feet) < 3:
+            return float("nan")
+        return support_margin(feet, self.unfinished.p_world_com[row, :2])

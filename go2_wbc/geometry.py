@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 
 def convex_hull(points: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "h 2"]:
@@ -50,35 +50,6 @@ def support_margins(
     turns = edges[:, 0] * offsets[:, :, 1] - edges[:, 1] * offsets[:, :, 0]
     is_inside = (turns >= 0.0).all(axis=1) & (len(hull) >= 3)
     return np.where(is_inside, distance, -distance)
-
-
-def stance_margins(
-    feet: Float[np.ndarray, "n k 2"], stance: Bool[np.ndarray, "n k"], p: Float[np.ndarray, "n 2"]
-) -> Float[np.ndarray, " n"]:
-    """``support_margin`` at many instants at once, each with its own feet and place.
-
-    Args:
-        feet: on the ground [m], no two at the same place.
-        stance: which of them stand; with fewer than three the margin is nan.
-        p: the places, usually the CoM projected to the ground [m].
-    """
-    edges = feet[:, None] - feet[:, :, None]  # [n, i, j]: from foot i to foot j
-    offsets = (p[:, None] - feet)[:, :, None]
-    sides = _cross(edges, offsets)
-    turns = _cross(edges[:, :, :, None], edges[:, :, None])  # [n, i, j, m]: of m from i to j
-    turns[np.broadcast_to(~stance[:, None, None], turns.shape)] = np.nan
-    squares = (edges**2).sum(axis=3)
-    is_edge = stance[:, :, None] & stance[:, None] & (squares > 0.0) & ~(turns < 0.0).any(axis=3)
-    along = np.clip((offsets * edges).sum(axis=3) / np.maximum(squares, _TINY), 0.0, 1.0)
-    distances = np.linalg.norm(offsets - along[..., None] * edges, axis=3)
-    distance = np.where(is_edge, distances, np.inf).min(axis=(1, 2))
-    has_area = (is_edge & (turns > 0.0).any(axis=3)).any(axis=(1, 2))
-    is_inside = has_area & ~(is_edge & (sides < 0.0)).any(axis=(1, 2))
-    return np.where(stance.sum(axis=1) < 3, np.nan, np.where(is_inside, distance, -distance))
-
-
-def _cross(a: Float[np.ndarray, "... 2"], b: Float[np.ndarray, "... 2"]) -> np.ndarray:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
 _TINY = 1e-300
