@@ -52,6 +52,32 @@ def support_margins(
     return np.where(is_inside, distance, -distance)
 
 
+def moving_support_margins(
+    points: Float[np.ndarray, "n k 2"], p: Float[np.ndarray, "n 2"]
+) -> Float[np.ndarray, " n"]:
+    """``support_margin`` of every row: other points, another place.
+
+    For a few points: every way from one to another is looked at, and is an edge of the hull if no
+    point lies on its right.
+
+    Args:
+        points: k contact points on the ground in each of n instants [m], at least two.
+        p: the place in each instant [m].
+    """
+    starts, ends = np.nonzero(~np.eye(points.shape[1], dtype=bool))
+    edges = points[:, ends] - points[:, starts]
+    to_points = points[:, None] - points[:, starts, None]
+    to_place = p[:, None] - points[:, starts]
+    sides = edges[..., None, 0] * to_points[..., 1] - edges[..., None, 1] * to_points[..., 0]
+    is_edge = (sides >= 0.0).all(axis=2)
+    along = (to_place * edges).sum(axis=2) / np.maximum((edges**2).sum(axis=2), _TINY)
+    away = np.linalg.norm(to_place - np.clip(along, 0.0, 1.0)[..., None] * edges, axis=2)
+    distance = np.where(is_edge, away, np.inf).min(axis=1)
+    turns = edges[..., 0] * to_place[..., 1] - edges[..., 1] * to_place[..., 0]
+    is_inside = (turns >= 0.0).all(axis=1, where=is_edge) & (sides > 0.0).any(axis=(1, 2))
+    return np.where(is_inside, distance, -distance)
+
+
 _TINY = 1e-300
 """[m^2] Keeps the division by the square of an edge defined for a hull of one point."""
 

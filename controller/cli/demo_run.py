@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Int
 
+import viz  # what is named viz.X below is imported when something is drawn
 from controller.cli.common import ExitCode, print_json, shown_path
 from controller.cli.demo_table import render
 from controller.cli.progress import ProgressLine
@@ -27,7 +28,6 @@ from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.viewer import display_problem
 from go2_wbc.recording import Recording
-from viz import export_animation, export_filmstrip, export_html
 
 START_NOISE = 0.05
 """Standard deviation [rad] of the joint angles from which the robot starts with ``--seed``."""
@@ -139,10 +139,10 @@ def _write_media(recording: Recording, report: DemoReport, paths: list[Path]) ->
     _, _, page, filmstrip, animation = paths
     with ProgressLine() as line:
         line.update(0.0, f"drawing {page.name}")
-        export_html(recording, page, title=TITLE)
+        viz.export_html(recording, page, title=TITLE)
         line.update(0.1, f"drawing {filmstrip.name}")
-        export_filmstrip(recording, filmstrip, times=filmstrip_times(report, recording))
-        export_animation(
+        viz.export_filmstrip(recording, filmstrip, times=filmstrip_times(report, recording))
+        viz.export_animation(
             recording,
             animation,
             progress=lambda share: line.update(0.2 + 0.8 * share, f"drawing {animation.name}"),

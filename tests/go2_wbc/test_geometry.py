@@ -10,7 +10,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from go2_wbc.geometry import convex_hull, support_margin, support_margins
+from go2_wbc.geometry import (
+    convex_hull,
+    moving_support_margins,
+    support_margin,
+    support_margins,
+)
 
 ROUNDING = 1e-9  # coordinates are at most 1 m
 SQUARE = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
@@ -114,3 +119,15 @@ def test_many_points_at_once_have_the_margins_that_they_have_alone() -> None:
     alone = [support_margin(feet, point) for point in points]
     np.testing.assert_array_equal(support_margins(feet, points), alone)
     assert min(alone) < 0.0 < max(alone)
+
+
+@given(
+    npst.arrays(
+        np.float64, st.tuples(st.just(5), st.integers(2, 4), st.just(2)), elements=coordinates
+    ),
+    npst.arrays(np.float64, (5, 2), elements=coordinates),
+)
+def test_moving_feet_have_the_margins_of_every_instant(points: np.ndarray, p: np.ndarray) -> None:
+    assume(all(area(convex_hull(feet)) > 1e-3 or len(convex_hull(feet)) < 3 for feet in points))
+    alone = [support_margin(feet, place) for feet, place in zip(points, p, strict=True)]
+    np.testing.assert_allclose(moving_support_margins(points, p), alone, rtol=0.0, atol=ROUNDING)
