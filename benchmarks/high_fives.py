@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import Trial, TrialFailed, TrialRobot
-from go2_wbc.geometry import stance_margins
+from go2_wbc.geometry import moving_support_margins
 from go2_wbc.legs import LEGS, SIDES, Leg
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording, true_runs
 from go2_wbc.robot.model import RobotModel
@@ -108,7 +108,7 @@ def least_margin(recorded: TruthRecording, support: list[Leg]) -> float:
     feet, com = recorded.p_world_contacts[:, support, :2], recorded.p_world_com[:, :2]
     if not np.isfinite(feet).all():
         return -math.inf  # a supporting foot left the ground
-    return float(stance_margins(feet, np.ones(feet.shape[:2], dtype=bool), com).min())
+    return float(moving_support_margins(feet, com).min())
 
 
 def largest_slip(recorded: TruthRecording, support: list[Leg]) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.errors import CommandError
-from go2_wbc.geometry import stance_margins
+from go2_wbc.geometry import moving_support_margins
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -104,9 +104,10 @@ class Samples:
 
     def recording(self) -> Recording:
         """The finished recording."""
-        margins = stance_margins(
-            self.p_world_feet[:, :, :2],
-            self.unfinished.stance,
-            self.unfinished.p_world_com[:, :2],
-        )
+        stance, p_com = self.unfinished.stance, self.unfinished.p_world_com[:, :2]
+        margins = np.full(len(stance), np.nan)
+        for feet in (mode for mode in np.unique(stance, axis=0) if mode.sum() >= 3):
+            rows = (stance == feet).all(axis=1)
+            p_feet = self.p_world_feet[rows][:, feet, :2]
+            margins[rows] = moving_support_margins(p_feet, p_com[rows])
         return replace(self.unfinished, support_margin=margins)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 
 def convex_hull(points: Float[np.ndarray, "k 2"]) -> Float[np.ndarray, "h 2"]:
@@ -52,33 +52,30 @@ def support_margins(
     return np.where(is_inside, distance, -distance)
 
 
-def stance_margins(
-    feet: Float[np.ndarray, "n k 2"], stance: Bool[np.ndarray, "n k"], p: Float[np.ndarray, "n 2"]
+def moving_support_margins(
+    points: Float[np.ndarray, "n k 2"], p: Float[np.ndarray, "n 2"]
 ) -> Float[np.ndarray, " n"]:
-    """``support_margin`` at many instants at once, each with its own feet and place.
+    """``support_margin`` of every row: other points, another place.
+
+    For a few points: every way from one to another is looked at, and is an edge of the hull if no
+    point lies on its right.
 
     Args:
-        feet: on the ground [m], no two at the same place.
-        stance: which of them stand; with fewer than three the margin is nan.
-        p: the places, usually the CoM projected to the ground [m].
+        points: k contact points on the ground in each of n instants [m], at least two.
+        p: the place in each instant [m].
     """
-    edges = feet[:, None] - feet[:, :, None]  # [n, i, j]: from foot i to foot j
-    offsets = (p[:, None] - feet)[:, :, None]
-    sides = _cross(edges, offsets)
-    turns = _cross(edges[:, :, :, None], edges[:, :, None])  # [n, i, j, m]: of m from i to j
-    turns[np.broadcast_to(~stance[:, None, None], turns.shape)] = np.nan
-    squares = (edges**2).sum(axis=3)
-    is_edge = stance[:, :, None] & stance[:, None] & (squares > 0.0) & ~(turns < 0.0).any(axis=3)
-    along = np.clip((offsets * edges).sum(axis=3) / np.maximum(squares, _TINY), 0.0, 1.0)
-    distances = np.linalg.norm(offsets - along[..., None] * edges, axis=3)
-    distance = np.where(is_edge, distances, np.inf).min(axis=(1, 2))
-    has_area = (is_edge & (turns > 0.0).any(axis=3)).any(axis=(1, 2))
-    is_inside = has_area & ~(is_edge & (sides < 0.0)).any(axis=(1, 2))
-    return np.where(stance.sum(axis=1) < 3, np.nan, np.where(is_inside, distance, -distance))
-
-
-def _cross(a: Float[np.ndarray, "... 2"], b: Float[np.ndarray, "... 2"]) -> np.ndarray:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    starts, ends = np.nonzero(~np.eye(points.shape[1], dtype=bool))
+    edges = points[:, ends] - points[:, starts]
+    to_points = points[:, None] - points[:, starts, None]
+    to_place = p[:, None] - points[:, starts]
+    sides = edges[..., None, 0] * to_points[..., 1] - edges[..., None, 1] * to_points[..., 0]
+    is_edge = (sides >= 0.0).all(axis=2)
+    along = (to_place * edges).sum(axis=2) / np.maximum((edges**2).sum(axis=2), _TINY)
+    away = np.linalg.norm(to_place - np.clip(along, 0.0, 1.0)[..., None] * edges, axis=2)
+    distance = np.where(is_edge, away, np.inf).min(axis=1)
+    turns = edges[..., 0] * to_place[..., 1] - edges[..., 1] * to_place[..., 0]
+    is_inside = (turns >= 0.0).all(axis=1, where=is_edge) & (sides > 0.0).any(axis=(1, 2))
+    return np.where(is_inside, distance, -distance)
 
 
 _TINY = 1e-300
