@@ -205,8 +205,8 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "answers",
-        "Trots on which the QP contradicts itself: is there always an answer, is the robot\n"
-        "never damped while upright, how often do constraints give way by more than they may.\n"
+        "Trots on which the QP contradicts itself: is there always an answer, is the\n"
+        "robot never damped while upright, how often do constraints give way too far.\n"
         "Exit code 0 if every threshold is met, 1 if one is not.",
         examples=EXAMPLES,
     )

@@ -122,12 +122,12 @@ def test_contradicting_bounds_are_infeasible_and_name_the_solver(solver: str) ->
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("part", ["g", "lower", "upper"])
+@pytest.mark.parametrize("part", ["H", "g", "C", "lower", "upper"])
 def test_a_nan_is_refused_at_once(solver: str, part: str) -> None:
     """ProxQP took seconds to give up, and a nan bound was taken for an open side."""
     qp = random_qp(3, 0)
     values = getattr(qp, part).copy()
-    values[11] = np.nan
+    values.ravel()[11] = np.nan
     with pytest.raises(QpInfeasible, match="holds a nan"):
         solve_dense_qp(replace(qp, **{part: values}), solver)
 
@@ -136,6 +136,14 @@ def test_an_answer_that_is_not_finite_counts_as_none(monkeypatch: pytest.MonkeyP
     nan = SimpleNamespace(found=True, x=np.full(12, np.nan), z=np.zeros(38), y=None)
     monkeypatch.setattr(qpsolvers, "solve_problem", lambda *_, **__: nan)
     with pytest.raises(QpInfeasible, match="no feasible point"):
+        solve_dense_qp(random_qp(1, 0), "daqp")
+
+
+def test_an_answer_that_breaks_the_bounds_counts_as_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Told of an impossible goal, daqp has returned 1e300 as solved."""
+    huge = SimpleNamespace(found=True, x=np.full(12, 1e300), z=np.zeros(38), y=None)
+    monkeypatch.setattr(qpsolvers, "solve_problem", lambda *_, **__: huge)
+    with pytest.raises(QpInfeasible, match="breaks the constraints"):
         solve_dense_qp(random_qp(1, 0), "daqp")
 
 
