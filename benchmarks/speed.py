@@ -10,7 +10,14 @@ from __future__ import annotations
 
 import argparse
 
-from benchmarks import speed_parts, speed_realtime, speed_solves, speed_startup, speed_ticks
+from benchmarks import (
+    speed_check,
+    speed_parts,
+    speed_realtime,
+    speed_solves,
+    speed_startup,
+    speed_ticks,
+)
 from benchmarks.scenario import Scenario, chosen_scenarios
 from benchmarks.session import add_options, positive, run_and_report, tasks_of
 from controller.cli.common import Subparsers, add_parser
@@ -27,6 +34,7 @@ SCENARIOS = (
     Scenario("ticks", speed_ticks.TICK_METRICS, speed_ticks.measure_ticks),
     Scenario("parts", speed_parts.METRICS, speed_parts.measure_parts),
     Scenario("commands", speed_ticks.COMMAND_METRICS, speed_ticks.measure_commands),
+    Scenario("checks", speed_check.CHECK_METRICS, speed_check.measure_checks),
     Scenario("startup", speed_startup.METRICS, speed_startup.measure_startup),
     Scenario("realtime", speed_realtime.METRICS, speed_realtime.measure_realtime),
 )
@@ -38,8 +46,8 @@ def register(subparsers: Subparsers) -> None:
         subparsers,
         "speed",
         "Processor time of the whole-body QP beside PlaCo's on the same states in turn,\n"
-        "of whole ticks with 2 ms of physics, of starts; and ticks late at the pace of\n"
-        "the wall clock. Wants an idle machine.",
+        "of whole ticks with 2 ms of physics, of checking a motion, of starts; and ticks\n"
+        "late at the pace of the wall clock. Wants an idle machine.",
         examples=EXAMPLES,
     )
     names = ", ".join(scenario.name for scenario in SCENARIOS)

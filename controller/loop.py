@@ -176,7 +176,8 @@ class ControlLoop:
         """
         if isinstance(target, JointReference):
             return 0.0, 0.0
-        return self._kernels.sag_and_lean(target.row, self.snapshot.row)
+        planned = self.behaviour.sag_and_lean
+        return planned or self._kernels.sag_and_lean(target.row, self.snapshot.row)
 
     def _is_plausible(self, state: RobotState) -> bool:
         q, v, tau, forces = state.q, state.v, state.tau, state.foot_forces

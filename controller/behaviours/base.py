@@ -16,12 +16,19 @@ class Behaviour(ABC):
         duration: time [s] that it takes, unless it says otherwise by ``is_finished``.
         needs_balance: whether a large tilt means that the robot has fallen.
         may_lie: whether the belly may be on the ground.
+        sag_and_lean: depth [m] of the trunk below where it shall be and angle [rad] from how it
+            shall be, if what is tracked says something else; None if it says so itself.
     """
 
     label: str = "?"
     duration: float = 0.0
     needs_balance: bool = True
     may_lie: bool = False
+
+    @property
+    def sag_and_lean(self) -> tuple[float, float] | None:
+        """See the attributes."""
+        return None
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state."""

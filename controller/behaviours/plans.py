@@ -57,6 +57,11 @@ class PlayPlan(Behaviour):
         """How far the robot has been off the plan since ``start``."""
         return self._follower.deviation
 
+    @property
+    def sag_and_lean(self) -> tuple[float, float]:
+        """From the plan: a correction that pulls against a load is no wanted lean."""
+        return self._follower.sag_and_lean
+
     def update(self, snapshot: Snapshot) -> Reference:
         """The plan's reference of this instant, in the world."""
         now = snapshot.state.time

@@ -178,8 +178,10 @@ LOCOMOTION = Layout(
 CORRECTION = Layout(rate=(), window=(6,), limit=(6,))
 """Numbers of the steady-state correction."""
 
-PLAYBACK = Layout(offset=(6,), place=(), attitude=(), joints=(), ticks=(), raised_ticks=())
-"""State of a playback: the correction, and how far the robot has been off its plan."""
+PLAYBACK = Layout(
+    offset=(6,), place=(), attitude=(), joints=(), ticks=(), raised_ticks=(), sag=(), lean=()
+)
+"""State of a playback: the correction, how far the robot has been off its plan, and is now."""
 
 FRICTION = Layout(
     dry=(12,),

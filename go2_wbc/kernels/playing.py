@@ -12,6 +12,7 @@ import numpy as np
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.derivation import rotation_of
 from go2_wbc.kernels.layout import CORRECTION, PLAYBACK, REFERENCE, SNAPSHOT
+from go2_wbc.kernels.supervision import sag_and_lean
 
 TIE = 1e-9
 """As ``contacts.TIE``."""
@@ -27,6 +28,7 @@ _FOOT_P, _FOOT_V, _FOOT_A = (_T[n] for n in ("p_world_feet", "v_world_feet", "a_
 _JOINT_Q, _JOINT_V, _JOINT_A = (_T[n] for n in ("q_joints", "v_joints", "a_joints"))
 _OFFSET, _PLACE, _ATTITUDE, _OFF_JOINTS = (_S[n] for n in ("offset", "place", "attitude", "joints"))
 _TICKS, _RAISED_TICKS = _S["ticks"], _S["raised_ticks"]
+_SAG, _LEAN = _S["sag"], _S["lean"]
 _RATE, _WINDOW, _LIMIT = _C["rate"], _C["window"], _C["limit"]
 
 
@@ -202,6 +204,7 @@ def note(row, snapshot, error, state):
 def follow(plan, snapshot, anchor, dt, correction, state, row):
     """Fill the corrected reference in the world, ``dt`` seconds after the last one."""
     place(plan, anchor, row)
+    state[_SAG], state[_LEAN] = sag_and_lean(row, snapshot)
     measured = snapshot[_P_COM : _P_COM + 3] if row[_IS_COM] != 0.0 else snapshot[_Q : _Q + 3]
     R, wanted = snapshot[_R : _R + 9].reshape(3, 3), row[_BODY_R : _BODY_R + 9].reshape(3, 3)
     error, turn = np.empty(6), np.empty((3, 3))

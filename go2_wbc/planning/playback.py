@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from math import acos
 
 import numpy as np
 from jaxtyping import Float
@@ -16,6 +17,8 @@ from go2_wbc.planning.correction import CorrectionConfig, SteadyStateCorrection,
 from go2_wbc.reference import Anchor, LegTask, Reference
 from go2_wbc.robot.rotations import log_rotation
 from go2_wbc.robot.snapshot import Snapshot
+
+_SAG, _LEAN = PLAYBACK.start["sag"], PLAYBACK.start["lean"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +54,11 @@ class PlanFollower(ABC):
     def deviation(self) -> Deviation:
         """How far the robot has been off the plan, the correction left out."""
 
+    @property
+    @abstractmethod
+    def sag_and_lean(self) -> tuple[float, float]:
+        """Now: depth [m] of the tracked point below the plan, and angle [rad] of the verticals."""
+
 
 class Playback(PlanFollower):
     """Follows a plan by the compiled kernel."""
@@ -77,6 +85,11 @@ class Playback(PlanFollower):
         _, place, attitude, joints, *_ = PLAYBACK.views(self._state)
         return Deviation(float(place), float(attitude), float(joints))
 
+    @property
+    def sag_and_lean(self) -> tuple[float, float]:
+        """See ``PlanFollower.sag_and_lean``."""
+        return float(self._state[_SAG]), float(self._state[_LEAN])
+
 
 class ReadablePlayback(PlanFollower):
     """The same as ``Playback``, step by step."""
@@ -88,6 +101,7 @@ class ReadablePlayback(PlanFollower):
         self._places: list[float] = []
         self._attitudes: list[float] = []
         self._joints: list[float] = []
+        self._sag_and_lean = 0.0, 0.0
 
     def follow(self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float) -> Reference:
         """See ``PlanFollower.follow``."""
@@ -100,6 +114,9 @@ class ReadablePlayback(PlanFollower):
         body = reference.body
         place = np.linalg.norm(body.p_world - tracked_position(snapshot, body.point))
         turn = log_rotation(body.R_world_base @ snapshot.R_world_base.T)
+        sag = (body.p_world - tracked_position(snapshot, body.point))[2]
+        between_verticals = float(body.R_world_base[2] @ snapshot.R_world_base[2])
+        self._sag_and_lean = float(sag), acos(min(max(between_verticals, -1.0), 1.0))
         self._places.append(float(place))
         self._attitudes.append(float(np.linalg.norm(turn)))
         raised = np.repeat([task is LegTask.JOINTS for task in reference.legs], 3)
@@ -112,6 +129,11 @@ class ReadablePlayback(PlanFollower):
         """See ``PlanFollower.deviation``."""
         means = [float(np.mean(off or [0.0])) for off in self._lists]
         return Deviation(*means)
+
+    @property
+    def sag_and_lean(self) -> tuple[float, float]:
+        """See ``PlanFollower.sag_and_lean``."""
+        return self._sag_and_lean
 
     @property
     def _lists(self) -> tuple[list[float], list[float], list[float]]:

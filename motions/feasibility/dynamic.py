@@ -50,6 +50,8 @@ PRESSED = 10.0
 a slip moves nothing (own choice, 6 % of the weight)."""
 LEAST_WEIGHT = 1.0
 """Least vertical force [N] by which moments are divided: the zero-moment point stays finite."""
+STILL = 1e-6
+"""Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15."""
 NO_SUPPORT = 1.0
 """How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
 TIGHT_TORQUE, TIGHT_LOAD, TIGHT_FRICTION, TIGHT_SUPPORT = 0.1, 10.0, 0.05, 0.01
@@ -110,12 +112,12 @@ def torque(
 ) -> tuple[Series, Series]:
     """Torques against the motors' peak, and against what ``model.motor`` gives at that speed.
 
-    Only a driving motor, tau v > 0, meets the line of torque and speed.
+    Only a driving motor, tau v > 0, meets the line of torque and speed; rounding moves none.
     """
     asked, most = np.abs(forces.tau), limits.torque_share * model.torque_limits
     lower, upper = model.motor.limits(motion.v[:, 6:])
     at_speed = np.where(forces.tau < 0.0, -lower, upper)
-    drives = forces.tau * motion.v[:, 6:] > 0.0
+    drives = forces.tau * motion.v[:, 6:] > STILL * asked
     tight = TIGHT_TORQUE * float(model.torque_limits.min())
     what = ("N m", JOINTS, motion.times, asked)
     return (

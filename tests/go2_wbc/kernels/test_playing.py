@@ -18,7 +18,7 @@ from go2_wbc.robot.model import RobotModel
 from motions import compile_motion
 from motions.compiler import CompiledPlan
 from motions.postures import PosturePlan
-from tests.engine_helpers import random_state
+from tests.engine_helpers import holding_reference, random_state, standing_q, state_of
 
 MODEL = RobotModel()
 TICK = 0.002
@@ -88,7 +88,24 @@ def test_a_playback_is_the_readable_one_tick_by_tick(config: CorrectionConfig) -
         assert found.place == pytest.approx(wanted.place, abs=ROUNDING)
         assert found.attitude == pytest.approx(wanted.attitude, abs=1e-8)
         assert found.joints == pytest.approx(wanted.joints, abs=ROUNDING)
+        assert ours.sag_and_lean == pytest.approx(theirs.sag_and_lean, abs=1e-7)
     assert corrected > 500
+
+
+@pytest.mark.parametrize("kind", [Playback, ReadablePlayback])
+def test_a_trunk_that_a_load_leans_is_judged_by_the_plan_and_not_by_its_correction(
+    kind: type[Playback] | type[ReadablePlayback],
+) -> None:
+    q = standing_q()
+    q[3:7] = rotations.quaternion_from_rpy(0.2, 0.0, 0.0)
+    snapshot = MODEL.snapshot(state_of(q))
+    upright = holding_reference(MODEL.snapshot(state_of(standing_q())))
+    playback = kind(Anchor(np.zeros(3), 0.0))
+    tracked = upright
+    for _ in range(2000):
+        tracked = playback.follow(upright.row, snapshot, TICK)
+    assert np.arccos(tracked.body.R_world_base[2, 2]) > 0.25, "the correction pulls against it"
+    assert playback.sag_and_lean[1] == pytest.approx(0.2, abs=1e-9)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 0.3, 2.0, 3.1, np.pi - 1e-7])
