@@ -21,8 +21,6 @@ from go2_wbc.robot.state import JointCommand, RobotState
 
 FALLEN_TILT = math.radians(60.0)
 """Tilt of the trunk from which on the robot has fallen, whatever the controller thinks."""
-TIMED_EVERY = 100
-"""Every hundredth tick's recording is timed."""
 TOUCH = 1.0
 """Force [N] between trunk and ground that counts as a touch."""
 
@@ -110,7 +108,7 @@ class GroundTruth(Plant):
 
     Attributes:
         start: plant time [s] of the last ``clear``.
-        cpu_time: processor time [s] that recording has taken; the ticks' from a sample of them.
+        cpu_time: processor time [s] that recording has taken.
         on_tick: called after every tick, for events in the middle of a call; or None.
     """
 
@@ -171,14 +169,12 @@ class GroundTruth(Plant):
         return recorded
 
     def _record(self) -> None:
-        is_timed = len(self._instants) % TIMED_EVERY == 0  # asking is a slow call on some machines
-        began = time.thread_time() if is_timed else 0.0
+        began = time.thread_time()
         plant = self._plant
         forces = plant.base_contact_force, plant.limb_contact_force
         feet = plant.p_world_feet
         self._instants.append(_Instant(plant.read(), feet, forces, plant.contacts()))
-        if is_timed:
-            self.cpu_time += TIMED_EVERY * (time.thread_time() - began)
+        self.cpu_time += time.thread_time() - began
 
 
 class _Instant(NamedTuple):
