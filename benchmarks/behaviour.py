@@ -24,7 +24,7 @@ SCENARIOS: tuple[Scenario, ...] = (
 )
 """In the order of the report."""
 EXAMPLES = """
-python -m benchmarks behaviour            everything; eleven minutes on two cores
+python -m benchmarks behaviour            everything; 11 minutes, two cores
 python -m benchmarks behaviour --quick    three seeds
 python -m benchmarks behaviour --resume   go on after an interruption
 python -m benchmarks behaviour --list     the metrics and their thresholds
