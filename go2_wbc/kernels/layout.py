@@ -175,6 +175,9 @@ LOCOMOTION = Layout(
 )
 """Numbers of the locomotion planner: gait, configuration, robot."""
 
+PLAN_CURVES = 30
+"""Curves of a plan: CoM, roll pitch yaw, twelve joints, and the places of the four feet."""
+
 CORRECTION = Layout(rate=(), window=(6,), limit=(6,))
 """Numbers of the steady-state correction."""
 
