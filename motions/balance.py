@@ -18,8 +18,9 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.inverse_kinematics import PoseTargets, solve_pose
 from go2_wbc.robot.model import RobotModel
 from motions.keys import BalanceShift
+from motions.language.written import SAME
 from motions.placement import configurations
-from motions.timeline import SAME, Timeline
+from motions.timeline import Timeline
 from motions.tracks import LegTracks, Poses, Times, followed
 
 MARGINS = (0.08, 0.065, 0.05, 0.035, 0.02)

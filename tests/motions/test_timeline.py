@@ -18,7 +18,7 @@ from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, deg
 from motions.compiler import contact_schedule
 from motions.keys import BalanceShift, BodyKey, LegKey
-from motions.timeline import SHIFT_TIME
+from motions.language.written import SHIFT_TIME
 from motions.tracks import home_poses
 
 MODEL = RobotModel()
