@@ -220,8 +220,9 @@ def _on_line(row: int, notes: Times, weights: Times) -> float:
     Iteratively reweighted least squares with Cauchy's weights.
     """
     first, last = max(row - NEIGHBOURS, 0), row + NEIGHBOURS + 1
-    number, note, weight = np.arange(first, first + len(notes[first:last])) - row, *(
-        values[first:last] for values in (notes, weights)
+    number, note, weight = (
+        np.arange(first, first + len(notes[first:last])) - row,
+        *(values[first:last] for values in (notes, weights)),
     )
     share = np.ones(len(note))
     line = np.zeros(2)
