@@ -105,12 +105,14 @@ class ReplayContent:
         is_plan: it is a plan; otherwise it was measured.
         verdict: what to say about the motion.
         ghost: another movement, shown translucent; its clock starts with the first one's.
+        beats: instants [s] that the motion counts in, drawn as a ruler.
     """
 
     recording: Recording
     is_plan: bool = False
     verdict: Verdict | None = None
     ghost: Recording | None = None
+    beats: tuple[float, ...] = ()
 
 
 def checked_content(shown: Recording | ReplayContent) -> ReplayContent:
