@@ -17,6 +17,7 @@
     │   └── PlantTimeout        the plant stopped answering
     └── MotionError
         ├── TimelineError       an authored motion is written wrongly
+        ├── MotionFileError     a saved motion or plan cannot be used; says why
         ├── MotionInfeasible    the motion breaks a limit; carries the findings
         └── StanceMismatch      the motion starts from another stance
 
@@ -125,6 +126,10 @@ class MotionError(Go2WbcError):
 
 class TimelineError(MotionError, ValueError):
     """An authored motion is written wrongly; the message says what and how to write it."""
+
+
+class MotionFileError(MotionError, ValueError):
+    """A saved motion or plan is damaged, of another version or robot, or cannot be a file."""
 
 
 class MotionInfeasible(MotionError):

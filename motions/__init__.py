@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         compile_motion,
     )
     from motions.registry import find_motion, load_file, load_motion, motion_names
+    from motions.saved.motion_file import save_motion
     from motions.timeline import Timeline, deg
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     "load_motion",
     "motion",
     "motion_names",
+    "save_motion",
 ]
 
 __getattr__ = lazy_exports(
@@ -58,6 +60,7 @@ __getattr__ = lazy_exports(
             "compile_motion",
         ),
         "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
+        "saved.motion_file": ("save_motion",),
         "timeline": ("Timeline", "deg"),
     },
 )

@@ -10,8 +10,9 @@ from go2_wbc.errors import CommandError, unknown_name
 
 if TYPE_CHECKING:
     from motions import FeasibilityReport, Motion, Timeline
+    from motions.authoring import Value
 
-MOTION_HELP = "a name of the library, FILE.py, or FILE.py:NAME"
+MOTION_HELP = "a name of the library, FILE.py or FILE.py:NAME, or a saved FILE.json"
 
 
 def add_motion(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
@@ -34,12 +35,13 @@ def timelines(words: list[str], settings: list[str]) -> list[Timeline]:
     Raises:
         CommandError: for an unknown name or a setting that cannot be read.
         TimelineError: for a file that cannot be used or a parameter out of range.
+        MotionFileError: for a saved motion that cannot be used.
     """
     from motions import motion_names
     from motions.authoring import parse_values
 
     values = parse_values(settings)
-    return [motion(**values) for word in words or motion_names() for motion in motions_of(word)]
+    return [line for word in words or motion_names() for line in _timelines_of(word, values)]
 
 
 def the_motion(word: str, settings: list[str]) -> Timeline:
@@ -49,6 +51,15 @@ def the_motion(word: str, settings: list[str]) -> Timeline:
         names = ", ".join(line.name for line in found)
         raise CommandError(f"{word} has several motions, choose FILE.py:NAME: {names}")
     return found[0]
+
+
+def _timelines_of(word: str, values: dict[str, Value]) -> list[Timeline]:
+    from motions import load_motion
+    from motions.registry import is_saved_motion
+
+    if is_saved_motion(word):
+        return [load_motion(word, **values)]
+    return [motion(**values) for motion in motions_of(word)]
 
 
 def motions_of(word: str) -> list[Motion]:
@@ -85,8 +96,11 @@ class MotionSource:
 
     def __init__(self, word: str, settings: list[str]) -> None:
         """Find the one motion that is meant; raises as ``the_motion``."""
-        own, _, _ = word.partition(":")
-        if not own.endswith(".py"):  # of the library: read its file too, as if it were one's own
+        from motions.registry import is_saved_motion
+
+        own = word if is_saved_motion(word) else word.partition(":")[0]
+        if not (is_saved_motion(word) or own.endswith(".py")):
+            # of the library: read its file too, as if it were one's own
             (motion,) = motions_of(word)
             own = motion.source.rpartition(":")[0]
             word = f"{own}:{word}"

@@ -1,4 +1,4 @@
-"""``go2-wbc export``: a motion's trajectory as NumPy or CSV, for other tools."""
+"""``go2-wbc export``: a motion's trajectory as NumPy or CSV, or the motion itself, as a file."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from controller.cli.motion_args import add_motion, the_motion
 from go2_wbc.legs import JOINT_NAMES, LEGS
 
 if TYPE_CHECKING:
+    from motions import Timeline
     from motions.trajectory import Trajectory
 
 EXAMPLES = """
 go2-wbc export wave --out wave.csv
 go2-wbc export wave --out wave.npz
+go2-wbc export wave --set times=5 --out wave5.json    then: go2-wbc run wave5.json
 """
 COLUMNS = """
 columns, 100 rows a second, in the frame between the feet (x ahead, z up):
@@ -36,25 +38,47 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "export",
-        "Write a motion's trajectory of the whole robot to a file.\n" + COLUMNS,
+        "Write a motion's trajectory of the whole robot, or the motion, to a file.\n" + COLUMNS,
         examples=EXAMPLES,
     )
     add_motion(parser)
     parser.add_argument(
-        "--out", metavar="FILE", type=Path, required=True, help="ends in .csv or .npz"
+        "--out", metavar="FILE", type=Path, required=True, help="ends in .csv, .npz or .json"
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compile, sample, write."""
-    from go2_wbc.files import checked_output, write_atomically
+    """Write what the ending asks for."""
+    from go2_wbc.files import checked_output
+    from motions import save_motion
+
+    target = checked_output(args.out, [".csv", ".npz", ".json"])
+    line = the_motion(args.motion, args.values)
+    written: dict[str, object] = {"motion": line.name, "file": str(target)}
+    if target.suffix == ".json":
+        what = f"{len(line.keys)} keys"
+        save_motion(line, target)
+        written["keys"] = len(line.keys)
+    else:
+        rows = _write_trajectory(line, target)
+        what = f"{rows} rows"
+        written["rows"] = rows
+    if args.json:
+        print_json(written)
+    else:
+        print(f"wrote {args.out}: {what} of {line.name}")
+    return ExitCode.OK
+
+
+def _write_trajectory(line: Timeline, target: Path) -> int:
+    """Compile, sample, write; returns how many rows."""
+    from go2_wbc.files import write_atomically
     from go2_wbc.robot.model import RobotModel
     from motions import compile_timeline
     from motions.trajectory import trajectory_of
 
-    target = checked_output(args.out, [".csv", ".npz"])
-    line, model = the_motion(args.motion, args.values), RobotModel()
+    model = RobotModel()
     path = trajectory_of(compile_timeline(line, model), model)
     if target.suffix == ".npz":
         stream = io.BytesIO()
@@ -64,11 +88,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         content = _csv(path).encode()
     write_atomically(target, content)
-    if args.json:
-        print_json({"motion": line.name, "file": str(target), "rows": len(path.times)})
-    else:
-        print(f"wrote {args.out}: {len(path.times)} rows of {line.name}")
-    return ExitCode.OK
+    return len(path.times)
 
 
 def _csv(path: Trajectory) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool
@@ -66,9 +67,9 @@ class CheckedMotion:
         )
 
 
-Playable = str | Motion | Timeline | MotionPlan | CheckedMotion
-"""What stands for a motion: a name of the library, a motion (with its default parameters), a
-timeline, a plan, or a motion that was checked before."""
+Playable = str | Path | Motion | Timeline | MotionPlan | CheckedMotion
+"""What stands for a motion: a name of the library, a saved motion's file, a motion (with its
+default parameters), a timeline, a plan, or a motion that was checked before."""
 
 
 def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
@@ -81,12 +82,13 @@ def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
     Raises:
         CommandError: for an unknown name, or for what stands for no motion.
         TimelineError: if the timeline is empty or its parameters are not valid.
+        MotionFileError: for a file that cannot be used.
     """
     if isinstance(motion, CheckedMotion):
         return motion.plan
     if isinstance(motion, MotionPlan):
         return motion
-    if isinstance(motion, str):
+    if isinstance(motion, str | Path):
         motion = load_motion(motion)
     elif isinstance(motion, Motion):
         motion = motion()

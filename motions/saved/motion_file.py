@@ -1,0 +1,135 @@
+"""A timeline as a JSON file that can be read and edited: one key a line, SI units, radians."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, Final
+
+from go2_wbc.errors import MotionFileError, TimelineError, unknown_name
+from go2_wbc.files import checked_output, write_atomically
+from motions.arguments import positive, quantity
+from motions.authoring import Motion
+from motions.keys import (
+    BODY_CHANNELS,
+    BalanceShift,
+    BodyKey,
+    Frame,
+    Key,
+    LegKey,
+    Mark,
+    PostureKey,
+)
+from motions.saved.envelope import Format, content_of, fields_of
+from motions.saved.values import decoded_fields, encoded, required
+from motions.timeline import Timeline
+
+MOTION_FORMAT: Final = Format("go2_wbc.motion", 1, "a saved motion", ".json")
+KINDS: Final[Mapping[str, type[Key]]] = {
+    "body": BodyKey,
+    "posture": PostureKey,
+    "leg": LegKey,
+    "balance": BalanceShift,
+    "mark": Mark,
+}
+"""The kinds of keys by the words that files have for them: a new kind needs a line here."""
+_WORDS: Final[Mapping[type[Key], str]] = {kind: word for word, kind in KINDS.items()}
+_KEYS: Final = "keys"
+_PLACES, _ANGLES = ("x", "y", "z"), ("hip", "thigh", "calf")
+
+
+def save_motion(motion: object, path: Path | str) -> Path:
+    """Write what was authored to a ``.json`` file; ``load_motion(path)`` reads it.
+
+    An older file of this name is replaced, or untouched if anything goes wrong.
+
+    Args:
+        motion: a ``Timeline``, or a ``Motion`` with its default parameters; others are refused.
+        path: where; ends in ``.json``.
+
+    Returns:
+        The absolute path.
+
+    Raises:
+        MotionFileError: for what is no timeline, or has what a file cannot hold: a function.
+        ConfigError: for another ending, a folder in the way, or a place without write access.
+    """
+    line = motion() if isinstance(motion, Motion) else motion
+    if not isinstance(line, Timeline):
+        raise MotionFileError(
+            f"save_motion needs a Timeline or a motion, got {motion!r:.60}; plans: save_plan"
+        )
+    target = checked_output(path, [MOTION_FORMAT.suffix])
+    return write_atomically(target, _text(line).encode())
+
+
+def read_motion(path: Path | str) -> Timeline:
+    """The timeline that ``save_motion`` wrote.
+
+    Raises:
+        MotionFileError: if there is no such file, or it is damaged, of another kind or a newer
+            version, or says what no timeline can; names the place in the file.
+    """
+    file = Path(path)
+    given = MOTION_FORMAT.without_header(fields_of(content_of(file), file), file)
+    try:
+        listed = required(given.pop(_KEYS, None), list, _KEYS)
+        keys = tuple(_key(item, f"{_KEYS}[{i}]") for i, item in enumerate(listed))
+        line = decoded_fields(given, Timeline, "the motion", {_KEYS: keys})
+        positive("beat", line.beat)
+        return line
+    except (MotionFileError, TimelineError, OverflowError) as error:
+        raise MotionFileError(f"{file}: {error}") from error
+
+
+def _text(line: Timeline) -> str:
+    """JSON with a line for each field and each key."""
+    names = [field.name for field in fields(line) if field.init and field.name != _KEYS]
+    rest = {name: encoded(getattr(line, name), name) for name in names}
+    rows = [json.dumps(_fields(key, f"{_KEYS}[{i}]")) for i, key in enumerate(line.keys)]
+    lines = [f"  {json.dumps(name)}: {json.dumps(value)}," for name, value in rest.items()]
+    header = [
+        f"  {json.dumps(name)}: {json.dumps(value)},"
+        for name, value in MOTION_FORMAT.header().items()
+    ]
+    listed = ",\n".join(f"    {row}" for row in rows)
+    listed = f"\n{listed}\n  " if rows else ""
+    return "\n".join(["{", *header, *lines, f'  "{_KEYS}": [{listed}]', "}", ""])
+
+
+def _fields(key: Key, where: str) -> dict[str, Any]:
+    if type(key) not in _WORDS:
+        raise MotionFileError(f"{where}: a file cannot hold a {type(key).__name__}")
+    return {"key": _WORDS[type(key)], **encoded(key, f"{where} ({key.track})")}
+
+
+def _key(value: object, where: str) -> Key:
+    given = dict(required(value, dict, where))
+    word = given.pop("key", None)
+    if not isinstance(word, str) or word not in KINDS:
+        raise MotionFileError(f"{where}: {unknown_name('key', str(word), KINDS)}")
+    key = decoded_fields(given, KINDS[word], where)
+    try:
+        _require_sane(key)
+    except TimelineError as error:
+        raise MotionFileError(f"{where}: {error}") from error
+    return key
+
+
+def _require_sane(key: Key) -> None:
+    """Raise TimelineError for what the calls of a timeline would not have written."""
+    if not 0.0 <= key.start < key.end:
+        raise TimelineError(f"must start at 0 s or later and end later, got {key.start} {key.end}")
+    if isinstance(key, BodyKey):
+        if key.channel not in BODY_CHANNELS:
+            raise TimelineError(unknown_name("channel", key.channel, BODY_CHANNELS))
+        quantity(key.channel, key.value)
+    if isinstance(key, LegKey):
+        frame, values = key.target.frame, key.target.values
+        names = _ANGLES if frame is Frame.JOINTS else _PLACES
+        for name, value in zip(names, values, strict=True):
+            quantity(name, value)
+        if frame is Frame.GROUND and values[2] < 0.0:
+            raise TimelineError(f"a foot cannot go below the ground: z is {values[2]}")
