@@ -8,7 +8,8 @@ from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from motions.authoring import Choice, Motion, Range, motion
-    from motions.compiler import CompiledPlan, compile_timeline
+    from motions.compiled_plan import CompiledPlan
+    from motions.compiler import compile_timeline
     from motions.feasibility import (
         CheckedMotion,
         FeasibilityChecker,

@@ -12,14 +12,14 @@ from itertools import pairwise, starmap
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
-from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, leg_angles
+from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from motions.keys import BODY_CHANNELS, BodyKey, Frame, Key, LegKey, LegTarget, PostureKey
-from motions.placement import Wanted, attitudes, place, turned_back
+from motions.placement import Wanted, attitudes, place, turned, turned_back
 from motions.postures import LIE_POSE, SIT_POSE, STAND_POSE
 from motions.timeline import Timeline
 
@@ -135,6 +135,20 @@ class LegTracks:
             origin = key.target
         return path
 
+    def feet(
+        self, stance: Bool[np.ndarray, "n 4"], body: Poses, joints: Float[np.ndarray, "n 12"]
+    ) -> Float[np.ndarray, "n 12"]:
+        """Places [m] of the feet's centres: where they stand, and where raised legs hold them.
+
+        ``body``, ``joints``: pose of the trunk and joint angles.
+        """
+        R, places = attitudes(body[:, 3:]), []
+        for leg in LEGS:
+            seen = foot_places(self._geometry[leg], joints[:, leg.joints])
+            held = body[:, :3] + turned(R, seen)
+            places.append(np.where(stance[:, leg, None], self.p_feet[leg], held))
+        return np.hstack(places)
+
     def _move(self, key: LegKey, origin: LegTarget, times: Times, body: Poses) -> LegAngles:
         share = eased(key, times)[:, None]
         goals = (origin, key.target)
@@ -181,7 +195,7 @@ def home_poses(model: RobotModel) -> Mapping[Posture, Float[np.ndarray, "6"]]:
             R=attitudes(STAND_POSE[None, 3:]),
             q_joints=np.zeros((1, 12)),
             raised=np.zeros((1, 4), dtype=bool),
-            p_feet=standing_feet(model),
+            p_feet=standing_feet(model)[None],
         )
         p_base = place(wanted, SETTLING_STEPS, model).p_base[0]
         stand = np.concatenate([p_base, STAND_POSE[3:]])

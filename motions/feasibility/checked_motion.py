@@ -15,7 +15,8 @@ from go2_wbc.recording import Recording
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.authoring import Motion
-from motions.compiler import CompiledPlan, compile_timeline
+from motions.compiled_plan import CompiledPlan
+from motions.compiler import compile_timeline
 from motions.feasibility.dynamic import Forces
 from motions.feasibility.report import FeasibilityReport
 from motions.registry import load_motion

@@ -260,7 +260,7 @@ def test_the_trajectory_puts_the_com_and_the_feet_where_the_plan_wants_them(
         com, feet = model.forward_kinematics(path.q[row])
         assert com == pytest.approx(reference.body.p_world, abs=EXACT)
         stands = reference.stance
-        assert feet[stands] == pytest.approx(path.p_feet[stands], abs=EXACT)
+        assert feet[stands] == pytest.approx(path.p_feet[0, stands], abs=EXACT)
         raised = ~np.repeat(stands, 3)
         assert path.q[row, 7:][raised] == pytest.approx(reference.q_joints[raised], abs=EXACT)
 
