@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
-from controller.cli.motion_args import add_motion, the_motion
+from controller.cli.motion_args import SAVED_MOTION, SAVED_PLAN, add_motion, the_motion
 from go2_wbc.legs import JOINT_NAMES, LEGS
 
 if TYPE_CHECKING:
-    from motions import Timeline
+    from motions import CompiledPlan, Timeline
     from motions.trajectory import Trajectory
 
 EXAMPLES = """
 go2-wbc export wave --out wave.csv
 go2-wbc export wave --out wave.npz
-go2-wbc export wave --set times=5 --out wave5.json    then: go2-wbc run wave5.json
+go2-wbc export wave --set times=5 --out wave5.json     then: go2-wbc run wave5.json
 """
 COLUMNS = """
 columns, 100 rows a second, in the frame between the feet (x ahead, z up):
@@ -43,7 +43,7 @@ def register(subparsers: Subparsers) -> None:
     )
     add_motion(parser)
     parser.add_argument(
-        "--out", metavar="FILE", type=Path, required=True, help="ends in .csv, .npz or .json"
+        "--out", metavar="FILE", type=Path, required=True, help="ends in .csv, .npz, .json or .plan"
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -53,33 +53,34 @@ def run(args: argparse.Namespace) -> int:
     from go2_wbc.files import checked_output
     from motions import save_motion
 
-    target = checked_output(args.out, [".csv", ".npz", ".json"])
-    line = the_motion(args.motion, args.values)
-    written: dict[str, object] = {"motion": line.name, "file": str(target)}
-    if target.suffix == ".json":
-        what = f"{len(line.keys)} keys"
-        save_motion(line, target)
-        written["keys"] = len(line.keys)
+    target = checked_output(args.out, [".csv", ".npz", SAVED_MOTION, SAVED_PLAN])
+    motion = the_motion(args.motion, args.values)
+    rows: dict[str, object] = {}
+    if target.suffix == SAVED_MOTION:
+        save_motion(motion, target)
     else:
-        rows = _write_trajectory(line, target)
-        what = f"{rows} rows"
-        written["rows"] = rows
+        rows = _write_compiled(motion, target)
     if args.json:
-        print_json(written)
+        print_json({"motion": motion.name, "file": str(target), **rows})
     else:
-        print(f"wrote {args.out}: {what} of {line.name}")
+        number = f": {rows['rows']} rows of" if rows else ":"
+        print(f"wrote {args.out}{number} {motion.name}")
     return ExitCode.OK
 
 
-def _write_trajectory(line: Timeline, target: Path) -> int:
-    """Compile, sample, write; returns how many rows."""
+def _write_compiled(motion: Timeline | CompiledPlan, target: Path) -> dict[str, object]:
+    """Write the plan or its trajectory; returns the number of rows of the latter."""
     from go2_wbc.files import write_atomically
     from go2_wbc.robot.model import RobotModel
-    from motions import compile_timeline
+    from motions import compile_motion, save_plan
     from motions.trajectory import trajectory_of
 
     model = RobotModel()
-    path = trajectory_of(compile_timeline(line, model), model)
+    plan = compile_motion(motion, model)
+    if target.suffix == SAVED_PLAN:
+        save_plan(plan, target, model=model)
+        return {}
+    path = trajectory_of(plan, model)
     if target.suffix == ".npz":
         stream = io.BytesIO()
         arrays: dict[str, Any] = {name: getattr(path, name) for name in ARRAYS}
@@ -88,7 +89,7 @@ def _write_trajectory(line: Timeline, target: Path) -> int:
     else:
         content = _csv(path).encode()
     write_atomically(target, content)
-    return len(path.times)
+    return {"rows": len(path.times)}
 
 
 def _csv(path: Trajectory) -> str:

@@ -15,16 +15,14 @@ from go2_wbc.recording import Recording
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.authoring import Motion
-from motions.compiled_plan import CompiledPlan
+from motions.compiled_plan import LEAST_FEET, CompiledPlan
 from motions.compiler import compile_timeline
 from motions.feasibility.dynamic import Forces
 from motions.feasibility.report import FeasibilityReport
 from motions.registry import load_motion
+from motions.saved.plan_file import is_saved_plan, load_plan
 from motions.timeline import Timeline
 from motions.trajectory import Trajectory
-
-_LEAST_FEET = 3
-"""Standing feet that span an area."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +48,7 @@ class CheckedMotion:
         """
         path = self.path
         (support,) = (series for series in self.report.series if series.check == "support")
-        has_area = path.stance.sum(axis=1) >= _LEAST_FEET
+        has_area = path.stance.sum(axis=1) >= LEAST_FEET
         spans = self.plan.spans if isinstance(self.plan, CompiledPlan) else {}
         return Recording(
             time=path.times,
@@ -69,8 +67,8 @@ class CheckedMotion:
 
 
 Playable = str | Path | Motion | Timeline | MotionPlan | CheckedMotion
-"""What stands for a motion: a name of the library, a saved motion's file, a motion (with its
-default parameters), a timeline, a plan, or a motion that was checked before."""
+"""What stands for a motion: a name of the library, the file of a saved motion or plan, a motion
+(with its default parameters), a timeline, a plan, or a motion that was checked before."""
 
 
 def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
@@ -89,6 +87,8 @@ def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
         return motion.plan
     if isinstance(motion, MotionPlan):
         return motion
+    if isinstance(motion, str | Path) and is_saved_plan(motion):
+        return load_plan(motion, model=model)
     if isinstance(motion, str | Path):
         motion = load_motion(motion)
     elif isinstance(motion, Motion):

@@ -23,7 +23,7 @@ from motions.keys import (
     PostureKey,
 )
 from motions.saved.envelope import Format, content_of, fields_of
-from motions.saved.values import decoded_fields, encoded, required
+from motions.saved.values import Decoder, Encoder, required
 from motions.timeline import Timeline
 
 MOTION_FORMAT: Final = Format("go2_wbc.motion", 1, "a saved motion", ".json")
@@ -58,9 +58,7 @@ def save_motion(motion: object, path: Path | str) -> Path:
     """
     line = motion() if isinstance(motion, Motion) else motion
     if not isinstance(line, Timeline):
-        raise MotionFileError(
-            f"save_motion needs a Timeline or a motion, got {motion!r:.60}; plans: save_plan"
-        )
+        raise MotionFileError(f"save_motion needs a Timeline or a motion, got {motion!r:.60}")
     target = checked_output(path, [MOTION_FORMAT.suffix])
     return write_atomically(target, _text(line).encode())
 
@@ -77,7 +75,7 @@ def read_motion(path: Path | str) -> Timeline:
     try:
         listed = required(given.pop(_KEYS, None), list, _KEYS)
         keys = tuple(_key(item, f"{_KEYS}[{i}]") for i, item in enumerate(listed))
-        line = decoded_fields(given, Timeline, "the motion", {_KEYS: keys})
+        line = Decoder().fields(given, Timeline, "the motion", {_KEYS: keys})
         positive("beat", line.beat)
         return line
     except (MotionFileError, TimelineError, OverflowError) as error:
@@ -87,7 +85,7 @@ def read_motion(path: Path | str) -> Timeline:
 def _text(line: Timeline) -> str:
     """JSON with a line for each field and each key."""
     names = [field.name for field in fields(line) if field.init and field.name != _KEYS]
-    rest = {name: encoded(getattr(line, name), name) for name in names}
+    rest = {name: Encoder().encoded(getattr(line, name), name) for name in names}
     rows = [json.dumps(_fields(key, f"{_KEYS}[{i}]")) for i, key in enumerate(line.keys)]
     lines = [f"  {json.dumps(name)}: {json.dumps(value)}," for name, value in rest.items()]
     header = [
@@ -102,7 +100,7 @@ def _text(line: Timeline) -> str:
 def _fields(key: Key, where: str) -> dict[str, Any]:
     if type(key) not in _WORDS:
         raise MotionFileError(f"{where}: a file cannot hold a {type(key).__name__}")
-    return {"key": _WORDS[type(key)], **encoded(key, f"{where} ({key.track})")}
+    return {"key": _WORDS[type(key)], **Encoder().encoded(key, f"{where} ({key.track})")}
 
 
 def _key(value: object, where: str) -> Key:
@@ -110,7 +108,7 @@ def _key(value: object, where: str) -> Key:
     word = given.pop("key", None)
     if not isinstance(word, str) or word not in KINDS:
         raise MotionFileError(f"{where}: {unknown_name('key', str(word), KINDS)}")
-    key = decoded_fields(given, KINDS[word], where)
+    key = Decoder().fields(given, KINDS[word], where)
     try:
         _require_sane(key)
     except TimelineError as error:

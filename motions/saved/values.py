@@ -1,16 +1,22 @@
-"""What a motion is made of as JSON, and back: numbers, words, lists and dataclasses.
+"""What a motion is made of as JSON and arrays, and back: numbers, words, lists and dataclasses.
 
-Reading goes by the annotations of the dataclasses, so that a new kind of key needs nothing here.
+Reading goes by the annotations of the dataclasses, so that a new kind of key, or a new field of a
+plan, needs nothing here.
 """
 
 from __future__ import annotations
 
+import math
 import types
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, fields, is_dataclass
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from enum import Enum
 from numbers import Integral, Real
-from typing import Any, TypeAlias, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeAlias, Union, final, get_args, get_origin, get_type_hints
+
+import numpy as np
+from jaxtyping import AbstractArray
+from scipy.interpolate import PPoly
 
 from go2_wbc.errors import Go2WbcError, MotionFileError, unknown_name
 from motions.arguments import is_number
@@ -21,96 +27,194 @@ Kind: TypeAlias = Any
 """An annotation."""
 Decoded: TypeAlias = Any
 """An instance of it."""
+_ARRAY = "array"
+_NUMBERS = "bif"
+"""What NumPy calls truth values, whole numbers and floats."""
 
 
-def encoded(value: object, where: str) -> Json:
-    """``value`` as JSON has it; a member of an enum by its word, a leg by its name.
+@final
+@dataclass(frozen=True, slots=True)
+class Encoder:
+    """Turns values into JSON.
 
-    Args:
-        value: a finite number, a word, nothing, or a tuple, set, mapping or dataclass of such.
-        where: what messages call it.
-
-    Raises:
-        MotionFileError: for anything else, such as a function.
+    Attributes:
+        arrays: takes the arrays, by the names that JSON has for them; None where a file holds none.
     """
-    if isinstance(value, Enum):
-        return _word(value)
-    if value is None or isinstance(value, bool | str):
-        return value
-    if is_number(value):
-        return int(value) if isinstance(value, Integral) else float(value)  # type: ignore[arg-type]
-    if isinstance(value, tuple | list):
-        return [encoded(item, f"{where}[{i}]") for i, item in enumerate(value)]
-    if isinstance(value, frozenset):
-        return [encoded(item, where) for item in sorted(value)]
-    if isinstance(value, Mapping):
-        return {str(encoded(key, where)): encoded(value[key], f"{where}.{key}") for key in value}
-    if is_dataclass(value) and not isinstance(value, type):
+
+    arrays: dict[str, np.ndarray] | None = None
+
+    def encoded(self, value: object, where: str) -> Json:
+        """``value`` as JSON has it; a member of an enum by its word, a leg by its name.
+
+        Args:
+            value: a finite number, a word, nothing, an array, piecewise polynomials, or a tuple,
+                set, mapping or dataclass of such; a field that is nan by default may be nan.
+            where: what messages call it.
+
+        Raises:
+            MotionFileError: for anything else, such as a function.
+        """
+        if isinstance(value, Enum):
+            return _word(value)
+        if value is None or isinstance(value, bool | str):
+            return value
+        if is_number(value):
+            return int(value) if isinstance(value, Integral) else float(value)  # type: ignore[arg-type]
+        if isinstance(value, tuple | list):
+            return [self.encoded(item, f"{where}[{i}]") for i, item in enumerate(value)]
+        if isinstance(value, frozenset):
+            return [self.encoded(item, where) for item in sorted(value)]
+        if isinstance(value, Mapping):
+            return {
+                str(self.encoded(key, where)): self.encoded(value[key], f"{where}.{key}")
+                for key in value
+            }
+        if is_dataclass(value) and not isinstance(value, type):
+            told = [(item, getattr(value, item.name)) for item in _given(type(value))]
+            known = [(item, own) for item, own in told if not _is_nan(own, item.default)]
+            return self.encoded({item.name: own for item, own in known}, where)
+        return self._arrays_of(value, where)
+
+    def _arrays_of(self, value: object, where: str) -> Json:
+        if isinstance(value, PPoly):
+            return self.encoded({"x": value.x, "c": value.c}, where)
+        if self.arrays is None or not isinstance(value, np.ndarray):
+            raise MotionFileError(
+                f"{where} is {value!r:.80}: a file holds finite numbers, words and lists of such; "
+                "save the plan instead (save_plan)"
+            )
+        self.arrays[where] = value
+        return {_ARRAY: where}
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Decoder:
+    """Turns JSON into values.
+
+    Attributes:
+        arrays: of the file.
+    """
+
+    arrays: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    def decoded(self, value: Json, kind: Kind, where: str) -> Decoded:
+        """The ``kind`` that ``value`` stands for.
+
+        Args:
+            value: what JSON says.
+            kind: an annotation: a number, ``str``, an enum, an array, ``PPoly``, a dataclass; a
+                tuple, frozenset or mapping of such; or a union.
+            where: what messages call it.
+
+        Raises:
+            MotionFileError: if it stands for none; says where and what would be right.
+        """
+        if get_origin(kind) is not None:
+            return self._collection(value, kind, where)
+        if is_dataclass(kind):
+            return self.fields(value, kind, where)
+        if kind is PPoly:
+            return self._polynomials(value, where)
+        if isinstance(kind, type) and issubclass(kind, Enum):
+            return _enum(value, kind, where)
+        if isinstance(kind, type) and issubclass(kind, AbstractArray):
+            return self._array(value, kind, where)
+        return _plain(value, kind, where)
+
+    def fields(
+        self,
+        value: Json,
+        kind: Kind,
+        where: str,
+        ready: Mapping[str, object] = types.MappingProxyType({}),
+    ) -> Decoded:
+        """The dataclass ``kind`` with the fields that ``value`` gives; others keep their defaults.
+
+        Args:
+            value: what JSON says of it: an object.
+            kind: the class.
+            where: what messages call it.
+            ready: fields that were read before.
+
+        Raises:
+            MotionFileError: for a field that it does not have, lacks, or whose value is wrong.
+        """
+        given = {item.name: item for item in _given(kind) if item.name not in ready}
+        for name in required(value, dict, where):
+            if name not in given:
+                raise MotionFileError(f"{where}: {unknown_name('field', name, given)}")
+        missing = [name for name, item in given.items() if _is_needed(item) and name not in value]
+        if missing:
+            raise MotionFileError(f"{where} lacks {', '.join(missing)}")
+        hints = get_type_hints(kind)
+        read = {name: self.decoded(value[name], hints[name], f"{where}.{name}") for name in value}
+        try:
+            return kind(**read, **ready)
+        except Go2WbcError as error:
+            raise MotionFileError(f"{where}: {error}") from error
+
+    def _collection(self, value: Json, kind: Kind, where: str) -> Decoded:
+        origin, kinds = get_origin(kind), get_args(kind)
+        if origin in (Union, types.UnionType):
+            return self._one_of(value, kinds, where)
+        if origin is tuple:
+            return self._tuple(value, kinds, where)
+        if origin is frozenset:
+            return frozenset(self._tuple(value, (*kinds, ...), where))
+        if isinstance(origin, type) and issubclass(origin, Mapping):
+            return self._mapping(value, kinds, where)
+        return _plain(value, kind, where)
+
+    def _one_of(self, value: Json, kinds: tuple[Kind, ...], where: str) -> Decoded:
+        if value is None and type(None) in kinds:
+            return None
+        wrong = []
+        for kind in kinds:
+            try:
+                return self.decoded(value, kind, where)
+            except MotionFileError as error:
+                wrong.append(error)
+        raise wrong[0]
+
+    def _tuple(self, value: Json, kinds: tuple[Kind, ...], where: str) -> tuple[Any, ...]:
+        items = required(value, list, where)
+        if kinds[-1] is ...:
+            kinds = (kinds[0],) * len(items)
+        if len(items) != len(kinds):
+            raise MotionFileError(f"{where} must be {len(kinds)} values, got {len(items)}")
+        pairs = enumerate(zip(items, kinds, strict=True))
+        return tuple(self.decoded(item, kind, f"{where}[{i}]") for i, (item, kind) in pairs)
+
+    def _mapping(self, value: Json, kinds: tuple[Kind, ...], where: str) -> dict[Any, Any]:
+        key_kind, kind = kinds
         return {
-            field.name: encoded(getattr(value, field.name), f"{where}.{field.name}")
-            for field in _given(type(value))
+            self.decoded(key, key_kind, where): self.decoded(item, kind, f"{where}.{key}")
+            for key, item in required(value, dict, where).items()
         }
-    raise MotionFileError(
-        f"{where} is {value!r}: a file holds finite numbers, words and lists of such; "
-        "save the plan instead (save_plan)"
-    )
 
+    def _array(self, value: Json, kind: Kind, where: str) -> np.ndarray:
+        name = required(value, dict, where).get(_ARRAY)
+        if name not in self.arrays:
+            raise MotionFileError(f"{where} names the array {name!r:.60}, which is not there")
+        array = self.arrays[name]
+        if not isinstance(array, kind) or array.dtype.kind not in _NUMBERS:
+            raise MotionFileError(
+                f"{where} must be {_named(kind)}, got {array.dtype}{list(array.shape)}"
+            )
+        if not np.isfinite(array).all():
+            raise MotionFileError(f"{where} has a value that is not finite")
+        return array
 
-def decoded(value: Json, kind: Kind, where: str) -> Decoded:
-    """The ``kind`` that ``value`` stands for.
-
-    Args:
-        value: what JSON says.
-        kind: an annotation: a number, ``str``, an enum, a dataclass; a tuple, frozenset or mapping
-            of such; or a union.
-        where: what messages call it.
-
-    Raises:
-        MotionFileError: if it stands for none; says where and what would be right.
-    """
-    origin = get_origin(kind)
-    if origin in (Union, types.UnionType):
-        return _one_of(value, get_args(kind), where)
-    if origin is tuple:
-        return _tuple(value, get_args(kind), where)
-    if origin is frozenset:
-        return frozenset(_tuple(value, (*get_args(kind), ...), where))
-    if isinstance(origin, type) and issubclass(origin, Mapping):
-        return _mapping(value, get_args(kind), where)
-    if isinstance(kind, type) and issubclass(kind, Enum):
-        return _enum(value, kind, where)
-    if is_dataclass(kind):
-        return decoded_fields(value, kind, where)
-    return _plain(value, kind, where)
-
-
-def decoded_fields(
-    value: Json, kind: Kind, where: str, ready: Mapping[str, object] = types.MappingProxyType({})
-) -> Decoded:
-    """The dataclass ``kind`` with the fields that ``value`` gives; others keep their defaults.
-
-    Args:
-        value: what JSON says of it: an object.
-        kind: the class.
-        where: what messages call it.
-        ready: fields that were read before.
-
-    Raises:
-        MotionFileError: for a field that it does not have, lacks, or whose value is wrong.
-    """
-    given = {field.name: field for field in _given(kind) if field.name not in ready}
-    for name in required(value, dict, where):
-        if name not in given:
-            raise MotionFileError(f"{where}: {unknown_name('field', name, given)}")
-    missing = [name for name, field in given.items() if _is_needed(field) and name not in value]
-    if missing:
-        raise MotionFileError(f"{where} lacks {', '.join(missing)}")
-    hints = get_type_hints(kind)
-    read = {name: decoded(value[name], hints[name], f"{where}.{name}") for name in value}
-    try:
-        return kind(**read, **ready)
-    except Go2WbcError as error:
-        raise MotionFileError(f"{where}: {error}") from error
+    def _polynomials(self, value: Json, where: str) -> PPoly:
+        parts = required(value, dict, where)
+        x, c = (self._array(parts.get(name), np.ndarray, f"{where}.{name}") for name in "xc")
+        if not (x.ndim == 1 and c.ndim > 1 and c.shape[1] == len(x) - 1 and (np.diff(x) > 0).all()):
+            raise MotionFileError(
+                f"{where} must be polynomials between increasing times, got x {list(x.shape)} and "
+                f"c {list(c.shape)}"
+            )
+        return PPoly(c, x)
 
 
 def required(value: Json, kind: type, where: str) -> Json:
@@ -122,45 +226,23 @@ def required(value: Json, kind: type, where: str) -> Json:
 
 
 def _given(kind: Kind) -> list[Field[Any]]:
-    return [field for field in fields(kind) if field.init]
+    return [item for item in fields(kind) if item.init]
 
 
-def _is_needed(field: Field[Any]) -> bool:
-    return field.default is MISSING and field.default_factory is MISSING
+def _is_needed(item: Field[Any]) -> bool:
+    return item.default is MISSING and item.default_factory is MISSING
+
+
+def _named(kind: Kind) -> str:
+    return "an array of numbers" if kind is np.ndarray else kind.__name__
+
+
+def _is_nan(*values: object) -> bool:
+    return all(isinstance(value, float) and math.isnan(value) for value in values)
 
 
 def _word(member: Enum) -> str:
     return member.value if isinstance(member.value, str) else member.name
-
-
-def _one_of(value: Json, kinds: tuple[Any, ...], where: str) -> Decoded:
-    if value is None and type(None) in kinds:
-        return None
-    wrong = []
-    for kind in kinds:
-        try:
-            return decoded(value, kind, where)
-        except MotionFileError as error:
-            wrong.append(error)
-    raise wrong[0]
-
-
-def _tuple(value: Json, kinds: tuple[Any, ...], where: str) -> tuple[Any, ...]:
-    items = required(value, list, where)
-    if kinds[-1] is ...:
-        kinds = (kinds[0],) * len(items)
-    if len(items) != len(kinds):
-        raise MotionFileError(f"{where} must be {len(kinds)} values, got {len(items)}")
-    pairs = enumerate(zip(items, kinds, strict=True))
-    return tuple(decoded(item, kind, f"{where}[{i}]") for i, (item, kind) in pairs)
-
-
-def _mapping(value: Json, kinds: tuple[Any, ...], where: str) -> dict[Any, Any]:
-    key_kind, kind = kinds
-    return {
-        decoded(key, key_kind, where): decoded(item, kind, f"{where}.{key}")
-        for key, item in required(value, dict, where).items()
-    }
 
 
 def _enum(value: Json, kind: type[Enum], where: str) -> Enum:

@@ -198,7 +198,7 @@ def test_the_commands_write_and_take_saved_motions(
     path = tmp_path / "two_nods.json"
     assert main(["export", "nod", "--set", "times=2", "--out", str(path), "--json"]) == ExitCode.OK
     said = json.loads(capsys.readouterr().out)
-    assert said == {"motion": "nod", "file": str(path), "keys": len(load_motion(path).keys)}
+    assert said == {"motion": "nod", "file": str(path)}
     assert load_motion(path) == load_motion("nod", times=2)
     assert main(["check", str(path)]) == ExitCode.OK
     assert "the robot can do it" in capsys.readouterr().out

@@ -13,7 +13,7 @@ import pytest
 from go2_wbc.curves import Ease
 from go2_wbc.errors import MotionFileError
 from go2_wbc.legs import Leg
-from motions.saved.values import decoded, encoded
+from motions.saved.values import Decoder, Encoder
 
 
 @dataclass(frozen=True)
@@ -38,20 +38,20 @@ WHOLE = Whole(
 
 
 def test_a_nested_value_comes_back_as_it_was() -> None:
-    text = json.dumps(encoded(WHOLE, "it"))
-    assert decoded(json.loads(text), Whole, "it") == WHOLE
+    text = json.dumps(Encoder().encoded(WHOLE, "it"))
+    assert Decoder().decoded(json.loads(text), Whole, "it") == WHOLE
     assert '"legs": ["FL", "FR"]' in text
     assert '"ease": "in"' in text
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
-    assert encoded((np.float64(0.5), np.int64(3)), "it") == [0.5, 3]
+    assert Encoder().encoded((np.float64(0.5), np.int64(3)), "it") == [0.5, 3]
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, abs, {1, 2}, np.zeros(3), b"x", Part])
 def test_what_json_has_no_word_for_is_refused(value: object) -> None:
     with pytest.raises(MotionFileError, match=r"it\[1\] is .* save the plan instead"):
-        encoded((1.0, value), "it")
+        Encoder().encoded((1.0, value), "it")
 
 
 @pytest.mark.parametrize(
@@ -67,6 +67,6 @@ def test_what_json_has_no_word_for_is_refused(value: object) -> None:
     ],
 )
 def test_what_does_not_fit_is_named(change: dict[str, Any], message: str) -> None:
-    fields = {**encoded(WHOLE, "it"), **change}
+    fields = {**Encoder().encoded(WHOLE, "it"), **change}
     with pytest.raises(MotionFileError, match=message):
-        decoded(fields, Whole, "it")
+        Decoder().decoded(fields, Whole, "it")
