@@ -15,6 +15,7 @@ from controller.cli.common import ExitCode
 from controller.cli.main import main
 from controller.cli.motion_args import MotionSource
 from go2_wbc.errors import CommandError
+from motions import Timeline
 from tests.live_preview import BROKEN, GOOD, TOO_HIGH, LivePreview
 from tests.viz.page_reader import read_data
 from viz.replay.html_page import PAGE_LIMIT
