@@ -5,23 +5,26 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import fields
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
 from go2_wbc.errors import MotionFileError, TimelineError, unknown_name
 from go2_wbc.files import checked_output, write_atomically
-from motions.arguments import positive, quantity
 from motions.authoring import Motion
 from motions.keys import (
     BODY_CHANNELS,
     BalanceShift,
     BodyKey,
+    BodyPathKey,
     Frame,
+    JointKey,
     Key,
     LegKey,
     Mark,
     PostureKey,
 )
+from motions.language.clock import BeatClock
 from motions.saved.envelope import Format, content_of, fields_of
 from motions.saved.values import Decoder, Encoder, required
 from motions.timeline import Timeline
@@ -29,15 +32,18 @@ from motions.timeline import Timeline
 MOTION_FORMAT: Final = Format("go2_wbc.motion", 1, "a saved motion", ".json")
 KINDS: Final[Mapping[str, type[Key]]] = {
     "body": BodyKey,
+    "body_path": BodyPathKey,
     "posture": PostureKey,
     "leg": LegKey,
+    "joint": JointKey,
     "balance": BalanceShift,
     "mark": Mark,
 }
 """The kinds of keys by the words that files have for them: a new kind needs a line here."""
 _WORDS: Final[Mapping[type[Key], str]] = {kind: word for word, kind in KINDS.items()}
 _KEYS: Final = "keys"
-_PLACES, _ANGLES = ("x", "y", "z"), ("hip", "thigh", "calf")
+_JOINTS: Final = 3
+"""Of a leg."""
 
 
 def save_motion(motion: object, path: Path | str) -> Path:
@@ -76,7 +82,7 @@ def read_motion(path: Path | str) -> Timeline:
         listed = required(given.pop(_KEYS, None), list, _KEYS)
         keys = tuple(_key(item, f"{_KEYS}[{i}]") for i, item in enumerate(listed))
         line = Decoder().fields(given, Timeline, "the motion", {_KEYS: keys})
-        positive("beat", line.beat)
+        BeatClock.of(line.clock.instants)
         return line
     except (MotionFileError, TimelineError, OverflowError) as error:
         raise MotionFileError(f"{file}: {error}") from error
@@ -117,17 +123,24 @@ def _key(value: object, where: str) -> Key:
 
 
 def _require_sane(key: Key) -> None:
-    """Raise TimelineError for what the calls of a timeline would not have written."""
-    if not 0.0 <= key.start < key.end:
+    """Raise TimelineError for what no call writes; what is too far is for the check to say."""
+    if not 0.0 <= key.start <= key.end:
         raise TimelineError(f"must start at 0 s or later and end later, got {key.start} {key.end}")
-    if isinstance(key, BodyKey):
-        if key.channel not in BODY_CHANNELS:
-            raise TimelineError(unknown_name("channel", key.channel, BODY_CHANNELS))
-        quantity(key.channel, key.value)
-    if isinstance(key, LegKey):
-        frame, values = key.target.frame, key.target.values
-        names = _ANGLES if frame is Frame.JOINTS else _PLACES
-        for name, value in zip(names, values, strict=True):
-            quantity(name, value)
-        if frame is Frame.GROUND and values[2] < 0.0:
-            raise TimelineError(f"a foot cannot go below the ground: z is {values[2]}")
+    if isinstance(key, BodyKey) and key.channel not in BODY_CHANNELS:
+        raise TimelineError(unknown_name("channel", key.channel, BODY_CHANNELS))
+    if isinstance(key, BodyPathKey):
+        _require_way(key)
+    if isinstance(key, JointKey) and key.joint not in range(_JOINTS):
+        raise TimelineError(f"joint must be 0, 1 or 2, got {key.joint}")
+    if isinstance(key, LegKey) and key.target.frame is Frame.GROUND and key.target.values[2] < 0.0:
+        raise TimelineError(f"a foot cannot go below the ground: z is {key.target.values[2]}")
+
+
+def _require_way(key: BodyPathKey) -> None:
+    shares = (0.0, *key.shares, 1.0)
+    is_rising = all(a < b for a, b in pairwise(shares))
+    if not is_rising or len(key.shares) != len(key.through):
+        raise TimelineError(
+            "shares must be as many as the places in through, and rise between 0 and 1, got "
+            f"{list(key.shares)}"
+        )

@@ -58,6 +58,23 @@ calls: st.SearchStrategy[Call] = st.one_of(
         times,
     ),
     st.builds(lambda beats: lambda line: line.bpm(beats), st.floats(40.0, 200.0)),
+    st.builds(
+        lambda leg, name, angle, t: lambda line: line.joint(leg, name, angle, over=t),
+        legs,
+        st.sampled_from(("hip", "thigh", "calf")),
+        angles,
+        times,
+    ),
+    st.builds(
+        lambda values, t: (
+            lambda line: line.body_path([{"x": x, "roll": x} for x in values], over=t)
+        ),
+        st.lists(small, min_size=2, max_size=4),
+        times,
+    ),
+    st.builds(lambda first, gap: lambda line: line.on_beats([first, first + gap]), times, times),
+    st.builds(lambda factor: lambda line: line.scale_time(factor).scale(factor), times),
+    st.just(lambda line: line.home(over=1.0).reverse()),
     st.just(lambda line: line.mirror()),
     st.just(lambda line: line.also()),
     st.just(lambda line: line.together(Timeline().body(z=-0.02, over=0.4).home(over=0.3))),
