@@ -14,6 +14,7 @@ from go2_wbc.reference import Posture
 from motions import Timeline
 from motions.keys import BODY_CHANNELS
 
+MANY = 60  # keys; repeating a repetition makes more and more of them
 Call = Callable[[Timeline], Timeline]
 
 times = st.floats(0.05, 5.0)
@@ -40,21 +41,14 @@ def joints(leg: Leg, hip: float, thigh: float, calf: float, over: float) -> Call
 
 calls: st.SearchStrategy[Call] = st.one_of(
     st.builds(body, st.sampled_from(BODY_CHANNELS), small, times, eases),
-    st.builds(
-        foot,
-        legs,
-        st.tuples(small, small, small),
-        times,
-        st.sampled_from(("ground", "body")),
-        eases,
-    ),
+    st.builds(foot, legs, st.tuples(small, small, small), times, frames, eases),
     st.builds(joints, legs, angles, angles, angles, times),
     st.builds(lambda t, name: lambda line: line.hold(t, name=name), times, st.text(max_size=8)),
     st.builds(lambda t: lambda line: line.home(over=t), times),
     st.builds(lambda leg, t: lambda line: line.unweight(leg, over=t), legs, times),
     st.builds(
         lambda posture, t: lambda line: line.posture(posture, over=t),
-        st.sampled_from(Posture),
+        postures,
         times,
     ),
     st.builds(lambda beats: lambda line: line.bpm(beats), st.floats(40.0, 200.0)),
@@ -104,7 +98,8 @@ def timeline_of(drawn: Written) -> Timeline:
     line = Timeline(**arguments)
     for call in called:
         try:
-            line = call(line)
+            longer = call(line)
         except TimelineError:
             continue
+        line = longer if len(longer.keys) < MANY else line
     return line
