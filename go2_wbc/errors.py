@@ -17,6 +17,8 @@
     │   └── PlantTimeout        the plant stopped answering
     └── MotionError
         ├── TimelineError       an authored motion is written wrongly
+        ├── DynamicMotionRefused  it jumps or stands on few feet, and nobody allowed that
+        ├── MotionFileError     a saved motion or plan cannot be used; says why
         ├── MotionInfeasible    the motion breaks a limit; carries the findings
         └── StanceMismatch      the motion starts from another stance
 
@@ -125,6 +127,14 @@ class MotionError(Go2WbcError):
 
 class TimelineError(MotionError, ValueError):
     """An authored motion is written wrongly; the message says what and how to write it."""
+
+
+class DynamicMotionRefused(MotionError):
+    """A motion with flight or few feet was asked of hardware without being allowed."""
+
+
+class MotionFileError(MotionError, ValueError):
+    """A saved motion or plan is damaged, of another version or robot, or cannot be a file."""
 
 
 class MotionInfeasible(MotionError):

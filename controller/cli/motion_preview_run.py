@@ -61,7 +61,7 @@ def write_files(args: argparse.Namespace) -> int:
 def serve(args: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C; the exit code is that of what was saved last."""
     source, checker = MotionSource(args.motion, args.values), FeasibilityChecker()
-    checked = checker.evaluate(source.timeline())
+    checked = checker.evaluate(source.motion())
     with PreviewServer(planned(checked), source.name, args.port) as server:
         ok = checked.report.ok
         try:
@@ -86,7 +86,7 @@ def _show_again(
 ) -> bool:
     """Check and show what the file says now; whether the robot can do it."""
     try:
-        checked = checker.evaluate(source.timeline())
+        checked = checker.evaluate(source.motion())
         server.publish(planned(checked))
     except (Go2WbcError, OSError) as error:
         server.publish_error(str(error))
