@@ -166,7 +166,9 @@ def test_beats_are_lines_on_the_time_strip(
         "(() => {const c = replay.charts[0].picture; return Array.from("
         "c.getContext('2d').getImageData(0, c.height - 40, c.width, 1).data)})()"
     )
-    content = ReplayContent(recording, beats=tuple(np.arange(0.25, recording.duration, 0.5)))
+    content = ReplayContent(
+        recording, beats=tuple(np.arange(0.25, recording.duration, 0.5).tolist())
+    )
     page = viz.export_html(content, tmp_path / "beats.html", title="beats")
     with Tab(chromium_browser) as tab:
         tab.open(page.as_uri())
