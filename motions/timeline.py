@@ -16,9 +16,10 @@ import math
 
 from motions.language.arrangement import Arrangement
 from motions.language.moves import Moves
+from motions.language.steps import Steps
 
 
-class Timeline(Moves, Arrangement):
+class Timeline(Moves, Steps, Arrangement):
     """An authored motion; ``motions.language`` holds its calls."""
 
     __slots__ = ()
