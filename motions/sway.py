@@ -74,11 +74,11 @@ class Stepping:
         heights = CubicSpline(self.times, self.p_com[:, 2], bc_type="clamped")
         return self.p_com[:, 2] / (self.gravity + heights(self.times, 2))
 
-    @property
-    def zmp(self) -> Float[np.ndarray, "n 2"]:
-        """Zero-moment point [m] without any sway."""
-        path = CubicSpline(self.times, self.p_com[:, :2], bc_type="clamped")
-        return self.p_com[:, :2] - self.lever[:, None] * path(self.times, 2) + self.bias
+    def zmp(self, way: Float[np.ndarray, "n 2"] | float = 0.0) -> Float[np.ndarray, "n 2"]:
+        """Zero-moment point [m] if ``way`` is added to the CoM."""
+        p = self.p_com[:, :2] + way
+        path = CubicSpline(self.times, p, bc_type="clamped")
+        return p - self.lever[:, None] * path(self.times, 2) + self.bias
 
 
 def sway(stepping: Stepping) -> Float[np.ndarray, "n 2"]:
@@ -143,7 +143,7 @@ def _limits(
     many = np.flatnonzero(stepping.stance.sum(axis=1) > 2)
     parts, ends = [], []
     for table, rows, points in (
-        (zmp, np.arange(len(bounds)), stepping.zmp),
+        (zmp, np.arange(len(bounds)), stepping.zmp()),
         (values, many, stepping.p_com[:, :2]),
     ):
         for edge in range(normals.shape[1]):

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
-from motions.placement import Wanted, attitudes, centres_of_mass, place
+from motions.placement import Wanted, attitudes, centres_of_mass, configurations, place
 from motions.sway import Stepping, sway
 from motions.tracks import LegTracks, Poses, Times
+from motions.trajectory import rates, zero_moment_points
 
 CENTRING_STEPS = 5
 """Steps that put the CoM in its place; see ``place``."""
+PASSES = 3
+"""Times that the way is found; from the second on with what the pendulum leaves out, as the whole
+robot's dynamics say of the last way (Kajita et al. 2003, sec. 5)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +41,7 @@ def swayed(
 ) -> Float[np.ndarray, "n 2"]:
     """Places x, y [m] of the base with which the ground can hold the trunk that goes as ``body``."""
     joints = np.hstack([tracks.path(leg, span.times, body).q for leg in LEGS])
-    com = centres_of_mass(body, joints, model)
+    com, rpy = centres_of_mass(body, joints, model), body[:, 3:]
     p_feet = tracks.footing.places(span.times)
     stepping = Stepping(
         times=span.times,
@@ -47,13 +51,30 @@ def swayed(
         gravity=model.gravity,
         bias=np.zeros((len(com), 2)),
     )
-    com[:, :2] += sway(stepping)
     wanted = Wanted(
         p=com,
         is_com=np.ones(len(com), dtype=bool),
-        R=attitudes(body[:, 3:]),
+        R=attitudes(rpy),
         q_joints=joints,
         raised=span.raised,
         p_feet=p_feet,
     )
-    return place(wanted, CENTRING_STEPS, model).p_base[:, :2]
+    placed = place(wanted, CENTRING_STEPS, model)
+    for _ in range(PASSES):
+        way = sway(stepping)
+        wanted = replace(wanted, p=com + np.pad(way, ((0, 0), (0, 1))))
+        placed = place(wanted, CENTRING_STEPS, model)
+        true = _zmp(span.times, np.hstack([placed.p_base, rpy]), placed.q_joints, model)
+        stepping = replace(stepping, bias=stepping.bias + true - stepping.zmp(way))
+    return placed.p_base[:, :2]
+
+
+def _zmp(
+    times: Times, poses: Poses, joints: Float[np.ndarray, "n 12"], model: RobotModel
+) -> Float[np.ndarray, "n 2"]:
+    """The zero-moment point [m] of the whole robot, by inverse dynamics."""
+    q = configurations(poses, joints)
+    v, a = rates(times, q, poses[:, 3:])
+    rows = zip(q, v, a, strict=True)
+    wrench = np.array([model.inverse_dynamics(*row)[:6] for row in rows])
+    return zero_moment_points(q, poses[:, 3:], wrench)

@@ -49,10 +49,10 @@ class StepGait:
 STEP_GAITS: Mapping[str, StepGait] = {
     "walk": StepGait(
         offsets=(0.25, 0.75, 0.0, 0.5),
-        period=1.6,
-        least_period=1.2,
-        duty=0.8,
-        stride=0.16,
+        period=2.0,
+        least_period=1.8,
+        duty=0.82,
+        stride=0.12,
         turn=0.35,
         rest=0.9,
         height=0.05,
@@ -61,11 +61,11 @@ STEP_GAITS: Mapping[str, StepGait] = {
         offsets=(0.0, 0.5, 0.5, 0.0),
         period=0.4,
         least_period=0.36,
-        duty=0.5,
+        duty=0.575,
         stride=0.12,
         turn=0.2,
         rest=0.4,
-        height=0.06,
+        height=0.05,
     ),
 }
 """Gaits of authored steps: own choice, found in simulation."""
