@@ -1,4 +1,4 @@
-"""How the CoM goes while feet step: so that the ground can hold it, and near to where it was wanted.
+"""How the CoM goes while feet step: so that the ground can hold it, near to where it was wanted.
 
 With its height z, the CoM c and the zero-moment point p of an inverted pendulum are related by
 
@@ -125,8 +125,9 @@ def _spline(stepping: Stepping) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
     knots = times[0] + length * np.arange(-3, pieces + 4)
     inside = np.clip(times, knots[3], knots[-4])
     count = pieces + 3
-    differences = [diags([-1.0, 1.0], [0, 1], shape=(n - 1, n)) / length for n in
-                   (count, count - 1, count - 2)]
+    differences = [
+        diags([-1.0, 1.0], [0, 1], shape=(n - 1, n)) / length for n in (count, count - 1, count - 2)
+    ]
     second = differences[1] @ differences[0]
     values = BSpline.design_matrix(inside, knots, 3)
     curvature = BSpline.design_matrix(inside, knots[2:-2], 1) @ second

@@ -39,7 +39,7 @@ class Span:
 def swayed(
     span: Span, body: Poses, tracks: LegTracks, model: RobotModel
 ) -> Float[np.ndarray, "n 2"]:
-    """Places x, y [m] of the base with which the ground can hold the trunk that goes as ``body``."""
+    """Places x, y [m] of the base, near those of ``body``, in which the ground can hold it."""
     joints = np.hstack([tracks.path(leg, span.times, body).q for leg in LEGS])
     com, rpy = centres_of_mass(body, joints, model), body[:, 3:]
     p_feet = tracks.footing.places(span.times)
