@@ -19,7 +19,7 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
-from motions.footing import Footing
+from motions.footing import Footing, standing_feet
 from motions.keys import (
     BODY_CHANNELS,
     BodyKey,
@@ -237,13 +237,6 @@ def _flat(frames: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
 
 def _headings(frames: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
     return attitudes(np.column_stack([np.zeros((len(frames), 2)), frames[:, 2]]))
-
-
-def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
-    """Where the feet's centres stand [m]: below the hips, a foot's radius above the ground."""
-    p_feet = model.p_base_feet_nominal.copy()
-    p_feet[:, 2] = model.foot_radius
-    return p_feet
 
 
 def home_poses(model: RobotModel) -> Mapping[Posture, Float[np.ndarray, "6"]]:
