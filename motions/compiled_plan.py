@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.interpolate import PPoly
 
 from go2_wbc.contacts import TIE, ContactSchedule
 from go2_wbc.curves import CurvePoint
 from go2_wbc.errors import MotionError
 from go2_wbc.kernels.layout import REFERENCE
-from go2_wbc.reference import LegTask, MotionPlan, Posture, Reference, TrackedPoint
+from go2_wbc.reference import Anchor, LegTask, MotionPlan, Posture, Reference, TrackedPoint
 from motions.placement import attitudes
 from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, reference
 from motions.problem import Problem
@@ -74,6 +74,13 @@ class CompiledPlan(MotionPlan):
         """Whether fewer than three feet stand at any time; see ``MotionPlan.is_dynamic``."""
         return bool((self.contacts.modes.sum(axis=1) < LEAST_FEET).any())
 
+    @property
+    def end_pose(self) -> tuple[float, float, float]:
+        """Where it ends: x, y [m] and yaw [rad] of the frame of the feet, in that of the motion."""
+        anchor = Anchor.of_feet(self.curves(self.duration)[18:].reshape(4, 3), 0.0)
+        x, y, _ = anchor.p_world.tolist()
+        return x, y, anchor.yaw
+
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""
         return Reference.of_row(self.row_at(t))
@@ -113,8 +120,7 @@ class CompiledPlan(MotionPlan):
         """What the references at ``times`` ask for; ``at`` gives the same one by one."""
         values = self.curves(np.clip(times, 0.0, self.duration))
         phase = self.contacts.at_times(times)
-        event = np.searchsorted(self.contacts.times, times + TIE, side="right") - 1
-        swings = self.swings[np.maximum(event, 0)]
+        swings = self.swings[event_at(self.contacts, times)]
         return PlanSamples(
             times=times,
             p_world=values[:, :3],
@@ -126,6 +132,12 @@ class CompiledPlan(MotionPlan):
             p_feet=values[:, 18:].reshape(-1, 4, 3),
             normal_force_max=NORMAL_FORCE_MAX * phase.load_share(self.ramp),
         )
+
+
+def event_at(contacts: ContactSchedule, times: Float[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
+    """Index of the last event at or before each of ``times`` [s], of a schedule that ends."""
+    event = np.searchsorted(contacts.times, times + TIE, side="right") - 1
+    return np.maximum(event, 0)
 
 
 def _tasks(stance: Bool[np.ndarray, "*n 4"], swings: Bool[np.ndarray, "*n 4"]) -> np.ndarray:

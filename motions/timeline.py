@@ -7,6 +7,8 @@ ahead, y left, z up.
 
     Timeline().body(pitch=deg(15), z=-0.05, over=0.8).hold(0.4).home(over=0.8)
 
+Steps put feet in new places; from then on places count from these.
+
 A foot that is raised is off the ground until it is put down; the body first moves over the feet
 that stay, unless the motion is made with ``balance=False``.
 """
@@ -14,15 +16,35 @@ that stay, unless the motion is made with ``balance=False``.
 from __future__ import annotations
 
 import math
+from functools import cache
 
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.robot.model import RobotModel
+from motions.footing import Footing, standing_feet
 from motions.language.shapes import Shapes
+from motions.language.steps import Steps
 from motions.language.transforms import Transforms
 
 
-class Timeline(Shapes, Transforms):
+class Timeline(Shapes, Steps, Transforms):
     """An authored motion; ``motions.language`` holds its calls."""
 
     __slots__ = ()
+
+    @property
+    def end_pose(self) -> tuple[float, float, float]:
+        """Where it ends: x, y [m] and yaw [rad] of the frame of the feet, seen from its start.
+
+        Of the installed Go2, with its feet below its hips at first.
+        """
+        return Footing(self, _nominal_feet()).end_pose
+
+
+@cache
+def _nominal_feet() -> Float[np.ndarray, "4 3"]:
+    return standing_feet(RobotModel())
 
 
 def deg(angle: float) -> float:
