@@ -82,6 +82,17 @@ SNAPSHOT = Layout(
 )
 """Of ``robot.snapshot.Snapshot``, the state's q and v first."""
 
+ROBOT = Layout(
+    mass=(),
+    gravity=(),
+    foot_radius=(),
+    links=(13, 10),
+    p_joints=(12, 3),
+    p_calf_feet=(4, 3),
+    armature=(12,),
+)
+"""Numbers of the robot for its snapshot: of each link mass, first moment and inertia."""
+
 REFERENCE = Layout(
     is_com=(),
     p_world=(3,),

@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.kernels.compilation import kernel, subroutine
-from go2_wbc.kernels.derivation import rotation_of
 from go2_wbc.kernels.layout import CORRECTION, PLAYBACK, REFERENCE, SNAPSHOT
+from go2_wbc.kernels.rigid_body import rotation_of
 from go2_wbc.kernels.supervision import sag_and_lean
 
 TIE = 1e-9
