@@ -44,6 +44,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.rigid_body",
         "go2_wbc.kernels.simulation",
         "go2_wbc.kernels.supervision",
+        "go2_wbc.kernels.vectors",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",
         "go2_wbc.robot.rotations",

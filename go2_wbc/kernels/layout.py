@@ -142,6 +142,9 @@ PROGRAM = Layout(
 )
 """Numbers of the built-in tasks and constraints of the whole-body controller."""
 
+DECISION = Layout(z=(30,), tau=(12,), tau_motors=(12,))
+"""What the QP decides: z of ``wbc.problem``, and torques without and with friction."""
+
 PLANNER = Layout(
     yaw=(),
     position=(2,),

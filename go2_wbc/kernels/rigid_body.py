@@ -8,7 +8,7 @@ along the axes of its hip, which the hip's angle turns about x from the base's: 
 about y of these axes, so that few rotations are left.
 
 A body is its mass, its first moment h = m c and its inertia I = (xx, xy, xz, yy, yz, zz), both
-about the origin of its joint. Triples of numbers are vectors.
+about the origin of its joint.
 """
 
 from __future__ import annotations
@@ -17,6 +17,19 @@ import numpy as np
 
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.layout import ROBOT, SNAPSHOT
+from go2_wbc.kernels.vectors import (
+    AXES,
+    V3,
+    about_x,
+    about_y,
+    along,
+    cross,
+    plus,
+    plus_scaled,
+    put,
+    rotation_of,
+    vector,
+)
 
 _R, _M, _H = (SNAPSHOT.start[n] for n in ("R_world_base", "mass_matrix", "bias"))
 _P_COM, _V_COM, _J_COM, _DRIFT_COM = (
@@ -33,50 +46,19 @@ _MASS, _GRAVITY, _RADIUS, _ARMATURE = (
 )
 _LINKS, _JOINTS, _FEET = (ROBOT.start[n] for n in ("links", "p_joints", "p_calf_feet"))
 
-_V3, _I6 = "UniTuple(f8, 3)", "UniTuple(f8, 6)"
-_BODY = f"Tuple((f8, {_V3}, {_I6}))"
-_AXES = f"UniTuple({_V3}, 3)"
-_LEG = f"Tuple((f8, f8, {_V3}, {_V3}, {_V3}, {_V3}, {_BODY}, {_BODY}, {_BODY}))"
-_WRENCH = f"Tuple(({_V3}, {_V3}))"
+_I6 = "UniTuple(f8, 6)"
+_BODY = f"Tuple((f8, {V3}, {_I6}))"
+_LEG = f"Tuple((f8, f8, {V3}, {V3}, {V3}, {V3}, {_BODY}, {_BODY}, {_BODY}))"
+_WRENCH = f"Tuple(({V3}, {V3}))"
 _ZERO = (0.0, 0.0, 0.0)
 
 
-@subroutine(f"{_V3}({_V3}, {_V3})")
-def plus(a, b):
-    """a + b."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
-
-
-@subroutine(f"{_V3}({_V3}, f8, {_V3})")
-def plus_scaled(a, factor, b):
-    """a + factor b."""
-    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
-
-
-@subroutine(f"{_V3}({_V3}, {_V3})")
-def cross(a, b):
-    """a x b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@subroutine(f"{_V3}({_I6}, {_V3})")
+@subroutine(f"{V3}({_I6}, {V3})")
 def times(inertia, a):
     """Inertia times a vector."""
     xx, xy, xz, yy, yz, zz = inertia
     x, y, z = a
     return xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z
-
-
-@subroutine(f"{_V3}(f8, f8, {_V3})")
-def about_x(c, s, a):
-    """A vector turned about x by the angle of this cosine and sine."""
-    return a[0], c * a[1] - s * a[2], s * a[1] + c * a[2]
-
-
-@subroutine(f"{_V3}(f8, f8, {_V3})")
-def about_y(c, s, a):
-    """A vector turned about y."""
-    return c * a[0] + s * a[2], a[1], c * a[2] - s * a[0]
 
 
 @subroutine(f"{_I6}(f8, f8, {_I6})")
@@ -109,7 +91,7 @@ def inertia_about_y(c, s, inertia):
     )
 
 
-@subroutine(f"{_BODY}({_BODY}, {_BODY}, {_V3})")
+@subroutine(f"{_BODY}({_BODY}, {_BODY}, {V3})")
 def joined(a, b, d):
     """The body of a and of b, which is given about a point at d.
 
@@ -148,13 +130,13 @@ def body_about_y(c, s, body):
     return body[0], about_y(c, s, body[1]), inertia_about_y(c, s, body[2])
 
 
-@subroutine(f"{_V3}({_V3}, {_V3}, {_V3}, {_V3})")
+@subroutine(f"{V3}({V3}, {V3}, {V3}, {V3})")
 def acceleration_at(a, w, dw, p):
     """Acceleration of a body's point at p from one with acceleration a: a + dw x p + w x w x p."""
     return plus(a, plus(cross(dw, p), cross(w, cross(w, p))))
 
 
-@subroutine(f"{_WRENCH}({_BODY}, {_V3}, {_V3}, {_V3})")
+@subroutine(f"{_WRENCH}({_BODY}, {V3}, {V3}, {V3})")
 def wrench_on(body, a, w, dw):
     """Force, and moment about its origin, that move a body so."""
     m, h, inertia = body
@@ -163,44 +145,13 @@ def wrench_on(body, a, w, dw):
     return force, moment
 
 
-@subroutine(f"{_V3}(f8[::1], i8)")
-def vector(numbers, start):
-    """Three numbers of a row."""
-    return numbers[start], numbers[start + 1], numbers[start + 2]
-
-
-@subroutine(f"void(f8[::1], i8, {_V3})")
-def put(row, start, a):
-    """Put a vector in its place in a row."""
-    row[start], row[start + 1], row[start + 2] = a
-
-
-@subroutine(f"{_V3}({_AXES}, {_V3})")
-def along(axes, a):
-    """A vector given along these axes."""
-    x, y, z = axes
-    return (
-        x[0] * a[0] + y[0] * a[1] + z[0] * a[2],
-        x[1] * a[0] + y[1] * a[1] + z[1] * a[2],
-        x[2] * a[0] + y[2] * a[1] + z[2] * a[2],
-    )
-
-
-@subroutine("void(f8, f8, f8, f8, f8[:,::1])")
-def rotation_of(x, y, z, w, R):
-    """Fill the rotation matrix of a unit quaternion."""
-    R[0, 0], R[0, 1], R[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
-    R[1, 0], R[1, 1], R[1, 2] = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
-    R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
-
-
 @subroutine("void(f8[::1], i8, i8, f8)")
 def put_twice(row, i, k, value):
     """Put a number in its two places in the mass matrix."""
     row[_M + 18 * i + k], row[_M + 18 * k + i] = value, value
 
 
-@subroutine(f"void(f8[::1], i8, f8, {_AXES}, {_V3}, {_V3})")
+@subroutine(f"void(f8[::1], i8, f8, {AXES}, {V3}, {V3})")
 def couple(row, n, mass, base, linear, angular):
     """Fill what couples a joint to the base: the robot's momentum if it alone turns at 1 rad/s."""
     velocity = along(base, linear)
@@ -210,7 +161,7 @@ def couple(row, n, mass, base, linear, angular):
         row[_J_COM + 18 * i + n] = velocity[i] / mass
 
 
-@subroutine(f"void(f8[::1], i8, f8, {_V3}, {_V3})")
+@subroutine(f"void(f8[::1], i8, f8, {V3}, {V3})")
 def fill_foot_column(row, place, radius, linear, angular):
     """Fill a column of a foot's Jacobians; ``place`` is that of its first number."""
     for i in range(3):
@@ -245,7 +196,7 @@ def place_leg(robot, row, leg):
     )
 
 
-@subroutine(f"{_BODY}(f8[::1], f8[::1], i8, {_AXES}, {_LEG})")
+@subroutine(f"{_BODY}(f8[::1], f8[::1], i8, {AXES}, {_LEG})")
 def compose(robot, row, n, base, leg):
     """Fill rows and columns n to n + 2, a leg's, of M and J_com; returns the stiff leg.
 
@@ -282,7 +233,7 @@ def compose(robot, row, n, base, leg):
     return whole
 
 
-@subroutine(f"{_WRENCH}(f8[::1], f8[::1], i8, {_AXES}, {_V3}, {_LEG})")
+@subroutine(f"{_WRENCH}(f8[::1], f8[::1], i8, {AXES}, {V3}, {_LEG})")
 def move(robot, row, n, base, acceleration, leg):
     """Fill bias of joints n to n + 2, velocities and drifts of the foot; returns the leg's wrench.
 
@@ -316,7 +267,7 @@ def move(robot, row, n, base, acceleration, leg):
     return f1, plus(about_x(c, s, m1), cross(p_hip, f1))
 
 
-@subroutine(f"{_AXES}({_AXES}, f8, f8)")
+@subroutine(f"{AXES}({AXES}, f8, f8)")
 def hip_axes(base, c, s):
     """The axes of a hip from those of the base."""
     x, y, z = base
@@ -327,7 +278,7 @@ def hip_axes(base, c, s):
     )
 
 
-@subroutine(f"void(f8[::1], f8[::1], i8, UniTuple({_V3}, 4))")
+@subroutine(f"void(f8[::1], f8[::1], i8, UniTuple({V3}, 4))")
 def roll(robot, row, n, motion):
     """Fill velocities and drifts of a foot's centre and its contact; n: its first joint."""
     v, w, a, dw = motion
@@ -338,7 +289,7 @@ def roll(robot, row, n, motion):
     put(row, _DRIFT_CONTACTS + n, (a[0] - radius * dw[1], a[1] + radius * dw[0], a[2]))
 
 
-@subroutine(f"void(f8[::1], f8[::1], i8, {_AXES}, {_LEG})")
+@subroutine(f"void(f8[::1], f8[::1], i8, {AXES}, {_LEG})")
 def fill_foot(robot, row, leg_index, base, leg):
     """Fill the place of a foot's centre, its Jacobian and that of its contact."""
     c, s, p_hip, p_thigh, p_calf, p_foot, _, _, _ = leg
@@ -362,7 +313,7 @@ def fill_foot(robot, row, leg_index, base, leg):
     fill_foot_column(row, place + 2, radius, turned, axes[1])
 
 
-@subroutine(f"void(f8[::1], f8[::1], {_AXES}, {_BODY}, {_V3}, {_V3})")
+@subroutine(f"void(f8[::1], f8[::1], {AXES}, {_BODY}, {V3}, {V3})")
 def fill_base(robot, row, base, whole, force, moment):
     """Fill the base's part of M and h, and what is left of the CoM: the robot's momentum."""
     (m, h, (xx, xy, xz, yy, yz, zz)), (x, y, z), mass = whole, whole[1], robot[_MASS]
