@@ -103,16 +103,21 @@ def _compiled(function: F, signature: str, folder: Path | None, nogil: bool) -> 
 
 
 class _MachineCode(CompileResultCacheImpl):
-    """What is kept of a compiled function.
+    """What is kept of a compiled function: what running it takes, not what a caller is linked with.
 
-    With it Numba keeps an environment for each of its own functions that was compiled along
-    (``np.zeros``, ``min``), and loading one imports that function's module, scipy.linalg at last.
-    Compiled code takes nothing from that module: any other will do.
+    With it Numba keeps the function's intermediate code, for callers that are compiled later, and
+    loading one parses it all: only the entry's name is asked for. And it keeps an environment for
+    each of its own functions that was compiled along (``np.zeros``, ``min``), and loading one
+    imports that function's module, scipy.linalg at last. Compiled code takes nothing from that
+    module: any other will do.
     """
 
     def reduce(self, cres: Any) -> tuple[Any, ...]:
-        *rest, environments = cres._reduce()
-        return (*rest, [_light(environment) for environment in environments])
+        (name, kind, (machine_code, _)), *rest, environments = cres._reduce()
+        entry = f'define void @"{cres.fndesc.llvm_cpython_wrapper_name}"() {{ ret void }}'
+        names = llvmlite.binding.parse_assembly(entry).as_bitcode()
+        library = (name, kind, (machine_code, names))
+        return (library, *rest, [_light(environment) for environment in environments])
 
 
 def _light(environment: Environment) -> Environment:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from go2_wbc.lazy import without_collecting
+
 KERNELS = (
     "derivation",
     "condensed",
@@ -20,5 +22,6 @@ KERNELS = (
 
 def load_kernels() -> None:
     """Compile every kernel, or load it: half a second, or about 20 s the first time."""
-    for name in KERNELS:
-        import_module(f"go2_wbc.kernels.{name}")
+    with without_collecting():
+        for name in KERNELS:
+            import_module(f"go2_wbc.kernels.{name}")
