@@ -20,16 +20,16 @@ import platform
 import shutil
 import tempfile
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import llvmlite.binding
 import numba
 import numpy as np
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.environment import Environment
-from numba.core.runtime.nrt import rtsys
+from numba.core.runtime import _nrt_python
 
 _log = logging.getLogger(__name__)
 
@@ -72,20 +72,32 @@ def subroutine(signature: str) -> Callable[[F], F]:
     compiled for the arguments that it is given.
     """
 
-    def deferred(function: F) -> F:
-        dispatcher = numba.njit(error_model="numpy")(function)
-        template_for = dispatcher.get_call_template
+    return lambda function: cast(F, _Subroutine(function, signature))
 
-        def get_call_template(args: Any, kws: Any) -> Any:
-            if not dispatcher.overloads:
-                dispatcher.compile(signature)
-                dispatcher.disable_compile()
-            return template_for(args, kws)
 
-        dispatcher.get_call_template = get_call_template
-        return dispatcher
+class _Subroutine:
+    """A function that Numba is told of when it is needed: most processes load only its callers."""
 
-    return deferred
+    def __init__(self, function: Callable[..., Any], signature: str) -> None:
+        self._function, self._signature = function, signature
+
+    @cached_property
+    def _dispatcher(self) -> Any:
+        return numba.njit(error_model="numpy")(self._function)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What Numba asks a global variable for, once it compiles code that names it."""
+        if not self._dispatcher.overloads:
+            self._dispatcher.compile(self._signature)
+            self._dispatcher.disable_compile()
+        return self._dispatcher._numba_type_
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._dispatcher(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._dispatcher, name)
 
 
 def _compiled(function: F, signature: str, folder: Path | None, nogil: bool) -> F:
@@ -129,6 +141,16 @@ def _light(environment: Environment) -> Environment:
     return light
 
 
+@cache
+def _offer_runtime() -> None:
+    """Name the functions of Numba's runtime that machine code calls.
+
+    That much of ``rtsys.initialize`` does loaded code need; compiling does the rest.
+    """
+    for name, address in _nrt_python.c_helpers.items():
+        llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
 class _KernelCache(FunctionCache):
     """Numba's cache, but loading does not import the compiler's library of functions.
 
@@ -138,7 +160,7 @@ class _KernelCache(FunctionCache):
     _impl_class = _MachineCode
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        rtsys.initialize(target_context)
+        _offer_runtime()
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
 
