@@ -29,6 +29,7 @@ import numba
 import numpy as np
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.environment import Environment
+from numba.core.registry import CPUDispatcher
 from numba.core.runtime import _nrt_python
 
 _log = logging.getLogger(__name__)
@@ -71,7 +72,6 @@ def subroutine(signature: str) -> Callable[[F], F]:
     A process that loads the kernel does not need it. Called from Python, as by a test, it is
     compiled for the arguments that it is given.
     """
-
     return lambda function: cast(F, _Subroutine(function, signature))
 
 
@@ -111,7 +111,20 @@ def _compiled(function: F, signature: str, folder: Path | None, nogil: bool) -> 
     finally:
         numba.config.CACHE_DIR = before
     dispatcher.disable_compile()
+    if dispatcher.stats.cache_hits:
+        dispatcher.__class__ = _Loaded
+        dispatcher._for_callers = _Subroutine(function, signature)
     return dispatcher
+
+
+class _Loaded(CPUDispatcher):
+    """A kernel that was loaded: a kernel that calls it and is compiled now compiles it along."""
+
+    _for_callers: _Subroutine
+
+    @property
+    def _numba_type_(self) -> Any:
+        return self._for_callers._numba_type_
 
 
 class _MachineCode(CompileResultCacheImpl):
