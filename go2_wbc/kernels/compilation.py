@@ -30,7 +30,7 @@ import numpy as np
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.environment import Environment
 from numba.core.registry import CPUDispatcher
-from numba.core.runtime import _nrt_python
+from numba.core.runtime import _nrt_python  # pyright: ignore[reportAttributeAccessIssue]
 
 _log = logging.getLogger(__name__)
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from go2_wbc.lazy import without_collecting
-
 KERNELS = (
     "derivation",
     "condensed",
@@ -22,6 +20,5 @@ KERNELS = (
 
 def load_kernels() -> None:
     """Compile every kernel, or load it: half a second, or about 20 s the first time."""
-    with without_collecting():
-        for name in KERNELS:
-            import_module(f"go2_wbc.kernels.{name}")
+    for name in KERNELS:
+        import_module(f"go2_wbc.kernels.{name}")

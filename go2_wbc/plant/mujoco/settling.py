@@ -108,8 +108,8 @@ def _kept_file(model: mujoco.MjModel, data: mujoco.MjData) -> Path | None:
     start = np.empty(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, start, _STATE)
     digest = hashlib.sha256(mujoco.mj_versionString().encode() + Path(__file__).read_bytes())
-    digest.update(binary)
-    digest.update(start)
+    digest.update(binary.data)
+    digest.update(start.data)
     return folder / "lying" / digest.hexdigest()[:32]
 
 
