@@ -1,8 +1,9 @@
 """The authoring language: what body and feet do, and when.
 
 A ``Timeline`` is a value; every method returns a longer one. Time is a cursor that each call moves
-on by ``over`` seconds (beats, after ``bpm``); ``at`` puts it elsewhere and ``together`` runs parts
-side by side. Places are offsets from the pose in which the motion starts: x ahead, y left, z up.
+on by ``over`` seconds (beats, after ``bpm`` or ``on_beats``); ``at`` puts it elsewhere and
+``together`` runs parts side by side. Places are offsets from the pose in which the motion starts: x
+ahead, y left, z up.
 
     Timeline().body(pitch=deg(15), z=-0.05, over=0.8).hold(0.4).home(over=0.8)
 
@@ -22,12 +23,12 @@ from jaxtyping import Float
 
 from go2_wbc.robot.model import RobotModel
 from motions.footing import Footing, standing_feet
-from motions.language.arrangement import Arrangement
-from motions.language.moves import Moves
+from motions.language.shapes import Shapes
 from motions.language.steps import Steps
+from motions.language.transforms import Transforms
 
 
-class Timeline(Moves, Steps, Arrangement):
+class Timeline(Shapes, Steps, Transforms):
     """An authored motion; ``motions.language`` holds its calls."""
 
     __slots__ = ()
