@@ -17,6 +17,7 @@ from motions import (
     motion_names,
 )
 from motions.authoring import Choice
+from motions.compiler import LEAST_RAMP
 
 # Between a difference quotient over 2 ms and the derivative; the curves are smooth.
 DIFFERENCE_TOLERANCE = 2e-2
@@ -107,7 +108,8 @@ def test_a_foot_is_unloaded_before_it_lifts_and_loaded_only_after_it_lands(
     stances = np.array([plan.at(float(t)).stance for t in times])
     assert not loads[~stances].any()
     change = np.abs(np.diff(loads, axis=0)).max()
-    assert change < 0.05 * loads.max()
+    assert plan.ramp >= LEAST_RAMP
+    assert change < 1.01 * 0.005 / plan.ramp * loads.max()
 
 
 def test_a_left_high_five_is_the_mirror_image_of_a_right_one(model: RobotModel) -> None:
