@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
+from numpy.typing import ArrayLike
 from scipy.interpolate import PPoly
 
-from go2_wbc.contacts import TIE, ContactSchedule
+from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
 from go2_wbc.curves import CurvePoint
 from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.reference import LegTask, MotionPlan, Posture, Reference, TrackedPoint
+from motions.dynamic_span import DynamicSpan
 from motions.placement import attitudes
 from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, reference
 from motions.problem import Problem
@@ -35,6 +36,7 @@ class CompiledPlan(MotionPlan):
         ramp: time [s] over which a foot is unloaded before lift-off and loaded after touchdown.
         problems: what could not be done as written.
         spans: start and end [s] of the named holds.
+        dynamic: its parts that obey the whole robot's dynamics.
     """
 
     name: str
@@ -46,14 +48,21 @@ class CompiledPlan(MotionPlan):
     ramp: float
     problems: tuple[Problem, ...]
     spans: Mapping[str, tuple[float, float]]
+    dynamic: tuple[DynamicSpan, ...] = ()
     _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Bind what the kernel reads."""
         contacts, curves = self.contacts, self.curves
         tasks, events = _tasks(contacts.modes, self.swings), np.array(contacts.times)
-        tables = (curves.x, curves.c, events, tasks, contacts.since, contacts.until)
+        since, until = self._gradual(contacts.since, -np.inf), self._gradual(contacts.until, np.inf)
+        tables = (curves.x, curves.c, events, tasks, since, until)
         object.__setattr__(self, "_tables", tables)
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether some of it is flight or balance on few feet."""
+        return bool(self.dynamic)
 
     @property
     def duration(self) -> float:  # type: ignore[override]
@@ -74,15 +83,31 @@ class CompiledPlan(MotionPlan):
 
     def readable_at(self, t: float) -> Reference:
         """The same as ``at``, step by step: what the kernel is held to."""
-        curves, phase = self._curves_at(t), self.contacts.at(t)
+        curves, phase = self._curves_at(t), self._phases(np.array([t]))
         parts = (slice(6), slice(6, 18), slice(18, None))
         body, joints, feet = (CurvePoint(*(curve[part] for curve in curves)) for part in parts)
-        tasks = [LegTask(int(task)) for task in _tasks(phase.stance, self.swings[self._event(t)])]
-        share = phase.load_share(self.ramp)
+        tasks = [LegTask(int(task)) for task in _tasks(phase.stance, self.swings[self._events([t])])[0]]
+        share = phase.load_share(self.ramp)[0]
         return reference(TrackedPoint.COM, body, joints, feet, tasks, share)
 
-    def _event(self, t: float) -> int:
-        return max(bisect_right(self.contacts.times, t + TIE) - 1, 0)
+    def _events(self, times: ArrayLike) -> Int[np.ndarray, " n"]:
+        after = np.searchsorted(self.contacts.times, np.asarray(times) + TIE, side="right")
+        return np.maximum(after - 1, 0)
+
+    def _phases(self, times: Float[np.ndarray, " n"]) -> ContactPhase:
+        """The contacts at ``times``, with the changes to which load is ramped."""
+        rows, (*_, since, until) = self._events(times), self._tables
+        elapsed = np.maximum(times[:, None] - since[rows], 0.0)
+        return ContactPhase(self.contacts.modes[rows], elapsed, until[rows] - times[:, None])
+
+    def _gradual(
+        self, changes: Float[np.ndarray, "m 4"], never: float
+    ) -> Float[np.ndarray, "m 4"]:
+        """``changes`` of contacts [s] but those in dynamic spans: there forces jump as planned."""
+        table = changes.copy()
+        for span in self.dynamic:
+            table[(changes > span.start - TIE) & (changes < span.end + TIE)] = never
+        return table
 
     def _curves_at(self, t: float) -> Float[np.ndarray, "3 30"]:
         """Values, rates and accelerations of all curves: a cubic and its two derivatives."""
@@ -98,9 +123,7 @@ class CompiledPlan(MotionPlan):
     def samples(self, times: Float[np.ndarray, " n"]) -> PlanSamples:
         """What the references at ``times`` ask for; ``at`` gives the same one by one."""
         values = self.curves(np.clip(times, 0.0, self.duration))
-        phase = self.contacts.at_times(times)
-        event = np.searchsorted(self.contacts.times, times + TIE, side="right") - 1
-        swings = self.swings[np.maximum(event, 0)]
+        phase, swings = self._phases(times), self.swings[self._events(times)]
         return PlanSamples(
             times=times,
             p_world=values[:, :3],

@@ -40,8 +40,8 @@ UNLOAD_TIME = 0.3
 so that the forces of the others change slowly."""
 
 
-def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
-    """The plan of ``timeline``, in the frame of the motion.
+def compile_quasi_static(timeline: Timeline, model: RobotModel) -> CompiledPlan:
+    """The plan of ``timeline`` without dynamic blocks, in the frame of the motion.
 
     It tracks the CoM, which balance is about, and not the base. Clamped splines begin and end at
     rest.

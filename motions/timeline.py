@@ -15,10 +15,11 @@ from __future__ import annotations
 import math
 
 from motions.language.arrangement import Arrangement
+from motions.language.flight import Flight
 from motions.language.moves import Moves
 
 
-class Timeline(Moves, Arrangement):
+class Timeline(Moves, Flight, Arrangement):
     """An authored motion; ``motions.language`` holds its calls."""
 
     __slots__ = ()
