@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import pinocchio as pin
 from jaxtyping import Bool, Float
 from scipy.interpolate import PPoly
 
@@ -19,10 +18,10 @@ from go2_wbc.curves import Ease
 from go2_wbc.errors import PlanNotFound, TimelineError
 from go2_wbc.reference import Anchor, Posture
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
+from go2_wbc.robot.rotations import yaw_rotation
 from motions.compiled_plan import CompiledPlan
 from motions.compiler import compile_quasi_static
-from motions.dynamic_span import DynamicSpan, curves_of, placed
+from motions.dynamic_span import DynamicSpan, attitude_angles, curves_of, placed
 from motions.dynamics.phases import PhaseProblem
 from motions.dynamics.solver import solve
 from motions.dynamics.trajectory import DynamicTrajectory
@@ -113,7 +112,9 @@ class _Maker:
             if not isinstance(key, PhaseKey | Mark) and start - SAME <= key.start < end - SAME
         ]
         entry = line.entry if start == 0.0 else Posture.STAND
-        plan = self._compiled(keys or [replace(_RESTING, end=end - start)], end - start, entry, exit)
+        plan = self._compiled(
+            keys or [replace(_RESTING, end=end - start)], end - start, entry, exit
+        )
         self._add(plan.curves, np.array(plan.contacts.times), plan.contacts.modes, plan.swings)
         self._problems += [replace(one, time=one.time + start) for one in plan.problems]
         self._ramps.append(plan.ramp)
@@ -129,7 +130,7 @@ class _Maker:
             self._problems.append(Problem("dynamic plan", "trunk", block.start, reason=reason))
             self.add_stretch(block.end, Posture.STAND)
             return
-        span = DynamicSpan(self._time, placed(found, self._frame))
+        span = DynamicSpan(self._time, self._frame, problem, placed(found, self._frame))
         landed = _landed(found, self._frame)
         home = _moved(self._home(), landed).c[3, 0]
         curves = curves_of(span.trajectory, self._model, home)
@@ -166,11 +167,13 @@ class _Maker:
         )
 
     def _compiled(
-        self, keys: Sequence[Key], duration: float, entry: Posture, exit: Posture  # noqa: A002
+        self,
+        keys: Sequence[Key],
+        duration: float,
+        entry: Posture,
+        exit: Posture,  # noqa: A002
     ) -> CompiledPlan:
-        stretch = replace(
-            self._timeline, keys=tuple(keys), cursor=duration, entry=entry, exit=exit
-        )
+        stretch = replace(self._timeline, keys=tuple(keys), cursor=duration, entry=entry, exit=exit)
         return compile_quasi_static(stretch, self._model)
 
     def _home(self) -> PPoly:
@@ -190,8 +193,7 @@ class _Maker:
 
 def _turn(found: DynamicTrajectory) -> float:
     """Yaw [rad] from the start to the end, whole turns included."""
-    yaws = [rpy_from_rotation(pin.Quaternion(q[3:7]).toRotationMatrix())[2] for q in found.q]
-    return float(np.unwrap(yaws)[-1])
+    return float(attitude_angles(found.q)[-1, 2])
 
 
 def _landed(found: DynamicTrajectory, frame: Anchor) -> Anchor:

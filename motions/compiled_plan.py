@@ -86,7 +86,9 @@ class CompiledPlan(MotionPlan):
         curves, phase = self._curves_at(t), self._phases(np.array([t]))
         parts = (slice(6), slice(6, 18), slice(18, None))
         body, joints, feet = (CurvePoint(*(curve[part] for curve in curves)) for part in parts)
-        tasks = [LegTask(int(task)) for task in _tasks(phase.stance, self.swings[self._events([t])])[0]]
+        tasks = [
+            LegTask(int(task)) for task in _tasks(phase.stance, self.swings[self._events([t])])[0]
+        ]
         share = phase.load_share(self.ramp)[0]
         return reference(TrackedPoint.COM, body, joints, feet, tasks, share)
 
@@ -100,9 +102,7 @@ class CompiledPlan(MotionPlan):
         elapsed = np.maximum(times[:, None] - since[rows], 0.0)
         return ContactPhase(self.contacts.modes[rows], elapsed, until[rows] - times[:, None])
 
-    def _gradual(
-        self, changes: Float[np.ndarray, "m 4"], never: float
-    ) -> Float[np.ndarray, "m 4"]:
+    def _gradual(self, changes: Float[np.ndarray, "m 4"], never: float) -> Float[np.ndarray, "m 4"]:
         """``changes`` of contacts [s] but those in dynamic spans: there forces jump as planned."""
         table = changes.copy()
         for span in self.dynamic:

@@ -13,6 +13,7 @@ from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
+from motions.dynamics.phases import PhaseProblem
 from motions.dynamics.trajectory import DynamicTrajectory
 
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -24,16 +25,59 @@ class DynamicSpan:
 
     Attributes:
         start: when [s] it starts in the plan.
+        frame: where: the frame of its problem in that of the plan.
+        problem: what was asked.
         trajectory: states, torques, forces, gains and deviation; in the plan's frame.
     """
 
     start: float
+    frame: Anchor
+    problem: PhaseProblem
     trajectory: DynamicTrajectory
 
     @property
     def end(self) -> float:
         """When [s] it ends in the plan."""
         return self.start + self.trajectory.duration
+
+    def at(self, times: Float[np.ndarray, " k"], model: RobotModel) -> SpanSamples:
+        """States, torques and forces at ``times`` [s] of the plan, within the span."""
+        plan = self.trajectory
+        rows = np.searchsorted(plan.times, times - self.start, side="right") - 1
+        rows = np.clip(rows, 0, len(plan.tau) - 1)
+        steps = np.diff(plan.times)[rows]
+        share = np.clip((times - self.start - plan.times[rows]) / steps, 0.0, 1.0)[:, None]
+        a = (plan.v[rows + 1] - plan.v[rows]) / steps[:, None]
+        ways = share * steps[:, None] * plan.v[rows + 1]
+        q = [
+            pin.integrate(model.pin_model, plan.q[k], way)
+            for k, way in zip(rows, ways, strict=True)
+        ]
+        return SpanSamples(
+            q=np.array(q).reshape(-1, 19),
+            v=(1.0 - share) * plan.v[rows] + share * plan.v[rows + 1],
+            a=a,
+            tau=plan.tau[rows],
+            forces=plan.forces[rows],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class SpanSamples:
+    """A span at k instants.
+
+    Attributes:
+        q, v: (k, 19), (k, 18) states, between the knots as the solver steps.
+        a: (k, 18) accelerations.
+        tau: (k, 12) torques [N m].
+        forces: (k, 4, 3) of the ground on the feet [N].
+    """
+
+    q: Float[np.ndarray, "k 19"]
+    v: Float[np.ndarray, "k 18"]
+    a: Float[np.ndarray, "k 18"]
+    tau: Float[np.ndarray, "k 12"]
+    forces: Float[np.ndarray, "k 4 3"]
 
 
 def placed(trajectory: DynamicTrajectory, anchor: Anchor) -> DynamicTrajectory:
@@ -80,23 +124,40 @@ def followed(trajectory: DynamicTrajectory, model: RobotModel) -> Float[np.ndarr
     return q
 
 
+def feet_at(
+    q: Float[np.ndarray, "n 19"], v: Float[np.ndarray, "n 18"], model: RobotModel
+) -> tuple[Float[np.ndarray, "n 4 3"], Float[np.ndarray, "n 4 3"]]:
+    """Places [m] and velocities [m/s] of the feet's centres, in the frame in which ``q`` is."""
+    pin_model, data = model.pin_model, model.pin_model.createData()
+    frames = [pin_model.getFrameId(name) for name in FOOT_NAMES]
+    places, velocities = np.empty((len(q), 4, 3)), np.empty((len(q), 4, 3))
+    for row in range(len(q)):
+        pin.forwardKinematics(pin_model, data, q[row], v[row])
+        pin.updateFramePlacements(pin_model, data)
+        for leg, frame in enumerate(frames):
+            velocity = pin.getFrameVelocity(pin_model, data, frame, _ALIGNED)
+            places[row, leg], velocities[row, leg] = data.oMf[frame].translation, velocity.linear
+    return places, velocities
+
+
+def attitude_angles(q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 3"]:
+    """Roll, pitch, yaw [rad] of the trunk, whole turns added up from the first row on."""
+    turns = [pin.Quaternion(row[3:7]).toRotationMatrix() for row in q]
+    return np.unwrap([rpy_from_rotation(R) for R in turns], axis=0)
+
+
 def _values_and_rates(
     q: Float[np.ndarray, "n 19"], v: Float[np.ndarray, "n 18"], model: RobotModel
 ) -> tuple[Float[np.ndarray, "n 30"], Float[np.ndarray, "n 30"]]:
     pin_model, data = model.pin_model, model.pin_model.createData()
-    frames = [pin_model.getFrameId(name) for name in FOOT_NAMES]
-    values, rates = np.empty((len(q), 30)), np.empty((len(q), 30))
+    rpy, (places, speeds) = attitude_angles(q), feet_at(q, v, model)
+    coms, moves = np.empty((len(q), 3)), np.empty((len(q), 3))
     for row in range(len(q)):
-        com = pin.centerOfMass(pin_model, data, q[row], v[row])
-        pin.updateFramePlacements(pin_model, data)
-        rpy = rpy_from_rotation(pin.Quaternion(q[row, 3:7]).toRotationMatrix())
-        places = [data.oMf[frame].translation for frame in frames]
-        speeds = [pin.getFrameVelocity(pin_model, data, frame, _ALIGNED).linear for frame in frames]
-        values[row] = np.concatenate([com, rpy, q[row, 7:], *places])
-        turning = _rpy_rates(rpy, v[row, 3:6])
-        rates[row] = np.concatenate([data.vcom[0], turning, v[row, 6:], *speeds])
-    values[:, 3:6] = np.unwrap(values[:, 3:6], axis=0)
-    return values, rates
+        coms[row] = pin.centerOfMass(pin_model, data, q[row], v[row])
+        moves[row] = data.vcom[0]
+    turning = [_rpy_rates(*pair) for pair in zip(rpy, v[:, 3:6], strict=True)]
+    values = np.hstack([coms, rpy, q[:, 7:], places.reshape(-1, 12)])
+    return values, np.hstack([moves, turning, v[:, 6:], speeds.reshape(-1, 12)])
 
 
 def _rpy_rates(

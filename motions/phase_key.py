@@ -39,5 +39,3 @@ def _mirrored(phase: Phase) -> Phase:
     feet = {leg.mirror: (x, -y, z) for leg, (x, y, z) in phase.feet.items()}
     stance = frozenset(leg.mirror for leg in phase.stance)
     return replace(phase, stance=stance, body=body, feet=feet)
-
-

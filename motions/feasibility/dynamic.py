@@ -134,7 +134,8 @@ def contacts(
     Friction is max(|f_x|, |f_y|) / f_z, in the axes of the pyramid that the controller keeps.
     """
     times, normal = motion.times, forces.contact[:, :, 2]
-    is_needed = ~motion.stance.all(axis=1, keepdims=True)  # on four feet one may be unloaded
+    written = ~motion.is_dynamic[:, None]
+    is_needed = written & ~motion.stance.all(axis=1, keepdims=True)  # of four one may be unloaded
     stands = (motion.load_share > LOADED) & is_needed
     sideways = np.abs(forces.contact[:, :, :2]).max(axis=2)
     pressed = normal > PRESSED
@@ -143,9 +144,9 @@ def contacts(
     load = ("foot load", "N", FEET, times, normal)
     grip = ("friction", "", FEET, times, needed)
     return (
-        Series.against(*wrench, np.array([limits.wrench, limits.wrench * ARM])),
+        Series.against(*wrench, np.array([limits.wrench, limits.wrench * ARM]), where=written),
         Series.against(*load, limits.foot_load, is_floor=True, where=stands, tight=TIGHT_LOAD),
-        Series.against(*grip, limits.friction, where=pressed, tight=TIGHT_FRICTION),
+        Series.against(*grip, limits.friction, where=pressed & written, tight=TIGHT_FRICTION),
     )
 
 
@@ -164,9 +165,11 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
             values[rows, column] = support_margins(feet, points[rows])
     com = ("support", "m", ("CoM",), motion.times, values[:, :1])
     zmp = ("support of ZMP", "m", ("ZMP",), motion.times, values[:, 1:])
+    written = ~motion.is_dynamic[:, None]
+    how = {"is_floor": True, "where": written, "tight": TIGHT_SUPPORT}
     return (
-        Series.against(*com, limits.support, is_floor=True, tight=TIGHT_SUPPORT),
-        Series.against(*zmp, limits.zero_moment, is_floor=True, tight=TIGHT_SUPPORT),
+        Series.against(*com, limits.support, **how),
+        Series.against(*zmp, limits.zero_moment, **how),
     )
 
 

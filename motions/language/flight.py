@@ -64,7 +64,10 @@ class Flight(Written):
             positive("phase() duration", duration) * self.beat,
             frozenset(word("foot", leg, Leg.__members__) for leg in stance),
             None if body is None else _pose(body),
-            {word("foot", leg, Leg.__members__): _place(place) for leg, place in (feet or {}).items()},
+            {
+                word("foot", leg, Leg.__members__): _place(place)
+                for leg, place in (feet or {}).items()
+            },
             label,
         )
         last = max(self.in_order(PhaseKey), key=lambda key: key.end, default=None)
