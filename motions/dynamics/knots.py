@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Bool, Float
-from scipy.interpolate import PchipInterpolator
+from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import Anchor
@@ -23,6 +23,10 @@ from motions.dynamics.phases import FullState, Phase, PhaseProblem
 from motions.dynamics.standing import standing, standing_feet
 from motions.placement import attitudes, configurations, turned, turned_back
 
+GRAVITY = 9.81
+LEAD = 0.2
+"""Share of a flight's way by which the trunk is ahead of the feet at take-off, and behind them at
+touchdown, in the first guess."""
 KNOT_PERIOD = 0.02
 """Time [s] between knots, nearly: phases last whole numbers of them. Half of it costs two to four
 times the work, and the plans are no better (own experiments)."""
@@ -128,37 +132,49 @@ def _trunk_path(
     ends: tuple[FullState, FullState],
     p_feet: Float[np.ndarray, "4 3"],
 ) -> Float[np.ndarray, "n1 6"]:
-    """Through the poses that are asked, over the feet where none is, and ballistic in flight."""
+    """Through the poses that are asked, over the feet where none is, and ballistic in flight.
+
+    In a flight the feet go farther than the trunk, which is ahead of them at take-off and behind
+    them at touchdown.
+    """
     first, last = (pose_of(state.q) for state in ends)
-    keys, poses = [0], [first]
     origin = Anchor.of_feet(p_feet, 0.0)
-    for goal in goals:
-        pose = goal.pose
-        if pose is None:
-            here = Anchor.of_feet(goal.p_feet, 0.0)
-            pose = first.copy()
-            pose[:2] += here.p_world[:2] - origin.p_world[:2]
-            pose[5] += here.yaw - origin.yaw
-        keys.append(goal.knot)
-        poses.append(pose)
-    poses[-1] = last if goals[-1].pose is None else poses[-1]
-    table = np.array(poses)
+    keys = [0, *(goal.knot for goal in goals)]
+    table = np.array([first, *(_over_feet(first, origin, goal.p_feet) for goal in goals)])
+    flights = _spans(~stance.any(axis=1))
+    for begin, end in flights:
+        rows = [keys.index(begin), keys.index(end)]
+        lead = LEAD * (table[rows[1]] - table[rows[0]])
+        table[rows] += np.array([lead, -lead])
+    for row, goal in enumerate(goals, start=1):
+        if goal.pose is not None:
+            table[row] = goal.pose
+    if goals[-1].pose is None:
+        table[-1] = last
     table[:, 5] = np.unwrap(table[:, 5])
-    path = PchipInterpolator(times[keys], table)(times)
-    flying = np.concatenate([~stance.any(axis=1), [False]])
-    for begin, end in _spans(flying):
-        _throw(path, times, begin, min(end, len(times) - 1))
-    return path
+    slopes = PchipInterpolator(times[keys], table).derivative()(times[keys])
+    slopes[[0, -1]] = 0.0
+    for begin, end in flights:
+        rows = [keys.index(begin), keys.index(end)]
+        inside = slice(rows[0], rows[1] + 1)
+        t = times[np.array(keys)[inside]] - times[begin]
+        share = (t / t[-1])[:, None]
+        table[inside] = (1.0 - share) * table[rows[0]] + share * table[rows[1]]
+        table[inside, 2] += 0.5 * GRAVITY * t * (t[-1] - t)
+        slopes[inside] = (table[rows[1]] - table[rows[0]]) / t[-1]
+        slopes[inside, 2] += 0.5 * GRAVITY * (t[-1] - 2.0 * t)
+    return CubicHermiteSpline(times[keys], table, slopes)(times)
 
 
-def _throw(
-    path: Float[np.ndarray, "n1 6"], times: Float[np.ndarray, " n1"], begin: int, end: int
-) -> None:
-    """Make the flight from knot ``begin`` to ``end`` straight, with the height of a throw."""
-    t = times[begin : end + 1] - times[begin]
-    share = (t / t[-1])[:, None]
-    path[begin : end + 1] = (1.0 - share) * path[begin] + share * path[end]
-    path[begin : end + 1, 2] += 0.5 * 9.81 * t * (t[-1] - t)
+def _over_feet(
+    first: Float[np.ndarray, "6"], origin: Anchor, p_feet: Float[np.ndarray, "4 3"]
+) -> Float[np.ndarray, "6"]:
+    """The first pose, moved as the feet have moved."""
+    here = Anchor.of_feet(p_feet, 0.0)
+    pose = first.copy()
+    pose[:2] += here.p_world[:2] - origin.p_world[:2]
+    pose[5] += here.yaw - origin.yaw
+    return pose
 
 
 def _spans(mask: Bool[np.ndarray, " n"]) -> list[tuple[int, int]]:

@@ -41,3 +41,53 @@ def _flight_time(height: float) -> float:
 def _moved(x: float, y: float, yaw: float, z: float) -> dict[Leg, tuple[float, float, float]]:
     moved = _FOOTPRINT @ yaw_rotation(yaw)[:2, :2].T - _FOOTPRINT + [x, y]
     return {leg: (float(moved[leg, 0]), float(moved[leg, 1]), z) for leg in LEGS}
+
+
+def hop(times: int = 3, period: float = 0.5, height: float = 0.05) -> tuple[Phase, ...]:
+    """Hop in place, touching down once a ``period`` [s]."""
+    half = 0.5 * _flight_time(height)
+    up, down = _moved(0.0, 0.0, 0.0, height), _moved(0.0, 0.0, 0.0, 0.0)
+    ground = period - 2.0 * half
+    phases = [Phase(0.30, body=(0.0, 0.0, _CROUCH, 0.0, 0.0, 0.0), label="crouch")]
+    for count in range(1, times + 1):
+        phases += [
+            Phase(0.20 if count == 1 else ground, label=f"push {count}"),
+            Phase(half, frozenset(), feet=up, label=f"rise {count}"),
+            Phase(half, frozenset(), feet=down, label=f"fall {count}"),
+        ]
+    phases += [
+        Phase(0.20, label="land"),
+        Phase(0.30, body=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), label="stand"),
+    ]
+    return tuple(phases)
+
+
+REAR, FRONT = frozenset({Leg.RL, Leg.RR}), frozenset({Leg.FL, Leg.FR})
+
+
+def rear(pitch: float = math.radians(-25.0), hold: float = 0.5) -> tuple[Phase, ...]:
+    """Rear up on the rear feet, the trunk at ``pitch`` (negative: front up) for ``hold`` [s]."""
+    up: _Body = (-0.10, 0.0, 0.04, 0.0, pitch, 0.0)
+    return (
+        Phase(0.40, body=(-0.04, 0.0, -0.03, 0.0, 0.3 * pitch, 0.0), label="lean back"),
+        Phase(0.16, label="push"),
+        Phase(0.30, REAR, body=up, label="rear up"),
+        Phase(hold, REAR, body=up, label="hold"),
+        Phase(0.30, REAR, feet={leg: (0.0, 0.0, 0.0) for leg in FRONT}, label="down"),
+        Phase(0.20, label="land"),
+        Phase(0.40, body=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), label="stand"),
+    )
+
+
+def lift(legs: tuple[Leg, ...] = (Leg.FL, Leg.RR), hold: float = 0.35, height: float = 0.06) -> tuple[Phase, ...]:
+    """Lift feet together and put them down where they stood."""
+    up = {leg: (0.0, 0.0, height) for leg in legs}
+    down = {leg: (0.0, 0.0, 0.0) for leg in legs}
+    stance = ALL_FEET - frozenset(legs)
+    return (
+        Phase(0.40, label="shift"),
+        Phase(0.5 * hold, stance, feet=up, label="lift"),
+        Phase(0.5 * hold, stance, feet=down, label="lower"),
+        Phase(0.20, label="land"),
+        Phase(0.30, body=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), label="stand"),
+    )

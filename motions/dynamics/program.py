@@ -61,6 +61,14 @@ class Program:
         for row, model in enumerate(self._models):
             model.u_lb, model.u_ub = lower[row], upper[row]
 
+    def soften(self, share: float) -> None:
+        """Let forces outside the friction cone cost ``share`` of their full cost."""
+        for model in self._models:
+            costs = model.differential.costs.costs.todict()
+            for name in FOOT_NAMES:
+                if (cone := costs.get(_cone_of(name))) is not None:
+                    cone.weight = share * self._weights.friction
+
     def _running(
         self, knot: int, dt: float, goal: Goal | None
     ) -> crocoddyl.IntegratedActionModelEuler:
@@ -106,7 +114,7 @@ class Program:
         )
         residual = crocoddyl.ResidualModelContactFrictionCone(self._state, frame, cone, 12)
         barrier = _barrier(cone.lb, cone.ub)
-        self._add(costs, f"{name}_cone", residual, self._weights.friction, barrier)
+        self._add(costs, _cone_of(name), residual, self._weights.friction, barrier)
 
     def _add_effort(self, costs: crocoddyl.CostModelSum, knot: int) -> None:
         """Torques near standing, and near the first guess."""
@@ -192,6 +200,10 @@ class Program:
         else:
             cost = crocoddyl.CostModelResidual(self._state, activation, residual)
         costs.addCost(name, cost, weight)
+
+
+def _cone_of(foot: str) -> str:
+    return f"{foot}_cone"
 
 
 def _barrier(

@@ -5,22 +5,26 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import crocoddyl
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from motions.dynamics.knots import Knots
 from motions.dynamics.program import Program
 
-ITERATIONS = 200
+ITERATIONS = 100
 """Of one start; what converges does so in fewer (own experiments)."""
-START, DEFAULT = 1e-3, 1e-9
-"""First regularisations: a strong one for a rough guess, the solver's own for a good one."""
-STOP = 1e-4
-"""Expected improvement of the cost below which a solution is done."""
+REGULARISATIONS = (1e-1, 1e-3, 1e-9)
+"""First regularisations to try: a strong one for a rough guess; the last is the solver's own."""
+SOFT = 1e-2
+"""Share of the cost of forces outside the cone with which a start begins: the full cost is so steep
+that from a rough guess it takes five times the iterations, if it converges at all."""
+SOFT_STOP, STOP = 1e-2, 1e-3
+"""Expected improvement of the cost below which a soft and a full solution are done."""
 LINE_ROUNDS = 4
 """Rounds in which torque bounds and speeds are made to agree."""
 
@@ -59,7 +63,6 @@ class Search:
         self._deadline = time.monotonic() + budget
         self._progress = progress
         self._solver = crocoddyl.SolverBoxFDDP(program.problem)
-        self._solver.th_stop = STOP
         self._watch = _watch(self)
         self._solver.setCallbacks([self._watch])
 
@@ -92,11 +95,12 @@ class Search:
         knots = self._knots
         guess = list(np.hstack([knots.q, knots.v]))
         still = [guess[0]] * len(guess)
-        for xs, regularisation in (
-            (guess, START), (guess, DEFAULT), (still, DEFAULT), (still, START),
-        ):  # fmt: skip
-            us = [self._program.tau_hold] * (len(xs) - 1)
-            if self._solve(xs, us, regularisation):
+        us = [self._program.tau_hold] * (len(guess) - 1)
+        for xs, regularisation in product((guess, still), REGULARISATIONS):
+            self._program.soften(SOFT)
+            self._solve(xs, us, regularisation, SOFT_STOP)
+            self._program.soften(1.0)
+            if self._solve(list(self._solver.xs), list(self._solver.us), regularisation, STOP):
                 return
         raise PlanNotFound(
             f"no dynamic plan: none of the starts converges ({self.iterations} iterations); the "
@@ -107,7 +111,6 @@ class Search:
         """Bound the torques by the speeds of the solution until both agree."""
         for _ in range(LINE_ROUNDS):
             x, us = np.array(self._solver.xs), np.array(self._solver.us)
-            before = [(m.u_lb.copy(), m.u_ub.copy()) for m in self._program.problem.runningModels]
             self._program.bound(x[:-1, 19 + 6 :])
             bounds = [(m.u_lb, m.u_ub) for m in self._program.problem.runningModels]
             over = max(
@@ -117,10 +120,13 @@ class Search:
             if over < AGREED:
                 return
             clipped = [np.clip(u, *bound) for u, bound in zip(us, bounds, strict=True)]
-            self._solve(list(x), clipped, START)
+            self._solve(list(x), clipped, REGULARISATIONS[0], STOP)
 
-    def _solve(self, xs: list[np.ndarray], us: list[np.ndarray], regularisation: float) -> bool:
+    def _solve(
+        self, xs: list[np.ndarray], us: list[np.ndarray], regularisation: float, stop: float
+    ) -> bool:
         solver = self._solver
+        solver.th_stop = stop
         converged = solver.solve(xs, us, ITERATIONS, False, regularisation)
         return bool(converged and solver.isFeasible and np.isfinite(solver.cost))
 
