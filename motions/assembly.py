@@ -101,7 +101,7 @@ class _Maker:
         self._problems: list[Problem] = []
         self._ramps: list[float] = []
 
-    def add_stretch(self, end: float, exit: Posture) -> None:  # noqa: A002 (as Timeline's)
+    def add_stretch(self, end: float, exit: Posture) -> None:
         """What is written from here to ``end`` [s]."""
         start, line = self._time, self._timeline
         if end - start < SHORTEST:
@@ -171,7 +171,7 @@ class _Maker:
         keys: Sequence[Key],
         duration: float,
         entry: Posture,
-        exit: Posture,  # noqa: A002
+        exit: Posture,
     ) -> CompiledPlan:
         stretch = replace(self._timeline, keys=tuple(keys), cursor=duration, entry=entry, exit=exit)
         return compile_quasi_static(stretch, self._model)

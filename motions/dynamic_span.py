@@ -59,6 +59,7 @@ class DynamicSpan:
             a=a,
             tau=plan.tau[rows],
             forces=plan.forces[rows],
+            v_motors=0.5 * (plan.v[rows, 6:] + plan.v[rows + 1, 6:]),
         )
 
 
@@ -71,6 +72,9 @@ class SpanSamples:
         a: (k, 18) accelerations.
         tau: (k, 12) torques [N m].
         forces: (k, 4, 3) of the ground on the feet [N].
+        v_motors: (k, 12) joint speeds [rad/s] at which the torques are given: the mean from knot to
+            knot, since a step by semi-implicit Euler gives the torque of the middle between the
+            speeds (as leapfrog does).
     """
 
     q: Float[np.ndarray, "k 19"]
@@ -78,6 +82,7 @@ class SpanSamples:
     a: Float[np.ndarray, "k 18"]
     tau: Float[np.ndarray, "k 12"]
     forces: Float[np.ndarray, "k 4 3"]
+    v_motors: Float[np.ndarray, "k 12"]
 
 
 def placed(trajectory: DynamicTrajectory, anchor: Anchor) -> DynamicTrajectory:

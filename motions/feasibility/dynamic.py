@@ -68,12 +68,14 @@ class Forces:
         tau: (n, 12) joint torques [N m].
         missing: (n, 2) part of the force [N] and of the moment [N m] that the feet cannot give.
         zmp: (n, 2) zero-moment point on the ground [m].
+        v_motors: (n, 12) joint speeds [rad/s] at which the torques are given; by default the path's.
     """
 
     contact: Float[np.ndarray, "n 4 3"]
     tau: Float[np.ndarray, "n 12"]
     missing: Float[np.ndarray, "n 2"]
     zmp: Float[np.ndarray, "n 2"]
+    v_motors: Float[np.ndarray, "n 12"] | None = None
 
 
 def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
@@ -115,9 +117,10 @@ def torque(
     Only a driving motor, tau v > 0, meets the line of torque and speed; rounding moves none.
     """
     asked, most = np.abs(forces.tau), limits.torque_share * model.torque_limits
-    lower, upper = model.motor.limits(motion.v[:, 6:])
+    v = motion.v[:, 6:] if forces.v_motors is None else forces.v_motors
+    lower, upper = model.motor.limits(v)
     at_speed = np.where(forces.tau < 0.0, -lower, upper)
-    drives = forces.tau * motion.v[:, 6:] > STILL * asked
+    drives = forces.tau * v > STILL * asked
     tight = TIGHT_TORQUE * float(model.torque_limits.min())
     what = ("N m", JOINTS, motion.times, asked)
     return (

@@ -17,7 +17,7 @@ import pinocchio as pin
 from jaxtyping import Bool, Float
 from scipy.interpolate import PPoly
 
-from go2_wbc.legs import FOOT_NAMES, LEGS
+from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
 from motions.compiled_plan import CompiledPlan
@@ -38,11 +38,13 @@ NEAR = 0.8
 def with_spans(forces: Forces, path: Trajectory, plan: CompiledPlan, model: RobotModel) -> Forces:
     """``forces`` along ``path`` with the plan's own where it is dynamic."""
     contact, tau, missing = forces.contact.copy(), forces.tau.copy(), forces.missing.copy()
+    v = path.v[:, 6:].copy()
     for span in plan.dynamic:
         rows = (path.times >= span.start) & (path.times < span.end)
         found = span.at(path.times[rows], model)
         contact[rows], tau[rows], missing[rows] = found.forces, found.tau, 0.0
-    return replace(forces, contact=contact, tau=tau, missing=missing)
+        v[rows] = found.v_motors
+    return replace(forces, contact=contact, tau=tau, missing=missing, v_motors=v)
 
 
 def flight(plan: CompiledPlan, model: RobotModel, limits: FlightLimits) -> list[Series]:
