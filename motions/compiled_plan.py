@@ -14,7 +14,7 @@ from scipy.interpolate import PPoly
 from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
 from go2_wbc.curves import CurvePoint
 from go2_wbc.kernels.layout import REFERENCE
-from go2_wbc.reference import LegTask, MotionPlan, Posture, Reference, TrackedPoint
+from go2_wbc.reference import Footsteps, LegTask, MotionPlan, Posture, Reference, TrackedPoint
 from motions.dynamic_span import DynamicSpan
 from motions.placement import attitudes
 from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, reference
@@ -68,6 +68,13 @@ class CompiledPlan(MotionPlan):
     def duration(self) -> float:  # type: ignore[override]
         """Length of the motion [s]."""
         return float(self.curves.x[-1])
+
+    @property
+    def footsteps(self) -> Footsteps | None:
+        """How its feet step, if any does; see ``MotionPlan.footsteps``."""
+        if not self.swings.any():
+            return None
+        return Footsteps(self.contacts, self.ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX)
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""

@@ -41,7 +41,7 @@ class PlayPlan(Behaviour):
         super().start(snapshot)
         self._last = self._start
         self._anchor = Anchor.of_feet(snapshot.p_world_feet, FOOT_RADIUS)
-        self._follower = Playback(self._anchor)
+        self._follower = Playback(self._anchor, self.plan.footsteps)
 
     def return_safely(self) -> None:
         """Leave the plan: go to its nearest instant on four loaded feet; any thread may call."""
@@ -65,17 +65,20 @@ class PlayPlan(Behaviour):
     def update(self, snapshot: Snapshot) -> Reference:
         """The plan's reference of this instant, in the world."""
         now = snapshot.state.time
-        row = self._planned(now)
-        reference = self._follower.follow(row, snapshot, now - self._last)
+        row, t = self._planned(now)
+        reference = self._follower.follow(row, snapshot, t, now - self._last)
         self._last = now
         return reference
 
-    def _planned(self, now: float) -> Float[np.ndarray, " size"]:
+    def _planned(self, now: float) -> tuple[Float[np.ndarray, " size"], float]:
+        """The plan's row of this tick, and how far into the plan it is [s]."""
         if self._must_return and self._return is None:
             self._return = SafeReturn(self.plan, self._last - self._start)
         if self._return is not None:
-            return self._return.advance(now - self._last).row
-        return self.plan.row_at(now - self._start)
+            row = self._return.advance(now - self._last).row
+            return row, self._return.t
+        t = now - self._start
+        return self.plan.row_at(t), t
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the plan is over, or the way back from it."""

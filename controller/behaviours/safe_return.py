@@ -26,27 +26,28 @@ class SafeReturn:
     """Runs the clock of a plan smoothly from one instant to the nearest safe one.
 
     Attributes:
+        t: where its clock stands [s].
         target: the safe instant [s].
         is_over: whether it has been reached.
     """
 
     def __init__(self, plan: MotionPlan, t: float) -> None:
         """Leave ``plan`` ``t`` seconds into it."""
-        self._plan, self._t, self._rate = plan, min(t, plan.duration), 1.0
-        self.target = nearest_safe_instant(plan, self._t)
+        self._plan, self.t, self._rate = plan, min(t, plan.duration), 1.0
+        self.target = nearest_safe_instant(plan, self.t)
         self.is_over = False
 
     def advance(self, dt: float) -> Reference:
         """The reference ``dt`` seconds later, its rates those of the clock."""
-        left = self.target - self._t
+        left = self.target - self.t
         self.is_over = self.is_over or (abs(left) < ARRIVED and abs(self._rate) < 0.1)
         if self.is_over or dt <= 0.0:
-            return retimed(self._plan.at(self._t), 0.0 if self.is_over else self._rate, 0.0)
+            return retimed(self._plan.at(self.t), 0.0 if self.is_over else self._rate, 0.0)
         wanted = np.sign(left) * min(1.0, np.sqrt(2.0 * _BRAKING * abs(left) / TURNING))
         change = float(np.clip(wanted - self._rate, -dt / TURNING, dt / TURNING))
         self._rate += change
-        self._t += self._rate * dt
-        return retimed(self._plan.at(self._t), self._rate, change / dt)
+        self.t += self._rate * dt
+        return retimed(self._plan.at(self.t), self._rate, change / dt)
 
 
 def nearest_safe_instant(plan: MotionPlan, t: float) -> float:
