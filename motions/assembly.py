@@ -20,11 +20,11 @@ from go2_wbc.reference import Anchor, Posture
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.compiled_plan import CompiledPlan
-from motions.compiler import compile_quasi_static
+from motions.compiler import UNLOAD_TIME, compile_quasi_static
 from motions.dynamic_span import DynamicSpan, attitude_angles, curves_of, placed
 from motions.dynamics.phases import PhaseProblem
 from motions.dynamics.solver import solve
-from motions.dynamics.trajectory import DynamicTrajectory
+from motions.dynamics.standing import standing, standing_feet
 from motions.keys import BodyKey, Key, Mark
 from motions.language.flight import away_from_home
 from motions.language.written import SAME
@@ -34,6 +34,8 @@ from motions.timeline import Timeline
 
 SHORTEST = 1e-6
 """Time [s] between dynamic blocks below which there is none: absorbs rounding of sums."""
+SAME_PLACE = 1e-3
+"""Distance [m] below which feet count as standing below the hips: less than what tracking adds."""
 _RESTING = BodyKey(0.0, 0.0, Ease.LINEAR, "z", 0.0)
 
 
@@ -91,11 +93,16 @@ class _Part:
 
 
 class _Maker:
-    """Makes the parts of a plan, one after the other."""
+    """Makes the parts of a plan, one after the other.
+
+    Between them the robot stands at rest over ``feet``, which are in the frame of the next part.
+    """
 
     def __init__(self, timeline: Timeline, model: RobotModel) -> None:
         self._timeline, self._model = timeline, model
         self._time, self._frame = 0.0, Anchor(np.zeros(3), 0.0)
+        self._home = standing_feet(model)
+        self._feet = self._home
         self._parts: list[_Part] = []
         self._spans: list[DynamicSpan] = []
         self._problems: list[Problem] = []
@@ -112,17 +119,21 @@ class _Maker:
             if not isinstance(key, PhaseKey | Mark) and start - SAME <= key.start < end - SAME
         ]
         entry = line.entry if start == 0.0 else Posture.STAND
-        plan = self._compiled(
-            keys or [replace(_RESTING, end=end - start)], end - start, entry, exit
-        )
-        self._add(plan.curves, np.array(plan.contacts.times), plan.contacts.modes, plan.swings)
+        stretch = replace(line, cursor=end - start, entry=entry, exit=exit)
+        plan = self._compiled(stretch, keys or [replace(_RESTING, end=end - start)])
+        curves = _moved(plan.curves, self._frame)
+        times, modes = np.array(plan.contacts.times), plan.contacts.modes
+        self._parts.append(_Part(start, curves, times, modes, plan.swings))
         self._problems += [replace(one, time=one.time + start) for one in plan.problems]
         self._ramps.append(plan.ramp)
-        self._time = end
+        last = plan.curves(plan.duration)
+        self._move_on(end, last[18:].reshape(4, 3), last[5])
 
     def add_block(self, block: PhaseKey) -> None:
         """A dynamic block, solved; one that cannot be is rest and a problem."""
-        problem = PhaseProblem(block.phases, tolerance=self._timeline.tolerance)
+        is_home = self._feet is self._home
+        initial = None if is_home else standing(self._model, self._feet)
+        problem = PhaseProblem(block.phases, initial, tolerance=self._timeline.tolerance)
         try:
             found = solve(problem, self._model)
         except PlanNotFound as error:
@@ -130,18 +141,19 @@ class _Maker:
             self._problems.append(Problem("dynamic plan", "trunk", block.start, reason=reason))
             self.add_stretch(block.end, Posture.STAND)
             return
-        span = DynamicSpan(self._time, self._frame, problem, placed(found, self._frame))
-        landed = _landed(found, self._frame)
-        home = _moved(self._home(), landed).c[3, 0]
-        curves = curves_of(span.trajectory, self._model, home)
-        stance = found.stance
+        start, stance = self._time, found.stance
+        span = DynamicSpan(start, self._frame, problem, placed(found, self._frame))
         changes = np.flatnonzero(np.any(stance[1:] != stance[:-1], axis=1)) + 1
         rows = np.concatenate([[0], changes])
-        self._parts.append(
-            _Part(self._time, curves, found.times[rows], stance[rows], ~stance[rows])
-        )
+        asked = self._feet + problem.shift
+        yaw = float(attitude_angles(found.q)[-1, 2])
+        self._move_on(start + found.duration, asked, yaw, landed=found.p_feet[-1])
+        rest = replace(self._timeline, entry=Posture.STAND, exit=Posture.STAND, cursor=1.0)
+        home = self._compiled(rest, [replace(_RESTING, end=1.0)]).curves
+        curves = curves_of(span.trajectory, self._model, _moved(home, self._frame).c[3, 0])
+        times = found.times[rows]
+        self._parts.append(_Part(start, curves, times, stance[rows], ~stance[rows]))
         self._spans.append(span)
-        self._time, self._frame = span.end, landed
 
     def joined(self) -> CompiledPlan:
         """All parts as one plan."""
@@ -152,56 +164,48 @@ class _Maker:
             np.concatenate([*knots, [self._time]]),
         )
         times = np.concatenate([part.start + part.times for part in parts])
-        modes = np.concatenate([part.stance for part in parts])
         return CompiledPlan(
             name=line.name,
             entry=line.entry,
             exit=line.exit,
             curves=curves,
-            contacts=ContactSchedule(tuple(times.tolist()), modes),
+            contacts=ContactSchedule(
+                tuple(times.tolist()), np.concatenate([part.stance for part in parts])
+            ),
             swings=np.concatenate([part.swings for part in parts]),
-            ramp=min(self._ramps, default=0.0),
+            ramp=min(self._ramps, default=UNLOAD_TIME),
             problems=tuple(self._problems),
             spans={mark.name: (mark.start, mark.end) for mark in line.in_order(Mark)},
             dynamic=tuple(self._spans),
         )
 
-    def _compiled(
-        self,
-        keys: Sequence[Key],
-        duration: float,
-        entry: Posture,
-        exit: Posture,
-    ) -> CompiledPlan:
-        stretch = replace(self._timeline, keys=tuple(keys), cursor=duration, entry=entry, exit=exit)
-        return compile_quasi_static(stretch, self._model)
+    def _compiled(self, stretch: Timeline, keys: Sequence[Key]) -> CompiledPlan:
+        feet = None if self._feet is self._home else self._feet
+        return compile_quasi_static(replace(stretch, keys=tuple(keys)), self._model, feet)
 
-    def _home(self) -> PPoly:
-        """Standing at rest."""
-        keys = [replace(_RESTING, end=1.0)]
-        return self._compiled(keys, 1.0, Posture.STAND, Posture.STAND).curves
-
-    def _add(
+    def _move_on(
         self,
-        curves: PPoly,
-        times: Float[np.ndarray, " m"],
-        stance: Bool[np.ndarray, "m 4"],
-        swings: Bool[np.ndarray, "m 4"],
+        time: float,
+        feet: Float[np.ndarray, "4 3"],
+        yaw: float,
+        landed: Float[np.ndarray, "4 3"] | None = None,
     ) -> None:
-        self._parts.append(_Part(self._time, _moved(curves, self._frame), times, stance, swings))
+        """Go on at ``time`` [s], standing on ``feet``; all of them in the frame of before.
 
-
-def _turn(found: DynamicTrajectory) -> float:
-    """Yaw [rad] from the start to the end, whole turns included."""
-    return float(attitude_angles(found.q)[-1, 2])
-
-
-def _landed(found: DynamicTrajectory, frame: Anchor) -> Anchor:
-    """The frame of what follows: below the feet where they land, on the ground of before."""
-    here = Anchor.of_feet(found.p_feet[-1], 0.0)
-    turned = 2.0 * np.pi * round((_turn(found) - here.yaw) / (2.0 * np.pi))
-    p = np.array([*here.p_world[:2], 0.0])
-    return Anchor(frame.p_world + yaw_rotation(frame.yaw) @ p, frame.yaw + here.yaw + turned)
+        ``yaw``: of the trunk [rad], whole turns counted. ``landed``: where the feet have come to,
+        a little beside: the next frame is there.
+        """
+        asked = Anchor.of_feet(feet, self._model.foot_radius)
+        own = (feet - asked.p_world) @ yaw_rotation(asked.yaw)
+        own[:, 2] = self._home[:, 2]
+        is_home = np.abs(own - self._home).max() < SAME_PLACE
+        self._feet = self._home if is_home else own
+        here = asked if landed is None else Anchor.of_feet(landed, 0.0)
+        turns = 2.0 * np.pi * round((yaw - here.yaw) / (2.0 * np.pi))
+        p = np.array([*here.p_world[:2], 0.0])
+        frame = self._frame
+        to = frame.p_world + yaw_rotation(frame.yaw) @ p
+        self._time, self._frame = time, Anchor(to, frame.yaw + here.yaw + turns)
 
 
 def _moved(curves: PPoly, frame: Anchor) -> PPoly:

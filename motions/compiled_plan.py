@@ -8,18 +8,29 @@ from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from numpy.typing import ArrayLike
 from scipy.interpolate import PPoly
 
 from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
 from go2_wbc.curves import CurvePoint
 from go2_wbc.kernels.layout import REFERENCE
-from go2_wbc.reference import Footsteps, LegTask, MotionPlan, Posture, Reference, TrackedPoint
+from go2_wbc.reference import (
+    Anchor,
+    Footsteps,
+    LegTask,
+    MotionPlan,
+    Posture,
+    Reference,
+    TrackedPoint,
+)
 from motions.dynamic_span import DynamicSpan
 from motions.placement import attitudes
 from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, reference
 from motions.problem import Problem
 from motions.samples import PlanSamples
+
+LANDING_RAMP = 0.01
+"""Time [s] over which a foot takes up its load after a flight: own choice, a few ticks. Landing
+takes 0.1 s, and the forces that it needs are planned."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +85,15 @@ class CompiledPlan(MotionPlan):
         """How its feet step, if any does; see ``MotionPlan.footsteps``."""
         if not self.swings.any():
             return None
-        return Footsteps(self.contacts, self.ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX)
+        ramp = min(self.ramp, LANDING_RAMP) if self.is_dynamic else self.ramp
+        return Footsteps(self.contacts, ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX)
+
+    @property
+    def end_pose(self) -> tuple[float, float, float]:
+        """Where it ends: x, y [m] and yaw [rad] of the frame of the feet, in that of the motion."""
+        anchor = Anchor.of_feet(self.curves(self.duration)[18:].reshape(4, 3), 0.0)
+        x, y, _ = anchor.p_world.tolist()
+        return x, y, anchor.yaw
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""
@@ -90,22 +109,18 @@ class CompiledPlan(MotionPlan):
 
     def readable_at(self, t: float) -> Reference:
         """The same as ``at``, step by step: what the kernel is held to."""
-        curves, phase = self._curves_at(t), self._phases(np.array([t]))
+        now = np.array([t])
+        curves, phase = self._curves_at(t), self._phases(now)
         parts = (slice(6), slice(6, 18), slice(18, None))
         body, joints, feet = (CurvePoint(*(curve[part] for curve in curves)) for part in parts)
-        tasks = [
-            LegTask(int(task)) for task in _tasks(phase.stance, self.swings[self._events([t])])[0]
-        ]
+        asked = _tasks(phase.stance, self.swings[event_at(self.contacts, now)])[0]
+        tasks = [LegTask(int(task)) for task in asked]
         share = phase.load_share(self.ramp)[0]
         return reference(TrackedPoint.COM, body, joints, feet, tasks, share)
 
-    def _events(self, times: ArrayLike) -> Int[np.ndarray, " n"]:
-        after = np.searchsorted(self.contacts.times, np.asarray(times) + TIE, side="right")
-        return np.maximum(after - 1, 0)
-
     def _phases(self, times: Float[np.ndarray, " n"]) -> ContactPhase:
         """The contacts at ``times``, with the changes to which load is ramped."""
-        rows, (*_, since, until) = self._events(times), self._tables
+        rows, (*_, since, until) = event_at(self.contacts, times), self._tables
         elapsed = np.maximum(times[:, None] - since[rows], 0.0)
         return ContactPhase(self.contacts.modes[rows], elapsed, until[rows] - times[:, None])
 
@@ -130,7 +145,7 @@ class CompiledPlan(MotionPlan):
     def samples(self, times: Float[np.ndarray, " n"]) -> PlanSamples:
         """What the references at ``times`` ask for; ``at`` gives the same one by one."""
         values = self.curves(np.clip(times, 0.0, self.duration))
-        phase, swings = self._phases(times), self.swings[self._events(times)]
+        phase, swings = self._phases(times), self.swings[event_at(self.contacts, times)]
         return PlanSamples(
             times=times,
             p_world=values[:, :3],
@@ -142,6 +157,12 @@ class CompiledPlan(MotionPlan):
             p_feet=values[:, 18:].reshape(-1, 4, 3),
             normal_force_max=NORMAL_FORCE_MAX * phase.load_share(self.ramp),
         )
+
+
+def event_at(contacts: ContactSchedule, times: Float[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
+    """Index of the last event at or before each of ``times`` [s], of a schedule that ends."""
+    event = np.searchsorted(contacts.times, times + TIE, side="right") - 1
+    return np.maximum(event, 0)
 
 
 def _tasks(stance: Bool[np.ndarray, "*n 4"], swings: Bool[np.ndarray, "*n 4"]) -> np.ndarray:

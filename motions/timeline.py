@@ -17,9 +17,10 @@ import math
 from motions.language.arrangement import Arrangement
 from motions.language.flight import Flight
 from motions.language.moves import Moves
+from motions.language.steps import Steps
 
 
-class Timeline(Moves, Flight, Arrangement):
+class Timeline(Moves, Steps, Flight, Arrangement):
     """An authored motion; ``motions.language`` holds its calls."""
 
     __slots__ = ()

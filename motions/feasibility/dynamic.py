@@ -68,7 +68,8 @@ class Forces:
         tau: (n, 12) joint torques [N m].
         missing: (n, 2) part of the force [N] and of the moment [N m] that the feet cannot give.
         zmp: (n, 2) zero-moment point on the ground [m].
-        v_motors: (n, 12) joint speeds [rad/s] at which the torques are given; by default the path's.
+        v_motors: (n, 12) joint speeds [rad/s] at which the torques are given; those of the path
+            unless said.
     """
 
     contact: Float[np.ndarray, "n 4 3"]

@@ -127,17 +127,19 @@ def smoothness(motion: Trajectory, limits: FeasibilityLimits) -> Series:
 def ends(
     plan: MotionPlan, motion: Trajectory, model: RobotModel, limits: FeasibilityLimits
 ) -> Series:
-    """Whether the motion starts and ends at rest in the postures that it names."""
+    """Whether the motion starts and ends at rest in the postures that it names.
+
+    They are above the feet as they stand then, with their heading.
+    """
     home = home_poses(model)
     names = tuple(f"{end} {what}" for end in ENDS for what in ("place", "attitude", "speed"))
     bounds = np.array([limits.stance_position, limits.stance_angle, limits.end_speed] * 2)
     values = []
     for row, posture in ((0, plan.entry), (-1, plan.exit)):
-        frame = Anchor.of_feet(motion.p_feet[row], model.foot_radius)
-        place = frame.p_world + yaw_rotation(frame.yaw) @ home[posture][:3]
-        attitude = home[posture][3:] + [0.0, 0.0, frame.yaw]
-        turn = motion.rpy[row] - attitude
-        turn[2] = wrap_angle(float(turn[2]))
+        feet = Anchor.of_feet(motion.p_feet[row], model.foot_radius)
+        place = feet.p_world + yaw_rotation(feet.yaw) @ home[posture][:3]
+        turn = motion.rpy[row] - home[posture][3:]
+        turn[2] = wrap_angle(float(turn[2]) - feet.yaw)
         off = (motion.q[row, :3] - place, turn, motion.v[row])
         values += [float(np.abs(part).max()) for part in off]
     if plan.entry is Posture.LIE or not motion.stance[0].all():
