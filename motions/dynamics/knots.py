@@ -139,14 +139,17 @@ def _trunk_path(
     """
     first, last = (pose_of(state.q) for state in ends)
     origin = Anchor.of_feet(p_feet, 0.0)
-    keys = [0, *(goal.knot for goal in goals)]
-    table = np.array([first, *(_over_feet(first, origin, goal.p_feet) for goal in goals)])
     flights = _spans(~stance.any(axis=1))
+    edges = {knot for span in flights for knot in span}
+    known = [goal for goal in goals if goal.pose is not None or goal.knot in edges]
+    known += [goals[-1]] if goals[-1] not in known else []
+    keys = [0, *(goal.knot for goal in known)]
+    table = np.array([first, *(_over_feet(first, origin, goal.p_feet) for goal in known)])
     for begin, end in flights:
         rows = [keys.index(begin), keys.index(end)]
         lead = LEAD * (table[rows[1]] - table[rows[0]])
         table[rows] += np.array([lead, -lead])
-    for row, goal in enumerate(goals, start=1):
+    for row, goal in enumerate(known, start=1):
         if goal.pose is not None:
             table[row] = goal.pose
     if goals[-1].pose is None:

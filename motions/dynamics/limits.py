@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 from go2_wbc.validation import require_not_negative, require_positive, require_share
+
+SOFT = 0.1
+"""Share of the costs with which a start begins; see ``Weights.softened``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,9 +59,9 @@ class Weights:
     """
 
     torque: float = 1e-3
-    friction: float = 10.0
+    friction: float = 1.0
     joint_range: float = 2e3
-    joint_speed: float = 200.0
+    joint_speed: float = 50.0
     ground: float = 1e4
     clearance: float = 2e4
     foot_place: float = 2e4
@@ -67,3 +70,16 @@ class Weights:
     end: float = 1e3
     posture: float = 0.1
     speed: float = 0.01
+
+    def softened(self) -> Weights:
+        """The same with everything but effort at a tenth, for a rough guess.
+
+        From one, the full costs are so steep that solving takes five times the iterations, if it
+        converges at all (own experiments).
+        """
+        eased = {
+            part.name: SOFT * getattr(self, part.name)
+            for part in fields(self)
+            if part.name not in ("torque", "posture", "speed")
+        }
+        return replace(self, **eased)

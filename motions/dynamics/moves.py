@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.rotations import yaw_rotation
@@ -65,21 +64,30 @@ def hop(times: int = 3, period: float = 0.5, height: float = 0.05) -> tuple[Phas
 REAR, FRONT = frozenset({Leg.RL, Leg.RR}), frozenset({Leg.FL, Leg.FR})
 
 
-def rear(pitch: float = math.radians(-25.0), hold: float = 0.5) -> tuple[Phase, ...]:
-    """Rear up on the rear feet, the trunk at ``pitch`` (negative: front up) for ``hold`` [s]."""
-    up: _Body = (-0.10, 0.0, 0.04, 0.0, pitch, 0.0)
+def rear(
+    pitch: float = math.radians(-25.0),
+    hold: float = 0.6,
+    x: float | None = None,
+    z: float = 0.03,
+    lean: float = -0.06,
+) -> tuple[Phase, ...]:
+    """Rear up on the rear feet, the trunk at ``pitch`` (negative: front up)."""
+    if x is None:
+        x = -0.19 * (1.0 - 1.0 / math.cosh(0.5 * hold / 0.175))
+    up: _Body = (x, 0.0, z, 0.0, pitch, 0.0)
     return (
-        Phase(0.40, body=(-0.04, 0.0, -0.03, 0.0, 0.3 * pitch, 0.0), label="lean back"),
-        Phase(0.16, label="push"),
-        Phase(0.30, REAR, body=up, label="rear up"),
-        Phase(hold, REAR, body=up, label="hold"),
-        Phase(0.30, REAR, feet={leg: (0.0, 0.0, 0.0) for leg in FRONT}, label="down"),
+        Phase(0.40, body=(lean, 0.0, -0.05, 0.0, 0.0, 0.0), label="lean back"),
+        Phase(0.20, label="push"),
+        Phase(0.5 * hold, REAR, body=up, label="rear up"),
+        Phase(0.5 * hold, REAR, feet={leg: (0.0, 0.0, 0.0) for leg in FRONT}, label="down"),
         Phase(0.20, label="land"),
         Phase(0.40, body=(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), label="stand"),
     )
 
 
-def lift(legs: tuple[Leg, ...] = (Leg.FL, Leg.RR), hold: float = 0.35, height: float = 0.06) -> tuple[Phase, ...]:
+def lift(
+    legs: tuple[Leg, ...] = (Leg.FL, Leg.RR), hold: float = 0.35, height: float = 0.06
+) -> tuple[Phase, ...]:
     """Lift feet together and put them down where they stood."""
     up = {leg: (0.0, 0.0, height) for leg in legs}
     down = {leg: (0.0, 0.0, 0.0) for leg in legs}

@@ -55,19 +55,17 @@ class Program:
         self.problem = crocoddyl.ShootingProblem(x0, self._models, terminal)
         self.bound(np.zeros((len(steps), 12)))
 
-    def bound(self, v_joints: Float[np.ndarray, "n 12"]) -> None:
-        """Bound the torques by what the motors give at speeds ``v_joints`` [rad/s] of each knot."""
+    def bound(
+        self, v_joints: Float[np.ndarray, "n 12"]
+    ) -> tuple[Float[np.ndarray, "n 12"], Float[np.ndarray, "n 12"]]:
+        """Bound the torques by what the motors give at speeds ``v_joints`` [rad/s] of each knot.
+
+        Returns them: lower and upper.
+        """
         lower, upper = self._model.motor.scaled(self._limits.torque_share).limits(v_joints)
         for row, model in enumerate(self._models):
             model.u_lb, model.u_ub = lower[row], upper[row]
-
-    def soften(self, share: float) -> None:
-        """Let forces outside the friction cone cost ``share`` of their full cost."""
-        for model in self._models:
-            costs = model.differential.costs.costs.todict()
-            for name in FOOT_NAMES:
-                if (cone := costs.get(_cone_of(name))) is not None:
-                    cone.weight = share * self._weights.friction
+        return lower, upper
 
     def _running(
         self, knot: int, dt: float, goal: Goal | None
@@ -114,7 +112,7 @@ class Program:
         )
         residual = crocoddyl.ResidualModelContactFrictionCone(self._state, frame, cone, 12)
         barrier = _barrier(cone.lb, cone.ub)
-        self._add(costs, _cone_of(name), residual, self._weights.friction, barrier)
+        self._add(costs, f"{name}_cone", residual, self._weights.friction, barrier)
 
     def _add_effort(self, costs: crocoddyl.CostModelSum, knot: int) -> None:
         """Torques near standing, and near the first guess."""
@@ -123,11 +121,9 @@ class Program:
             costs, "torque", crocoddyl.ResidualModelControl(self._state, self.tau_hold),
             weights.torque,
         )  # fmt: skip
-        scale = np.concatenate(
-            [np.zeros(6), np.full(12, weights.posture), np.full(18, weights.speed)]
-        )
+        scale = np.repeat([0.0, weights.posture, weights.speed], [6, 12, 18])
         posture = crocoddyl.ResidualModelState(
-            self._state, np.concatenate([knots.q[knot], np.zeros(18)]), 12
+            self._state, np.concatenate([knots.q[knot], knots.v[knot, :6], np.zeros(12)]), 12
         )
         activation = crocoddyl.ActivationModelWeightedQuad(scale)
         self._add(costs, "posture", posture, 1.0, activation)
@@ -200,10 +196,6 @@ class Program:
         else:
             cost = crocoddyl.CostModelResidual(self._state, activation, residual)
         costs.addCost(name, cost, weight)
-
-
-def _cone_of(foot: str) -> str:
-    return f"{foot}_cone"
 
 
 def _barrier(

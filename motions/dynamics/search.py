@@ -16,17 +16,17 @@ from go2_wbc.legs import FOOT_NAMES, LEGS
 from motions.dynamics.knots import Knots
 from motions.dynamics.program import Program
 
-ITERATIONS = 100
+ITERATIONS = 120
 """Of one start; what converges does so in fewer (own experiments)."""
-REGULARISATIONS = (1e-1, 1e-3, 1e-9)
-"""First regularisations to try: a strong one for a rough guess; the last is the solver's own."""
-SOFT = 1e-2
-"""Share of the cost of forces outside the cone with which a start begins: the full cost is so steep
-that from a rough guess it takes five times the iterations, if it converges at all."""
+REGULARISATIONS = (1e-2, 1e-1, 1e-3)
+"""First regularisations, in the order in which they are tried (own experiments)."""
 SOFT_STOP, STOP = 1e-2, 1e-3
-"""Expected improvement of the cost below which a soft and a full solution are done."""
+"""Expected improvement of the cost below which a softened and a full program are done."""
 LINE_ROUNDS = 4
 """Rounds in which torque bounds and speeds are made to agree."""
+AGREED = 0.5
+"""Torque [N m] over the bounds of its own speed that counts as none."""
+_JOINT_RATES = slice(19 + 6, None)
 
 Progress = Callable[[int, float], None]
 
@@ -55,16 +55,26 @@ class Search:
     """
 
     def __init__(
-        self, program: Program, knots: Knots, *, budget: float, progress: Progress | None
+        self,
+        soft: Program,
+        full: Program,
+        knots: Knots,
+        *,
+        budget: float,
+        progress: Progress | None,
     ) -> None:
         """Prepare; the budget [s] runs from here."""
         self.iterations = 0
-        self._program, self._knots, self._budget = program, knots, budget
+        self._full, self._knots, self._budget = full, knots, budget
         self._deadline = time.monotonic() + budget
         self._progress = progress
-        self._solver = crocoddyl.SolverBoxFDDP(program.problem)
         self._watch = _watch(self)
-        self._solver.setCallbacks([self._watch])
+        self._soft_solver, self._solver = self._solver_of(soft), self._solver_of(full)
+
+    def _solver_of(self, program: Program) -> crocoddyl.SolverBoxFDDP:
+        solver = crocoddyl.SolverBoxFDDP(program.problem)
+        solver.setCallbacks([self._watch])
+        return solver
 
     def run(self) -> Found:
         """A solution.
@@ -82,11 +92,11 @@ class Search:
             ) from None
         return self._found()
 
-    def step(self) -> None:
+    def step(self, cost: float) -> None:
         """Count an iteration, tell, and stop when time is up."""
         self.iterations += 1
         if self._progress is not None:
-            self._progress(self.iterations, float(self._solver.cost))
+            self._progress(self.iterations, cost)
         if time.monotonic() > self._deadline:
             raise _Expired
 
@@ -95,12 +105,11 @@ class Search:
         knots = self._knots
         guess = list(np.hstack([knots.q, knots.v]))
         still = [guess[0]] * len(guess)
-        us = [self._program.tau_hold] * (len(guess) - 1)
+        us = [self._full.tau_hold] * (len(guess) - 1)
         for xs, regularisation in product((guess, still), REGULARISATIONS):
-            self._program.soften(SOFT)
-            self._solve(xs, us, regularisation, SOFT_STOP)
-            self._program.soften(1.0)
-            if self._solve(list(self._solver.xs), list(self._solver.us), regularisation, STOP):
+            soft = self._soft_solver
+            self._solve(soft, xs, us, regularisation, SOFT_STOP)
+            if self._solve(self._solver, list(soft.xs), list(soft.us), regularisation, STOP):
                 return
         raise PlanNotFound(
             f"no dynamic plan: none of the starts converges ({self.iterations} iterations); the "
@@ -111,27 +120,26 @@ class Search:
         """Bound the torques by the speeds of the solution until both agree."""
         for _ in range(LINE_ROUNDS):
             x, us = np.array(self._solver.xs), np.array(self._solver.us)
-            self._program.bound(x[:-1, 19 + 6 :])
-            bounds = [(m.u_lb, m.u_ub) for m in self._program.problem.runningModels]
-            over = max(
-                float(np.maximum(lower - u, u - upper).max())
-                for u, (lower, upper) in zip(us, bounds, strict=True)
-            )
-            if over < AGREED:
+            lower, upper = self._full.bound(x[:-1, _JOINT_RATES])
+            if max(np.max(lower - us), np.max(us - upper)) < AGREED:
                 return
-            clipped = [np.clip(u, *bound) for u, bound in zip(us, bounds, strict=True)]
-            self._solve(list(x), clipped, REGULARISATIONS[0], STOP)
+            us = np.clip(us, lower, upper)
+            self._solve(self._solver, list(x), list(us), REGULARISATIONS[0], STOP)
 
     def _solve(
-        self, xs: list[np.ndarray], us: list[np.ndarray], regularisation: float, stop: float
+        self,
+        solver: crocoddyl.SolverBoxFDDP,
+        xs: list[np.ndarray],
+        us: list[np.ndarray],
+        regularisation: float,
+        stop: float,
     ) -> bool:
-        solver = self._solver
         solver.th_stop = stop
         converged = solver.solve(xs, us, ITERATIONS, False, regularisation)
         return bool(converged and solver.isFeasible and np.isfinite(solver.cost))
 
     def _found(self) -> Found:
-        solver, problem = self._solver, self._program.problem
+        solver, problem = self._solver, self._full.problem
         problem.calc(solver.xs, solver.us)
         forces = np.zeros((len(self._knots.stance), 4, 3))
         for row, data in enumerate(problem.runningDatas):
@@ -145,13 +153,9 @@ class Search:
         )  # fmt: skip
 
 
-AGREED = 0.5
-"""Torque [N m] over the bounds of its own speed that counts as none."""
-
-
 def _watch(search: Search) -> crocoddyl.CallbackAbstract:
     class Watch(crocoddyl.CallbackAbstract):
-        def __call__(self, solver: object) -> None:
-            search.step()
+        def __call__(self, solver: crocoddyl.SolverBoxFDDP) -> None:
+            search.step(float(solver.cost))
 
     return Watch()

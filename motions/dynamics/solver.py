@@ -55,8 +55,10 @@ def solve(
 
     limits = limits or PlanLimits()
     knots = knots_of(problem, model, limits)
-    program = Program(knots, model, limits, weights or Weights())
-    found = Search(program, knots, budget=budget, progress=progress).run()
+    weights = weights or Weights()
+    soft = Program(knots, model, limits, weights.softened())
+    full = Program(knots, model, limits, weights)
+    found = Search(soft, full, knots, budget=budget, progress=progress).run()
     q = found.x[:, :19]
     p_feet = feet_at(model, q)
     trajectory = DynamicTrajectory(
