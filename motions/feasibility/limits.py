@@ -79,7 +79,7 @@ class FlightLimits:
 
     step: float = 1e-3
     defect: float = 0.5
-    curve: float = 0.02
+    curve: float = 0.03
     pull: float = 1.0
     friction: float = 0.55
     slip: float = 0.02
