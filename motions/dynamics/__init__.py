@@ -11,8 +11,13 @@ from typing import TYPE_CHECKING
 from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from motions.dynamics.cache import solve_cached
+    from motions.dynamics.limits import PlanLimits
     from motions.dynamics.phases import FullState, Phase, PhaseProblem, Tolerance
+    from motions.dynamics.pieces import pieces
+    from motions.dynamics.solver import solve
     from motions.dynamics.trajectory import DynamicTrajectory, Miss
+    from motions.dynamics.verdict import Reading, audit
 
 __all__ = [
     "DynamicTrajectory",
@@ -20,13 +25,24 @@ __all__ = [
     "Miss",
     "Phase",
     "PhaseProblem",
+    "PlanLimits",
+    "Reading",
     "Tolerance",
+    "audit",
+    "pieces",
+    "solve",
+    "solve_cached",
 ]
 
 __getattr__ = lazy_exports(
     __name__,
     {
+        "cache": ("solve_cached",),
+        "limits": ("PlanLimits",),
         "phases": ("FullState", "Phase", "PhaseProblem", "Tolerance"),
+        "pieces": ("pieces",),
+        "solver": ("solve",),
         "trajectory": ("DynamicTrajectory", "Miss"),
+        "verdict": ("Reading", "audit"),
     },
 )

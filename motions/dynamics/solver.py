@@ -74,7 +74,7 @@ def solve(
         cost=found.cost,
         misses=_misses(knots, q, p_feet),
     )
-    _accept(trajectory, problem, model)
+    accept(trajectory, problem, model)
     return trajectory
 
 
@@ -105,7 +105,7 @@ def _misses(knots: Knots, q: np.ndarray, p_feet: np.ndarray) -> tuple[Miss, ...]
     return tuple(misses)
 
 
-def _accept(trajectory: DynamicTrajectory, problem: PhaseProblem, model: RobotModel) -> None:
+def accept(trajectory: DynamicTrajectory, problem: PhaseProblem, model: RobotModel) -> None:
     """Raise PlanNotFound for a plan that breaks a limit or is too far off."""
     reasons = [str(reading) for reading in audit(trajectory, model) if not reading.is_kept]
     if reasons:
