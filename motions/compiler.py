@@ -24,10 +24,11 @@ from go2_wbc.robot.model import RobotModel
 from motions.balance import Balancer
 from motions.compiled_plan import CompiledPlan, event_at
 from motions.footing import Footing
-from motions.keys import Mark
+from motions.keys import BalanceShift, Mark
 from motions.language.written import SAME
 from motions.placement import centres_of_mass
 from motions.problem import Problem
+from motions.swaying import Span, swayed
 from motions.timeline import Timeline
 from motions.tracks import (
     LegTracks,
@@ -79,13 +80,18 @@ def compile_quasi_static(
     body = body_path(timeline, home, times, footing.frames(times))
     offsets, problems = Balancer(timeline, tracks, model, times, body).balance()
     body[:, :2] += offsets
+    contacts = contact_schedule(timeline)
+    steps = _swings(timeline, contacts)
+    raised = ~(contacts.at_times(times).stance | steps[event_at(contacts, times)])
+    for shift in timeline.in_order(BalanceShift):
+        if shift.is_swaying:
+            rows = slice(*np.searchsorted(times, [shift.start - SAME, shift.end + SAME]).tolist())
+            span = Span(times[rows], contacts.at_times(times[rows]).stance, raised[rows])
+            body[rows, :2] = swayed(span, body[rows], tracks, model)
     paths = [tracks.path(leg, times, body) for leg in LEGS]
     joints = np.hstack([path.q for path in paths])
     com = centres_of_mass(body, joints, model)
     problems += _out_of_reach(paths, times)
-    contacts = contact_schedule(timeline)
-    steps = _swings(timeline, contacts)
-    raised = ~(contacts.at_times(times).stance | steps[event_at(contacts, times)])
     feet = tracks.feet(raised, footing.places(times), body, joints)
     samples = np.hstack([com, body[:, 3:], joints, feet.reshape(-1, 12)])
     return CompiledPlan(

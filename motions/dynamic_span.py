@@ -14,6 +14,7 @@ from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
 from motions.dynamics.phases import PhaseProblem
+from motions.dynamics.pieces import ATTITUDE, sampled
 from motions.dynamics.trajectory import DynamicTrajectory
 
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -104,29 +105,16 @@ def curves_of(
 ) -> PPoly:
     """The curves of ``CompiledPlan`` that play ``trajectory``, from its start to rest at ``end``.
 
-    The solver steps by semi-implicit Euler, q_k+1 = q_k + dt v_k+1: its q leads its v by half a
-    step. A robot with its constant accelerations from knot to knot has the mean of both speeds on
-    the way; the curves go where that robot goes, so that places, speeds and accelerations are each
-    other's derivatives and change where the contacts do. What is left to ``end``, some millimetres,
-    is made up for while the last phase stands.
+    What is left to ``end``, some millimetres, is made up for while the last phase stands.
     """
-    times, v = trajectory.times, trajectory.v
-    q = followed(trajectory, model)
-    values, rates = _values_and_rates(q, v, model)
+    times = trajectory.times
+    values, rates = sampled(trajectory, model)
+    values[:, ATTITUDE] = np.unwrap(values[:, ATTITUDE], axis=0)
     moves = ~trajectory.stance.all(axis=1)
     first = int(np.flatnonzero(moves)[-1]) + 1 if moves.any() else 0
     values[:, 5] += 2.0 * np.pi * np.round((end[5] - values[-1, 5]) / (2.0 * np.pi))
     _lead_to(end, times, values, rates, first)
     return CubicHermiteSpline(times, values, rates)
-
-
-def followed(trajectory: DynamicTrajectory, model: RobotModel) -> Float[np.ndarray, "n1 19"]:
-    """Where the robot comes by the speeds of ``trajectory``, each step with the mean of both."""
-    q = trajectory.q.copy()
-    steps = np.diff(trajectory.times)[:, None] * 0.5 * (trajectory.v[1:] + trajectory.v[:-1])
-    for row, step in enumerate(steps):
-        q[row + 1] = pin.integrate(model.pin_model, q[row], step)
-    return q
 
 
 def feet_at(
@@ -149,33 +137,6 @@ def attitude_angles(q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 3"]:
     """Roll, pitch, yaw [rad] of the trunk, whole turns added up from the first row on."""
     turns = [pin.Quaternion(row[3:7]).toRotationMatrix() for row in q]
     return np.unwrap([rpy_from_rotation(R) for R in turns], axis=0)
-
-
-def _values_and_rates(
-    q: Float[np.ndarray, "n 19"], v: Float[np.ndarray, "n 18"], model: RobotModel
-) -> tuple[Float[np.ndarray, "n 30"], Float[np.ndarray, "n 30"]]:
-    pin_model, data = model.pin_model, model.pin_model.createData()
-    rpy, (places, speeds) = attitude_angles(q), feet_at(q, v, model)
-    coms, moves = np.empty((len(q), 3)), np.empty((len(q), 3))
-    for row in range(len(q)):
-        coms[row] = pin.centerOfMass(pin_model, data, q[row], v[row])
-        moves[row] = data.vcom[0]
-    turning = [_rpy_rates(*pair) for pair in zip(rpy, v[:, 3:6], strict=True)]
-    values = np.hstack([coms, rpy, q[:, 7:], places.reshape(-1, 12)])
-    return values, np.hstack([moves, turning, v[:, 6:], speeds.reshape(-1, 12)])
-
-
-def _rpy_rates(
-    rpy: Float[np.ndarray, "3"], w_base: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "3"]:
-    """Rates of roll, pitch, yaw [rad/s] from the angular velocity in the base frame.
-
-    Craig, Introduction to Robotics, 3rd ed., eq. 5.44, in the base frame and solved for the rates.
-    """
-    roll, pitch, _ = rpy
-    sr, cr, cp, tp = np.sin(roll), np.cos(roll), np.cos(pitch), np.tan(pitch)
-    x, y, z = w_base
-    return np.array([x + tp * (sr * y + cr * z), cr * y - sr * z, (sr * y + cr * z) / cp])
 
 
 def _lead_to(

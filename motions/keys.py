@@ -188,9 +188,15 @@ class Mark(Key):
 
 @dataclass(frozen=True, slots=True)
 class BalanceShift(Key):
-    """The trunk moves over the feet that stay when ``raised`` legs are in the air."""
+    """The trunk moves over the feet that stay when ``raised`` legs are in the air.
+
+    Attributes:
+        raised: these legs.
+        is_swaying: whether it is instead over those of the feet that stand while others step.
+    """
 
     raised: frozenset[Leg]
+    is_swaying: bool = False
 
     @property
     def track(self) -> str:

@@ -36,6 +36,8 @@ from motions.tracks import sample_times, standing_feet
 
 CENTRING_STEPS = 5
 """Steps that put the CoM in its place; see ``place``."""
+LEAST_WEIGHT = 1.0
+"""Least vertical force [N] by which moments are divided: the zero-moment point stays finite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +102,7 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     v, a = np.zeros((len(times), 18)), np.zeros((len(times), 18))
     for rows in _runs(is_dynamic):
         if not is_dynamic[rows.start] and rows.stop - rows.start > 1:
-            v[rows], a[rows] = _rates(times[rows], q[rows], rpy[rows], R[rows])
+            v[rows], a[rows] = rates(times[rows], q[rows], rpy[rows])
     greatest = asked.normal_force_max
     path = Trajectory(
         times=times,
@@ -171,11 +173,8 @@ def _rpy_of(R: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "n 3"]:
     return np.column_stack([roll, pitch, yaw])
 
 
-def _rates(
-    times: Float[np.ndarray, " n"],
-    q: Float[np.ndarray, "n 19"],
-    rpy: Float[np.ndarray, "n 3"],
-    R: Float[np.ndarray, "n 3 3"],
+def rates(
+    times: Float[np.ndarray, " n"], q: Float[np.ndarray, "n 19"], rpy: Float[np.ndarray, "n 3"]
 ) -> tuple[Float[np.ndarray, "n 18"], Float[np.ndarray, "n 18"]]:
     """Velocity and acceleration (n, 18) as Pinocchio counts them: the base's in its own frame.
 
@@ -183,12 +182,29 @@ def _rates(
     dv_b/dt = R' a_w - w_b x v_b (Featherstone 2008, ch. 2: spatial, not classical); so that of
     w_b = R' w_w is R' dw_w.
     """
+    R = attitudes(rpy)
     spline = CubicSpline(times, np.hstack([q[:, :3], rpy, q[:, 7:]]), bc_type="clamped")
     rate, acceleration = spline(times, 1), spline(times, 2)
     turning = _angular_rates(rpy, rate[:, 3:6], acceleration[:, 3:6])
     v, a = turned_back(R, rate[:, :3]), turned_back(R, acceleration[:, :3])
     w, dw = (turned_back(R, vectors) for vectors in turning)
     return np.hstack([v, w, rate[:, 6:]]), np.hstack([a - np.cross(w, v), dw, acceleration[:, 6:]])
+
+
+def zero_moment_points(
+    q: Float[np.ndarray, "n 19"], rpy: Float[np.ndarray, "n 3"], wrench: Float[np.ndarray, "n 6"]
+) -> Float[np.ndarray, "n 2"]:
+    """Where the ground's forces act together (Vukobratovic & Borovac 2004, eq. 3).
+
+    ``wrench``: what the trunk needs, about the base in its frame. Moved to the origin on the
+    ground, F = R F_b and N = R N_b + p x F; there is no moment about the level axes at the point
+    x = -N_y / F_z, y = N_x / F_z. Where the feet hardly press, F_z counts as ``LEAST_WEIGHT``.
+    """
+    R = attitudes(rpy)
+    force = turned(R, wrench[:, :3])
+    moment = turned(R, wrench[:, 3:]) + np.cross(q[:, :3], force)
+    vertical = np.maximum(force[:, 2], LEAST_WEIGHT)
+    return np.column_stack([-moment[:, 1], moment[:, 0]]) / vertical[:, None]
 
 
 def _angular_rates(

@@ -21,7 +21,8 @@ from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
 from motions.compiled_plan import CompiledPlan
-from motions.dynamic_span import DynamicSpan, attitude_angles, feet_at, followed
+from motions.dynamic_span import DynamicSpan, attitude_angles, feet_at
+from motions.dynamics.pieces import centred
 from motions.dynamics.verdict import defects
 from motions.feasibility.dynamic import PRESSED, Forces
 from motions.feasibility.kinematic import FEET, JOINTS
@@ -92,9 +93,9 @@ class _Judge:
         return self._at_knots("equations", "N, N m", _ROWS, off, self.limits.defect)
 
     def curves(self) -> Series:
-        """How far the curves that are played are from where the span's speeds lead: m, rad."""
+        """How far the curves that are played are from the span's states: m, rad."""
         plan, model = self.span.trajectory, self.model
-        q = followed(plan, model)
+        q = centred(plan, model)
         values = self.played(np.minimum(self.span.start + plan.times, self.played.x[-1]))
         com = np.array([model.center_of_mass(row) for row in q])
         R = [pin.Quaternion(row[3:7]).toRotationMatrix() for row in q]

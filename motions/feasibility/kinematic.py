@@ -91,11 +91,11 @@ def landing(
 ) -> tuple[Series, Series]:
     """Where and how fast raised feet leave and meet the ground.
 
-    The speed at touchdown is that of the sample before: the central difference at the last one in
-    the air already reaches to the foot that stands.
+    The speed at touchdown is that between the last two samples in the air; a difference to the
+    next one would reach to the foot that stands.
     """
     stands, times, places = motion.stance, motion.times, _feet(motion, model)
-    paces = np.linalg.norm(np.gradient(places, times, axis=0), axis=2)
+    paces = np.linalg.norm(np.diff(places, axis=0), axis=2) / np.diff(times)[:, None]
     away, speed = np.full(stands.shape, np.nan), np.full(stands.shape, np.nan)
     written = ~(motion.is_dynamic[1:] | motion.is_dynamic[:-1])[:, None]
     for edge, leg in np.argwhere((stands[1:] != stands[:-1]) & written):

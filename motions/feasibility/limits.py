@@ -20,6 +20,9 @@ class FeasibilityLimits:
         foot_load: least normal force [N] of a foot that stands: 6 % of the weight.
         support: least distance [m] of the CoM to the edges of the support polygon.
         zero_moment: the same for the zero-moment point.
+        off_line: greatest distance [m] of the zero-moment point from the line between two feet.
+        pair_time: longest time [s] on two feet; in it a trunk that is off balance falls four times
+            as far off, exp(t / sqrt(0.29 m / g)).
         wrench: greatest part [N] of the force that no contact forces can give, 3 % of the weight;
             of the moment as much on an arm of 0.2 m.
         self_distance: least distance [m] between links that must not touch.
@@ -43,6 +46,8 @@ class FeasibilityLimits:
     foot_load: float = 10.0
     support: float = 0.015
     zero_moment: float = 0.01
+    off_line: float = 0.01
+    pair_time: float = 0.25
     wrench: float = 5.0
     self_distance: float = 0.005
     clearance: float = 0.02
