@@ -22,8 +22,8 @@ from go2_wbc.robot.rotations import yaw_rotation
 from motions.compiled_plan import CompiledPlan
 from motions.compiler import UNLOAD_TIME, compile_quasi_static
 from motions.dynamic_span import DynamicSpan, attitude_angles, curves_of, placed
+from motions.dynamics.cache import solve_cached
 from motions.dynamics.phases import PhaseProblem
-from motions.dynamics.solver import solve
 from motions.dynamics.standing import standing, standing_feet
 from motions.keys import BodyKey, Key, Mark
 from motions.language.flight import away_from_home
@@ -135,7 +135,7 @@ class _Maker:
         initial = None if is_home else standing(self._model, self._feet)
         problem = PhaseProblem(block.phases, initial, tolerance=self._timeline.tolerance)
         try:
-            found = solve(problem, self._model)
+            found = solve_cached(problem, self._model)
         except PlanNotFound as error:
             reason = "; ".join(error.reasons) or str(error)
             self._problems.append(Problem("dynamic plan", "trunk", block.start, reason=reason))
