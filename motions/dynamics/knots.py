@@ -19,17 +19,13 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation
 from motions.dynamics.limits import PlanLimits
-from motions.dynamics.phases import FullState, Phase, PhaseProblem
+from motions.dynamics.phases import GRAVITY, KNOT_PERIOD, FullState, Phase, PhaseProblem
 from motions.dynamics.standing import standing, standing_feet
 from motions.placement import attitudes, configurations, turned, turned_back
 
-GRAVITY = 9.81
 LEAD = 0.2
 """Share of a flight's way by which the trunk is ahead of the feet at take-off, and behind them at
 touchdown, in the first guess."""
-KNOT_PERIOD = 0.02
-"""Time [s] between knots, nearly: phases last whole numbers of them. Half of it costs two to four
-times the work, and the plans are no better (own experiments)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -63,10 +63,10 @@ class Search:
         budget: float,
         progress: Progress | None,
     ) -> None:
-        """Prepare; the budget [s] runs from here."""
+        """Prepare; the budget, processor time [s], runs from here."""
         self.iterations = 0
         self._full, self._knots, self._budget = full, knots, budget
-        self._deadline = time.monotonic() + budget
+        self._deadline = time.thread_time() + budget
         self._progress = progress
         self._watch = _watch(self)
         self._soft_solver, self._solver = self._solver_of(soft), self._solver_of(full)
@@ -87,7 +87,7 @@ class Search:
             self._agree()
         except _Expired:
             raise PlanNotFound(
-                f"no dynamic plan within {self._budget:g} s ({self.iterations} iterations); "
+                f"no dynamic plan within {self._budget:g} s of processor time ({self.iterations} iterations); "
                 "ask for less, or give a larger budget"
             ) from None
         return self._found()
@@ -97,7 +97,7 @@ class Search:
         self.iterations += 1
         if self._progress is not None:
             self._progress(self.iterations, cost)
-        if time.monotonic() > self._deadline:
+        if time.thread_time() > self._deadline:
             raise _Expired
 
     def _climb(self) -> None:

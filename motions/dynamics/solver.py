@@ -19,7 +19,7 @@ from motions.dynamics.verdict import audit
 
 INSTALL_LINE = "pip install go2-wbc[dynamics]"
 BUDGET = 20.0
-"""Time [s] that solving may take."""
+"""Processor time [s] that solving may take."""
 
 
 def solve(
@@ -39,7 +39,7 @@ def solve(
     Args:
         problem: what is asked.
         model: the robot.
-        budget: time [s] after which to give up.
+        budget: processor time [s] after which to give up.
         progress: called after every iteration with their number and the cost.
         limits: what the plan keeps.
         weights: what being off costs.
