@@ -14,6 +14,9 @@ from go2_wbc.errors import MotionError
 
 FORMAT = 1
 """Version of the files; others are refused."""
+BALANCING_FEET = 2
+"""On so many feet or fewer the plan's own gains are worth keeping: on more, the whole-body controller
+balances by itself."""
 _ARRAYS = {
     "times": (None,),
     "q": (None, 19),
@@ -114,7 +117,8 @@ class DynamicTrajectory:
         """The content of a file that ``from_bytes`` reads.
 
         Args:
-            is_small: compress, with gains to three digits: a quarter of the size.
+            is_small: compress, with gains to three digits and only where two feet stand or
+                fewer, 0 elsewhere: a sixth of the size.
         """
         header = {
             "format": FORMAT,
@@ -126,7 +130,8 @@ class DynamicTrajectory:
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         save = np.savez_compressed if is_small else np.savez
         if is_small:
-            arrays["gains"] = self.gains.astype(np.float16)
+            is_needed = self.stance.sum(axis=1) <= BALANCING_FEET
+            arrays["gains"] = (self.gains * is_needed[:, None, None]).astype(np.float16)
         save(stream, header=np.array(json.dumps(header)), **arrays)
         return stream.getvalue()
 
