@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from go2_wbc.curves import Ease
-from go2_wbc.errors import TimelineError
+from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
 from motions.arguments import is_number, positive, quantity, word
@@ -44,6 +44,11 @@ class Flight(Written):
     """
 
     __slots__ = ()
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether some of it is solved."""
+        return any(isinstance(key, PhaseKey) for key in self.keys)
 
     def jump(
         self: _Line, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, height: float = 0.1
@@ -194,7 +199,8 @@ def away_from_home(line: Written, time: float) -> list[str]:
 
 def _pose(body: Mapping[str, float]) -> tuple[float, float, float, float, float, float]:
     for name in body:
-        word("coordinate of the body", name, {name: name for name in BODY_COORDINATES})
+        if name not in BODY_COORDINATES:
+            raise TimelineError(unknown_name("coordinate of the body", name, BODY_COORDINATES))
     x, y, z, roll, pitch, yaw = (quantity(name, body.get(name, 0.0)) for name in BODY_COORDINATES)
     return x, y, z, roll, pitch, yaw
 
