@@ -65,7 +65,8 @@ class CompiledPlan(MotionPlan):
         """How its feet step, if any does; see ``MotionPlan.footsteps``."""
         if not self.swings.any():
             return None
-        return Footsteps(self.contacts, self.ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX)
+        loads = NORMAL_FORCE_MIN, NORMAL_FORCE_MAX
+        return Footsteps(self.contacts, self.swings, self.ramp, *loads)
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""
