@@ -61,7 +61,7 @@ class WbcConfig:
     speed_share: float = 1.0
     stance_damping: float = 20.0
     braking: float = 200.0
-    limit_horizon: float = 0.02
+    limit_horizon: float = 0.01
     joint_margin: float = 0.0
     joint_friction: JointFriction = field(default_factory=JointFriction)
 
