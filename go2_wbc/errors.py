@@ -18,6 +18,7 @@
     └── MotionError
         ├── TimelineError       an authored motion is written wrongly
         ├── MotionInfeasible    the motion breaks a limit; carries the findings
+        ├── PlanNotFound        no dynamic motion does what was asked; says what binds, where
         └── StanceMismatch      the motion starts from another stance
 
 A third-party exception is converted where the library is called (``raise ... from``).
@@ -133,6 +134,18 @@ class MotionInfeasible(MotionError):
     def __init__(self, name: str, findings: Sequence[object]) -> None:
         self.findings = tuple(findings)
         super().__init__("\n  ".join([f"motion {name!r} is infeasible:", *map(str, findings)]))
+
+
+class PlanNotFound(MotionError):
+    """No dynamic motion was found that does what was asked; says what binds, and where.
+
+    Attributes:
+        reasons: one line for each thing that is in the way.
+    """
+
+    def __init__(self, message: str, reasons: Sequence[str] = ()) -> None:
+        self.reasons = tuple(reasons)
+        super().__init__("\n  ".join([message, *self.reasons]))
 
 
 class StanceMismatch(MotionError):

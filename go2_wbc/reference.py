@@ -233,6 +233,8 @@ class Footsteps:
     Attributes:
         contacts: who stands when.
         swings: (m, 4) at each event of ``contacts``, the feet in the air that follow their places.
+        unloads: (m, 4) when [s] each foot that stands lifts off next, if it gives up its load
+            before that; inf if it pushes off.
         ramp: time [s] over which a foot takes up its load after touchdown and gives it up before
             lift-off.
         normal_force_min, normal_force_max: bounds [N] of a stance foot's normal force.
@@ -240,6 +242,7 @@ class Footsteps:
 
     contacts: ContactSchedule
     swings: Bool[np.ndarray, "m 4"]
+    unloads: Float[np.ndarray, "m 4"]
     ramp: float
     normal_force_min: float
     normal_force_max: float

@@ -17,9 +17,11 @@ QUARTER, HALF = math.pi / 2, math.pi
 LARGEST_ANGLES: Mapping[str, float] = {
     **dict.fromkeys(("roll", "pitch", "yaw", "hip"), QUARTER),
     **dict.fromkeys(("thigh", "calf"), HALF),
+    "turn": 4.0 * math.pi,
 }
 """Angles [rad] beyond which degrees were meant. A hip turns by 48 deg, and the trunk, on its feet,
 by less; a calf reaches from -156 to -48 deg, a thigh farther, but none needs more than half a turn.
+Who walks may turn twice.
 """
 
 _Meaning = TypeVar("_Meaning", bound=Enum)
@@ -43,7 +45,7 @@ def positive(name: str, value: float) -> float:
     return float(value)
 
 
-def quantity(name: str, value: float) -> float:
+def quantity(name: str, value: float, farthest: float = FARTHEST) -> float:
     """``value`` as a float: an angle [rad] for the names of angles, else a length [m].
 
     Raises:
@@ -51,7 +53,7 @@ def quantity(name: str, value: float) -> float:
     """
     if not is_number(value):
         raise TimelineError(f"{name} must be a finite number, got {value!r}")
-    largest = LARGEST_ANGLES.get(name, FARTHEST)
+    largest = LARGEST_ANGLES.get(name, farthest)
     if abs(value) > largest and name in LARGEST_ANGLES:
         raise TimelineError(
             f"{name} of {value:g} rad looks like degrees: write deg({value:g}); {value:g} rad is "

@@ -41,7 +41,7 @@ class Balancer:
         self, timeline: Timeline, tracks: LegTracks, model: RobotModel, times: Times, body: Poses
     ) -> None:
         """``body``: the path of the trunk at ``times``, without any shift."""
-        self._tracks, self._model = tracks, model
+        self._tracks, self._footing, self._model = tracks, tracks.footing, model
         self._times, self._body = times, body
         self._shifts, self._end = timeline.in_order(BalanceShift), timeline.end
         self._key_ends = sorted(key.end for key in timeline.keys)
@@ -82,13 +82,16 @@ class Balancer:
         pose[:2] += guess
         instant = self._times[index : index + 1]
         joints = [self._tracks.path(leg, instant, pose[None]).q[0] for leg in LEGS]
-        return self._solve(raised, pose, np.concatenate(joints))[:2] - self._body[index, :2]
+        p_feet = self._footing.places(instant)[0]
+        placed = self._solve(raised, pose, np.concatenate(joints), p_feet)
+        return placed[:2] - self._body[index, :2]
 
     def _solve(
         self,
         raised: frozenset[Leg],
         pose: Float[np.ndarray, "6"],
         joints: Float[np.ndarray, "12"],
+        p_feet: Float[np.ndarray, "4 3"],
     ) -> Float[np.ndarray, "19"]:
         """The balanced configuration nearest to ``pose`` that keeps the greatest margin.
 
@@ -103,7 +106,7 @@ class Balancer:
         best: IkError | None = None
         for margin in MARGINS:
             targets = PoseTargets(
-                p_world_feet=self._tracks.p_feet,
+                p_world_feet=p_feet,
                 rpy=(float(pose[3]), float(pose[4]), float(pose[5])),
                 height=float(pose[2]),
                 raised=leg,

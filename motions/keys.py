@@ -135,6 +135,46 @@ class LegKey(Key):
 
 
 @dataclass(frozen=True, slots=True)
+class StepKey(Key):
+    """A foot swings to a new place and stands there.
+
+    Attributes:
+        leg: whose foot.
+        place: x, y [m] and yaw [rad], in the frame of the four feet: its origin in their middle, x
+            along their heading. Of a single step, the way of the foot, after the frame has turned
+            by yaw with the foot on it; of a square one, the pose of the frame in which the foot
+            then stands below its hip.
+        height: of the foot [m] above its way, at most.
+        since: instant [s] whose frame of the feet it is; a foot in the air counts where it lands.
+        lead: the trunk follows from so long [s] before the swing until so long after it.
+        is_square: whether ``place`` is the pose of a frame.
+    """
+
+    leg: Leg
+    place: tuple[float, float, float]
+    height: float
+    since: float
+    lead: float = 0.0
+    is_square: bool = False
+
+    def later(self, seconds: float) -> StepKey:
+        """The same key, moved in time."""
+        start, end, since = (t + seconds for t in (self.start, self.end, self.since))
+        return replace(self, start=start, end=end, since=since)
+
+    @property
+    def track(self) -> str:
+        """The leg."""
+        return f"foot {self.leg.name}"
+
+    @property
+    def mirrored(self) -> StepKey:
+        """Left and right exchanged."""
+        x, y, yaw = self.place
+        return replace(self, leg=self.leg.mirror, place=(x, -y, -yaw))
+
+
+@dataclass(frozen=True, slots=True)
 class Mark(Key):
     """A named span of time: something is worth looking at."""
 
@@ -148,9 +188,15 @@ class Mark(Key):
 
 @dataclass(frozen=True, slots=True)
 class BalanceShift(Key):
-    """The trunk moves over the feet that stay when ``raised`` legs are in the air."""
+    """The trunk moves over the feet that stay when ``raised`` legs are in the air.
+
+    Attributes:
+        raised: these legs.
+        is_swaying: whether it is instead over those of the feet that stand while others step.
+    """
 
     raised: frozenset[Leg]
+    is_swaying: bool = False
 
     @property
     def track(self) -> str:

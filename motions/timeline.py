@@ -15,10 +15,12 @@ from __future__ import annotations
 import math
 
 from motions.language.arrangement import Arrangement
+from motions.language.flight import Flight
 from motions.language.moves import Moves
+from motions.language.steps import Steps
 
 
-class Timeline(Moves, Arrangement):
+class Timeline(Moves, Steps, Flight, Arrangement):
     """An authored motion; ``motions.language`` holds its calls."""
 
     __slots__ = ()

@@ -1,13 +1,14 @@
 """Tracks of a timeline as functions of many instants at once: where trunk and legs shall be.
 
 Everything is in the frame of the motion: z up, x ahead, its origin on the ground in the middle of
-the four feet.
+the four feet as they stand at first. Offsets count in the frame of the feet as they stand by then.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise, starmap
 from weakref import WeakKeyDictionary
 
@@ -18,7 +19,17 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
-from motions.keys import BODY_CHANNELS, BodyKey, Frame, Key, LegKey, LegTarget, PostureKey
+from motions.footing import Footing
+from motions.keys import (
+    BODY_CHANNELS,
+    BodyKey,
+    Frame,
+    Key,
+    LegKey,
+    LegTarget,
+    PostureKey,
+    StepKey,
+)
 from motions.placement import Wanted, attitudes, place, turned, turned_back
 from motions.postures import LIE_POSE, SIT_POSE, STAND_POSE
 from motions.timeline import Timeline
@@ -35,6 +46,8 @@ SETTLING_STEPS = 10
 
 Times = Float[np.ndarray, " n"]
 Poses = Float[np.ndarray, "n 6"]
+Joints = Float[np.ndarray, "n 12"]
+Feet = Float[np.ndarray, "n 4 3"]
 Move = tuple[Key, Float[np.ndarray, " k"]]
 
 
@@ -64,15 +77,24 @@ def followed(
 
 
 def body_path(
-    timeline: Timeline, home: Mapping[Posture, Float[np.ndarray, "6"]], times: Times
+    timeline: Timeline,
+    home: Mapping[Posture, Float[np.ndarray, "6"]],
+    times: Times,
+    frames: Float[np.ndarray, "n 3"],
 ) -> Poses:
-    """Base position [m] and roll, pitch, yaw [rad] at ``times``, without the shift for balance."""
+    """Base position [m] and roll, pitch, yaw [rad] at ``times``, without the shift for balance.
+
+    ``frames``: x, y [m] and yaw [rad] of the frame of the feet (``Footing.frames``).
+    """
     moves: dict[str, list[Move]] = {channel: [] for channel in BODY_CHANNELS}
     for key in timeline.in_order(BodyKey):
         moves[key.channel].append((key, np.array([key.value])))
     postures = [(key, home[key.posture]) for key in timeline.in_order(PostureKey)]
     offsets = [followed(times, np.zeros(1), moves[channel]) for channel in BODY_CHANNELS]
-    return followed(times, home[timeline.entry], postures) + np.hstack(offsets)
+    path = followed(times, home[timeline.entry], postures) + np.hstack(offsets)
+    path[:, :2] = frames[:, :2] + turned(_headings(frames), path[:, :3])[:, :2]
+    path[:, 5] += frames[:, 2]
+    return path
 
 
 def eased(key: Key, times: Times) -> Float[np.ndarray, " n"]:
@@ -86,7 +108,7 @@ def eased(key: Key, times: Times) -> Float[np.ndarray, " n"]:
 
 def flights(timeline: Timeline, leg: Leg) -> list[tuple[float, float]]:
     """Spans [s] in which a foot is off the ground; the last one may be endless."""
-    spans: list[tuple[float, float]] = []
+    spans = swings(timeline, leg)
     begin: float | None = None
     for key in timeline.in_order(LegKey):
         if key.leg is not leg:
@@ -96,25 +118,32 @@ def flights(timeline: Timeline, leg: Leg) -> list[tuple[float, float]]:
         if key.target.is_on_ground:
             spans.append((begin, key.end))
             begin = None
-    return spans if begin is None else [*spans, (begin, np.inf)]
+    return sorted(spans if begin is None else [*spans, (begin, np.inf)])
+
+
+def swings(timeline: Timeline, leg: Leg) -> list[tuple[float, float]]:
+    """Spans [s] in which a foot steps."""
+    return [(key.start, key.end) for key in timeline.in_order(StepKey) if key.leg is leg]
 
 
 class LegTracks:
     """Evaluates the legs' tracks of a timeline along a path of the trunk.
 
     Attributes:
-        p_feet: (4, 3) where the feet stand [m].
+        footing: where the feet stand.
     """
 
-    def __init__(self, timeline: Timeline, model: RobotModel, home: Float[np.ndarray, "6"]) -> None:
-        """``home``: pose of the trunk in which the motion starts, on four feet."""
+    def __init__(
+        self, timeline: Timeline, footing: Footing, model: RobotModel, home: Float[np.ndarray, "6"]
+    ) -> None:
+        """``home``: pose of the trunk in the frame of the feet in which the motion starts."""
         self._geometry = {leg: LegGeometry.of(model, leg) for leg in LEGS}
         self._keys: dict[Leg, list[LegKey]] = {leg: [] for leg in LEGS}
         for key in timeline.in_order(LegKey):
             self._keys[key.leg].append(key)
         self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
-        self.p_feet = standing_feet(model)
-        self._p_base_feet_home = (self.p_feet - home[:3]) @ attitudes(home[None, 3:])[0]
+        self.footing = footing
+        self._p_home, self._R_home = home[:3], attitudes(home[None, 3:])[0]
 
     def path(self, leg: Leg, times: Times, body: Poses) -> LegAngles:
         """Joint angles of ``leg`` at increasing ``times``, at which the trunk is at ``body``.
@@ -124,55 +153,90 @@ class LegTracks:
         keys, starts = self._keys[leg], self._starts[leg]
         first = max(bisect_right(starts, times[0]) - 1, 0)
         origin = keys[first - 1].target if first else LegTarget.on_ground()
-        path = self._at(leg, origin, body)
+        ground = self.ground(leg, times)
+        path = self._at(leg, origin, body, ground)
         for index in range(first, bisect_right(starts, times[-1])):
             key = keys[index]
             following = starts[index + 1] if index + 1 < len(keys) else np.inf
             until = max(np.searchsorted(times, following), np.searchsorted(times, key.end, "right"))
             rows = slice(int(np.searchsorted(times, key.start)), int(until))
-            moved = self._move(key, origin, times[rows], body[rows])
+            moved = self._move(key, origin, times[rows], body[rows], ground.part(rows))
             path.q[rows], path.miss[rows] = moved.q, moved.miss
             origin = key.target
         return path
 
+    def ground(self, leg: Leg, times: Times) -> Ground:
+        """Where the foot of ``leg`` stands at ``times``."""
+        return Ground(self.footing.place(leg, times), self.footing.frames(times))
+
     def feet(
-        self, stance: Bool[np.ndarray, "n 4"], body: Poses, joints: Float[np.ndarray, "n 12"]
-    ) -> Float[np.ndarray, "n 12"]:
-        """Places [m] of the feet's centres: where they stand, and where raised legs hold them.
+        self, raised: Bool[np.ndarray, "n 4"], p_feet: Feet, body: Poses, joints: Joints
+    ) -> Feet:
+        """Places [m] of the feet's centres: ``p_feet``, and where raised legs hold them.
 
         ``body``, ``joints``: pose of the trunk and joint angles.
         """
-        R, places = attitudes(body[:, 3:]), []
+        R, places = attitudes(body[:, 3:]), p_feet.copy()
         for leg in LEGS:
-            seen = foot_places(self._geometry[leg], joints[:, leg.joints])
-            held = body[:, :3] + turned(R, seen)
-            places.append(np.where(stance[:, leg, None], self.p_feet[leg], held))
-        return np.hstack(places)
+            rows = raised[:, leg]
+            seen = foot_places(self._geometry[leg], joints[rows][:, leg.joints])
+            places[rows, leg] = body[rows, :3] + turned(R[rows], seen)
+        return places
 
-    def _move(self, key: LegKey, origin: LegTarget, times: Times, body: Poses) -> LegAngles:
+    def _move(
+        self, key: LegKey, origin: LegTarget, times: Times, body: Poses, ground: Ground
+    ) -> LegAngles:
         share = eased(key, times)[:, None]
         goals = (origin, key.target)
         span = times <= key.end
         if all(goal.frame is not Frame.JOINTS for goal in goals):
-            places = [self._places(key.leg, goal, body) for goal in goals]
+            places = [self._places(goal, body, ground) for goal in goals]
             hip = self._geometry[key.leg].p_base_hip[2]
             if all((place[span, 2] < hip - LOW).all() for place in places):
                 between = (1.0 - share) * places[0] + share * places[1]
                 return leg_angles(self._geometry[key.leg], between)
-        first, second = (self._at(key.leg, goal, body) for goal in goals)
+        first, second = (self._at(key.leg, goal, body, ground) for goal in goals)
         q = (1.0 - share) * first.q + share * second.q
         return LegAngles(q, np.where(share[:, 0] < 1.0, first.miss, second.miss))
 
-    def _at(self, leg: Leg, target: LegTarget, body: Poses) -> LegAngles:
+    def _at(self, leg: Leg, target: LegTarget, body: Poses, ground: Ground) -> LegAngles:
         if target.frame is Frame.JOINTS:
             return LegAngles(np.tile(target.values, (len(body), 1)), np.zeros(len(body)))
-        return leg_angles(self._geometry[leg], self._places(leg, target, body))
+        return leg_angles(self._geometry[leg], self._places(target, body, ground))
 
-    def _places(self, leg: Leg, target: LegTarget, body: Poses) -> Float[np.ndarray, "n 3"]:
-        offset = np.array(target.values)
+    def _places(self, target: LegTarget, body: Poses, ground: Ground) -> Float[np.ndarray, "n 3"]:
+        """Places of a foot [m], seen from the base."""
+        offset, R = np.array(target.values), _headings(ground.frames)
         if target.frame is Frame.BODY:
-            return np.tile(self._p_base_feet_home[leg] + offset, (len(body), 1))
-        return turned_back(attitudes(body[:, 3:]), self.p_feet[leg] + offset - body[:, :3])
+            seen = turned_back(R, ground.p - _flat(ground.frames))
+            return (seen - self._p_home) @ self._R_home + offset
+        place = ground.p + R @ offset
+        return turned_back(attitudes(body[:, 3:]), place - body[:, :3])
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """Where one foot stands.
+
+    Attributes:
+        p: (n, 3) its centre [m].
+        frames: (n, 3) x, y [m] and yaw [rad] of the frame of the four feet.
+    """
+
+    p: Float[np.ndarray, "n 3"]
+    frames: Float[np.ndarray, "n 3"]
+
+    def part(self, rows: slice) -> Ground:
+        """Some of its instants."""
+        return Ground(self.p[rows], self.frames[rows])
+
+
+def _flat(frames: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    return np.column_stack([frames[:, :2], np.zeros(len(frames))])
+
+
+def _headings(frames: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
+    return attitudes(np.column_stack([np.zeros((len(frames), 2)), frames[:, 2]]))
 
 
 def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:

@@ -3,14 +3,17 @@
 The references say where the CoM, the trunk's attitude and the raised legs shall be. The rest
 follows: standing feet stay in their places, so the trunk's place is the one that puts the CoM where
 it is wanted, and the standing legs' angles come from closed-form inverse kinematics. Velocities and
-accelerations are those of a cubic spline through the samples.
+accelerations are those of a cubic spline through the samples. Dynamic spans bring their own states.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+import pinocchio as pin
 from jaxtyping import Bool, Float
 from scipy.interpolate import CubicSpline
 
@@ -18,12 +21,23 @@ from go2_wbc.errors import MotionError
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.compiled_plan import CompiledPlan
-from motions.placement import Wanted, attitudes, configurations, place, turned, turned_back
+from motions.dynamic_span import DynamicSpan
+from motions.placement import (
+    Wanted,
+    attitudes,
+    centres_of_mass,
+    configurations,
+    place,
+    turned,
+    turned_back,
+)
 from motions.samples import PlanSamples
 from motions.tracks import sample_times, standing_feet
 
 CENTRING_STEPS = 5
 """Steps that put the CoM in its place; see ``place``."""
+LEAST_WEIGHT = 1.0
+"""Least vertical force [N] by which moments are divided: the zero-moment point stays finite."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +54,7 @@ class Trajectory:
         load_share: (n, 4) share of its load that a foot may bear.
         p_feet: (n, 4, 3) where the feet are [m] of legs that do not follow their joints.
         miss: (n, 4) distance [m] by which such a foot is out of its leg's reach.
+        is_dynamic: (n,) instants in spans that obey the whole robot's dynamics, of which they are.
     """
 
     times: Float[np.ndarray, " n"]
@@ -52,6 +67,7 @@ class Trajectory:
     load_share: Float[np.ndarray, "n 4"]
     p_feet: Float[np.ndarray, "n 4 3"]
     miss: Float[np.ndarray, "n 4"]
+    is_dynamic: Bool[np.ndarray, " n"]
 
     def placed(self, p_base: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """Points of the base [m], one an instant, in the frame of the motion."""
@@ -81,9 +97,14 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     )
     placed = place(wanted, CENTRING_STEPS, model)
     q = configurations(np.hstack([placed.p_base, rpy]), placed.q_joints)
-    v, a = _rates(times, q, rpy, R)
+    spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
+    is_dynamic = _are_within(times, spans)
+    v, a = np.zeros((len(times), 18)), np.zeros((len(times), 18))
+    for rows in _runs(is_dynamic):
+        if not is_dynamic[rows.start] and rows.stop - rows.start > 1:
+            v[rows], a[rows] = rates(times[rows], q[rows], rpy[rows])
     greatest = asked.normal_force_max
-    return Trajectory(
+    path = Trajectory(
         times=times,
         q=q,
         v=v,
@@ -94,7 +115,39 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
         load_share=greatest / max(float(greatest.max()), 1e-9),
         p_feet=asked.p_feet,
         miss=placed.miss,
+        is_dynamic=is_dynamic,
     )
+    for span in spans:
+        _fill(path, span, model)
+    return path
+
+
+def _are_within(
+    times: Float[np.ndarray, " n"], spans: Sequence[DynamicSpan]
+) -> Bool[np.ndarray, " n"]:
+    within = np.zeros(len(times), dtype=bool)
+    for span in spans:
+        within |= (times >= span.start) & (times < span.end)
+    return within
+
+
+def _runs(mask: Bool[np.ndarray, " n"]) -> list[slice]:
+    """Rows between changes of ``mask``."""
+    edges = [0, *(np.flatnonzero(np.diff(mask)) + 1).tolist(), len(mask)]
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def _fill(path: Trajectory, span: DynamicSpan, model: RobotModel) -> None:
+    """Put the span's own states into its rows of ``path``."""
+    rows = _are_within(path.times, [span])
+    found = span.at(path.times[rows], model)
+    path.q[rows], path.v[rows], path.a[rows] = found.q, found.v, found.a
+    turns = np.array([pin.Quaternion(q[3:7]).toRotationMatrix() for q in found.q])
+    own = np.unwrap(_rpy_of(turns), axis=0)
+    path.rpy[rows] = own + 2.0 * np.pi * np.round((path.rpy[rows][:1] - own[:1]) / (2.0 * np.pi))
+    poses = np.hstack([found.q[:, :3], path.rpy[rows]])
+    path.p_com[rows] = centres_of_mass(poses, found.q[:, 7:], model)
+    path.miss[rows] = 0.0
 
 
 def _require_finite(asked: PlanSamples) -> None:
@@ -120,11 +173,8 @@ def _rpy_of(R: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "n 3"]:
     return np.column_stack([roll, pitch, yaw])
 
 
-def _rates(
-    times: Float[np.ndarray, " n"],
-    q: Float[np.ndarray, "n 19"],
-    rpy: Float[np.ndarray, "n 3"],
-    R: Float[np.ndarray, "n 3 3"],
+def rates(
+    times: Float[np.ndarray, " n"], q: Float[np.ndarray, "n 19"], rpy: Float[np.ndarray, "n 3"]
 ) -> tuple[Float[np.ndarray, "n 18"], Float[np.ndarray, "n 18"]]:
     """Velocity and acceleration (n, 18) as Pinocchio counts them: the base's in its own frame.
 
@@ -132,12 +182,29 @@ def _rates(
     dv_b/dt = R' a_w - w_b x v_b (Featherstone 2008, ch. 2: spatial, not classical); so that of
     w_b = R' w_w is R' dw_w.
     """
+    R = attitudes(rpy)
     spline = CubicSpline(times, np.hstack([q[:, :3], rpy, q[:, 7:]]), bc_type="clamped")
     rate, acceleration = spline(times, 1), spline(times, 2)
     turning = _angular_rates(rpy, rate[:, 3:6], acceleration[:, 3:6])
     v, a = turned_back(R, rate[:, :3]), turned_back(R, acceleration[:, :3])
     w, dw = (turned_back(R, vectors) for vectors in turning)
     return np.hstack([v, w, rate[:, 6:]]), np.hstack([a - np.cross(w, v), dw, acceleration[:, 6:]])
+
+
+def zero_moment_points(
+    q: Float[np.ndarray, "n 19"], rpy: Float[np.ndarray, "n 3"], wrench: Float[np.ndarray, "n 6"]
+) -> Float[np.ndarray, "n 2"]:
+    """Where the ground's forces act together (Vukobratovic & Borovac 2004, eq. 3).
+
+    ``wrench``: what the trunk needs, about the base in its frame. Moved to the origin on the
+    ground, F = R F_b and N = R N_b + p x F; there is no moment about the level axes at the point
+    x = -N_y / F_z, y = N_x / F_z. Where the feet hardly press, F_z counts as ``LEAST_WEIGHT``.
+    """
+    R = attitudes(rpy)
+    force = turned(R, wrench[:, :3])
+    moment = turned(R, wrench[:, 3:]) + np.cross(q[:, :3], force)
+    vertical = np.maximum(force[:, 2], LEAST_WEIGHT)
+    return np.column_stack([-moment[:, 1], moment[:, 0]]) / vertical[:, None]
 
 
 def _angular_rates(

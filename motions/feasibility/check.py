@@ -8,10 +8,10 @@ from go2_wbc.errors import MotionError
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.compiled_plan import CompiledPlan
-from motions.feasibility import dynamic, kinematic
+from motions.feasibility import dynamic, flight, kinematic
 from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion
 from motions.feasibility.collision import SelfCollision, self_distance
-from motions.feasibility.limits import FeasibilityLimits
+from motions.feasibility.limits import FeasibilityLimits, FlightLimits
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.problem import Problem
 from motions.trajectory import trajectory_of
@@ -92,7 +92,11 @@ class FeasibilityChecker:
         plan, model, limits = compile_motion(motion, self.model), self.model, self._limits
         path = trajectory_of(plan, model)
         forces = dynamic.forces_of(path, model)
-        problems = plan.problems if isinstance(plan, CompiledPlan) else ()
+        problems, in_flight = (), []
+        if isinstance(plan, CompiledPlan):
+            problems = plan.problems
+            forces = flight.with_spans(forces, path, plan, model)
+            in_flight = flight.flight(plan, model, FlightLimits())
         com, zero_moment_point = dynamic.support(path, forces, limits)
         landing_place, landing_speed = kinematic.landing(path, model, limits)
         in_order_of_causes = [
@@ -112,6 +116,7 @@ class FeasibilityChecker:
             zero_moment_point,
             *dynamic.contacts(path, forces, limits),
             *dynamic.torque(path, forces, model, limits),
+            *in_flight,
         ]
         report = FeasibilityReport.of(plan.name, plan.duration, in_order_of_causes)
         return CheckedMotion(plan, report, path, forces)

@@ -13,9 +13,9 @@ from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
+from motions.assembly import compile_timeline
 from motions.authoring import Motion
 from motions.compiled_plan import CompiledPlan
-from motions.compiler import compile_timeline
 from motions.feasibility.dynamic import Forces
 from motions.feasibility.report import FeasibilityReport
 from motions.registry import load_motion

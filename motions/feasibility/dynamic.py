@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.geometry import support_margins
@@ -32,9 +32,9 @@ from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from motions.feasibility.kinematic import FEET, JOINTS
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
-from motions.placement import attitudes, turned
+from motions.placement import attitudes
 from motions.plan import NORMAL_FORCE_MAX
-from motions.trajectory import Trajectory
+from motions.trajectory import Trajectory, zero_moment_points
 
 ARM = 0.2
 """Length [m] that makes moments comparable to forces: half the distance of front and rear feet."""
@@ -48,8 +48,6 @@ LOADED = 0.999
 PRESSED = 10.0
 """Normal force [N] from which on the friction of a foot matters; below, the quotient is noise and
 a slip moves nothing (own choice, 6 % of the weight)."""
-LEAST_WEIGHT = 1.0
-"""Least vertical force [N] by which moments are divided: the zero-moment point stays finite."""
 STILL = 1e-6
 """Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15."""
 NO_SUPPORT = 1.0
@@ -68,12 +66,15 @@ class Forces:
         tau: (n, 12) joint torques [N m].
         missing: (n, 2) part of the force [N] and of the moment [N m] that the feet cannot give.
         zmp: (n, 2) zero-moment point on the ground [m].
+        v_motors: (n, 12) joint speeds [rad/s] at which the torques are given; those of the path
+            unless said.
     """
 
     contact: Float[np.ndarray, "n 4 3"]
     tau: Float[np.ndarray, "n 12"]
     missing: Float[np.ndarray, "n 2"]
     zmp: Float[np.ndarray, "n 2"]
+    v_motors: Float[np.ndarray, "n 12"] | None = None
 
 
 def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
@@ -89,7 +90,7 @@ def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     given = (joints, attitudes(motion.rpy), needed, load_share)
     tables = (leg_table(model), friction_pyramid(PYRAMID), _SCALE, numbers)
     share_loads(*given, *tables, contact, tau, missing)
-    return Forces(contact, tau, missing, _zero_moment_points(motion, needed[:, :6]))
+    return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, needed[:, :6]))
 
 
 def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:
@@ -104,7 +105,7 @@ def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:
         contact[row], missing[row] = _share(snapshot, needed[:6], motion.load_share[row], model)
         J = snapshot.J_contacts.reshape(12, 18)
         tau[row] = needed[6:] - J[:, 6:].T @ contact[row].ravel()
-    return Forces(contact, tau, missing, _zero_moment_points(motion, wrench))
+    return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench))
 
 
 def torque(
@@ -115,9 +116,10 @@ def torque(
     Only a driving motor, tau v > 0, meets the line of torque and speed; rounding moves none.
     """
     asked, most = np.abs(forces.tau), limits.torque_share * model.torque_limits
-    lower, upper = model.motor.limits(motion.v[:, 6:])
+    v = motion.v[:, 6:] if forces.v_motors is None else forces.v_motors
+    lower, upper = model.motor.limits(v)
     at_speed = np.where(forces.tau < 0.0, -lower, upper)
-    drives = forces.tau * motion.v[:, 6:] > STILL * asked
+    drives = forces.tau * v > STILL * asked
     tight = TIGHT_TORQUE * float(model.torque_limits.min())
     what = ("N m", JOINTS, motion.times, asked)
     return (
@@ -134,7 +136,8 @@ def contacts(
     Friction is max(|f_x|, |f_y|) / f_z, in the axes of the pyramid that the controller keeps.
     """
     times, normal = motion.times, forces.contact[:, :, 2]
-    is_needed = ~motion.stance.all(axis=1, keepdims=True)  # on four feet one may be unloaded
+    written = ~motion.is_dynamic[:, None]
+    is_needed = written & ~motion.stance.all(axis=1, keepdims=True)  # of four one may be unloaded
     stands = (motion.load_share > LOADED) & is_needed
     sideways = np.abs(forces.contact[:, :, :2]).max(axis=2)
     pressed = normal > PRESSED
@@ -143,9 +146,9 @@ def contacts(
     load = ("foot load", "N", FEET, times, normal)
     grip = ("friction", "", FEET, times, needed)
     return (
-        Series.against(*wrench, np.array([limits.wrench, limits.wrench * ARM])),
+        Series.against(*wrench, np.array([limits.wrench, limits.wrench * ARM]), where=written),
         Series.against(*load, limits.foot_load, is_floor=True, where=stands, tight=TIGHT_LOAD),
-        Series.against(*grip, limits.friction, where=pressed, tight=TIGHT_FRICTION),
+        Series.against(*grip, limits.friction, where=pressed & written, tight=TIGHT_FRICTION),
     )
 
 
@@ -155,6 +158,9 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
     At rest the CoM must lie above it (McGhee & Frank 1968); in motion the zero-moment point must
     lie in it, or the feet would have to pull (Vukobratovic & Borovac 2004). Negative outside; less
     than three feet have no inside, none at all count as 1 m outside.
+
+    Two feet hold a trunk that passes over the line between them, as a trot does: if they stand for
+    a short time only, the zero-moment point must be near that line, and the CoM need not.
     """
     values = np.full((len(motion.times), 2), -NO_SUPPORT)
     for rows in _same_support(motion):
@@ -162,12 +168,26 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
         feet = motion.p_feet[rows[0], stands, :2]
         for column, points in enumerate((motion.p_com[:, :2], forces.zmp)):
             values[rows, column] = support_margins(feet, points[rows])
+    passes = _passes_over_two(motion, limits)
     com = ("support", "m", ("CoM",), motion.times, values[:, :1])
     zmp = ("support of ZMP", "m", ("ZMP",), motion.times, values[:, 1:])
+    least = np.where(passes, -limits.off_line, limits.zero_moment)[:, None]
+    written, tight = ~motion.is_dynamic, TIGHT_SUPPORT
+    where, both = (written & ~passes)[:, None], written[:, None]
     return (
-        Series.against(*com, limits.support, is_floor=True, tight=TIGHT_SUPPORT),
-        Series.against(*zmp, limits.zero_moment, is_floor=True, tight=TIGHT_SUPPORT),
+        Series.against(*com, limits.support, is_floor=True, where=where, tight=tight),
+        Series.against(*zmp, least, is_floor=True, where=both, tight=tight),
     )
+
+
+def _passes_over_two(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.ndarray, " n"]:
+    """Samples in which two feet stand, for no longer than they may."""
+    two = motion.stance.sum(axis=1) == _PAIR
+    changes = (motion.stance[1:] != motion.stance[:-1]).any(axis=1)
+    for rows in np.split(np.arange(len(two)), np.flatnonzero(changes) + 1):
+        lasts = motion.times[rows[-1]] - motion.times[rows[0]]
+        two[rows] &= lasts <= limits.pair_time
+    return two
 
 
 def _same_support(motion: Trajectory) -> list[Int[np.ndarray, " k"]]:
@@ -227,22 +247,7 @@ def _share(
     return forces, np.array([np.linalg.norm(wrench[:3]), np.linalg.norm(wrench[3:])])
 
 
-def _zero_moment_points(
-    motion: Trajectory, wrench: Float[np.ndarray, "n 6"]
-) -> Float[np.ndarray, "n 2"]:
-    """Where the ground's forces act together (Vukobratovic & Borovac 2004, eq. 3).
-
-    ``wrench``: what the trunk needs, about the base in its frame. Moved to the origin on the
-    ground, F = R F_b and N = R N_b + p x F; there is no moment about the level axes at the point
-    x = -N_y / F_z, y = N_x / F_z. Where the feet hardly press, F_z counts as ``LEAST_WEIGHT``.
-    """
-    R = attitudes(motion.rpy)
-    force = turned(R, wrench[:, :3])
-    moment = turned(R, wrench[:, 3:]) + np.cross(motion.q[:, :3], force)
-    vertical = np.maximum(force[:, 2], LEAST_WEIGHT)
-    return np.column_stack([-moment[:, 1], moment[:, 0]]) / vertical[:, None]
-
-
+_PAIR = 2
 _SCALE = np.repeat([1.0, 1.0 / ARM], 3)
 _PYRAMIDS = tuple(np.kron(np.eye(feet), friction_pyramid(PYRAMID)) for feet in (1, 2, 3, 4))
 """Rows of one to four feet."""

@@ -11,9 +11,10 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.legs import JOINT_NAMES, LEGS
-from go2_wbc.reference import MotionPlan, Posture
+from go2_wbc.reference import Anchor, MotionPlan, Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
 from motions.tracks import home_poses
@@ -77,6 +78,7 @@ def dragging(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) -
     """
     places = _feet(motion, model)
     rubs = (places[:, :, 2] - model.foot_radius < limits.drag_height) & ~motion.stance
+    rubs &= ~motion.is_dynamic[:, None]
     steps = np.linalg.norm(np.diff(places[:, :, :2], axis=0), axis=2)
     ways = np.zeros(rubs.shape)
     for row, leg in np.argwhere(rubs[1:] & rubs[:-1]):
@@ -89,13 +91,14 @@ def landing(
 ) -> tuple[Series, Series]:
     """Where and how fast raised feet leave and meet the ground.
 
-    The speed at touchdown is that of the sample before: the central difference at the last one in
-    the air already reaches to the foot that stands.
+    The speed at touchdown is that between the last two samples in the air; a difference to the
+    next one would reach to the foot that stands.
     """
     stands, times, places = motion.stance, motion.times, _feet(motion, model)
-    paces = np.linalg.norm(np.gradient(places, times, axis=0), axis=2)
+    paces = np.linalg.norm(np.diff(places, axis=0), axis=2) / np.diff(times)[:, None]
     away, speed = np.full(stands.shape, np.nan), np.full(stands.shape, np.nan)
-    for edge, leg in np.argwhere(stands[1:] != stands[:-1]):
+    written = ~(motion.is_dynamic[1:] | motion.is_dynamic[:-1])[:, None]
+    for edge, leg in np.argwhere((stands[1:] != stands[:-1]) & written):
         lands = stands[edge + 1, leg]
         row, standing = (edge, edge + 1) if lands else (edge + 1, edge)
         away[row, leg] = np.linalg.norm(places[row, leg] - motion.p_feet[standing, leg])
@@ -115,20 +118,29 @@ def smoothness(motion: Trajectory, limits: FeasibilityLimits) -> Series:
     values = np.maximum.reduceat(jumps, (0, 3, 6), axis=1)
     bounds = np.array([limits.body_jump, limits.body_jump, limits.joint_jump])
     subjects = ("trunk", "trunk turning", "joints")
-    return Series.against("continuity", "/s", subjects, motion.times, values, bounds)
+    written = ~motion.is_dynamic
+    written[1:] &= ~motion.is_dynamic[:-1]
+    what = ("continuity", "/s", subjects, motion.times, values)
+    return Series.against(*what, bounds, where=written[:, None])
 
 
 def ends(
     plan: MotionPlan, motion: Trajectory, model: RobotModel, limits: FeasibilityLimits
 ) -> Series:
-    """Whether the motion starts and ends at rest in the postures that it names."""
+    """Whether the motion starts and ends at rest in the postures that it names.
+
+    They are above the feet as they stand then, with their heading.
+    """
     home = home_poses(model)
     names = tuple(f"{end} {what}" for end in ENDS for what in ("place", "attitude", "speed"))
     bounds = np.array([limits.stance_position, limits.stance_angle, limits.end_speed] * 2)
     values = []
     for row, posture in ((0, plan.entry), (-1, plan.exit)):
-        place, attitude = home[posture][:3], home[posture][3:]
-        off = (motion.q[row, :3] - place, motion.rpy[row] - attitude, motion.v[row])
+        feet = Anchor.of_feet(motion.p_feet[row], model.foot_radius)
+        place = feet.p_world + yaw_rotation(feet.yaw) @ home[posture][:3]
+        turn = motion.rpy[row] - home[posture][3:]
+        turn[2] = wrap_angle(float(turn[2]) - feet.yaw)
+        off = (motion.q[row, :3] - place, turn, motion.v[row])
         values += [float(np.abs(part).max()) for part in off]
     if plan.entry is Posture.LIE or not motion.stance[0].all():
         values[0] = np.inf

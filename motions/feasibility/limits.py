@@ -20,6 +20,9 @@ class FeasibilityLimits:
         foot_load: least normal force [N] of a foot that stands: 6 % of the weight.
         support: least distance [m] of the CoM to the edges of the support polygon.
         zero_moment: the same for the zero-moment point.
+        off_line: greatest distance [m] of the zero-moment point from the line between two feet.
+        pair_time: longest time [s] on two feet; in it a trunk that is off balance falls four times
+            as far off, exp(t / sqrt(0.29 m / g)).
         wrench: greatest part [N] of the force that no contact forces can give, 3 % of the weight;
             of the moment as much on an arm of 0.2 m.
         self_distance: least distance [m] between links that must not touch.
@@ -43,6 +46,8 @@ class FeasibilityLimits:
     foot_load: float = 10.0
     support: float = 0.015
     zero_moment: float = 0.01
+    off_line: float = 0.01
+    pair_time: float = 0.25
     wrench: float = 5.0
     self_distance: float = 0.005
     clearance: float = 0.02
@@ -56,6 +61,34 @@ class FeasibilityLimits:
     stance_position: float = 0.02
     stance_angle: float = 0.05
     end_speed: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a limit that is not positive."""
+        require_positive(self, *(f.name for f in fields(self)))
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLimits:
+    """What dynamic spans must keep.
+
+    Attributes:
+        step: greatest difference [m, rad] of a state from where the speeds lead.
+        defect: greatest remainder [N, N m] of the equations of motion: 0.3 % of the weight.
+        curve: greatest distance [m, rad] of the curves that are played from the states.
+        pull: greatest force [N] that a foot would need without ground.
+        friction: ratio of tangential and normal force, less than the 0.6 of the controller and of
+            the slipperiest ground that dynamic motions are made for.
+        slip: distance [m] that a standing foot may move, and be off the ground.
+        touchdown: greatest speed [m/s] of a foot that comes down.
+    """
+
+    step: float = 1e-3
+    defect: float = 0.5
+    curve: float = 0.03
+    pull: float = 1.0
+    friction: float = 0.55
+    slip: float = 0.02
+    touchdown: float = 1.0
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a limit that is not positive."""

@@ -14,6 +14,7 @@ from go2_wbc.errors import TimelineError
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Posture
 from motions.arguments import positive
+from motions.dynamics.phases import Tolerance
 from motions.keys import BalanceShift, BodyKey, Key, LegKey
 
 SHIFT_TIME = 0.9
@@ -36,6 +37,7 @@ class Written:
         balance: whether the body moves over the standing feet before one is raised.
         shift_time: how long [s] that takes, before a tempo is set.
         shift_beats: how many beats it takes with a tempo; 0 without one.
+        tolerance: how far what is solved may be from what is asked.
         keys: what was written so far.
         cursor: when [s] the next call starts.
         beat: seconds that one unit of ``over`` lasts.
@@ -48,6 +50,7 @@ class Written:
     name: str = field(default="motion", kw_only=True)
     balance: bool = field(default=True, kw_only=True)
     shift_time: float = field(default=SHIFT_TIME, kw_only=True)
+    tolerance: Tolerance = field(default=Tolerance(), kw_only=True)
     keys: tuple[Key, ...] = field(default=(), kw_only=True)
     cursor: float = field(default=0.0, kw_only=True)
     beat: float = field(default=1.0, kw_only=True)

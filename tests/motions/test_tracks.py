@@ -7,8 +7,9 @@ import numpy as np
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline
+from motions.footing import Footing
 from motions.postures import STAND_POSE
-from motions.tracks import LegTracks
+from motions.tracks import LegTracks, standing_feet
 
 FAR = 0.6  # m; ahead of where the foot stands, out of its leg's reach
 
@@ -18,6 +19,8 @@ def test_a_leg_on_its_way_from_a_place_out_of_reach_misses_it_until_it_has_arriv
     line = line.leg("FR", hip=0.0, thigh=0.8, calf=-1.6, over=1.0)
     times = np.array([1.0, 1.5, 1.999, 2.0])
     body = np.tile(STAND_POSE, (len(times), 1))
-    miss = LegTracks(line, RobotModel(), STAND_POSE).path(Leg.FR, times, body).miss
+    model = RobotModel()
+    tracks = LegTracks(line, Footing(line, standing_feet(model)), model, STAND_POSE)
+    miss = tracks.path(Leg.FR, times, body).miss
     assert miss[0] > 0.1
     assert miss.tolist() == [miss[0], miss[0], miss[0], 0.0]

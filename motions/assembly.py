@@ -1,0 +1,218 @@
+"""Timeline -> plan: what is written is compiled, dynamic blocks are solved, and both are joined.
+
+Each part is made in a frame of its own, on the ground below the feet where it starts; so what
+follows a jump counts from where it lands. All of them rest standing where they meet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.interpolate import PPoly
+
+from go2_wbc.contacts import ContactSchedule
+from go2_wbc.curves import Ease
+from go2_wbc.errors import PlanNotFound, TimelineError
+from go2_wbc.reference import Anchor, Posture
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import yaw_rotation
+from motions.compiled_plan import CompiledPlan
+from motions.compiler import UNLOAD_TIME, compile_quasi_static
+from motions.dynamic_span import DynamicSpan, attitude_angles, curves_of, placed
+from motions.dynamics.phases import PhaseProblem
+from motions.dynamics.solver import solve
+from motions.dynamics.standing import standing, standing_feet
+from motions.keys import BodyKey, Key, Mark
+from motions.language.flight import away_from_home
+from motions.language.written import SAME
+from motions.phase_key import PhaseKey
+from motions.problem import Problem
+from motions.timeline import Timeline
+
+SHORTEST = 1e-6
+"""Time [s] between dynamic blocks below which there is none: absorbs rounding of sums."""
+SAME_PLACE = 1e-3
+"""Distance [m] below which feet count as standing below the hips: less than what tracking adds."""
+_RESTING = BodyKey(0.0, 0.0, Ease.LINEAR, "z", 0.0)
+
+
+def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
+    """The plan of ``timeline``, in the frame of the motion.
+
+    Args:
+        timeline: what to compile.
+        model: of the robot; compiling uses its data, so it must not be that of a control loop that
+            runs in another thread.
+
+    Raises:
+        TimelineError: if it is empty, a dynamic block does not start standing at home, something
+            else moves meanwhile, or its phases do not fit each other.
+        MissingDependency: if a block must be solved and the solver is not installed.
+    """
+    blocks = timeline.in_order(PhaseKey)
+    if not blocks:
+        return compile_quasi_static(timeline, model)
+    for block in blocks:
+        _require_alone(timeline, block)
+    maker = _Maker(timeline, model)
+    for block in blocks:
+        maker.add_stretch(block.start, Posture.STAND)
+        maker.add_block(block)
+    maker.add_stretch(timeline.end, timeline.exit)
+    return maker.joined()
+
+
+def _require_alone(timeline: Timeline, block: PhaseKey) -> None:
+    for key in timeline.keys:
+        is_apart = key.end <= block.start + SAME or key.start >= block.end - SAME
+        if not (is_apart or key is block or isinstance(key, Mark)):
+            raise TimelineError(
+                f"{key.track} moves from {key.start:.2f} to {key.end:.2f} s, within a dynamic "
+                f"block from {block.start:.2f} to {block.end:.2f} s, which takes the whole robot"
+            )
+    away = away_from_home(timeline, block.start)
+    if away:
+        raise TimelineError(
+            f"the dynamic block at {block.start:.2f} s starts standing at home(); away: "
+            f"{', '.join(away)}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """Curves and contacts from ``start`` [s] on, in the frame of the motion."""
+
+    start: float
+    curves: PPoly
+    times: Float[np.ndarray, " m"]
+    stance: Bool[np.ndarray, "m 4"]
+    swings: Bool[np.ndarray, "m 4"]
+
+
+class _Maker:
+    """Makes the parts of a plan, one after the other.
+
+    Between them the robot stands at rest over ``feet``, which are in the frame of the next part.
+    """
+
+    def __init__(self, timeline: Timeline, model: RobotModel) -> None:
+        self._timeline, self._model = timeline, model
+        self._time, self._frame = 0.0, Anchor(np.zeros(3), 0.0)
+        self._home = standing_feet(model)
+        self._feet = self._home
+        self._parts: list[_Part] = []
+        self._spans: list[DynamicSpan] = []
+        self._problems: list[Problem] = []
+        self._ramps: list[float] = []
+
+    def add_stretch(self, end: float, exit: Posture) -> None:
+        """What is written from here to ``end`` [s]."""
+        start, line = self._time, self._timeline
+        if end - start < SHORTEST:
+            return
+        keys = [
+            key.later(-start)
+            for key in line.keys
+            if not isinstance(key, PhaseKey | Mark) and start - SAME <= key.start < end - SAME
+        ]
+        entry = line.entry if start == 0.0 else Posture.STAND
+        stretch = replace(line, cursor=end - start, entry=entry, exit=exit)
+        plan = self._compiled(stretch, keys or [replace(_RESTING, end=end - start)])
+        curves = _moved(plan.curves, self._frame)
+        times, modes = np.array(plan.contacts.times), plan.contacts.modes
+        self._parts.append(_Part(start, curves, times, modes, plan.swings))
+        self._problems += [replace(one, time=one.time + start) for one in plan.problems]
+        self._ramps.append(plan.ramp)
+        last = plan.curves(plan.duration)
+        self._move_on(end, last[18:].reshape(4, 3), last[5])
+
+    def add_block(self, block: PhaseKey) -> None:
+        """A dynamic block, solved; one that cannot be is rest and a problem."""
+        is_home = self._feet is self._home
+        initial = None if is_home else standing(self._model, self._feet)
+        problem = PhaseProblem(block.phases, initial, tolerance=self._timeline.tolerance)
+        try:
+            found = solve(problem, self._model)
+        except PlanNotFound as error:
+            reason = "; ".join(error.reasons) or str(error)
+            self._problems.append(Problem("dynamic plan", "trunk", block.start, reason=reason))
+            self.add_stretch(block.end, Posture.STAND)
+            return
+        start, stance = self._time, found.stance
+        span = DynamicSpan(start, self._frame, problem, placed(found, self._frame))
+        changes = np.flatnonzero(np.any(stance[1:] != stance[:-1], axis=1)) + 1
+        rows = np.concatenate([[0], changes])
+        asked = self._feet + problem.shift
+        yaw = float(attitude_angles(found.q)[-1, 2])
+        self._move_on(start + found.duration, asked, yaw, landed=found.p_feet[-1])
+        rest = replace(self._timeline, entry=Posture.STAND, exit=Posture.STAND, cursor=1.0)
+        home = self._compiled(rest, [replace(_RESTING, end=1.0)]).curves
+        curves = curves_of(span.trajectory, self._model, _moved(home, self._frame).c[3, 0])
+        times = found.times[rows]
+        self._parts.append(_Part(start, curves, times, stance[rows], ~stance[rows]))
+        self._spans.append(span)
+
+    def joined(self) -> CompiledPlan:
+        """All parts as one plan."""
+        line, parts = self._timeline, self._parts
+        knots = [part.start + part.curves.x[:-1] for part in parts]
+        curves = PPoly(
+            np.concatenate([part.curves.c for part in parts], axis=1),
+            np.concatenate([*knots, [self._time]]),
+        )
+        times = np.concatenate([part.start + part.times for part in parts])
+        return CompiledPlan(
+            name=line.name,
+            entry=line.entry,
+            exit=line.exit,
+            curves=curves,
+            contacts=ContactSchedule(
+                tuple(times.tolist()), np.concatenate([part.stance for part in parts])
+            ),
+            swings=np.concatenate([part.swings for part in parts]),
+            ramp=min(self._ramps, default=UNLOAD_TIME),
+            problems=tuple(self._problems),
+            spans={mark.name: (mark.start, mark.end) for mark in line.in_order(Mark)},
+            dynamic=tuple(self._spans),
+        )
+
+    def _compiled(self, stretch: Timeline, keys: Sequence[Key]) -> CompiledPlan:
+        feet = None if self._feet is self._home else self._feet
+        return compile_quasi_static(replace(stretch, keys=tuple(keys)), self._model, feet)
+
+    def _move_on(
+        self,
+        time: float,
+        feet: Float[np.ndarray, "4 3"],
+        yaw: float,
+        landed: Float[np.ndarray, "4 3"] | None = None,
+    ) -> None:
+        """Go on at ``time`` [s], standing on ``feet``; all of them in the frame of before.
+
+        ``yaw``: of the trunk [rad], whole turns counted. ``landed``: where the feet have come to,
+        a little beside: the next frame is there.
+        """
+        asked = Anchor.of_feet(feet, self._model.foot_radius)
+        own = (feet - asked.p_world) @ yaw_rotation(asked.yaw)
+        own[:, 2] = self._home[:, 2]
+        is_home = np.abs(own - self._home).max() < SAME_PLACE
+        self._feet = self._home if is_home else own
+        here = asked if landed is None else Anchor.of_feet(landed, 0.0)
+        turns = 2.0 * np.pi * round((yaw - here.yaw) / (2.0 * np.pi))
+        p = np.array([*here.p_world[:2], 0.0])
+        frame = self._frame
+        to = frame.p_world + yaw_rotation(frame.yaw) @ p
+        self._time, self._frame = time, Anchor(to, frame.yaw + here.yaw + turns)
+
+
+def _moved(curves: PPoly, frame: Anchor) -> PPoly:
+    """``curves`` of a part, in the frame of the motion: its coefficients turn as places do."""
+    R, c = yaw_rotation(frame.yaw), curves.c.copy()
+    for column in (0, *range(18, 30, 3)):
+        c[:, :, column : column + 3] = curves.c[:, :, column : column + 3] @ R.T
+        c[3, :, column : column + 3] += frame.p_world
+    c[3, :, 5] += frame.yaw
+    return PPoly(c, curves.x)

@@ -1,0 +1,133 @@
+"""Where the feet stand while a motion steps, and the frame from which its trunk is counted."""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.errors import TimelineError
+from go2_wbc.legs import LEGS, Leg
+from go2_wbc.reference import Anchor
+from go2_wbc.robot.rotations import yaw_rotation
+from motions.keys import Key, LegKey, StepKey
+from motions.language.written import SAME
+from motions.timeline import Timeline
+
+Times = Float[np.ndarray, " n"]
+
+_ROUND = 64.0
+"""1 / (u^3 (1 - u)^3) at u = 1/2: makes the height of a swing 1 in its middle."""
+
+
+class Footing:
+    """The places of the feet of a timeline, in the frame of the motion.
+
+    A foot that steps swings along a straight line by minimum jerk, and up and down by the curve
+    h 64 u^3 (1 - u)^3 of the share u of the time, which begins and ends without speed and
+    acceleration.
+
+    Attributes:
+        start: (4, 3) where the feet's centres are at first [m].
+    """
+
+    def __init__(
+        self,
+        timeline: Timeline,
+        nominal: Float[np.ndarray, "4 3"],
+        start: Float[np.ndarray, "4 3"] | None = None,
+    ) -> None:
+        """Work out where every step lands.
+
+        Args:
+            timeline: that steps.
+            nominal: where the feet's centres stand below their hips [m].
+            start: where they are at first [m], by default there.
+
+        Raises:
+            TimelineError: if a raised foot steps.
+        """
+        self.start = nominal if start is None else start
+        self._nominal = nominal
+        self._steps: dict[Leg, list[tuple[StepKey, Float[np.ndarray, "3"]]]] = {
+            leg: [] for leg in LEGS
+        }
+        for key in timeline.in_order(StepKey):
+            self._steps[key.leg].append((key, self._goal(key)))
+        for leg, steps in self._steps.items():
+            if steps:
+                _require_on_ground(timeline, leg)
+
+    @property
+    def is_moving(self) -> bool:
+        """Whether any foot steps."""
+        return any(self._steps.values())
+
+    def places(self, times: Times) -> Float[np.ndarray, "n 4 3"]:
+        """The feet's centres [m]: where they stand, or are on their way."""
+        return np.stack([self.place(leg, times) for leg in LEGS], axis=1)
+
+    def place(self, leg: Leg, times: Times) -> Float[np.ndarray, "n 3"]:
+        """The centre [m] of one foot."""
+        p_foot = np.tile(self.start[leg], (len(times), 1))
+        for key, goal in self._steps[leg]:
+            after = times >= key.start
+            u = _shares(key, times[after], 0.0)
+            here = p_foot[after]
+            here += _minimum_jerk(u)[:, None] * (goal - here)
+            here[:, 2] += key.height * _ROUND * (u * (1.0 - u)) ** 3
+            p_foot[after] = here
+        return p_foot
+
+    def frames(self, times: Times) -> Float[np.ndarray, "n 3"]:
+        """x, y [m] and yaw [rad] of the frame of the feet, as the trunk follows it.
+
+        Every step moves it by minimum jerk; the yaw is continuous over increasing ``times``.
+        """
+        p_feet = np.tile(self.start[:, :2], (len(times), 1, 1))
+        for leg, steps in self._steps.items():
+            last = self.start[leg, :2]
+            for key, goal in steps:
+                share = _minimum_jerk(_shares(key, times, key.lead))
+                p_feet[:, leg] += share[:, None] * (goal[:2] - last)
+                last = goal[:2]
+        ahead = p_feet[:, :2].mean(axis=1) - p_feet[:, 2:].mean(axis=1)
+        yaw = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+        return np.column_stack([p_feet.mean(axis=1), yaw])
+
+    def _goal(self, key: StepKey) -> Float[np.ndarray, "3"]:
+        p_feet = self.start.copy()
+        for leg, steps in self._steps.items():
+            for earlier, goal in steps:
+                if earlier.start < key.since - SAME:
+                    p_feet[leg] = goal
+        frame = Anchor.of_feet(p_feet, 0.0)
+        x, y, yaw = key.place
+        way, R = np.array([x, y, 0.0]), yaw_rotation(frame.yaw)
+        turned = R @ yaw_rotation(yaw)
+        if key.is_square:
+            foot = self._nominal[key.leg]
+            place = frame.p_world + R @ way + turned @ foot
+        else:
+            place = frame.p_world + turned @ R.T @ (p_feet[key.leg] - frame.p_world) + R @ way
+        return np.array([*place[:2], p_feet[key.leg, 2]])
+
+
+def _require_on_ground(timeline: Timeline, leg: Leg) -> None:
+    is_raised = False
+    keys: list[Key] = [*timeline.in_order(LegKey), *timeline.in_order(StepKey)]
+    for key in sorted(keys, key=lambda key: key.start):
+        if isinstance(key, LegKey) and key.leg is leg:
+            is_raised = not key.target.is_on_ground
+        if isinstance(key, StepKey) and key.leg is leg and is_raised:
+            raise TimelineError(
+                f"foot {leg.name} is raised when it shall step at {key.start:.2f} s: put it down "
+                "before"
+            )
+
+
+def _shares(key: StepKey, times: Times, lead: float) -> Times:
+    return np.clip((times - key.start + lead) / (key.end - key.start + 2.0 * lead), 0.0, 1.0)
+
+
+def _minimum_jerk(u: Times) -> Times:
+    return u**3 * (10.0 + u * (6.0 * u - 15.0))

@@ -1,0 +1,190 @@
+"""How the CoM goes while feet step: so that the ground can hold it, near to where it was wanted.
+
+With its height z, the CoM c and the zero-moment point p of an inverted pendulum are related by
+
+    p = c - z / (g + z'') c''                                       (Kajita et al. 2003, eq. 3)
+
+and p must stay among the feet that stand: a margin inside their polygon, or, of two feet, near the
+line between them. So the way e that is added to c is a uniform cubic spline, whose coefficients
+minimise
+
+    integral of |e|^2 + tau^6 |e'''|^2 + rho |what is beyond the edges|^2,
+
+a convex problem without hard constraints: Newton's method on its pieces ends after some ten steps,
+and where no way keeps all margins the least bad one comes out, for the check to judge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.interpolate import BSpline, CubicSpline
+from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags, hstack, vstack
+from scipy.sparse.linalg import spsolve
+
+from go2_wbc.geometry import convex_hull
+
+INSIDE = 0.03
+"""Distance [m] that CoM and zero-moment point keep from the edges of three or four feet: twice the
+check's limit for the CoM. A foot then bears 18 N or more, an eighth of the weight."""
+OFF_LINE = 0.001
+"""Distance [m] that the zero-moment point may be off the line of two feet."""
+FROM_FOOT = 0.05
+"""Distance [m] that it keeps from these feet, along the line."""
+SMOOTHING = 0.25
+"""Time tau [s] over which the way is smoothed: own choice, half the time between two steps."""
+STIFFNESS = 1e4
+"""Weight rho of what is beyond the edges: what is left of it is below 0.1 mm."""
+KNOTS = 5
+"""Pieces of the spline in the shortest time between two changes of the contacts, at least."""
+SHORTEST, LONGEST = 0.03, 0.08
+"""Length [s] of a piece: three samples, and what the smoothing asks for."""
+MOST_STEPS = 40
+"""Newton steps; they end by themselves when no row changes its side."""
+
+Times = Float[np.ndarray, " n"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stepping:
+    """What is known of a stretch in which feet step, at n instants.
+
+    Attributes:
+        times: increasing, evenly [s].
+        p_com: (n, 3) where the CoM would be [m].
+        stance: (n, 4) feet that stand.
+        p_feet: (n, 4, 3) where the feet are [m].
+        gravity: [m/s^2].
+        bias: (n, 2) zero-moment point less that of the pendulum [m].
+    """
+
+    times: Times
+    p_com: Float[np.ndarray, "n 3"]
+    stance: Bool[np.ndarray, "n 4"]
+    p_feet: Float[np.ndarray, "n 4 3"]
+    gravity: float
+    bias: Float[np.ndarray, "n 2"]
+
+    @property
+    def lever(self) -> Times:
+        """z / (g + z'') [s^2]."""
+        heights = CubicSpline(self.times, self.p_com[:, 2], bc_type="clamped")
+        return self.p_com[:, 2] / (self.gravity + heights(self.times, 2))
+
+    def zmp(self, way: Float[np.ndarray, "n 2"] | float = 0.0) -> Float[np.ndarray, "n 2"]:
+        """Zero-moment point [m] if ``way`` is added to the CoM."""
+        p = self.p_com[:, :2] + way
+        path = CubicSpline(self.times, p, bc_type="clamped")
+        return p - self.lever[:, None] * path(self.times, 2) + self.bias
+
+
+def sway(stepping: Stepping) -> Float[np.ndarray, "n 2"]:
+    """What to add to the place of the CoM [m]; nothing, at rest, at both ends."""
+    values, curvature, jerk = _spline(stepping)
+    if values.shape[1] == 0:
+        return np.zeros((len(stepping.times), 2))
+    G, h = _limits(stepping, values, values - diags(stepping.lever) @ curvature)
+    period = float(np.mean(np.diff(stepping.times)))
+    H = block_diag([period * (values.T @ values) + SMOOTHING**6 * (jerk.T @ jerk)] * 2)
+    x = _least(H, G, h, STIFFNESS * period).reshape(2, -1)
+    return np.column_stack([values @ x[0], values @ x[1]])
+
+
+def _least(
+    H: csc_matrix, G: csr_matrix, h: Float[np.ndarray, " k"], stiffness: float
+) -> Float[np.ndarray, " m"]:
+    """The x of least x' H x + s |max(0, G x - h)|^2."""
+    x = np.zeros(H.shape[0])
+    before = np.zeros(len(h), dtype=bool)
+    for _ in range(MOST_STEPS):
+        active = G @ x > h
+        if (active == before).all():
+            break
+        part, before = G[active], active
+        x = spsolve((H + stiffness * part.T @ part).tocsc(), stiffness * (part.T @ h[active]))
+    return x
+
+
+def _spline(stepping: Stepping) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
+    """From the coefficients to values and second derivatives at the times, and to the jerks.
+
+    On uniform knots, h apart, a derivative of a spline has the differences of its coefficients over
+    h as its own. The jerks (one a piece) are scaled by sqrt(h), so that their squares sum to an
+    integral. The three outermost coefficients on either side are 0 and left out.
+    """
+    times = stepping.times
+    is_change = (stepping.stance[1:] != stepping.stance[:-1]).any(axis=1)
+    spans = np.diff(times[1:][is_change])
+    shortest = float(spans.min()) if len(spans) else LONGEST * KNOTS
+    wanted = min(max(shortest / KNOTS, SHORTEST), LONGEST)
+    pieces = max(round((times[-1] - times[0]) / wanted), 1)
+    length = (times[-1] - times[0]) / pieces
+    knots = times[0] + length * np.arange(-3, pieces + 4)
+    inside = np.clip(times, knots[3], knots[-4])
+    count = pieces + 3
+    differences = [
+        diags([-1.0, 1.0], [0, 1], shape=(n - 1, n)) / length for n in (count, count - 1, count - 2)
+    ]
+    second = differences[1] @ differences[0]
+    values = BSpline.design_matrix(inside, knots, 3)
+    curvature = BSpline.design_matrix(inside, knots[2:-2], 1) @ second
+    jerk = np.sqrt(length) * differences[2] @ second
+    free = slice(3, max(count - 3, 3))
+    return tuple(csr_matrix(table)[:, free] for table in (values, curvature, jerk))
+
+
+def _limits(
+    stepping: Stepping, values: csr_matrix, zmp: csr_matrix
+) -> tuple[csr_matrix, Float[np.ndarray, " k"]]:
+    """G, h: the sway x keeps zero-moment point and CoM inside where G x <= h."""
+    normals, bounds = _edges(stepping)
+    many = np.flatnonzero(stepping.stance.sum(axis=1) > 2)
+    parts, ends = [], []
+    for table, rows, points in (
+        (zmp, np.arange(len(bounds)), stepping.zmp()),
+        (values, many, stepping.p_com[:, :2]),
+    ):
+        for edge in range(normals.shape[1]):
+            n, part = normals[rows, edge], table[rows]
+            parts.append(hstack([diags(n[:, 0]) @ part, diags(n[:, 1]) @ part]))
+            ends.append(bounds[rows, edge] - (n * points[rows]).sum(axis=1))
+    h = np.concatenate(ends)
+    is_edge = np.isfinite(h)
+    return vstack(parts).tocsr()[is_edge], h[is_edge]
+
+
+def _edges(
+    stepping: Stepping,
+) -> tuple[Float[np.ndarray, "n 4 2"], Float[np.ndarray, "n 4"]]:
+    """Normals and bounds: n p <= b where p keeps its margin; b is infinite where there is none."""
+    count = len(stepping.times)
+    normals, bounds = np.zeros((count, 4, 2)), np.full((count, 4), np.inf)
+    places = np.where(stepping.stance[:, :, None], stepping.p_feet[:, :, :2], np.inf)
+    is_new = np.ones(count, dtype=bool)
+    is_new[1:] = (places[1:] != places[:-1]).any(axis=(1, 2))
+    starts = [*np.flatnonzero(is_new).tolist(), count]
+    for start, end in pairwise(starts):
+        feet = stepping.p_feet[start, stepping.stance[start], :2]
+        if len(feet) >= 2:
+            rows = slice(start, end)
+            n, b = _polygon(convex_hull(feet))
+            normals[rows, : len(n)], bounds[rows, : len(b)] = n, b
+    return normals, bounds
+
+
+def _polygon(
+    corners: Float[np.ndarray, "k 2"],
+) -> tuple[Float[np.ndarray, "j 2"], Float[np.ndarray, " j"]]:
+    """Outward normals and bounds of a polygon, or of a line, each its margin further in."""
+    ways = np.roll(corners, -1, axis=0) - corners
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    n = np.column_stack([ways[:, 1], -ways[:, 0]])
+    b = (n * corners).sum(axis=1)
+    if len(corners) > 2:
+        return n, b - INSIDE
+    along = np.array([ways[0], -ways[0]])
+    ends = np.array([along[0] @ corners[1], along[1] @ corners[0]]) - FROM_FOOT
+    return np.vstack([n, along]), np.concatenate([b + OFF_LINE, ends])
