@@ -272,6 +272,11 @@ class MotionPlan(ABC):
         return self.at(t).row
 
     @property
+    def is_dynamic(self) -> bool:
+        """Whether some of it is flight or balance on few feet."""
+        return False
+
+    @property
     def footsteps(self) -> Footsteps | None:
         """How its feet step; None if none does: each comes down where it stood."""
         return None

@@ -44,19 +44,18 @@ class SafeReturn:
     def __init__(self, plan: MotionPlan, t: float) -> None:
         """Leave ``plan`` ``t`` seconds into it."""
         self._plan, self.t, self._rate = plan, min(t, plan.duration), 1.0
-        way = way_out(plan, self.t)
-        self.target, self._keeps_tempo_until = way.target, way.keeps_tempo_until
+        self._way = way_out(plan, self.t)
+        self.target = self._way.target
         self.is_over = False
 
     def advance(self, dt: float) -> Reference:
         """The reference ``dt`` seconds later, its rates those of the clock."""
-        if self.t < self._keeps_tempo_until:
+        if self.t < self._way.keeps_tempo_until:
             self.t = min(self.t + dt, self._plan.duration)
             return self._plan.at(self.t)
         left = self.target - self.t
-        is_there = left <= 0.0 and self.target <= self._keeps_tempo_until
         has_stopped = abs(left) < ARRIVED and abs(self._rate) < 0.1
-        self.is_over = self.is_over or is_there or has_stopped
+        self.is_over = self.is_over or self._way.is_left_in_motion or has_stopped
         if self.is_over or dt <= 0.0:
             return retimed(self._plan.at(self.t), 0.0 if self.is_over else self._rate, 0.0)
         wanted = np.sign(left) * min(1.0, np.sqrt(2.0 * _BRAKING * abs(left) / TURNING))
@@ -72,12 +71,13 @@ class WayOut:
 
     Attributes:
         target: instant [s] on four feet at which the clock shall stand.
-        keeps_tempo_until: instant [s] before which it keeps its tempo; if the target is no later,
-            the plan is left there as it goes.
+        keeps_tempo_until: instant [s] before which it keeps its tempo.
+        is_left_in_motion: whether the plan is left at the target as it goes, and not slowed down.
     """
 
     target: float
     keeps_tempo_until: float
+    is_left_in_motion: bool = False
 
 
 def way_out(plan: MotionPlan, t: float) -> WayOut:
@@ -90,11 +90,12 @@ def way_out(plan: MotionPlan, t: float) -> WayOut:
                 return WayOut(target, t)
     landings = (_landing(plan, span) for span in calm if span[0] > t)
     smooth = next(
-        (way for way in landings if way is not None), WayOut(plan.duration, plan.duration)
+        (way for way in landings if way is not None),
+        WayOut(plan.duration, plan.duration, is_left_in_motion=True),
     )
     first = _next_on_four_feet(plan, t)
     if first + PATIENCE < smooth.keeps_tempo_until:
-        return WayOut(first, first)
+        return WayOut(first, first, is_left_in_motion=True)
     return smooth
 
 
@@ -148,7 +149,7 @@ def _landing(plan: MotionPlan, span: tuple[float, float]) -> WayOut | None:
     """The way to stop in a calm span ahead, if there is time enough."""
     start, end = span
     if start + ROOM > end:
-        return WayOut(plan.duration, plan.duration) if end == plan.duration else None
+        return None
     target = nearest_safe_instant(plan, start + ROOM, start + ROOM, end)
     return None if target is None else WayOut(target, start)
 

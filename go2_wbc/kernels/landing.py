@@ -82,8 +82,8 @@ def carry(row, snapshot, state):
 
 @subroutine(
     "void(f8, f8[::1], Array(f8, 1, 'A', readonly=True), Array(f8, 2, 'A', readonly=True), "
-    "Array(f8, 2, 'A', readonly=True), Array(f8, 2, 'A', readonly=True), f8[::1], f8[::1], f8[::1], "
-    "f8[::1])"
+    "Array(f8, 2, 'A', readonly=True), Array(f8, 2, 'A', readonly=True), "
+    "f8[::1], f8[::1], f8[::1], f8[::1])"
 )
 def land(t, contact, events, since, until, unloads, snapshot, numbers, state, row):
     """Change ``row``, a plan in the world, to what the feet's measured contacts make of it."""

@@ -219,8 +219,8 @@ def follow(
     """Fill the corrected reference in the world, ``dt`` seconds after the last one.
 
     ``t``: how far into the plan; ``contact`` (4,): feet with a measured contact. ``events``,
-    ``since``, ``until``: of the plan's contacts, ``unloads``: of ``Footsteps``, and ``landing``: numbers of ``layout.LANDING``;
-    without any events no foot steps.
+    ``since``, ``until``: of the plan's contacts; ``unloads``: of ``Footsteps``; ``landing``:
+    numbers of ``layout.LANDING``. Without any events no foot steps.
     """
     place(plan, state[_ANCHOR : _ANCHOR + 4], row)
     if len(events) > 0:
