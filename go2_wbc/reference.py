@@ -232,12 +232,17 @@ class Footsteps:
 
     Attributes:
         contacts: who stands when.
+        swings: (m, 4) at each event of ``contacts``, the feet in the air that follow their places.
+        unloads: (m, 4) when [s] each foot that stands lifts off next, if it gives up its load
+            before that; inf if it pushes off.
         ramp: time [s] over which a foot takes up its load after touchdown and gives it up before
             lift-off.
         normal_force_min, normal_force_max: bounds [N] of a stance foot's normal force.
     """
 
     contacts: ContactSchedule
+    swings: Bool[np.ndarray, "m 4"]
+    unloads: Float[np.ndarray, "m 4"]
     ramp: float
     normal_force_min: float
     normal_force_max: float
@@ -265,6 +270,11 @@ class MotionPlan(ABC):
     def row_at(self, t: float) -> Float[np.ndarray, " size"]:
         """The numbers of ``at(t)`` in one row; a plan that can fill it by a kernel does so."""
         return self.at(t).row
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether some of it is flight or balance on few feet."""
+        return False
 
     @property
     def footsteps(self) -> Footsteps | None:

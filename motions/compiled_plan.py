@@ -86,7 +86,16 @@ class CompiledPlan(MotionPlan):
         if not self.swings.any():
             return None
         ramp = min(self.ramp, LANDING_RAMP) if self.is_dynamic else self.ramp
-        return Footsteps(self.contacts, ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX)
+        return Footsteps(
+            contacts=self.contacts,
+            swings=self.swings,
+            unloads=np.where(
+                self.contacts.modes, self._gradual(self.contacts.until, np.inf), np.inf
+            ),
+            ramp=ramp,
+            normal_force_min=NORMAL_FORCE_MIN,
+            normal_force_max=NORMAL_FORCE_MAX,
+        )
 
     @property
     def end_pose(self) -> tuple[float, float, float]:

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from controller.behaviours.base import Behaviour
 from controller.behaviours.safe_return import SafeReturn
 from go2_wbc.planning.correction import tracked_position
+from go2_wbc.planning.landing import Landings
 from go2_wbc.planning.playback import Deviation, PlanFollower, Playback
 from go2_wbc.reference import Anchor, MotionPlan, Posture, Reference
 from go2_wbc.robot.model import FOOT_RADIUS
@@ -31,7 +32,7 @@ class PlayPlan(Behaviour):
     def __init__(self, plan: MotionPlan) -> None:
         """Play ``plan``."""
         self.label, self.duration = plan.name, plan.duration
-        self.plan = plan
+        self.plan, self.is_dynamic = plan, plan.is_dynamic
         self._start = self._last = 0.0
         self._must_return = False
         self._return: SafeReturn | None = None
@@ -56,6 +57,22 @@ class PlayPlan(Behaviour):
     def deviation(self) -> Deviation:
         """How far the robot has been off the plan since ``start``."""
         return self._follower.deviation
+
+    @property
+    def landings(self) -> Landings:
+        """What came of the landings of feet that step."""
+        return self._follower.landings
+
+    def end_error(self, snapshot: Snapshot) -> tuple[float, float]:
+        """Distance [m], on the level, and angle [rad] of the feet's middle from its planned end.
+
+        That is where the plan ends, placed where the robot stood when it began.
+        """
+        planned = self.plan.at(self.plan.duration).placed(self._anchor).p_world_feet
+        wanted = Anchor.of_feet(planned, FOOT_RADIUS)
+        stands = Anchor.of_feet(snapshot.p_world_feet, FOOT_RADIUS)
+        off = (stands.p_world - wanted.p_world)[:2]
+        return float(np.linalg.norm(off)), abs(wrap_angle(stands.yaw - wanted.yaw))
 
     @property
     def sag_and_lean(self) -> tuple[float, float]:

@@ -82,9 +82,10 @@ def carry(row, snapshot, state):
 
 @subroutine(
     "void(f8, f8[::1], Array(f8, 1, 'A', readonly=True), Array(f8, 2, 'A', readonly=True), "
-    "Array(f8, 2, 'A', readonly=True), f8[::1], f8[::1], f8[::1], f8[::1])"
+    "Array(f8, 2, 'A', readonly=True), Array(f8, 2, 'A', readonly=True), "
+    "f8[::1], f8[::1], f8[::1], f8[::1])"
 )
-def land(t, contact, events, since, until, snapshot, numbers, state, row):
+def land(t, contact, events, since, until, unloads, snapshot, numbers, state, row):
     """Change ``row``, a plan in the world, to what the feet's measured contacts make of it."""
     event = max(np.searchsorted(events, t + TIE, side="right") - 1, 0)
     stands = False
@@ -109,7 +110,7 @@ def land(t, contact, events, since, until, snapshot, numbers, state, row):
         stands = True
         row[_LEGS + leg] = STANCE
         if state[_TOUCHDOWN + leg] > -np.inf:
-            left = end - t if planned == STANCE else np.inf
+            left = unloads[event, leg] - t if planned == STANCE else np.inf
             nearest = min(t - state[_TOUCHDOWN + leg], left)
             share = min(max(nearest / max(numbers[_RAMP], TIE), 0.0), 1.0)
             row[_F_MIN + leg] = numbers[_LEAST] * share

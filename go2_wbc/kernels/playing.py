@@ -210,19 +210,21 @@ def is_in_flight(row):
 
 
 @kernel(
-    f"void(f8[::1], f8[::1], f8, f8, f8[::1], {_LIST}, {_TABLE}, {_TABLE}, f8[::1], f8[::1], "
-    "f8[::1], f8[::1])"
+    f"void(f8[::1], f8[::1], f8, f8, f8[::1], {_LIST}, {_TABLE}, {_TABLE}, {_TABLE}, "
+    "f8[::1], f8[::1], f8[::1], f8[::1])"
 )
-def follow(plan, snapshot, t, dt, contact, events, since, until, landing, correction, state, row):
+def follow(
+    plan, snapshot, t, dt, contact, events, since, until, unloads, landing, correction, state, row
+):
     """Fill the corrected reference in the world, ``dt`` seconds after the last one.
 
     ``t``: how far into the plan; ``contact`` (4,): feet with a measured contact. ``events``,
-    ``since``, ``until``: of the plan's contacts, and ``landing``: numbers of ``layout.LANDING``;
-    without any events no foot steps.
+    ``since``, ``until``: of the plan's contacts; ``unloads``: of ``Footsteps``; ``landing``:
+    numbers of ``layout.LANDING``. Without any events no foot steps.
     """
     place(plan, state[_ANCHOR : _ANCHOR + 4], row)
     if len(events) > 0:
-        land(t, contact, events, since, until, snapshot, landing, state, row)
+        land(t, contact, events, since, until, unloads, snapshot, landing, state, row)
     state[_SAG], state[_LEAN] = sag_and_lean(row, snapshot)
     measured = snapshot[_P_COM : _P_COM + 3] if row[_IS_COM] != 0.0 else snapshot[_Q : _Q + 3]
     R, wanted = snapshot[_R : _R + 9].reshape(3, 3), row[_BODY_R : _BODY_R + 9].reshape(3, 3)

@@ -18,13 +18,14 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.contacts import ContactPhase
+from go2_wbc.contacts import TIE, ContactPhase
 from go2_wbc.legs import LEGS
 from go2_wbc.planning.locomotion import GROUND_SHARE
 from go2_wbc.reference import Anchor, Footsteps, LegTask, Reference
@@ -86,12 +87,14 @@ class ReadableLanding:
             t: [s].
         """
         phase, placed = self._steps.contacts.at(t), plan.placed(self.anchor)
+        event = max(bisect_right(self._steps.contacts.times, t + TIE) - 1, 0)
+        left = self._steps.unloads[event] - t
         for leg in LEGS:
             self._plan(leg, plan.legs[leg])
             if self._is_in_air[leg]:
                 self._notice(leg, phase, snapshot, t)
         legs = [self._task(leg) for leg in LEGS]
-        loads = np.array([self._load(leg, phase, t, placed) for leg in LEGS])
+        loads = np.array([self._load(leg, t, float(left[leg]), placed) for leg in LEGS])
         feet = placed.p_world_feet.copy(), placed.v_world_feet.copy(), placed.a_world_feet.copy()
         for leg in LEGS:
             if legs[leg] is LegTask.SWING and self._planned[leg] is LegTask.STANCE:
@@ -139,9 +142,7 @@ class ReadableLanding:
             return LegTask.JOINTS
         return LegTask.SWING if self._is_in_air[leg] else LegTask.STANCE
 
-    def _load(
-        self, leg: int, phase: ContactPhase, t: float, placed: Reference
-    ) -> tuple[float, float]:
+    def _load(self, leg: int, t: float, left: float, placed: Reference) -> tuple[float, float]:
         """Least and greatest normal force [N], ramped from when the foot came down."""
         if self._is_in_air[leg]:
             return 0.0, 0.0
@@ -149,8 +150,8 @@ class ReadableLanding:
         if touchdown is None:
             return float(placed.normal_force_min[leg]), float(placed.normal_force_max[leg])
         should_stand = self._planned[leg] is LegTask.STANCE
-        left = float(phase.remaining[leg]) if should_stand else np.inf
-        share = min(max(min(t - touchdown, left) / self._steps.ramp, 0.0), 1.0)
+        nearest = min(t - touchdown, left if should_stand else np.inf)
+        share = min(max(nearest / self._steps.ramp, 0.0), 1.0)
         return self._steps.normal_force_min * share, self._steps.normal_force_max * share
 
     def _press(

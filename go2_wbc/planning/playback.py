@@ -187,13 +187,15 @@ class ReadablePlayback(PlanFollower):
         return self._places, self._attitudes, self._joints
 
 
-_Tables = tuple[Any, Any, Any, Any]
+_Tables = tuple[Any, Any, Any, Any, Any]
 
 
 def _tables(footsteps: Footsteps) -> _Tables:
     contacts = footsteps.contacts
     events = np.array(contacts.times)
-    return events, contacts.since, contacts.until, LANDING.pack(landing_numbers(footsteps))
+    numbers = LANDING.pack(landing_numbers(footsteps))
+    return events, contacts.since, contacts.until, footsteps.unloads, numbers
 
 
-_NO_STEPS: _Tables = np.zeros(0), np.zeros((0, 4)), np.zeros((0, 4)), np.zeros(LANDING.size)
+_NO_TABLE = np.zeros((0, 4))
+_NO_STEPS: _Tables = np.zeros(0), _NO_TABLE, _NO_TABLE, _NO_TABLE, np.zeros(LANDING.size)
