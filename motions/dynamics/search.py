@@ -87,8 +87,8 @@ class Search:
             self._agree()
         except _Expired:
             raise PlanNotFound(
-                f"no dynamic plan within {self._budget:g} s of processor time ({self.iterations} iterations); "
-                "ask for less, or give a larger budget"
+                f"no dynamic plan within {self._budget:g} s of processor time "
+                f"({self.iterations} iterations); ask for less, or give a larger budget"
             ) from None
         return self._found()
 
