@@ -26,8 +26,8 @@ from motions.dynamics.cache import solve_cached
 from motions.dynamics.phases import PhaseProblem
 from motions.dynamics.standing import standing, standing_feet
 from motions.keys import BodyKey, Key, Mark
+from motions.language.clock import SAME
 from motions.language.flight import away_from_home
-from motions.language.written import SAME
 from motions.phase_key import PhaseKey
 from motions.problem import Problem
 from motions.timeline import Timeline

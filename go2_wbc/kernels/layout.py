@@ -29,6 +29,10 @@ class Layout:
             for end, length, (name, shape) in zip(ends, lengths, shapes.items(), strict=True)
         }
 
+    def slice(self, name: str) -> slice:
+        """Where one of the arrays lies in a row."""
+        return self._places[name][0]
+
     def view(self, row: Float[np.ndarray, " size"], name: str) -> Float[np.ndarray, "..."]:
         """One of the arrays that ``row`` holds; changing it changes the row."""
         place, shape = self._places[name]

@@ -15,8 +15,8 @@ from go2_wbc.errors import MotionError
 FORMAT = 1
 """Version of the files; others are refused."""
 BALANCING_FEET = 2
-"""On so many feet or fewer the plan's own gains are worth keeping: on more, the whole-body controller
-balances by itself."""
+"""On so many feet or fewer the plan's own gains are worth keeping: on more, the whole-body
+controller balances by itself."""
 _ARRAYS = {
     "times": (None,),
     "q": (None, 19),

@@ -16,12 +16,10 @@ from go2_wbc.reference import Posture
 from motions.arguments import positive
 from motions.dynamics.phases import Tolerance
 from motions.keys import BalanceShift, BodyKey, Key, LegKey
+from motions.language.clock import SAME, BeatClock
 
 SHIFT_TIME = 0.9
 """Time [s] in which the body moves over the feet that stay, before another one is raised."""
-SAME = 1e-9
-"""Times this close [s] are the same: absorbs rounding of sums."""
-
 _KeyType = TypeVar("_KeyType", bound=Key)
 _Line = TypeVar("_Line", bound="Written")
 
@@ -40,7 +38,7 @@ class Written:
         tolerance: how far what is solved may be from what is asked.
         keys: what was written so far.
         cursor: when [s] the next call starts.
-        beat: seconds that one unit of ``over`` lasts.
+        clock: what one unit of ``over`` lasts, here and later.
         last_start: when [s] the last call's move starts.
         floor: the cursor does not fall behind this time [s] after ``also``.
     """
@@ -53,7 +51,7 @@ class Written:
     tolerance: Tolerance = field(default=Tolerance(), kw_only=True)
     keys: tuple[Key, ...] = field(default=(), kw_only=True)
     cursor: float = field(default=0.0, kw_only=True)
-    beat: float = field(default=1.0, kw_only=True)
+    clock: BeatClock = field(default=BeatClock(), kw_only=True)
     shift_beats: float = field(default=0.0, kw_only=True)
     last_start: float = field(default=0.0, kw_only=True)
     floor: float = field(default=0.0, kw_only=True)
@@ -101,7 +99,9 @@ class Written:
     def _shifted(self: _Line, raised: frozenset[Leg]) -> _Line:
         if not self.balance or self.shifted_for == raised:
             return self
-        end = self.cursor + (self.shift_beats * self.beat or self.shift_time)
+        end = self.cursor + self.shift_time
+        if self.shift_beats:
+            end = self.clock.after(self.cursor, self.shift_beats)
         return self._longer([BalanceShift(self.cursor, end, Ease.MINIMUM_JERK, raised)], end)
 
     def _longer(self: _Line, keys: Sequence[Key], cursor: float) -> _Line:
@@ -117,7 +117,7 @@ class Written:
         return self._longer([key.later(start) for key in other.keys], start + other.end)
 
     def _span(self, over: float) -> tuple[float, float]:
-        return self.cursor, self.cursor + positive("over", over) * self.beat
+        return self.cursor, self.clock.after(self.cursor, positive("over", over))
 
 
 def _require_no_overlap(keys: Sequence[Key]) -> None:

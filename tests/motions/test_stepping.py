@@ -11,7 +11,7 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, compile_timeline, deg
-from motions.tracks import standing_feet
+from motions.footing import standing_feet
 from motions.trajectory import trajectory_of
 
 MODEL = RobotModel()
