@@ -60,7 +60,7 @@ def solve_cached(
     path = (folder or plan_folder()) / f"{_key(problem, model, limits, weights)}.npz"
     kept = _read(path)
     if kept is not None:
-        accept(kept, problem, model)
+        accept(kept, problem.tolerance, model)
         return kept
     found = solve(problem, model, budget=budget, progress=progress, limits=limits, weights=weights)
     _write(path, found)

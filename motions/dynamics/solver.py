@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
+from jaxtyping import Float
 
 from go2_wbc.errors import MissingDependency, PlanNotFound
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import rotation_from_rpy
+from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from motions.dynamics.knots import Knots, feet_at, knots_of
 from motions.dynamics.limits import PlanLimits, Weights
-from motions.dynamics.phases import PhaseProblem
+from motions.dynamics.phases import PhaseProblem, Tolerance
 from motions.dynamics.trajectory import DynamicTrajectory, Miss
 from motions.dynamics.verdict import audit
 
@@ -49,19 +51,33 @@ def solve(
         PlanNotFound: if no plan is found in time, or the best one breaks a limit or is farther from
             what was asked than the problem's tolerance; says what binds, and where.
     """
+    limits = limits or PlanLimits()
+    knots = knots_of(problem, model, limits)
+    plan = optimum(knots, model, limits, weights or Weights(), budget=budget, progress=progress)
+    plan = replace(plan, misses=_misses(knots, plan))
+    accept(plan, problem.tolerance, model)
+    return plan
+
+
+def optimum(
+    knots: Knots,
+    model: RobotModel,
+    limits: PlanLimits,
+    weights: Weights,
+    *,
+    budget: float,
+    progress: Callable[[int, float], None] | None,
+) -> DynamicTrajectory:
+    """The best plan for ``knots``, whatever it misses and breaks; see ``solve``."""
     require_crocoddyl()
     from motions.dynamics.program import Program
     from motions.dynamics.search import Search
 
-    limits = limits or PlanLimits()
-    knots = knots_of(problem, model, limits)
-    weights = weights or Weights()
     soft = Program(knots, model, limits, weights.softened())
     full = Program(knots, model, limits, weights)
     found = Search(soft, full, knots, budget=budget, progress=progress).run()
     q = found.x[:, :19]
-    p_feet = feet_at(model, q)
-    trajectory = DynamicTrajectory(
+    return DynamicTrajectory(
         times=knots.times,
         q=q,
         v=found.x[:, 19:],
@@ -69,13 +85,11 @@ def solve(
         forces=found.forces,
         stance=knots.stance,
         gains=found.gains,
-        p_feet=p_feet,
+        p_feet=feet_at(model, q),
         iterations=found.iterations,
         cost=found.cost,
-        misses=_misses(knots, q, p_feet),
+        misses=(),
     )
-    accept(trajectory, problem, model)
-    return trajectory
 
 
 def require_crocoddyl() -> None:
@@ -89,36 +103,42 @@ def require_crocoddyl() -> None:
         ) from error
 
 
-def _misses(knots: Knots, q: np.ndarray, p_feet: np.ndarray) -> tuple[Miss, ...]:
+def _misses(knots: Knots, plan: DynamicTrajectory) -> tuple[Miss, ...]:
     misses = []
     for goal in knots.goals:
         time = float(knots.times[goal.knot])
         if goal.pose is not None:
-            R = pin.Quaternion(q[goal.knot, 3:7]).toRotationMatrix()
-            off = pin.log3(rotation_from_rpy(*goal.pose[3:].tolist()).T @ R)
-            place = float(np.linalg.norm(q[goal.knot, :3] - goal.pose[:3]))
-            misses.append(Miss("trunk", goal.label, time, place, float(np.linalg.norm(off))))
+            R_des = rotation_from_rpy(*goal.pose[3:].tolist())
+            place, angle = trunk_miss(plan.q[goal.knot], goal.pose[:3], R_des)
+            misses.append(Miss("trunk", goal.label, time, place, angle))
         for leg in LEGS:
             if goal.asked[leg]:
-                off = np.linalg.norm(p_feet[goal.knot, leg] - goal.p_feet[leg])
+                off = np.linalg.norm(plan.p_feet[goal.knot, leg] - goal.p_feet[leg])
                 misses.append(Miss(FOOT_NAMES[leg], goal.label, time, float(off), 0.0))
     return tuple(misses)
 
 
-def accept(trajectory: DynamicTrajectory, problem: PhaseProblem, model: RobotModel) -> None:
-    """Raise PlanNotFound for a plan that breaks a limit or is too far off."""
-    reasons = [str(reading) for reading in audit(trajectory, model) if not reading.is_kept]
+def trunk_miss(
+    q: Float[np.ndarray, "19"], p: Float[np.ndarray, "3"], R: Float[np.ndarray, "3 3"]
+) -> tuple[float, float]:
+    """Distance [m] and angle [rad] between the trunk at ``q`` and a wanted pose."""
+    angle = log_rotation(R.T @ pin.Quaternion(q[3:7]).toRotationMatrix())
+    return float(np.linalg.norm(q[:3] - p)), float(np.linalg.norm(angle))
+
+
+def accept(plan: DynamicTrajectory, tolerance: Tolerance, model: RobotModel) -> None:
+    """Raise PlanNotFound for a plan that breaks a limit or is too far from what was asked."""
+    reasons = [str(reading) for reading in audit(plan, model) if not reading.is_kept]
     if reasons:
         raise PlanNotFound("no dynamic plan: the best one breaks what the robot can do", reasons)
-    tolerance = problem.tolerance
     far = [
         str(miss)
-        for miss in trajectory.misses
+        for miss in plan.misses
         if miss.position > tolerance.position or miss.angle > tolerance.angle
     ]
     if far:
         raise PlanNotFound(
             f"no dynamic plan within {1e3 * tolerance.position:.0f} mm and "
-            f"{np.degrees(tolerance.angle):.0f} deg of the phases; the nearest one is off:",
+            f"{np.degrees(tolerance.angle):.0f} deg of what was asked; the nearest one is off:",
             far,
         )

@@ -73,6 +73,7 @@ class DynamicTrajectory:
         iterations: of the solver, over all its starts.
         cost: at the end.
         misses: what was asked at the phases' ends, and how far the plan is from it.
+        lag: time [s] by which the plan is late against a motion that was written as a whole.
     """
 
     times: Float[np.ndarray, " n1"]
@@ -86,6 +87,7 @@ class DynamicTrajectory:
     iterations: int
     cost: float
     misses: tuple[Miss, ...]
+    lag: float = 0.0
 
     @property
     def duration(self) -> float:
@@ -124,6 +126,7 @@ class DynamicTrajectory:
             "format": FORMAT,
             "iterations": self.iterations,
             "cost": self.cost,
+            "lag": self.lag,
             "misses": [[getattr(miss, part.name) for part in fields(Miss)] for miss in self.misses],
         }
         stream = io.BytesIO()
@@ -148,7 +151,8 @@ class DynamicTrajectory:
                 arrays = {name: _wide(file[name]) for name in _ARRAYS}
             version = header["format"]
             misses = tuple(Miss(*row) for row in header["misses"])
-            numbers = int(header["iterations"]), float(header["cost"])
+            iterations = int(header["iterations"])
+            cost, lag = float(header["cost"]), float(header["lag"])
         except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
             raise MotionError(
                 f"this is no dynamic trajectory, or a damaged one: {error}"
@@ -156,7 +160,7 @@ class DynamicTrajectory:
         if version != FORMAT:
             raise MotionError(f"a trajectory of format {version}; this version reads {FORMAT}")
         _check_shapes(arrays)
-        return DynamicTrajectory(**arrays, iterations=numbers[0], cost=numbers[1], misses=misses)
+        return DynamicTrajectory(**arrays, iterations=iterations, cost=cost, misses=misses, lag=lag)
 
 
 def _wide(array: np.ndarray) -> np.ndarray:
