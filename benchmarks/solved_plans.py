@@ -56,7 +56,8 @@ def shipped_problems(model: RobotModel) -> dict[str, PhaseProblem]:
     found = {}
     for line in _timelines():
         for span in compile_timeline(line, model).dynamic:
-            found[problem_key(span.problem, model, PlanLimits())] = span.problem
+            if isinstance(span.asked, PhaseProblem):
+                found[problem_key(span.asked, model, PlanLimits())] = span.asked
     return found
 
 

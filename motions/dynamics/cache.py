@@ -17,7 +17,8 @@ from go2_wbc.errors import ConfigError, MotionError
 from go2_wbc.files import write_atomically
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics.limits import PlanLimits, Weights
-from motions.dynamics.phases import PhaseProblem
+from motions.dynamics.nearest import Written, nearest
+from motions.dynamics.phases import PhaseProblem, Tolerance
 from motions.dynamics.solver import BUDGET, accept, solve
 from motions.dynamics.trajectory import DynamicTrajectory
 
@@ -55,7 +56,7 @@ def solve_cached(
     limits, weights = limits or PlanLimits(), weights or Weights()
     shipped = _read(SHIPPED / f"{problem_key(problem, model, limits)}.npz")
     if shipped is not None:
-        accept(shipped, problem, model)
+        accept(shipped, problem.tolerance, model)
         return shipped
     path = (folder or plan_folder()) / f"{_key(problem, model, limits, weights)}.npz"
     kept = _read(path)
@@ -63,6 +64,33 @@ def solve_cached(
         accept(kept, problem.tolerance, model)
         return kept
     found = solve(problem, model, budget=budget, progress=progress, limits=limits, weights=weights)
+    _write(path, found)
+    return found
+
+
+def nearest_cached(
+    written: Written,
+    model: RobotModel,
+    *,
+    tolerance: Tolerance,
+    budget: float = BUDGET,
+    progress: Callable[[int, float], None] | None = None,
+) -> DynamicTrajectory:
+    """What ``nearest`` finds, read from disk if it was found before; see ``solve_cached``.
+
+    Raises:
+        MissingDependency: if it must be solved and crocoddyl is not installed.
+        PlanNotFound: if there is no such plan within the tolerance.
+    """
+    digest = hashlib.sha256(repr((astuple(PlanLimits()), _versions())).encode())
+    for array in (written.times, written.q, written.stance, *_numbers(model)):
+        digest.update(np.ascontiguousarray(array, float).tobytes())
+    path = plan_folder() / f"{digest.hexdigest()[:32]}.npz"
+    kept = _read(path)
+    if kept is not None:
+        accept(kept, tolerance, model)
+        return kept
+    found = nearest(written, model, tolerance=tolerance, budget=budget, progress=progress)
     _write(path, found)
     return found
 

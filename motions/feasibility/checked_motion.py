@@ -87,16 +87,26 @@ def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
         return motion.plan
     if isinstance(motion, MotionPlan):
         return motion
-    if isinstance(motion, str):
-        motion = load_motion(motion)
-    elif isinstance(motion, Motion):
-        motion = motion()
-    if not isinstance(motion, Timeline):
+    line = timeline_of(motion)
+    if line is None:
         raise CommandError(
             "motion must be a name of the library, a function with @motion before it, a Timeline, "
             f"a plan or a CheckedMotion, got {motion!r}"
         )
-    return compile_timeline(motion, model)
+    return compile_timeline(line, model)
+
+
+def timeline_of(motion: object) -> Timeline | None:
+    """The timeline of ``motion``; of a plan, or of what stands for no motion, none.
+
+    Raises:
+        CommandError: for an unknown name.
+    """
+    if isinstance(motion, str):
+        return load_motion(motion)
+    if isinstance(motion, Motion):
+        return motion()
+    return motion if isinstance(motion, Timeline) else None
 
 
 def _label(

@@ -103,7 +103,7 @@ def test_a_pounce_is_a_jump_from_a_low_crouch() -> None:
     ("write", "message"),
     [
         (lambda: Timeline().jump(x=2.0), "a jump's x must be from -1 to 1, got 2"),
-        (lambda: Timeline().jump(height=2.0), "a jump's height must be from 0.02 to 0.4, got 2"),
+        (lambda: Timeline().jump(height=2.0), "a jump's height must be from -0.4 to 0.4, got 2"),
         (lambda: Timeline().jump(height=0.0), "height must be from 0.02 to 0.4, got 0"),
         (lambda: Timeline().jump(height=-0.1), "height must be from 0.02 to 0.4, got -0.1"),
         (lambda: Timeline().jump(y=math.nan), "y must be from -0.6 to 0.6, got nan"),
