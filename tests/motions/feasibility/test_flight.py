@@ -142,7 +142,7 @@ def test_a_plan_beyond_its_tolerance_is_refused_with_how_far_and_when(
 ) -> None:
     plan = plan_of("jump_forward", checker)
     (span,) = plan.dynamic
-    narrow = replace(span, tolerance=Tolerance(position=0.002))
+    narrow = replace(span, tolerance=Tolerance(position=0.0005))
     report = checker.check(replace(plan, dynamic=(narrow,)))
     (check,) = {one.check for one in report.failures}
     assert check == "off by"
