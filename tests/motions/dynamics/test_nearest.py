@@ -32,7 +32,7 @@ def two_feet(model: RobotModel) -> Written:
     still = written(Timeline().body(z=-0.001, over=0.8).home(over=0.1), model)
     air = (still.times > 0.3) & (still.times < 0.6)
     stance = still.stance.copy()
-    stance[np.ix_(air, [Leg.FL, Leg.RR])] = False
+    stance[air, Leg.FL] = stance[air, Leg.RR] = False
     return replace(still, stance=stance)
 
 
