@@ -74,6 +74,18 @@ class Knots:
     final: FullState
 
 
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A solution at its knots: states, torques, forces, gains, and what it took."""
+
+    x: Float[np.ndarray, "n1 37"]
+    tau: Float[np.ndarray, "n 12"]
+    forces: Float[np.ndarray, "n 4 3"]
+    gains: Float[np.ndarray, "n 12 36"]
+    iterations: int
+    cost: float
+
+
 def knots_of(problem: PhaseProblem, model: RobotModel, limits: PlanLimits) -> Knots:
     """``problem`` at its knots."""
     initial = problem.initial or standing(model, standing_feet(model))

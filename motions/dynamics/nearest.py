@@ -18,7 +18,7 @@ from go2_wbc.robot.model import RobotModel
 from motions.dynamics.knots import Goal, Knots, feet_at, guess_velocities
 from motions.dynamics.limits import PlanLimits, Weights
 from motions.dynamics.phases import KNOT_PERIOD, LONGEST_PHASE, FullState, Tolerance
-from motions.dynamics.solver import BUDGET, accept, optimum, trunk_miss
+from motions.dynamics.solver import BUDGET, Task, optimum, trunk_miss
 from motions.dynamics.trajectory import DynamicTrajectory, Miss
 
 TRACKING = (300.0, 100.0, 1000.0)
@@ -28,6 +28,8 @@ POSTURE = 3.0
 """Weight of the legs' angles [1/rad^2], by which feet in the air follow what was written."""
 LATEST = 0.2
 """Greatest lag [s] that is looked for."""
+LAG_STEP = 0.005
+"""Between two lags [s] that are compared."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,13 +98,12 @@ def nearest(
         weights = Weights(track=weight, posture=POSTURE, trunk=0.0)
         share = budget / len(TRACKING)
         try:
-            plan = optimum(knots, model, limits, weights, budget=share, progress=progress)
-            plan = replace(plan, misses=_misses(knots, plan), lag=_lag(knots, plan))
-            accept(plan, tolerance or Tolerance(), model)
+            task = Task(knots, model, limits, weights, tolerance or Tolerance(), _misses)
+            plan = optimum(task, budget=share, progress=progress)
         except PlanNotFound as error:
             last = last or error
         else:
-            return plan
+            return replace(plan, lag=_lag(knots, plan))
     raise last or PlanNotFound("no dynamic plan: nothing was tried")
 
 
@@ -183,7 +184,8 @@ def _lag(knots: Knots, plan: DynamicTrajectory) -> float:
     """The delay [s] with which what was written comes nearest to the trunk's path."""
     times = knots.times
     wanted, done = knots.q[:, :7], plan.q[:, :7]
-    steps = np.arange(-LATEST, LATEST + 1e-9, 0.25 * KNOT_PERIOD)
+    count = round(LATEST / LAG_STEP)
+    steps = LAG_STEP * np.arange(-count, count + 1)
     errors = []
     for step in steps:
         moved = [np.interp(times - step, times, column) for column in wanted.T]

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import product
 
 import crocoddyl
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.legs import FOOT_NAMES, LEGS
-from motions.dynamics.knots import Knots
+from motions.dynamics.knots import Found, Knots
 from motions.dynamics.program import Program
 
 ITERATIONS = 120
@@ -29,18 +27,6 @@ AGREED = 0.5
 _JOINT_RATES = slice(19 + 6, None)
 
 Progress = Callable[[int, float], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """A solution at its knots: states, torques, forces, gains, and what it took."""
-
-    x: Float[np.ndarray, "n1 37"]
-    tau: Float[np.ndarray, "n 12"]
-    forces: Float[np.ndarray, "n 4 3"]
-    gains: Float[np.ndarray, "n 12 36"]
-    iterations: int
-    cost: float
 
 
 class _Expired(Exception):
@@ -60,11 +46,17 @@ class Search:
         full: Program,
         knots: Knots,
         *,
+        is_good: Callable[[Found], bool],
         budget: float,
         progress: Progress | None,
     ) -> None:
-        """Prepare; the budget, processor time [s], runs from here."""
+        """Prepare; the budget, processor time [s], runs from here.
+
+        ``is_good`` says whether a solution may be taken although the solver has not converged: it
+        obeys the dynamics, and what more it could gain is only cost.
+        """
         self.iterations = 0
+        self._is_good = is_good
         self._full, self._knots, self._budget = full, knots, budget
         self._deadline = time.thread_time() + budget
         self._progress = progress
@@ -92,6 +84,12 @@ class Search:
             ) from None
         return self._found()
 
+    def best(self) -> Found | None:
+        """Where the search is, if that obeys the dynamics."""
+        solver = self._solver
+        is_whole = bool(len(solver.xs)) and solver.isFeasible and np.isfinite(solver.cost)
+        return self._found() if is_whole else None
+
     def step(self, cost: float) -> None:
         """Count an iteration, tell, and stop when time is up."""
         self.iterations += 1
@@ -110,6 +108,9 @@ class Search:
             soft = self._soft_solver
             self._solve(soft, xs, us, regularisation, SOFT_STOP)
             if self._solve(self._solver, list(soft.xs), list(soft.us), regularisation, STOP):
+                return
+            best = self.best()
+            if best is not None and self._is_good(best):
                 return
         raise PlanNotFound(
             f"no dynamic plan: none of the starts converges ({self.iterations} iterations); the "

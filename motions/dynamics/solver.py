@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
@@ -13,7 +13,7 @@ from go2_wbc.errors import MissingDependency, PlanNotFound
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
-from motions.dynamics.knots import Knots, feet_at, knots_of
+from motions.dynamics.knots import Found, Knots, feet_at, knots_of
 from motions.dynamics.limits import PlanLimits, Weights
 from motions.dynamics.phases import PhaseProblem, Tolerance
 from motions.dynamics.trajectory import DynamicTrajectory, Miss
@@ -53,43 +53,75 @@ def solve(
     """
     limits = limits or PlanLimits()
     knots = knots_of(problem, model, limits)
-    plan = optimum(knots, model, limits, weights or Weights(), budget=budget, progress=progress)
-    plan = replace(plan, misses=_misses(knots, plan))
-    accept(plan, problem.tolerance, model)
-    return plan
+    task = Task(knots, model, limits, weights or Weights(), problem.tolerance, _misses)
+    return optimum(task, budget=budget, progress=progress)
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What is solved, and what is then asked of the plan.
+
+    Attributes:
+        knots: the problem.
+        model: the robot.
+        limits: what the plan keeps.
+        weights: what being off costs.
+        tolerance: how far it may be from what was asked.
+        misses: measures how far that is.
+    """
+
+    knots: Knots
+    model: RobotModel
+    limits: PlanLimits
+    weights: Weights
+    tolerance: Tolerance
+    misses: Callable[[Knots, DynamicTrajectory], tuple[Miss, ...]]
+
+    def plan(self, found: Found) -> DynamicTrajectory:
+        """The plan of what the search found."""
+        q = found.x[:, :19]
+        plan = DynamicTrajectory(
+            times=self.knots.times,
+            q=q,
+            v=found.x[:, 19:],
+            tau=found.tau,
+            forces=found.forces,
+            stance=self.knots.stance,
+            gains=found.gains,
+            p_feet=feet_at(self.model, q),
+            iterations=found.iterations,
+            cost=found.cost,
+            misses=(),
+        )
+        return replace(plan, misses=self.misses(self.knots, plan))
 
 
 def optimum(
-    knots: Knots,
-    model: RobotModel,
-    limits: PlanLimits,
-    weights: Weights,
-    *,
-    budget: float,
-    progress: Callable[[int, float], None] | None,
+    task: Task, *, budget: float, progress: Callable[[int, float], None] | None
 ) -> DynamicTrajectory:
-    """The best plan for ``knots``, whatever it misses and breaks; see ``solve``."""
+    """The best plan for ``task``; raises what ``solve`` does."""
     require_crocoddyl()
     from motions.dynamics.program import Program
     from motions.dynamics.search import Search
 
+    def objections(found: Found) -> list[str]:
+        plan = task.plan(found)
+        return broken_limits(plan, task.model) + far_misses(plan, task.tolerance)
+
+    knots, model, limits, weights = task.knots, task.model, task.limits, task.weights
     soft = Program(knots, model, limits, weights.softened())
     full = Program(knots, model, limits, weights)
-    found = Search(soft, full, knots, budget=budget, progress=progress).run()
-    q = found.x[:, :19]
-    return DynamicTrajectory(
-        times=knots.times,
-        q=q,
-        v=found.x[:, 19:],
-        tau=found.tau,
-        forces=found.forces,
-        stance=knots.stance,
-        gains=found.gains,
-        p_feet=feet_at(model, q),
-        iterations=found.iterations,
-        cost=found.cost,
-        misses=(),
-    )
+    search = Search(
+        soft, full, knots,
+        is_good=lambda found: not objections(found), budget=budget, progress=progress,
+    )  # fmt: skip
+    try:
+        plan = task.plan(search.run())
+    except PlanNotFound as error:
+        best = search.best()
+        raise PlanNotFound(str(error), [] if best is None else objections(best)) from None
+    accept(plan, task.tolerance, model)
+    return plan
 
 
 def require_crocoddyl() -> None:
@@ -128,17 +160,25 @@ def trunk_miss(
 
 def accept(plan: DynamicTrajectory, tolerance: Tolerance, model: RobotModel) -> None:
     """Raise PlanNotFound for a plan that breaks a limit or is too far from what was asked."""
-    reasons = [str(reading) for reading in audit(plan, model) if not reading.is_kept]
-    if reasons:
-        raise PlanNotFound("no dynamic plan: the best one breaks what the robot can do", reasons)
-    far = [
-        str(miss)
-        for miss in plan.misses
-        if miss.position > tolerance.position or miss.angle > tolerance.angle
-    ]
-    if far:
+    if broken := broken_limits(plan, model):
+        raise PlanNotFound("no dynamic plan: the best one breaks what the robot can do", broken)
+    if far := far_misses(plan, tolerance):
         raise PlanNotFound(
             f"no dynamic plan within {1e3 * tolerance.position:.0f} mm and "
             f"{np.degrees(tolerance.angle):.0f} deg of what was asked; the nearest one is off:",
             far,
         )
+
+
+def broken_limits(plan: DynamicTrajectory, model: RobotModel) -> list[str]:
+    """What a plan breaks, in words."""
+    return [str(reading) for reading in audit(plan, model) if not reading.is_kept]
+
+
+def far_misses(plan: DynamicTrajectory, tolerance: Tolerance) -> list[str]:
+    """Where a plan is too far from what was asked, in words."""
+    return [
+        str(miss)
+        for miss in plan.misses
+        if miss.position > tolerance.position or miss.angle > tolerance.angle
+    ]
