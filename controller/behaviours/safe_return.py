@@ -71,7 +71,7 @@ class WayOut:
 
     Attributes:
         target: instant [s] on four feet at which the clock shall stand.
-        keeps_tempo_until: instant [s] before which it keeps its tempo.
+        keeps_tempo_until: instant [s] before which it keeps its tempo; -inf if it need not.
         is_left_in_motion: whether the plan is left at the target as it goes, and not slowed down.
     """
 
@@ -87,7 +87,7 @@ def way_out(plan: MotionPlan, t: float) -> WayOut:
         if start <= t < end and (t + ROOM <= end or end == plan.duration):
             target = nearest_safe_instant(plan, t, start, end)
             if target is not None:
-                return WayOut(target, t)
+                return WayOut(target, -np.inf)
     landings = (_landing(plan, span) for span in calm if span[0] > t)
     smooth = next(
         (way for way in landings if way is not None),

@@ -21,6 +21,30 @@ FORCE_WEIGHTS = (1e-6, 1e2)
 
 
 @dataclass(frozen=True, slots=True)
+class DynamicWbcConfig:
+    """What is different for plans with flights or few feet.
+
+    Attributes:
+        position_weight: task weight. A push-off that is short of torque must not keep the attitude
+            at the cost of the speed: as much as the orientation's.
+        swing_weight: task weight. In flight the trunk is turned by the legs only: with the weight
+            of slow motions they are 50 mm off their places when they land, the robot lands 1.5 to
+            2 times as far off, and motors give all they have for 2 to 6 times as long.
+        limit_horizon: time [s] in which a joint-limit bound must be met. In 0.02 s the knees may
+            not speed up as fast as a jump needs, which costs a quarter of its height.
+    """
+
+    position_weight: float = 10.0
+    swing_weight: float = 100.0
+    limit_horizon: float = 0.01
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a number that is out of range."""
+        require_positive(self, "limit_horizon")
+        require_between(self, *WEIGHTS, "position_weight", "swing_weight")
+
+
+@dataclass(frozen=True, slots=True)
 class WbcConfig:
     """Numbers of the whole-body controller.
 
@@ -42,11 +66,9 @@ class WbcConfig:
         stance_damping: [1/s] on the velocity of stance contact points.
         braking: joint deceleration [rad/s^2] that the limits count on.
         limit_horizon: time [s] in which a joint-limit bound must be met.
-        dynamic_limit_horizon: the same [s] for plans with flights or few feet: at 0.02 the knees
-            may not speed up fast enough, which costs a jump a quarter of its height; at 0.005
-            joints reach 0.9 of their speed limit (own simulation).
         joint_margin: distance [rad] that the joints keep from their position limits.
         joint_friction: friction of the joints, fed forward.
+        dynamic: what is different for plans with flights or few feet.
     """
 
     solver: str = "active_set"
@@ -65,13 +87,13 @@ class WbcConfig:
     stance_damping: float = 20.0
     braking: float = 200.0
     limit_horizon: float = 0.02
-    dynamic_limit_horizon: float = 0.01
     joint_margin: float = 0.0
     joint_friction: JointFriction = field(default_factory=JointFriction)
+    dynamic: DynamicWbcConfig = field(default_factory=DynamicWbcConfig)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a number that is out of range."""
-        require_positive(self, "friction", "braking", "limit_horizon", "dynamic_limit_horizon")
+        require_positive(self, "friction", "braking", "limit_horizon")
         require_share(self, "torque_share", "speed_share")
         require_not_negative(self, "stance_damping", "joint_margin")
         require_between(self, *FORCE_WEIGHTS, "force_weight")
@@ -82,4 +104,10 @@ class WbcConfig:
     @property
     def for_dynamics(self) -> WbcConfig:
         """The same numbers, for plans with flights or few feet."""
-        return replace(self, limit_horizon=self.dynamic_limit_horizon)
+        special = self.dynamic
+        return replace(
+            self,
+            position_weight=special.position_weight,
+            swing_weight=special.swing_weight,
+            limit_horizon=special.limit_horizon,
+        )
