@@ -176,7 +176,7 @@ def _way_through(points: Sequence[Sequence[float]]) -> Way:
     return Way(np.column_stack([curve(fine), heading]))
 
 
-def _numbers(points: Sequence[Sequence[float]]) -> np.ndarray:
+def _numbers(points: object) -> np.ndarray:
     is_list = isinstance(points, Sequence | np.ndarray)
     rows = (
         [tuple(p) if isinstance(p, Sequence | np.ndarray) else () for p in points]
