@@ -78,8 +78,9 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
         load_kernels()
     model = RobotModel(settings.description, motor=config.motor)
     wbc = WholeBodyController(model, config.backend, config.wbc)
+    dynamic_wbc = WholeBodyController(model, config.backend, config.wbc.for_dynamics)
     telemetry = Telemetry(model, max(1, round(settings.recorded_time / plant.control_period)))
-    loop = ControlLoop(plant, model, wbc, telemetry, config.safety)
+    loop = ControlLoop(plant, model, wbc, telemetry, config.safety, dynamic_wbc)
     with ExitStack() as opened:
         viewer = None
         if settings.viewer:

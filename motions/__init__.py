@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from motions.assembly import compile_timeline
     from motions.authoring import Choice, Motion, Range, motion
     from motions.compiled_plan import CompiledPlan
-    from motions.compiler import compile_timeline
     from motions.feasibility import (
         CheckedMotion,
         FeasibilityChecker,
@@ -52,8 +52,9 @@ __all__ = [
 __getattr__ = lazy_exports(
     __name__,
     {
+        "assembly": ("compile_timeline",),
         "authoring": ("Choice", "Motion", "Range", "motion"),
-        "compiler": ("CompiledPlan", "compile_timeline"),
+        "compiled_plan": ("CompiledPlan",),
         "feasibility": (
             "CheckedMotion",
             "FeasibilityChecker",

@@ -36,6 +36,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.goals",
         "go2_wbc.kernels.inputs",
         "go2_wbc.kernels.kinematics",
+        "go2_wbc.kernels.landing",
         "go2_wbc.kernels.loading",  # loaded here
         "go2_wbc.kernels.loads",
         "go2_wbc.kernels.locomotion",

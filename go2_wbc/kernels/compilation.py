@@ -37,7 +37,8 @@ _log = logging.getLogger(__name__)
 F = TypeVar("F", bound=Callable[..., Any])
 
 CACHE_VARIABLE = "GO2_WBC_CACHE_DIR"
-"""Environment variable that names the folder for compiled kernels; by default the user's cache."""
+"""Environment variable that names the folder for compiled kernels and solved plans; by default the
+user's cache."""
 
 
 def kernel(signature: str, *, nogil: bool = False) -> Callable[[F], F]:
@@ -181,7 +182,7 @@ class _KernelCache(FunctionCache):
 @cache
 def kernel_folder() -> Path | None:
     """Where compiled kernels are kept; None if nothing can be written. Says when it is empty."""
-    folder = _cache_root() / f"kernels-{_fingerprint()}"
+    folder = cache_root() / f"kernels-{_fingerprint()}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
@@ -198,7 +199,8 @@ def kernel_folder() -> Path | None:
     return folder
 
 
-def _cache_root() -> Path:
+def cache_root() -> Path:
+    """The folder for what this package makes once and keeps."""
     if named := os.environ.get(CACHE_VARIABLE):
         return Path(named)
     if base := os.environ.get("XDG_CACHE_HOME"):

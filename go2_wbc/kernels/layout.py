@@ -200,9 +200,39 @@ CORRECTION = Layout(rate=(), window=(6,), limit=(6,))
 """Numbers of the steady-state correction."""
 
 PLAYBACK = Layout(
-    offset=(6,), place=(), attitude=(), joints=(), ticks=(), raised_ticks=(), sag=(), lean=()
+    offset=(6,),
+    place=(),
+    attitude=(),
+    joints=(),
+    ticks=(),
+    raised_ticks=(),
+    sag=(),
+    lean=(),
+    anchor=(4,),
+    origin=(4,),
+    planned=(4,),
+    is_in_air=(4,),
+    is_awaited=(4,),
+    touchdown=(4,),
+    missed=(),
+    landing_error=(),
 )
-"""State of a playback: the correction, how far the robot has been off its plan, and is now."""
+"""State of a playback: the correction, how far the robot has been off its plan, and is now; where
+the plan is (x, y, z, yaw), now and at first; and of each foot that steps what the plan asks of it,
+whether it is in the air, whether its landing is still to be judged, and when it came down."""
+
+LANDING = Layout(
+    earliest=(),
+    press_speed=(),
+    press_depth=(),
+    time_out=(),
+    ground_share=(),
+    foot_radius=(),
+    ramp=(),
+    normal_force_min=(),
+    normal_force_max=(),
+)
+"""Numbers by which the feet of a plan land: of ``planning.landing`` and of the plan."""
 
 FRICTION = Layout(
     dry=(12,),

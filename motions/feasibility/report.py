@@ -79,7 +79,7 @@ class Series:
         limits: Float[np.ndarray, "*some"] | float,
         *,
         is_floor: bool = False,
-        where: Bool[np.ndarray, "n k"] | bool = True,
+        where: Bool[np.ndarray, "#n #k"] | bool = True,
         tight: float = 0.0,
     ) -> Series:
         """Of values that may not exceed ``limits``, or fall below them; checked only ``where``."""
