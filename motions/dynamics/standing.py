@@ -33,7 +33,7 @@ def standing(model: RobotModel, p_feet: Float[np.ndarray, "4 3"]) -> FullState:
         R=yaw_rotation(anchor.yaw)[None],
         q_joints=np.zeros((1, 12)),
         raised=np.zeros((1, 4), dtype=bool),
-        p_feet=p_feet,
+        p_feet=p_feet[None],
     )
     placed = place(wanted, SETTLING_STEPS, model)
     pose = np.concatenate([placed.p_base[0], [0.0, 0.0, anchor.yaw]])
