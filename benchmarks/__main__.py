@@ -13,6 +13,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("feasibility", "benchmarks.feasibility", "the feasibility check against physics"),
     Command("bridges", "benchmarks.bridges.command", "ROS 2 and Unitree's protocol, by processes"),
     Command("answers", "benchmarks.answers", "the QP where its constraints contradict each other"),
+    Command("dance", "benchmarks.dance", "dances against the true beats of their songs"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
     Command("evidence", "benchmarks.evidence", "fill the table of docs/evidence.md"),

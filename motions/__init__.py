@@ -18,10 +18,12 @@ if TYPE_CHECKING:
         check,
         compile_motion,
     )
+    from motions.music.finding import Beats, beats
     from motions.registry import find_motion, load_file, load_motion, motion_names
     from motions.timeline import Timeline, deg
 
 __all__ = [
+    "Beats",
     "CheckedMotion",
     "Choice",
     "CompiledPlan",
@@ -32,6 +34,7 @@ __all__ = [
     "Playable",
     "Range",
     "Timeline",
+    "beats",
     "check",
     "compile_motion",
     "compile_timeline",
@@ -57,6 +60,7 @@ __getattr__ = lazy_exports(
             "check",
             "compile_motion",
         ),
+        "music.finding": ("Beats", "beats"),
         "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
         "timeline": ("Timeline", "deg"),
     },
