@@ -11,7 +11,7 @@ from controller.cli.motion_run import teller
 from controller.cli.progress import ProgressLine
 
 if TYPE_CHECKING:
-    from motions import CheckedMotion
+    from motions import CheckedMotion, FeasibilityChecker
     from motions.music import Beats, Dance, DancedAccents
 
 EXAMPLES = """
@@ -87,7 +87,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _played(
-    dance: Dance, checked: CheckedMotion, checker: Any, line: ProgressLine
+    dance: Dance, checked: CheckedMotion, checker: FeasibilityChecker, line: ProgressLine
 ) -> tuple[Any, dict[str, Any]]:
     """What to show of the run, and what was measured."""
     from contextlib import closing

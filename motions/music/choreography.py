@@ -20,8 +20,10 @@ from motions.music.moves import MOVES, Accent, Move
 from motions.timeline import Timeline
 
 LEAD = 0.006
-"""How far [s] a dance is written ahead of the song. On the tuning seeds 0 to 9 the trunk turned back
-7 ms late in the mean (241 accents), and a foot was on the ground 6 ms early (64)."""
+"""How far [s] a dance is written ahead of the song. On the tuning seeds 0 to 9 the trunk turned
+back 7 ms late in the mean (241 accents), and a foot was on the ground 6 ms early (64)."""
+LONGEST = 180.0
+"""Length [s] of the longest dance: it ends before a longer song. A run is kept for 4 minutes."""
 SHORTEST_PULSE = 0.55
 """Least length [s] of a pulse: a move takes one. Own choice."""
 LEAST_PULSES = 4
@@ -102,7 +104,7 @@ def compose(found: Beats, seed: int, names: Sequence[str] = ()) -> Dance:
     """
     moves = _named(names)
     pulses = _playable(pulses_of(found))
-    wanted = MOVES_PER_SECOND * found.duration + SLACK
+    wanted = MOVES_PER_SECOND * min(found.duration, LONGEST) + SLACK
     return _written(pulses, _chosen(pulses, moves, wanted, np.random.default_rng(seed)), seed)
 
 
@@ -117,12 +119,16 @@ def feasible_dance(
     """
     dance = compose(found, seed, names)
     pulses, rng = dance.pulses, np.random.default_rng([seed, 1])
+    checked = checker.evaluate(dance.timeline)
     for _ in range(ATTEMPTS):
-        checked = checker.evaluate(dance.timeline)
         if checked.report.ok:
             return dance, checked
         times = [finding.time for finding in checked.report.failures]
-        dance = _written(pulses, _replaced(dance, times, _named(names), rng), seed)
+        moves = _replaced(dance, times, _named(names), rng)
+        if moves == list(dance.moves):
+            break
+        dance = _written(pulses, moves, seed)
+        checked = checker.evaluate(dance.timeline)
     raise MotionInfeasible(dance.timeline.name, checked.report.failures)
 
 
@@ -133,8 +139,9 @@ def _named(names: Sequence[str]) -> list[Move]:
     return [MOVES[name] for name in names or MOVES]
 
 
-def _playable(pulses: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+def _playable(pulses: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
     """The pulses from the first on halfway after which a move may start; that is the count-in."""
+    pulses = pulses[pulses < LONGEST]
     middles = 0.5 * (pulses[1:] + pulses[:-1])
     late = (pulses[:-1] >= LEAD) & (middles - LEAD >= GET_READY)
     kept = pulses[int(np.argmax(late)) :] if late.any() else pulses[:0]
@@ -164,10 +171,8 @@ def _chosen(
         if not bag:
             bag = [moves[i] for i in rng.permutation(len(moves))]
         last = placed[-1].move if placed else None
-        ends = [(move, now + move.pulses(pulse)) for move in bag if move is not last]
-        fits = [
-            m for m, end in ends if end <= min((len(placed) + 1 + SLACK) / per_pulse, len(pulses))
-        ]
+        until = min((len(placed) + 1 + SLACK) / per_pulse, len(pulses))
+        fits = [m for m in bag if m is not last and now + m.pulses(pulse) <= until]
         move = next(iter(fits), None)
         if move is None:
             move = _shortest(moves, placed, pulse, rng)

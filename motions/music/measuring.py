@@ -15,7 +15,7 @@ from motions.music.choreography import Dance
 from motions.music.moves import Accent
 
 ON_THE_BEAT = 0.04
-"""Distance [s] from a beat within which an accent is on it: less than listeners notice in a dance."""
+"""Distance [s] from a beat within which an accent is on it: one picture of a film (25 a second)."""
 NEAR = 0.45
 """Share of a pulse, before and after it, in which its accent is looked for."""
 
