@@ -18,7 +18,7 @@ EXAMPLES = """
 go2-wbc dance song.wav
 go2-wbc dance song.wav --seed 3 --html dance.html
 go2-wbc dance song.wav --moves nod sway twist tap_FR
-go2-wbc dance song.wav --no-play --json    the moves and their times, not played
+go2-wbc dance song.wav --no-play --json    its moves and their times
 """
 
 

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 
 from go2_wbc.errors import CommandError, MissingDependency
 
-INSTALL_LINE = 'python -m pip install "go2-wbc[music]"'
+INSTALL_LINE = 'python -m pip install -e ".[music]"'
 RATE = 22050
 """Samples per second that are looked at: librosa's default."""
 HOP, WINDOW = 128, 512

@@ -80,4 +80,4 @@ def test_without_the_extra_the_install_line_is_said(
 ) -> None:
     monkeypatch.setitem(sys.modules, "librosa", None)
     assert main(["dance", str(tmp_path / "song.wav")]) == ExitCode.RUNTIME
-    assert "go2-wbc[music]" in capsys.readouterr().err
+    assert 'install -e ".[music]"' in capsys.readouterr().err
