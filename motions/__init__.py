@@ -8,7 +8,8 @@ from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from motions.authoring import Choice, Motion, Range, motion
-    from motions.compiler import CompiledPlan, compile_timeline
+    from motions.compiled_plan import CompiledPlan
+    from motions.compiler import compile_timeline
     from motions.feasibility import (
         CheckedMotion,
         FeasibilityChecker,
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     )
     from motions.music.finding import Beats, beats
     from motions.registry import find_motion, load_file, load_motion, motion_names
+    from motions.saved.motion_file import save_motion
+    from motions.saved.plan_file import load_plan, save_plan
     from motions.timeline import Timeline, deg
 
 __all__ = [
@@ -42,8 +45,11 @@ __all__ = [
     "find_motion",
     "load_file",
     "load_motion",
+    "load_plan",
     "motion",
     "motion_names",
+    "save_motion",
+    "save_plan",
 ]
 
 __getattr__ = lazy_exports(
@@ -62,6 +68,8 @@ __getattr__ = lazy_exports(
         ),
         "music.finding": ("Beats", "beats"),
         "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
+        "saved.motion_file": ("save_motion",),
+        "saved.plan_file": ("load_plan", "save_plan"),
         "timeline": ("Timeline", "deg"),
     },
 )

@@ -8,7 +8,7 @@ written. Between those instants the trunk moves smoothly.
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -20,6 +20,7 @@ from go2_wbc.robot.model import RobotModel
 from motions.keys import BalanceShift
 from motions.language.written import SAME
 from motions.placement import configurations
+from motions.problem import Problem
 from motions.timeline import Timeline
 from motions.tracks import LegTracks, Poses, Times, followed
 
@@ -31,25 +32,6 @@ last is the check's limit (``FeasibilityLimits.support``) with 5 mm to spare. Ow
 """
 JOINT_MARGIN = 0.02
 """Distance [rad] that the joints keep from their limits in a balanced pose: own choice."""
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """What cannot be done as it is written.
-
-    Attributes:
-        check: what the feasibility check calls it.
-        subject: the leg, or the trunk.
-        time: when [s] it is worst.
-        miss: distance [m] by which the leg is too short; nan if that is not what is wrong.
-        reason: why no pose is balanced.
-    """
-
-    check: str
-    subject: str
-    time: float
-    miss: float = np.nan
-    reason: str = ""
 
 
 class Balancer:

@@ -9,27 +9,20 @@ kept in ``problems``, which the feasibility check reports.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 
 from go2_wbc.contacts import ContactSchedule
-from go2_wbc.curves import CurvePoint
 from go2_wbc.errors import TimelineError
-from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.legs import LEGS
-from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
-from motions.balance import Balancer, Problem
+from motions.balance import Balancer
+from motions.compiled_plan import CompiledPlan
 from motions.keys import Mark
-from motions.placement import attitudes, centres_of_mass
-from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, reference
-from motions.samples import PlanSamples
+from motions.placement import centres_of_mass
+from motions.problem import Problem
 from motions.timeline import Timeline
 from motions.tracks import (
     LegTracks,
@@ -45,89 +38,6 @@ tracking adds."""
 UNLOAD_TIME = 0.3
 """Time [s] over which a foot gives up its load before lift-off, if there is that much: own choice,
 so that the forces of the others change slowly."""
-
-
-@dataclass(frozen=True, slots=True)
-class CompiledPlan(MotionPlan):
-    """A timeline, ready to be played.
-
-    Attributes:
-        name, entry, exit: see ``MotionPlan``.
-        curves: spline of CoM [m], roll, pitch, yaw [rad] and the twelve joints [rad]: (18,).
-        contacts: who stands when.
-        ramp: time [s] over which a foot is unloaded before lift-off and loaded after touchdown.
-        problems: what could not be done as written.
-        spans: start and end [s] of the named holds.
-    """
-
-    name: str
-    entry: Posture
-    exit: Posture
-    curves: CubicSpline
-    contacts: ContactSchedule
-    ramp: float
-    problems: tuple[Problem, ...]
-    spans: Mapping[str, tuple[float, float]]
-    _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Bind what the kernel reads."""
-        contacts, curves = self.contacts, self.curves
-        modes, events = contacts.modes.astype(float), np.array(contacts.times)
-        tables = (curves.x, curves.c, events, modes, contacts.since, contacts.until)
-        object.__setattr__(self, "_tables", tables)
-
-    @property
-    def duration(self) -> float:  # type: ignore[override]
-        """Length of the motion [s]."""
-        return float(self.curves.x[-1])
-
-    def at(self, t: float) -> Reference:
-        """The reference at ``t``; see ``MotionPlan.at``."""
-        return Reference.of_row(self.row_at(t))
-
-    def row_at(self, t: float) -> Float[np.ndarray, " size"]:
-        """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
-        from go2_wbc.kernels.playing import planned_at
-
-        row = np.empty(REFERENCE.size)
-        planned_at(*self._tables, self.ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, t, row)
-        return row
-
-    def readable_at(self, t: float) -> Reference:
-        """The same as ``at``, step by step: what the kernel is held to."""
-        curves, phase = self._curves_at(t), self.contacts.at(t)
-        body, joints = (
-            CurvePoint(*(curve[part] for curve in curves)) for part in (slice(6), slice(6, None))
-        )
-        share = phase.load_share(self.ramp)
-        return reference(TrackedPoint.COM, body, joints, phase.stance, share)
-
-    def _curves_at(self, t: float) -> Float[np.ndarray, "3 18"]:
-        """Values, rates and accelerations of all curves: a cubic and its two derivatives."""
-        knots, end = self.curves.x, self.duration
-        inside = min(max(t, 0.0), end)
-        piece = min(int(np.searchsorted(knots, inside, side="right")), len(knots) - 1) - 1
-        s = inside - float(knots[piece])
-        powers = np.array([[s**3, s * s, s, 1], [3 * s * s, 2 * s, 1, 0], [6 * s, 2, 0, 0]])
-        if inside != t:
-            powers[1:] = 0.0  # the ends are held
-        return powers @ self.curves.c[:, piece]
-
-    def samples(self, times: Float[np.ndarray, " n"]) -> PlanSamples:
-        """What the references at ``times`` ask for; ``at`` gives the same one by one."""
-        values = self.curves(np.clip(times, 0.0, self.duration))
-        phase = self.contacts.at_times(times)
-        return PlanSamples(
-            times=times,
-            p_world=values[:, :3],
-            is_com=np.ones(len(times), dtype=bool),
-            R_world_base=attitudes(values[:, 3:6]),
-            q_joints=values[:, 6:],
-            stance=phase.stance,
-            raised=~phase.stance,
-            normal_force_max=NORMAL_FORCE_MAX * phase.load_share(self.ramp),
-        )
 
 
 def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
@@ -162,13 +72,17 @@ def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
         if path.miss[worst] > REACH_TOLERANCE:
             miss = float(path.miss[worst])
             problems.append(Problem("way of a foot", leg.name, float(times[worst]), miss))
-    samples = np.hstack([com, body[:, 3:], joints])
+    contacts = contact_schedule(timeline)
+    samples = np.hstack(
+        [com, body[:, 3:], joints, tracks.feet(contacts.at_times(times).stance, body, joints)]
+    )
     return CompiledPlan(
         name=timeline.name,
         entry=timeline.entry,
         exit=timeline.exit,
         curves=CubicSpline(times, samples, bc_type="clamped"),
-        contacts=contact_schedule(timeline),
+        contacts=contacts,
+        swings=np.zeros_like(contacts.modes),
         ramp=_ramp(timeline),
         problems=tuple(problems),
         spans={mark.name: (mark.start, mark.end) for mark in timeline.in_order(Mark)},

@@ -30,8 +30,8 @@ class Wanted:
         is_com: (n,) of which.
         R: (n, 3, 3) attitude of the trunk.
         q_joints: (n, 12) angles [rad] of the raised legs; those of the others do not count.
-        raised: (n, 4) legs that follow their joints; the others stand.
-        p_feet: (4, 3) where standing feet are [m].
+        raised: (n, 4) legs that follow their joints; the others, their feet.
+        p_feet: (n, 4, 3) where the feet of the other legs are [m].
     """
 
     p: Float[np.ndarray, "n 3"]
@@ -39,7 +39,7 @@ class Wanted:
     R: Float[np.ndarray, "n 3 3"]
     q_joints: Float[np.ndarray, "n 12"]
     raised: Bool[np.ndarray, "n 4"]
-    p_feet: Float[np.ndarray, "4 3"]
+    p_feet: Float[np.ndarray, "n 4 3"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class Placed:
         p_base: (n, 3) origin of the base [m].
         q_joints: (n, 12) joint angles [rad].
         p_com: (n, 3) CoM [m].
-        miss: (n, 4) distance [m] by which a standing foot is out of its leg's reach.
+        miss: (n, 4) distance [m] by which such a foot is out of its leg's reach.
     """
 
     p_base: Float[np.ndarray, "n 3"]
@@ -96,7 +96,7 @@ def readable_place(wanted: Wanted, steps: int, model: RobotModel) -> Placed:
     miss, com = np.zeros((len(q), 4)), np.zeros((len(q), 3))
     for step in range(steps + 1):
         for leg in LEGS:
-            places = attitude.apply(wanted.p_feet[leg] - base, inverse=True)
+            places = attitude.apply(wanted.p_feet[:, leg] - base, inverse=True)
             found = readable_leg_angles(LegGeometry.of(model, leg), places)
             stands = ~wanted.raised[:, leg]
             joints[stands, leg.joints] = found.q[stands]

@@ -1,15 +1,17 @@
-"""References of a trunk that moves over feet that stand.
+"""References of a trunk that moves over feet that stand or step.
 
 ``reference`` says what they are; ``reference_row`` is its compiled form.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from go2_wbc.curves import CurvePoint
-from go2_wbc.kernels.layout import REFERENCE
+from go2_wbc.kernels.layout import PLAN_CURVES, REFERENCE
 from go2_wbc.reference import BodyTarget, LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import angular_velocity_from_rpy, rotation_from_rpy
 
@@ -23,21 +25,22 @@ def reference(
     point: TrackedPoint,
     body: CurvePoint,
     joints: CurvePoint,
-    stance: Bool[np.ndarray, "4"],
+    feet: CurvePoint,
+    tasks: Sequence[LegTask],
     load_share: Float[np.ndarray, "4"],
 ) -> Reference:
-    """The reference of feet that stand and of raised legs that follow their joints.
+    """The reference of a trunk and four legs.
 
     Args:
         point: which point the first three components of ``body`` move.
         body: x, y, z [m] and roll, pitch, yaw [rad] (6,) with their derivatives.
         joints: angles [rad] (12,) with their derivatives.
-        stance: feet that stand.
+        feet: places of the feet's centres [m] (12,) with their derivatives.
+        tasks: what each of the four legs does.
         load_share: share of its load that a foot may bear.
     """
     w, dw = angular_velocity_from_rpy(body.value[3:], body.rate[3:], body.acceleration[3:])
     roll, pitch, yaw = body.value[3:]
-    zeros = np.zeros((4, 3))
     return Reference(
         body=BodyTarget(
             point=point,
@@ -48,12 +51,12 @@ def reference(
             w_world=w,
             dw_world=dw,
         ),
-        legs=tuple(LegTask.STANCE if stands else LegTask.JOINTS for stands in stance),
+        legs=tuple(tasks),
         normal_force_min=NORMAL_FORCE_MIN * load_share,
         normal_force_max=NORMAL_FORCE_MAX * load_share,
-        p_world_feet=zeros,
-        v_world_feet=zeros,
-        a_world_feet=zeros,
+        p_world_feet=feet.value.reshape(4, 3),
+        v_world_feet=feet.rate.reshape(4, 3),
+        a_world_feet=feet.acceleration.reshape(4, 3),
         q_joints=joints.value,
         v_joints=joints.rate,
         a_joints=joints.acceleration,
@@ -64,11 +67,11 @@ def reference_row(point: TrackedPoint, body: CurvePoint) -> Float[np.ndarray, " 
     """The row of ``reference`` for four feet that stand, by a kernel."""
     from go2_wbc.kernels.playing import planned
 
-    row, curves = np.empty(REFERENCE.size), np.zeros((3, 18))
+    row, curves = np.empty(REFERENCE.size), np.zeros((3, PLAN_CURVES))
     curves[0, :6], curves[1, :6], curves[2, :6] = body.value, body.rate, body.acceleration
     is_com = 1.0 if point is TrackedPoint.COM else 0.0
-    planned(is_com, curves, _ALL, _ALL, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, row)
+    planned(is_com, curves, _STANCE, _ALL, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, row)
     return row
 
 
-_ALL = np.ones(4)
+_STANCE, _ALL = np.zeros(4), np.ones(4)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.curves import CurvePoint, Segment
-from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
+from go2_wbc.reference import LegTask, MotionPlan, Posture, Reference, TrackedPoint
 from motions.plan import reference, reference_row
 
 STAND_HEIGHT = 0.29
@@ -28,6 +28,7 @@ TUCKED_JOINTS = np.tile([0.0, 1.30, -2.66], 4)
 SPLAYED_JOINTS = TUCKED_JOINTS + np.tile([0.3, 0.0, 0.0, -0.3, 0.0, 0.0], 2)
 """Joint angles [rad] with the feet beside the hips, so that the folded legs carry nothing."""
 _STILL = CurvePoint(*(np.zeros(12) for _ in range(3)))
+_STANDING = (LegTask.STANCE,) * 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +62,7 @@ class PosturePlan(MotionPlan):
 
     def readable_at(self, t: float) -> Reference:
         """The same as ``at``, step by step: what the kernel is held to."""
-        return reference(self.point, self.body.at(t), _STILL, np.ones(4, dtype=bool), np.ones(4))
+        return reference(self.point, self.body.at(t), _STILL, _STILL, _STANDING, np.ones(4))
 
 
 def rise(start: Float[np.ndarray, "6"], entry: Posture, duration: float = 1.2) -> PosturePlan:

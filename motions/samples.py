@@ -22,6 +22,7 @@ class PlanSamples:
         q_joints: (n, 12) joint angles [rad] of legs that follow their joints.
         stance: (n, 4) feet that stand.
         raised: (n, 4) legs that follow their joints.
+        p_feet: (n, 4, 3) where the other feet are [m].
         normal_force_max: (n, 4) greatest normal force [N] of each foot.
     """
 
@@ -32,12 +33,17 @@ class PlanSamples:
     q_joints: Float[np.ndarray, "n 12"]
     stance: Bool[np.ndarray, "n 4"]
     raised: Bool[np.ndarray, "n 4"]
+    p_feet: Float[np.ndarray, "n 4 3"]
     normal_force_max: Float[np.ndarray, "n 4"]
 
     @staticmethod
-    def one_by_one(plan: MotionPlan, times: Float[np.ndarray, " n"]) -> PlanSamples:
-        """The samples of any plan, by its ``at``."""
+    def one_by_one(
+        plan: MotionPlan, times: Float[np.ndarray, " n"], p_feet: Float[np.ndarray, "*n 4 3"]
+    ) -> PlanSamples:
+        """The samples of any plan, by its ``at``; its feet stand at ``p_feet``."""
         references = [plan.at(float(t)) for t in times]
+        swings = np.array([[t is LegTask.SWING for t in one.legs] for one in references])
+        swung = np.array([one.p_world_feet for one in references])
         return PlanSamples(
             times=times,
             p_world=np.array([one.body.p_world for one in references]),
@@ -45,6 +51,7 @@ class PlanSamples:
             R_world_base=np.array([one.body.R_world_base for one in references]),
             q_joints=np.array([one.q_joints for one in references]),
             stance=np.array([one.stance for one in references]),
+            p_feet=np.where(swings[:, :, None], swung, p_feet),
             raised=np.array([[t is LegTask.JOINTS for t in one.legs] for one in references]),
             normal_force_max=np.array([one.normal_force_max for one in references]),
         )

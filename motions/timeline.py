@@ -15,11 +15,11 @@ from __future__ import annotations
 
 import math
 
-from motions.language.arrangement import Arrangement
-from motions.language.moves import Moves
+from motions.language.shapes import Shapes
+from motions.language.transforms import Transforms
 
 
-class Timeline(Moves, Arrangement):
+class Timeline(Shapes, Transforms):
     """An authored motion; ``motions.language`` holds its calls."""
 
     __slots__ = ()

@@ -8,18 +8,30 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise, starmap
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
+from scipy.interpolate import CubicSpline
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
-from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, leg_angles
+from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
-from motions.keys import BODY_CHANNELS, BodyKey, Frame, Key, LegKey, LegTarget, PostureKey
-from motions.placement import Wanted, attitudes, place, turned_back
+from motions.keys import (
+    BODY_CHANNELS,
+    BodyKey,
+    BodyPathKey,
+    Frame,
+    JointKey,
+    Key,
+    LegKey,
+    LegTarget,
+    PostureKey,
+)
+from motions.placement import Wanted, attitudes, place, turned, turned_back
 from motions.postures import LIE_POSE, SIT_POSE, STAND_POSE
 from motions.timeline import Timeline
 
@@ -58,7 +70,7 @@ def followed(
     last = first
     edges = np.searchsorted(times, [*(key.start for key, _ in moves), np.inf]).tolist()
     for (key, goal), rows in zip(moves, starmap(slice, pairwise(edges)), strict=True):
-        path[rows] = last + eased(key, times[rows])[:, None] * (goal - last)
+        path[rows] = last + _way(key, times[rows], last, goal)
         last = goal
     return path
 
@@ -73,6 +85,18 @@ def body_path(
     postures = [(key, home[key.posture]) for key in timeline.in_order(PostureKey)]
     offsets = [followed(times, np.zeros(1), moves[channel]) for channel in BODY_CHANNELS]
     return followed(times, home[timeline.entry], postures) + np.hstack(offsets)
+
+
+def _way(
+    key: Key, times: Times, last: Float[np.ndarray, " k"], goal: Float[np.ndarray, " k"]
+) -> Float[np.ndarray, "n k"]:
+    """How far (n, k) a key has gone from ``last``; a path through points by a clamped spline."""
+    if not isinstance(key, BodyPathKey):
+        return eased(key, times)[:, None] * (goal - last)
+    shares = np.array([0.0, *key.shares, 1.0])
+    places = np.array([float(last[0]), *key.through, key.value]) - last[0]
+    passed = np.clip((times - key.start) / (key.end - key.start), 0.0, 1.0)
+    return CubicSpline(shares, places, bc_type="clamped")(passed)[:, None]
 
 
 def eased(key: Key, times: Times) -> Float[np.ndarray, " n"]:
@@ -112,9 +136,33 @@ class LegTracks:
         self._keys: dict[Leg, list[LegKey]] = {leg: [] for leg in LEGS}
         for key in timeline.in_order(LegKey):
             self._keys[key.leg].append(key)
-        self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
         self.p_feet = standing_feet(model)
         self._p_base_feet_home = (self.p_feet - home[:3]) @ attitudes(home[None, 3:])[0]
+        homes = home_poses(model)
+        for leg, keys in self._keys.items():
+            self._keys[leg] = self._completed(leg, keys, timeline, homes)
+        self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
+
+    def _completed(
+        self,
+        leg: Leg,
+        keys: Sequence[LegKey],
+        timeline: Timeline,
+        homes: Mapping[Posture, Float[np.ndarray, "6"]],
+    ) -> list[LegKey]:
+        """The keys with the angles of joints that stay as they are, from the goal before."""
+        done, origin = list[LegKey](), LegTarget.on_ground()
+        for key in keys:
+            whole: LegKey = key
+            if isinstance(key, JointKey):
+                body = body_path(timeline, homes, np.array([key.start]))
+                angles = self._at(leg, origin, body).q[0]
+                angles[key.joint] = key.target.values[key.joint]
+                hip, thigh, calf = angles.tolist()
+                whole = replace(key, target=LegTarget(Frame.JOINTS, (hip, thigh, calf)))
+            done.append(whole)
+            origin = whole.target
+        return done
 
     def path(self, leg: Leg, times: Times, body: Poses) -> LegAngles:
         """Joint angles of ``leg`` at increasing ``times``, at which the trunk is at ``body``.
@@ -134,6 +182,20 @@ class LegTracks:
             path.q[rows], path.miss[rows] = moved.q, moved.miss
             origin = key.target
         return path
+
+    def feet(
+        self, stance: Bool[np.ndarray, "n 4"], body: Poses, joints: Float[np.ndarray, "n 12"]
+    ) -> Float[np.ndarray, "n 12"]:
+        """Places [m] of the feet's centres: where they stand, and where raised legs hold them.
+
+        ``body``, ``joints``: pose of the trunk and joint angles.
+        """
+        R, places = attitudes(body[:, 3:]), []
+        for leg in LEGS:
+            seen = foot_places(self._geometry[leg], joints[:, leg.joints])
+            held = body[:, :3] + turned(R, seen)
+            places.append(np.where(stance[:, leg, None], self.p_feet[leg], held))
+        return np.hstack(places)
 
     def _move(self, key: LegKey, origin: LegTarget, times: Times, body: Poses) -> LegAngles:
         share = eased(key, times)[:, None]
@@ -181,7 +243,7 @@ def home_poses(model: RobotModel) -> Mapping[Posture, Float[np.ndarray, "6"]]:
             R=attitudes(STAND_POSE[None, 3:]),
             q_joints=np.zeros((1, 12)),
             raised=np.zeros((1, 4), dtype=bool),
-            p_feet=standing_feet(model),
+            p_feet=standing_feet(model)[None],
         )
         p_base = place(wanted, SETTLING_STEPS, model).p_base[0]
         stand = np.concatenate([p_base, STAND_POSE[3:]])

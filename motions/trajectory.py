@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from go2_wbc.errors import MotionError
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
-from motions.compiler import CompiledPlan
+from motions.compiled_plan import CompiledPlan
 from motions.placement import Wanted, attitudes, configurations, place, turned, turned_back
 from motions.samples import PlanSamples
 from motions.tracks import sample_times, standing_feet
@@ -38,8 +38,8 @@ class Trajectory:
         p_com: (n, 3) CoM [m].
         stance: (n, 4) feet that stand.
         load_share: (n, 4) share of its load that a foot may bear.
-        p_feet: (4, 3) where the feet stand [m].
-        miss: (n, 4) distance [m] by which a standing foot is out of its leg's reach.
+        p_feet: (n, 4, 3) where the feet are [m] of legs that do not follow their joints.
+        miss: (n, 4) distance [m] by which such a foot is out of its leg's reach.
     """
 
     times: Float[np.ndarray, " n"]
@@ -50,7 +50,7 @@ class Trajectory:
     p_com: Float[np.ndarray, "n 3"]
     stance: Bool[np.ndarray, "n 4"]
     load_share: Float[np.ndarray, "n 4"]
-    p_feet: Float[np.ndarray, "4 3"]
+    p_feet: Float[np.ndarray, "n 4 3"]
     miss: Float[np.ndarray, "n 4"]
 
     def placed(self, p_base: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
@@ -59,24 +59,25 @@ class Trajectory:
 
 
 def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
-    """The trajectory of ``plan``; the feet stand below the hips, and land where they stood.
+    """The trajectory of ``plan``; of one that does not say where, the feet stand below the hips.
 
     Raises:
         MotionError: if the plan is not finite.
     """
     times = sample_times(plan.duration)
     is_compiled = isinstance(plan, CompiledPlan)
-    asked = plan.samples(times) if is_compiled else PlanSamples.one_by_one(plan, times)
+    p_feet = standing_feet(model)
+    asked = plan.samples(times) if is_compiled else PlanSamples.one_by_one(plan, times, p_feet)
     _require_finite(asked)
     rpy = np.unwrap(_rpy_of(asked.R_world_base), axis=0)
-    R, p_feet = attitudes(rpy), standing_feet(model)
+    R = attitudes(rpy)
     wanted = Wanted(
         p=asked.p_world,
         is_com=asked.is_com,
         R=R,
         q_joints=asked.q_joints,
         raised=asked.raised,
-        p_feet=p_feet,
+        p_feet=asked.p_feet,
     )
     placed = place(wanted, CENTRING_STEPS, model)
     q = configurations(np.hstack([placed.p_base, rpy]), placed.q_joints)
@@ -91,14 +92,15 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
         p_com=placed.p_com,
         stance=asked.stance,
         load_share=greatest / max(float(greatest.max()), 1e-9),
-        p_feet=p_feet,
+        p_feet=asked.p_feet,
         miss=placed.miss,
     )
 
 
 def _require_finite(asked: PlanSamples) -> None:
     count = len(asked.times)
-    parts = (asked.p_world, asked.R_world_base.reshape(count, 9), asked.q_joints)
+    turns, p_feet = asked.R_world_base.reshape(count, 9), asked.p_feet.reshape(count, 12)
+    parts = (asked.p_world, turns, asked.q_joints, p_feet)
     is_finite = np.isfinite(np.hstack(parts)).all(axis=1)
     if not is_finite.all():
         t = float(asked.times[int(np.argmin(is_finite))])

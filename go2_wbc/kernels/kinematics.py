@@ -175,7 +175,7 @@ def see_foot(R, p, p_foot, seen):
 
 
 @kernel(
-    "void(f8[:,::1], b1[::1], b1[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], i8, "
+    "void(f8[:,::1], b1[::1], b1[:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], i8, "
     "f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1])",
     nogil=True,
 )
@@ -196,7 +196,7 @@ def settle(wanted, is_com, raised, R, p_feet, legs, links, steps, p, joints, mis
             for leg in range(4):
                 if raised[i, leg]:
                     continue
-                see_foot(R[i], p[i], p_feet[leg], foot)
+                see_foot(R[i], p[i], p_feet[i, leg], foot)
                 if step == steps:
                     angles = joints[i, 3 * leg : 3 * leg + 3]
                     miss[i, leg] = solve_leg(legs[leg], foot[0], foot[1], foot[2], angles)

@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.kernels.compilation import kernel, subroutine
-from go2_wbc.kernels.derivation import rotation_of
-from go2_wbc.kernels.layout import CORRECTION, PLAYBACK, REFERENCE, SNAPSHOT
+from go2_wbc.kernels.layout import CORRECTION, PLAN_CURVES, PLAYBACK, REFERENCE, SNAPSHOT
 from go2_wbc.kernels.supervision import sag_and_lean
+from go2_wbc.kernels.vectors import rotation_of
 
 TIE = 1e-9
 """As ``contacts.TIE``."""
-JOINTS = 2.0
-"""The value of ``reference.LegTask.JOINTS``."""
+STANCE, JOINTS = 0.0, 2.0
+"""Values of ``reference.LegTask``."""
 
 _N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLAYBACK.start, CORRECTION.start
 _Q, _R, _P_COM = _N["q"], _N["R_world_base"], _N["p_world_com"]
@@ -31,16 +31,19 @@ _TICKS, _RAISED_TICKS = _S["ticks"], _S["raised_ticks"]
 _SAG, _LEAN = _S["sag"], _S["lean"]
 _RATE, _WINDOW, _LIMIT = _C["rate"], _C["window"], _C["limit"]
 
+_TABLE, _LIST = "Array(f8, 2, 'A', readonly=True)", "Array(f8, 1, 'A', readonly=True)"
+
 
 # --- the plan ---------------------------------------------------------------------------------
 
 
-@kernel("void(f8, f8[:,::1], f8[::1], f8[::1], f8, f8, f8[::1])")
-def planned(is_com, curves, stands, share, least, greatest, row):
-    """Fill the reference of a body (x, y, z, roll, pitch, yaw) over feet that stand.
+@kernel(f"void(f8, f8[:,::1], {_LIST}, f8[::1], f8, f8, f8[::1])")
+def planned(is_com, curves, tasks, share, least, greatest, row):
+    """Fill the reference of a body (x, y, z, roll, pitch, yaw) and four legs.
 
-    ``curves`` (3, 18): values, rates and accelerations of body and joints. Angular velocity of
-    Z-Y-X angles: Craig, Introduction to Robotics, 3rd ed., eq. 5.44.
+    ``curves`` (3, 30): values, rates and accelerations of body, joints and feet; ``tasks``: values
+    of ``LegTask``. Angular velocity of Z-Y-X angles: Craig, Introduction to Robotics, 3rd ed., eq.
+    5.44.
     """
     row[:] = 0.0
     row[_IS_COM] = is_com
@@ -69,46 +72,46 @@ def planned(is_com, curves, stands, share, least, greatest, row):
     row[_BODY_DW + 1] = sy * cp * ddr + cy * ddp + (cy * dy * cp - sy * sp * dp) * dr - sy * dy * dp
     row[_BODY_DW + 2] = ddy - sp * ddr - cp * dp * dr
     for leg in range(4):
-        row[_LEGS + leg] = 0.0 if stands[leg] != 0.0 else JOINTS
+        row[_LEGS + leg] = tasks[leg]
         row[_F_MIN + leg], row[_F_MAX + leg] = least * share[leg], greatest * share[leg]
     for n in range(12):
         row[_JOINT_Q + n] = curves[0, 6 + n]
         row[_JOINT_V + n] = curves[1, 6 + n]
         row[_JOINT_A + n] = curves[2, 6 + n]
-
-
-_TABLE, _LIST = "Array(f8, 2, 'A', readonly=True)", "Array(f8, 1, 'A', readonly=True)"
+        row[_FOOT_P + n] = curves[0, 18 + n]
+        row[_FOOT_V + n] = curves[1, 18 + n]
+        row[_FOOT_A + n] = curves[2, 18 + n]
 
 
 @kernel(
     f"void({_LIST}, Array(f8, 3, 'A', readonly=True), {_LIST}, {_TABLE}, {_TABLE}, {_TABLE}, "
     "f8, f8, f8, f8, f8[::1])"
 )
-def planned_at(knots, pieces, events, modes, since, until, ramp, least, greatest, t, row):
+def planned_at(knots, pieces, events, tasks, since, until, ramp, least, greatest, t, row):
     """Fill the reference of splines and a contact schedule at ``t`` seconds.
 
-    ``pieces`` (4, n, 18): coefficients of the cubics between ``knots``, the cube's first.
-    ``modes``, ``since``, ``until`` (m, 4): from each event on, the feet in stance, and when each
+    ``pieces`` (4, n, 30): coefficients of the cubics between ``knots``, the cube's first.
+    ``tasks``, ``since``, ``until`` (m, 4): from each event on, what the legs do, and when each
     foot's contact changed last and changes next. The ends are held.
     """
     end = knots[-1]
     inside = min(max(t, 0.0), end)
     piece = min(np.searchsorted(knots, inside, side="right"), len(knots) - 1) - 1
     s = inside - knots[piece]
-    curves = np.zeros((3, 18))
-    for k in range(18):
+    curves = np.zeros((3, PLAN_CURVES))
+    for k in range(PLAN_CURVES):
         a, b, c = pieces[0, piece, k], pieces[1, piece, k], pieces[2, piece, k]
         curves[0, k] = ((a * s + b) * s + c) * s + pieces[3, piece, k]
         if inside == t:
             curves[1, k] = (3 * a * s + 2 * b) * s + c
             curves[2, k] = 6 * a * s + 2 * b
     event = max(np.searchsorted(events, t + TIE, side="right") - 1, 0)
-    stands, share = np.empty(4), np.empty(4)
+    share = np.zeros(4)
     for leg in range(4):
-        stands[leg] = modes[event, leg]
-        nearest = min(max(t - since[event, leg], 0.0), until[event, leg] - t)
-        share[leg] = stands[leg] * min(max(nearest / max(ramp, TIE), 0.0), 1.0)
-    planned(1.0, curves, stands, share, least, greatest, row)
+        if tasks[event, leg] == STANCE:
+            nearest = min(max(t - since[event, leg], 0.0), until[event, leg] - t)
+            share[leg] = min(max(nearest / max(ramp, TIE), 0.0), 1.0)
+    planned(1.0, curves, tasks[event], share, least, greatest, row)
 
 
 # --- where it is followed -------------------------------------------------------------------

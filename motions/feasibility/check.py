@@ -7,13 +7,13 @@ import numpy as np
 from go2_wbc.errors import MotionError
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
-from motions.balance import Problem
-from motions.compiler import CompiledPlan
+from motions.compiled_plan import CompiledPlan
 from motions.feasibility import dynamic, kinematic
 from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import FeasibilityReport, Series
+from motions.problem import Problem
 from motions.trajectory import trajectory_of
 
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.geometry import support_margins
@@ -157,13 +157,9 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
     than three feet have no inside, none at all count as 1 m outside.
     """
     values = np.full((len(motion.times), 2), -NO_SUPPORT)
-    modes = motion.stance @ np.array([1, 2, 4, 8])
-    for mode in np.unique(modes).tolist():
-        if not mode:
-            continue
-        rows = modes == mode
-        stands = motion.stance[int(np.argmax(rows))]
-        feet = motion.p_feet[stands, :2]
+    for rows in _same_support(motion):
+        stands = motion.stance[rows[0]]
+        feet = motion.p_feet[rows[0], stands, :2]
         for column, points in enumerate((motion.p_com[:, :2], forces.zmp)):
             values[rows, column] = support_margins(feet, points[rows])
     com = ("support", "m", ("CoM",), motion.times, values[:, :1])
@@ -172,6 +168,16 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
         Series.against(*com, limits.support, is_floor=True, tight=TIGHT_SUPPORT),
         Series.against(*zmp, limits.zero_moment, is_floor=True, tight=TIGHT_SUPPORT),
     )
+
+
+def _same_support(motion: Trajectory) -> list[Int[np.ndarray, " k"]]:
+    """Samples in which the same feet, at least one, stand in the same places."""
+    places = np.where(motion.stance[:, :, None], motion.p_feet[:, :, :2], np.nan)
+    keys = np.nan_to_num(np.round(places.reshape(-1, 8), 6), nan=np.inf)
+    _, group = np.unique(keys, axis=0, return_inverse=True)
+    ordered = np.argsort(group, kind="stable")
+    groups = np.split(ordered, np.flatnonzero(np.diff(group[ordered])) + 1)
+    return [rows for rows in groups if motion.stance[rows[0]].any()]
 
 
 def _state(motion: Trajectory, row: int) -> RobotState:

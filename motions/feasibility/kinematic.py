@@ -97,8 +97,8 @@ def landing(
     away, speed = np.full(stands.shape, np.nan), np.full(stands.shape, np.nan)
     for edge, leg in np.argwhere(stands[1:] != stands[:-1]):
         lands = stands[edge + 1, leg]
-        row = edge if lands else edge + 1  # the sample of the flight
-        away[row, leg] = np.linalg.norm(places[row, leg] - motion.p_feet[leg])
+        row, standing = (edge, edge + 1) if lands else (edge + 1, edge)
+        away[row, leg] = np.linalg.norm(places[row, leg] - motion.p_feet[standing, leg])
         speed[row, leg] = paces[max(row - 1, 0), leg] if lands else 0.0
     return (
         Series.against("landing place", "m", FEET, times, away, limits.landing),

@@ -11,7 +11,7 @@ from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
-from motions.compiler import CompiledPlan
+from motions.compiled_plan import CompiledPlan
 from tests.controller.plants import WatchedPlant
 
 TICK = 0.002

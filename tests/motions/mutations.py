@@ -200,7 +200,7 @@ def limit_broken(line: Timeline, model: RobotModel) -> str:
     plan = compile_timeline(line, model)
     times = np.arange(0.0, plan.duration + STEP / 2, STEP)
     values = plan.curves(np.minimum(times, plan.duration))
-    joints = values[:, 6:]
+    joints = values[:, 6:18]
     speed = np.abs(np.diff(joints, axis=0)) / STEP
     trunk = np.diff(values[:, :6], axis=0) / STEP
     stance = np.array([plan.contacts.at(float(t)).stance for t in times])

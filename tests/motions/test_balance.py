@@ -21,7 +21,7 @@ def test_a_trunk_that_has_moved_away_is_balanced_from_where_it_is(x: float, y: f
     line = Timeline().body(x=x, y=y, over=0.8).foot("FR", z=0.06, over=0.8)
     path = trajectory_of(compile_timeline(line.home(over=1.0), model), model)
     raised = ~path.stance.all(axis=1)
-    standing = path.p_feet[path.stance[raised][0], :2]
+    standing = path.p_feet[0, path.stance[raised][0], :2]
     margins = support_margins(standing, path.p_com[raised, :2])
     assert raised.sum() > 50
     assert margins.min() > MARGINS[0] - AGREEMENT  # the best is possible here

@@ -30,7 +30,7 @@ def test_trunk_and_joints_are_those_of_the_readable_form(model: RobotModel, step
         R=attitudes(rng.normal(scale=0.3, size=(COUNT, 3))),
         q_joints=rng.uniform(-2.0, 2.0, size=(COUNT, 12)),
         raised=rng.random((COUNT, 4)) < 0.3,
-        p_feet=standing_feet(model) + rng.normal(scale=0.02, size=(4, 3)),
+        p_feet=standing_feet(model) + rng.normal(scale=0.02, size=(COUNT, 4, 3)),
     )
     found, expected = place(wanted, steps, model), readable_place(wanted, steps, model)
     for name in ("p_base", "q_joints", "p_com", "miss"):
@@ -50,7 +50,7 @@ def test_what_is_wanted_stays_as_it_was(model: RobotModel) -> None:
         R=np.eye(3)[None],
         q_joints=np.zeros((1, 12)),
         raised=np.zeros((1, 4), dtype=bool),
-        p_feet=standing_feet(model),
+        p_feet=standing_feet(model)[None],
     )
     for array in (wanted.p, wanted.R, wanted.q_joints, wanted.raised, wanted.p_feet):
         array.flags.writeable = False

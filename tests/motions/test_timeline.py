@@ -142,7 +142,7 @@ def test_a_foot_passes_its_key_points() -> None:
     p_base = foot_places(geometry, value[6:][Leg.FR.joints][None])[0]
     wanted = MODEL.p_base_feet_nominal[Leg.FR].copy() + [0.05, -0.02, 0.12]
     wanted[2] = MODEL.foot_radius + 0.12
-    joints = value[6:]
+    joints = value[6:18]
     base = value[:3] - MODEL.center_of_mass(np.concatenate([np.zeros(6), [1.0], joints]))
     assert p_base + base == pytest.approx(wanted, abs=1e-4)
 
@@ -243,7 +243,7 @@ def test_closed_form_angles_bring_the_foot_to_its_place(leg: Leg, share: list[fl
 
 def test_a_standing_robot_has_the_angles_it_stands_with() -> None:
     value, _, _ = plan_of(Timeline().body(z=-0.01, over=1.0).home(over=1.0))._curves_at(0.0)
-    q = np.concatenate([HOME[:3], [0.0, 0.0, 0.0, 1.0], value[6:]])
+    q = np.concatenate([HOME[:3], [0.0, 0.0, 0.0, 1.0], value[6:18]])
     _, feet = MODEL.forward_kinematics(q)
     assert feet[:, 2] == pytest.approx(np.full(4, MODEL.foot_radius), abs=NEAR)
     assert feet[:, :2] == pytest.approx(MODEL.p_base_feet_nominal[:, :2], abs=NEAR)

@@ -16,7 +16,7 @@ from go2_wbc.reference import Anchor, BodyTarget, LegTask, Posture, Reference, T
 from go2_wbc.robot import rotations
 from go2_wbc.robot.model import RobotModel
 from motions import compile_motion
-from motions.compiler import CompiledPlan
+from motions.compiled_plan import CompiledPlan
 from motions.postures import PosturePlan
 from tests.engine_helpers import holding_reference, random_state, standing_q, state_of
 

@@ -92,7 +92,7 @@ def random_trajectory(model: RobotModel, count: int, *, pace: float, seed: int) 
         p_com=poses[:, :3],
         stance=load_share > 0.0,
         load_share=load_share,
-        p_feet=np.zeros((4, 3)),
+        p_feet=np.zeros((count, 4, 3)),
         miss=np.zeros((count, 4)),
     )
 

@@ -1,0 +1,133 @@
+"""A motion as cubics and contacts, ready to be played."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.interpolate import PPoly
+
+from go2_wbc.contacts import TIE, ContactSchedule
+from go2_wbc.curves import CurvePoint
+from go2_wbc.errors import MotionError
+from go2_wbc.kernels.layout import REFERENCE
+from go2_wbc.reference import LegTask, MotionPlan, Posture, Reference, TrackedPoint
+from motions.placement import attitudes
+from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, reference
+from motions.problem import Problem
+from motions.samples import PlanSamples
+
+LEAST_FEET = 3
+"""Standing feet that span an area, so that a robot that stops there can keep standing."""
+
+
+@dataclass(frozen=True, slots=True)
+class CompiledPlan(MotionPlan):
+    """A timeline, ready to be played.
+
+    Attributes:
+        name, entry, exit: see ``MotionPlan``.
+        curves: cubics of CoM [m], roll, pitch, yaw [rad], the twelve joints [rad] and the places of
+            the four feet's centres [m]: (30,).
+        contacts: who stands when.
+        swings: (m, 4) at each event of ``contacts``, the feet in the air that follow their places;
+            the others in the air follow their joints.
+        ramp: time [s] over which a foot is unloaded before lift-off and loaded after touchdown.
+        problems: what could not be done as written.
+        spans: start and end [s] of the named holds.
+    """
+
+    name: str
+    entry: Posture
+    exit: Posture
+    curves: PPoly
+    contacts: ContactSchedule
+    swings: Bool[np.ndarray, "m 4"]
+    ramp: float
+    problems: tuple[Problem, ...]
+    spans: Mapping[str, tuple[float, float]]
+    _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Bind what the kernel reads; raise MotionError for tables of different lengths."""
+        contacts, curves = self.contacts, self.curves
+        if self.swings.shape != contacts.modes.shape:
+            raise MotionError(
+                f"plan {self.name!r}: swings must have a row for each of {len(contacts.times)} "
+                f"contact events, got {list(self.swings.shape)}"
+            )
+        tasks, events = _tasks(contacts.modes, self.swings), np.array(contacts.times)
+        tables = (curves.x, curves.c, events, tasks, contacts.since, contacts.until)
+        object.__setattr__(self, "_tables", tables)
+
+    @property
+    def duration(self) -> float:  # type: ignore[override]
+        """Length of the motion [s]."""
+        return float(self.curves.x[-1])
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether fewer than three feet stand at any time; see ``MotionPlan.is_dynamic``."""
+        return bool((self.contacts.modes.sum(axis=1) < LEAST_FEET).any())
+
+    def at(self, t: float) -> Reference:
+        """The reference at ``t``; see ``MotionPlan.at``."""
+        return Reference.of_row(self.row_at(t))
+
+    def row_at(self, t: float) -> Float[np.ndarray, " size"]:
+        """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
+        from go2_wbc.kernels.playing import planned_at
+
+        row = np.empty(REFERENCE.size)
+        planned_at(*self._tables, self.ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, t, row)
+        return row
+
+    def readable_at(self, t: float) -> Reference:
+        """The same as ``at``, step by step: what the kernel is held to."""
+        curves, phase = self._curves_at(t), self.contacts.at(t)
+        parts = (slice(6), slice(6, 18), slice(18, None))
+        body, joints, feet = (CurvePoint(*(curve[part] for curve in curves)) for part in parts)
+        tasks = [LegTask(int(task)) for task in _tasks(phase.stance, self.swings[self._event(t)])]
+        share = phase.load_share(self.ramp)
+        return reference(TrackedPoint.COM, body, joints, feet, tasks, share)
+
+    def _event(self, t: float) -> int:
+        return max(bisect_right(self.contacts.times, t + TIE) - 1, 0)
+
+    def _curves_at(self, t: float) -> Float[np.ndarray, "3 30"]:
+        """Values, rates and accelerations of all curves: a cubic and its two derivatives."""
+        knots, end = self.curves.x, self.duration
+        inside = min(max(t, 0.0), end)
+        piece = min(int(np.searchsorted(knots, inside, side="right")), len(knots) - 1) - 1
+        s = inside - float(knots[piece])
+        powers = np.array([[s**3, s * s, s, 1], [3 * s * s, 2 * s, 1, 0], [6 * s, 2, 0, 0]])
+        if inside != t:
+            powers[1:] = 0.0  # the ends are held
+        return powers @ self.curves.c[:, piece]
+
+    def samples(self, times: Float[np.ndarray, " n"]) -> PlanSamples:
+        """What the references at ``times`` ask for; ``at`` gives the same one by one."""
+        values = self.curves(np.clip(times, 0.0, self.duration))
+        phase = self.contacts.at_times(times)
+        event = np.searchsorted(self.contacts.times, times + TIE, side="right") - 1
+        swings = self.swings[np.maximum(event, 0)]
+        return PlanSamples(
+            times=times,
+            p_world=values[:, :3],
+            is_com=np.ones(len(times), dtype=bool),
+            R_world_base=attitudes(values[:, 3:6]),
+            q_joints=values[:, 6:18],
+            stance=phase.stance,
+            raised=~(phase.stance | swings),
+            p_feet=values[:, 18:].reshape(-1, 4, 3),
+            normal_force_max=NORMAL_FORCE_MAX * phase.load_share(self.ramp),
+        )
+
+
+def _tasks(stance: Bool[np.ndarray, "*n 4"], swings: Bool[np.ndarray, "*n 4"]) -> np.ndarray:
+    in_air = np.where(swings, float(LegTask.SWING), float(LegTask.JOINTS))
+    return np.where(stance, float(LegTask.STANCE), in_air)
