@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +42,7 @@ def register(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--no-play", action="store_true", help="compose and check it only")
     parser.add_argument(
-        "--html", metavar="FILE", type=Path, help="write a 3D replay page, or one of the plan"
+        "--html", metavar="FILE", type=Path, help="write a 3D replay page with the music"
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -76,7 +77,8 @@ def run(args: argparse.Namespace) -> int:
             told |= measured
             ok = bool(measured["ok"])
         if target is not None:
-            export_html(content, target, title=dance.timeline.name)
+            shown = replace(content, beats=tuple(found.times.tolist()), sound=_music(args.song))
+            export_html(shown, target, title=dance.timeline.name)
     if args.json:
         print_json(told)
     else:
@@ -110,6 +112,14 @@ def _played(
         content = performed(checked, go2.recording(), checker.model)
     reason = "" if result.ok else result.fall or result.reason
     return content, {"ok": result.ok, "reason": reason, **_accents(dance, heard)}
+
+
+def _music(song: Path) -> bytes:
+    """As much of the song as can be danced, for the page."""
+    from motions.music.choreography import LONGEST
+    from motions.music.sound import RATE, mp3_of, read_sound
+
+    return mp3_of(read_sound(song)[: round(LONGEST * RATE)])
 
 
 def _accents(dance: Dance, heard: DancedAccents) -> dict[str, Any]:

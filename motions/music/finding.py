@@ -14,11 +14,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float, Int
 
-from go2_wbc.errors import CommandError, MissingDependency
+from go2_wbc.errors import CommandError
+from motions.music.sound import RATE, Sound, read_sound
 
-INSTALL_LINE = 'python -m pip install -e ".[music]"'
-RATE = 22050
-"""Samples per second that are looked at: librosa's default."""
 HOP, WINDOW = 128, 512
 """Samples from one frame to the next (5.8 ms), and of a frame (23 ms): short, to tell when a note
 begins; librosa's defaults are 512 and 2048."""
@@ -27,8 +25,6 @@ BANDS = 40
 LATENESS = 0.0061
 """How late [s] the beginning of a note is found, beyond librosa's own correction: mean of 71
 songs of ``songs``, the tuning seeds 0 to 59 and eleven click tracks; 0.5 ms from song to song."""
-LONGEST = 900.0
-"""Length [s] of the longest song: a quarter of an hour, so that no file fills the memory."""
 LEAST_BEATS = 4
 """A bar: fewer are no song."""
 SILENCE = 1e-4
@@ -58,7 +54,6 @@ NEIGHBOURS = 8
 OUTLIER = 0.01
 """Distance [s] from a straight line of beats from which on a note counts less."""
 
-Sound = Float[np.ndarray, " m"]
 Frames = Float[np.ndarray, " n"]
 Times = Float[np.ndarray, " k"]
 
@@ -93,7 +88,7 @@ def beats(path: Path | str) -> Beats:
             has no four beats or no steady ones.
         MissingDependency: without the extra ``[music]``.
     """
-    sound, name = _read(Path(path)), Path(path).name
+    sound, name = read_sound(path), Path(path).name
     if len(sound) < WINDOW or float(np.abs(sound).max()) < SILENCE:
         raise CommandError(f"{name} is silent: there is no beat in it")
     onsets = _onsets(sound)
@@ -112,32 +107,6 @@ def beats(path: Path | str) -> Beats:
         duration=len(sound) / RATE,
         agreement=agreement,
     )
-
-
-def _read(path: Path) -> Sound:
-    """The sound of a file, one channel, ``RATE`` samples a second."""
-    try:
-        import librosa
-        import soundfile
-    except (ImportError, OSError) as error:  # soundfile: OSError without its C library
-        raise MissingDependency(f"music needs librosa ({error}): {INSTALL_LINE}") from error
-    if not path.is_file():
-        raise CommandError(f"{path}: there is no such file; give a song, such as song.wav")
-    try:
-        length = soundfile.info(str(path)).duration
-        if length > LONGEST:
-            raise CommandError(
-                f"{path.name} is {length:.0f} s long, {LONGEST:.0f} s at most: cut it"
-            )
-        channels, rate = soundfile.read(str(path), dtype="float32", always_2d=True)
-    except (RuntimeError, OSError) as error:  # soundfile's own error is a RuntimeError
-        raise CommandError(
-            f"{path.name} is no song that can be read; valid: WAV, FLAC, OGG, MP3 ({error})"
-        ) from error
-    if not np.isfinite(channels).all():
-        raise CommandError(f"{path.name} is no song: it has samples that are no numbers")
-    sound = channels.mean(axis=1)
-    return librosa.resample(sound, orig_sr=rate, target_sr=RATE) if rate != RATE else sound
 
 
 def _onsets(sound: Sound) -> Frames:

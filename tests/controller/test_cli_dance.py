@@ -12,6 +12,7 @@ import pytest
 from controller.cli.common import ExitCode
 from controller.cli.main import main
 from motions.music import Beats, click_track
+from motions.music.sound import RATE, read_sound
 from tests.viz.page_reader import read_data
 
 SECONDS, BPM = 7.0, 96.0
@@ -27,10 +28,9 @@ def song(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_dance_is_played_on_the_beats_and_measured(
-    song: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    song: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    page = tmp_path / "dance.html"
-    assert main(["dance", str(song), "--seed", "3", "--json", "--html", str(page)]) == ExitCode.OK
+    assert main(["dance", str(song), "--seed", "3", "--json"]) == ExitCode.OK
     told = json.loads(capsys.readouterr().out)
     assert told["ok"]
     assert told["tempo"] == BPM
@@ -38,8 +38,18 @@ def test_a_dance_is_played_on_the_beats_and_measured(
     assert len(told["accents"]) >= len(told["moves"])
     assert told["on_beat"] == 1.0
     assert max(abs(accent["late_ms"]) for accent in told["accents"]) < 40.0
-    header, _ = read_data(page.read_text(encoding="utf-8"))
-    assert header["title"] == "dance 3"
+
+
+def test_the_page_of_a_dance_has_its_beats_and_its_music(song: Path, tmp_path: Path) -> None:
+    pytest.importorskip("librosa", reason="needs the extra [music]")
+    page = tmp_path / "dance.html"
+    assert main(["dance", str(song), "--no-play", "--html", str(page)]) == ExitCode.OK
+    header, arrays = read_data(page.read_text(encoding="utf-8"))
+    assert header["title"] == "dance 0"
+    assert header["beats"] == pytest.approx(click_track(BPM, SECONDS).beats)
+    path = tmp_path / "again.mp3"
+    path.write_bytes(arrays["sound"].tobytes())
+    assert len(read_sound(path)) == pytest.approx(SECONDS * RATE, abs=1)
 
 
 def test_without_playing_the_moves_and_their_times_are_told(
