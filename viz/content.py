@@ -129,6 +129,7 @@ class ReplayContent:
         ghost: another movement, shown translucent; its clock starts with the first one's.
         beats: instants [s] that the motion counts in, drawn as a ruler.
         sliders: parameters that a live page lets one choose.
+        sound: an MP3 file that starts with the recording, played in step with it; empty for none.
     """
 
     recording: Recording
@@ -137,6 +138,7 @@ class ReplayContent:
     ghost: Recording | None = None
     beats: tuple[float, ...] = ()
     sliders: tuple[Slider, ...] = ()
+    sound: bytes = b""
 
 
 def checked_content(shown: Recording | ReplayContent) -> ReplayContent:

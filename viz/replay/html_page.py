@@ -27,6 +27,7 @@ _SCRIPTS = (
     "replay_flags.js",
     "replay_charts.js",
     "replay_verdict.js",
+    "replay_sound.js",
     "replay_app.js",
 )
 _LIVE_SCRIPT = "replay_live.js"

@@ -41,10 +41,13 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         "labels": [[s.start, s.end, s.label] for s in content.recording.spans()],
         "force_scale": max(highest, _LEAST_FORCE_SCALE),
         "beats": list(content.beats),
+        "has_sound": bool(content.sound),
         "sliders": [asdict(slider) for slider in content.sliders],
         "verdict": None,
         "ghost": None,
     }
+    if content.sound:
+        pack.add("sound", np.frombuffer(content.sound, np.uint8))
     if content.verdict is not None:
         header["verdict"] = _add_verdict(pack, content.verdict)
     if content.ghost is not None:

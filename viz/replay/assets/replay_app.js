@@ -12,6 +12,8 @@ class Player {
     this.behaviour = document.getElementById("behaviour");
     charts.forEach((chart) => chart.onScrub((t) => this.scrub(t)));
     this.verdict = new VerdictPanel(data, (t) => this.scrub(t));
+    this.sound = new Sound();
+    this.sound.use(data);
     this.describe();
     this.seek(0);
     this.last = performance.now();
@@ -24,6 +26,7 @@ class Player {
     this.scene.use(data);
     this.charts.forEach((chart) => chart.use(data));
     this.verdict.use(data);
+    this.sound.use(data);
     this.describe();
     this.seek(this.time);
   }
@@ -66,11 +69,11 @@ class Player {
 
   advance(passed) {
     if (this.time < this.data.duration) {
-      this.seek(this.time + passed * this.speed);
+      this.seek(this.sound.follow(this.time + passed * this.speed));
       return;
     }
     this.rest += passed;
-    if (this.rest > END_PAUSE) this.seek(0);
+    if (this.rest > END_PAUSE) this.play(true);
   }
 
   seek(t) {
@@ -105,11 +108,13 @@ class Player {
   play(isPlaying) {
     if (isPlaying && this.time >= this.data.duration) this.seek(0);
     this.isPlaying = isPlaying;
+    this.sound.play(isPlaying, this.time, this.speed);
     this.button.classList.toggle("playing", isPlaying);
   }
 
   setSpeed(speed) {
     this.speed = speed;
+    this.sound.play(this.isPlaying, this.time, speed);
     for (const button of document.querySelectorAll("[data-speed]")) {
       button.classList.toggle("on", Number(button.dataset.speed) === speed);
     }
@@ -202,7 +207,8 @@ async function start() {
   }
   const player = new Player(data, scene, makeCharts(data));
   bindControls(player);
-  player.play(!window.matchMedia("(prefers-reduced-motion: reduce)").matches);
+  const isStill = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+  player.play(!isStill && !data.sound);
   window.replay = player; // for scripts and tests
   if (typeof listen === "function") listen(player);
 }

@@ -1,0 +1,35 @@
+"use strict";
+// The music of a dance, in step with the player.
+
+const OUT_OF_STEP = 0.03; // s, from which on the picture follows the music
+
+class Sound {
+  constructor() {
+    this.audio = null;
+  }
+
+  use(data) {
+    this.play(false, 0, 1);
+    if (this.audio) URL.revokeObjectURL(this.audio.src);
+    const file = data.sound && new Blob([data.sound], { type: "audio/mpeg" });
+    this.audio = file && new Audio(URL.createObjectURL(file));
+  }
+
+  // A browser lets a page sound once it was clicked; before that the picture moves alone.
+  play(isPlaying, time, speed) {
+    const { audio } = this;
+    if (!audio) return;
+    audio.pause();
+    if (!isPlaying) return;
+    audio.currentTime = time;
+    audio.playbackRate = speed;
+    audio.play().catch(() => {});
+  }
+
+  // The player's next time: that of the music where it is heard and the picture is out of step.
+  follow(time) {
+    const { audio } = this;
+    if (!audio || audio.paused || audio.ended || audio.seeking) return time;
+    return Math.abs(audio.currentTime - time) > OUT_OF_STEP ? audio.currentTime : time;
+  }
+}
