@@ -29,6 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 
 class Go2WbcError(Exception):
@@ -150,5 +151,8 @@ class StanceMismatch(MotionError):
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
-    """Message for a name that does not exist, with the names that do."""
-    return f"unknown {kind} {name!r}; valid: {', '.join(sorted(valid))}"
+    """Message for a name that does not exist, with all that do, and the nearest."""
+    names = sorted(valid)
+    nearest = get_close_matches(name, names, 1)
+    hint = f"; did you mean {nearest[0]!r}?" if nearest else ""
+    return f"unknown {kind} {name!r}; valid: {', '.join(names)}{hint}"

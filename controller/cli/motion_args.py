@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from motions import CompiledPlan, FeasibilityReport, Motion, Timeline
-    from motions.authoring import Value
+    from motions.authoring import Parameter, Value
 
 SAVED_MOTION, SAVED_PLAN = ".json", ".plan"
 """Endings of the files that ``save_motion`` and ``save_plan`` write."""
@@ -99,6 +99,8 @@ class MotionSource:
     Attributes:
         path: the file.
         name: of the motion.
+        parameters: those that it had when it was made last, with what was chosen for each; a saved
+            motion has none.
     """
 
     def __init__(self, word: str, settings: list[str]) -> None:
@@ -111,18 +113,42 @@ class MotionSource:
             own = motion.source.rpartition(":")[0]
             word = f"{own}:{word}"
         self._word, self._settings, self.path = word, settings, Path(own)
+        self._is_saved, self._is_new_choice = is_saved, False
+        self._chosen: dict[str, Value] = {}
+        self.parameters: dict[Parameter, Value] = {}
         self._seen = self._last = self._signature()
         self.name = self.motion().name
 
     def motion(self) -> Timeline | CompiledPlan:
-        """The motion as its file says now; raises as ``the_motion``."""
-        return the_motion(self._word, self._settings)
+        """The motion as its file says now, with what was chosen; raises as ``the_motion``."""
+        from motions.authoring import parse_values
+
+        if self._is_saved:
+            return the_motion(self._word, self._settings)
+        found = motions_of(self._word)
+        if len(found) > 1:
+            names = ", ".join(motion.name for motion in found)
+            raise CommandError(f"{self._word} has several motions, choose FILE.py:NAME: {names}")
+        parameters = {parameter.name: parameter for parameter in found[0].parameters}
+        chosen = {name: value for name, value in self._chosen.items() if name in parameters}
+        values = {**parse_values(self._settings), **chosen}
+        self.parameters = {
+            item: values.get(name, item.default) for name, item in parameters.items()
+        }
+        return found[0](**values)
+
+    def choose(self, values: dict[str, Value]) -> None:
+        """Take other values for parameters; any thread may call."""
+        self._chosen, self._is_new_choice = values, True
 
     def has_changed(self) -> bool:
-        """Whether the file was saved, and has rested since the call before.
+        """Whether other values were chosen, or the file was saved and rested since the call before.
 
         A save takes a moment, in which the file may be empty, cut short or away.
         """
+        if self._is_new_choice:
+            self._is_new_choice = False
+            return True
         now = self._signature()
         has_rested, self._last = now == self._last, now
         if now is None or now == self._seen or not has_rested:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 EXAMPLES = """
 go2-wbc export wave --out wave.csv
 go2-wbc export wave --out wave.npz
-go2-wbc export wave --set times=5 --out wave5.json     then: go2-wbc run wave5.json
+go2-wbc export wave --set times=5 --out five.json  then: go2-wbc run five.json
 """
 COLUMNS = """
 columns, 100 rows a second, in the frame between the feet (x ahead, z up):

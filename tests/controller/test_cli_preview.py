@@ -112,8 +112,8 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(
 
 
 def test_unknown_motions_and_several_motions_are_refused(rise: Path, capsys: Output) -> None:
-    assert main(["preview", "moonwalk", "--no-open"]) == ExitCode.USAGE
-    assert "unknown motion 'moonwalk'; valid: bow" in capsys.readouterr().err
+    assert main(["preview", "levitate", "--no-open"]) == ExitCode.USAGE
+    assert "unknown motion 'levitate'; valid: beckon" in capsys.readouterr().err
     rise.write_text(GOOD + GOOD.replace("rise", "second"), encoding="utf-8")
     assert main(["preview", str(rise), "--no-open"]) == ExitCode.USAGE
     assert "choose FILE.py:NAME: rise, second" in capsys.readouterr().err
