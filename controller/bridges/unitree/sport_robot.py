@@ -20,6 +20,7 @@ from go2_wbc.errors import Go2WbcError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant.base import Plant
 from go2_wbc.reference import MotionPlan
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from motions import (
@@ -75,7 +76,7 @@ class SportRobot:
         """Take over a robot that lies on the ground."""
         self._config = config
         self._checker = FeasibilityChecker()  # with a model of its own: the loop is another thread
-        plans = self._plans()
+        plans = playable_plans(self._checker.model)
         walks = {api: name for api, name in WALKS.items() if name in GAITS}
         self.unsupported = (MOTIONS.keys() | WALKS.keys()) - plans.keys() - walks.keys()
         self._gait = "trot"
@@ -111,18 +112,6 @@ class SportRobot:
     def is_alive(self) -> bool:
         """Whether the control loop still runs."""
         return self._runner.is_alive
-
-    def _plans(self) -> Mapping[int, MotionPlan]:
-        """The motions that the library has, ready to be played."""
-        plans = {}
-        for api, name in MOTIONS.items():
-            if name not in motion_names():
-                continue
-            try:
-                plans[api] = compile_motion(name, self._checker.model)
-            except Go2WbcError as error:
-                _log.warning("%s will not be supported: %s", Api(api).name, error)
-        return plans
 
     def _walk(self, gait: str) -> object:
         """Enter walking mode; ``Move`` walks like this from now on."""
@@ -187,3 +176,16 @@ class SportRobot:
     def close(self) -> None:
         """Go limp and stop."""
         self._assembly.close()
+
+
+def playable_plans(model: RobotModel) -> Mapping[int, MotionPlan]:
+    """The plans of the calls for which the library has a motion that can be compiled here."""
+    plans = {}
+    for api, name in MOTIONS.items():
+        if name not in motion_names():
+            continue
+        try:
+            plans[api] = compile_motion(name, model)
+        except Go2WbcError as error:
+            _log.warning("%s will not be supported: %s", Api(api).name, error)
+    return plans

@@ -12,15 +12,19 @@ from unittest.mock import create_autospec
 import pytest
 
 from benchmarks.bridges.processes import wait_until
-from controller.bridges.unitree import sport_api, sport_service
+from controller.bridges.unitree import sport_api, sport_robot, sport_service
 from controller.bridges.unitree.codec import Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
-from controller.bridges.unitree.sport_robot import SportRobot
+from controller.bridges.unitree.sport_robot import MOTIONS, WALKS, SportRobot
 from controller.bridges.unitree.sport_service import WAITING, SportService
 from controller.modes import Mode
 from controller.navigation import APPROACH
 from controller.procedures import Aborted
-from go2_wbc.errors import ClosedError, CommandError, PlantError
+from go2_wbc.contacts import GAITS
+from go2_wbc.errors import ClosedError, CommandError, MissingDependency, PlantError
+from go2_wbc.reference import MotionPlan
+from go2_wbc.robot.model import RobotModel
+from motions import compile_timeline, load_motion, motion_names
 from tests.controller.plants import HANG_GUARD, lying_state
 
 LEAN = '{"x": 0.1, "y": 0.1, "z": 0.0}'
@@ -230,6 +234,32 @@ def test_what_the_library_has_no_motion_for_is_not_supported(stage: Stage) -> No
     assert stage.code(Api.FRONT_JUMP) == Code.NOT_SUPPORTED
     assert stage.code(Api.FRONT_POUNCE) == Code.OK
     assert [call.args for call in stage.robot.perform.call_args_list] == [(Api.FRONT_POUNCE,)]
+
+
+def test_at_least_twenty_four_calls_do_what_they_say() -> None:
+    there = motion_names()
+    calls = {api for api in Api if api >= Api.DAMP}
+    lacking = {api for api, name in MOTIONS.items() if name not in there}
+    lacking |= {api for api, gait in WALKS.items() if gait not in GAITS}
+    assert len(calls - lacking) >= 24
+
+
+def test_a_motion_that_cannot_be_compiled_here_is_not_supported(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    plan = compile_timeline(load_motion("bow"), RobotModel())
+
+    def compiled(name: str, _model: RobotModel) -> MotionPlan:
+        if name == "heart":
+            raise MissingDependency("install the extra")
+        return plan
+
+    monkeypatch.setattr(sport_robot, "compile_motion", compiled)
+    plans = sport_robot.playable_plans(RobotModel())
+    assert Api.HEART not in plans
+    assert Api.HELLO in plans
+    assert Api.FRONT_JUMP in plans or MOTIONS[Api.FRONT_JUMP] not in motion_names()
+    assert "HEART will not be supported: install the extra" in caplog.text
 
 
 def test_cross_step_is_switched_on_and_off(stage: Stage) -> None:
