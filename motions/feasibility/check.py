@@ -113,7 +113,8 @@ class FeasibilityChecker:
             *dynamic.contacts(path, forces, limits),
             *dynamic.torque(path, forces, model, limits),
         ]
-        report = FeasibilityReport.of(plan.name, plan.duration, in_order_of_causes)
+        end_pose = plan.end_pose if isinstance(plan, CompiledPlan) else None
+        report = FeasibilityReport.of(plan.name, plan.duration, in_order_of_causes, end_pose)
         return CheckedMotion(plan, report, path, forces)
 
 

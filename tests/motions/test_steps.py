@@ -221,6 +221,15 @@ def test_a_trot_whose_trunk_leaves_the_line_of_its_feet_is_refused() -> None:
     assert "support of ZMP" in failures(line)
 
 
+def test_the_report_says_where_a_motion_ends_if_it_goes_anywhere() -> None:
+    line = Timeline().walk(0.2, gait="trot")
+    report = CHECKER.check(line)
+    assert report.table().endswith("It ends at x 0.200 m, y 0.000 m, turned by 0.0 deg.")
+    assert report.as_dict()["end_pose"] == pytest.approx(line.end_pose, abs=EXACT)
+    stays = Timeline().body(z=-0.01, over=0.5).home(over=0.5)
+    assert "It ends" not in CHECKER.check(stays).table()
+
+
 def test_a_motion_ends_above_its_feet_or_is_refused() -> None:
     assert "entry and exit" in failures(Timeline().walk(0.1, gait="trot").body(x=0.05, over=0.5))
 
