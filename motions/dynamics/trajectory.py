@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from dataclasses import dataclass, fields
+from tokenize import TokenError
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -17,6 +19,10 @@ FORMAT = 1
 BALANCING_FEET = 2
 """On so many feet or fewer the plan's own gains are worth keeping: on more, the whole-body
 controller balances by itself."""
+UNREADABLE = (
+    OSError, ValueError, EOFError, SyntaxError, TokenError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What ``numpy.load`` raises for damaged files."""
 _ARRAYS = {
     "times": (None,),
     "q": (None, 19),
@@ -153,7 +159,7 @@ class DynamicTrajectory:
             misses = tuple(Miss(*row) for row in header["misses"])
             iterations = int(header["iterations"])
             cost, lag = float(header["cost"]), float(header["lag"])
-        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        except (*UNREADABLE, KeyError, TypeError) as error:
             raise MotionError(
                 f"this is no dynamic trajectory, or a damaged one: {error}"
             ) from error

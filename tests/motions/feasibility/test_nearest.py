@@ -41,7 +41,7 @@ def test_the_nearest_motion_is_feasible_and_says_how_far_off_it_is(
 ) -> None:
     plan = checker.plan(SWAY)
     assert isinstance(plan, CompiledPlan)
-    assert plan.is_dynamic
+    assert plan.has_dynamic_spans
     assert plan.duration == pytest.approx(SWAY.end)
     report = checker.check(plan)
     assert report.ok, report.table()
