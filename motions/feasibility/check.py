@@ -76,7 +76,7 @@ class FeasibilityChecker:
             unknown = _failed(Problem("numbers", "plan", 0.0, reason=str(error)))
             return FeasibilityReport.of(plan.name, plan.duration, [unknown])
 
-    def _compiled(self, motion: Playable) -> MotionPlan:
+    def _compiled(self, motion: object) -> MotionPlan:
         """The plan of ``motion``, the nearest feasible one where its timeline asks for that."""
         line = timeline_of(motion)
         if line is None or line.physics != NEAREST:

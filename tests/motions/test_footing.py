@@ -8,7 +8,8 @@ import pytest
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
-from motions import Timeline, compile_timeline, deg
+from motions import Timeline, deg
+from motions.compiler import compile_quasi_static
 from motions.footing import Footing, standing_feet
 
 MODEL = RobotModel()
@@ -46,7 +47,7 @@ def test_the_yaw_of_the_frame_goes_on_beyond_half_a_turn() -> None:
 
 def test_a_stretch_may_start_from_feet_anywhere() -> None:
     start = NOMINAL @ yaw_rotation(deg(40)).T + np.array([1.0, -0.5, 0.0])
-    plan = compile_timeline(Timeline().walk(0.1, gait="trot"), MODEL, start)
+    plan = compile_quasi_static(Timeline().walk(0.1, gait="trot"), MODEL, start)
     ahead = yaw_rotation(deg(40)) @ np.array([0.1, 0.0, 0.0])
     assert plan.at(0.0).p_world_feet == pytest.approx(start, abs=1e-6)
     assert plan.end_pose == pytest.approx((1.0 + ahead[0], -0.5 + ahead[1], deg(40)), abs=1e-6)
