@@ -34,8 +34,7 @@ STANDING = tuple(
     for name in motion_names()
     if not any(isinstance(key, StepKey | PhaseKey) for key in load_motion(name).keys)
 )
-"""Motions of the library that keep three feet on the ground and stay where they are: what the oracle
-knows the rules of."""
+"""Motions of the library that stay on three feet or four: what the oracle knows the rules of."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -87,7 +87,7 @@ def test_velocities_are_the_derivatives_of_positions(model: RobotModel, name: st
     plan = compile_timeline(load_motion(name), model)
     rng = np.random.default_rng(1)
     for t in rng.uniform(STEP, plan.duration - STEP, 40):
-        if within_dynamic(plan, t):  # where accelerations change at knots only
+        if plan.swings.any():  # steps and jumps change accelerations from knot to knot
             piece = int(np.searchsorted(plan.curves.x, t)) - 1
             t = plan.curves.x[piece : piece + 2].mean()
         before, now, after = (plan.at(float(t) + shift) for shift in (-STEP, 0.0, STEP))
@@ -96,7 +96,7 @@ def test_velocities_are_the_derivatives_of_positions(model: RobotModel, name: st
         assert now.body.v_world == pytest.approx(p_rate, abs=DIFFERENCE_TOLERANCE)
         assert now.v_joints == pytest.approx(q_rate, abs=DIFFERENCE_TOLERANCE)
         a_rate = (after.v_joints - before.v_joints) / (2 * STEP)
-        assert now.a_joints == pytest.approx(a_rate, rel=0.05, abs=10 * DIFFERENCE_TOLERANCE)
+        assert now.a_joints == pytest.approx(a_rate, abs=10 * DIFFERENCE_TOLERANCE)
         spin = after.body.R_world_base @ before.body.R_world_base.T
         w_rate = np.array([spin[2, 1], spin[0, 2], spin[1, 0]]) / (2 * STEP)
         assert now.body.w_world == pytest.approx(w_rate, abs=DIFFERENCE_TOLERANCE)
