@@ -211,6 +211,8 @@ def _replaced(
             continue
         length = item.move.pulses(pulse)
         others = [m for m in moves if m.pulses(pulse) == length and m is not item.move]
+        beside = [other.move for other in placed[max(number - 1, 0) : number + 2]]
+        others = [m for m in others if m not in beside] or others
         if others:
             placed[number] = PlacedMove(others[rng.integers(len(others))], item.pulse)
     return placed
