@@ -28,6 +28,8 @@ columns, 100 rows a second, in the frame between the feet (x ahead, z up):
   speeds [rad/s] of the 12 joints; com_x com_y com_z [m]; stance of each foot.
 npz: the same as arrays time, q (position, quaternion x y z w, joints), v, a (in
 the base frame), rpy, p_com, stance.
+json: the motion as it is written; plan: as it is played, by this robot only.
+  Every command takes these two in place of a name.
 """
 ARRAYS = ("q", "v", "a", "rpy", "p_com", "stance")
 """What an npz file holds beside the time."""

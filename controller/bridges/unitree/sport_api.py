@@ -1,8 +1,8 @@
 """Unitree's sport service in names and numbers (unitree_sdk2, ``go2/sport`` and ``rpc``).
 
-Unitree has renumbered its procedures more than once. These are those of unitree_sdk2_python,
-``unitree_sdk2py/go2/sport/sport_api.py`` (robots from V1.1.6 on), and, where a later SDK has taken
-a call out, of ``include/unitree/robot/go2/sport/sport_api.hpp`` in unitree_sdk2: 1018, 1026, 1033.
+Unitree has renumbered its procedures more than once. These are those of robots from V1.1.6 on, from
+``unitree_sdk2py/go2/sport/sport_api.py`` of unitree_sdk2_python, which keeps some of before beside
+them: 1018, 1026, 1033.
 """
 
 from __future__ import annotations

@@ -15,7 +15,6 @@ import pytest
 from controller.cli.common import ExitCode
 from controller.cli.main import main
 from go2_wbc.errors import ConfigError, MotionFileError
-from go2_wbc.robot.fingerprint import fingerprint
 from go2_wbc.robot.model import RobotModel
 from motions import (
     CompiledPlan,
@@ -82,17 +81,6 @@ def test_what_could_not_be_done_as_written_is_still_known(tmp_path: Path) -> Non
 def test_a_saved_plan_is_checked_and_played_by_the_name_of_its_file(file: Path) -> None:
     assert check(file).margins == check(LEAN).margins
     assert check(str(file)).motion == "lean"
-
-
-def test_the_fingerprint_is_that_of_the_robots_numbers() -> None:
-    assert fingerprint(RobotModel()) == fingerprint(MODEL)
-    others = [
-        RobotModel(armature=np.full(12, 0.01)),
-        RobotModel(foot_radius=0.023),
-    ]
-    heavy = RobotModel()
-    heavy.pin_model.inertias[1].mass += 1e-3
-    assert len({fingerprint(model) for model in (MODEL, heavy, *others)}) == 4
 
 
 def test_a_plan_for_another_robot_is_refused(file: Path) -> None:
