@@ -188,8 +188,9 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "dynamics",
-        "Solve jumps, hops, rears and lifts from cold, and the nearest to motions that the\n"
-        "check refuses: processor time, deviation, torque. Needs go2-wbc[dynamics].",
+        "Solve jumps, hops, rears and lifts from cold, and the nearest to motions that\n"
+        "the check refuses: processor time, deviation, torque. Needs\n"
+        "go2-wbc[dynamics].",
         examples=EXAMPLES,
     )
     names = ", ".join(scenario.name for scenario in SCENARIOS)

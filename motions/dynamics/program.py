@@ -36,6 +36,7 @@ class Program:
 
     Attributes:
         problem: crocoddyl's.
+        motor: what the motors give, at the share that plans may use.
         tau_hold: (12,) torques [N m] that hold the robot standing: first controls everywhere.
     """
 
@@ -44,6 +45,7 @@ class Program:
     ) -> None:
         """Build every knot's dynamics and costs."""
         self._knots, self._model, self._limits, self._weights = knots, model, limits, weights
+        self.motor = model.motor.scaled(limits.torque_share)
         self._state = crocoddyl.StateMultibody(model.pin_model)
         self._actuation = crocoddyl.ActuationModelFloatingBase(self._state)
         self._feet = [model.pin_model.getFrameId(name) for name in FOOT_NAMES]
@@ -55,16 +57,17 @@ class Program:
         terminal = self._terminal(goals[len(steps)])
         x0 = np.concatenate([knots.initial.q, knots.initial.v])
         self.problem = crocoddyl.ShootingProblem(x0, self._models, terminal)
-        self.bound(np.zeros((len(steps), 12)))
+        still = np.zeros((len(steps), 12))
+        self.bound(still, still)
 
     def bound(
-        self, v_joints: Float[np.ndarray, "n 12"]
+        self, slowest: Float[np.ndarray, "n 12"], fastest: Float[np.ndarray, "n 12"]
     ) -> tuple[Float[np.ndarray, "n 12"], Float[np.ndarray, "n 12"]]:
-        """Bound the torques by what the motors give at speeds ``v_joints`` [rad/s] of each knot.
+        """Bound the torques by what the motors give at joint speeds between two [rad/s], by knots.
 
         Returns them: lower and upper.
         """
-        lower, upper = self._model.motor.scaled(self._limits.torque_share).limits(v_joints)
+        lower, upper = self.motor.limits(slowest)[0], self.motor.limits(fastest)[1]
         for row, model in enumerate(self._models):
             model.u_lb, model.u_ub = lower[row], upper[row]
         return lower, upper

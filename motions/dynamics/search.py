@@ -22,8 +22,9 @@ SOFT_STOP, STOP = 1e-2, 1e-3
 """Expected improvement of the cost below which a softened and a full program are done."""
 LINE_ROUNDS = 4
 """Rounds in which torque bounds and speeds are made to agree."""
-AGREED = 0.5
-"""Torque [N m] over the bounds of its own speed that counts as none."""
+AGREED = 1.1
+"""Torque over what the plan may use at the speed of its knot with which it is done: 0.94 of what
+the motors give with ``PlanLimits.torque_share`` at 0.85. Exact agreement takes many rounds."""
 _JOINT_RATES = slice(19 + 6, None)
 
 Progress = Callable[[int, float], None]
@@ -118,13 +119,16 @@ class Search:
         )
 
     def _agree(self) -> None:
-        """Bound the torques by the speeds of the solution until both agree."""
+        """Bound the torques by the greatest speeds of the solutions until they agree."""
+        program = self._full
+        slowest = fastest = np.zeros((len(self._knots.stance), 12))
         for _ in range(LINE_ROUNDS):
             x, us = np.array(self._solver.xs), np.array(self._solver.us)
-            lower, upper = self._full.bound(x[:-1, _JOINT_RATES])
-            if max(np.max(lower - us), np.max(us - upper)) < AGREED:
+            v = x[:-1, _JOINT_RATES]
+            if program.motor.share(us, v).max() <= AGREED:
                 return
-            us = np.clip(us, lower, upper)
+            slowest, fastest = np.minimum(slowest, v), np.maximum(fastest, v)
+            us = np.clip(us, *program.bound(slowest, fastest))
             self._solve(self._solver, list(x), list(us), REGULARISATIONS[0], STOP)
 
     def _solve(
