@@ -12,6 +12,7 @@ from contextlib import closing
 import numpy as np
 
 from benchmarks.scenario import Direction, Measurement, Metric
+from benchmarks.speed_bare import BareWork, timed
 from benchmarks.speed_solves import recorded_ticks, slowness
 from benchmarks.trials import Trial, TrialFailed
 from controller.go2_controller import GO2Controller
@@ -55,6 +56,7 @@ COMMAND_METRICS = (
     Metric("commands.median", _COMMANDS, "tick, median", "us", None),
     Metric("commands.p99", _COMMANDS, "99 of 100, by median", "", None),
     Metric("commands.worst", _COMMANDS, "worst by median", "", 5.0),
+    Metric("commands.bare", _COMMANDS, "of a bare loop beside it", "", None),
     Metric("commands.collections", _COMMANDS, "garbage collections", "", None),
     Metric("commands.peak", _COMMANDS, "allocated in a tick", "kB", None),
     Metric("commands.kept", _COMMANDS, "blocks kept of a tick", "", None),
@@ -122,7 +124,7 @@ def measure_commands(trial: Trial) -> Measurement:
     ):
         go2.walk()
         gc.callbacks.append(note)
-        spent = _walk(go2, random, ends)
+        spent, bare = _walk(go2, random, ends)
         gc.callbacks.remove(note)
         median = float(np.median(spent))
         peak, kept = _memory(plant, go2, ends)
@@ -131,6 +133,7 @@ def measure_commands(trial: Trial) -> Measurement:
             "commands.median": median,
             "commands.p99": float(np.quantile(spent, 0.99)) / median,
             "commands.worst": float(spent.max()) / median,
+            "commands.bare": float(bare.max()) / float(np.median(bare)),
             "commands.collections": float(len(passes)),
             "commands.peak": peak / 1e3,
             "commands.kept": kept,
@@ -138,9 +141,14 @@ def measure_commands(trial: Trial) -> Measurement:
     )
 
 
-def _walk(go2: GO2Controller, random: np.random.Generator, ends: list[int]) -> np.ndarray:
-    """Time [us] of each tick; what happens between two commands belongs to none."""
-    spent = []
+def _walk(
+    go2: GO2Controller, random: np.random.Generator, ends: list[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Time [us] of each tick, and of as many pieces of bare work, second by second in turn.
+
+    What happens between two commands belongs to no tick.
+    """
+    spent, bare = [], []
     for _ in range(round(COMMAND_TIME)):
         ahead, aside, turn = random.uniform(-1.0, 1.0, 3) * FASTEST
         go2.move(float(ahead), float(turn), linear_y=float(aside))
@@ -149,7 +157,9 @@ def _walk(go2: GO2Controller, random: np.random.Generator, ends: list[int]) -> n
         if not go2.last_outcome.ok:
             raise TrialFailed(go2.last_outcome.reason)
         spent.append(np.diff(ends) / 1e3)
-    return np.concatenate(spent)
+        work = BareWork(float(np.median(spent[-1])))
+        bare.append(timed(work, len(spent[-1])))
+    return np.concatenate(spent), np.concatenate(bare)
 
 
 def _memory(plant: MujocoPlant, go2: GO2Controller, ends: list[int]) -> tuple[float, float]:

@@ -6,13 +6,23 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from go2_wbc.errors import CommandError
 from go2_wbc.geometry import moving_support_margins
+from go2_wbc.kernels.layout import Layout
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
+
+BLOCK = 4096
+"""Ticks whose memory is asked for at once, 2.4 MB: numpy wants huge pages for 4 MB and more, and
+the first touch of one of these cost 5.6 ms of a tick (seen on a virtual machine)."""
+_TICK = Layout(time=(), q=(19,), v=(18,), tau=(12,), forces=(4,), stance=(4,), com=(3,), feet=(12,))
+_TIME = _TICK.start["time"]
+_Q, _V, _TAU, _FORCES, _STANCE, _COM, _FEET = (
+    _TICK.slice(name) for name in ("q", "v", "tau", "forces", "stance", "com", "feet")
+)
 
 
 class Telemetry:
@@ -29,11 +39,7 @@ class Telemetry:
         """Args: capacity: number of ticks that the ring holds."""
         self._model = model
         self._capacity = capacity
-        self._time = np.empty(capacity)
-        self._q, self._v = np.empty((capacity, 19)), np.empty((capacity, 18))
-        self._tau, self._forces = np.empty((capacity, 12)), np.empty((capacity, 4))
-        self._stance = np.empty((capacity, 4), dtype=bool)
-        self._com, self._feet = np.empty((capacity, 3)), np.empty((capacity, 4, 3))
+        self._blocks: list[Float[np.ndarray, "k size"]] = []
         self._labels = np.empty(capacity, dtype=object)
         self._count = 0
         self._peak_torque, self._peak_speed = np.zeros(12), np.zeros(12)
@@ -41,12 +47,15 @@ class Telemetry:
 
     def record(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"], label: str) -> None:
         """Add one tick."""
-        i = self._count % self._capacity
-        state = snapshot.state
-        self._time[i], self._q[i], self._v[i] = state.time, state.q, state.v
-        self._tau[i], self._forces[i] = state.tau, state.foot_forces
-        self._stance[i], self._labels[i] = stance, label
-        self._com[i], self._feet[i] = snapshot.p_world_com, snapshot.p_world_feet
+        i, state = self._count % self._capacity, snapshot.state
+        block, place = divmod(i, BLOCK)
+        if block == len(self._blocks):
+            self._blocks.append(np.empty((min(BLOCK, self._capacity - i), _TICK.size)))
+        row = self._blocks[block][place]
+        row[_TIME], row[_Q], row[_V], row[_TAU] = state.time, state.q, state.v, state.tau
+        row[_FORCES], row[_STANCE] = state.foot_forces, stance
+        row[_COM], row[_FEET] = snapshot.p_world_com, snapshot.p_world_feet.ravel()
+        self._labels[i] = label
         self._count += 1
         np.maximum(self._peak_torque, np.abs(state.tau), out=self._peak_torque)
         np.maximum(self._peak_speed, np.abs(state.v[6:]), out=self._peak_speed)
@@ -71,23 +80,34 @@ class Telemetry:
             raise CommandError(f"rate must be positive, got {rate}")
         order = np.arange(max(0, self._count - self._capacity), self._count)
         rows = order % self._capacity
-        rows = rows[np.searchsorted(self._time[rows], since) :]
+        times = self._taken(rows, slice(0, 1))[:, 0]
+        first = np.searchsorted(times, since)
+        rows, times = rows[first:], times[first:]
         if len(rows) > 1:
-            span = float(self._time[rows[-1]] - self._time[rows[0]])
+            span = float(times[-1] - times[0])
             rows = rows[:: max(1, round((len(rows) - 1) / max(rate * span, 1.0)))]
         labels = tuple(str(label) for label in self._labels[rows])
+        taken = self._taken(rows, slice(None))
         recording = Recording(
-            time=self._time[rows].copy(),
-            q=self._q[rows],
-            v=self._v[rows],
-            tau=self._tau[rows],
-            foot_forces=self._forces[rows],
-            stance=self._stance[rows],
-            p_world_com=self._com[rows],
+            time=taken[:, _TIME],
+            q=taken[:, _Q],
+            v=taken[:, _V],
+            tau=taken[:, _TAU],
+            foot_forces=taken[:, _FORCES],
+            stance=taken[:, _STANCE] > 0.0,
+            p_world_com=taken[:, _COM],
             support_margin=np.full(len(rows), np.nan),
             labels=labels,
         )
-        return Samples(recording, self._feet[rows])
+        return Samples(recording, taken[:, _FEET].reshape(-1, 4, 3))
+
+    def _taken(self, rows: Int[np.ndarray, " n"], columns: slice) -> Float[np.ndarray, "n k"]:
+        """A copy of some columns of these rows."""
+        blocks, places = np.divmod(rows, BLOCK)
+        taken = np.empty((len(rows), _TICK.size))[:, columns]
+        for block in np.unique(blocks):
+            taken[blocks == block] = self._blocks[block][places[blocks == block], columns]
+        return taken
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from motions.assembly import compile_timeline
     from motions.authoring import Choice, Motion, Range, motion
     from motions.compiled_plan import CompiledPlan
+    from motions.dynamics.phases import Tolerance
     from motions.feasibility import (
         CheckedMotion,
         FeasibilityChecker,
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
         compile_motion,
     )
     from motions.registry import find_motion, load_file, load_motion, motion_names
+    from motions.saved.motion_file import save_motion
+    from motions.saved.plan_file import load_plan, save_plan
     from motions.timeline import Timeline, deg
 
 __all__ = [
@@ -33,6 +36,7 @@ __all__ = [
     "Playable",
     "Range",
     "Timeline",
+    "Tolerance",
     "check",
     "compile_motion",
     "compile_timeline",
@@ -40,8 +44,11 @@ __all__ = [
     "find_motion",
     "load_file",
     "load_motion",
+    "load_plan",
     "motion",
     "motion_names",
+    "save_motion",
+    "save_plan",
 ]
 
 __getattr__ = lazy_exports(
@@ -50,6 +57,7 @@ __getattr__ = lazy_exports(
         "assembly": ("compile_timeline",),
         "authoring": ("Choice", "Motion", "Range", "motion"),
         "compiled_plan": ("CompiledPlan",),
+        "dynamics.phases": ("Tolerance",),
         "feasibility": (
             "CheckedMotion",
             "FeasibilityChecker",
@@ -60,6 +68,8 @@ __getattr__ = lazy_exports(
             "compile_motion",
         ),
         "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
+        "saved.motion_file": ("save_motion",),
+        "saved.plan_file": ("load_plan", "save_plan"),
         "timeline": ("Timeline", "deg"),
     },
 )

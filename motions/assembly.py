@@ -6,7 +6,7 @@ follows a jump counts from where it lands. All of them rest standing where they 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,12 +22,14 @@ from go2_wbc.robot.rotations import yaw_rotation
 from motions.compiled_plan import CompiledPlan
 from motions.compiler import UNLOAD_TIME, compile_quasi_static
 from motions.dynamic_span import DynamicSpan, attitude_angles, curves_of, placed
+from motions.dynamics.cache import solve_cached
+from motions.dynamics.nearest import Written
 from motions.dynamics.phases import PhaseProblem
-from motions.dynamics.solver import solve
 from motions.dynamics.standing import standing, standing_feet
+from motions.dynamics.trajectory import DynamicTrajectory
 from motions.keys import BodyKey, Key, Mark
+from motions.language.clock import SAME
 from motions.language.flight import away_from_home
-from motions.language.written import SAME
 from motions.phase_key import PhaseKey
 from motions.problem import Problem
 from motions.timeline import Timeline
@@ -39,13 +41,28 @@ SAME_PLACE = 1e-3
 _RESTING = BodyKey(0.0, 0.0, Ease.LINEAR, "z", 0.0)
 
 
-def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
+Mend = Callable[[CompiledPlan], tuple[Written, DynamicTrajectory] | None]
+"""What the robot cannot do as it is written, and the nearest that it can; nothing if it can."""
+Progress = Callable[[int, float], None]
+
+
+def compile_timeline(
+    timeline: Timeline,
+    model: RobotModel,
+    *,
+    mend: Mend | None = None,
+    progress: Progress | None = None,
+) -> CompiledPlan:
     """The plan of ``timeline``, in the frame of the motion.
 
     Args:
         timeline: what to compile.
         model: of the robot; compiling uses its data, so it must not be that of a control loop that
             runs in another thread.
+        mend: finds the nearest feasible motion of a stretch between dynamic blocks; without it all
+            is compiled as it is written. ``FeasibilityChecker.plan`` gives it where the timeline
+            asks for it.
+        progress: called while something is solved, with the number of iterations and the cost.
 
     Raises:
         TimelineError: if it is empty, a dynamic block does not start standing at home, something
@@ -53,11 +70,11 @@ def compile_timeline(timeline: Timeline, model: RobotModel) -> CompiledPlan:
         MissingDependency: if a block must be solved and the solver is not installed.
     """
     blocks = timeline.in_order(PhaseKey)
-    if not blocks:
+    if not blocks and mend is None:
         return compile_quasi_static(timeline, model)
     for block in blocks:
         _require_alone(timeline, block)
-    maker = _Maker(timeline, model)
+    maker = _Maker(timeline, model, mend, progress)
     for block in blocks:
         maker.add_stretch(block.start, Posture.STAND)
         maker.add_block(block)
@@ -98,8 +115,11 @@ class _Maker:
     Between them the robot stands at rest over ``feet``, which are in the frame of the next part.
     """
 
-    def __init__(self, timeline: Timeline, model: RobotModel) -> None:
+    def __init__(
+        self, timeline: Timeline, model: RobotModel, mend: Mend | None, progress: Progress | None
+    ) -> None:
         self._timeline, self._model = timeline, model
+        self._mend, self._progress = mend, progress
         self._time, self._frame = 0.0, Anchor(np.zeros(3), 0.0)
         self._home = standing_feet(model)
         self._feet = self._home
@@ -121,13 +141,33 @@ class _Maker:
         entry = line.entry if start == 0.0 else Posture.STAND
         stretch = replace(line, cursor=end - start, entry=entry, exit=exit)
         plan = self._compiled(stretch, keys or [replace(_RESTING, end=end - start)])
-        curves = _moved(plan.curves, self._frame)
-        times, modes = np.array(plan.contacts.times), plan.contacts.modes
-        self._parts.append(_Part(start, curves, times, modes, plan.swings))
-        self._problems += [replace(one, time=one.time + start) for one in plan.problems]
-        self._ramps.append(plan.ramp)
+        if not (keys and self._is_mended(plan)):
+            curves = _moved(plan.curves, self._frame)
+            times, modes = np.array(plan.contacts.times), plan.contacts.modes
+            self._parts.append(_Part(start, curves, times, modes, plan.swings))
+            self._problems += [replace(one, time=one.time + start) for one in plan.problems]
+            self._ramps.append(plan.ramp)
         last = plan.curves(plan.duration)
         self._move_on(end, last[18:].reshape(4, 3), last[5])
+
+    def _is_mended(self, plan: CompiledPlan) -> bool:
+        """Whether what is wrong with ``plan`` has been put right, as a dynamic part."""
+        try:
+            mended = None if self._mend is None else self._mend(plan)
+        except PlanNotFound as error:
+            self._fail("nearest motion", error)
+            return False
+        if mended is None:
+            return False
+        written, found = mended
+        self._solved(
+            found, written, _moved(plan.curves, self._frame)(plan.duration), self._time, self._frame
+        )
+        return True
+
+    def _fail(self, check: str, error: PlanNotFound) -> None:
+        reason = "; ".join([str(error).split("\n")[0], *error.reasons])
+        self._problems.append(Problem(check, "trunk", self._time, reason=reason))
 
     def add_block(self, block: PhaseKey) -> None:
         """A dynamic block, solved; one that cannot be is rest and a problem."""
@@ -135,22 +175,32 @@ class _Maker:
         initial = None if is_home else standing(self._model, self._feet)
         problem = PhaseProblem(block.phases, initial, tolerance=self._timeline.tolerance)
         try:
-            found = solve(problem, self._model)
+            found = solve_cached(problem, self._model, progress=self._progress)
         except PlanNotFound as error:
-            reason = "; ".join(error.reasons) or str(error)
-            self._problems.append(Problem("dynamic plan", "trunk", block.start, reason=reason))
+            self._fail("dynamic plan", error)
             self.add_stretch(block.end, Posture.STAND)
             return
-        start, stance = self._time, found.stance
-        span = DynamicSpan(start, self._frame, problem, placed(found, self._frame))
-        changes = np.flatnonzero(np.any(stance[1:] != stance[:-1], axis=1)) + 1
-        rows = np.concatenate([[0], changes])
-        asked = self._feet + problem.shift
+        start, frame = self._time, self._frame
         yaw = float(attitude_angles(found.q)[-1, 2])
+        asked = self._feet + problem.shift
         self._move_on(start + found.duration, asked, yaw, landed=found.p_feet[-1])
         rest = replace(self._timeline, entry=Posture.STAND, exit=Posture.STAND, cursor=1.0)
         home = self._compiled(rest, [replace(_RESTING, end=1.0)]).curves
-        curves = curves_of(span.trajectory, self._model, _moved(home, self._frame).c[3, 0])
+        self._solved(found, problem, _moved(home, self._frame)(0.0), start, frame)
+
+    def _solved(
+        self,
+        found: DynamicTrajectory,
+        asked: PhaseProblem | Written,
+        end: Float[np.ndarray, "30"],
+        start: float,
+        frame: Anchor,
+    ) -> None:
+        """A part that ends at rest at ``end`` (see ``CompiledPlan.curves``)."""
+        span = DynamicSpan(start, frame, asked, placed(found, frame), self._timeline.tolerance)
+        curves, stance = curves_of(span.trajectory, self._model, end), found.stance
+        changes = np.flatnonzero(np.any(stance[1:] != stance[:-1], axis=1)) + 1
+        rows = np.concatenate([[0], changes])
         times = found.times[rows]
         self._parts.append(_Part(start, curves, times, stance[rows], ~stance[rows]))
         self._spans.append(span)

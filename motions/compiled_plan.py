@@ -12,6 +12,7 @@ from scipy.interpolate import PPoly
 
 from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
 from go2_wbc.curves import CurvePoint
+from go2_wbc.errors import MotionError
 from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.reference import (
     Anchor,
@@ -31,6 +32,8 @@ from motions.samples import PlanSamples
 LANDING_RAMP = 0.01
 """Time [s] over which a foot takes up its load after a flight: own choice, a few ticks. Landing
 takes 0.1 s, and the forces that it needs are planned."""
+LEAST_FEET = 3
+"""Standing feet that span an area, so that a robot that stops there can keep standing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,16 +66,21 @@ class CompiledPlan(MotionPlan):
     _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Bind what the kernel reads."""
+        """Bind what the kernel reads; raise MotionError for tables of different lengths."""
         contacts, curves = self.contacts, self.curves
+        if self.swings.shape != contacts.modes.shape:
+            raise MotionError(
+                f"plan {self.name!r}: swings must have a row for each of {len(contacts.times)} "
+                f"contact events, got {list(self.swings.shape)}"
+            )
         tasks, events = _tasks(contacts.modes, self.swings), np.array(contacts.times)
         since, until = self._gradual(contacts.since, -np.inf), self._gradual(contacts.until, np.inf)
         tables = (curves.x, curves.c, events, tasks, since, until)
         object.__setattr__(self, "_tables", tables)
 
     @property
-    def is_dynamic(self) -> bool:
-        """Whether some of it is flight or balance on few feet."""
+    def has_dynamic_spans(self) -> bool:
+        """Whether some of it is solved; see ``MotionPlan.has_dynamic_spans``."""
         return bool(self.dynamic)
 
     @property
@@ -85,7 +93,7 @@ class CompiledPlan(MotionPlan):
         """How its feet step, if any does; see ``MotionPlan.footsteps``."""
         if not self.swings.any():
             return None
-        ramp = min(self.ramp, LANDING_RAMP) if self.is_dynamic else self.ramp
+        ramp = min(self.ramp, LANDING_RAMP) if self.dynamic else self.ramp
         return Footsteps(
             contacts=self.contacts,
             swings=self.swings,
@@ -103,6 +111,11 @@ class CompiledPlan(MotionPlan):
         anchor = Anchor.of_feet(self.curves(self.duration)[18:].reshape(4, 3), 0.0)
         x, y, _ = anchor.p_world.tolist()
         return x, y, anchor.yaw
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether fewer than three feet stand at any time; see ``MotionPlan.is_dynamic``."""
+        return bool((self.contacts.modes.sum(axis=1) < LEAST_FEET).any())
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""

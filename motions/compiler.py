@@ -23,7 +23,7 @@ from go2_wbc.robot.leg_kinematics import LegAngles
 from go2_wbc.robot.model import RobotModel
 from motions.balance import Balancer
 from motions.compiled_plan import CompiledPlan, event_at
-from motions.footing import Footing
+from motions.footing import Footing, standing_feet
 from motions.keys import BalanceShift, Mark
 from motions.language.written import SAME
 from motions.placement import centres_of_mass
@@ -37,7 +37,6 @@ from motions.tracks import (
     flights,
     home_poses,
     sample_times,
-    standing_feet,
     swings,
 )
 

@@ -13,8 +13,9 @@ from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
-from motions.dynamics.phases import PhaseProblem
-from motions.dynamics.pieces import ATTITUDE, sampled
+from motions.dynamics.curves import ATTITUDE, sampled
+from motions.dynamics.nearest import Written
+from motions.dynamics.phases import PhaseProblem, Tolerance
 from motions.dynamics.trajectory import DynamicTrajectory
 
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -27,14 +28,16 @@ class DynamicSpan:
     Attributes:
         start: when [s] it starts in the plan.
         frame: where: the frame of its problem in that of the plan.
-        problem: what was asked.
+        asked: phases, or a motion that physics does not allow as it was written, in ``frame``.
         trajectory: states, torques, forces, gains and deviation; in the plan's frame.
+        tolerance: how far it may be from what was asked.
     """
 
     start: float
     frame: Anchor
-    problem: PhaseProblem
+    asked: PhaseProblem | Written
     trajectory: DynamicTrajectory
+    tolerance: Tolerance = Tolerance()
 
     @property
     def end(self) -> float:

@@ -8,10 +8,10 @@ from jaxtyping import Float
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Anchor
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.keys import Key, LegKey, StepKey
-from motions.language.written import SAME
-from motions.timeline import Timeline
+from motions.language.written import SAME, Written
 
 Times = Float[np.ndarray, " n"]
 
@@ -32,7 +32,7 @@ class Footing:
 
     def __init__(
         self,
-        timeline: Timeline,
+        timeline: Written,
         nominal: Float[np.ndarray, "4 3"],
         start: Float[np.ndarray, "4 3"] | None = None,
     ) -> None:
@@ -94,12 +94,21 @@ class Footing:
         yaw = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
         return np.column_stack([p_feet.mean(axis=1), yaw])
 
+    @property
+    def end(self) -> Float[np.ndarray, "4 3"]:
+        """Where the feet's centres are when all steps are done [m]."""
+        return self._feet_at(np.inf)
+
+    @property
+    def end_pose(self) -> tuple[float, float, float]:
+        """x, y [m] and yaw [rad] of the frame of the feet when all steps are done."""
+        p_feet = self._feet_at(np.inf)
+        frame = Anchor.of_feet(p_feet, 0.0)
+        x, y, _ = frame.p_world.tolist()
+        return x, y, frame.yaw
+
     def _goal(self, key: StepKey) -> Float[np.ndarray, "3"]:
-        p_feet = self.start.copy()
-        for leg, steps in self._steps.items():
-            for earlier, goal in steps:
-                if earlier.start < key.since - SAME:
-                    p_feet[leg] = goal
+        p_feet = self._feet_at(key.since)
         frame = Anchor.of_feet(p_feet, 0.0)
         x, y, yaw = key.place
         way, R = np.array([x, y, 0.0]), yaw_rotation(frame.yaw)
@@ -111,8 +120,24 @@ class Footing:
             place = frame.p_world + turned @ R.T @ (p_feet[key.leg] - frame.p_world) + R @ way
         return np.array([*place[:2], p_feet[key.leg, 2]])
 
+    def _feet_at(self, t: float) -> Float[np.ndarray, "4 3"]:
+        """Where the feet stand [m], or will land, of those steps that have begun before ``t``."""
+        p_feet = self.start.copy()
+        for leg, steps in self._steps.items():
+            for key, goal in steps:
+                if key.start < t - SAME:
+                    p_feet[leg] = goal
+        return p_feet
 
-def _require_on_ground(timeline: Timeline, leg: Leg) -> None:
+
+def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
+    """Where the feet's centres stand [m]: below the hips, a foot's radius above the ground."""
+    p_feet = model.p_base_feet_nominal.copy()
+    p_feet[:, 2] = model.foot_radius
+    return p_feet
+
+
+def _require_on_ground(timeline: Written, leg: Leg) -> None:
     is_raised = False
     keys: list[Key] = [*timeline.in_order(LegKey), *timeline.in_order(StepKey)]
     for key in sorted(keys, key=lambda key: key.start):

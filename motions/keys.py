@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TypeVar
 
-from go2_wbc.curves import Ease
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Posture
+from motions.easing import Easing
 
 BODY_CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw")
 """What of the trunk can move: places [m] and angles [rad], as offsets from the posture."""
@@ -57,6 +57,13 @@ class LegTarget:
         values = (-first, second, third) if is_angle else (first, -second, third)
         return replace(self, values=values)
 
+    def scaled(self, amplitude: float) -> LegTarget:
+        """Its offset multiplied; angles stay."""
+        if self.frame is Frame.JOINTS:
+            return self
+        x, y, z = self.values
+        return replace(self, values=(amplitude * x, amplitude * y, amplitude * z))
+
 
 @dataclass(frozen=True, slots=True)
 class Key(ABC):
@@ -69,11 +76,15 @@ class Key(ABC):
 
     start: float
     end: float
-    ease: Ease
+    ease: Easing
 
     def later(self: _KeyType, seconds: float) -> _KeyType:
         """The same key, moved in time."""
         return replace(self, start=self.start + seconds, end=self.end + seconds)
+
+    def slower(self: _KeyType, factor: float) -> _KeyType:
+        """The same key, all times multiplied."""
+        return replace(self, start=factor * self.start, end=factor * self.end)
 
     @property
     @abstractmethod
@@ -83,6 +94,11 @@ class Key(ABC):
     @property
     def mirrored(self) -> Key:
         """Left and right exchanged."""
+        return self
+
+    def scaled(self, amplitude: float) -> Key:
+        """Its offsets multiplied; what is no offset stays."""
+        del amplitude
         return self
 
 
@@ -101,7 +117,29 @@ class BodyKey(Key):
     @property
     def mirrored(self) -> BodyKey:
         """Left and right exchanged."""
-        return replace(self, value=-self.value) if self.channel in _FLIPPED else self
+        return self.scaled(-1.0) if self.channel in _FLIPPED else self
+
+    def scaled(self, amplitude: float) -> BodyKey:
+        """Its offset multiplied."""
+        return replace(self, value=amplitude * self.value)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyPathKey(BodyKey):
+    """The trunk moves along one channel through several offsets [m or rad], without a stop.
+
+    Attributes:
+        through: offsets on the way to ``value``.
+        shares: shares of the time, between 0 and 1, at which they are passed.
+    """
+
+    through: tuple[float, ...]
+    shares: tuple[float, ...]
+
+    def scaled(self, amplitude: float) -> BodyPathKey:
+        """Its offsets multiplied."""
+        through = tuple(amplitude * value for value in self.through)
+        return replace(self, value=amplitude * self.value, through=through)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +171,21 @@ class LegKey(Key):
         """Left and right exchanged."""
         return replace(self, leg=self.leg.mirror, target=self.target.mirrored)
 
+    def scaled(self, amplitude: float) -> LegKey:
+        """Its offset multiplied; angles stay."""
+        return replace(self, target=self.target.scaled(amplitude))
+
+
+@dataclass(frozen=True, slots=True)
+class JointKey(LegKey):
+    """One joint of a leg moves to its angle in ``target``; the others stay as they are.
+
+    Attributes:
+        joint: which of the three.
+    """
+
+    joint: int
+
 
 @dataclass(frozen=True, slots=True)
 class StepKey(Key):
@@ -161,6 +214,16 @@ class StepKey(Key):
         """The same key, moved in time."""
         start, end, since = (t + seconds for t in (self.start, self.end, self.since))
         return replace(self, start=start, end=end, since=since)
+
+    def slower(self, factor: float) -> StepKey:
+        """The same key, all times multiplied."""
+        start, end, since = (factor * t for t in (self.start, self.end, self.since))
+        return replace(self, start=start, end=end, since=since, lead=factor * self.lead)
+
+    def scaled(self, amplitude: float) -> StepKey:
+        """Its way multiplied."""
+        x, y, yaw = self.place
+        return replace(self, place=(amplitude * x, amplitude * y, amplitude * yaw))
 
     @property
     def track(self) -> str:

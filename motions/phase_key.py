@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from motions.dynamics.phases import Phase
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.errors import TimelineError
+from motions.dynamics.phases import Phase, PhaseProblem
 from motions.keys import Key
 
 
@@ -24,6 +28,25 @@ class PhaseKey(Key):
     def track(self) -> str:
         """The whole robot."""
         return "the whole robot"
+
+    @property
+    def shift(self) -> Float[np.ndarray, "4 3"]:
+        """Where each foot comes to stand [m], in the frame of the feet at the start."""
+        return PhaseProblem(self.phases).shift
+
+    def slower(self, factor: float) -> PhaseKey:
+        """Gravity does not wait."""
+        raise TimelineError(
+            f"scale_time({factor:g}) does not work with a dynamic block, whose pace gravity sets; "
+            "give its calls other numbers"
+        )
+
+    def scaled(self, amplitude: float) -> PhaseKey:
+        """Nor do heights scale without times."""
+        raise TimelineError(
+            f"scale({amplitude:g}) does not work with a dynamic block, whose heights and times go "
+            "together; give its calls other numbers"
+        )
 
     @property
     def mirrored(self) -> PhaseKey:

@@ -1,10 +1,13 @@
 """The authoring language: what body and feet do, and when.
 
 A ``Timeline`` is a value; every method returns a longer one. Time is a cursor that each call moves
-on by ``over`` seconds (beats, after ``bpm``); ``at`` puts it elsewhere and ``together`` runs parts
-side by side. Places are offsets from the pose in which the motion starts: x ahead, y left, z up.
+on by ``over`` seconds (beats, after ``bpm`` or ``on_beats``); ``at`` puts it elsewhere and
+``together`` runs parts side by side. Places are offsets from the pose in which the motion starts: x
+ahead, y left, z up.
 
     Timeline().body(pitch=deg(15), z=-0.05, over=0.8).hold(0.4).home(over=0.8)
+
+Steps put feet in new places; from then on places count from these.
 
 A foot that is raised is off the ground until it is put down; the body first moves over the feet
 that stay, unless the motion is made with ``balance=False``.
@@ -13,17 +16,52 @@ that stay, unless the motion is made with ``balance=False``.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import cache
 
-from motions.language.arrangement import Arrangement
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.reference import Anchor
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import yaw_rotation
+from motions.footing import Footing, standing_feet
+from motions.language.clock import SAME
 from motions.language.flight import Flight
-from motions.language.moves import Moves
+from motions.language.shapes import Shapes
 from motions.language.steps import Steps
+from motions.language.transforms import Transforms
+from motions.phase_key import PhaseKey
 
 
-class Timeline(Moves, Steps, Flight, Arrangement):
+class Timeline(Shapes, Steps, Flight, Transforms):
     """An authored motion; ``motions.language`` holds its calls."""
 
     __slots__ = ()
+
+    @property
+    def end_pose(self) -> tuple[float, float, float]:
+        """Where it ends: x, y [m] and yaw [rad] of the frame of the feet, seen from its start.
+
+        Of the installed Go2, with its feet below its hips at first.
+        """
+        nominal = _nominal_feet()
+        feet, start = nominal, 0.0
+        for block in self.in_order(PhaseKey):
+            feet = Footing(self._between(start, block.start), nominal, feet).end
+            heading = yaw_rotation(Anchor.of_feet(feet, 0.0).yaw)
+            feet, start = feet + block.shift @ heading.T, block.end
+        return Footing(self._between(start, math.inf), nominal, feet).end_pose
+
+    def _between(self, start: float, end: float) -> Timeline:
+        """What is written from ``start`` to ``end`` [s]."""
+        keys = (key for key in self.keys if not isinstance(key, PhaseKey))
+        return replace(self, keys=tuple(key for key in keys if start - SAME <= key.start < end))
+
+
+@cache
+def _nominal_feet() -> Float[np.ndarray, "4 3"]:
+    return standing_feet(RobotModel())
 
 
 def deg(angle: float) -> float:

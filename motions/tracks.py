@@ -8,22 +8,25 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise, starmap
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.interpolate import CubicSpline
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
-from motions.footing import Footing
+from motions.footing import Footing, standing_feet
 from motions.keys import (
     BODY_CHANNELS,
     BodyKey,
+    BodyPathKey,
     Frame,
+    JointKey,
     Key,
     LegKey,
     LegTarget,
@@ -71,7 +74,7 @@ def followed(
     last = first
     edges = np.searchsorted(times, [*(key.start for key, _ in moves), np.inf]).tolist()
     for (key, goal), rows in zip(moves, starmap(slice, pairwise(edges)), strict=True):
-        path[rows] = last + eased(key, times[rows])[:, None] * (goal - last)
+        path[rows] = last + _way(key, times[rows], last, goal)
         last = goal
     return path
 
@@ -95,6 +98,18 @@ def body_path(
     path[:, :2] = frames[:, :2] + turned(_headings(frames), path[:, :3])[:, :2]
     path[:, 5] += frames[:, 2]
     return path
+
+
+def _way(
+    key: Key, times: Times, last: Float[np.ndarray, " k"], goal: Float[np.ndarray, " k"]
+) -> Float[np.ndarray, "n k"]:
+    """How far (n, k) a key has gone from ``last``; a path through points by a clamped spline."""
+    if not isinstance(key, BodyPathKey):
+        return eased(key, times)[:, None] * (goal - last)
+    shares = np.array([0.0, *key.shares, 1.0])
+    places = np.array([float(last[0]), *key.through, key.value]) - last[0]
+    passed = np.clip((times - key.start) / (key.end - key.start), 0.0, 1.0)
+    return CubicSpline(shares, places, bc_type="clamped")(passed)[:, None]
 
 
 def eased(key: Key, times: Times) -> Float[np.ndarray, " n"]:
@@ -141,9 +156,35 @@ class LegTracks:
         self._keys: dict[Leg, list[LegKey]] = {leg: [] for leg in LEGS}
         for key in timeline.in_order(LegKey):
             self._keys[key.leg].append(key)
-        self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
         self.footing = footing
         self._p_home, self._R_home = home[:3], attitudes(home[None, 3:])[0]
+        homes = home_poses(model)
+        for leg, keys in self._keys.items():
+            self._keys[leg] = self._completed(leg, keys, timeline, homes)
+        self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
+
+    def _completed(
+        self,
+        leg: Leg,
+        keys: Sequence[LegKey],
+        timeline: Timeline,
+        homes: Mapping[Posture, Float[np.ndarray, "6"]],
+    ) -> list[LegKey]:
+        """The keys with the angles of joints that stay as they are, from the goal before."""
+        done, origin = list[LegKey](), LegTarget.on_ground()
+        for key in keys:
+            whole: LegKey = key
+            if isinstance(key, JointKey):
+                times = np.array([key.start])
+                ground = self.ground(leg, times)
+                body = body_path(timeline, homes, times, ground.frames)
+                angles = self._at(leg, origin, body, ground).q[0]
+                angles[key.joint] = key.target.values[key.joint]
+                hip, thigh, calf = angles.tolist()
+                whole = replace(key, target=LegTarget(Frame.JOINTS, (hip, thigh, calf)))
+            done.append(whole)
+            origin = whole.target
+        return done
 
     def path(self, leg: Leg, times: Times, body: Poses) -> LegAngles:
         """Joint angles of ``leg`` at increasing ``times``, at which the trunk is at ``body``.
@@ -237,13 +278,6 @@ def _flat(frames: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
 
 def _headings(frames: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
     return attitudes(np.column_stack([np.zeros((len(frames), 2)), frames[:, 2]]))
-
-
-def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
-    """Where the feet's centres stand [m]: below the hips, a foot's radius above the ground."""
-    p_feet = model.p_base_feet_nominal.copy()
-    p_feet[:, 2] = model.foot_radius
-    return p_feet
 
 
 def home_poses(model: RobotModel) -> Mapping[Posture, Float[np.ndarray, "6"]]:

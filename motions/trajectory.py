@@ -22,6 +22,7 @@ from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.compiled_plan import CompiledPlan
 from motions.dynamic_span import DynamicSpan
+from motions.footing import standing_feet
 from motions.placement import (
     Wanted,
     attitudes,
@@ -32,7 +33,7 @@ from motions.placement import (
     turned_back,
 )
 from motions.samples import PlanSamples
-from motions.tracks import sample_times, standing_feet
+from motions.tracks import sample_times
 
 CENTRING_STEPS = 5
 """Steps that put the CoM in its place; see ``place``."""

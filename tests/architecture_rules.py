@@ -31,6 +31,9 @@ FENCES: dict[str, tuple[str, ...]] = {
         "go2_wbc/robot/inverse_kinematics.py",
         "benchmarks/speed_placo.py",
     ),
+    "crocoddyl": ("motions/dynamics/*",),
+    "librosa": ("motions/music/*",),
+    "soundfile": ("motions/music/*",),
     "rclpy": ("controller/bridges/*",),
     "cyclonedds": ("controller/bridges/*",),
 }
@@ -39,7 +42,7 @@ FENCES: dict[str, tuple[str, ...]] = {
 DISTRIBUTIONS = {"pinocchio": "pin", "PIL": "pillow", "collada": "pycollada"}
 """What to install for an import name, where the two differ."""
 
-OPTIONAL = frozenset({"rclpy", "cyclonedds", "pytest"})
+OPTIONAL = frozenset({"rclpy", "cyclonedds", "pytest", "crocoddyl", "librosa", "soundfile"})
 """Libraries that are imported only by those who have them; their fences keep them apart."""
 
 PRINTERS = (

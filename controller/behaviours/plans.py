@@ -32,7 +32,7 @@ class PlayPlan(Behaviour):
     def __init__(self, plan: MotionPlan) -> None:
         """Play ``plan``."""
         self.label, self.duration = plan.name, plan.duration
-        self.plan, self.is_dynamic = plan, plan.is_dynamic
+        self.plan, self.is_dynamic = plan, plan.has_dynamic_spans
         self._start = self._last = 0.0
         self._must_return = False
         self._return: SafeReturn | None = None

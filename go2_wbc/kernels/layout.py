@@ -29,6 +29,10 @@ class Layout:
             for end, length, (name, shape) in zip(ends, lengths, shapes.items(), strict=True)
         }
 
+    def slice(self, name: str) -> slice:
+        """Where one of the arrays lies in a row."""
+        return self._places[name][0]
+
     def view(self, row: Float[np.ndarray, " size"], name: str) -> Float[np.ndarray, "..."]:
         """One of the arrays that ``row`` holds; changing it changes the row."""
         place, shape = self._places[name]
@@ -82,6 +86,17 @@ SNAPSHOT = Layout(
 )
 """Of ``robot.snapshot.Snapshot``, the state's q and v first."""
 
+ROBOT = Layout(
+    mass=(),
+    gravity=(),
+    foot_radius=(),
+    links=(13, 10),
+    p_joints=(12, 3),
+    p_calf_feet=(4, 3),
+    armature=(12,),
+)
+"""Numbers of the robot for its snapshot: of each link mass, first moment and inertia."""
+
 REFERENCE = Layout(
     is_com=(),
     p_world=(3,),
@@ -130,6 +145,9 @@ PROGRAM = Layout(
     singular_determinant=(),
 )
 """Numbers of the built-in tasks and constraints of the whole-body controller."""
+
+DECISION = Layout(z=(30,), tau=(12,), tau_motors=(12,))
+"""What the QP decides: z of ``wbc.problem``, and torques without and with friction."""
 
 PLANNER = Layout(
     yaw=(),

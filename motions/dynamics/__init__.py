@@ -12,9 +12,9 @@ from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from motions.dynamics.cache import solve_cached
+    from motions.dynamics.curves import pieces
     from motions.dynamics.limits import PlanLimits
     from motions.dynamics.phases import FullState, Phase, PhaseProblem, Tolerance
-    from motions.dynamics.pieces import pieces
     from motions.dynamics.solver import solve
     from motions.dynamics.trajectory import DynamicTrajectory, Miss
     from motions.dynamics.verdict import Reading, audit
@@ -40,7 +40,7 @@ __getattr__ = lazy_exports(
         "cache": ("solve_cached",),
         "limits": ("PlanLimits",),
         "phases": ("FullState", "Phase", "PhaseProblem", "Tolerance"),
-        "pieces": ("pieces",),
+        "curves": ("pieces",),
         "solver": ("solve",),
         "trajectory": ("DynamicTrajectory", "Miss"),
         "verdict": ("Reading", "audit"),

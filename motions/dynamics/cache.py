@@ -17,12 +17,16 @@ from go2_wbc.errors import ConfigError, MotionError
 from go2_wbc.files import write_atomically
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics.limits import PlanLimits, Weights
-from motions.dynamics.phases import PhaseProblem
+from motions.dynamics.nearest import Written, nearest
+from motions.dynamics.phases import PhaseProblem, Tolerance
 from motions.dynamics.solver import BUDGET, accept, solve
 from motions.dynamics.trajectory import DynamicTrajectory
 
 _log = logging.getLogger(__name__)
 _PACKAGES = ("crocoddyl", "pin")
+SHIPPED = Path(__file__).parent / "solved"
+"""Plans that come with the package, by ``problem_key``: whatever solved them, each is judged when
+it is read."""
 
 
 def solve_cached(
@@ -35,7 +39,7 @@ def solve_cached(
     weights: Weights | None = None,
     folder: Path | None = None,
 ) -> DynamicTrajectory:
-    """What ``solve`` finds, read from disk if it was found before.
+    """What ``solve`` finds, read from disk if it was found before, or comes with the package.
 
     A damaged file is solved and written anew; where nothing can be written, that is logged and the
     plan returned all the same. What is read is judged like what is solved.
@@ -50,12 +54,43 @@ def solve_cached(
         PlanNotFound: if there is no such plan.
     """
     limits, weights = limits or PlanLimits(), weights or Weights()
+    shipped = _read(SHIPPED / f"{problem_key(problem, model, limits)}.npz")
+    if shipped is not None:
+        accept(shipped, problem.tolerance, model)
+        return shipped
     path = (folder or plan_folder()) / f"{_key(problem, model, limits, weights)}.npz"
     kept = _read(path)
     if kept is not None:
-        accept(kept, problem, model)
+        accept(kept, problem.tolerance, model)
         return kept
     found = solve(problem, model, budget=budget, progress=progress, limits=limits, weights=weights)
+    _write(path, found)
+    return found
+
+
+def nearest_cached(
+    written: Written,
+    model: RobotModel,
+    *,
+    tolerance: Tolerance,
+    budget: float = BUDGET,
+    progress: Callable[[int, float], None] | None = None,
+) -> DynamicTrajectory:
+    """What ``nearest`` finds, read from disk if it was found before; see ``solve_cached``.
+
+    Raises:
+        MissingDependency: if it must be solved and crocoddyl is not installed.
+        PlanNotFound: if there is no such plan within the tolerance.
+    """
+    digest = hashlib.sha256(repr((astuple(PlanLimits()), _versions())).encode())
+    for array in (written.times, written.q, written.stance, *_numbers(model)):
+        digest.update(np.ascontiguousarray(array, float).tobytes())
+    path = plan_folder() / f"{digest.hexdigest()[:32]}.npz"
+    kept = _read(path)
+    if kept is not None:
+        accept(kept, tolerance, model)
+        return kept
+    found = nearest(written, model, tolerance=tolerance, budget=budget, progress=progress)
     _write(path, found)
     return found
 
@@ -65,6 +100,20 @@ def plan_folder() -> Path:
     from go2_wbc.kernels.compilation import cache_root
 
     return cache_root() / "plans"
+
+
+def ship(problem: PhaseProblem, model: RobotModel, folder: Path) -> Path:
+    """Solve ``problem`` and write the plan into ``folder``; the file.
+
+    Raises:
+        MissingDependency: if crocoddyl is not installed.
+        PlanNotFound: if there is no such plan.
+        ConfigError: if the folder cannot be written.
+    """
+    limits = PlanLimits()
+    found = solve(problem, model, limits=limits)
+    path = folder / f"{problem_key(problem, model, limits)}.npz"
+    return write_atomically(path, found.to_bytes(is_small=True))
 
 
 def _read(path: Path) -> DynamicTrajectory | None:
@@ -88,7 +137,17 @@ def _write(path: Path, trajectory: DynamicTrajectory) -> None:
 
 
 def _key(problem: PhaseProblem, model: RobotModel, limits: PlanLimits, weights: Weights) -> str:
-    """A hash of all that the plan depends on; the tolerance only says whether it is accepted."""
+    """A hash of all that the plan depends on."""
+    asked = problem_key(problem, model, limits)
+    text = repr((asked, astuple(weights), _versions()))
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def problem_key(problem: PhaseProblem, model: RobotModel, limits: PlanLimits) -> str:
+    """A hash of what is asked, of which robot; any plan that keeps the limits answers it.
+
+    The tolerance only says whether a plan is accepted.
+    """
     digest = hashlib.sha256()
     for phase in problem.phases:
         feet = sorted((int(leg), place) for leg, place in phase.feet.items())
@@ -96,7 +155,7 @@ def _key(problem: PhaseProblem, model: RobotModel, limits: PlanLimits, weights: 
         digest.update(repr((phase.duration, stance, phase.body, feet, phase.label)).encode())
     for state in (problem.initial, problem.final):
         digest.update(b"rest" if state is None else state.q.tobytes() + state.v.tobytes())
-    digest.update(repr((astuple(limits), astuple(weights), _versions())).encode())
+    digest.update(repr(astuple(limits)).encode())
     for array in _numbers(model):
         digest.update(np.ascontiguousarray(array, float).tobytes())
     return digest.hexdigest()[:32]

@@ -19,17 +19,13 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation
 from motions.dynamics.limits import PlanLimits
-from motions.dynamics.phases import FullState, Phase, PhaseProblem
+from motions.dynamics.phases import GRAVITY, KNOT_PERIOD, FullState, Phase, PhaseProblem
 from motions.dynamics.standing import standing, standing_feet
 from motions.placement import attitudes, configurations, turned, turned_back
 
-GRAVITY = 9.81
 LEAD = 0.2
 """Share of a flight's way by which the trunk is ahead of the feet at take-off, and behind them at
 touchdown, in the first guess."""
-KNOT_PERIOD = 0.02
-"""Time [s] between knots, nearly: phases last whole numbers of them. Half of it costs two to four
-times the work, and the plans are no better (own experiments)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +56,7 @@ class Knots:
     Attributes:
         times: (n+1,) [s].
         stance: (n, 4) feet that stand.
+        p_stance: (n, 4, 3) where those that stand do [m].
         goals: what the phases ask, by knots.
         clearance: (n+1, 4) least height [m] of each foot's centre.
         q, v: (n+1, 19), (n+1, 18) the first guess.
@@ -68,12 +65,25 @@ class Knots:
 
     times: Float[np.ndarray, " n1"]
     stance: Bool[np.ndarray, "n 4"]
+    p_stance: Float[np.ndarray, "n 4 3"]
     goals: tuple[Goal, ...]
     clearance: Float[np.ndarray, "n1 4"]
     q: Float[np.ndarray, "n1 19"]
     v: Float[np.ndarray, "n1 18"]
     initial: FullState
     final: FullState
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A solution at its knots: states, torques, forces, gains, and what it took."""
+
+    x: Float[np.ndarray, "n1 37"]
+    tau: Float[np.ndarray, "n 12"]
+    forces: Float[np.ndarray, "n 4 3"]
+    gains: Float[np.ndarray, "n 12 36"]
+    iterations: int
+    cost: float
 
 
 def knots_of(problem: PhaseProblem, model: RobotModel, limits: PlanLimits) -> Knots:
@@ -96,9 +106,16 @@ def knots_of(problem: PhaseProblem, model: RobotModel, limits: PlanLimits) -> Kn
     q = _configurations(poses, feet, model, limits)
     q[0], q[-1] = initial.q, final.q
     return Knots(
-        times, stance, goals, _clearances(stance, model, limits), q, _velocities(q, times, model),
-        initial, final,
-    )  # fmt: skip
+        times=times,
+        stance=stance,
+        p_stance=p_feet + np.repeat(problem.foot_shifts, counts, axis=0),
+        goals=goals,
+        clearance=_clearances(stance, model, limits),
+        q=q,
+        v=guess_velocities(q, times, model),
+        initial=initial,
+        final=final,
+    )
 
 
 def _standing(phases: tuple[Phase, ...]) -> Bool[np.ndarray, "n 4"]:
@@ -139,7 +156,7 @@ def _trunk_path(
     """
     first, last = (pose_of(state.q) for state in ends)
     origin = Anchor.of_feet(p_feet, 0.0)
-    flights = _spans(~stance.any(axis=1))
+    flights = _spans(np.logical_not(stance.any(axis=1)))
     edges = {knot for span in flights for knot in span}
     known = [goal for goal in goals if goal.pose is not None or goal.knot in edges]
     known += [goals[-1]] if goals[-1] not in known else []
@@ -235,7 +252,7 @@ def _configurations(
     return configurations(poses, np.clip(joints, model.q_lower + margin, model.q_upper - margin))
 
 
-def _velocities(
+def guess_velocities(
     q: Float[np.ndarray, "n1 19"], times: Float[np.ndarray, " n1"], model: RobotModel
 ) -> Float[np.ndarray, "n1 18"]:
     """Rates that lead from each row to the next, as the solver integrates; at rest at the start."""

@@ -54,8 +54,10 @@ class Weights:
         foot_place, foot_speed: of a foot at touchdown or in its place, at one knot.
         trunk: of the trunk at the end of a phase [1/m^2, 1/rad^2], at one knot.
         end: of the last state, at one knot.
-        posture: of joints and trunk against the path of the first guess [1/rad^2].
+        posture: of joints against the path of the first guess [1/rad^2].
         speed: of all velocities.
+        track: of the trunk against the path of the first guess [1/m^2, 1/rad^2]: nothing, unless
+            that path is what is asked.
     """
 
     torque: float = 1e-3
@@ -70,6 +72,7 @@ class Weights:
     end: float = 1e3
     posture: float = 0.1
     speed: float = 0.01
+    track: float = 0.0
 
     def softened(self) -> Weights:
         """The same with everything but effort at a tenth, for a rough guess.
@@ -80,6 +83,6 @@ class Weights:
         eased = {
             part.name: SOFT * getattr(self, part.name)
             for part in fields(self)
-            if part.name not in ("torque", "posture", "speed")
+            if part.name not in ("torque", "posture", "speed", "track")
         }
         return replace(self, **eased)

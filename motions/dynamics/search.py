@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import product
 
 import crocoddyl
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.legs import FOOT_NAMES, LEGS
-from motions.dynamics.knots import Knots
+from motions.dynamics.knots import Found, Knots
 from motions.dynamics.program import Program
 
 ITERATIONS = 120
@@ -24,23 +22,12 @@ SOFT_STOP, STOP = 1e-2, 1e-3
 """Expected improvement of the cost below which a softened and a full program are done."""
 LINE_ROUNDS = 4
 """Rounds in which torque bounds and speeds are made to agree."""
-AGREED = 0.5
-"""Torque [N m] over the bounds of its own speed that counts as none."""
+AGREED = 1.1
+"""Torque over what the plan may use at the speed of its knot with which it is done: 0.94 of what
+the motors give with ``PlanLimits.torque_share`` at 0.85. Exact agreement takes many rounds."""
 _JOINT_RATES = slice(19 + 6, None)
 
 Progress = Callable[[int, float], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """A solution at its knots: states, torques, forces, gains, and what it took."""
-
-    x: Float[np.ndarray, "n1 37"]
-    tau: Float[np.ndarray, "n 12"]
-    forces: Float[np.ndarray, "n 4 3"]
-    gains: Float[np.ndarray, "n 12 36"]
-    iterations: int
-    cost: float
 
 
 class _Expired(Exception):
@@ -60,13 +47,19 @@ class Search:
         full: Program,
         knots: Knots,
         *,
+        is_good: Callable[[Found], bool],
         budget: float,
         progress: Progress | None,
     ) -> None:
-        """Prepare; the budget [s] runs from here."""
+        """Prepare; the budget, processor time [s], runs from here.
+
+        ``is_good`` says whether a solution may be taken although the solver has not converged: it
+        obeys the dynamics, and what more it could gain is only cost.
+        """
         self.iterations = 0
+        self._is_good = is_good
         self._full, self._knots, self._budget = full, knots, budget
-        self._deadline = time.monotonic() + budget
+        self._deadline = time.thread_time() + budget
         self._progress = progress
         self._watch = _watch(self)
         self._soft_solver, self._solver = self._solver_of(soft), self._solver_of(full)
@@ -87,17 +80,23 @@ class Search:
             self._agree()
         except _Expired:
             raise PlanNotFound(
-                f"no dynamic plan within {self._budget:g} s ({self.iterations} iterations); "
-                "ask for less, or give a larger budget"
+                f"no dynamic plan within {self._budget:g} s of processor time "
+                f"({self.iterations} iterations); ask for less, or give a larger budget"
             ) from None
         return self._found()
+
+    def best(self) -> Found | None:
+        """Where the search is, if that obeys the dynamics."""
+        solver = self._solver
+        is_whole = bool(len(solver.xs)) and solver.isFeasible and np.isfinite(solver.cost)
+        return self._found() if is_whole else None
 
     def step(self, cost: float) -> None:
         """Count an iteration, tell, and stop when time is up."""
         self.iterations += 1
         if self._progress is not None:
             self._progress(self.iterations, cost)
-        if time.monotonic() > self._deadline:
+        if time.thread_time() > self._deadline:
             raise _Expired
 
     def _climb(self) -> None:
@@ -111,19 +110,25 @@ class Search:
             self._solve(soft, xs, us, regularisation, SOFT_STOP)
             if self._solve(self._solver, list(soft.xs), list(soft.us), regularisation, STOP):
                 return
+            best = self.best()
+            if best is not None and self._is_good(best):
+                return
         raise PlanNotFound(
             f"no dynamic plan: none of the starts converges ({self.iterations} iterations); the "
             "phases ask for more than the robot can do"
         )
 
     def _agree(self) -> None:
-        """Bound the torques by the speeds of the solution until both agree."""
+        """Bound the torques by the greatest speeds of the solutions until they agree."""
+        program = self._full
+        slowest = fastest = np.zeros((len(self._knots.stance), 12))
         for _ in range(LINE_ROUNDS):
             x, us = np.array(self._solver.xs), np.array(self._solver.us)
-            lower, upper = self._full.bound(x[:-1, _JOINT_RATES])
-            if max(np.max(lower - us), np.max(us - upper)) < AGREED:
+            v = x[:-1, _JOINT_RATES]
+            if program.motor.share(us, v).max() <= AGREED:
                 return
-            us = np.clip(us, lower, upper)
+            slowest, fastest = np.minimum(slowest, v), np.maximum(fastest, v)
+            us = np.clip(us, *program.bound(slowest, fastest))
             self._solve(self._solver, list(x), list(us), REGULARISATIONS[0], STOP)
 
     def _solve(

@@ -25,7 +25,7 @@ def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
 
 
 def standing(model: RobotModel, p_feet: Float[np.ndarray, "4 3"]) -> FullState:
-    """Standing at rest, the CoM above the middle of feet at ``p_feet`` [m], the trunk along them."""
+    """Standing at rest on feet at ``p_feet`` [m]: CoM above their middle, trunk along them."""
     anchor = Anchor.of_feet(p_feet, model.foot_radius)
     wanted = Wanted(
         p=(anchor.p_world + STAND_POSE[:3])[None],

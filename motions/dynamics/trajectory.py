@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+import zlib
 from dataclasses import dataclass, fields
+from tokenize import TokenError
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -14,6 +16,13 @@ from go2_wbc.errors import MotionError
 
 FORMAT = 1
 """Version of the files; others are refused."""
+BALANCING_FEET = 2
+"""On so many feet or fewer the plan's own gains are worth keeping: on more, the whole-body
+controller balances by itself."""
+UNREADABLE = (
+    OSError, ValueError, EOFError, SyntaxError, TokenError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What ``numpy.load`` raises for damaged files."""
 _ARRAYS = {
     "times": (None,),
     "q": (None, 19),
@@ -70,6 +79,7 @@ class DynamicTrajectory:
         iterations: of the solver, over all its starts.
         cost: at the end.
         misses: what was asked at the phases' ends, and how far the plan is from it.
+        lag: time [s] by which the plan is late against a motion that was written as a whole.
     """
 
     times: Float[np.ndarray, " n1"]
@@ -83,6 +93,7 @@ class DynamicTrajectory:
     iterations: int
     cost: float
     misses: tuple[Miss, ...]
+    lag: float = 0.0
 
     @property
     def duration(self) -> float:
@@ -110,17 +121,27 @@ class DynamicTrajectory:
         }
         return "; ".join(map(str, sorted(worst, key=lambda miss: miss.time)))
 
-    def to_bytes(self) -> bytes:
-        """The content of a file that ``from_bytes`` reads."""
+    def to_bytes(self, *, is_small: bool = False) -> bytes:
+        """The content of a file that ``from_bytes`` reads.
+
+        Args:
+            is_small: compress, with gains to three digits and only where two feet stand or
+                fewer, 0 elsewhere: a sixth of the size.
+        """
         header = {
             "format": FORMAT,
             "iterations": self.iterations,
             "cost": self.cost,
+            "lag": self.lag,
             "misses": [[getattr(miss, part.name) for part in fields(Miss)] for miss in self.misses],
         }
         stream = io.BytesIO()
         arrays = {name: getattr(self, name) for name in _ARRAYS}
-        np.savez(stream, header=np.array(json.dumps(header)), **arrays)
+        save = np.savez_compressed if is_small else np.savez
+        if is_small:
+            is_needed = self.stance.sum(axis=1) <= BALANCING_FEET
+            arrays["gains"] = (self.gains * is_needed[:, None, None]).astype(np.float16)
+        save(stream, header=np.array(json.dumps(header)), **arrays)
         return stream.getvalue()
 
     @staticmethod
@@ -133,18 +154,23 @@ class DynamicTrajectory:
         try:
             with np.load(io.BytesIO(content), allow_pickle=False) as file:
                 header = json.loads(str(file["header"]))
-                arrays = {name: file[name] for name in _ARRAYS}
+                arrays = {name: _wide(file[name]) for name in _ARRAYS}
             version = header["format"]
             misses = tuple(Miss(*row) for row in header["misses"])
-            numbers = int(header["iterations"]), float(header["cost"])
-        except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+            iterations = int(header["iterations"])
+            cost, lag = float(header["cost"]), float(header["lag"])
+        except (*UNREADABLE, KeyError, TypeError) as error:
             raise MotionError(
                 f"this is no dynamic trajectory, or a damaged one: {error}"
             ) from error
         if version != FORMAT:
             raise MotionError(f"a trajectory of format {version}; this version reads {FORMAT}")
         _check_shapes(arrays)
-        return DynamicTrajectory(**arrays, iterations=numbers[0], cost=numbers[1], misses=misses)
+        return DynamicTrajectory(**arrays, iterations=iterations, cost=cost, misses=misses, lag=lag)
+
+
+def _wide(array: np.ndarray) -> np.ndarray:
+    return array.astype(float) if array.dtype == np.float16 else array
 
 
 def _check_shapes(arrays: dict[str, np.ndarray]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool
@@ -15,15 +16,13 @@ from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.assembly import compile_timeline
 from motions.authoring import Motion
-from motions.compiled_plan import CompiledPlan
+from motions.compiled_plan import LEAST_FEET, CompiledPlan
 from motions.feasibility.dynamic import Forces
 from motions.feasibility.report import FeasibilityReport
 from motions.registry import load_motion
+from motions.saved.plan_file import is_saved_plan, load_plan
 from motions.timeline import Timeline
 from motions.trajectory import Trajectory
-
-_LEAST_FEET = 3
-"""Standing feet that span an area."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +48,7 @@ class CheckedMotion:
         """
         path = self.path
         (support,) = (series for series in self.report.series if series.check == "support")
-        has_area = path.stance.sum(axis=1) >= _LEAST_FEET
+        has_area = path.stance.sum(axis=1) >= LEAST_FEET
         spans = self.plan.spans if isinstance(self.plan, CompiledPlan) else {}
         return Recording(
             time=path.times,
@@ -67,9 +66,9 @@ class CheckedMotion:
         )
 
 
-Playable = str | Motion | Timeline | MotionPlan | CheckedMotion
-"""What stands for a motion: a name of the library, a motion (with its default parameters), a
-timeline, a plan, or a motion that was checked before."""
+Playable = str | Path | Motion | Timeline | MotionPlan | CheckedMotion
+"""What stands for a motion: a name of the library, the file of a saved motion or plan, a motion
+(with its default parameters), a timeline, a plan, or a motion that was checked before."""
 
 
 def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
@@ -82,21 +81,34 @@ def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
     Raises:
         CommandError: for an unknown name, or for what stands for no motion.
         TimelineError: if the timeline is empty or its parameters are not valid.
+        MotionFileError: for a file that cannot be used.
     """
     if isinstance(motion, CheckedMotion):
         return motion.plan
     if isinstance(motion, MotionPlan):
         return motion
-    if isinstance(motion, str):
-        motion = load_motion(motion)
-    elif isinstance(motion, Motion):
-        motion = motion()
-    if not isinstance(motion, Timeline):
+    if isinstance(motion, str | Path) and is_saved_plan(motion):
+        return load_plan(motion, model=model)
+    line = timeline_of(motion)
+    if line is None:
         raise CommandError(
             "motion must be a name of the library, a function with @motion before it, a Timeline, "
             f"a plan or a CheckedMotion, got {motion!r}"
         )
-    return compile_timeline(motion, model)
+    return compile_timeline(line, model)
+
+
+def timeline_of(motion: object) -> Timeline | None:
+    """The timeline of ``motion``; of a plan, or of what stands for no motion, none.
+
+    Raises:
+        CommandError: for an unknown name.
+    """
+    if isinstance(motion, str | Path):
+        return None if is_saved_plan(motion) else load_motion(motion)
+    if isinstance(motion, Motion):
+        return motion()
+    return motion if isinstance(motion, Timeline) else None
 
 
 def _label(

@@ -19,14 +19,16 @@ from scipy.interpolate import PPoly
 
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
+from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from motions.compiled_plan import CompiledPlan
-from motions.dynamic_span import DynamicSpan, attitude_angles, feet_at
-from motions.dynamics.pieces import centred
+from motions.dynamic_span import DynamicSpan, feet_at
+from motions.dynamics.curves import centred
+from motions.dynamics.phases import PhaseProblem
 from motions.dynamics.verdict import defects
 from motions.feasibility.dynamic import PRESSED, Forces
 from motions.feasibility.kinematic import FEET, JOINTS
 from motions.feasibility.limits import FlightLimits
+from motions.feasibility.misses import Misses, of_phases, of_written
 from motions.feasibility.report import Series
 from motions.trajectory import Trajectory
 
@@ -152,49 +154,26 @@ class _Judge:
 
     def place(self) -> Series:
         """Distance from what was asked at the ends of phases: mm."""
-        tolerance = 1e3 * self.span.problem.tolerance.position
-        return self._asked("off by", "mm", tolerance, 1e3 * self._misses()[0])
+        tolerance = 1e3 * self.span.tolerance.position
+        return self._asked("off by", "mm", tolerance, 1e3 * self._misses().away)
 
     def turn(self) -> Series:
         """Angle between the trunk and what was asked, whole turns counted: deg."""
-        tolerance = float(np.degrees(self.span.problem.tolerance.angle))
-        return self._asked("turned off by", "deg", tolerance, np.degrees(self._misses()[1]))
+        tolerance = float(np.degrees(self.span.tolerance.angle))
+        return self._asked("turned off by", "deg", tolerance, np.degrees(self._misses().turned))
 
     def _asked(self, check: str, unit: str, tolerance: float, values: _Columns) -> Series:
         subjects, where = ("trunk", *FEET), ~np.isnan(values)
-        times = self.span.start + self._ends()[0]
+        times = self.span.start + self._misses().times
         what = (check, unit, subjects, times, np.nan_to_num(values))
         return Series.against(*what, tolerance, where=where, tight=(1.0 - NEAR) * tolerance)
 
-    def _ends(self) -> tuple[Float[np.ndarray, " p"], list[int]]:
-        """Ends [s] of the phases, and their knots."""
-        plan = self.span.trajectory
-        ends = np.cumsum([phase.duration for phase in self.span.problem.phases])
-        return ends, [int(np.argmin(np.abs(plan.times - end))) for end in ends]
-
-    def _misses(self) -> tuple[_Columns, _Columns]:
-        """Distances [m] of trunk and feet from what was asked, and the trunk's angle [rad]; (p, 5).
-
-        nan where nothing was asked.
-        """
-        plan, problem, frame = self.span.trajectory, self.span.problem, self.span.frame
-        R = yaw_rotation(frame.yaw)
-        feet = feet_at(plan.q, plan.v, self.model)[0]
-        shifts = problem.foot_shifts @ R.T
-        stands = [*(phase.stance for phase in problem.phases), frozenset(LEGS)]
-        away, turned = (np.full((len(problem.phases), 5), np.nan) for _ in range(2))
-        angles = attitude_angles(plan.q)
-        for row, (phase, knot) in enumerate(zip(problem.phases, self._ends()[1], strict=True)):
-            for leg in LEGS:
-                lands = leg in stands[row + 1] and leg not in phase.stance
-                if leg in phase.feet or lands:
-                    asked = feet[0, leg] + shifts[row, leg]
-                    away[row, 1 + leg] = np.linalg.norm(feet[knot, leg] - asked)
-            if phase.body is not None:
-                asked = plan.q[0, :3] + R @ np.array(phase.body[:3])
-                away[row, 0] = np.linalg.norm(plan.q[knot, :3] - asked)
-                turned[row, 0] = np.abs(angles[knot] - angles[0] - phase.body[3:]).max()
-        return away, turned
+    def _misses(self) -> Misses:
+        asked, plan = self.span.asked, self.span.trajectory
+        places = feet_at(plan.q, plan.v, self.model)[0]
+        if isinstance(asked, PhaseProblem):
+            return of_phases(plan, asked, self.span.frame, places)
+        return of_written(plan, asked, self.span.frame, places, self.model)
 
     def _at_knots(
         self, check: str, unit: str, subjects: tuple[str, ...], values: _Columns, limit: float,

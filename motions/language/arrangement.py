@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import TypeVar
 
@@ -10,7 +10,8 @@ from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError
 from motions.arguments import is_number, positive
 from motions.keys import BODY_CHANNELS, Mark
-from motions.language.written import SAME, Written
+from motions.language.clock import BeatClock
+from motions.language.written import Written
 
 _Line = TypeVar("_Line", bound="Arrangement")
 
@@ -36,7 +37,7 @@ class Arrangement(Written):
         """Put the cursor ``t`` seconds (beats) after the start of the motion."""
         if not (is_number(t) and t >= 0.0):
             raise TimelineError(f"at() needs a time of 0 s or later, got {t!r}")
-        return replace(self, cursor=t * self.beat)
+        return replace(self, cursor=self.clock.at(t))
 
     def bpm(self: _Line, beats_per_minute: float, *, shift_time: float | None = None) -> _Line:
         """Count ``over``, ``hold`` and ``at`` in beats from here on.
@@ -44,10 +45,28 @@ class Arrangement(Written):
         Before a foot is raised the trunk then moves aside in ``shift_time`` beats; by default in
         the fewest whole beats that are no shorter than the timeline's ``shift_time``.
         """
-        beat = 60.0 / positive("bpm", beats_per_minute)
+        interval = 60.0 / positive("bpm", beats_per_minute)
+        return self._counted(BeatClock.steady(interval), shift_time)
+
+    def on_beats(self: _Line, times: Iterable[float], *, shift_time: float | None = None) -> _Line:
+        """Count in the beats at these ``times`` [s] of the motion from here on.
+
+        ``at(0)`` is the first of them. Between two beats time goes evenly; after the last one, and
+        before the first, beats are as far apart as the nearest two.
+
+        Args:
+            times: increasing instants, such as ``beats("song.wav").times``.
+            shift_time: as for ``bpm``, in beats.
+
+        Raises:
+            TimelineError: for fewer than two times, or times that do not increase from 0 s on.
+        """
+        return self._counted(BeatClock.of(times), shift_time)
+
+    def _counted(self: _Line, clock: BeatClock, shift_time: float | None) -> _Line:
         if shift_time is None:
-            return replace(self, beat=beat, shift_beats=math.ceil(self.shift_time / beat - SAME))
-        return replace(self, beat=beat, shift_beats=positive("shift_time", shift_time))
+            return replace(self, clock=clock, shift_beats=float(clock.fewest(self.shift_time)))
+        return replace(self, clock=clock, shift_beats=positive("shift_time", shift_time))
 
     # --- putting motions together ---------------------------------------------------------
 

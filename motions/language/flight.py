@@ -9,30 +9,23 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from itertools import count, pairwise
 from typing import TypeVar
 
-import numpy as np
-
 from go2_wbc.curves import Ease
-from go2_wbc.errors import TimelineError
+from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
-from motions.arguments import is_number, positive, quantity, word
+from motions.arguments import positive, quantity, word
 from motions.dynamics import moves
 from motions.dynamics.phases import BODY_COORDINATES, Phase
 from motions.keys import BODY_CHANNELS, PostureKey
-from motions.language.written import SAME, Written
+from motions.language.clock import SAME, BeatClock
+from motions.language.written import Written
 from motions.phase_key import PhaseKey
 
 _Line = TypeVar("_Line", bound="Flight")
 _Place = tuple[float, float, float]
-FARTHEST, HIGHEST = 1.0, 0.5
-"""Distance and height [m] of jumps beyond which no planner need be asked: the power of the motors
-ends at about 0.7 and 0.3 m (own experiments)."""
-FULL_TURN = 2.0 * math.pi
-MOST_HOPS = 16
-SHORTEST_STAND = 0.1
-"""Least time [s] on the ground between hops: own choice, five of the planner's knots."""
 _LOW = (-0.03, 0.0, -0.09, 0.0, 0.1, 0.0)
 """Trunk before it pounces [m, rad]."""
 
@@ -45,6 +38,11 @@ class Flight(Written):
 
     __slots__ = ()
 
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether some of it is solved."""
+        return any(isinstance(key, PhaseKey) for key in self.keys)
+
     def jump(
         self: _Line, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, height: float = 0.1
     ) -> _Line:
@@ -52,46 +50,30 @@ class Flight(Written):
 
         Offsets count from where it lands.
         """
-        return self._to_beats(self._jump("jump()", x, y, yaw, height))
+        return self._to_beats(moves.jump(x, y, yaw, height))
 
     def spin_jump(self: _Line, angle: float, *, height: float = 0.12) -> _Line:
         """Jump up and turn by ``angle`` [rad] in the air, to the left if it is positive."""
-        return self._to_beats(self._jump("spin_jump()", 0.0, 0.0, angle, height))
+        return self._to_beats(moves.jump(yaw=angle, height=height))
 
     def pounce(self: _Line, x: float = 0.3, *, height: float = 0.08, crouch: float = 0.6) -> _Line:
         """Crouch low for ``crouch`` seconds (beats), then leap ``x`` [m] ahead."""
-        first, *others = self._jump("pounce()", x, 0.0, 0.0, height)
-        duration = positive("pounce(): crouch", crouch) * self.beat
+        first, *others = moves.jump(x, height=height)
+        duration = self._seconds("pounce(): crouch", crouch)
         low = replace(first, duration=duration, body=_LOW, label="crouch low")
         return self._to_beats((low, *others))
 
     def hop(self: _Line, times: int, *, height: float = 0.05, period: float = 0.5) -> _Line:
         """Hop in place ``times`` times, coming down once a ``period`` [s, beats]."""
-        if isinstance(times, bool) or not isinstance(times, int) or not 1 <= times <= MOST_HOPS:
-            raise TimelineError(
-                f"hop() needs a whole number of times from 1 to {MOST_HOPS}, got {times!r}"
-            )
-        rise = _within("hop(): height", positive("hop(): height", height), HIGHEST, "m")
-        every = positive("hop(): period", period) * self.beat
-        shortest = 2.0 * math.sqrt(2.0 * rise / moves.GRAVITY) + SHORTEST_STAND
-        if every < shortest:
-            raise TimelineError(
-                f"hop(): a period of {every:.2f} s is too short for {rise:g} m high hops, which "
-                f"take {shortest:.2f} s or more; make them lower"
-            )
-        return self._to_beats(moves.hop(times, every, rise))
+        phases = moves.hop(times, self._seconds("hop(): period", period), height)
+        return self._to_beats(phases, period)
 
     def rear(self: _Line, pitch: float = -math.radians(25.0), *, hold: float = 0.6) -> _Line:
         """Rear up on the hind feet to a ``pitch`` [rad] below 0, nose up.
 
         The front feet are in the air for ``hold`` seconds (beats).
         """
-        angle = quantity("pitch", pitch)
-        if angle >= 0.0:
-            raise TimelineError(
-                f"rear(): pitch is {pitch:g} rad; the nose goes up: give one below 0"
-            )
-        return self._to_beats(moves.rear(angle, positive("rear(): hold", hold) * self.beat))
+        return self._to_beats(moves.rear(pitch, self._seconds("rear(): hold", hold)))
 
     def lift(
         self: _Line, legs: Collection[Leg | str], *, hold: float = 0.35, height: float = 0.06
@@ -100,37 +82,36 @@ class Flight(Written):
 
         For one foot at a time, which takes no balance on a line, there is ``foot``.
         """
-        feet = tuple(sorted({word("foot", leg, Leg.__members__) for leg in legs}))
-        if len(feet) != 2 or isinstance(legs, str):
+        given = (legs,) if isinstance(legs, str) else legs
+        feet = sorted({word("foot", leg, Leg.__members__) for leg in given})
+        if len(feet) != 2:
             raise TimelineError(f"lift() takes two feet, such as ('FL', 'RR'), got {legs!r}")
-        time = positive("lift(): hold", hold) * self.beat
-        rise = _within("lift(): height", positive("lift(): height", height), HIGHEST, "m")
-        return self._to_beats(moves.lift(feet, time, rise))
+        return self._to_beats(moves.lift(feet, self._seconds("lift(): hold", hold), height))
 
-    def _jump(self, call: str, x: float, y: float, yaw: float, height: float) -> tuple[Phase, ...]:
-        place = [_within(f"{call}: {n}", v, FARTHEST, "m") for n, v in (("x", x), ("y", y))]
-        turn = _within(f"{call}: yaw", yaw, FULL_TURN, "rad")
-        rise = _within(f"{call}: height", positive(f"{call}: height", height), HIGHEST, "m")
-        return moves.jump(*place, turn, rise)
+    def _seconds(self, name: str, beats: float) -> float:
+        return self.clock.after(self.cursor, positive(name, beats)) - self.cursor
 
-    def _to_beats(self: _Line, phases: tuple[Phase, ...]) -> _Line:
-        """A block of ``phases``, the first and last as long as the tempo needs."""
+    def _to_beats(self: _Line, phases: tuple[Phase, ...], period: float | None = None) -> _Line:
+        """A block of ``phases``, some of them longer, so that it keeps the tempo, if there is one.
+
+        Feet come down on a beat first, then ``period`` beats later each time; the end is on one.
+        """
         if not self.shift_beats:
             return self._block(phases)
-        first, last = phases[0], phases[-1]
-        ends = np.cumsum([phase.duration for phase in phases])
-        lands = next(
-            end
-            for end, phase, following in zip(ends, phases, phases[1:], strict=False)
-            if phase.stance != following.stance and following.stance > phase.stance
-        )
-        longer = replace(first, duration=first.duration + self._to_next_beat(float(lands)))
-        whole = float(ends[-1]) + longer.duration - first.duration
-        end = replace(last, duration=last.duration + self._to_next_beat(whole))
-        return self._block((longer, *phases[1:-1], end))
-
-    def _to_next_beat(self, time: float) -> float:
-        return math.ceil(time / self.beat - SAME) * self.beat - time
+        timed, now, last = list(phases), self.cursor, None
+        first = 0  # the phase that is made longer, before the next touchdown
+        for row, (phase, after) in enumerate(pairwise(phases)):
+            now += phase.duration
+            if not after.stance > phase.stance:
+                continue
+            goal = _next_beat(self.clock, now) if last is None else now
+            if last is not None and period is not None:
+                goal = self.clock.after(last, period)
+            _lengthen(timed, first, goal - now)
+            now, last, first = goal, goal, row + 1
+        now += phases[-1].duration
+        _lengthen(timed, len(phases) - 1, _next_beat(self.clock, now) - now)
+        return self._block(tuple(timed))
 
     def phase(
         self: _Line,
@@ -153,7 +134,7 @@ class Flight(Written):
             label: what messages call it.
         """
         phase = Phase(
-            positive("phase() duration", duration) * self.beat,
+            self._seconds("phase(): duration", duration),
             frozenset(word("foot", leg, Leg.__members__) for leg in stance),
             None if body is None else _pose(body),
             {
@@ -192,9 +173,20 @@ def away_from_home(line: Written, time: float) -> list[str]:
     return away
 
 
+def _next_beat(clock: BeatClock, time: float) -> float:
+    """The first beat [s] at or after ``time``."""
+    return next(beat for beat in map(clock.at, count()) if beat > time - SAME)
+
+
+def _lengthen(phases: list[Phase], row: int, seconds: float) -> None:
+    if abs(seconds) > SAME:
+        phases[row] = replace(phases[row], duration=phases[row].duration + seconds)
+
+
 def _pose(body: Mapping[str, float]) -> tuple[float, float, float, float, float, float]:
     for name in body:
-        word("coordinate of the body", name, {name: name for name in BODY_COORDINATES})
+        if name not in BODY_COORDINATES:
+            raise TimelineError(unknown_name("coordinate of the body", name, BODY_COORDINATES))
     x, y, z, roll, pitch, yaw = (quantity(name, body.get(name, 0.0)) for name in BODY_COORDINATES)
     return x, y, z, roll, pitch, yaw
 
@@ -205,15 +197,3 @@ def _place(place: Sequence[float]) -> _Place:
     except (TypeError, ValueError):
         raise TimelineError(f"a foot's place must be x, y, z [m], got {place!r}") from None
     return quantity("x", x), quantity("y", y), quantity("z", z)
-
-
-def _within(name: str, value: float, largest: float, unit: str) -> float:
-    """``value``, a number from -``largest`` to ``largest``."""
-    if not is_number(value):
-        raise TimelineError(f"{name} must be a finite number, got {value!r}")
-    if abs(value) > largest:
-        hint = f"; write deg({value:g})?" if unit == "rad" else ""
-        raise TimelineError(
-            f"{name} is {value:g} {unit}: no jump goes beyond {largest:.3g} {unit}{hint}"
-        )
-    return float(value)

@@ -10,6 +10,7 @@ from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Posture
 from motions.arguments import quantity, word
+from motions.easing import EaseWord, easing
 from motions.keys import (
     BODY_CHANNELS,
     BalanceShift,
@@ -23,7 +24,6 @@ from motions.keys import (
 from motions.language.written import Written
 from motions.poses import POSES
 
-_EASES = {ease.value: ease for ease in Ease}
 _FRAMES = {frame.value: frame for frame in (Frame.GROUND, Frame.BODY)}
 _POSTURES = {posture.value: posture for posture in Posture}
 
@@ -48,7 +48,7 @@ class Moves(Written):
         pitch: float | None = None,
         yaw: float | None = None,
         over: float,
-        ease: Ease | str = Ease.MINIMUM_JERK,
+        ease: EaseWord = Ease.MINIMUM_JERK,
     ) -> _Line:
         """Move the trunk [m, rad]; what is left out keeps its value.
 
@@ -60,7 +60,7 @@ class Moves(Written):
         if not given:
             raise TimelineError(f"body() needs one of {', '.join(BODY_CHANNELS)}")
         start, end = self._span(over)
-        curve = word("ease", ease, _EASES)
+        curve = easing(ease)
         keys = [
             BodyKey(start, end, curve, name, quantity(name, value)) for name, value in given.items()
         ]
@@ -72,7 +72,7 @@ class Moves(Written):
         start, end = self._span(over)
         return self._longer([PostureKey(start, end, Ease.MINIMUM_JERK, which)], end)
 
-    def pose(self: _Line, name: str, *, over: float, ease: Ease | str = Ease.MINIMUM_JERK) -> _Line:
+    def pose(self: _Line, name: str, *, over: float, ease: EaseWord = Ease.MINIMUM_JERK) -> _Line:
         """Move the trunk to a named pose: see ``POSES``."""
         if name not in POSES:
             raise TimelineError(unknown_name("pose", name, POSES))
@@ -89,7 +89,7 @@ class Moves(Written):
         z: float = 0.0,
         over: float,
         frame: Frame | str = Frame.GROUND,
-        ease: Ease | str = Ease.MINIMUM_JERK,
+        ease: EaseWord = Ease.MINIMUM_JERK,
     ) -> _Line:
         """Move a foot [m] from where it stands; with ``frame="body"`` it goes with the trunk.
 
@@ -110,7 +110,7 @@ class Moves(Written):
         thigh: float,
         calf: float,
         over: float,
-        ease: Ease | str = Ease.MINIMUM_JERK,
+        ease: EaseWord = Ease.MINIMUM_JERK,
     ) -> _Line:
         """Move the joints of a raised leg to these angles [rad]."""
         angles = (quantity("hip", hip), quantity("thigh", thigh), quantity("calf", calf))
@@ -148,11 +148,11 @@ class Moves(Written):
             keys.append(BalanceShift(start, end, Ease.MINIMUM_JERK, frozenset()))
         return line._longer(keys, end)
 
-    def _move_leg(self: _Line, leg: Leg, target: LegTarget, over: float, ease: Ease | str) -> _Line:
+    def _move_leg(self: _Line, leg: Leg, target: LegTarget, over: float, ease: EaseWord) -> _Line:
         line, is_raised = self, leg in self.raised
         if target.is_on_ground and not is_raised:
             raise TimelineError(f"foot {leg.name} is on the ground already: raise it, z > 0")
         if not is_raised:
             line = self._shifted(self.raised | {leg})
         start, end = line._span(over)
-        return line._longer([LegKey(start, end, word("ease", ease, _EASES), leg, target)], end)
+        return line._longer([LegKey(start, end, easing(ease), leg, target)], end)

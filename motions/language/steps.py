@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
@@ -153,6 +152,8 @@ class Steps(Written):
 
 def _way_through(points: Sequence[Sequence[float]]) -> Way:
     """The way through ``points``: cubic splines over the distances between them."""
+    from scipy.interpolate import CubicSpline  # only who writes a path waits for it
+
     given = _numbers(points)
     corners = np.vstack([np.zeros(given.shape[1]), given])
     lengths = np.linalg.norm(np.diff(corners[:, :2], axis=0), axis=1)
@@ -175,7 +176,7 @@ def _way_through(points: Sequence[Sequence[float]]) -> Way:
     return Way(np.column_stack([curve(fine), heading]))
 
 
-def _numbers(points: Sequence[Sequence[float]]) -> np.ndarray:
+def _numbers(points: object) -> np.ndarray:
     is_list = isinstance(points, Sequence | np.ndarray)
     rows = (
         [tuple(p) if isinstance(p, Sequence | np.ndarray) else () for p in points]

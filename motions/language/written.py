@@ -10,17 +10,18 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from go2_wbc.curves import Ease
-from go2_wbc.errors import TimelineError
+from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Posture
 from motions.arguments import positive
 from motions.dynamics.phases import Tolerance
 from motions.keys import BalanceShift, BodyKey, Key, LegKey
+from motions.language.clock import SAME, BeatClock
 
 SHIFT_TIME = 0.9
 """Time [s] in which the body moves over the feet that stay, before another one is raised."""
-SAME = 1e-9
-"""Times this close [s] are the same: absorbs rounding of sums."""
+AS_WRITTEN, NEAREST = PHYSICS = ("as_written", "nearest")
+"""What may be made of a motion that the robot cannot do: nothing, or the nearest that it can."""
 
 _KeyType = TypeVar("_KeyType", bound=Key)
 _Line = TypeVar("_Line", bound="Written")
@@ -37,10 +38,12 @@ class Written:
         balance: whether the body moves over the standing feet before one is raised.
         shift_time: how long [s] that takes, before a tempo is set.
         shift_beats: how many beats it takes with a tempo; 0 without one.
+        physics: "as_written", or "nearest": what the robot cannot do as written is solved as the
+            nearest motion that it can.
         tolerance: how far what is solved may be from what is asked.
         keys: what was written so far.
         cursor: when [s] the next call starts.
-        beat: seconds that one unit of ``over`` lasts.
+        clock: what one unit of ``over`` lasts, here and later.
         last_start: when [s] the last call's move starts.
         floor: the cursor does not fall behind this time [s] after ``also``.
     """
@@ -50,10 +53,11 @@ class Written:
     name: str = field(default="motion", kw_only=True)
     balance: bool = field(default=True, kw_only=True)
     shift_time: float = field(default=SHIFT_TIME, kw_only=True)
+    physics: str = field(default=AS_WRITTEN, kw_only=True)
     tolerance: Tolerance = field(default=Tolerance(), kw_only=True)
     keys: tuple[Key, ...] = field(default=(), kw_only=True)
     cursor: float = field(default=0.0, kw_only=True)
-    beat: float = field(default=1.0, kw_only=True)
+    clock: BeatClock = field(default=BeatClock(), kw_only=True)
     shift_beats: float = field(default=0.0, kw_only=True)
     last_start: float = field(default=0.0, kw_only=True)
     floor: float = field(default=0.0, kw_only=True)
@@ -65,6 +69,12 @@ class Written:
                 valid = ", ".join(f"Posture.{posture.name}" for posture in Posture)
                 raise TimelineError(f"{name} must be one of {valid}, got {getattr(self, name)!r}")
         positive("shift_time", self.shift_time)
+        if self.physics not in PHYSICS:
+            raise TimelineError(unknown_name("physics", str(self.physics), PHYSICS))
+        if not isinstance(self.tolerance, Tolerance):
+            raise TimelineError(
+                f"tolerance must be a Tolerance(position [m], angle [rad]), got {self.tolerance!r}"
+            )
         _require_no_overlap(self.keys)
 
     # --- what is written ------------------------------------------------------------------
@@ -101,7 +111,9 @@ class Written:
     def _shifted(self: _Line, raised: frozenset[Leg]) -> _Line:
         if not self.balance or self.shifted_for == raised:
             return self
-        end = self.cursor + (self.shift_beats * self.beat or self.shift_time)
+        end = self.cursor + self.shift_time
+        if self.shift_beats:
+            end = self.clock.after(self.cursor, self.shift_beats)
         return self._longer([BalanceShift(self.cursor, end, Ease.MINIMUM_JERK, raised)], end)
 
     def _longer(self: _Line, keys: Sequence[Key], cursor: float) -> _Line:
@@ -117,7 +129,7 @@ class Written:
         return self._longer([key.later(start) for key in other.keys], start + other.end)
 
     def _span(self, over: float) -> tuple[float, float]:
-        return self.cursor, self.cursor + positive("over", over) * self.beat
+        return self.cursor, self.clock.after(self.cursor, positive("over", over))
 
 
 def _require_no_overlap(keys: Sequence[Key]) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.telemetry import Telemetry
+from controller.telemetry import BLOCK, Telemetry
 from go2_wbc.errors import CommandError
 from go2_wbc.robot.model import RobotModel
 from tests.controller.plants import lying_state
@@ -15,6 +15,15 @@ from tests.controller.plants import lying_state
 CAPACITY = 50
 PERIOD = 0.002
 ALL = np.ones(4, dtype=bool)
+
+
+HUGE_PAGES = 4 << 20
+"""Memory [bytes] from which on numpy asks for huge pages."""
+
+
+@pytest.fixture(autouse=True, params=[BLOCK, 7])
+def _in_blocks(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("controller.telemetry.BLOCK", request.param)
 
 
 @pytest.fixture(scope="module")
@@ -108,3 +117,10 @@ def test_the_support_margin_is_that_of_the_planned_stance_feet(model: RobotModel
 def test_a_rate_that_is_not_positive_is_refused(model: RobotModel, rate: float) -> None:
     with pytest.raises(CommandError, match="rate must be positive"):
         recorded(model, 3).samples(rate).recording()
+
+
+def test_memory_is_asked_for_in_pieces_too_small_for_huge_pages(model: RobotModel) -> None:
+    telemetry = Telemetry(model, 2 * BLOCK)
+    telemetry.record(model.snapshot(lying_state(0.0)), ALL, "first")
+    assert telemetry._blocks[0].nbytes < HUGE_PAGES
+    assert len(telemetry._blocks) == 1

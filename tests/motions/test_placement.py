@@ -8,8 +8,8 @@ import pytest
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import angular_velocity_from_rpy, rotation_from_rpy, rpy_from_rotation
 from motions.balance import nearest
+from motions.footing import standing_feet
 from motions.placement import Wanted, attitudes, place, readable_place
-from motions.tracks import standing_feet
 from motions.trajectory import _angular_rates, _rpy_of
 
 COUNT = 300

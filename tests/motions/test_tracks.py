@@ -7,9 +7,9 @@ import numpy as np
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline
-from motions.footing import Footing
+from motions.footing import Footing, standing_feet
 from motions.postures import STAND_POSE
-from motions.tracks import LegTracks, standing_feet
+from motions.tracks import LegTracks
 
 FAR = 0.6  # m; ahead of where the foot stands, out of its leg's reach
 

@@ -1,0 +1,237 @@
+"""``python -m benchmarks steps``: where authored steps end, against where they were to end.
+
+Random steps to new places, and walks with turns and raised paws, one and three after another. The
+gaits of ``motions.step_gaits`` were chosen by the check and on two runs on the nominal floor; no
+seed of theirs is judged here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario, chosen_scenarios
+from benchmarks.session import add_options, positive, run_and_report, tasks_of
+from benchmarks.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
+from controller.cli.common import Subparsers, add_parser
+from controller.motion_measurement import FULL
+from go2_wbc.legs import LEGS
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.reference import Anchor
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from motions import CompiledPlan, Timeline, compile_timeline, deg
+
+FIRST_SEED = 4100
+"""Seed of the first trial that is judged."""
+FRICTION_RANGE = (0.6, 1.0)
+MASS_RANGE = (0.95, 1.05)
+"""Factor on every mass and inertia of the robot; the controller is not told."""
+STEP_AHEAD, STEP_ASIDE = 0.06, 0.03
+"""Greatest way [m] of a random step, in either direction."""
+SEEDS, QUICK_SEEDS = 20, 3
+ROUNDS = 3
+"""Times that a walk is played."""
+EXAMPLES = """
+python -m benchmarks steps            everything; minutes on two cores
+python -m benchmarks steps --quick    three seeds
+python -m benchmarks steps --rows step --json
+python -m benchmarks steps --list     the metrics and their thresholds
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """One motion, played.
+
+    Attributes:
+        feet_off: largest distance [m], on the level, of a foot at the end from its planned place.
+        torque, speed: largest share of a joint's torque and speed limit.
+        saturated: share of ticks in which some motor gave all it has.
+    """
+
+    feet_off: float
+    torque: float
+    speed: float
+    saturated: float
+
+
+def plant_of(trial: Trial) -> MujocoPlant:
+    """A simulated robot under the conditions of the trial."""
+    rng = np.random.default_rng(FIRST_SEED + trial.seed)
+    friction, mass, yaw = rng.uniform(*zip(FRICTION_RANGE, MASS_RANGE, YAW_RANGE, strict=True))
+    return MujocoPlant(
+        friction=float(friction),
+        mass_scale=float(mass),
+        seed=FIRST_SEED + trial.seed,
+        initial_yaw=float(yaw),
+        initial_joint_noise=JOINT_NOISE,
+    )
+
+
+def random_steps(rng: np.random.Generator) -> Timeline:
+    """Every foot steps once, in any order, to any place nearby."""
+    line = Timeline(name="random steps")
+    for leg in rng.permutation(4).tolist():
+        x, y = rng.uniform((-STEP_AHEAD, -STEP_ASIDE), (STEP_AHEAD, STEP_ASIDE)).tolist()
+        line = line.step(LEGS[leg], x, y, over=float(rng.uniform(0.4, 0.8)))
+    return line.home(over=0.8)
+
+
+def walk_with_paws(gait: str) -> Timeline:
+    """2 m with two turns of 90 deg, and three raised paws."""
+    line = Timeline(name=f"{gait} with paws").walk(x=0.7, gait=gait)
+    line = _paw(line, "FR").turn(deg(90), gait=gait).walk(x=0.6, gait=gait)
+    line = _paw(line, "FL").turn(deg(-90), gait=gait).walk(x=0.7, gait=gait)
+    return _paw(line, "FR").home(over=0.8)
+
+
+def _paw(line: Timeline, leg: str) -> Timeline:
+    return line.foot(leg, x=0.06, z=0.12, over=0.7).hold(0.3).down(leg, over=0.6).home(over=0.6)
+
+
+def play(robot: TrialRobot, plan: CompiledPlan) -> Played:
+    """Play ``plan``.
+
+    Raises:
+        TrialFailed: if the robot falls, or says that it has not done it.
+    """
+    model = RobotModel()
+    anchor = feet_frame(robot)
+    robot.truth.clear()
+    robot.require(robot.go2.play(plan, check=False))
+    recorded = robot.truth.recording()
+    wanted = plan.at(plan.duration).placed(anchor).p_world_feet
+    off = recorded.p_world_feet[-1] - wanted
+    shares = recorded.torque_shares(model)
+    return Played(
+        feet_off=float(np.linalg.norm(off[:, :2], axis=1).max()),
+        torque=float(shares.max()),
+        speed=recorded.peak_speed_share(model),
+        saturated=float((shares >= FULL).any(axis=tuple(range(1, shares.ndim))).mean()),
+    )
+
+
+def feet_frame(robot: TrialRobot) -> Anchor:
+    """The frame of the feet as they stand, in truth."""
+    model = RobotModel()
+    return Anchor.of_feet(model.snapshot(robot.plant.read()).p_world_feet, model.foot_radius)
+
+
+def onwards(anchor: Anchor, pose: tuple[float, float, float]) -> Anchor:
+    """The frame at ``pose`` (x, y [m], yaw [rad]) in another one."""
+    x, y, yaw = pose
+    p = anchor.p_world + yaw_rotation(anchor.yaw) @ np.array([x, y, 0.0])
+    return Anchor(p, anchor.yaw + yaw)
+
+
+def measure_steps(trial: Trial) -> Measurement:
+    """Random steps, twice: of the feet's final places, the one that is farthest off."""
+    rng = np.random.default_rng(10 * FIRST_SEED + trial.seed)
+    line, model = random_steps(rng), RobotModel()
+    with TrialRobot(plant_of(trial)) as robot:
+        robot.require(robot.go2.stand())
+        played = play(robot, compile_timeline(line, model))
+    return Measurement(
+        {
+            "step.place": 1000.0 * played.feet_off,
+            "step.torque": played.torque,
+            "step.saturated": 100.0 * played.saturated,
+        }
+    )
+
+
+def measure_walk(trial: Trial, gait: str) -> Measurement:
+    """The walk three times in a row: where it ends, against where it was to end."""
+    plan = _walk(gait)
+    off: list[tuple[float, float]] = []
+    runs: list[Played] = []
+    with TrialRobot(plant_of(trial)) as robot:
+        robot.require(robot.go2.stand())
+        predicted = feet_frame(robot)
+        try:
+            for _ in range(ROUNDS):
+                runs.append(play(robot, plan))
+                predicted, ended = onwards(predicted, plan.end_pose), feet_frame(robot)
+                place = float(np.linalg.norm((ended.p_world - predicted.p_world)[:2]))
+                off.append((place, abs(wrap_angle(ended.yaw - predicted.yaw))))
+        except TrialFailed as failed:
+            name = f"{gait}.done"
+            return Measurement({name: len(runs) / ROUNDS}, {name: str(failed)}, str(failed))
+    return Measurement(
+        {
+            f"{gait}.done": 1.0,
+            f"{gait}.place1": 1000.0 * off[0][0],
+            f"{gait}.yaw1": math.degrees(off[0][1]),
+            f"{gait}.place3": 1000.0 * off[-1][0],
+            f"{gait}.yaw3": math.degrees(off[-1][1]),
+            f"{gait}.torque": max(run.torque for run in runs),
+            f"{gait}.speed": max(run.speed for run in runs),
+            f"{gait}.saturated": 100.0 * max(run.saturated for run in runs),
+        }
+    )
+
+
+@cache
+def _walk(gait: str) -> CompiledPlan:
+    """The walk, compiled once for all trials of a process: it depends on nothing of theirs."""
+    return compile_timeline(walk_with_paws(gait), RobotModel())
+
+
+def _walk_metrics(gait: str) -> tuple[Metric, ...]:
+    item = f"{gait} 2 m, two turns of 90 deg, three paws"
+    return (
+        Metric(f"{gait}.done", item, "share of three walks done", "", 1.0, Direction.AT_LEAST),
+        Metric(f"{gait}.place1", item, "end off its prediction", "mm", 50.0),
+        Metric(f"{gait}.yaw1", item, "heading off it", "deg", 4.0),
+        Metric(f"{gait}.place3", item, "end off, after three", "mm", 50.0),
+        Metric(f"{gait}.yaw3", item, "heading off, after three", "deg", 4.0),
+        Metric(f"{gait}.torque", item, "peak torque / limit", "", 1.0),
+        Metric(f"{gait}.speed", item, "peak joint speed / limit", "", 1.0),
+        Metric(f"{gait}.saturated", item, "saturated ticks", "%", 2.0),
+    )
+
+
+_STEP = "four random steps"
+SCENARIOS = (
+    Scenario(
+        "step",
+        (
+            Metric("step.place", _STEP, "worst foot off its place", "mm", 15.0),
+            Metric("step.torque", _STEP, "peak torque / limit", "", 1.0),
+            Metric("step.saturated", _STEP, "saturated ticks", "%", 2.0),
+        ),
+        measure_steps,
+    ),
+    Scenario("walk", _walk_metrics("walk"), partial(measure_walk, gait="walk")),
+    Scenario("trot", _walk_metrics("trot"), partial(measure_walk, gait="trot")),
+)
+"""In the order of the report."""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``steps``."""
+    parser = add_parser(
+        subparsers,
+        "steps",
+        "Authored steps and walks: where do they end, against where they were to end.\n"
+        "Exit code 0 if every threshold is met, 1 if one is not.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument("--seeds", metavar="N", type=positive, help=f"default {SEEDS}")
+    parser.add_argument("--quick", action="store_true", help=f"{QUICK_SEEDS} seeds")
+    parser.add_argument(
+        "--rows", metavar="NAME", nargs="+", default=[], help="only these scenarios; see --list"
+    )
+    add_options(parser, has_jobs=True, has_list=True)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run what was asked for, report, and say by the exit code whether all thresholds are met."""
+    scenarios = chosen_scenarios(SCENARIOS, args.rows)
+    seeds = args.seeds or (QUICK_SEEDS if args.quick else SEEDS)
+    return run_and_report(args, scenarios, tasks_of(scenarios, seeds))

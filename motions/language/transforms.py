@@ -1,0 +1,104 @@
+"""A whole motion made into another: slower, smaller, backwards, again and again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from go2_wbc.errors import TimelineError
+from motions.arguments import positive
+from motions.easing import backwards
+from motions.keys import (
+    BalanceShift,
+    BodyKey,
+    BodyPathKey,
+    Key,
+    LegKey,
+    LegTarget,
+    Mark,
+    PostureKey,
+)
+from motions.language.arrangement import Arrangement
+from motions.language.clock import SAME, BeatClock
+
+_Line = TypeVar("_Line", bound="Transforms")
+
+
+class Transforms(Arrangement):
+    """What can be made of a motion that is written."""
+
+    __slots__ = ()
+
+    def scale_time(self: _Line, factor: float) -> _Line:
+        """The same motion, ``factor`` times as long: 2 is half as fast."""
+        longer = positive("factor", factor)
+        return replace(
+            self,
+            keys=tuple(key.slower(longer) for key in self.keys),
+            clock=BeatClock(tuple(longer * t for t in self.clock.instants)),
+            shift_time=longer * self.shift_time,
+            **{name: longer * getattr(self, name) for name in ("cursor", "last_start", "floor")},
+        )
+
+    def scale(self: _Line, amplitude: float) -> _Line:
+        """The same motion with all offsets of trunk and feet multiplied: 0.5 is half as large.
+
+        Postures and the angles of ``leg`` and ``joint`` are no offsets, and stay.
+        """
+        share = positive("amplitude", amplitude)
+        return replace(self, keys=tuple(key.scaled(share) for key in self.keys))
+
+    def reverse(self: _Line) -> _Line:
+        """The same motion backwards; it must end at home.
+
+        Raises:
+            TimelineError: if it does not, or holds a call that has no way back.
+        """
+        self._require_home("reverse()")
+        end, last = self.end, dict[str, Any]()
+        keys = list[Key]()
+        for key in sorted(self.keys, key=lambda key: key.start):
+            keys.append(_backwards(key, last, self, end))
+        return replace(
+            self, keys=tuple(keys), entry=self.exit, exit=self.entry, cursor=end, floor=0.0
+        )
+
+    def loop(self: _Line, until: float) -> _Line:
+        """This whole motion, over and over, as often as it fits into ``until`` seconds.
+
+        Raises:
+            TimelineError: if it does not fit once, or does not end as it began.
+        """
+        times = int((positive("until", until) + SAME) / self.end) if self.end else 0
+        if times < 1:
+            raise TimelineError(
+                f"loop(): {until:g} s are less than the motion takes, {self.end:.2f} s"
+            )
+        return self.repeat(times)
+
+
+_GOALS: dict[type[Key], tuple[str, Callable[[Transforms], Any]]] = {
+    BodyKey: ("value", lambda line: 0.0),
+    BodyPathKey: ("value", lambda line: 0.0),
+    PostureKey: ("posture", lambda line: line.entry),
+    LegKey: ("target", lambda line: LegTarget.on_ground()),
+    BalanceShift: ("raised", lambda line: frozenset()),
+}
+"""What each key leads to, and where its track is before the first one."""
+
+
+def _backwards(key: Key, last: dict[str, Any], line: Transforms, end: float) -> Key:
+    """The key that leads back to where ``key`` came from; ``last``: where each track is."""
+    turned = replace(key, start=end - key.end, end=end - key.start, ease=backwards(key.ease))
+    if isinstance(key, Mark):
+        return turned
+    if type(key) not in _GOALS:
+        raise TimelineError(f"reverse() does not work with {key.track}: it has no way back")
+    name, first = _GOALS[type(key)]
+    before = last.get(key.track, first(line))
+    last[key.track] = getattr(key, name)
+    if isinstance(turned, BodyPathKey):
+        shares = tuple(1.0 - share for share in reversed(turned.shares))
+        turned = replace(turned, through=turned.through[::-1], shares=shares)
+    return replace(turned, **{name: before})

@@ -1,0 +1,1 @@
+"""Music: the beats of a song, songs whose beats are known, and dances on them."""
