@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from motions.assembly import compile_timeline
     from motions.authoring import Choice, Motion, Range, motion
     from motions.compiled_plan import CompiledPlan
+    from motions.dynamics.phases import Tolerance
     from motions.feasibility import (
         CheckedMotion,
         FeasibilityChecker,
@@ -37,6 +38,7 @@ __all__ = [
     "Playable",
     "Range",
     "Timeline",
+    "Tolerance",
     "beats",
     "check",
     "compile_motion",
@@ -58,6 +60,7 @@ __getattr__ = lazy_exports(
         "assembly": ("compile_timeline",),
         "authoring": ("Choice", "Motion", "Range", "motion"),
         "compiled_plan": ("CompiledPlan",),
+        "dynamics.phases": ("Tolerance",),
         "feasibility": (
             "CheckedMotion",
             "FeasibilityChecker",

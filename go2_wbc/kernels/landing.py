@@ -1,4 +1,4 @@
-"""Feet of a plan that land where and when they meet the ground, as a part of ``playing.follow``.
+"""Feet of a plan that land where and when they meet the ground: part of ``playing.follow_steps``.
 
 ``planning.landing`` is its readable form, and says why.
 """

@@ -1,9 +1,9 @@
 """One tick of a motion that is played, as kernels: the plan's row, and where it is followed.
 
 ``planned`` is the plan's reference at an instant, in the motion's frame; ``motions.plan`` is its
-readable form. ``follow`` places it in the world, lets its feet land when they meet the ground
-(``landing``), notes how far the robot is off it and adds the steady-state correction;
-``planning.playback`` is its readable form.
+readable form. ``follow`` places it in the world, notes how far the robot is off it and adds the
+steady-state correction; ``follow_steps`` also lets its feet land when they meet the ground
+(``landing``). ``planning.playback`` is their readable form.
 """
 
 from __future__ import annotations
@@ -209,22 +209,9 @@ def is_in_flight(row):
     return not stands
 
 
-@kernel(
-    f"void(f8[::1], f8[::1], f8, f8, f8[::1], {_LIST}, {_TABLE}, {_TABLE}, {_TABLE}, "
-    "f8[::1], f8[::1], f8[::1], f8[::1])"
-)
-def follow(
-    plan, snapshot, t, dt, contact, events, since, until, unloads, landing, correction, state, row
-):
-    """Fill the corrected reference in the world, ``dt`` seconds after the last one.
-
-    ``t``: how far into the plan; ``contact`` (4,): feet with a measured contact. ``events``,
-    ``since``, ``until``: of the plan's contacts; ``unloads``: of ``Footsteps``; ``landing``:
-    numbers of ``layout.LANDING``. Without any events no foot steps.
-    """
-    place(plan, state[_ANCHOR : _ANCHOR + 4], row)
-    if len(events) > 0:
-        land(t, contact, events, since, until, unloads, snapshot, landing, state, row)
+@subroutine("void(f8[::1], f8, f8[::1], f8[::1], f8[::1])")
+def correct(snapshot, dt, correction, state, row):
+    """Note how far the robot is off ``row``, and correct it after ``dt`` seconds of that error."""
     state[_SAG], state[_LEAN] = sag_and_lean(row, snapshot)
     measured = snapshot[_P_COM : _P_COM + 3] if row[_IS_COM] != 0.0 else snapshot[_Q : _Q + 3]
     R, wanted = snapshot[_R : _R + 9].reshape(3, 3), row[_BODY_R : _BODY_R + 9].reshape(3, 3)
@@ -251,3 +238,28 @@ def follow(
                 + turn[i, 1] * planned_attitude[1, k]
                 + turn[i, 2] * planned_attitude[2, k]
             )
+
+
+@kernel("void(f8[::1], f8[::1], f8, f8[::1], f8[::1], f8[::1])")
+def follow(plan, snapshot, dt, correction, state, row):
+    """Fill the corrected reference in the world, ``dt`` seconds after the last one."""
+    place(plan, state[_ANCHOR : _ANCHOR + 4], row)
+    correct(snapshot, dt, correction, state, row)
+
+
+@kernel(
+    f"void(f8[::1], f8[::1], f8, f8, f8[::1], {_LIST}, {_TABLE}, {_TABLE}, {_TABLE}, "
+    "f8[::1], f8[::1], f8[::1], f8[::1])"
+)
+def follow_steps(
+    plan, snapshot, t, dt, contact, events, since, until, unloads, landing, correction, state, row
+):
+    """The same for a plan whose feet step.
+
+    ``t``: how far into the plan; ``contact`` (4,): feet with a measured contact. ``events``,
+    ``since``, ``until``: of the plan's contacts; ``unloads``: of ``Footsteps``; ``landing``:
+    numbers of ``layout.LANDING``.
+    """
+    place(plan, state[_ANCHOR : _ANCHOR + 4], row)
+    land(t, contact, events, since, until, unloads, snapshot, landing, state, row)
+    correct(snapshot, dt, correction, state, row)

@@ -81,11 +81,11 @@ class Playback(PlanFollower):
         config: CorrectionConfig | None = None,
     ) -> None:
         """Follow a plan at ``anchor``, without correction at first."""
-        from go2_wbc.kernels.playing import follow
+        from go2_wbc.kernels.playing import follow, follow_steps
 
         config = config or CorrectionConfig()
-        self._follow = follow
-        self._steps = _NO_STEPS if footsteps is None else _tables(footsteps)
+        self._follow, self._follow_steps = follow, follow_steps
+        self._steps = None if footsteps is None else _tables(footsteps)
         self._correction = CORRECTION.pack([config.rate, config.window, config.limit])
         self._contact = np.zeros(4)
         self._state = np.zeros(PLAYBACK.size)
@@ -97,10 +97,14 @@ class Playback(PlanFollower):
         self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, t: float, dt: float
     ) -> Reference:
         """See ``PlanFollower.follow``."""
-        row, contact = np.empty(REFERENCE.size), self._contact
-        contact[:] = snapshot.state.feet_in_contact
+        row = np.empty(REFERENCE.size)
         steps, correction, state = self._steps, self._correction, self._state
-        self._follow(plan, snapshot.row, t, dt, contact, *steps, correction, state, row)
+        if steps is None:
+            self._follow(plan, snapshot.row, dt, correction, state, row)
+        else:
+            contact = self._contact
+            contact[:] = snapshot.state.feet_in_contact
+            self._follow_steps(plan, snapshot.row, t, dt, contact, *steps, correction, state, row)
         return Reference.of_row(row)
 
     @property
@@ -195,7 +199,3 @@ def _tables(footsteps: Footsteps) -> _Tables:
     events = np.array(contacts.times)
     numbers = LANDING.pack(landing_numbers(footsteps))
     return events, contacts.since, contacts.until, footsteps.unloads, numbers
-
-
-_NO_TABLE = np.zeros((0, 4))
-_NO_STEPS: _Tables = np.zeros(0), _NO_TABLE, _NO_TABLE, _NO_TABLE, np.zeros(LANDING.size)
