@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import BSpline, CubicSpline
-from scipy.sparse import block_diag, csr_matrix, diags, hstack, vstack
+from scipy.sparse import block_diag, csr_matrix, diags, eye, hstack, vstack
 from scipy.sparse.linalg import spsolve
 
 from go2_wbc.geometry import convex_hull
@@ -88,7 +88,7 @@ class Stepping:
 def sway(stepping: Stepping) -> Float[np.ndarray, "n 2"]:
     """What to add to the place of the CoM [m]; nothing, at rest, at both ends."""
     values, curvature, jerk = _spline(stepping)
-    if values.shape[1] == 0:
+    if not values.nnz:
         return np.zeros((len(stepping.times), 2))
     G, h = _limits(stepping, values, csr_matrix(values - diags(stepping.lever) @ curvature))
     period = float(np.mean(np.diff(stepping.times)))
@@ -105,23 +105,20 @@ def _least(
 
     Newton's steps, halved until f falls; they end where they would gain nothing.
     """
-    x, beyond = np.zeros(H.shape[0]), -h
-    f = stiffness * float((np.maximum(beyond, 0.0) ** 2).sum())
+
+    def f(x: Float[np.ndarray, " m"]) -> float:
+        beyond = np.maximum(G @ x - h, 0.0)
+        return float(x @ (H @ x) + stiffness * beyond @ beyond)
+
+    x = np.zeros_like(H.diagonal())
     for _ in range(MOST_STEPS):
-        active = beyond > 0.0
-        part, goal = G[active], h[active]
-        way = spsolve((H + stiffness * part.T @ part).tocsc(), stiffness * (part.T @ goal)) - x
-        for share in HALVES:
-            tried = x + share * way
-            beyond = G @ tried - h
-            before, f = f, float(tried @ (H @ tried))
-            f += stiffness * float((np.maximum(beyond, 0.0) ** 2).sum())
-            if f < before:
-                break
-            f = before
-        if not f < (1.0 - GAIN) * before:
+        active = G @ x > h
+        part, wanted = G[active], (1.0 - GAIN) * f(x)
+        way = spsolve((H + stiffness * part.T @ part).tocsc(), stiffness * part.T @ h[active]) - x
+        better = next((p for p in (x + share * way for share in HALVES) if f(p) < wanted), None)
+        if better is None:
             break
-        x = tried
+        x = better
     return x
 
 
@@ -143,7 +140,7 @@ def _spline(stepping: Stepping) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
     inside = np.clip(times, knots[3], knots[-4])
     count = pieces + 3
     differences = [
-        diags([-1.0, 1.0], [0, 1], shape=(n - 1, n)) / length for n in (count, count - 1, count - 2)
+        (eye(n - 1, n, k=1) - eye(n - 1, n)) / length for n in (count, count - 1, count - 2)
     ]
     second = differences[1] @ differences[0]
     values = BSpline.design_matrix(inside, knots, 3)

@@ -129,7 +129,8 @@ class FeasibilityChecker:
             *dynamic.torque(path, forces, model, limits),
             *in_flight,
         ]
-        report = FeasibilityReport.of(plan.name, plan.duration, in_order_of_causes)
+        end_pose = plan.end_pose if isinstance(plan, CompiledPlan) else None
+        report = FeasibilityReport.of(plan.name, plan.duration, in_order_of_causes, end_pose)
         return CheckedMotion(plan, report, path, forces)
 
 

@@ -34,6 +34,13 @@ def last_feet(line: Timeline) -> np.ndarray:
     return trajectory_of(plan_of(line), MODEL).p_feet[-1]
 
 
+def feasible(line: Timeline) -> CompiledPlan:
+    """The plan of a motion that the check lets pass."""
+    plan = plan_of(line)
+    CHECKER.check(plan).raise_if_infeasible()
+    return plan
+
+
 def failures(line: Timeline) -> set[str]:
     return {finding.check for finding in CHECKER.check(line).failures}
 
@@ -58,7 +65,7 @@ def test_a_foot_that_steps_lands_where_the_step_says_and_the_others_stay() -> No
 
 
 def test_a_robot_that_steps_lands_the_foot_where_the_step_says() -> None:
-    plan = CHECKER.plan(Timeline().step("FL", 0.06, 0.03, over=0.6).home(over=0.8))
+    plan = feasible(Timeline().step("FL", 0.06, 0.03, over=0.6).home(over=0.8))
     _, feet = played(plan)
     planned = plan.at(plan.duration).p_world_feet[Leg.FL]
     assert np.linalg.norm((feet[Leg.FL] - planned)[:2]) < PLACED
@@ -214,6 +221,15 @@ def test_a_trot_whose_trunk_leaves_the_line_of_its_feet_is_refused() -> None:
     assert "support of ZMP" in failures(line)
 
 
+def test_the_report_says_where_a_motion_ends_if_it_goes_anywhere() -> None:
+    line = Timeline().walk(0.2, gait="trot")
+    report = CHECKER.check(line)
+    assert report.table().endswith("It ends at x 0.200 m, y 0.000 m, turned by 0.0 deg.")
+    assert report.as_dict()["end_pose"] == pytest.approx(line.end_pose, abs=EXACT)
+    stays = Timeline().body(z=-0.01, over=0.5).home(over=0.5)
+    assert "It ends" not in CHECKER.check(stays).table()
+
+
 def test_a_motion_ends_above_its_feet_or_is_refused() -> None:
     assert "entry and exit" in failures(Timeline().walk(0.1, gait="trot").body(x=0.05, over=0.5))
 
@@ -224,7 +240,7 @@ def test_a_motion_ends_above_its_feet_or_is_refused() -> None:
 def test_a_robot_ends_a_trot_with_turns_and_a_raised_paw_where_it_was_to_end() -> None:
     line = Timeline().walk(0.3, gait="trot").turn(deg(60), gait="trot")
     line = line.foot("FR", x=0.05, z=0.1, over=0.6).home(over=0.6).side_step(0.1, gait="trot")
-    plan = CHECKER.plan(line)
+    plan = feasible(line)
     _, feet = played(plan)
     ended, (x, y, yaw) = Anchor.of_feet(feet, MODEL.foot_radius), plan.end_pose
     assert np.hypot(ended.p_world[0] - x, ended.p_world[1] - y) < ENDED
@@ -232,7 +248,7 @@ def test_a_robot_ends_a_trot_with_turns_and_a_raised_paw_where_it_was_to_end() -
 
 
 def test_a_robot_walks_with_one_foot_after_the_other() -> None:
-    plan = CHECKER.plan(Timeline().walk(0.12, turn=deg(10)))
+    plan = feasible(Timeline().walk(0.12, turn=deg(10)))
     _, feet = played(plan)
     wanted = plan.at(plan.duration).p_world_feet
     assert np.linalg.norm((feet - wanted)[:, :2], axis=1).max() < PLACED
