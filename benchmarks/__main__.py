@@ -17,6 +17,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("dynamics", "benchmarks.dynamics", "solving dynamic motions, and what comes of it"),
     Command("dance", "benchmarks.dance", "dances against the true beats of their songs"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
+    Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
     Command("solve", "benchmarks.solved_plans", "solve the library's dynamic plans, to ship them"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
     Command("evidence", "benchmarks.evidence", "fill the table of docs/evidence.md"),
@@ -37,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     if arguments == ["--list"]:
         for command in COMMANDS:
-            print(f"{command.name:<14}{command.summary}")
+            print(f"{command.name:<17}{command.summary}")
         return ExitCode.OK
     description = "Measure over many seeds, against fixed thresholds. --list names the benchmarks."
     program = Program("python -m benchmarks", description, COMMANDS, EXAMPLES)

@@ -1,0 +1,227 @@
+"""``python -m benchmarks dynamic_motions``: dynamic motions, played in physics.
+
+Jumps, hops, rears and a lifted pair from stand to stand, by torques alone. Nothing was tuned on the
+seeds that are judged here.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario, chosen_scenarios
+from benchmarks.session import add_options, positive, run_and_report, tasks_of
+from benchmarks.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
+from controller.cli.common import Subparsers, add_parser
+from controller.motion_measurement import FULL
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from go2_wbc.reference import Anchor
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg
+
+FIRST_SEED = 6200
+"""Seed of the first trial that is judged."""
+FRICTION_RANGE = (0.6, 1.0)
+MASS_RANGE = (0.95, 1.05)
+"""Factor on every mass and inertia of the robot; the controller is not told."""
+AFTERWARDS = 1.0
+"""Time [s] for which the robot must stand when the motion is over."""
+PRESSED = 15.0
+"""Force [N] on a foot from which on it has touched down: a tenth of the weight."""
+FLOWN = 0.06
+"""Time [s] without contact after which a contact counts as a touchdown."""
+TEMPO, HOPS = 120.0, 3
+SEEDS, QUICK_SEEDS = 20, 3
+EXAMPLES = """
+python -m benchmarks dynamic_motions            everything; minutes on two cores
+python -m benchmarks dynamic_motions --quick    three seeds
+python -m benchmarks dynamic_motions --rows up turn --json
+python -m benchmarks dynamic_motions --list     the metrics and their thresholds
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """What is played, and what it must reach.
+
+    Attributes:
+        title: in the report.
+        write: makes the timeline.
+        height: planned height [m] of the feet, where it is judged.
+        counts_beats: whether touchdowns are compared with beats.
+        done: share of the trials that must be done.
+    """
+
+    title: str
+    write: Callable[[], Timeline]
+    height: float | None = None
+    counts_beats: bool = False
+    done: float = 1.0
+
+
+def _jump(**values: float) -> Timeline:
+    return Timeline().jump(**values)
+
+
+ITEMS: dict[str, Item] = {
+    "up": Item("jump, feet 0.15 m up", partial(_jump, height=0.15), height=0.15),
+    "forward": Item("jump 0.5 m ahead", partial(_jump, x=0.5, height=0.1)),
+    "sideways": Item("jump 0.3 m to the left", partial(_jump, y=0.3, height=0.1)),
+    "back": Item("jump 0.3 m back", partial(_jump, x=-0.3, height=0.1)),
+    "turn": Item("jump and turn by 90 deg", lambda: Timeline().spin_jump(deg(90))),
+    "hops": Item(
+        "three hops to 120 beats a minute",
+        lambda: Timeline().bpm(TEMPO).hop(HOPS, period=1),
+        counts_beats=True,
+    ),
+    "rear25": Item("rear up, trunk at -25 deg", lambda: Timeline().rear(deg(-25), hold=0.6)),
+    "rear40": Item(
+        "rear up, trunk at -40 deg", lambda: Timeline().rear(deg(-40), hold=0.6), done=0.95
+    ),
+    "pair": Item("diagonal pair lifted 0.35 s", lambda: Timeline().lift(("FL", "RR"), hold=0.35)),
+}
+
+
+def plant_of(trial: Trial) -> MujocoPlant:
+    """A simulated robot under the conditions of the trial."""
+    rng = np.random.default_rng(FIRST_SEED + trial.seed)
+    friction, mass, yaw = rng.uniform(*zip(FRICTION_RANGE, MASS_RANGE, YAW_RANGE, strict=True))
+    return MujocoPlant(
+        friction=float(friction),
+        mass_scale=float(mass),
+        seed=FIRST_SEED + trial.seed,
+        initial_yaw=float(yaw),
+        initial_joint_noise=JOINT_NOISE,
+    )
+
+
+@cache
+def plan_of(name: str) -> tuple[CompiledPlan, bool]:
+    """The plan of an item, and whether the check lets it pass; once for all trials of a process."""
+    model = RobotModel()
+    plan = compile_timeline(ITEMS[name].write(), model)
+    return plan, FeasibilityChecker(model).check(plan).ok
+
+
+def measure(trial: Trial, name: str) -> Measurement:
+    """Play it, stand for a second, look what came of it."""
+    plan, is_feasible = plan_of(name)
+    if not is_feasible:
+        return Measurement({f"{name}.done": 0.0}, reason="the check refuses the plan")
+    model = RobotModel()
+    with TrialRobot(plant_of(trial)) as robot:
+        robot.require(robot.go2.stand())
+        before = _feet_frame(robot, model)
+        robot.truth.clear()
+        try:
+            robot.require(robot.go2.play(plan, check=False))
+            recorded = robot.truth.recording()
+            robot.wait(AFTERWARDS)
+        except TrialFailed as failed:
+            done = f"{name}.done"
+            return Measurement({done: 0.0}, {done: str(failed)}, str(failed))
+        after = _feet_frame(robot, model)
+    return Measurement(_values(name, plan, recorded, (before, after), model))
+
+
+def _values(
+    name: str,
+    plan: CompiledPlan,
+    recorded: TruthRecording,
+    frames: tuple[Anchor, Anchor],
+    model: RobotModel,
+) -> dict[str, float]:
+    before, after = frames
+    x, y, yaw = plan.end_pose
+    moved = yaw_rotation(before.yaw).T @ (after.p_world - before.p_world)
+    shares = recorded.torque_shares(model)
+    is_full = (shares >= FULL).any(axis=tuple(range(1, shares.ndim)))
+    values = {
+        f"{name}.done": 1.0,
+        f"{name}.place": 1000.0 * math.hypot(moved[0] - x, moved[1] - y),
+        f"{name}.yaw": abs(math.degrees(wrap_angle(after.yaw - before.yaw - yaw))),
+        f"{name}.torque": float(shares.max()),
+        f"{name}.speed": recorded.peak_speed_share(model),
+        f"{name}.saturated": 100.0 * float(is_full.mean()),
+    }
+    item = ITEMS[name]
+    if item.height is not None:
+        heights = recorded.p_world_feet[:, :, 2].min(axis=1) - model.foot_radius
+        values[f"{name}.height"] = 1000.0 * abs(float(heights.max()) - item.height)
+    if item.counts_beats:
+        values[f"{name}.beat"] = 1000.0 * _beat_error(recorded)
+    return values
+
+
+def _beat_error(recorded: TruthRecording) -> float:
+    """Greatest distance [s] of a touchdown of all feet from its beat; a missing one counts as 1."""
+    times = recorded.time - recorded.time[0]
+    flies = (recorded.foot_forces < PRESSED).all(axis=1)
+    edges = np.flatnonzero(np.diff(flies.astype(int)))
+    landings = [
+        float(times[end + 1])
+        for start, end in zip(edges[:-1], edges[1:], strict=True)
+        if flies[end] and times[end] - times[start] >= FLOWN
+    ]
+    beat = 60.0 / TEMPO
+    off = [abs(t / beat - round(t / beat)) * beat for t in landings]
+    return max(off) if len(landings) == HOPS else 1.0
+
+
+def _feet_frame(robot: TrialRobot, model: RobotModel) -> Anchor:
+    return Anchor.of_feet(model.snapshot(robot.plant.read()).p_world_feet, model.foot_radius)
+
+
+def _metrics(name: str, item: Item) -> tuple[Metric, ...]:
+    title, least = item.title, Direction.AT_LEAST
+    found = [
+        Metric(f"{name}.done", title, "done, stands 1 s later", "", item.done, least),
+        Metric(f"{name}.place", title, "lands off its place", "mm", 40.0),
+        Metric(f"{name}.yaw", title, "lands off its heading", "deg", 3.0),
+        Metric(f"{name}.torque", title, "peak torque / limit", "", 1.0),
+        Metric(f"{name}.speed", title, "peak joint speed / limit", "", 1.0),
+        Metric(f"{name}.saturated", title, "saturated ticks", "%", 2.0),
+    ]
+    if item.height is not None:
+        found.append(Metric(f"{name}.height", title, "apex off the plan", "mm", 20.0))
+    if item.counts_beats:
+        found.append(Metric(f"{name}.beat", title, "touchdown off its beat", "ms", 20.0))
+    return tuple(found)
+
+
+SCENARIOS = tuple(
+    Scenario(name, _metrics(name, item), partial(measure, name=name))
+    for name, item in ITEMS.items()
+)
+"""In the order of the report."""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``dynamic_motions``."""
+    parser = add_parser(
+        subparsers,
+        "dynamic_motions",
+        "Jumps, hops, rears and lifts in physics: are they done, and where do they land.\n"
+        "Exit code 0 if every threshold is met, 1 if one is not.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument("--seeds", metavar="N", type=positive, help=f"default {SEEDS}")
+    parser.add_argument("--quick", action="store_true", help=f"{QUICK_SEEDS} seeds")
+    parser.add_argument(
+        "--rows", metavar="NAME", nargs="+", default=[], help="only these scenarios; see --list"
+    )
+    add_options(parser, has_jobs=True, has_list=True)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run what was asked for, report, and say by the exit code whether all thresholds are met."""
+    scenarios = chosen_scenarios(SCENARIOS, args.rows)
+    seeds = args.seeds or (QUICK_SEEDS if args.quick else SEEDS)
+    return run_and_report(args, scenarios, tasks_of(scenarios, seeds))
