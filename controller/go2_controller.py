@@ -219,22 +219,31 @@ class GO2Controller:
                 plan = motions.compile_timeline(timeline, self._checker.model)
         return self._call("high_five", lambda: self._pilot.high_five(plan, leg, HEIGHT))
 
-    def play(self, motion: motions.Playable, *, check: bool = True) -> bool:
-        """Play a motion: a name of the library, a timeline, a compiled plan, or a checked motion.
+    def play(
+        self, motion: motions.Playable, *, check: bool = True, allow_dynamic: bool = False
+    ) -> bool:
+        """Play a motion: a name of the library, a saved motion's file, a timeline, or a plan.
 
-        With ``check=False`` also one that the robot cannot do, to see what happens. What
-        ``FeasibilityChecker.evaluate`` returned is neither compiled nor checked again.
+        What ``FeasibilityChecker.evaluate`` returned is neither compiled nor checked again.
+
+        Args:
+            motion: a ``Playable``.
+            check: with False also one that the robot cannot do is played, to see what happens.
+            allow_dynamic: let also a robot that may be a real one (``Plant.is_hardware``) play
+                motions with flight or on fewer than three feet. Simulated ones always do.
 
         Raises:
             CommandError: for an unknown name; lists the valid ones. Also for what is no motion.
             TimelineError: for an empty timeline.
+            MotionFileError: for a file that cannot be used.
+            DynamicMotionRefused: for a dynamic motion on hardware without ``allow_dynamic``.
             StanceMismatch: if the motion starts from another stance.
             MotionInfeasible: if the motion breaks a limit of the robot; carries the findings.
         """
         self._check_open()
         with self._planning:  # one thread at a time
             plan = self._checker.plan(motion, check=check)
-        return self._call("play", lambda: self._pilot.play(plan))
+        return self._call("play", lambda: self._pilot.play(plan, allow_dynamic=allow_dynamic))
 
     def cancel(self) -> None:
         """From another thread or the plant: leave the motion that plays, safely, and stand.

@@ -33,7 +33,7 @@ from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait, find_gait
-from go2_wbc.errors import ModeError, StanceMismatch
+from go2_wbc.errors import DynamicMotionRefused, ModeError, StanceMismatch
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.reference import MotionPlan, Posture
@@ -226,12 +226,28 @@ class Pilot:
 
     # --- motions --------------------------------------------------------------------------
 
-    def play(self, plan: MotionPlan, watch: Callable[[float], None] | None = None) -> Measurements:
+    def play(
+        self,
+        plan: MotionPlan,
+        watch: Callable[[float], None] | None = None,
+        *,
+        allow_dynamic: bool = False,
+    ) -> Measurements:
         """Play ``plan``; ``watch(t)`` is called after every tick, t seconds into it.
 
         Raises:
+            DynamicMotionRefused: if the plan is dynamic, the plant may be a robot, and the caller
+                does not allow it.
             StanceMismatch: if the plan starts from another stance.
         """
+        plant = self._loop.plant
+        if plan.is_dynamic and plant.is_hardware and not allow_dynamic:
+            raise DynamicMotionRefused(
+                f"motion {plan.name!r} is dynamic: fewer than three feet carry the robot in parts "
+                f"of it, so it cannot be stopped there, and {type(plant).__name__} may move a "
+                "robot. No dynamic motion of this project was tried on one. To play it all the "
+                "same: play(..., allow_dynamic=True)"
+            )
         self._meet_entry(plan)
         if self._must_return:
             raise Aborted(

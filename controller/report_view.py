@@ -15,8 +15,9 @@ from go2_wbc.recording import Recording
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from motions import CheckedMotion, FeasibilityReport, Finding
+from motions.authoring import Choice, Parameter
 from motions.feasibility import Series
-from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Verdict
+from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Slider, Verdict
 
 _AFTERWARDS = 1.0
 """How long [s] a run is shown after the end of its motion."""
@@ -46,6 +47,15 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
     labels = (*plan.labels, "afterwards")
     own = replace(own, labels=tuple(labels[row] for row in np.searchsorted(plan.time, own.time)))
     return ReplayContent(own, verdict=verdict_of(checked.report), ghost=plan)
+
+
+def slider(parameter: Parameter, value: float | str) -> Slider:
+    """A motion's parameter as what a live page lets one choose."""
+    valid = parameter.valid
+    if isinstance(valid, Choice):
+        return Slider(parameter.name, value, words=valid.words)
+    is_whole = isinstance(parameter.default, int)
+    return Slider(parameter.name, value, valid.low, valid.high, is_whole, valid.unit)
 
 
 def verdict_of(report: FeasibilityReport) -> Verdict:

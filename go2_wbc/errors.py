@@ -17,6 +17,8 @@
     │   └── PlantTimeout        the plant stopped answering
     └── MotionError
         ├── TimelineError       an authored motion is written wrongly
+        ├── DynamicMotionRefused  it jumps or stands on few feet, and nobody allowed that
+        ├── MotionFileError     a saved motion or plan cannot be used; says why
         ├── MotionInfeasible    the motion breaks a limit; carries the findings
         └── StanceMismatch      the motion starts from another stance
 
@@ -27,6 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 
 
 class Go2WbcError(Exception):
@@ -127,6 +130,14 @@ class TimelineError(MotionError, ValueError):
     """An authored motion is written wrongly; the message says what and how to write it."""
 
 
+class DynamicMotionRefused(MotionError):
+    """A motion with flight or few feet was asked of hardware without being allowed."""
+
+
+class MotionFileError(MotionError, ValueError):
+    """A saved motion or plan is damaged, of another version or robot, or cannot be a file."""
+
+
 class MotionInfeasible(MotionError):
     """The motion breaks a limit; ``findings`` says which, where and when."""
 
@@ -140,5 +151,8 @@ class StanceMismatch(MotionError):
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
-    """Message for a name that does not exist, with the names that do."""
-    return f"unknown {kind} {name!r}; valid: {', '.join(sorted(valid))}"
+    """Message for a name that does not exist, with all that do, and the nearest."""
+    names = sorted(valid)
+    nearest = get_close_matches(name, names, 1)
+    hint = f"; did you mean {nearest[0]!r}?" if nearest else ""
+    return f"unknown {kind} {name!r}; valid: {', '.join(names)}{hint}"

@@ -240,6 +240,14 @@ class MotionPlan(ABC):
     exit: Posture
     duration: float
 
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether there are phases that fewer than three feet carry: flight, or two feet.
+
+        Such a motion cannot be stopped in the middle, and is refused on hardware unless allowed.
+        """
+        return False
+
     @abstractmethod
     def at(self, t: float) -> Reference:
         """The reference ``t`` seconds after the start; the ends are held outside [0, duration]."""

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
         compile_motion,
     )
     from motions.registry import find_motion, load_file, load_motion, motion_names
+    from motions.saved.motion_file import save_motion
+    from motions.saved.plan_file import load_plan, save_plan
     from motions.timeline import Timeline, deg
 
 __all__ = [
@@ -40,8 +42,11 @@ __all__ = [
     "find_motion",
     "load_file",
     "load_motion",
+    "load_plan",
     "motion",
     "motion_names",
+    "save_motion",
+    "save_plan",
 ]
 
 __getattr__ = lazy_exports(
@@ -59,6 +64,8 @@ __getattr__ = lazy_exports(
             "compile_motion",
         ),
         "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
+        "saved.motion_file": ("save_motion",),
+        "saved.plan_file": ("load_plan", "save_plan"),
         "timeline": ("Timeline", "deg"),
     },
 )

@@ -13,12 +13,16 @@ from scipy.interpolate import PPoly
 
 from go2_wbc.contacts import TIE, ContactSchedule
 from go2_wbc.curves import CurvePoint
+from go2_wbc.errors import MotionError
 from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.reference import Anchor, LegTask, MotionPlan, Posture, Reference, TrackedPoint
 from motions.placement import attitudes
 from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, reference
 from motions.problem import Problem
 from motions.samples import PlanSamples
+
+LEAST_FEET = 3
+"""Standing feet that span an area, so that a robot that stops there can keep standing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +53,13 @@ class CompiledPlan(MotionPlan):
     _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Bind what the kernel reads."""
+        """Bind what the kernel reads; raise MotionError for tables of different lengths."""
         contacts, curves = self.contacts, self.curves
+        if self.swings.shape != contacts.modes.shape:
+            raise MotionError(
+                f"plan {self.name!r}: swings must have a row for each of {len(contacts.times)} "
+                f"contact events, got {list(self.swings.shape)}"
+            )
         tasks, events = _tasks(contacts.modes, self.swings), np.array(contacts.times)
         tables = (curves.x, curves.c, events, tasks, contacts.since, contacts.until)
         object.__setattr__(self, "_tables", tables)
@@ -66,6 +75,11 @@ class CompiledPlan(MotionPlan):
         anchor = Anchor.of_feet(self.curves(self.duration)[18:].reshape(4, 3), 0.0)
         x, y, _ = anchor.p_world.tolist()
         return x, y, anchor.yaw
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether fewer than three feet stand at any time; see ``MotionPlan.is_dynamic``."""
+        return bool((self.contacts.modes.sum(axis=1) < LEAST_FEET).any())
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""

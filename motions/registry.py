@@ -14,6 +14,7 @@ from typing import Any
 from go2_wbc.errors import CommandError, TimelineError, unknown_name
 from motions import library
 from motions.authoring import Motion, Value, last_line
+from motions.saved.motion_file import MOTION_FORMAT, read_motion
 from motions.timeline import Timeline
 
 
@@ -35,14 +36,24 @@ def find_motion(name: str) -> Motion:
     return getattr(module, name)
 
 
-def load_motion(name: str, **values: Value) -> Timeline:
-    """The timeline of a motion of the library, with these parameters.
+def load_motion(name: str | Path, **values: Value) -> Timeline:
+    """The timeline of a motion of the library, with these parameters, or of a ``.json`` file.
 
     Raises:
         CommandError: for an unknown name; lists the valid ones.
-        TimelineError: for a parameter that is not valid.
+        TimelineError: for a parameter that is not valid; a file has none.
+        MotionFileError: if the file is missing, damaged, or not what ``save_motion`` wrote.
     """
-    return find_motion(name)(**values)
+    if not is_saved_motion(name):
+        return find_motion(str(name))(**values)
+    if values:
+        raise TimelineError(f"{name}: a saved motion has no parameters, got {', '.join(values)}")
+    return read_motion(name)
+
+
+def is_saved_motion(name: str | Path) -> bool:
+    """Whether ``name`` is that of a file from ``save_motion``, by its ending."""
+    return str(name).endswith(MOTION_FORMAT.suffix)
 
 
 def load_file(path: Path | str) -> Mapping[str, Motion]:

@@ -97,6 +97,28 @@ class Verdict:
 
 
 @dataclass(frozen=True, slots=True)
+class Slider:
+    """A parameter that can be chosen on a live page.
+
+    Attributes:
+        name: of the parameter.
+        value: what is chosen now: a number, or one of ``words``.
+        low, high: what is valid.
+        is_whole: only whole numbers are.
+        unit: of the number.
+        words: what is valid instead of a number.
+    """
+
+    name: str
+    value: float | str
+    low: float = 0.0
+    high: float = 1.0
+    is_whole: bool = False
+    unit: str = ""
+    words: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class ReplayContent:
     """What to show.
 
@@ -105,12 +127,16 @@ class ReplayContent:
         is_plan: it is a plan; otherwise it was measured.
         verdict: what to say about the motion.
         ghost: another movement, shown translucent; its clock starts with the first one's.
+        beats: instants [s] that the motion counts in, drawn as a ruler.
+        sliders: parameters that a live page lets one choose.
     """
 
     recording: Recording
     is_plan: bool = False
     verdict: Verdict | None = None
     ghost: Recording | None = None
+    beats: tuple[float, ...] = ()
+    sliders: tuple[Slider, ...] = ()
 
 
 def checked_content(shown: Recording | ReplayContent) -> ReplayContent:

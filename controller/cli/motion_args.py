@@ -9,9 +9,14 @@ from typing import TYPE_CHECKING
 from go2_wbc.errors import CommandError, unknown_name
 
 if TYPE_CHECKING:
-    from motions import FeasibilityReport, Motion, Timeline
+    from collections.abc import Sequence
 
-MOTION_HELP = "a name of the library, FILE.py, or FILE.py:NAME"
+    from motions import CompiledPlan, FeasibilityReport, Motion, Timeline
+    from motions.authoring import Parameter, Value
+
+SAVED_MOTION, SAVED_PLAN = ".json", ".plan"
+"""Endings of the files that ``save_motion`` and ``save_plan`` write."""
+MOTION_HELP = "a name of the library, FILE.py[:NAME], or a saved FILE.json or FILE.plan"
 
 
 def add_motion(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
@@ -28,27 +33,40 @@ def add_motion(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
     )
 
 
-def timelines(words: list[str], settings: list[str]) -> list[Timeline]:
-    """The motions that are meant; the whole library if there is no word.
+def meant(words: list[str], settings: list[str]) -> list[Timeline | CompiledPlan]:
+    """The motions, or saved plans, that are meant; the whole library if there is no word.
 
     Raises:
         CommandError: for an unknown name or a setting that cannot be read.
         TimelineError: for a file that cannot be used or a parameter out of range.
+        MotionFileError: for a saved motion or plan that cannot be used.
     """
     from motions import motion_names
     from motions.authoring import parse_values
 
     values = parse_values(settings)
-    return [motion(**values) for word in words or motion_names() for motion in motions_of(word)]
+    return [line for word in words or motion_names() for line in _meant_by(word, values)]
 
 
-def the_motion(word: str, settings: list[str]) -> Timeline:
-    """The one motion that is meant; raises as ``timelines``, and CommandError for several."""
-    found = timelines([word], settings)
+def the_motion(word: str, settings: list[str]) -> Timeline | CompiledPlan:
+    """The one motion or plan that is meant; raises as ``meant``, and CommandError for several."""
+    found = meant([word], settings)
     if len(found) > 1:
         names = ", ".join(line.name for line in found)
         raise CommandError(f"{word} has several motions, choose FILE.py:NAME: {names}")
     return found[0]
+
+
+def _meant_by(word: str, values: dict[str, Value]) -> Sequence[Timeline | CompiledPlan]:
+    from motions import load_motion, load_plan
+
+    if word.endswith(SAVED_PLAN):
+        if values:
+            raise CommandError(f"{word}: a saved plan has no parameters, got {', '.join(values)}")
+        return [load_plan(word)]
+    if word.endswith(SAVED_MOTION):
+        return [load_motion(word, **values)]
+    return [motion(**values) for motion in motions_of(word)]
 
 
 def motions_of(word: str) -> list[Motion]:
@@ -76,33 +94,61 @@ def print_verdict(report: FeasibilityReport) -> None:
 
 
 class MotionSource:
-    """Makes a motion's timeline anew whenever its file was saved.
+    """Makes a motion anew whenever its file was saved.
 
     Attributes:
         path: the file.
         name: of the motion.
+        parameters: those that it had when it was made last, with what was chosen for each; a saved
+            motion has none.
     """
 
     def __init__(self, word: str, settings: list[str]) -> None:
         """Find the one motion that is meant; raises as ``the_motion``."""
-        own, _, _ = word.partition(":")
-        if not own.endswith(".py"):  # of the library: read its file too, as if it were one's own
+        is_saved = word.endswith((SAVED_MOTION, SAVED_PLAN))
+        own = word if is_saved else word.partition(":")[0]
+        if not (is_saved or own.endswith(".py")):
+            # of the library: read its file too, as if it were one's own
             (motion,) = motions_of(word)
             own = motion.source.rpartition(":")[0]
             word = f"{own}:{word}"
         self._word, self._settings, self.path = word, settings, Path(own)
+        self._is_saved, self._is_new_choice = is_saved, False
+        self._chosen: dict[str, Value] = {}
+        self.parameters: dict[Parameter, Value] = {}
         self._seen = self._last = self._signature()
-        self.name = self.timeline().name
+        self.name = self.motion().name
 
-    def timeline(self) -> Timeline:
-        """The motion as its file says now; raises as ``the_motion``."""
-        return the_motion(self._word, self._settings)
+    def motion(self) -> Timeline | CompiledPlan:
+        """The motion as its file says now, with what was chosen; raises as ``the_motion``."""
+        from motions.authoring import parse_values
+
+        if self._is_saved:
+            return the_motion(self._word, self._settings)
+        found = motions_of(self._word)
+        if len(found) > 1:
+            names = ", ".join(motion.name for motion in found)
+            raise CommandError(f"{self._word} has several motions, choose FILE.py:NAME: {names}")
+        parameters = {parameter.name: parameter for parameter in found[0].parameters}
+        chosen = {name: value for name, value in self._chosen.items() if name in parameters}
+        values = {**parse_values(self._settings), **chosen}
+        self.parameters = {
+            item: values.get(name, item.default) for name, item in parameters.items()
+        }
+        return found[0](**values)
+
+    def choose(self, values: dict[str, Value]) -> None:
+        """Take other values for parameters; any thread may call."""
+        self._chosen, self._is_new_choice = values, True
 
     def has_changed(self) -> bool:
-        """Whether the file was saved, and has rested since the call before.
+        """Whether other values were chosen, or the file was saved and rested since the call before.
 
         A save takes a moment, in which the file may be empty, cut short or away.
         """
+        if self._is_new_choice:
+            self._is_new_choice = False
+            return True
         now = self._signature()
         has_rested, self._last = now == self._last, now
         if now is None or now == self._seen or not has_rested:

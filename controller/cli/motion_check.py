@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
-from controller.cli.motion_args import add_motion, print_verdict, timelines
+from controller.cli.motion_args import add_motion, meant, print_verdict
 from controller.cli.progress import ProgressLine
 
 EXAMPLES = """
@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     """Check, print, and say by the exit code whether all is feasible."""
     from motions import FeasibilityChecker
 
-    lines = timelines(args.motion, args.values)
+    lines = meant(args.motion, args.values)
     checker = FeasibilityChecker()
     reports = []
     with ProgressLine() as progress:

@@ -1,4 +1,4 @@
-"""``go2-wbc export``: a motion's trajectory as NumPy or CSV, for other tools."""
+"""``go2-wbc export``: a motion's trajectory as NumPy or CSV, or the motion itself, as a file."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
-from controller.cli.motion_args import add_motion, the_motion
+from controller.cli.motion_args import SAVED_MOTION, SAVED_PLAN, add_motion, the_motion
 from go2_wbc.legs import JOINT_NAMES, LEGS
 
 if TYPE_CHECKING:
+    from motions import CompiledPlan, Timeline
     from motions.trajectory import Trajectory
 
 EXAMPLES = """
 go2-wbc export wave --out wave.csv
 go2-wbc export wave --out wave.npz
+go2-wbc export wave --set times=5 --out five.json  then: go2-wbc run five.json
 """
 COLUMNS = """
 columns, 100 rows a second, in the frame between the feet (x ahead, z up):
@@ -36,26 +38,49 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "export",
-        "Write a motion's trajectory of the whole robot to a file.\n" + COLUMNS,
+        "Write a motion's trajectory of the whole robot, or the motion, to a file.\n" + COLUMNS,
         examples=EXAMPLES,
     )
     add_motion(parser)
     parser.add_argument(
-        "--out", metavar="FILE", type=Path, required=True, help="ends in .csv or .npz"
+        "--out", metavar="FILE", type=Path, required=True, help="ends in .csv, .npz, .json or .plan"
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Compile, sample, write."""
-    from go2_wbc.files import checked_output, write_atomically
+    """Write what the ending asks for."""
+    from go2_wbc.files import checked_output
+    from motions import save_motion
+
+    target = checked_output(args.out, [".csv", ".npz", SAVED_MOTION, SAVED_PLAN])
+    motion = the_motion(args.motion, args.values)
+    rows: dict[str, object] = {}
+    if target.suffix == SAVED_MOTION:
+        save_motion(motion, target)
+    else:
+        rows = _write_compiled(motion, target)
+    if args.json:
+        print_json({"motion": motion.name, "file": str(target), **rows})
+    else:
+        number = f": {rows['rows']} rows of" if rows else ":"
+        print(f"wrote {args.out}{number} {motion.name}")
+    return ExitCode.OK
+
+
+def _write_compiled(motion: Timeline | CompiledPlan, target: Path) -> dict[str, object]:
+    """Write the plan or its trajectory; returns the number of rows of the latter."""
+    from go2_wbc.files import write_atomically
     from go2_wbc.robot.model import RobotModel
-    from motions import compile_timeline
+    from motions import compile_motion, save_plan
     from motions.trajectory import trajectory_of
 
-    target = checked_output(args.out, [".csv", ".npz"])
-    line, model = the_motion(args.motion, args.values), RobotModel()
-    path = trajectory_of(compile_timeline(line, model), model)
+    model = RobotModel()
+    plan = compile_motion(motion, model)
+    if target.suffix == SAVED_PLAN:
+        save_plan(plan, target, model=model)
+        return {}
+    path = trajectory_of(plan, model)
     if target.suffix == ".npz":
         stream = io.BytesIO()
         arrays: dict[str, Any] = {name: getattr(path, name) for name in ARRAYS}
@@ -64,11 +89,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         content = _csv(path).encode()
     write_atomically(target, content)
-    if args.json:
-        print_json({"motion": line.name, "file": str(target), "rows": len(path.times)})
-    else:
-        print(f"wrote {args.out}: {len(path.times)} rows of {line.name}")
-    return ExitCode.OK
+    return {"rows": len(path.times)}
 
 
 def _csv(path: Trajectory) -> str:

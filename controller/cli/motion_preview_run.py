@@ -6,16 +6,18 @@ import argparse
 import sys
 import time
 import webbrowser
+from dataclasses import replace
 
 import viz
 from controller.cli.common import ExitCode, print_json, print_json_line, shown_path
 from controller.cli.motion_args import MotionSource, print_verdict, the_motion
 from controller.cli.progress import ProgressLine
-from controller.report_view import planned
+from controller.report_view import planned, slider
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.files import checked_output
 from go2_wbc.plant.mujoco.viewer import display_problem
-from motions import FeasibilityChecker, FeasibilityReport
+from motions import CheckedMotion, FeasibilityChecker, FeasibilityReport
+from viz.content import ReplayContent
 from viz.replay.preview_server import PreviewServer
 
 POLL_PERIOD = 0.05
@@ -61,8 +63,9 @@ def write_files(args: argparse.Namespace) -> int:
 def serve(args: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C; the exit code is that of what was saved last."""
     source, checker = MotionSource(args.motion, args.values), FeasibilityChecker()
-    checked = checker.evaluate(source.timeline())
-    with PreviewServer(planned(checked), source.name, args.port) as server:
+    checked = checker.evaluate(source.motion())
+    content = _content(source, checked)
+    with PreviewServer(content, source.name, args.port, source.choose) as server:
         ok = checked.report.ok
         try:
             if args.json:
@@ -86,8 +89,8 @@ def _show_again(
 ) -> bool:
     """Check and show what the file says now; whether the robot can do it."""
     try:
-        checked = checker.evaluate(source.timeline())
-        server.publish(planned(checked))
+        checked = checker.evaluate(source.motion())
+        server.publish(_content(source, checked))
     except (Go2WbcError, OSError) as error:
         server.publish_error(str(error))
         if as_json:
@@ -97,6 +100,11 @@ def _show_again(
         return False
     _tell(checked.report, as_json=as_json)
     return checked.report.ok
+
+
+def _content(source: MotionSource, checked: CheckedMotion) -> ReplayContent:
+    sliders = tuple(slider(*item) for item in source.parameters.items())
+    return replace(planned(checked), sliders=sliders)
 
 
 def _tell(report: FeasibilityReport, *, as_json: bool) -> None:

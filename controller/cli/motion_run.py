@@ -60,10 +60,10 @@ def run(args: argparse.Namespace) -> int:
     from motions import FeasibilityChecker
     from viz import HTML_SUFFIXES, export_html
 
-    timeline = the_motion(args.motion, args.values)
+    motion = the_motion(args.motion, args.values)
     target = None if args.html is None else checked_output(args.html, HTML_SUFFIXES)
     checker = FeasibilityChecker()
-    checked = checker.evaluate(timeline)
+    checked = checker.evaluate(motion)
     plan, report = checked.plan, checked.report
     if not args.force:
         report.raise_if_infeasible()

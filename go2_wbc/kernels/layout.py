@@ -86,6 +86,17 @@ SNAPSHOT = Layout(
 )
 """Of ``robot.snapshot.Snapshot``, the state's q and v first."""
 
+ROBOT = Layout(
+    mass=(),
+    gravity=(),
+    foot_radius=(),
+    links=(13, 10),
+    p_joints=(12, 3),
+    p_calf_feet=(4, 3),
+    armature=(12,),
+)
+"""Numbers of the robot for its snapshot: of each link mass, first moment and inertia."""
+
 REFERENCE = Layout(
     is_com=(),
     p_world=(3,),
@@ -134,6 +145,9 @@ PROGRAM = Layout(
     singular_determinant=(),
 )
 """Numbers of the built-in tasks and constraints of the whole-body controller."""
+
+DECISION = Layout(z=(30,), tau=(12,), tau_motors=(12,))
+"""What the QP decides: z of ``wbc.problem``, and torques without and with friction."""
 
 PLANNER = Layout(
     yaw=(),

@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.kernels.compilation import kernel, subroutine
-from go2_wbc.kernels.derivation import rotation_of
 from go2_wbc.kernels.layout import CORRECTION, PLAN_CURVES, PLAYBACK, REFERENCE, SNAPSHOT
 from go2_wbc.kernels.supervision import sag_and_lean
+from go2_wbc.kernels.vectors import rotation_of
 
 TIE = 1e-9
 """As ``contacts.TIE``."""

@@ -23,6 +23,14 @@ class Plant(ABC):
         """Whether time also passes between two ``write``, so that commands must not stop."""
         return False
 
+    @property
+    def is_hardware(self) -> bool:
+        """Whether a robot may be moved: dynamic motions are then refused unless allowed.
+
+        What is live is taken for one unless it says that it is none.
+        """
+        return self.is_live
+
     @abstractmethod
     def read(self) -> RobotState:
         """The newest measured state.

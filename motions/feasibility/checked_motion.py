@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool
@@ -14,16 +15,14 @@ from go2_wbc.recording import Recording
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.authoring import Motion
-from motions.compiled_plan import CompiledPlan
+from motions.compiled_plan import LEAST_FEET, CompiledPlan
 from motions.compiler import compile_timeline
 from motions.feasibility.dynamic import Forces
 from motions.feasibility.report import FeasibilityReport
 from motions.registry import load_motion
+from motions.saved.plan_file import is_saved_plan, load_plan
 from motions.timeline import Timeline
 from motions.trajectory import Trajectory
-
-_LEAST_FEET = 3
-"""Standing feet that span an area."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +48,7 @@ class CheckedMotion:
         """
         path = self.path
         (support,) = (series for series in self.report.series if series.check == "support")
-        has_area = path.stance.sum(axis=1) >= _LEAST_FEET
+        has_area = path.stance.sum(axis=1) >= LEAST_FEET
         spans = self.plan.spans if isinstance(self.plan, CompiledPlan) else {}
         return Recording(
             time=path.times,
@@ -67,9 +66,9 @@ class CheckedMotion:
         )
 
 
-Playable = str | Motion | Timeline | MotionPlan | CheckedMotion
-"""What stands for a motion: a name of the library, a motion (with its default parameters), a
-timeline, a plan, or a motion that was checked before."""
+Playable = str | Path | Motion | Timeline | MotionPlan | CheckedMotion
+"""What stands for a motion: a name of the library, the file of a saved motion or plan, a motion
+(with its default parameters), a timeline, a plan, or a motion that was checked before."""
 
 
 def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
@@ -82,12 +81,15 @@ def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
     Raises:
         CommandError: for an unknown name, or for what stands for no motion.
         TimelineError: if the timeline is empty or its parameters are not valid.
+        MotionFileError: for a file that cannot be used.
     """
     if isinstance(motion, CheckedMotion):
         return motion.plan
     if isinstance(motion, MotionPlan):
         return motion
-    if isinstance(motion, str):
+    if isinstance(motion, str | Path) and is_saved_plan(motion):
+        return load_plan(motion, model=model)
+    if isinstance(motion, str | Path):
         motion = load_motion(motion)
     elif isinstance(motion, Motion):
         motion = motion()

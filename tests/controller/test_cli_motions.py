@@ -78,7 +78,7 @@ def test_check_gives_json_with_every_margin(capsys: pytest.CaptureFixture[str]) 
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["check", "moonwalk"], ExitCode.USAGE, "unknown motion 'moonwalk'; valid: bow"),
+        (["check", "levitate"], ExitCode.USAGE, "unknown motion 'levitate'; valid: beckon"),
         (["check", "nowhere.py"], ExitCode.FAILED, "there is no file nowhere.py"),
         (["check", "wave", "--set", "times=99"], ExitCode.FAILED, "times must be 1 to 8, got 99"),
         (["check", "wave", "--set", "times"], ExitCode.USAGE, "set by NAME=VALUE, got 'times'"),

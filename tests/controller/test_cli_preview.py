@@ -15,6 +15,7 @@ from controller.cli.common import ExitCode
 from controller.cli.main import main
 from controller.cli.motion_args import MotionSource
 from go2_wbc.errors import CommandError
+from motions import Timeline
 from tests.live_preview import BROKEN, GOOD, TOO_HIGH, LivePreview
 from tests.viz.page_reader import read_data
 from viz.replay.html_page import PAGE_LIMIT
@@ -111,8 +112,8 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(
 
 
 def test_unknown_motions_and_several_motions_are_refused(rise: Path, capsys: Output) -> None:
-    assert main(["preview", "moonwalk", "--no-open"]) == ExitCode.USAGE
-    assert "unknown motion 'moonwalk'; valid: bow" in capsys.readouterr().err
+    assert main(["preview", "levitate", "--no-open"]) == ExitCode.USAGE
+    assert "unknown motion 'levitate'; valid: beckon" in capsys.readouterr().err
     rise.write_text(GOOD + GOOD.replace("rise", "second"), encoding="utf-8")
     assert main(["preview", str(rise), "--no-open"]) == ExitCode.USAGE
     assert "choose FILE.py:NAME: rise, second" in capsys.readouterr().err
@@ -124,6 +125,12 @@ def test_a_port_in_use_is_named(capsys: Output) -> None:
         arguments = ["preview", "bow", "--no-open", "--port", str(port)]
         assert main(arguments) == ExitCode.USAGE
     assert f"cannot listen on port {port} of 127.0.0.1" in capsys.readouterr().err
+
+
+def seconds(source: MotionSource) -> float:
+    line = source.motion()
+    assert isinstance(line, Timeline)
+    return line.end
 
 
 def test_a_source_sees_saves_once_they_are_done(rise: Path) -> None:
@@ -140,13 +147,13 @@ def test_a_source_sees_saves_once_they_are_done(rise: Path) -> None:
     assert not source.has_changed()
     rise.write_text(GOOD.replace("over=0.8", "over=1.8"), encoding="utf-8")
     assert [source.has_changed() for _ in range(3)] == [False, True, False]
-    assert source.timeline().end == pytest.approx(4.0)
+    assert seconds(source) == pytest.approx(4.0)
 
 
 def test_a_motion_of_the_library_has_its_own_file_and_parameters() -> None:
     source = MotionSource("wave", ["times=3"])
     assert source.path.name == "wave.py"
-    assert source.timeline().end > MotionSource("wave", ["times=2"]).timeline().end
+    assert seconds(source) > seconds(MotionSource("wave", ["times=2"]))
     with pytest.raises(CommandError, match="unknown motion"):
         MotionSource("waves", [])
 

@@ -87,3 +87,5 @@ def test_an_infeasible_motion_lists_every_finding() -> None:
 
 def test_an_unknown_name_is_answered_with_the_sorted_valid_ones() -> None:
     assert unknown_name("gait", "run", ("walk", "trot")) == "unknown gait 'run'; valid: trot, walk"
+    nearly = unknown_name("gait", "tort", ("walk", "trot"))
+    assert nearly == "unknown gait 'tort'; valid: trot, walk; did you mean 'trot'?"

@@ -210,7 +210,7 @@ def test_legs_that_cross_are_found(checker: FeasibilityChecker) -> None:
 
 def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: FeasibilityChecker) -> None:
     assert checker.check("bow").motion == "bow"
-    with pytest.raises(CommandError, match="unknown motion 'bows'; valid: bow"):
+    with pytest.raises(CommandError, match="unknown motion 'bows'; valid: beckon, bow"):
         checker.check("bows")
     for ask in (FeasibilityChecker.check, FeasibilityChecker.evaluate, FeasibilityChecker.plan):
         with pytest.raises(CommandError, match=r"motion must be a name of the library.* got 3"):

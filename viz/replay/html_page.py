@@ -23,6 +23,7 @@ _SCRIPTS = (
     "replay_stage.js",
     "replay_scene.js",
     "replay_ghost.js",
+    "replay_steps.js",
     "replay_flags.js",
     "replay_charts.js",
     "replay_verdict.js",

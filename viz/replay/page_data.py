@@ -40,6 +40,8 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         **_add_frames(pack, "", frames),
         "labels": [[s.start, s.end, s.label] for s in content.recording.spans()],
         "force_scale": max(highest, _LEAST_FORCE_SCALE),
+        "beats": list(content.beats),
+        "sliders": [asdict(slider) for slider in content.sliders],
         "verdict": None,
         "ghost": None,
     }

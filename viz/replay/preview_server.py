@@ -11,7 +11,7 @@ import json
 import logging
 import threading
 import uuid
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -28,6 +28,10 @@ LOOPBACK = "127.0.0.1"
 LOOPBACK_NAMES = (LOOPBACK, "localhost", "[::1]")
 _HEARTBEAT = 10.0
 """A page that hears nothing for so long [s] gets an empty line, which finds closed pages."""
+_MOST_SENT = 4096
+"""Longest text [bytes] that a page may send."""
+Values = dict[str, float | str]
+"""What was chosen for parameters, by their names."""
 _HEADERS = {
     "Cache-Control": "no-store",
     "Content-Security-Policy": "default-src 'self' 'unsafe-inline' data: blob:",
@@ -58,24 +62,34 @@ class PreviewServer(ThreadingHTTPServer):
 
     Attributes:
         url: address of the page.
+        on_values: who is told what was chosen.
     """
 
     daemon_threads = True
     block_on_close = False
 
-    def __init__(self, content: ReplayContent, title: str, port: int) -> None:
+    def __init__(
+        self,
+        content: ReplayContent,
+        title: str,
+        port: int,
+        on_values: Callable[[Values], None] | None = None,
+    ) -> None:
         """Bind and serve in the background.
 
         Args:
             content: what the page shows at first.
             title: of the page.
             port: to listen on; 0 takes any that is free.
+            on_values: called from a thread of the server with what was chosen on the page for the
+                content's sliders; nothing about it has been checked but that it is names with
+                numbers or words.
 
         Raises:
             ConfigError: if the port is in use or out of range, or for a recording that cannot be
                 drawn.
         """
-        self._title = title
+        self._title, self.on_values = title, on_values
         self._scene = scene_text()
         self._changed = threading.Condition()
         self._is_open = True
@@ -157,7 +171,7 @@ class PreviewServer(ThreadingHTTPServer):
 
 @final
 class _Handler(BaseHTTPRequestHandler):
-    """Answers GET of ``/``, ``/data`` and ``/events``, and nothing else."""
+    """Answers GET of ``/``, ``/data``, ``/events``, POST of ``/parameters``, and nothing else."""
 
     server: PreviewServer  # type: ignore[reportIncompatibleVariableOverride]
 
@@ -174,6 +188,37 @@ class _Handler(BaseHTTPRequestHandler):
             self._stream()
         else:
             self._answer("not here\n", "text/plain", HTTPStatus.NOT_FOUND)
+
+    def do_POST(self) -> None:
+        """Take values for the parameters, from a page of this server only."""
+        port, on_values = self.server.server_port, self.server.on_values
+        own = {f"{name}:{port}" for name in LOOPBACK_NAMES}
+        origin = self.headers.get("Origin", "")
+        if self.headers.get("Host", "") not in own or origin.removeprefix("http://") not in own:
+            self._answer("only for this machine\n", "text/plain", HTTPStatus.FORBIDDEN)
+        elif self.path != "/parameters" or on_values is None:
+            self._answer("not here\n", "text/plain", HTTPStatus.NOT_FOUND)
+        elif (values := self._values()) is None:
+            why = "needs names with numbers or words, as JSON\n"
+            self._answer(why, "text/plain", HTTPStatus.BAD_REQUEST)
+        else:
+            on_values(values)
+            self._answer("", "text/plain")
+
+    def _values(self) -> Values | None:
+        """What was sent, if it is values."""
+        length = self.headers.get("Content-Length", "")
+        if not length.isdecimal() or int(length) > _MOST_SENT:
+            return None
+        try:
+            values = json.loads(self.rfile.read(int(length)))
+        except ValueError:
+            return None
+        is_one = isinstance(values, dict) and all(
+            isinstance(value, int | float | str) and not isinstance(value, bool)
+            for value in values.values()
+        )
+        return values if is_one else None
 
     def _answer(self, text: str, kind: str, status: HTTPStatus = HTTPStatus.OK) -> None:
         content = text.encode()

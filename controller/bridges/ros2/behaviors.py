@@ -10,7 +10,7 @@ from controller.modes import Mode
 from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import Go2WbcError, unknown_name
 from go2_wbc.reference import MotionPlan, Posture
-from motions import CompiledPlan, FeasibilityChecker, load_motion
+from motions import CompiledPlan, FeasibilityChecker, find_motion
 from motions.authoring import Value, parse_values
 
 HIGH_FIVE = "high_five"
@@ -89,7 +89,7 @@ def motion_job(motion: str, settings: Sequence[str], go2: GO2Controller, reply: 
 
     def prepare() -> None:
         values.update(parse_values(settings))
-        plans.append(FeasibilityChecker().plan(load_motion(motion, **values)))
+        plans.append(FeasibilityChecker().plan(find_motion(motion)(**values)))
 
     def play(job: Job) -> bool:
         (plan,) = plans

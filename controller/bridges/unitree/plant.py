@@ -158,6 +158,11 @@ class UnitreePlant(Plant):
         """True: a robot does not wait."""
         return True
 
+    @property
+    def is_hardware(self) -> bool:
+        """True, also on the loopback: simulators speak the same protocol, and nothing tells."""
+        return True
+
     def read(self) -> RobotState:
         """The estimated state after the last ``write``, or at the start."""
         self._check_open()

@@ -57,9 +57,9 @@ def test_an_order_is_answered_after_it_has_happened(command: str, call: str) -> 
 
 
 def test_an_unknown_order_is_refused_with_the_valid_names() -> None:
-    (answer,) = ordered(jobs_of(FakeGo2()), "moonwalk")
+    (answer,) = ordered(jobs_of(FakeGo2()), "levitate")
     assert not answer.success
-    assert "'moonwalk'" in answer.message
+    assert "'levitate'" in answer.message
     assert all(name in answer.message for name in COMMANDS)
 
 
@@ -154,9 +154,9 @@ def test_a_high_five_is_compiled_and_checked_once(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_motion_that_does_not_exist_is_answered_with_those_that_do() -> None:
-    answer = played(FakeGo2(), "moonwalk")
+    answer = played(FakeGo2(), "levitate")
     assert not answer.success
-    assert answer.message.startswith("unknown motion 'moonwalk'; valid: bow,")
+    assert answer.message.startswith("unknown motion 'levitate'; valid: beckon,")
 
 
 @pytest.mark.parametrize(

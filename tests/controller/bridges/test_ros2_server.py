@@ -42,7 +42,7 @@ def test_a_behaviour_is_answered_when_odometry_bears_it_out(server: Process, pro
 def test_an_unknown_behaviour_is_refused_with_the_valid_names(
     server: Process, probe: Probe
 ) -> None:
-    answer = probe.call("moonwalk")
+    answer = probe.call("levitate")
     assert not answer.success
     assert "valid: damp, high_five, lie_down, recover, sit, stand, stop, up, walk" in answer.message
 
@@ -239,10 +239,10 @@ def test_a_high_five_that_is_cancelled_ends_standing(server: Process, probe: Pro
 def test_a_motion_that_does_not_exist_is_aborted_with_the_names(
     server: Process, probe: Probe
 ) -> None:
-    handle, _ = goal_of(probe, "moonwalk")
+    handle, _ = goal_of(probe, "levitate")
     answer = probe.result(handle.get_result_async())
     assert answer.status == 6  # aborted
-    assert "unknown motion 'moonwalk'; valid: bow," in answer.result.message
+    assert "unknown motion 'levitate'; valid: beckon," in answer.result.message
 
 
 # --- other ways to serve ------------------------------------------------------------------------

@@ -52,5 +52,25 @@ def test_the_page_follows_every_save(tmp_path: Path, chromium_browser: Browser) 
         browser.wait_for(f"{_ERROR}.textContent.includes('The preview has ended')")
 
 
+@pytest.mark.slow
+def test_a_slider_makes_the_motion_anew(chromium_browser: Browser) -> None:
+    with LivePreview("wave") as preview, Tab(chromium_browser) as browser:
+        browser.open(preview.url)
+        browser.wait_for("replay.version")
+        shown = "[...document.querySelectorAll('#sliders label span')].map(one => one.textContent)"
+        assert browser.evaluate(shown) == ["Side", "Times"]
+        before = browser.evaluate("replay.data.duration")
+        browser.evaluate(
+            "(() => {const times = document.querySelector('#sliders input');"
+            "times.value = 5; times.dispatchEvent(new Event('input'))})()"
+        )
+        browser.wait_for(f"replay.data.duration > {before} + 1")
+        assert browser.evaluate("document.querySelector('#sliders input').value") == "5"
+        assert browser.evaluate("document.querySelector('#sliders select').value") == "right"
+        assert browser.complaints == []
+        assert preview.heard()["ok"]
+        assert preview.heard()["duration"] > before + 1
+
+
 def _camera(browser: Tab) -> list[float]:
     return browser.evaluate("replay.scene.viewer.camera.position.toArray()")

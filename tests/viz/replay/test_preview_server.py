@@ -66,9 +66,56 @@ def test_the_loopbacks_own_names_are_accepted(server: PreviewServer, host: str) 
     assert _get(server, "/data", host.format(_port(server)))[0] == 200
 
 
-def test_nothing_but_get_is_answered(server: PreviewServer) -> None:
+def _post(
+    server: PreviewServer, path: str, body: bytes, headers: dict[str, str] | None = None
+) -> int:
     connection = http.client.HTTPConnection("127.0.0.1", _port(server), timeout=30)
-    connection.request("POST", "/data", body=b"x")
+    own = {"Origin": f"http://127.0.0.1:{_port(server)}"}
+    connection.request("POST", path, body=body, headers={**own, **(headers or {})})
+    status = connection.getresponse().status
+    connection.close()
+    return status
+
+
+def test_values_that_a_page_sends_are_handed_on(recording: Recording) -> None:
+    chosen: list[object] = []
+    with PreviewServer(ReplayContent(recording), "A plan", 0, chosen.append) as server:
+        body = b'{"angle": 0.2, "times": 3, "side": "left"}'
+        assert _post(server, "/parameters", body) == 200
+        assert chosen == [{"angle": 0.2, "times": 3, "side": "left"}]
+
+
+@pytest.mark.parametrize(
+    "body", [b"", b"{", b"[1]", b'{"a": [1]}', b'{"a": true}', b'{"a": null}', b" " * 5000]
+)
+def test_what_is_no_values_is_refused(recording: Recording, body: bytes) -> None:
+    chosen: list[object] = []
+    with PreviewServer(ReplayContent(recording), "A plan", 0, chosen.append) as server:
+        assert _post(server, "/parameters", body) == 400
+    assert chosen == []
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Origin": "http://evil.example"},
+        {"Origin": ""},
+        {"Origin": "null"},
+        {"Host": "evil.example"},
+    ],
+)
+def test_other_web_sites_cannot_send_values(recording: Recording, headers: dict[str, str]) -> None:
+    chosen: list[object] = []
+    with PreviewServer(ReplayContent(recording), "A plan", 0, chosen.append) as server:
+        assert _post(server, "/parameters", b'{"angle": 0.2}', headers) == 403
+    assert chosen == []
+
+
+def test_nothing_else_can_be_sent(server: PreviewServer) -> None:
+    assert _post(server, "/data", b"x") == 404
+    assert _post(server, "/parameters", b"{}") == 404  # this motion has none
+    connection = http.client.HTTPConnection("127.0.0.1", _port(server), timeout=30)
+    connection.request("PUT", "/data", body=b"x")
     assert connection.getresponse().status == 501
     connection.close()
 

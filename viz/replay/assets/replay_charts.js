@@ -90,6 +90,18 @@ class Timeline extends TimeCanvas {
       this.drawLeg(paint, leg, k, top + k * row, row - 3);
     });
     this.drawAxis(paint, this.height - axis);
+    this.drawBeats(paint, this.height - axis);
+  }
+
+  // The beats that the motion counts in: a line for each, a longer and darker one for every fourth.
+  drawBeats(paint, bottom) {
+    this.data.header.beats.forEach((t, k) => {
+      const isFirst = k % 4 === 0;
+      paint.globalAlpha = isFirst ? 0.55 : 0.28;
+      paint.fillStyle = INK;
+      paint.fillRect(this.xAt(t) - 0.5, isFirst ? 22 : 26, 1, bottom - (isFirst ? 22 : 26));
+    });
+    paint.globalAlpha = 1;
   }
 
   drawLabels(paint, height) {
@@ -142,14 +154,10 @@ class Timeline extends TimeCanvas {
     const half = 0.5 / data.rate;
     paint.globalAlpha = 0.22;
     paint.fillStyle = color;
-    for (let i = 0, start = -1; i <= data.frames; i++) {
-      const planned = i < data.frames && data.stance[4 * i + k];
-      if (planned && start < 0) start = i;
-      if (!planned && start >= 0) {
-        const [from, to] = [this.xAt(Math.max(start / data.rate - half, 0)), this.xAt(Math.min((i - 1) / data.rate + half, data.duration))];
-        paint.fillRect(from, top, to - from, height);
-        start = -1;
-      }
+    for (const [first, last] of stances(data, k)) {
+      const from = this.xAt(Math.max(first / data.rate - half, 0));
+      const to = this.xAt(Math.min(last / data.rate + half, data.duration));
+      paint.fillRect(from, top, to - from, height);
     }
     paint.globalAlpha = 0.9;
     paint.beginPath();

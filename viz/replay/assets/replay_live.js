@@ -1,7 +1,73 @@
 "use strict";
 // Only in a page that `go2-wbc preview` serves: it shows what was saved, as soon as it is saved.
 
+const REST = 120; // ms, a slider that has not moved for so long is sent
+
+// The motion's parameters: what is chosen is sent to the server, which makes the motion anew.
+class Sliders {
+  constructor() {
+    this.box = document.getElementById("sliders");
+    this.shape = "";
+    this.inputs = new Map();
+  }
+
+  // Shows the parameters of `header`; the one that is being moved stays where it is.
+  use({ sliders }) {
+    document.getElementById("app").classList.toggle("tuned", sliders.length > 0);
+    const shape = JSON.stringify(sliders.map((slider) => ({ ...slider, value: null })));
+    if (shape !== this.shape) this.build(sliders);
+    this.shape = shape;
+    for (const { name, value } of sliders) {
+      const { input, tell } = this.inputs.get(name);
+      if (input !== document.activeElement) input.value = value;
+      tell();
+    }
+  }
+
+  build(sliders) {
+    this.inputs.clear();
+    this.box.querySelector("div").replaceChildren(...sliders.map((slider) => this.row(slider)));
+  }
+
+  row({ name, low, high, is_whole: isWhole, unit, words }) {
+    const row = document.createElement("label");
+    const [title, output] = [document.createElement("span"), document.createElement("output")];
+    const input = document.createElement(words.length ? "select" : "input");
+    title.textContent = readable(name);
+    if (words.length) {
+      input.append(...words.map((word) => new Option(readable(word), word)));
+    } else {
+      Object.assign(input, { type: "range", min: low, max: high, step: isWhole ? 1 : "any" });
+    }
+    const tell = () => {
+      const shown = Number(Number(input.value).toPrecision(3));
+      output.textContent = words.length ? "" : `${shown} ${unit}`.trim();
+    };
+    input.addEventListener("input", () => {
+      tell();
+      clearTimeout(this.waiting);
+      this.waiting = setTimeout(() => this.send(), REST);
+    });
+    input.dataset.name = name;
+    this.inputs.set(name, { input, tell, isWord: words.length > 0 });
+    row.append(title, input, output);
+    return row;
+  }
+
+  send() {
+    const values = {};
+    for (const [name, { input, isWord }] of this.inputs) {
+      values[name] = isWord ? input.value : Number(input.value);
+    }
+    fetch("parameters", {
+      method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(values),
+    });
+  }
+}
+
 function listen(player) {
+  const sliders = new Sliders();
+  sliders.use(player.data.header);
   const box = document.getElementById("error");
   const showError = (title, text, isQuiet = false) => {
     box.hidden = !title;
@@ -17,6 +83,7 @@ function listen(player) {
       const answer = await fetch("data");
       player.use(new ReplayData(await unpack(await answer.text()), player.data.scene));
       version = player.data.header.version;
+      sliders.use(player.data.header);
     }
     if (state.error) showError("This does not work; the last good version is shown.", state.error);
     else showError("", "");

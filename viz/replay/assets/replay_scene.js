@@ -30,6 +30,7 @@ class RobotScene {
     for (const name of ["forces", "contacts", "com"]) this.makeMarker(this.node(name));
     this.makeSupport();
     this.ghost = new Ghost(this);
+    this.steps = new Steps(this);
     this.flags = new Flags(this);
     this.use(data);
     this.show(0);
@@ -43,6 +44,7 @@ class RobotScene {
   use(data) {
     this.data = data;
     this.makePaths();
+    this.steps.use(data);
     this.ghost.use(data);
     this.flags.use(data);
   }
@@ -153,6 +155,7 @@ class RobotScene {
     const from = Math.max(0, frame - Math.round(PATH_SECONDS * data.rate));
     this.node("paths").visible = this.shown.paths;
     for (const line of this.paths) line.geometry.setDrawRange(from, frame - from + 1);
+    this.steps.show(t);
     this.follow(t);
     this.flags.show(t);
     this.viewer.set_dirty();

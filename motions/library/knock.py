@@ -1,0 +1,21 @@
+"""Knock."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from motions.authoring import Choice, Range, motion
+from motions.timeline import Timeline
+
+
+@motion
+def knock(
+    side: Annotated[str, Choice("left", "right")] = "right",
+    times: Annotated[int, Range(1, 6)] = 3,
+) -> Timeline:
+    """Knock: a paw at a door, three times from the knee, and wait for an answer."""
+    line = Timeline().leg("FR", hip=0.0, thigh=-0.5, calf=-1.9, over=0.8)
+    for _ in range(times):
+        line = line.joint("FR", "calf", -1.55, over=0.25).joint("FR", "calf", -1.9, over=0.25)
+    line = line.hold(0.4).home(over=0.8)
+    return line if side == "right" else line.mirror()
