@@ -38,6 +38,7 @@ KINDS: Final[Mapping[str, type[Key]]] = {
     "posture": PostureKey,
     "leg": LegKey,
     "joint": JointKey,
+    "step": StepKey,
     "balance": BalanceShift,
     "step": StepKey,
     "phases": PhaseKey,
@@ -134,6 +135,10 @@ def _require_sane(key: Key) -> None:
         raise TimelineError(unknown_name("channel", key.channel, BODY_CHANNELS))
     if isinstance(key, BodyPathKey):
         _require_way(key)
+    if isinstance(key, StepKey) and not (
+        0.0 <= key.since <= key.start < key.end and key.height > 0.0 and key.lead >= 0.0
+    ):
+        raise TimelineError("a step needs since <= start < end, height above 0 and lead from 0 on")
     if isinstance(key, JointKey) and key.joint not in range(_JOINTS):
         raise TimelineError(f"joint must be 0, 1 or 2, got {key.joint}")
     if isinstance(key, LegKey) and key.target.frame is Frame.GROUND and key.target.values[2] < 0.0:

@@ -45,6 +45,7 @@ calls: st.SearchStrategy[Call] = st.one_of(
     st.builds(joints, legs, angles, angles, angles, times),
     st.builds(lambda t, name: lambda line: line.hold(t, name=name), times, st.text(max_size=8)),
     st.builds(lambda t: lambda line: line.home(over=t), times),
+    st.builds(lambda leg, x, t: lambda line: line.step(leg, x, over=t), legs, small, times),
     st.builds(lambda leg, t: lambda line: line.unweight(leg, over=t), legs, times),
     st.builds(
         lambda posture, t: lambda line: line.posture(posture, over=t),
