@@ -39,6 +39,7 @@ class CompiledPlan(MotionPlan):
         ramp: time [s] over which a foot is unloaded before lift-off and loaded after touchdown.
         problems: what could not be done as written.
         spans: start and end [s] of the named holds.
+        beats: instants [s] that it counts in.
     """
 
     name: str
@@ -50,6 +51,7 @@ class CompiledPlan(MotionPlan):
     ramp: float
     problems: tuple[Problem, ...]
     spans: Mapping[str, tuple[float, float]]
+    beats: tuple[float, ...] = ()
     _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
