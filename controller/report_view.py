@@ -12,9 +12,9 @@ from go2_wbc.errors import PlantError
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.ground_truth import true_runs
 from go2_wbc.recording import Recording
-from go2_wbc.reference import Anchor
+from go2_wbc.reference import Anchor, MotionPlan
 from go2_wbc.robot.model import RobotModel
-from motions import CheckedMotion, FeasibilityReport, Finding
+from motions import CheckedMotion, CompiledPlan, FeasibilityReport, Finding
 from motions.authoring import Choice, Parameter
 from motions.feasibility import Series
 from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Slider, Verdict
@@ -24,11 +24,14 @@ _AFTERWARDS = 1.0
 _TOGETHER = 0.05
 """Annotations on one limit that are this close in time [s] become one."""
 _LEAST_SAMPLES = 2
+_MOVED, _TURNED = 0.02, np.radians(2.0)
+"""A motion that ends farther from its start, [m] and [rad], moves on."""
 
 
 def planned(checked: CheckedMotion) -> ReplayContent:
     """The plan with its verdict."""
-    return ReplayContent(checked.recording(), is_plan=True, verdict=verdict_of(checked.report))
+    verdict = verdict_of(checked.report)
+    return _shown(checked.plan, ReplayContent(checked.recording(), is_plan=True, verdict=verdict))
 
 
 def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> ReplayContent:
@@ -46,7 +49,17 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
     plan = checked.recording()
     labels = (*plan.labels, "afterwards")
     own = replace(own, labels=tuple(labels[row] for row in np.searchsorted(plan.time, own.time)))
-    return ReplayContent(own, verdict=verdict_of(checked.report), ghost=plan)
+    shown = ReplayContent(own, verdict=verdict_of(checked.report), ghost=plan)
+    return _shown(checked.plan, shown)
+
+
+def _shown(plan: MotionPlan, content: ReplayContent) -> ReplayContent:
+    """With the beats that a plan counts in, and where it is to end if it moves on."""
+    if not isinstance(plan, CompiledPlan):
+        return content
+    x, y, yaw = plan.end_pose
+    moves_on = np.hypot(x, y) > _MOVED or abs(yaw) > _TURNED
+    return replace(content, beats=plan.beats, end_pose=(x, y, yaw) if moves_on else None)
 
 
 def slider(parameter: Parameter, value: float | str) -> Slider:

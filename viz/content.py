@@ -12,6 +12,7 @@ from jaxtyping import Float, Int
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
+from viz.sound import Sound
 
 CENTRE_OF_MASS = "com"
 """Stands in ``Annotation.parts`` for the centre of mass."""
@@ -127,16 +128,24 @@ class ReplayContent:
         is_plan: it is a plan; otherwise it was measured.
         verdict: what to say about the motion.
         ghost: another movement, shown translucent; its clock starts with the first one's.
+        ghost_name: what the ghost is, in words.
+        judges_ghost: the verdict is on the ghost; otherwise on ``recording``.
         beats: instants [s] that the motion counts in, drawn as a ruler.
         sliders: parameters that a live page lets one choose.
+        sound: played in step with the movement, from its start.
+        end_pose: where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet.
     """
 
     recording: Recording
     is_plan: bool = False
     verdict: Verdict | None = None
     ghost: Recording | None = None
+    ghost_name: str = "the plan, which was checked"
+    judges_ghost: bool = True
     beats: tuple[float, ...] = ()
     sliders: tuple[Slider, ...] = ()
+    sound: Sound | None = None
+    end_pose: tuple[float, float, float] | None = None
 
 
 def checked_content(shown: Recording | ReplayContent) -> ReplayContent:

@@ -12,6 +12,8 @@ class Player {
     this.behaviour = document.getElementById("behaviour");
     charts.forEach((chart) => chart.onScrub((t) => this.scrub(t)));
     this.verdict = new VerdictPanel(data, (t) => this.scrub(t));
+    this.sound = new Soundtrack();
+    this.sound.use(data);
     this.describe();
     this.seek(0);
     this.last = performance.now();
@@ -24,6 +26,7 @@ class Player {
     this.scene.use(data);
     this.charts.forEach((chart) => chart.use(data));
     this.verdict.use(data);
+    this.sound.use(data);
     this.describe();
     this.seek(this.time);
   }
@@ -36,6 +39,9 @@ class Player {
     document.getElementById("total").textContent = ` / ${data.duration.toFixed(2)} s`;
     document.getElementById("app").classList.toggle("has-ghost", data.ghost !== null);
     document.getElementById("force-key").textContent = isPlan ? "planned force" : "measured force";
+    document.getElementById("ghost-key").textContent = isPlan ? "force of the ghost" : "planned force";
+    const solid = isPlan ? "the plan" : "what was measured";
+    document.getElementById("who").textContent = `Solid: ${solid}. Blue: ${data.header.ghost_name}.`;
   }
 
   cycleGhost() {
@@ -60,13 +66,14 @@ class Player {
     const passed = Math.min((now - this.last) / 1000, 0.1);
     this.last = now;
     if (this.isPlaying) this.advance(passed);
+    this.sound.follow(this);
     if (this.scene.shown.orbit) this.scene.orbit(passed);
     requestAnimationFrame((later) => this.tick(later));
   }
 
   advance(passed) {
     if (this.time < this.data.duration) {
-      this.seek(this.time + passed * this.speed);
+      this.moveTo(this.sound.steer(this.time + passed * this.speed));
       return;
     }
     this.rest += passed;
@@ -74,6 +81,11 @@ class Player {
   }
 
   seek(t) {
+    this.moveTo(t);
+    this.sound.jump(this.time);
+  }
+
+  moveTo(t) {
     this.rest = 0;
     this.time = this.data.clampTime(t);
     this.scene.show(this.time);
@@ -137,6 +149,7 @@ function bindControls(player) {
   each("speed", (speed) => player.setSpeed(Number(speed)));
   each("step", (frames) => player.step(Number(frames)));
   each("ghost", () => player.cycleGhost());
+  each("sound", () => player.sound.turn(!player.sound.isOn));
   each("open", (name) => player.openTab(name));
   player.button.addEventListener("click", () => {
     player.play(!player.isPlaying);
@@ -156,6 +169,7 @@ function bindControls(player) {
     else if (views[key]) player.scene.setView(views[key]);
     else if (toggles[key]) player.toggle(toggles[key]);
     else if (key === "g" && player.data.ghost) player.cycleGhost();
+    else if (key === "m" && player.data.sound) player.sound.turn(!player.sound.isOn);
     else if (key === "n" && player.data.annotations.length) player.jumpToNext();
     else return;
     event.preventDefault();
