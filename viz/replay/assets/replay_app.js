@@ -117,6 +117,7 @@ class Player {
   play(isPlaying) {
     if (isPlaying && this.time >= this.data.duration) this.seek(0);
     this.isPlaying = isPlaying;
+    this.sound.follow(this);
     this.button.classList.toggle("playing", isPlaying);
   }
 
