@@ -19,12 +19,17 @@ PROCESSES = 5
 ROBOT = "from controller import GO2Controller; go2 = GO2Controller()"
 STAND = f"{ROBOT}; raise SystemExit(not go2.stand())"
 DEMO = "from controller.cli.main import main; raise SystemExit(main(['demo', '--no-media']))"
-STARTS = {
+LIBRARIES = "import numpy, pinocchio, mujoco, numba"
+STARTS: dict[str, tuple[str, str, float | None]] = {
     "robot": ("`from controller import GO2Controller; GO2Controller()`", ROBOT, 0.7),
     "stand": ("the same, and `stand()`", STAND, 1.5),
+    "libraries": (f"`{LIBRARIES}`: what a robot imports", LIBRARIES, None),
     "demo": ("`go2-wbc demo --no-media`, to its end", DEMO, 5.0),
 }
 """What is started: its name, its code, and the processor time [s] that it may take."""
+
+_NO_BYTECODE = "PYTHONDONTWRITEBYTECODE"
+"""Kept from the processes: a user's Python compiles a module once, not at every start."""
 
 METRICS = tuple(
     metric
@@ -57,7 +62,8 @@ def started(code: str) -> tuple[float, float]:
         TrialFailed: if it fails.
     """
     root = Path(__file__).resolve().parent.parent
-    environment = {**os.environ, "PYTHONPATH": str(root)}
+    environment = {name: value for name, value in os.environ.items() if name != _NO_BYTECODE}
+    environment["PYTHONPATH"] = str(root)
     with tempfile.TemporaryDirectory() as folder:
         before, start = _children_time(), time.perf_counter()
         command = [sys.executable, "-c", code]

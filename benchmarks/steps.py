@@ -63,7 +63,7 @@ class Played:
 def plant_of(trial: Trial) -> MujocoPlant:
     """A simulated robot under the conditions of the trial."""
     rng = np.random.default_rng(FIRST_SEED + trial.seed)
-    friction, mass, yaw = rng.uniform(*zip(FRICTION_RANGE, MASS_RANGE, YAW_RANGE, strict=True))
+    friction, mass, yaw = (rng.uniform(*r) for r in (FRICTION_RANGE, MASS_RANGE, YAW_RANGE))
     return MujocoPlant(
         friction=float(friction),
         mass_scale=float(mass),

@@ -12,6 +12,7 @@ from controller.runner import Runner
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.kernels.loading import load_kernels
+from go2_wbc.lazy import without_collecting
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
@@ -73,11 +74,13 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
         PlantError: if the plant does not answer, or another pilot drives it.
     """
     settings = settings or PilotSettings()
-    load_kernels()
+    with without_collecting():
+        load_kernels()
     model = RobotModel(settings.description, motor=config.motor)
     wbc = WholeBodyController(model, config.backend, config.wbc)
+    dynamic_wbc = WholeBodyController(model, config.backend, config.wbc.for_dynamics)
     telemetry = Telemetry(model, max(1, round(settings.recorded_time / plant.control_period)))
-    loop = ControlLoop(plant, model, wbc, telemetry, config.safety)
+    loop = ControlLoop(plant, model, wbc, telemetry, config.safety, dynamic_wbc)
     with ExitStack() as opened:
         viewer = None
         if settings.viewer:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.legs import LEGS, Leg
+from go2_wbc.planning.landing import Landings
 from go2_wbc.planning.playback import Deviation
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
@@ -30,6 +31,11 @@ ATTITUDE_DEVIATION = 0.1
 """Angle [rad] that the trunk may be off its plan, on the average."""
 JOINT_DEVIATION = 0.2
 """Angle [rad] that the worst joint of a raised leg may be off its plan, on the average."""
+END_PLACE = 0.05
+"""Distance [m] from its planned end at which a motion that moves on may end: what is asked of a
+walk of 2 m."""
+END_HEADING = np.radians(4.0)
+"""Angle [rad] by which its end may be turned."""
 
 
 def unfolded_legs(snapshot: Snapshot) -> list[Leg]:
@@ -106,6 +112,27 @@ def is_small(deviation: Deviation) -> bool:
         and deviation.attitude < ATTITUDE_DEVIATION
         and deviation.joints < JOINT_DEVIATION
     )
+
+
+def has_arrived(place: float, heading: float, landings: Landings) -> bool:
+    """Whether a motion that moves on has ended where it was to end, every foot landed.
+
+    Args:
+        place: distance [m] of the feet's middle from there.
+        heading: angle [rad] by which they are turned.
+        landings: what came of its steps.
+    """
+    return place < END_PLACE and heading < END_HEADING and landings.missed == 0
+
+
+def arrival_measurements(place: float, heading: float, landings: Landings) -> dict[str, float]:
+    """By name with unit; see ``has_arrived``."""
+    return {
+        "end place error [m]": place,
+        "end heading error [rad]": heading,
+        "worst landing error [m]": landings.error,
+        "missed landings": float(landings.missed),
+    }
 
 
 def deviation_measurements(deviation: Deviation) -> dict[str, float]:

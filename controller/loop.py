@@ -66,13 +66,23 @@ class ControlLoop:
         wbc: WholeBodyController,
         telemetry: Telemetry,
         safety: SafetyConfig,
+        dynamic_wbc: WholeBodyController | None = None,
     ) -> None:
         """Start damped.
+
+        Args:
+            plant: what to drive.
+            model: the robot.
+            wbc: what follows references.
+            telemetry: what records.
+            safety: when to give up.
+            dynamic_wbc: what follows those of dynamic behaviours; ``wbc`` unless given.
 
         Raises:
             PlantError: if the plant does not answer, or its state is not finite.
         """
         self.plant, self.model, self.wbc, self.telemetry = plant, model, wbc, telemetry
+        self._dynamic_wbc = dynamic_wbc or wbc
         from go2_wbc.kernels import supervision  # compiled; importing this module is not
 
         self._kernels = supervision
@@ -188,7 +198,8 @@ class ControlLoop:
         if isinstance(target, JointReference):
             return JointCommand.servo(target.q_joints, target.v_joints, target.kp, target.kd)
         try:
-            solution = self.wbc.solve(self.snapshot, target, relax=True)
+            wbc = self._dynamic_wbc if self.behaviour.is_dynamic else self.wbc
+            solution = wbc.solve(self.snapshot, target, relax=True)
         except QpInfeasible as error:
             return self._without_solution(error)
         if solution.is_relaxed:

@@ -89,7 +89,7 @@ def measure_motion(
     truth.clear()
     said = go2.play(plan, check=False)
     fall, dt = truth.fall(), truth.control_period
-    recorded = _during_motion(go2, truth, plan.name)
+    recorded = during_motion(go2, truth, plan.name)
     shares = recorded.torque_shares(model)
     force = np.maximum(recorded.trunk_force, recorded.limb_force)
     com, attitude, feet = _off_plan(recorded, plan, model)
@@ -109,7 +109,7 @@ def measure_motion(
     )
 
 
-def _during_motion(go2: GO2Controller, truth: GroundTruth, name: str) -> TruthRecording:
+def during_motion(go2: GO2Controller, truth: GroundTruth, name: str) -> TruthRecording:
     """The ticks in which the plan was played."""
     ticks = go2.telemetry.samples(1.0 / truth.control_period, since=truth.start).unfinished
     recorded, times = truth.recording(), ticks.time[np.array(ticks.labels) == name]

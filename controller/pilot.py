@@ -18,9 +18,11 @@ from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.walking import Walking
 from controller.checks import (
     LYING_HEIGHT,
+    arrival_measurements,
     base_height,
     deviation_measurements,
     ground_height,
+    has_arrived,
     is_lying,
     is_sitting,
     is_small,
@@ -270,10 +272,19 @@ class Pilot:
             at_rest = self._settle(plan.exit, plan.name)
         finally:
             self.playing = None
-        deviation = behaviour.deviation
+        return self._judged(behaviour, at_rest)
+
+    def _judged(self, played: PlayPlan, at_rest: Measurements) -> Measurements:
+        """What was measured of a motion, if that shows that it was done."""
+        deviation, name = played.deviation, played.plan.name
         measured = {**at_rest, **deviation_measurements(deviation)}
+        if played.plan.footsteps is not None:
+            arrival = *played.end_error(self._loop.snapshot), played.landings
+            measured |= arrival_measurements(*arrival)
+            if not has_arrived(*arrival):
+                raise Aborted(f"{name} ended elsewhere: {listed(measured)}", measured)
         if not is_small(deviation):
-            raise Aborted(f"{plan.name} went another way: {listed(measured)}", measured)
+            raise Aborted(f"{name} went another way: {listed(measured)}", measured)
         return measured
 
     def return_safely(self) -> None:

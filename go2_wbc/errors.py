@@ -20,6 +20,7 @@
         ├── DynamicMotionRefused  it jumps or stands on few feet, and nobody allowed that
         ├── MotionFileError     a saved motion or plan cannot be used; says why
         ├── MotionInfeasible    the motion breaks a limit; carries the findings
+        ├── PlanNotFound        no dynamic motion does what was asked; says what binds, where
         └── StanceMismatch      the motion starts from another stance
 
 A third-party exception is converted where the library is called (``raise ... from``).
@@ -144,6 +145,18 @@ class MotionInfeasible(MotionError):
     def __init__(self, name: str, findings: Sequence[object]) -> None:
         self.findings = tuple(findings)
         super().__init__("\n  ".join([f"motion {name!r} is infeasible:", *map(str, findings)]))
+
+
+class PlanNotFound(MotionError):
+    """No dynamic motion was found that does what was asked; says what binds, and where.
+
+    Attributes:
+        reasons: one line for each thing that is in the way.
+    """
+
+    def __init__(self, message: str, reasons: Sequence[str] = ()) -> None:
+        self.reasons = tuple(reasons)
+        super().__init__("\n  ".join([message, *self.reasons]))
 
 
 class StanceMismatch(MotionError):

@@ -1,14 +1,14 @@
 """Public names that are imported when they are first used.
 
 A package's ``__init__`` runs for every import of one of its modules, so an eager one would load
-Pinocchio and MuJoCo for a command line that only prints its help. Meanwhile garbage is not looked
-for: imports leave next to none, and looking through all that they make takes a tenth of their time.
+Pinocchio and MuJoCo for a command line that only prints its help.
 """
 
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 
 
@@ -24,13 +24,28 @@ def lazy_exports(package: str, homes: Mapping[str, Sequence[str]]) -> Callable[[
     def load(name: str) -> object:
         if name not in home_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        is_collecting = gc.isenabled()
-        gc.disable()
-        try:
+        with without_collecting():
             module = import_module(f"{package}.{home_of[name]}")
-        finally:
-            if is_collecting:
-                gc.enable()
         return getattr(module, name)
 
     return load
+
+
+@contextmanager
+def without_collecting() -> Iterator[None]:
+    """Does not look for garbage while something is imported.
+
+    Imports leave next to none, and looking through all that they make takes a tenth of their time.
+    What they made counts as old afterwards, so that it is not looked through then.
+    """
+    if not gc.isenabled():
+        yield
+        return
+    gc.disable()
+    try:
+        yield
+    finally:
+        if not gc.get_freeze_count():  # a program's own frozen objects stay so
+            gc.freeze()
+            gc.unfreeze()  # into the oldest generation
+        gc.enable()

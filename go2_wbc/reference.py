@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.contacts import ContactSchedule
 from go2_wbc.errors import CommandError
 from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.robot.rotations import yaw_rotation
@@ -225,6 +226,28 @@ class Anchor:
         return Anchor(middle, float(np.arctan2(ahead[1], ahead[0])))
 
 
+@dataclass(frozen=True, slots=True)
+class Footsteps:
+    """What is known of a plan whose feet step to places, so that they can land when they do.
+
+    Attributes:
+        contacts: who stands when.
+        swings: (m, 4) at each event of ``contacts``, the feet in the air that follow their places.
+        unloads: (m, 4) when [s] each foot that stands lifts off next, if it gives up its load
+            before that; inf if it pushes off.
+        ramp: time [s] over which a foot takes up its load after touchdown and gives it up before
+            lift-off.
+        normal_force_min, normal_force_max: bounds [N] of a stance foot's normal force.
+    """
+
+    contacts: ContactSchedule
+    swings: Bool[np.ndarray, "m 4"]
+    unloads: Float[np.ndarray, "m 4"]
+    ramp: float
+    normal_force_min: float
+    normal_force_max: float
+
+
 class MotionPlan(ABC):
     """A motion, ready to be played: a reference for every instant, in the motion's own frame.
 
@@ -255,6 +278,16 @@ class MotionPlan(ABC):
     def row_at(self, t: float) -> Float[np.ndarray, " size"]:
         """The numbers of ``at(t)`` in one row; a plan that can fill it by a kernel does so."""
         return self.at(t).row
+
+    @property
+    def has_dynamic_spans(self) -> bool:
+        """Whether some of it is solved by the whole robot's dynamics."""
+        return False
+
+    @property
+    def footsteps(self) -> Footsteps | None:
+        """How its feet step; None if none does: each comes down where it stood."""
+        return None
 
 
 @dataclass(frozen=True, slots=True)

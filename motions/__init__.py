@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from motions.assembly import compile_timeline
     from motions.authoring import Choice, Motion, Range, motion
     from motions.compiled_plan import CompiledPlan
-    from motions.compiler import compile_timeline
     from motions.feasibility import (
         CheckedMotion,
         FeasibilityChecker,
@@ -19,12 +19,14 @@ if TYPE_CHECKING:
         check,
         compile_motion,
     )
+    from motions.music.finding import Beats, beats
     from motions.registry import find_motion, load_file, load_motion, motion_names
     from motions.saved.motion_file import save_motion
     from motions.saved.plan_file import load_plan, save_plan
     from motions.timeline import Timeline, deg
 
 __all__ = [
+    "Beats",
     "CheckedMotion",
     "Choice",
     "CompiledPlan",
@@ -35,6 +37,7 @@ __all__ = [
     "Playable",
     "Range",
     "Timeline",
+    "beats",
     "check",
     "compile_motion",
     "compile_timeline",
@@ -52,8 +55,9 @@ __all__ = [
 __getattr__ = lazy_exports(
     __name__,
     {
+        "assembly": ("compile_timeline",),
         "authoring": ("Choice", "Motion", "Range", "motion"),
-        "compiler": ("CompiledPlan", "compile_timeline"),
+        "compiled_plan": ("CompiledPlan",),
         "feasibility": (
             "CheckedMotion",
             "FeasibilityChecker",
@@ -63,6 +67,7 @@ __getattr__ = lazy_exports(
             "check",
             "compile_motion",
         ),
+        "music.finding": ("Beats", "beats"),
         "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
         "saved.motion_file": ("save_motion",),
         "saved.plan_file": ("load_plan", "save_plan"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,16 +10,28 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.interpolate import PPoly
 
-from go2_wbc.contacts import TIE, ContactSchedule
+from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
 from go2_wbc.curves import CurvePoint
 from go2_wbc.errors import MotionError
 from go2_wbc.kernels.layout import REFERENCE
-from go2_wbc.reference import Anchor, LegTask, MotionPlan, Posture, Reference, TrackedPoint
+from go2_wbc.reference import (
+    Anchor,
+    Footsteps,
+    LegTask,
+    MotionPlan,
+    Posture,
+    Reference,
+    TrackedPoint,
+)
+from motions.dynamic_span import DynamicSpan
 from motions.placement import attitudes
 from motions.plan import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN, reference
 from motions.problem import Problem
 from motions.samples import PlanSamples
 
+LANDING_RAMP = 0.01
+"""Time [s] over which a foot takes up its load after a flight: own choice, a few ticks. Landing
+takes 0.1 s, and the forces that it needs are planned."""
 LEAST_FEET = 3
 """Standing feet that span an area, so that a robot that stops there can keep standing."""
 
@@ -40,6 +51,7 @@ class CompiledPlan(MotionPlan):
         problems: what could not be done as written.
         spans: start and end [s] of the named holds.
         beats: instants [s] that it counts in.
+        dynamic: its parts that obey the whole robot's dynamics.
     """
 
     name: str
@@ -52,6 +64,7 @@ class CompiledPlan(MotionPlan):
     problems: tuple[Problem, ...]
     spans: Mapping[str, tuple[float, float]]
     beats: tuple[float, ...] = ()
+    dynamic: tuple[DynamicSpan, ...] = ()
     _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -63,8 +76,14 @@ class CompiledPlan(MotionPlan):
                 f"contact events, got {list(self.swings.shape)}"
             )
         tasks, events = _tasks(contacts.modes, self.swings), np.array(contacts.times)
-        tables = (curves.x, curves.c, events, tasks, contacts.since, contacts.until)
+        since, until = self._gradual(contacts.since, -np.inf), self._gradual(contacts.until, np.inf)
+        tables = (curves.x, curves.c, events, tasks, since, until)
         object.__setattr__(self, "_tables", tables)
+
+    @property
+    def has_dynamic_spans(self) -> bool:
+        """Whether some of it is solved; see ``MotionPlan.has_dynamic_spans``."""
+        return bool(self.dynamic)
 
     @property
     def duration(self) -> float:  # type: ignore[override]
@@ -72,9 +91,21 @@ class CompiledPlan(MotionPlan):
         return float(self.curves.x[-1])
 
     @property
-    def is_dynamic(self) -> bool:
-        """Whether fewer than three feet stand at any time; see ``MotionPlan.is_dynamic``."""
-        return bool((self.contacts.modes.sum(axis=1) < LEAST_FEET).any())
+    def footsteps(self) -> Footsteps | None:
+        """How its feet step, if any does; see ``MotionPlan.footsteps``."""
+        if not self.swings.any():
+            return None
+        ramp = min(self.ramp, LANDING_RAMP) if self.dynamic else self.ramp
+        return Footsteps(
+            contacts=self.contacts,
+            swings=self.swings,
+            unloads=np.where(
+                self.contacts.modes, self._gradual(self.contacts.until, np.inf), np.inf
+            ),
+            ramp=ramp,
+            normal_force_min=NORMAL_FORCE_MIN,
+            normal_force_max=NORMAL_FORCE_MAX,
+        )
 
     @property
     def end_pose(self) -> tuple[float, float, float]:
@@ -82,6 +113,11 @@ class CompiledPlan(MotionPlan):
         anchor = Anchor.of_feet(self.curves(self.duration)[18:].reshape(4, 3), 0.0)
         x, y, _ = anchor.p_world.tolist()
         return x, y, anchor.yaw
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether fewer than three feet stand at any time; see ``MotionPlan.is_dynamic``."""
+        return bool((self.contacts.modes.sum(axis=1) < LEAST_FEET).any())
 
     def at(self, t: float) -> Reference:
         """The reference at ``t``; see ``MotionPlan.at``."""
@@ -97,15 +133,27 @@ class CompiledPlan(MotionPlan):
 
     def readable_at(self, t: float) -> Reference:
         """The same as ``at``, step by step: what the kernel is held to."""
-        curves, phase = self._curves_at(t), self.contacts.at(t)
+        now = np.array([t])
+        curves, phase = self._curves_at(t), self._phases(now)
         parts = (slice(6), slice(6, 18), slice(18, None))
         body, joints, feet = (CurvePoint(*(curve[part] for curve in curves)) for part in parts)
-        tasks = [LegTask(int(task)) for task in _tasks(phase.stance, self.swings[self._event(t)])]
-        share = phase.load_share(self.ramp)
+        asked = _tasks(phase.stance, self.swings[event_at(self.contacts, now)])[0]
+        tasks = [LegTask(int(task)) for task in asked]
+        share = phase.load_share(self.ramp)[0]
         return reference(TrackedPoint.COM, body, joints, feet, tasks, share)
 
-    def _event(self, t: float) -> int:
-        return max(bisect_right(self.contacts.times, t + TIE) - 1, 0)
+    def _phases(self, times: Float[np.ndarray, " n"]) -> ContactPhase:
+        """The contacts at ``times``, with the changes to which load is ramped."""
+        rows, (*_, since, until) = event_at(self.contacts, times), self._tables
+        elapsed = np.maximum(times[:, None] - since[rows], 0.0)
+        return ContactPhase(self.contacts.modes[rows], elapsed, until[rows] - times[:, None])
+
+    def _gradual(self, changes: Float[np.ndarray, "m 4"], never: float) -> Float[np.ndarray, "m 4"]:
+        """``changes`` of contacts [s] but those in dynamic spans: there forces jump as planned."""
+        table = changes.copy()
+        for span in self.dynamic:
+            table[(changes > span.start - TIE) & (changes < span.end + TIE)] = never
+        return table
 
     def _curves_at(self, t: float) -> Float[np.ndarray, "3 30"]:
         """Values, rates and accelerations of all curves: a cubic and its two derivatives."""
@@ -121,8 +169,7 @@ class CompiledPlan(MotionPlan):
     def samples(self, times: Float[np.ndarray, " n"]) -> PlanSamples:
         """What the references at ``times`` ask for; ``at`` gives the same one by one."""
         values = self.curves(np.clip(times, 0.0, self.duration))
-        phase = self.contacts.at_times(times)
-        swings = self.swings[event_at(self.contacts, times)]
+        phase, swings = self._phases(times), self.swings[event_at(self.contacts, times)]
         return PlanSamples(
             times=times,
             p_world=values[:, :3],

@@ -50,10 +50,10 @@ LEAST_RAMP = 0.03
 """The same [s] where one foot lands as another lifts off: as ``LocomotionConfig.load_ramp``."""
 
 
-def compile_timeline(
+def compile_quasi_static(
     timeline: Timeline, model: RobotModel, p_feet: Float[np.ndarray, "4 3"] | None = None
 ) -> CompiledPlan:
-    """The plan of ``timeline``, in the frame of the motion.
+    """The plan of ``timeline`` without dynamic blocks, in the frame of the motion.
 
     It tracks the CoM, which balance is about, and not the base. Clamped splines begin and end at
     rest.

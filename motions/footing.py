@@ -95,6 +95,11 @@ class Footing:
         return np.column_stack([p_feet.mean(axis=1), yaw])
 
     @property
+    def end(self) -> Float[np.ndarray, "4 3"]:
+        """Where the feet's centres are when all steps are done [m]."""
+        return self._feet_at(np.inf)
+
+    @property
     def end_pose(self) -> tuple[float, float, float]:
         """x, y [m] and yaw [rad] of the frame of the feet when all steps are done."""
         p_feet = self._feet_at(np.inf)

@@ -215,6 +215,16 @@ class StepKey(Key):
         start, end, since = (t + seconds for t in (self.start, self.end, self.since))
         return replace(self, start=start, end=end, since=since)
 
+    def slower(self, factor: float) -> StepKey:
+        """The same key, all times multiplied."""
+        start, end, since = (factor * t for t in (self.start, self.end, self.since))
+        return replace(self, start=start, end=end, since=since, lead=factor * self.lead)
+
+    def scaled(self, amplitude: float) -> StepKey:
+        """Its way multiplied."""
+        x, y, yaw = self.place
+        return replace(self, place=(amplitude * x, amplitude * y, amplitude * yaw))
+
     @property
     def track(self) -> str:
         """The leg."""

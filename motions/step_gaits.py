@@ -15,6 +15,8 @@ from motions.keys import StepKey
 
 SAME = 1e-9
 """Shares and times this close are the same: absorbs rounding."""
+HALVES, THIRDS = (0.25, 0.5, 1.0, 2.0, 4.0), (1.0 / 3.0, 2.0 / 3.0, 3.0)
+"""Beats between two landings, in the order in which they are tried."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +73,8 @@ STEP_GAITS: Mapping[str, StepGait] = {
         offsets=(0.0, 0.5, 0.5, 0.0),
         period=0.4,
         least_period=0.36,
-        most_period=0.56,
-        duty=0.575,
+        most_period=0.62,
+        duty=0.6,
         stride=0.12,
         side_stride=0.08,
         turn=0.25,
@@ -82,7 +84,7 @@ STEP_GAITS: Mapping[str, StepGait] = {
     ),
 }
 """By their names. ``walk``: one foot after the other, the CoM always over three. ``trot``: pairs
-across, which overlap by 30 ms on four feet."""
+across, with 40 ms on four feet between them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,10 +139,7 @@ def rhythm_for(gait: StepGait, rounds: int, beat: float | None) -> Rhythm:
     """The rhythm of so many rounds; with a ``beat`` [s], feet land on beats or parts of them."""
     period, before = gait.period, gait.rest
     if beat is not None:
-        between = [beat * n for n in (0.25, 1.0 / 3.0, 0.5, 1.0, 2.0, 3.0, 4.0)]
-        periods = [gait.landings * t for t in between]
-        fit = [p for p in periods if gait.least_period <= p + SAME and p <= gait.most_period + SAME]
-        period = min(fit, key=lambda p: abs(math.log(p / gait.period)), default=period)
+        period = _period_on(gait, beat)
         swing = (1.0 - gait.duty) * period
         before = math.ceil((gait.rest + swing) / beat - SAME) * beat - swing
     stepping = (rounds - 1.0 + gait.last) * period
@@ -148,6 +147,16 @@ def rhythm_for(gait: StepGait, rounds: int, beat: float | None) -> Rhythm:
     if beat is not None:
         over = math.ceil(over / beat - SAME) * beat
     return Rhythm(rounds, period, before, over)
+
+
+def _period_on(gait: StepGait, beat: float) -> float:
+    """The period [s] nearest to the gait's own in which feet land on halves of beats, or thirds."""
+    for parts in (HALVES, THIRDS):
+        periods = [gait.landings * part * beat for part in parts]
+        fit = [p for p in periods if gait.least_period <= p + SAME and p <= gait.most_period + SAME]
+        if fit:
+            return min(fit, key=lambda p: abs(math.log(p / gait.period)))
+    return gait.period
 
 
 def rhythm_within(gait: StepGait, rounds: int, over: float) -> Rhythm:

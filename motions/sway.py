@@ -22,7 +22,7 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import BSpline, CubicSpline
-from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags, hstack, vstack
+from scipy.sparse import block_diag, csr_matrix, diags, eye, hstack, vstack
 from scipy.sparse.linalg import spsolve
 
 from go2_wbc.geometry import convex_hull
@@ -43,7 +43,11 @@ KNOTS = 5
 SHORTEST, LONGEST = 0.03, 0.08
 """Length [s] of a piece: three samples, and what the smoothing asks for."""
 MOST_STEPS = 40
-"""Newton steps; they end by themselves when no row changes its side."""
+"""Newton steps; they end by themselves after some ten."""
+HALVES = tuple(0.5**k for k in range(6))
+"""Shares of a step that are tried."""
+GAIN = 1e-4
+"""Least share of f that a step must gain: it moves the way by less than a micrometre or two."""
 
 Times = Float[np.ndarray, " n"]
 
@@ -84,27 +88,37 @@ class Stepping:
 def sway(stepping: Stepping) -> Float[np.ndarray, "n 2"]:
     """What to add to the place of the CoM [m]; nothing, at rest, at both ends."""
     values, curvature, jerk = _spline(stepping)
-    if values.shape[1] == 0:
+    if not values.nnz:
         return np.zeros((len(stepping.times), 2))
-    G, h = _limits(stepping, values, values - diags(stepping.lever) @ curvature)
+    G, h = _limits(stepping, values, csr_matrix(values - diags(stepping.lever) @ curvature))
     period = float(np.mean(np.diff(stepping.times)))
-    H = block_diag([period * (values.T @ values) + SMOOTHING**6 * (jerk.T @ jerk)] * 2)
+    own = period * (values.T @ values) + SMOOTHING**6 * (jerk.T @ jerk)
+    H = csr_matrix(block_diag([own, own]))
     x = _least(H, G, h, STIFFNESS * period).reshape(2, -1)
     return np.column_stack([values @ x[0], values @ x[1]])
 
 
 def _least(
-    H: csc_matrix, G: csr_matrix, h: Float[np.ndarray, " k"], stiffness: float
+    H: csr_matrix, G: csr_matrix, h: Float[np.ndarray, " k"], stiffness: float
 ) -> Float[np.ndarray, " m"]:
-    """The x of least x' H x + s |max(0, G x - h)|^2."""
-    x = np.zeros(H.shape[0])
-    before = np.zeros(len(h), dtype=bool)
+    """The x of least f(x) = x' H x + s |max(0, G x - h)|^2.
+
+    Newton's steps, halved until f falls; they end where they would gain nothing.
+    """
+
+    def f(x: Float[np.ndarray, " m"]) -> float:
+        beyond = np.maximum(G @ x - h, 0.0)
+        return float(x @ (H @ x) + stiffness * beyond @ beyond)
+
+    x = np.zeros_like(H.diagonal())
     for _ in range(MOST_STEPS):
         active = G @ x > h
-        if (active == before).all():
+        part, wanted = G[active], (1.0 - GAIN) * f(x)
+        way = spsolve((H + stiffness * part.T @ part).tocsc(), stiffness * part.T @ h[active]) - x
+        better = next((p for p in (x + share * way for share in HALVES) if f(p) < wanted), None)
+        if better is None:
             break
-        part, before = G[active], active
-        x = spsolve((H + stiffness * part.T @ part).tocsc(), stiffness * (part.T @ h[active]))
+        x = better
     return x
 
 
@@ -126,14 +140,15 @@ def _spline(stepping: Stepping) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
     inside = np.clip(times, knots[3], knots[-4])
     count = pieces + 3
     differences = [
-        diags([-1.0, 1.0], [0, 1], shape=(n - 1, n)) / length for n in (count, count - 1, count - 2)
+        (eye(n - 1, n, k=1) - eye(n - 1, n)) / length for n in (count, count - 1, count - 2)
     ]
     second = differences[1] @ differences[0]
     values = BSpline.design_matrix(inside, knots, 3)
     curvature = BSpline.design_matrix(inside, knots[2:-2], 1) @ second
     jerk = np.sqrt(length) * differences[2] @ second
     free = slice(3, max(count - 3, 3))
-    return tuple(csr_matrix(table)[:, free] for table in (values, curvature, jerk))
+    first, second, third = (csr_matrix(table)[:, free] for table in (values, curvature, jerk))
+    return first, second, third
 
 
 def _limits(
@@ -153,7 +168,7 @@ def _limits(
             ends.append(bounds[rows, edge] - (n * points[rows]).sum(axis=1))
     h = np.concatenate(ends)
     is_edge = np.isfinite(h)
-    return vstack(parts).tocsr()[is_edge], h[is_edge]
+    return csr_matrix(vstack(parts))[is_edge], h[is_edge]
 
 
 def _edges(

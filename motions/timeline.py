@@ -16,19 +16,25 @@ that stay, unless the motion is made with ``balance=False``.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import yaw_rotation
 from motions.footing import Footing, standing_feet
+from motions.language.clock import SAME
+from motions.language.flight import Flight
 from motions.language.shapes import Shapes
 from motions.language.steps import Steps
 from motions.language.transforms import Transforms
+from motions.phase_key import PhaseKey
 
 
-class Timeline(Shapes, Steps, Transforms):
+class Timeline(Shapes, Steps, Flight, Transforms):
     """An authored motion; ``motions.language`` holds its calls."""
 
     __slots__ = ()
@@ -39,7 +45,18 @@ class Timeline(Shapes, Steps, Transforms):
 
         Of the installed Go2, with its feet below its hips at first.
         """
-        return Footing(self, _nominal_feet()).end_pose
+        nominal = _nominal_feet()
+        feet, start = nominal, 0.0
+        for block in self.in_order(PhaseKey):
+            feet = Footing(self._between(start, block.start), nominal, feet).end
+            heading = yaw_rotation(Anchor.of_feet(feet, 0.0).yaw)
+            feet, start = feet + block.shift @ heading.T, block.end
+        return Footing(self._between(start, math.inf), nominal, feet).end_pose
+
+    def _between(self, start: float, end: float) -> Timeline:
+        """What is written from ``start`` to ``end`` [s]."""
+        keys = (key for key in self.keys if not isinstance(key, PhaseKey))
+        return replace(self, keys=tuple(key for key in keys if start - SAME <= key.start < end))
 
 
 @cache

@@ -3,14 +3,17 @@
 The references say where the CoM, the trunk's attitude and the raised legs shall be. The rest
 follows: standing feet stay in their places, so the trunk's place is the one that puts the CoM where
 it is wanted, and the standing legs' angles come from closed-form inverse kinematics. Velocities and
-accelerations are those of a cubic spline through the samples.
+accelerations are those of a cubic spline through the samples. Dynamic spans bring their own states.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+import pinocchio as pin
 from jaxtyping import Bool, Float
 from scipy.interpolate import CubicSpline
 
@@ -18,8 +21,17 @@ from go2_wbc.errors import MotionError
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.compiled_plan import CompiledPlan
+from motions.dynamic_span import DynamicSpan
 from motions.footing import standing_feet
-from motions.placement import Wanted, attitudes, configurations, place, turned, turned_back
+from motions.placement import (
+    Wanted,
+    attitudes,
+    centres_of_mass,
+    configurations,
+    place,
+    turned,
+    turned_back,
+)
 from motions.samples import PlanSamples
 from motions.tracks import sample_times
 
@@ -43,6 +55,7 @@ class Trajectory:
         load_share: (n, 4) share of its load that a foot may bear.
         p_feet: (n, 4, 3) where the feet are [m] of legs that do not follow their joints.
         miss: (n, 4) distance [m] by which such a foot is out of its leg's reach.
+        is_dynamic: (n,) instants in spans that obey the whole robot's dynamics, of which they are.
     """
 
     times: Float[np.ndarray, " n"]
@@ -55,6 +68,7 @@ class Trajectory:
     load_share: Float[np.ndarray, "n 4"]
     p_feet: Float[np.ndarray, "n 4 3"]
     miss: Float[np.ndarray, "n 4"]
+    is_dynamic: Bool[np.ndarray, " n"]
 
     def placed(self, p_base: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """Points of the base [m], one an instant, in the frame of the motion."""
@@ -84,9 +98,14 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     )
     placed = place(wanted, CENTRING_STEPS, model)
     q = configurations(np.hstack([placed.p_base, rpy]), placed.q_joints)
-    v, a = rates(times, q, rpy)
+    spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
+    is_dynamic = _are_within(times, spans)
+    v, a = np.zeros((len(times), 18)), np.zeros((len(times), 18))
+    for rows in _runs(is_dynamic):
+        if not is_dynamic[rows.start] and rows.stop - rows.start > 1:
+            v[rows], a[rows] = rates(times[rows], q[rows], rpy[rows])
     greatest = asked.normal_force_max
-    return Trajectory(
+    path = Trajectory(
         times=times,
         q=q,
         v=v,
@@ -97,7 +116,39 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
         load_share=greatest / max(float(greatest.max()), 1e-9),
         p_feet=asked.p_feet,
         miss=placed.miss,
+        is_dynamic=is_dynamic,
     )
+    for span in spans:
+        _fill(path, span, model)
+    return path
+
+
+def _are_within(
+    times: Float[np.ndarray, " n"], spans: Sequence[DynamicSpan]
+) -> Bool[np.ndarray, " n"]:
+    within = np.zeros(len(times), dtype=bool)
+    for span in spans:
+        within |= (times >= span.start) & (times < span.end)
+    return within
+
+
+def _runs(mask: Bool[np.ndarray, " n"]) -> list[slice]:
+    """Rows between changes of ``mask``."""
+    edges = [0, *(np.flatnonzero(np.diff(mask)) + 1).tolist(), len(mask)]
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def _fill(path: Trajectory, span: DynamicSpan, model: RobotModel) -> None:
+    """Put the span's own states into its rows of ``path``."""
+    rows = _are_within(path.times, [span])
+    found = span.at(path.times[rows], model)
+    path.q[rows], path.v[rows], path.a[rows] = found.q, found.v, found.a
+    turns = np.array([pin.Quaternion(q[3:7]).toRotationMatrix() for q in found.q])
+    own = np.unwrap(_rpy_of(turns), axis=0)
+    path.rpy[rows] = own + 2.0 * np.pi * np.round((path.rpy[rows][:1] - own[:1]) / (2.0 * np.pi))
+    poses = np.hstack([found.q[:, :3], path.rpy[rows]])
+    path.p_com[rows] = centres_of_mass(poses, found.q[:, 7:], model)
+    path.miss[rows] = 0.0
 
 
 def _require_finite(asked: PlanSamples) -> None:

@@ -31,19 +31,21 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.active_set",  # compiled: a kernel cannot be wrapped
         "go2_wbc.kernels.bounds",
         "go2_wbc.kernels.condensed",
-        "go2_wbc.kernels.derivation",
         "go2_wbc.kernels.elimination",
         "go2_wbc.kernels.friction",
         "go2_wbc.kernels.goals",
         "go2_wbc.kernels.inputs",
         "go2_wbc.kernels.kinematics",
+        "go2_wbc.kernels.landing",
         "go2_wbc.kernels.loading",  # loaded here
         "go2_wbc.kernels.loads",
         "go2_wbc.kernels.locomotion",
         "go2_wbc.kernels.motor",
         "go2_wbc.kernels.playing",
+        "go2_wbc.kernels.rigid_body",
         "go2_wbc.kernels.simulation",
         "go2_wbc.kernels.supervision",
+        "go2_wbc.kernels.vectors",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",
         "go2_wbc.robot.rotations",

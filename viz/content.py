@@ -12,7 +12,6 @@ from jaxtyping import Float, Int
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
-from viz.sound import Sound
 
 CENTRE_OF_MASS = "com"
 """Stands in ``Annotation.parts`` for the centre of mass."""
@@ -132,7 +131,7 @@ class ReplayContent:
         judges_ghost: the verdict is on the ghost; otherwise on ``recording``.
         beats: instants [s] that the motion counts in, drawn as a ruler.
         sliders: parameters that a live page lets one choose.
-        sound: played in step with the movement, from its start.
+        sound: an MP3 file that starts with the recording, played in step with it; empty for none.
         end_pose: where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet.
     """
 
@@ -144,7 +143,7 @@ class ReplayContent:
     judges_ghost: bool = True
     beats: tuple[float, ...] = ()
     sliders: tuple[Slider, ...] = ()
-    sound: Sound | None = None
+    sound: bytes = b""
     end_pose: tuple[float, float, float] | None = None
 
 

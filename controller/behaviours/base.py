@@ -16,6 +16,7 @@ class Behaviour(ABC):
         duration: time [s] that it takes, unless it says otherwise by ``is_finished``.
         needs_balance: whether a large tilt means that the robot has fallen.
         may_lie: whether the belly may be on the ground.
+        is_dynamic: whether it flies, or stands on few feet.
         sag_and_lean: depth [m] of the trunk below where it shall be and angle [rad] from how it
             shall be, if what is tracked says something else; None if it says so itself.
     """
@@ -24,6 +25,7 @@ class Behaviour(ABC):
     duration: float = 0.0
     needs_balance: bool = True
     may_lie: bool = False
+    is_dynamic: bool = False
 
     @property
     def sag_and_lean(self) -> tuple[float, float] | None:

@@ -10,6 +10,7 @@ from jaxtyping import Float
 from controller.behaviours.base import Behaviour
 from controller.behaviours.safe_return import SafeReturn
 from go2_wbc.planning.correction import tracked_position
+from go2_wbc.planning.landing import Landings
 from go2_wbc.planning.playback import Deviation, PlanFollower, Playback
 from go2_wbc.reference import Anchor, MotionPlan, Posture, Reference
 from go2_wbc.robot.model import FOOT_RADIUS
@@ -31,7 +32,7 @@ class PlayPlan(Behaviour):
     def __init__(self, plan: MotionPlan) -> None:
         """Play ``plan``."""
         self.label, self.duration = plan.name, plan.duration
-        self.plan = plan
+        self.plan, self.is_dynamic = plan, plan.has_dynamic_spans
         self._start = self._last = 0.0
         self._must_return = False
         self._return: SafeReturn | None = None
@@ -41,7 +42,7 @@ class PlayPlan(Behaviour):
         super().start(snapshot)
         self._last = self._start
         self._anchor = Anchor.of_feet(snapshot.p_world_feet, FOOT_RADIUS)
-        self._follower = Playback(self._anchor)
+        self._follower = Playback(self._anchor, self.plan.footsteps)
 
     def return_safely(self) -> None:
         """Leave the plan: go to its nearest instant on four loaded feet; any thread may call."""
@@ -58,6 +59,22 @@ class PlayPlan(Behaviour):
         return self._follower.deviation
 
     @property
+    def landings(self) -> Landings:
+        """What came of the landings of feet that step."""
+        return self._follower.landings
+
+    def end_error(self, snapshot: Snapshot) -> tuple[float, float]:
+        """Distance [m], on the level, and angle [rad] of the feet's middle from its planned end.
+
+        That is where the plan ends, placed where the robot stood when it began.
+        """
+        planned = self.plan.at(self.plan.duration).placed(self._anchor).p_world_feet
+        wanted = Anchor.of_feet(planned, FOOT_RADIUS)
+        stands = Anchor.of_feet(snapshot.p_world_feet, FOOT_RADIUS)
+        off = (stands.p_world - wanted.p_world)[:2]
+        return float(np.linalg.norm(off)), abs(wrap_angle(stands.yaw - wanted.yaw))
+
+    @property
     def sag_and_lean(self) -> tuple[float, float]:
         """From the plan: a correction that pulls against a load is no wanted lean."""
         return self._follower.sag_and_lean
@@ -65,17 +82,20 @@ class PlayPlan(Behaviour):
     def update(self, snapshot: Snapshot) -> Reference:
         """The plan's reference of this instant, in the world."""
         now = snapshot.state.time
-        row = self._planned(now)
-        reference = self._follower.follow(row, snapshot, now - self._last)
+        row, t = self._planned(now)
+        reference = self._follower.follow(row, snapshot, t, now - self._last)
         self._last = now
         return reference
 
-    def _planned(self, now: float) -> Float[np.ndarray, " size"]:
+    def _planned(self, now: float) -> tuple[Float[np.ndarray, " size"], float]:
+        """The plan's row of this tick, and how far into the plan it is [s]."""
         if self._must_return and self._return is None:
             self._return = SafeReturn(self.plan, self._last - self._start)
         if self._return is not None:
-            return self._return.advance(now - self._last).row
-        return self.plan.row_at(now - self._start)
+            row = self._return.advance(now - self._last).row
+            return row, self._return.t
+        t = now - self._start
+        return self.plan.row_at(t), t
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the plan is over, or the way back from it."""

@@ -40,6 +40,7 @@ class Command:
 
 COMMANDS: tuple[Command, ...] = (
     Command("check", "controller.cli.motion_check", "can the robot do this motion?"),
+    Command("dance", "controller.cli.dance", "a dance on the beats of a song"),
     Command("demo", "controller.cli.demo", "stand, sit, walk, turn, high five; measured, in 3D"),
     Command("doctor", "controller.cli.doctor", "check this installation, say what is missing"),
     Command("export", "controller.cli.motion_export", "a motion's trajectory as NumPy or CSV"),

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
         closing(GroundTruth(MujocoPlant(friction=args.friction))) as truth,
         GO2Controller(plant=truth) as go2,
     ):
-        truth.on_tick = _teller(line, truth.control_period, plan.name, plan.duration)
+        truth.on_tick = teller(line, truth.control_period, plan.name, plan.duration)
         starts = {Posture.STAND: go2.stand, Posture.SIT: go2.sit}
         if plan.entry not in starts:
             raise StanceMismatch(f"{plan.name} starts from {plan.entry.value}: cannot be run")
@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     return ExitCode.OK if result.ok else ExitCode.FAILED
 
 
-def _teller(line: ProgressLine, period: float, name: str, duration: float) -> Callable[[], None]:
+def teller(line: ProgressLine, period: float, name: str, duration: float) -> Callable[[], None]:
     """Shows after every so many ticks how far the robot has come."""
     ticks = count(1)
 

@@ -238,21 +238,15 @@ def finish(rows, u, q, side, x, y, k):
     return SOLVED if np.isfinite(x).all() else UNFINISHED
 
 
-@kernel("i8(f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
-def solve_qp(H, g, E, e, C, lower, upper, x, y):
-    """Fill the minimiser x (n,) and the multipliers y (k + m,); returns the outcome.
-
-    H x + g + (E' C') y = 0; a row of C has y >= 0 at its upper bound and y <= 0 at its lower one.
-    """
-    n, k, m = len(g), len(e), len(lower)
+@subroutine("i8(f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def constrain(L, E, e, C, lower, upper, x, y):
+    """The same as ``solve_qp``, from the minimum x without constraints, with H = L L'."""
+    n, k, m = len(x), len(e), len(lower)
     y[:] = 0.0
     for i in range(m):
         if not lower[i] <= upper[i]:
             return BAD_BOUNDS
-    L, J, R = np.empty((n, n)), np.empty((n, n)), np.zeros((n, n))
-    if not factorise(H, L):
-        return SINGULAR
-    solve_factorised(L, g, x)
+    J, R = np.empty((n, n)), np.zeros((n, n))
     invert(L, J)
     rows, u = np.empty(n, dtype=np.int64), np.empty(n)  # working set: rows and multipliers
     side = np.zeros(m, dtype=np.int64)
@@ -281,3 +275,16 @@ def solve_qp(H, g, E, e, C, lower, upper, x, y):
             return INFEASIBLE if q == -1 else UNFINISHED
         side[row] = AT_LOWER if sign > 0.0 else AT_UPPER
     return UNFINISHED
+
+
+@kernel("i8(f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def solve_qp(H, g, E, e, C, lower, upper, x, y):
+    """Fill the minimiser x (n,) and the multipliers y (k + m,); returns the outcome.
+
+    H x + g + (E' C') y = 0; a row of C has y >= 0 at its upper bound and y <= 0 at its lower one.
+    """
+    L = np.empty((len(g), len(g)))
+    if not factorise(H, L):
+        return SINGULAR
+    solve_factorised(L, g, x)
+    return constrain(L, E, e, C, lower, upper, x, y)

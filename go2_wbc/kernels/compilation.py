@@ -20,23 +20,25 @@ import platform
 import shutil
 import tempfile
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import llvmlite.binding
 import numba
 import numpy as np
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.environment import Environment
-from numba.core.runtime.nrt import rtsys
+from numba.core.registry import CPUDispatcher
+from numba.core.runtime import _nrt_python  # pyright: ignore[reportAttributeAccessIssue]
 
 _log = logging.getLogger(__name__)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 CACHE_VARIABLE = "GO2_WBC_CACHE_DIR"
-"""Environment variable that names the folder for compiled kernels; by default the user's cache."""
+"""Environment variable that names the folder for compiled kernels and solved plans; by default the
+user's cache."""
 
 
 def kernel(signature: str, *, nogil: bool = False) -> Callable[[F], F]:
@@ -71,21 +73,32 @@ def subroutine(signature: str) -> Callable[[F], F]:
     A process that loads the kernel does not need it. Called from Python, as by a test, it is
     compiled for the arguments that it is given.
     """
+    return lambda function: cast(F, _Subroutine(function, signature))
 
-    def deferred(function: F) -> F:
-        dispatcher = numba.njit(error_model="numpy")(function)
-        template_for = dispatcher.get_call_template
 
-        def get_call_template(args: Any, kws: Any) -> Any:
-            if not dispatcher.overloads:
-                dispatcher.compile(signature)
-                dispatcher.disable_compile()
-            return template_for(args, kws)
+class _Subroutine:
+    """A function that Numba is told of when it is needed: most processes load only its callers."""
 
-        dispatcher.get_call_template = get_call_template
-        return dispatcher
+    def __init__(self, function: Callable[..., Any], signature: str) -> None:
+        self._function, self._signature = function, signature
 
-    return deferred
+    @cached_property
+    def _dispatcher(self) -> Any:
+        return numba.njit(error_model="numpy")(self._function)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What Numba asks a global variable for, once it compiles code that names it."""
+        if not self._dispatcher.overloads:
+            self._dispatcher.compile(self._signature)
+            self._dispatcher.disable_compile()
+        return self._dispatcher._numba_type_
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._dispatcher(*arguments)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._dispatcher, name)
 
 
 def _compiled(function: F, signature: str, folder: Path | None, nogil: bool) -> F:
@@ -99,20 +112,38 @@ def _compiled(function: F, signature: str, folder: Path | None, nogil: bool) -> 
     finally:
         numba.config.CACHE_DIR = before
     dispatcher.disable_compile()
+    if dispatcher.stats.cache_hits:
+        dispatcher.__class__ = _Loaded
+        dispatcher._for_callers = _Subroutine(function, signature)
     return dispatcher
 
 
-class _MachineCode(CompileResultCacheImpl):
-    """What is kept of a compiled function.
+class _Loaded(CPUDispatcher):
+    """A kernel that was loaded: a kernel that calls it and is compiled now compiles it along."""
 
-    With it Numba keeps an environment for each of its own functions that was compiled along
-    (``np.zeros``, ``min``), and loading one imports that function's module, scipy.linalg at last.
-    Compiled code takes nothing from that module: any other will do.
+    _for_callers: _Subroutine
+
+    @property
+    def _numba_type_(self) -> Any:
+        return self._for_callers._numba_type_
+
+
+class _MachineCode(CompileResultCacheImpl):
+    """What is kept of a compiled function: what running it takes, not what a caller is linked with.
+
+    With it Numba keeps the function's intermediate code, for callers that are compiled later, and
+    loading one parses it all: only the entry's name is asked for. And it keeps an environment for
+    each of its own functions that was compiled along (``np.zeros``, ``min``), and loading one
+    imports that function's module, scipy.linalg at last. Compiled code takes nothing from that
+    module: any other will do.
     """
 
     def reduce(self, cres: Any) -> tuple[Any, ...]:
-        *rest, environments = cres._reduce()
-        return (*rest, [_light(environment) for environment in environments])
+        (name, kind, (machine_code, _)), *rest, environments = cres._reduce()
+        entry = f'define void @"{cres.fndesc.llvm_cpython_wrapper_name}"() {{ ret void }}'
+        names = llvmlite.binding.parse_assembly(entry).as_bitcode()
+        library = (name, kind, (machine_code, names))
+        return (library, *rest, [_light(environment) for environment in environments])
 
 
 def _light(environment: Environment) -> Environment:
@@ -124,6 +155,16 @@ def _light(environment: Environment) -> Environment:
     return light
 
 
+@cache
+def _offer_runtime() -> None:
+    """Name the functions of Numba's runtime that machine code calls.
+
+    That much of ``rtsys.initialize`` does loaded code need; compiling does the rest.
+    """
+    for name, address in _nrt_python.c_helpers.items():
+        llvmlite.binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+
+
 class _KernelCache(FunctionCache):
     """Numba's cache, but loading does not import the compiler's library of functions.
 
@@ -133,7 +174,7 @@ class _KernelCache(FunctionCache):
     _impl_class = _MachineCode
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        rtsys.initialize(target_context)
+        _offer_runtime()
         with self._guard_against_spurious_io_errors():
             return self._load_overload(sig, target_context)
 
@@ -141,7 +182,7 @@ class _KernelCache(FunctionCache):
 @cache
 def kernel_folder() -> Path | None:
     """Where compiled kernels are kept; None if nothing can be written. Says when it is empty."""
-    folder = _cache_root() / f"kernels-{_fingerprint()}"
+    folder = cache_root() / f"kernels-{_fingerprint()}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
@@ -158,7 +199,8 @@ def kernel_folder() -> Path | None:
     return folder
 
 
-def _cache_root() -> Path:
+def cache_root() -> Path:
+    """The folder for what this package makes once and keeps."""
     if named := os.environ.get(CACHE_VARIABLE):
         return Path(named)
     if base := os.environ.get("XDG_CACHE_HOME"):

@@ -10,20 +10,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.kernels.active_set import SINGULAR, SOLVED, factorise, solve_factorised, solve_qp
+from go2_wbc.kernels.active_set import SINGULAR, SOLVED, constrain, factorise, solve_factorised
 from go2_wbc.kernels.bounds import MOST_ROWS, are_met, bound_forces, bound_joints
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.elimination import decide, eliminate, expand
 from go2_wbc.kernels.friction import motor_torques
 from go2_wbc.kernels.goals import add_body_goals, add_goal, add_leg_goals
 from go2_wbc.kernels.inputs import are_valid
-from go2_wbc.kernels.layout import SNAPSHOT
+from go2_wbc.kernels.layout import DECISION, SNAPSHOT
 
 UNSUITED = 10
 """Outcome, beside those of ``active_set``: a singular leg or a rotation by pi, which are for the
 full QP, or numbers that are not finite."""
 
 _M, _H, _J_CONTACTS = (SNAPSHOT.start[n] for n in ("mass_matrix", "bias", "J_contacts"))
+_TAU, _MOTORS = DECISION.start["tau"], DECISION.start["tau_motors"]
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1])")
@@ -41,40 +42,39 @@ def torques(snapshot, z, tau):
         tau[n] = value
 
 
-@subroutine("void(f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[::1])")
-def add_extra_goals(A, b, weights, affine, H, g):
-    """Rows (k, 30) of a user's own tasks."""
+@subroutine("void(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1])")
+def add_extra_goals(rows, affine, H, g):
+    """Rows (k, 32) of a user's own tasks: A, b, weight."""
     row = np.empty(13)
-    for n in range(len(b)):
+    for n in range(len(rows)):
         row[:] = 0.0
         for i in range(30):
             for k in range(13):
-                row[k] += A[n, i] * affine[i, k]
-        add_goal(H, g, row, b[n], weights[n])
+                row[k] += rows[n, i] * affine[i, k]
+        add_goal(H, g, row, rows[n, 30], rows[n, 31])
 
 
-@subroutine("i8(f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1])")
-def solve_bounded(snapshot, target, program, affine, H, g, u):
-    """Fill u (12,), the minimum within all bounds; returns the outcome."""
+@subroutine("i8(f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[::1])")
+def solve_bounded(snapshot, target, program, affine, L, u):
+    """Move u (12,) from the minimum without bounds to that within all; returns the outcome."""
     C, lower, upper = np.empty((MOST_ROWS, 12)), np.empty(MOST_ROWS), np.empty(MOST_ROWS)
     count = bound_forces(target, program, C, lower, upper)
     bound_joints(snapshot, program, affine, count, C, lower, upper)
     count += 24
     E, e, multipliers = np.empty((0, 12)), np.empty(0), np.empty(count)
-    return solve_qp(H, g, E, e, C[:count], lower[:count], upper[:count], u, multipliers)
+    return constrain(L, E, e, C[:count], lower[:count], upper[:count], u, multipliers)
 
 
-@kernel(
-    "i8(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])"
-)
-def solve_condensed(snapshot, target, program, friction, A, b, weights, z, tau, motors):
-    """Fill the decision z (30,) and torques (12,), without and with friction; returns the outcome.
+@kernel("i8(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1])")
+def solve_condensed(snapshot, target, program, friction, extra, decision):
+    """Fill the decision (``layout.DECISION``); returns the outcome.
 
-    ``A`` (k, 30), ``b`` (k,) and ``weights`` (k,) are rows of a user's own tasks; ``friction`` are
-    the numbers of ``kernels.friction``.
+    ``extra`` (k, 32) are rows of a user's own tasks: A, b, weight; ``friction`` are the numbers of
+    ``kernels.friction``.
     """
     if not are_valid(snapshot, target):
         return UNSUITED
+    z, tau, motors = decision[:_TAU], decision[_TAU:_MOTORS], decision[_MOTORS:]
     legs_map, base, affine = np.empty((12, 7)), np.empty((6, 13)), np.empty((30, 13))
     if not eliminate(snapshot, target, program, legs_map, base):
         return UNSUITED
@@ -82,9 +82,9 @@ def solve_condensed(snapshot, target, program, friction, A, b, weights, z, tau, 
     if not add_body_goals(snapshot, target, program, base, H, g):
         return UNSUITED
     add_leg_goals(snapshot, target, program, base, H, g)
-    if len(b) > 0:
+    if len(extra) > 0:
         expand(target, legs_map, base, affine)
-        add_extra_goals(A, b, weights, affine, H, g)
+        add_extra_goals(extra, affine, H, g)
     if not factorise(H, L):
         return SINGULAR
     solve_factorised(L, g, u)
@@ -93,7 +93,7 @@ def solve_condensed(snapshot, target, program, friction, A, b, weights, z, tau, 
     outcome = SOLVED
     if not are_met(snapshot, target, program, z, tau):
         expand(target, legs_map, base, affine)
-        outcome = solve_bounded(snapshot, target, program, affine, H, g, u)
+        outcome = solve_bounded(snapshot, target, program, affine, L, u)
         decide(target, legs_map, base, u, z)
         torques(snapshot, z, tau)
     motor_torques(snapshot, z, tau, friction, motors)

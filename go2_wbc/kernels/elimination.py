@@ -11,6 +11,7 @@ import numpy as np
 
 from go2_wbc.kernels.compilation import subroutine
 from go2_wbc.kernels.layout import PROGRAM, REFERENCE, SNAPSHOT
+from go2_wbc.kernels.vectors import along, cross, plus_scaled, vector
 
 STANCE, SWING, JOINTS = 0, 1, 2
 """The values of ``reference.LegTask``."""
@@ -25,30 +26,28 @@ _DAMPING, _SINGULAR = _P["stance_damping"], _P["singular_determinant"]
 @subroutine("b1(f8[::1], f8[::1], i8, f8[:,::1])")
 def stance_leg(snapshot, program, leg, legs_map):
     """(3): fill rows 3 leg to 3 leg + 2 of ``legs_map``; False if the leg is singular."""
-    J = snapshot[_J_CONTACTS + 54 * leg : _J_CONTACTS + 54 * leg + 54].reshape(3, 18)
-    c, first = 6 + 3 * leg, 3 * leg
-    inverse = np.empty((3, 3))
-    for i in range(3):
-        for k in range(3):
-            a, b = (k + 1) % 3, (k + 2) % 3
-            d, e = c + (i + 1) % 3, c + (i + 2) % 3
-            inverse[i, k] = J[a, d] * J[b, e] - J[a, e] * J[b, d]
-    determinant = (
-        J[0, c] * inverse[0, 0] + J[0, c + 1] * inverse[1, 0] + J[0, c + 2] * inverse[2, 0]
+    first, J = 3 * leg, _J_CONTACTS + 54 * leg
+    x, y, z = (
+        vector(snapshot, J + 6 + first),
+        vector(snapshot, J + 24 + first),
+        vector(snapshot, J + 42 + first),
     )
+    columns = cross(y, z), cross(z, x), cross(x, y)  # of the inverse, times the determinant
+    determinant = x[0] * columns[0][0] + x[1] * columns[0][1] + x[2] * columns[0][2]
     if not abs(determinant) >= program[_SINGULAR]:  # a nan counts as singular
         return False
-    wanted = np.empty(3)
-    for n in range(3):
-        k = first + n
-        wanted[n] = -snapshot[_DRIFT_CONTACTS + k]
-        wanted[n] -= program[_DAMPING] * snapshot[_V_CONTACTS + k]
+    drift, velocity = (
+        vector(snapshot, _DRIFT_CONTACTS + first),
+        vector(snapshot, _V_CONTACTS + first),
+    )
+    wanted = along(columns, plus_scaled(drift, program[_DAMPING], velocity))
+    for k in range(6):
+        column = snapshot[J + k], snapshot[J + 18 + k], snapshot[J + 36 + k]
+        moved = along(columns, column)
+        for i in range(3):
+            legs_map[first + i, k] = -moved[i] / determinant
     for i in range(3):
-        a, b = inverse[i, 0] / determinant, inverse[i, 1] / determinant
-        c = inverse[i, 2] / determinant
-        for k in range(6):
-            legs_map[first + i, k] = -(a * J[0, k] + b * J[1, k] + c * J[2, k])
-        legs_map[first + i, 6] = a * wanted[0] + b * wanted[1] + c * wanted[2]
+        legs_map[first + i, 6] = -wanted[i] / determinant
     return True
 
 

@@ -86,6 +86,17 @@ SNAPSHOT = Layout(
 )
 """Of ``robot.snapshot.Snapshot``, the state's q and v first."""
 
+ROBOT = Layout(
+    mass=(),
+    gravity=(),
+    foot_radius=(),
+    links=(13, 10),
+    p_joints=(12, 3),
+    p_calf_feet=(4, 3),
+    armature=(12,),
+)
+"""Numbers of the robot for its snapshot: of each link mass, first moment and inertia."""
+
 REFERENCE = Layout(
     is_com=(),
     p_world=(3,),
@@ -134,6 +145,9 @@ PROGRAM = Layout(
     singular_determinant=(),
 )
 """Numbers of the built-in tasks and constraints of the whole-body controller."""
+
+DECISION = Layout(z=(30,), tau=(12,), tau_motors=(12,))
+"""What the QP decides: z of ``wbc.problem``, and torques without and with friction."""
 
 PLANNER = Layout(
     yaw=(),
@@ -186,9 +200,39 @@ CORRECTION = Layout(rate=(), window=(6,), limit=(6,))
 """Numbers of the steady-state correction."""
 
 PLAYBACK = Layout(
-    offset=(6,), place=(), attitude=(), joints=(), ticks=(), raised_ticks=(), sag=(), lean=()
+    offset=(6,),
+    place=(),
+    attitude=(),
+    joints=(),
+    ticks=(),
+    raised_ticks=(),
+    sag=(),
+    lean=(),
+    anchor=(4,),
+    origin=(4,),
+    planned=(4,),
+    is_in_air=(4,),
+    is_awaited=(4,),
+    touchdown=(4,),
+    missed=(),
+    landing_error=(),
 )
-"""State of a playback: the correction, how far the robot has been off its plan, and is now."""
+"""State of a playback: the correction, how far the robot has been off its plan, and is now; where
+the plan is (x, y, z, yaw), now and at first; and of each foot that steps what the plan asks of it,
+whether it is in the air, whether its landing is still to be judged, and when it came down."""
+
+LANDING = Layout(
+    earliest=(),
+    press_speed=(),
+    press_depth=(),
+    time_out=(),
+    ground_share=(),
+    foot_radius=(),
+    ramp=(),
+    normal_force_min=(),
+    normal_force_max=(),
+)
+"""Numbers by which the feet of a plan land: of ``planning.landing`` and of the plan."""
 
 FRICTION = Layout(
     dry=(12,),

@@ -5,13 +5,13 @@ from __future__ import annotations
 from importlib import import_module
 
 KERNELS = (
-    "derivation",
     "condensed",
     "kinematics",
     "loads",
     "locomotion",
     "motor",
     "playing",
+    "rigid_body",
     "simulation",
     "supervision",
 )

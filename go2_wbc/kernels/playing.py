@@ -1,8 +1,9 @@
 """One tick of a motion that is played, as kernels: the plan's row, and where it is followed.
 
 ``planned`` is the plan's reference at an instant, in the motion's frame; ``motions.plan`` is its
-readable form. ``follow`` places it in the world, notes how far the robot is off it and adds the
-steady-state correction; ``planning.playback`` is its readable form.
+readable form. ``follow`` places it in the world, lets its feet land when they meet the ground
+(``landing``), notes how far the robot is off it and adds the steady-state correction;
+``planning.playback`` is its readable form.
 """
 
 from __future__ import annotations
@@ -10,14 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.kernels.compilation import kernel, subroutine
-from go2_wbc.kernels.derivation import rotation_of
+from go2_wbc.kernels.landing import JOINTS, STANCE, TIE, land
 from go2_wbc.kernels.layout import CORRECTION, PLAN_CURVES, PLAYBACK, REFERENCE, SNAPSHOT
 from go2_wbc.kernels.supervision import sag_and_lean
-
-TIE = 1e-9
-"""As ``contacts.TIE``."""
-STANCE, JOINTS = 0.0, 2.0
-"""Values of ``reference.LegTask``."""
+from go2_wbc.kernels.vectors import rotation_of
 
 _N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLAYBACK.start, CORRECTION.start
 _Q, _R, _P_COM = _N["q"], _N["R_world_base"], _N["p_world_com"]
@@ -28,7 +25,7 @@ _FOOT_P, _FOOT_V, _FOOT_A = (_T[n] for n in ("p_world_feet", "v_world_feet", "a_
 _JOINT_Q, _JOINT_V, _JOINT_A = (_T[n] for n in ("q_joints", "v_joints", "a_joints"))
 _OFFSET, _PLACE, _ATTITUDE, _OFF_JOINTS = (_S[n] for n in ("offset", "place", "attitude", "joints"))
 _TICKS, _RAISED_TICKS = _S["ticks"], _S["raised_ticks"]
-_SAG, _LEAN = _S["sag"], _S["lean"]
+_SAG, _LEAN, _ANCHOR = _S["sag"], _S["lean"], _S["anchor"]
 _RATE, _WINDOW, _LIMIT = _C["rate"], _C["window"], _C["limit"]
 
 _TABLE, _LIST = "Array(f8, 2, 'A', readonly=True)", "Array(f8, 1, 'A', readonly=True)"
@@ -203,10 +200,31 @@ def note(row, snapshot, error, state):
         state[_OFF_JOINTS] += (worst - state[_OFF_JOINTS]) / state[_RAISED_TICKS]
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1], f8, f8[::1], f8[::1], f8[::1])")
-def follow(plan, snapshot, anchor, dt, correction, state, row):
-    """Fill the corrected reference in the world, ``dt`` seconds after the last one."""
-    place(plan, anchor, row)
+@subroutine("b1(f8[::1])")
+def is_in_flight(row):
+    """Whether no foot stands."""
+    stands = False
+    for leg in range(4):
+        stands |= row[_LEGS + leg] == STANCE
+    return not stands
+
+
+@kernel(
+    f"void(f8[::1], f8[::1], f8, f8, f8[::1], {_LIST}, {_TABLE}, {_TABLE}, {_TABLE}, "
+    "f8[::1], f8[::1], f8[::1], f8[::1])"
+)
+def follow(
+    plan, snapshot, t, dt, contact, events, since, until, unloads, landing, correction, state, row
+):
+    """Fill the corrected reference in the world, ``dt`` seconds after the last one.
+
+    ``t``: how far into the plan; ``contact`` (4,): feet with a measured contact. ``events``,
+    ``since``, ``until``: of the plan's contacts; ``unloads``: of ``Footsteps``; ``landing``:
+    numbers of ``layout.LANDING``. Without any events no foot steps.
+    """
+    place(plan, state[_ANCHOR : _ANCHOR + 4], row)
+    if len(events) > 0:
+        land(t, contact, events, since, until, unloads, snapshot, landing, state, row)
     state[_SAG], state[_LEAN] = sag_and_lean(row, snapshot)
     measured = snapshot[_P_COM : _P_COM + 3] if row[_IS_COM] != 0.0 else snapshot[_Q : _Q + 3]
     R, wanted = snapshot[_R : _R + 9].reshape(3, 3), row[_BODY_R : _BODY_R + 9].reshape(3, 3)
@@ -217,11 +235,12 @@ def follow(plan, snapshot, anchor, dt, correction, state, row):
             turn[i, k] = wanted[i, 0] * R[k, 0] + wanted[i, 1] * R[k, 1] + wanted[i, 2] * R[k, 2]
     log_rotation(turn, error[3:])
     note(row, snapshot, error, state)
-    offset = state[_OFFSET : _OFFSET + 6]
+    offset, flies = state[_OFFSET : _OFFSET + 6], is_in_flight(row)
     for i in range(6):
         window, limit = correction[_WINDOW + i], correction[_LIMIT + i]
         counted = min(max(error[i], -window), window)
-        offset[i] = min(max(offset[i] + correction[_RATE] * dt * counted, -limit), limit)
+        change = 0.0 if flies else correction[_RATE] * dt * counted
+        offset[i] = min(max(offset[i] + change, -limit), limit)
     exp_rotation(offset[3:], turn)
     planned_attitude = wanted.copy()
     for i in range(3):

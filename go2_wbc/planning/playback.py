@@ -8,17 +8,20 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from math import acos
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.kernels.layout import CORRECTION, PLAYBACK, REFERENCE
+from go2_wbc.kernels.layout import CORRECTION, LANDING, PLAYBACK, REFERENCE
 from go2_wbc.planning.correction import CorrectionConfig, SteadyStateCorrection, tracked_position
-from go2_wbc.reference import Anchor, LegTask, Reference
+from go2_wbc.planning.landing import Landings, ReadableLanding, landing_numbers
+from go2_wbc.reference import Anchor, Footsteps, LegTask, Reference
 from go2_wbc.robot.rotations import log_rotation
 from go2_wbc.robot.snapshot import Snapshot
 
 _SAG, _LEAN = PLAYBACK.start["sag"], PLAYBACK.start["lean"]
+_MISSED, _ERROR = PLAYBACK.start["missed"], PLAYBACK.start["landing_error"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +43,22 @@ class PlanFollower(ABC):
     """Turns a plan's references, one a tick, into what is tracked in the world."""
 
     @abstractmethod
-    def follow(self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float) -> Reference:
+    def follow(
+        self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, t: float, dt: float
+    ) -> Reference:
         """The reference in the world.
 
         Args:
             plan: row of the plan's reference, in the motion's frame (``MotionPlan.row_at``).
             snapshot: of this tick.
+            t: seconds from the plan's start at which it stands there.
             dt: seconds since the last tick.
         """
+
+    @property
+    @abstractmethod
+    def landings(self) -> Landings:
+        """What came of the landings of feet that step."""
 
     @property
     @abstractmethod
@@ -63,21 +74,39 @@ class PlanFollower(ABC):
 class Playback(PlanFollower):
     """Follows a plan by the compiled kernel."""
 
-    def __init__(self, anchor: Anchor, config: CorrectionConfig | None = None) -> None:
+    def __init__(
+        self,
+        anchor: Anchor,
+        footsteps: Footsteps | None = None,
+        config: CorrectionConfig | None = None,
+    ) -> None:
         """Follow a plan at ``anchor``, without correction at first."""
         from go2_wbc.kernels.playing import follow
 
         config = config or CorrectionConfig()
         self._follow = follow
-        self._anchor = np.array([*anchor.p_world, anchor.yaw])
+        self._steps = _NO_STEPS if footsteps is None else _tables(footsteps)
         self._correction = CORRECTION.pack([config.rate, config.window, config.limit])
+        self._contact = np.zeros(4)
         self._state = np.zeros(PLAYBACK.size)
+        for name in ("anchor", "origin"):
+            PLAYBACK.view(self._state, name)[:] = [*anchor.p_world, anchor.yaw]
+        PLAYBACK.view(self._state, "touchdown")[:] = -np.inf
 
-    def follow(self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float) -> Reference:
+    def follow(
+        self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, t: float, dt: float
+    ) -> Reference:
         """See ``PlanFollower.follow``."""
-        row = np.empty(REFERENCE.size)
-        self._follow(plan, snapshot.row, self._anchor, dt, self._correction, self._state, row)
+        row, contact = np.empty(REFERENCE.size), self._contact
+        contact[:] = snapshot.state.feet_in_contact
+        steps, correction, state = self._steps, self._correction, self._state
+        self._follow(plan, snapshot.row, t, dt, contact, *steps, correction, state, row)
         return Reference.of_row(row)
+
+    @property
+    def landings(self) -> Landings:
+        """See ``PlanFollower.landings``."""
+        return Landings(int(self._state[_MISSED]), float(self._state[_ERROR]))
 
     @property
     def deviation(self) -> Deviation:
@@ -94,21 +123,39 @@ class Playback(PlanFollower):
 class ReadablePlayback(PlanFollower):
     """The same as ``Playback``, step by step."""
 
-    def __init__(self, anchor: Anchor, config: CorrectionConfig | None = None) -> None:
+    def __init__(
+        self,
+        anchor: Anchor,
+        footsteps: Footsteps | None = None,
+        config: CorrectionConfig | None = None,
+    ) -> None:
         """Follow a plan at ``anchor``, without correction at first."""
         self._anchor = anchor
+        self._landing = None if footsteps is None else ReadableLanding(anchor, footsteps)
         self._correction = SteadyStateCorrection(config)
         self._places: list[float] = []
         self._attitudes: list[float] = []
         self._joints: list[float] = []
         self._sag_and_lean = 0.0, 0.0
 
-    def follow(self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float) -> Reference:
+    def follow(
+        self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, t: float, dt: float
+    ) -> Reference:
         """See ``PlanFollower.follow``."""
-        reference = Reference.of_row(plan).placed(self._anchor)
+        reference = Reference.of_row(plan)
+        if self._landing is None:
+            reference = reference.placed(self._anchor)
+        else:
+            reference = self._landing.landed(reference, snapshot, t)
         self._note(reference, snapshot)
-        body = self._correction.corrected(reference.body, snapshot, dt)
+        counts = dt if reference.stance.any() else 0.0  # nothing can be corrected in flight
+        body = self._correction.corrected(reference.body, snapshot, counts)
         return replace(reference, body=body)
+
+    @property
+    def landings(self) -> Landings:
+        """See ``PlanFollower.landings``."""
+        return Landings(0, 0.0) if self._landing is None else self._landing.landings
 
     def _note(self, reference: Reference, snapshot: Snapshot) -> None:
         body = reference.body
@@ -138,3 +185,17 @@ class ReadablePlayback(PlanFollower):
     @property
     def _lists(self) -> tuple[list[float], list[float], list[float]]:
         return self._places, self._attitudes, self._joints
+
+
+_Tables = tuple[Any, Any, Any, Any, Any]
+
+
+def _tables(footsteps: Footsteps) -> _Tables:
+    contacts = footsteps.contacts
+    events = np.array(contacts.times)
+    numbers = LANDING.pack(landing_numbers(footsteps))
+    return events, contacts.since, contacts.until, footsteps.unloads, numbers
+
+
+_NO_TABLE = np.zeros((0, 4))
+_NO_STEPS: _Tables = np.zeros(0), _NO_TABLE, _NO_TABLE, _NO_TABLE, np.zeros(LANDING.size)

@@ -27,7 +27,7 @@ from jaxtyping import Float
 
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
-from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.model import LEG_AXES, RobotModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,16 +92,12 @@ def link_table(model: RobotModel) -> Float[np.ndarray, "13 7"]:
         if row == 0:
             continue
         table[row, 4:] = place.translation
-        axis = pin_model.joints[row + 1].shortname()
-        if axis != _AXES[(row - 1) % 3] or not np.array_equal(place.rotation, np.eye(3)):
+        axis, expected = pin_model.joints[row + 1].shortname(), LEG_AXES[(row - 1) % 3]
+        if axis != expected or not np.array_equal(place.rotation, np.eye(3)):
             raise DescriptionError(
-                f"{JOINT_NAMES[row - 1]} is a {axis}; expected {_AXES[(row - 1) % 3]}, not tilted"
+                f"{JOINT_NAMES[row - 1]} is a {axis}; expected {expected}, not tilted"
             )
     return table
-
-
-_AXES = ("JointModelRX", "JointModelRY", "JointModelRY")
-"""What Pinocchio calls the joints of a leg."""
 
 
 _KNOWN: WeakKeyDictionary[RobotModel, dict[Leg, LegGeometry]] = WeakKeyDictionary()

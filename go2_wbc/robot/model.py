@@ -1,14 +1,15 @@
 """The Go2 as Pinocchio sees it: limits, geometry, and the per-tick snapshot.
 
 One ``RobotModel`` owns one Pinocchio model and data. ``snapshot(state)`` computes every dynamic
-quantity of the tick: CRBA in the world convention, the nonlinear effects, and the feet's Jacobians
-and drifts; the CoM terms are read off the first rows of the mass matrix, which are the robot's
-linear momentum (Wieber, Tedrake & Kuindersma 2016, eq. 48.16).
+quantity of the tick in a kernel, which ``readable_snapshot`` is the law of: CRBA in the world
+convention, the nonlinear effects, and the feet's Jacobians and drifts; the CoM terms are read off
+the first rows of the mass matrix, which are the robot's linear momentum (Wieber, Tedrake &
+Kuindersma 2016, eq. 48.16).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 
@@ -17,7 +18,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from go2_wbc.errors import DescriptionError
-from go2_wbc.kernels.layout import SNAPSHOT
+from go2_wbc.kernels.layout import ROBOT, SNAPSHOT
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
@@ -28,6 +29,8 @@ FOOT_RADIUS = 0.022
 """Radius [m] of the spherical foot: the foot mesh's, see the robot description."""
 ROTOR_ARMATURE = np.tile([0.0045, 0.0045, 0.0164], 4)
 """Reflected rotor inertia [kg m^2] per joint; same provenance as the plant's ``JointDynamics``."""
+LEG_AXES = ("JointModelRX", "JointModelRY", "JointModelRY")
+"""What Pinocchio calls the joints of a leg: they turn about x, y and y."""
 HIP_LIMIT = 0.838
 """Published hip abduction limit [rad]; the URDF's 1.0472 is wider."""
 
@@ -80,7 +83,6 @@ class RobotModel:
         self._foot_frames = [self.pin_model.getFrameId(name) for name in FOOT_NAMES]
         self._zero_acceleration = np.zeros(18)
         self._read_constants()
-        self._bind_views()
 
     def _read_constants(self) -> None:
         model = self.pin_model
@@ -99,37 +101,49 @@ class RobotModel:
         self.p_base_feet_nominal = self.p_base_hips.copy()
         self.p_base_feet_nominal[:, 1] += self.hip_width * np.array([leg.side for leg in LEGS])
 
-    def _bind_views(self) -> None:
-        """Bind what the kernel reads in Pinocchio's data: views, which its next call changes."""
-        data = self._data
-        frames = [self.pin_model.frames[frame] for frame in self._foot_frames]
-        calves = [frame.parentJoint for frame in frames]
-        self._views = (
-            data.M,
-            data.nle,
-            data.J,
-            _one_view([data.oMi[calf].rotation for calf in calves]),
-            _one_view([data.oMi[calf].translation for calf in calves]),
-            _one_view([data.v[calf].vector for calf in calves]),
-            _one_view([data.a_gf[calf].vector for calf in calves]),
-            np.array([frame.placement.translation for frame in frames]),
-            np.array(self._constants),
-        )
-
     def snapshot(self, state: RobotState) -> Snapshot:
-        """Every dynamic quantity of ``state``, computed once."""
-        model, data = self.pin_model, self._data
-        pin.crba(model, data, state.q, pin.Convention.WORLD)  # M, J and the poses
-        pin.nonLinearEffects(model, data, state.q, state.v)  # h, velocities and accelerations
+        """Every dynamic quantity of ``state``, computed once.
+
+        By a kernel if the robot's legs turn about x, y and y, as a Go2's do, else by Pinocchio's
+        functions. The kernel takes the robot as it is at the first call.
+        """
+        numbers = self._numbers
+        if numbers is None:
+            return self.readable_snapshot(state)
         row = np.empty(SNAPSHOT.size)
-        self._derive(state.q, state.v, *self._views, row)
+        self._fill_snapshot(state.q, state.v, numbers, row)
         return Snapshot.of_row(state, row)
 
     @cached_property
-    def _derive(self) -> Callable[..., None]:
-        from go2_wbc.kernels.derivation import derive  # compiled; only who needs it waits for it
+    def _fill_snapshot(self) -> Callable[..., None]:
+        from go2_wbc.kernels.rigid_body import fill_snapshot  # compiled; only who needs it waits
 
-        return derive
+        return fill_snapshot
+
+    @cached_property
+    def _numbers(self) -> Float[np.ndarray, " size"] | None:
+        """The robot's numbers for the kernel; None for a robot that it does not know."""
+        model = self.pin_model
+        places = list(model.jointPlacements)[1:]
+        feet = [model.frames[frame] for frame in self._foot_frames]
+        is_known = (
+            list(model.parents) == _PARENTS
+            and [model.joints[n].shortname() for n in range(2, 14)] == [*LEG_AXES * 4]
+            and all(np.array_equal(place.rotation, np.eye(3)) for place in places)
+            and not np.any([places[0].translation, model.gravity.linear * [1.0, 1.0, 0.0]])
+            and [foot.parentJoint for foot in feet] == _CALVES
+        )
+        if not is_known:
+            return None
+        return ROBOT.pack(
+            [
+                *self._constants,
+                [_about_joint(inertia) for inertia in list(model.inertias)[1:]],
+                [place.translation for place in places[1:]],
+                [foot.placement.translation for foot in feet],
+                model.armature[6:],
+            ]
+        )
 
     def readable_snapshot(self, state: RobotState) -> Snapshot:
         """The same as ``snapshot``, by Pinocchio's own functions: what the kernel is held to."""
@@ -171,20 +185,16 @@ class RobotModel:
         return np.array(pin.rnea(self.pin_model, self._data, q, v, a))
 
 
-def _one_view(views: Sequence[Float[np.ndarray, "..."]]) -> Float[np.ndarray, "..."]:
-    """Views of arrays that lie in memory one after the other, as one view of all.
-
-    A kernel takes one array in a sixth of the time that it takes four in.
-    """
-    places = [view.__array_interface__["data"][0] for view in views]
-    steps = set(np.diff(places).tolist())
-    if len(steps) != 1:
-        raise RuntimeError(f"Pinocchio's joint data do not lie at equal distances: {places}")
-    first = views[0]
-    shape, strides = (len(views), *first.shape), (steps.pop(), *first.strides)
-    return np.lib.stride_tricks.as_strided(first, shape, strides)
+def _about_joint(inertia: pin.Inertia) -> Float[np.ndarray, "10"]:
+    """Mass, first moment and inertia (xx, xy, xz, yy, yz, zz) about the origin of the joint."""
+    mass, c = inertia.mass, inertia.lever
+    moved = inertia.inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
+    return np.array([mass, *(mass * c), *moved[np.triu_indices(3)]])
 
 
+_PARENTS = [0, 0, 1, 2, 3, 1, 5, 6, 1, 8, 9, 1, 11, 12]
+"""The joint before each, in Pinocchio's order: universe, base, and four legs of three."""
+_CALVES = [4, 7, 10, 13]
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 

@@ -176,12 +176,12 @@ class WholeBodyController:
         if self._program is None:
             return None
         start = time.perf_counter()
-        found = self._program.solve(snapshot, reference)
-        if found is None:
+        decision = self._program.solve(snapshot, reference)
+        if decision is None:
             return None
-        z, tau, motors = found
-        spent, formulate = time.perf_counter() - start, partial(self.formulate, snapshot, reference)
-        return WbcSolution(tau, motors, spent, self.backend_name, formulate, z)
+        spent = time.perf_counter() - start
+        formulate = partial(self.formulate, snapshot, reference)
+        return WbcSolution.of_row(decision, spent, self.backend_name, formulate)
 
 
 def _tasks(model: RobotModel, config: WbcConfig) -> tuple[Task, ...]:

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.kernels.layout import PROGRAM
+from go2_wbc.kernels.layout import DECISION, PROGRAM
 from go2_wbc.reference import Reference
 from go2_wbc.robot.joint_friction import FrictionFeedForward
 from go2_wbc.robot.snapshot import Snapshot
@@ -86,31 +86,26 @@ class Program:
         self._friction = friction.numbers
         self._extra_tasks = tasks[BUILT_IN_TASKS:]
 
-    def solve(
-        self, snapshot: Snapshot, reference: Reference
-    ) -> tuple[Float[np.ndarray, "30"], Float[np.ndarray, "12"], Float[np.ndarray, "12"]] | None:
-        """Decision z (see ``problem``), torques [N m] without and with the joints' friction.
+    def solve(self, snapshot: Snapshot, reference: Reference) -> Float[np.ndarray, " size"] | None:
+        """The decision (see ``kernels.layout.DECISION``); None if the kernel finds no solution."""
+        extra = _NO_ROWS
+        if self._extra_tasks:
+            extra = self._extra_rows(snapshot, reference)
+            if not np.isfinite(extra).all():
+                return None
+        numbers, decision = self._numbers, np.empty(DECISION.size)
+        outcome = self._solve(snapshot.row, reference.row, numbers, self._friction, extra, decision)
+        return decision if outcome == self._solved else None
 
-        None if the kernel finds no solution.
-        """
-        A, b, weights = self._extra_rows(snapshot, reference) if self._extra_tasks else _NO_ROWS
-        if self._extra_tasks and not (np.isfinite(A).all() and np.isfinite(b).all()):
-            return None
-        found = np.empty(SIZE), np.empty(12), np.empty(12)
-        rows = (snapshot.row, reference.row, self._numbers, self._friction, A, b, weights)
-        return found if self._solve(*rows, *found) == self._solved else None
-
-    def _extra_rows(
-        self, snapshot: Snapshot, reference: Reference
-    ) -> tuple[Float[np.ndarray, "k 30"], Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    def _extra_rows(self, snapshot: Snapshot, reference: Reference) -> Float[np.ndarray, "k 32"]:
         rows: list[Rows] = [task.rows(snapshot, reference) for task in self._extra_tasks]
         A, b = stacked(rows, self._extra_tasks)
         counts = [len(part.b) for part in rows]
         weights = np.repeat([task.weight for task in self._extra_tasks], counts)
-        return np.ascontiguousarray(A, float), b.astype(float), weights.astype(float)
+        return np.column_stack([A, b, weights]).astype(float, order="C")
 
 
-_NO_ROWS = (np.empty((0, SIZE)), np.empty(0), np.empty(0))
+_NO_ROWS = np.empty((0, SIZE + 2))
 
 
 def _first(kind: type[T], items: Sequence[object]) -> T:

@@ -9,9 +9,12 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import ResidualRow
+from go2_wbc.kernels.layout import DECISION
 from go2_wbc.robot.state import JointCommand
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, Problem
 from go2_wbc.wbc.tasks import Task
+
+_TAU, _MOTORS = DECISION.start["tau"], DECISION.start["tau_motors"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +37,17 @@ class WbcSolution:
     _formulate: Callable[[], Problem]
     _z: Float[np.ndarray, "30"]
     is_relaxed: bool = False
+
+    @staticmethod
+    def of_row(
+        row: Float[np.ndarray, " size"],
+        solve_time: float,
+        backend: str,
+        formulate: Callable[[], Problem],
+    ) -> WbcSolution:
+        """The solution whose arrays ``row`` holds (see ``kernels.layout.DECISION``)."""
+        tau, motors = row[_TAU:_MOTORS], row[_MOTORS:]
+        return WbcSolution(tau, motors, solve_time, backend, formulate, row[:_TAU])
 
     @staticmethod
     def from_decision(

@@ -7,12 +7,15 @@ import numpy as np
 from go2_wbc.errors import MotionError
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
+from motions.assembly import compile_timeline
 from motions.compiled_plan import CompiledPlan
-from motions.feasibility import dynamic, kinematic
-from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion
+from motions.feasibility import dynamic, flight, kinematic
+from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion, timeline_of
 from motions.feasibility.collision import SelfCollision, self_distance
-from motions.feasibility.limits import FeasibilityLimits
+from motions.feasibility.limits import FeasibilityLimits, FlightLimits
+from motions.feasibility.nearest import mending
 from motions.feasibility.report import FeasibilityReport, Series
+from motions.language.written import NEAREST
 from motions.problem import Problem
 from motions.trajectory import trajectory_of
 
@@ -47,7 +50,7 @@ class FeasibilityChecker:
             TimelineError: if the timeline is empty or its parameters are not valid.
             MotionInfeasible: if the motion breaks a limit; carries the findings.
         """
-        plan = compile_motion(motion, self.model)
+        plan = self._compiled(motion)
         if check:
             known = motion if isinstance(motion, CheckedMotion) else plan
             self.check(known).raise_if_infeasible()
@@ -66,12 +69,20 @@ class FeasibilityChecker:
         """
         if isinstance(motion, CheckedMotion):
             return motion.report
-        plan = compile_motion(motion, self.model)
+        plan = self._compiled(motion)
         try:
             return self.evaluate(plan).report
         except MotionError as error:
             unknown = _failed(Problem("numbers", "plan", 0.0, reason=str(error)))
             return FeasibilityReport.of(plan.name, plan.duration, [unknown])
+
+    def _compiled(self, motion: object) -> MotionPlan:
+        """The plan of ``motion``, the nearest feasible one where its timeline asks for that."""
+        line = timeline_of(motion)
+        if line is None or line.physics != NEAREST:
+            return compile_motion(motion if line is None else line, self.model)
+        mend = mending(self.evaluate, self.model, line.tolerance)
+        return compile_timeline(line, self.model, mend=mend)
 
     def evaluate(self, motion: Playable) -> CheckedMotion:
         """Compile and check ``motion``, once: its plan, the report, the movement and the forces.
@@ -89,10 +100,14 @@ class FeasibilityChecker:
         """
         if isinstance(motion, CheckedMotion):
             return motion
-        plan, model, limits = compile_motion(motion, self.model), self.model, self._limits
+        plan, model, limits = self._compiled(motion), self.model, self._limits
         path = trajectory_of(plan, model)
         forces = dynamic.forces_of(path, model)
-        problems = plan.problems if isinstance(plan, CompiledPlan) else ()
+        problems, in_flight = (), []
+        if isinstance(plan, CompiledPlan):
+            problems = plan.problems
+            forces = flight.with_spans(forces, path, plan, model)
+            in_flight = flight.flight(plan, model, FlightLimits())
         com, zero_moment_point = dynamic.support(path, forces, limits)
         landing_place, landing_speed = kinematic.landing(path, model, limits)
         in_order_of_causes = [
@@ -112,8 +127,10 @@ class FeasibilityChecker:
             zero_moment_point,
             *dynamic.contacts(path, forces, limits),
             *dynamic.torque(path, forces, model, limits),
+            *in_flight,
         ]
-        report = FeasibilityReport.of(plan.name, plan.duration, in_order_of_causes)
+        end_pose = plan.end_pose if isinstance(plan, CompiledPlan) else None
+        report = FeasibilityReport.of(plan.name, plan.duration, in_order_of_causes, end_pose)
         return CheckedMotion(plan, report, path, forces)
 
 

@@ -14,9 +14,9 @@ from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
+from motions.assembly import compile_timeline
 from motions.authoring import Motion
 from motions.compiled_plan import LEAST_FEET, CompiledPlan
-from motions.compiler import compile_timeline
 from motions.feasibility.dynamic import Forces
 from motions.feasibility.report import FeasibilityReport
 from motions.registry import load_motion
@@ -89,16 +89,26 @@ def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
         return motion
     if isinstance(motion, str | Path) and is_saved_plan(motion):
         return load_plan(motion, model=model)
-    if isinstance(motion, str | Path):
-        motion = load_motion(motion)
-    elif isinstance(motion, Motion):
-        motion = motion()
-    if not isinstance(motion, Timeline):
+    line = timeline_of(motion)
+    if line is None:
         raise CommandError(
             "motion must be a name of the library, a function with @motion before it, a Timeline, "
             f"a plan or a CheckedMotion, got {motion!r}"
         )
-    return compile_timeline(motion, model)
+    return compile_timeline(line, model)
+
+
+def timeline_of(motion: object) -> Timeline | None:
+    """The timeline of ``motion``; of a plan, or of what stands for no motion, none.
+
+    Raises:
+        CommandError: for an unknown name.
+    """
+    if isinstance(motion, str | Path):
+        return None if is_saved_plan(motion) else load_motion(motion)
+    if isinstance(motion, Motion):
+        return motion()
+    return motion if isinstance(motion, Timeline) else None
 
 
 def _label(

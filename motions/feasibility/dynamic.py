@@ -66,12 +66,15 @@ class Forces:
         tau: (n, 12) joint torques [N m].
         missing: (n, 2) part of the force [N] and of the moment [N m] that the feet cannot give.
         zmp: (n, 2) zero-moment point on the ground [m].
+        v_motors: (n, 12) joint speeds [rad/s] at which the torques are given; those of the path
+            unless said.
     """
 
     contact: Float[np.ndarray, "n 4 3"]
     tau: Float[np.ndarray, "n 12"]
     missing: Float[np.ndarray, "n 2"]
     zmp: Float[np.ndarray, "n 2"]
+    v_motors: Float[np.ndarray, "n 12"] | None = None
 
 
 def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
@@ -113,9 +116,10 @@ def torque(
     Only a driving motor, tau v > 0, meets the line of torque and speed; rounding moves none.
     """
     asked, most = np.abs(forces.tau), limits.torque_share * model.torque_limits
-    lower, upper = model.motor.limits(motion.v[:, 6:])
+    v = motion.v[:, 6:] if forces.v_motors is None else forces.v_motors
+    lower, upper = model.motor.limits(v)
     at_speed = np.where(forces.tau < 0.0, -lower, upper)
-    drives = forces.tau * motion.v[:, 6:] > STILL * asked
+    drives = forces.tau * v > STILL * asked
     tight = TIGHT_TORQUE * float(model.torque_limits.min())
     what = ("N m", JOINTS, motion.times, asked)
     return (
@@ -132,7 +136,8 @@ def contacts(
     Friction is max(|f_x|, |f_y|) / f_z, in the axes of the pyramid that the controller keeps.
     """
     times, normal = motion.times, forces.contact[:, :, 2]
-    is_needed = ~motion.stance.all(axis=1, keepdims=True)  # on four feet one may be unloaded
+    written = ~motion.is_dynamic[:, None]
+    is_needed = written & ~motion.stance.all(axis=1, keepdims=True)  # of four one may be unloaded
     stands = (motion.load_share > LOADED) & is_needed
     sideways = np.abs(forces.contact[:, :, :2]).max(axis=2)
     pressed = normal > PRESSED
@@ -141,9 +146,9 @@ def contacts(
     load = ("foot load", "N", FEET, times, normal)
     grip = ("friction", "", FEET, times, needed)
     return (
-        Series.against(*wrench, np.array([limits.wrench, limits.wrench * ARM])),
+        Series.against(*wrench, np.array([limits.wrench, limits.wrench * ARM]), where=written),
         Series.against(*load, limits.foot_load, is_floor=True, where=stands, tight=TIGHT_LOAD),
-        Series.against(*grip, limits.friction, where=pressed, tight=TIGHT_FRICTION),
+        Series.against(*grip, limits.friction, where=pressed & written, tight=TIGHT_FRICTION),
     )
 
 
@@ -167,10 +172,11 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
     com = ("support", "m", ("CoM",), motion.times, values[:, :1])
     zmp = ("support of ZMP", "m", ("ZMP",), motion.times, values[:, 1:])
     least = np.where(passes, -limits.off_line, limits.zero_moment)[:, None]
-    where, tight = ~passes[:, None], TIGHT_SUPPORT
+    written, tight = ~motion.is_dynamic, TIGHT_SUPPORT
+    where, both = (written & ~passes)[:, None], written[:, None]
     return (
         Series.against(*com, limits.support, is_floor=True, where=where, tight=tight),
-        Series.against(*zmp, least, is_floor=True, tight=tight),
+        Series.against(*zmp, least, is_floor=True, where=both, tight=tight),
     )
 
 

@@ -78,6 +78,7 @@ def dragging(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) -
     """
     places = _feet(motion, model)
     rubs = (places[:, :, 2] - model.foot_radius < limits.drag_height) & ~motion.stance
+    rubs &= ~motion.is_dynamic[:, None]
     steps = np.linalg.norm(np.diff(places[:, :, :2], axis=0), axis=2)
     ways = np.zeros(rubs.shape)
     for row, leg in np.argwhere(rubs[1:] & rubs[:-1]):
@@ -96,7 +97,8 @@ def landing(
     stands, times, places = motion.stance, motion.times, _feet(motion, model)
     paces = np.linalg.norm(np.diff(places, axis=0), axis=2) / np.diff(times)[:, None]
     away, speed = np.full(stands.shape, np.nan), np.full(stands.shape, np.nan)
-    for edge, leg in np.argwhere(stands[1:] != stands[:-1]):
+    written = ~(motion.is_dynamic[1:] | motion.is_dynamic[:-1])[:, None]
+    for edge, leg in np.argwhere((stands[1:] != stands[:-1]) & written):
         lands = stands[edge + 1, leg]
         row, standing = (edge, edge + 1) if lands else (edge + 1, edge)
         away[row, leg] = np.linalg.norm(places[row, leg] - motion.p_feet[standing, leg])
@@ -116,7 +118,10 @@ def smoothness(motion: Trajectory, limits: FeasibilityLimits) -> Series:
     values = np.maximum.reduceat(jumps, (0, 3, 6), axis=1)
     bounds = np.array([limits.body_jump, limits.body_jump, limits.joint_jump])
     subjects = ("trunk", "trunk turning", "joints")
-    return Series.against("continuity", "/s", subjects, motion.times, values, bounds)
+    written = ~motion.is_dynamic
+    written[1:] &= ~motion.is_dynamic[:-1]
+    what = ("continuity", "/s", subjects, motion.times, values)
+    return Series.against(*what, bounds, where=written[:, None])
 
 
 def ends(

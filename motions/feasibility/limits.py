@@ -65,3 +65,31 @@ class FeasibilityLimits:
     def __post_init__(self) -> None:
         """Raise ConfigError for a limit that is not positive."""
         require_positive(self, *(f.name for f in fields(self)))
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLimits:
+    """What dynamic spans must keep.
+
+    Attributes:
+        step: greatest difference [m, rad] of a state from where the speeds lead.
+        defect: greatest remainder [N, N m] of the equations of motion: 0.3 % of the weight.
+        curve: greatest distance [m, rad] of the curves that are played from the states.
+        pull: greatest force [N] that a foot would need without ground.
+        friction: ratio of tangential and normal force, less than the 0.6 of the controller and of
+            the slipperiest ground that dynamic motions are made for.
+        slip: distance [m] that a standing foot may move, and be off the ground.
+        touchdown: greatest speed [m/s] of a foot that comes down.
+    """
+
+    step: float = 1e-3
+    defect: float = 0.5
+    curve: float = 0.03
+    pull: float = 1.0
+    friction: float = 0.55
+    slip: float = 0.02
+    touchdown: float = 1.0
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a limit that is not positive."""
+        require_positive(self, *(f.name for f in fields(self)))

@@ -13,6 +13,8 @@ from go2_wbc.errors import MotionInfeasible
 
 NOISE = 1e-6
 """A value below this is nothing but rounding, and is shown as 0."""
+STAYS = 1e-3
+"""m, rad; a motion that ends nearer than this to where it starts does not go anywhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +81,7 @@ class Series:
         limits: Float[np.ndarray, "*some"] | float,
         *,
         is_floor: bool = False,
-        where: Bool[np.ndarray, "n k"] | bool = True,
+        where: Bool[np.ndarray, "#n #k"] | bool = True,
         tight: float = 0.0,
     ) -> Series:
         """Of values that may not exceed ``limits``, or fall below them; checked only ``where``."""
@@ -121,6 +123,8 @@ class FeasibilityReport:
             of one check the earliest first.
         warnings: limits that are met by little.
         margins: worst finding of every check.
+        end_pose: where the motion ends: x, y [m] and yaw [rad] of the frame of the feet, seen from
+            its start; None of a plan that does not say.
     """
 
     motion: str
@@ -129,9 +133,15 @@ class FeasibilityReport:
     failures: tuple[Finding, ...]
     warnings: tuple[Finding, ...]
     margins: Mapping[str, Finding]
+    end_pose: tuple[float, float, float] | None = None
 
     @staticmethod
-    def of(motion: str, duration: float, series: Sequence[Series]) -> FeasibilityReport:
+    def of(
+        motion: str,
+        duration: float,
+        series: Sequence[Series],
+        end_pose: tuple[float, float, float] | None = None,
+    ) -> FeasibilityReport:
         """Draw the conclusions from ``series``, which has causes before their consequences."""
         failures, warnings, margins = [], [], {}
         for item in series:
@@ -143,7 +153,7 @@ class FeasibilityReport:
             failures += sorted(broken, key=lambda finding: finding.time)
             warnings += [finding for finding in found if 0.0 <= finding.margin < item.tight]
         return FeasibilityReport(
-            motion, duration, tuple(series), tuple(failures), tuple(warnings), margins
+            motion, duration, tuple(series), tuple(failures), tuple(warnings), margins, end_pose
         )
 
     @property
@@ -172,6 +182,11 @@ class FeasibilityReport:
         verdict = "can do it" if self.ok else f"cannot do it: {_count(len(self.failures), 'limit')}"
         tight = f", {_count(len(self.warnings), 'tight margin')}" if self.warnings else ""
         lines += ["-" * 80, f"{self.motion}, {self.duration:.1f} s: the robot {verdict}{tight}."]
+        if self.end_pose is not None and max(map(abs, self.end_pose)) > STAYS:
+            x, y, yaw = self.end_pose
+            lines.append(
+                f"It ends at x {x:.3f} m, y {y:.3f} m, turned by {np.degrees(yaw):.1f} deg."
+            )
         return "\n".join(lines)
 
     def summary(self) -> str:
@@ -190,6 +205,7 @@ class FeasibilityReport:
             "motion": self.motion,
             "duration": self.duration,
             "ok": self.ok,
+            "end_pose": self.end_pose,
             "failures": [asdict(finding) for finding in self.failures],
             "warnings": [asdict(finding) for finding in self.warnings],
             "margins": {check: asdict(finding) for check, finding in self.margins.items()},

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -167,16 +167,15 @@ def _way_through(points: Sequence[Sequence[float]]) -> Way:
     fine = np.interp(np.arange(POINTS * len(lengths)) / POINTS, np.arange(len(s)), s)
     fine = np.append(fine, s[-1])
     if corners.shape[1] == _POSE:
-        ends = ((2, np.zeros(_POSE)), (2, np.zeros(_POSE)))
-        return Way(CubicSpline(s, corners, bc_type=ends)(fine))
-    ends = ((1, np.array([1.0, 0.0])), (2, np.zeros(2)))
+        return Way(CubicSpline(s, corners, bc_type="natural")(fine))
+    ends: Any = ((1, np.array([1.0, 0.0])), (2, np.zeros(2)))  # SciPy's stubs know words only
     curve = CubicSpline(s, corners, bc_type=ends)
     ahead = curve(fine, 1)
     heading = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
     return Way(np.column_stack([curve(fine), heading]))
 
 
-def _numbers(points: Sequence[Sequence[float]]) -> np.ndarray:
+def _numbers(points: object) -> np.ndarray:
     is_list = isinstance(points, Sequence | np.ndarray)
     rows = (
         [tuple(p) if isinstance(p, Sequence | np.ndarray) else () for p in points]

@@ -10,15 +10,19 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from go2_wbc.curves import Ease
-from go2_wbc.errors import TimelineError
+from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Posture
 from motions.arguments import positive
+from motions.dynamics.phases import Tolerance
 from motions.keys import BalanceShift, BodyKey, Key, LegKey
 from motions.language.clock import SAME, BeatClock
 
 SHIFT_TIME = 0.9
 """Time [s] in which the body moves over the feet that stay, before another one is raised."""
+AS_WRITTEN, NEAREST = PHYSICS = ("as_written", "nearest")
+"""What may be made of a motion that the robot cannot do: nothing, or the nearest that it can."""
+
 _KeyType = TypeVar("_KeyType", bound=Key)
 _Line = TypeVar("_Line", bound="Written")
 
@@ -36,6 +40,9 @@ class Written:
         shift_beats: how many beats it takes with a tempo; 0 without one.
         counted: beats [s] of what was written before the present tempo.
         counted_from: since when [s] the present tempo counts.
+        physics: "as_written", or "nearest": what the robot cannot do as written is solved as the
+            nearest motion that it can.
+        tolerance: how far what is solved may be from what is asked.
         keys: what was written so far.
         cursor: when [s] the next call starts.
         clock: what one unit of ``over`` lasts, here and later.
@@ -48,6 +55,8 @@ class Written:
     name: str = field(default="motion", kw_only=True)
     balance: bool = field(default=True, kw_only=True)
     shift_time: float = field(default=SHIFT_TIME, kw_only=True)
+    physics: str = field(default=AS_WRITTEN, kw_only=True)
+    tolerance: Tolerance = field(default=Tolerance(), kw_only=True)
     keys: tuple[Key, ...] = field(default=(), kw_only=True)
     cursor: float = field(default=0.0, kw_only=True)
     clock: BeatClock = field(default=BeatClock(), kw_only=True)
@@ -64,6 +73,12 @@ class Written:
                 valid = ", ".join(f"Posture.{posture.name}" for posture in Posture)
                 raise TimelineError(f"{name} must be one of {valid}, got {getattr(self, name)!r}")
         positive("shift_time", self.shift_time)
+        if self.physics not in PHYSICS:
+            raise TimelineError(unknown_name("physics", str(self.physics), PHYSICS))
+        if not isinstance(self.tolerance, Tolerance):
+            raise TimelineError(
+                f"tolerance must be a Tolerance(position [m], angle [rad]), got {self.tolerance!r}"
+            )
         _require_no_overlap(self.keys)
 
     # --- what is written ------------------------------------------------------------------

@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from go2_wbc.errors import CommandError, MissingDependency
+from go2_wbc.errors import CommandError
+from motions.music.sound import RATE, Sound, read_sound
 
-INSTALL_LINE = 'python -m pip install "go2-wbc[music]"'
-RATE = 22050
-"""Samples per second that are looked at: librosa's default."""
 HOP, WINDOW = 128, 512
 """Samples from one frame to the next (5.8 ms), and of a frame (23 ms): short, to tell when a note
 begins; librosa's defaults are 512 and 2048."""
@@ -27,12 +25,12 @@ BANDS = 40
 LATENESS = 0.0061
 """How late [s] the beginning of a note is found, beyond librosa's own correction: mean of 71
 songs of ``songs``, the tuning seeds 0 to 59 and eleven click tracks; 0.5 ms from song to song."""
-LONGEST = 900.0
-"""Length [s] of the longest song: a quarter of an hour, so that no file fills the memory."""
 LEAST_BEATS = 4
 """A bar: fewer are no song."""
 SILENCE = 1e-4
 """Amplitude, of 1, below which all is silent: the last step of 14 bits."""
+QUIET = 0.01
+"""Share of the greatest amplitude below which a song has not begun, or is over."""
 SLOWEST, FASTEST = 50.0, 210.0
 """Tempi [beats/min] that are looked for."""
 USUAL_TEMPO, TEMPO_SPREAD = 120.0, 1.5
@@ -46,6 +44,9 @@ TIGHTNESS = 300.0
 """How little the tempo may change from beat to beat; librosa's default is 100."""
 LEAST_AGREEMENT = 0.08
 """Mean correlation of a song with itself 1 to 8 beats later, below which it has no beat."""
+LEAST_RISE = 0.5
+"""Rise in loudness [dB] at the mean beat, below which it is none: songs have 6 and more, a steady
+tone 0.02."""
 SNAP = 0.05
 """How far [s] the loudest beginning of a note may be from a beat that it tells."""
 NEIGHBOURS = 8
@@ -87,19 +88,18 @@ def beats(path: Path | str) -> Beats:
             has no four beats or no steady ones.
         MissingDependency: without the extra ``[music]``.
     """
-    sound, name = _read(Path(path)), Path(path).name
+    sound, name = read_sound(path), Path(path).name
     if len(sound) < WINDOW or float(np.abs(sound).max()) < SILENCE:
         raise CommandError(f"{name} is silent: there is no beat in it")
     onsets = _onsets(sound)
     agreement, frames = _best_beats(onsets, name)
-    placed = _placed(frames, onsets)
-    times = placed - LATENESS
-    kept = (times >= 0.0) & (times <= len(sound) / RATE)
-    times, strengths = times[kept], _near(onsets, frames)[kept]
+    times = _placed(frames, onsets) - LATENESS
+    heard = np.flatnonzero(np.abs(sound) > QUIET * np.abs(sound).max()) / RATE
+    times = times[(times >= max(heard[0] - SNAP, 0.0)) & (times <= heard[-1])]
+    frames = np.round((times + LATENESS) * RATE / HOP).astype(int)
+    strengths = _near(onsets, np.minimum(frames, len(onsets) - 1))
     if len(times) < LEAST_BEATS:
-        raise CommandError(
-            f"{name} has {len(times)} beats, {LEAST_BEATS} are needed: is it cut short?"
-        )
+        raise CommandError(f"{name} has {len(times)} beats, a song has {LEAST_BEATS} or more")
     return Beats(
         tempo=60.0 * (len(times) - 1) / float(times[-1] - times[0]),
         times=times,
@@ -109,33 +109,7 @@ def beats(path: Path | str) -> Beats:
     )
 
 
-def _read(path: Path) -> Frames:
-    """The sound of a file, one channel, ``RATE`` samples a second."""
-    try:
-        import librosa
-        import soundfile
-    except (ImportError, OSError) as error:  # soundfile: OSError without its C library
-        raise MissingDependency(f"music needs librosa ({error}): {INSTALL_LINE}") from error
-    if not path.is_file():
-        raise CommandError(f"{path}: there is no such file; give a song, such as song.wav")
-    try:
-        length = soundfile.info(str(path)).duration
-        if length > LONGEST:
-            raise CommandError(
-                f"{path.name} is {length:.0f} s long, {LONGEST:.0f} s at most: cut it"
-            )
-        channels, rate = soundfile.read(str(path), dtype="float32", always_2d=True)
-    except (RuntimeError, OSError) as error:  # soundfile's own error is a RuntimeError
-        raise CommandError(
-            f"{path.name} is no song that can be read; valid: WAV, FLAC, OGG, MP3 ({error})"
-        ) from error
-    if not np.isfinite(channels).all():
-        raise CommandError(f"{path.name} is no song: it has samples that are no numbers")
-    sound = channels.mean(axis=1)
-    return librosa.resample(sound, orig_sr=rate, target_sr=RATE) if rate != RATE else sound
-
-
-def _onsets(sound: Frames) -> Frames:
+def _onsets(sound: Sound) -> Frames:
     """How strongly notes begin, in every frame."""
     import librosa
 
@@ -147,7 +121,7 @@ def _onsets(sound: Frames) -> Frames:
     )
 
 
-def _best_beats(onsets: Frames, name: str) -> tuple[float, Float[np.ndarray, " k"]]:
+def _best_beats(onsets: Frames, name: str) -> tuple[float, Int[np.ndarray, " k"]]:
     """How well the song agrees with its tempo, and the frames of its beats.
 
     Of the tempi at which the song is like itself, the one whose beats meet the strongest notes.
@@ -167,8 +141,9 @@ def _best_beats(onsets: Frames, name: str) -> tuple[float, Float[np.ndarray, " k
         likely = np.exp(-0.5 * (np.log2(bpm / USUAL_TEMPO) / TEMPO_SPREAD) ** 2)
         if len(frames) < LEAST_BEATS:
             continue
-        score = agreement * float(_near(onsets, frames).mean()) * float(likely)
-        if score > best:
+        rise = float(_near(onsets, frames).mean())
+        score = agreement * rise * float(likely)
+        if rise > LEAST_RISE and score > best:
             best, found = score, (agreement, np.asarray(frames))
     if found is None:
         raise CommandError(
@@ -196,37 +171,76 @@ def _tempi(onsets: Frames) -> list[tuple[float, float]]:
     return [(float(bpm[peak]), float(means[peak])) for peak in in_order]
 
 
-def _near(onsets: Frames, frames: Float[np.ndarray, " k"]) -> Times:
+def _near(onsets: Frames, frames: Int[np.ndarray, " k"]) -> Times:
     """How strongly notes begin about these frames."""
     hat = np.hanning(9)
     return np.convolve(onsets, hat / hat.sum(), "same")[frames]
 
 
-def _placed(frames: Float[np.ndarray, " k"], onsets: Frames) -> Times:
-    """Instants [s] of the beats: on a line through the notes that begin about each."""
-    reach = round(SNAP * RATE / HOP)
-    rows = frames[:, None] + np.arange(-reach, reach + 1)
-    around = np.where(
-        (rows >= 0) & (rows < len(onsets)), onsets[np.clip(rows, 0, len(onsets) - 1)], 0.0
-    )
-    notes = (frames - reach + around.argmax(axis=1)) * (HOP / RATE)
-    weights = around.max(axis=1) + 1e-9
-    return np.array([_on_line(row, notes, weights) for row in range(len(frames))])
+def _placed(frames: Int[np.ndarray, " k"], onsets: Frames) -> Float[np.ndarray, " j"]:
+    """Instants [s] of all beats of the song, from those that were found.
+
+    Dynamic programming loses the beat where a song begins and ends. So only its most regular
+    stretch is kept, and followed from there to both ends.
+    """
+    near = [_note(frame, onsets) for frame in frames.tolist()]
+    notes, weights = map(np.array, zip(*near, strict=True))
+    length = min(2 * NEIGHBOURS + 1, len(notes))
+    first = min(range(len(notes) - length + 1), key=lambda i: _unevenness(notes[i : i + length]))
+    stretch = slice(first, first + length)
+    notes, weights = _followed(notes[stretch], weights[stretch], onsets)
+    last = len(onsets) - 1.0
+    turned = _followed((last - notes)[::-1], weights[::-1], onsets[::-1])
+    notes, weights = (last - turned[0])[::-1], turned[1][::-1]
+    rows = np.arange(len(notes))
+    placed = [_line(rows[part] - row, notes[part], weights[part]) for row, part in _parts(rows)]
+    return np.array([line[1] for line in placed]) * (HOP / RATE)
 
 
-def _on_line(row: int, notes: Times, weights: Times) -> float:
-    """Where beat ``row`` is, by itself and its neighbours: a line, from which outliers count little.
+def _followed(
+    notes: Times, weights: Times, onsets: Frames
+) -> tuple[Float[np.ndarray, " j"], Float[np.ndarray, " j"]]:
+    """Notes [frames] on the beat, and their weights, to the end of the song."""
+    while True:
+        numbers = np.arange(-min(NEIGHBOURS, len(notes)), 0)
+        interval, place = _line(numbers, notes[numbers], weights[numbers])
+        following = place if place > notes[-1] else notes[-1] + interval
+        if not (interval > 1.0 and following < len(onsets)):
+            return notes, weights
+        note, weight = _note(following, onsets)
+        notes, weights = np.append(notes, note), np.append(weights, weight)
+
+
+def _note(place: float, onsets: Frames) -> tuple[float, float]:
+    """Frame and strength of the note that is meant by the beat at the frame ``place``."""
+    reach, middle = round(SNAP * RATE / HOP), round(place)
+    rows = np.arange(max(middle - reach, 0), min(middle + reach + 1, len(onsets)))
+    likely = onsets[rows] * np.cos(0.5 * np.pi * (rows - place) / (reach + 1))
+    best = int(likely.argmax())
+    if likely[best] <= 0.0:
+        return place, 1e-6
+    return float(rows[best]), float(likely[best])
+
+
+def _unevenness(notes: Times) -> float:
+    """How far notes are from equal distances: the median of the distances from a line."""
+    number = np.arange(len(notes))
+    return float(np.median(np.abs(notes - np.polyval(np.polyfit(number, notes, 1), number))))
+
+
+def _parts(rows: Int[np.ndarray, " k"]) -> list[tuple[int, slice]]:
+    """Every beat with its neighbours."""
+    return [(row, slice(max(row - NEIGHBOURS, 0), row + NEIGHBOURS + 1)) for row in rows.tolist()]
+
+
+def _line(numbers: Int[np.ndarray, " k"], notes: Times, weights: Times) -> Float[np.ndarray, "2"]:
+    """Slope and value at 0 of a line through notes [frames], on which outliers have little say.
 
     Iteratively reweighted least squares with Cauchy's weights.
     """
-    first, last = max(row - NEIGHBOURS, 0), row + NEIGHBOURS + 1
-    number, note, weight = (
-        np.arange(first, first + len(notes[first:last])) - row,
-        *(values[first:last] for values in (notes, weights)),
-    )
-    share = np.ones(len(note))
-    line = np.zeros(2)
+    share, line = np.ones(len(notes)), np.zeros(2)
     for _ in range(5):
-        line = np.polyfit(number, note, 1, w=np.sqrt(weight * share))
-        share = 1.0 / (1.0 + ((note - np.polyval(line, number)) / OUTLIER) ** 2)
-    return float(line[1])
+        line = np.polyfit(numbers, notes, 1, w=np.sqrt(weights * share))
+        off = (notes - np.polyval(line, numbers)) * (HOP / RATE)
+        share = 1.0 / (1.0 + (off / OUTLIER) ** 2)
+    return line

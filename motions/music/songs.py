@@ -37,6 +37,7 @@ SWING = 0.08
 """By which share of a beat the off-beats come late, at most."""
 
 Sound = Float[np.ndarray, " n"]
+Note = Float[np.ndarray, " m"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +89,7 @@ def click_track(bpm: float, seconds: float) -> Song:
     positive("seconds", seconds)
     beats = np.arange(LEAD_IN, seconds - 0.1, 60.0 / positive("bpm", bpm))
     sound = np.zeros(round(seconds * RATE))
-    for number, beat in enumerate(beats):
+    for number, beat in enumerate(beats.tolist()):
         pitch = CLICK_PITCH if number % BAR else ACCENT_PITCH
         _add(sound, beat, _tone(pitch, 0.03, decay=150.0))
     return Song(f"clicks at {bpm:g} beats/min", _levelled(sound), RATE, beats)
@@ -149,7 +150,7 @@ class _Player:
                 self._play(bar + place, _kick(), rng.uniform(0.8, 1.0), swing)
             for place in snares:
                 self._play(bar + place, _noise(rng, 0.15, 25.0), rng.uniform(0.3, 0.5), swing)
-            for place in np.arange(0.0, BAR, hats):
+            for place in np.arange(0.0, BAR, hats).tolist():
                 self._play(bar + place, _noise(rng, 0.05, 90.0), hat_gain, swing)
 
     def bass_and_chords(self) -> None:
@@ -170,7 +171,7 @@ class _Player:
         first, second = self.beats[whole], self.beats[whole + 1]
         return float(first + (place - whole) * (second - first))
 
-    def _play(self, place: float, note: Sound, gain: float, swing: float) -> None:
+    def _play(self, place: float, note: Note, gain: float, swing: float) -> None:
         if place > len(self.beats) - 1:
             return
         late = swing if place % 1.0 else 0.0
@@ -194,7 +195,7 @@ def _noise(rng: np.random.Generator, seconds: float, decay: float) -> Sound:
     return np.exp(-decay * t) * rng.standard_normal(len(t))
 
 
-def _add(sound: Sound, when: float, note: Sound) -> None:
+def _add(sound: Sound, when: float, note: Note) -> None:
     start = max(round(when * RATE), 0)
     end = min(start + len(note), len(sound))
     sound[start:end] += note[: max(end - start, 0)]

@@ -23,8 +23,10 @@ from motions.keys import (
     LegKey,
     Mark,
     PostureKey,
+    StepKey,
 )
 from motions.language.clock import BeatClock
+from motions.phase_key import PhaseKey
 from motions.saved.envelope import Format, content_of, fields_of
 from motions.saved.values import Decoder, Encoder, required
 from motions.timeline import Timeline
@@ -37,6 +39,8 @@ KINDS: Final[Mapping[str, type[Key]]] = {
     "leg": LegKey,
     "joint": JointKey,
     "balance": BalanceShift,
+    "step": StepKey,
+    "phases": PhaseKey,
     "mark": Mark,
 }
 """The kinds of keys by the words that files have for them: a new kind needs a line here."""

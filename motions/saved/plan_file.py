@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,6 +15,7 @@ from go2_wbc.kernels.layout import PLAN_CURVES
 from go2_wbc.robot.fingerprint import fingerprint
 from go2_wbc.robot.model import RobotModel
 from motions.compiled_plan import CompiledPlan
+from motions.dynamics.trajectory import UNREADABLE
 from motions.language.clock import SAME
 from motions.saved.envelope import Format, content_of, fields_of
 from motions.saved.values import Decoder, Encoder
@@ -105,7 +104,7 @@ def _arrays_of(file: Path) -> dict[str, np.ndarray]:
     try:
         with np.load(io.BytesIO(content_of(file)), allow_pickle=False) as archive:
             return {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+    except (*UNREADABLE, KeyError) as error:
         raise MotionFileError(f"{file} is damaged, cut short, or no saved plan: {error}") from error
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,10 +11,13 @@ from controller.behaviours.plans import PlayPlan
 from controller.behaviours.safe_return import SafeReturn, nearest_safe_instant, retimed
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
+from go2_wbc.contacts import ContactSchedule
+from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
 from motions.compiled_plan import CompiledPlan
 from tests.controller.plants import WatchedPlant
+from tests.stepping_plans import LANDING, LIFT_OFF, TAKE_OFF, TOUCHDOWN, hop_plan, step_plan
 
 TICK = 0.002
 # s into the high five: lifting, tapping, lowering.
@@ -73,6 +78,8 @@ def test_the_safe_instant_has_four_fully_loaded_feet_and_is_the_nearer_one(
     plan: CompiledPlan,
 ) -> None:
     early, late = nearest_safe_instant(plan, 2.0), nearest_safe_instant(plan, 7.3)
+    assert early is not None
+    assert late is not None
     assert early < 2.0
     assert late > 7.3
     for t in (early, late):
@@ -102,3 +109,51 @@ def test_time_that_runs_backwards_negates_velocities_only(plan: CompiledPlan) ->
     assert (backward.a_joints == forward.a_joints).all()
     assert (backward.body.v_world == -forward.body.v_world).all()
     assert (backward.q_joints == forward.q_joints).all()
+
+
+def test_a_flight_that_has_begun_is_not_slowed_down_and_ends_on_four_feet() -> None:
+    plan = hop_plan(RobotModel(), 0.1, 3)
+    for moment in (TAKE_OFF - 0.1, TAKE_OFF + 0.01, LANDING - 0.01):
+        way_back, last = SafeReturn(plan, moment), moment
+        assert LANDING < way_back.target < LANDING + 0.5
+        while not way_back.is_over:
+            reference = way_back.advance(TICK)
+            if way_back.t < LANDING:
+                assert way_back.t == pytest.approx(last + TICK), "at its own tempo"
+                assert (reference.row == plan.row_at(way_back.t)).all()
+            assert way_back.t < LANDING + 0.5
+            last = way_back.t
+        assert plan.at(way_back.t).stance.all()
+        assert not way_back.advance(TICK).body.v_world.any()
+
+
+def test_a_crouch_before_a_flight_is_left_at_once() -> None:
+    plan = hop_plan(RobotModel(), 0.1)
+    way_back = SafeReturn(plan, 0.1)
+    assert way_back.target < TAKE_OFF - 0.1
+    while not way_back.is_over:
+        way_back.advance(TICK)
+        assert way_back.t < TAKE_OFF - 0.1
+
+
+def test_a_foot_that_steps_goes_on_to_its_new_place() -> None:
+    plan = step_plan(RobotModel(), Leg.FR, 0.05)
+    way_back = SafeReturn(plan, LIFT_OFF + 0.05)
+    assert way_back.target > TOUCHDOWN
+    while not way_back.is_over:
+        before = way_back.t
+        way_back.advance(TICK)
+        assert way_back.t >= before or way_back.t > TOUCHDOWN, "not back to where it stood"
+
+
+def test_a_gait_that_never_stands_for_long_is_left_on_four_feet() -> None:
+    hop = hop_plan(RobotModel(), 0.1, 6)
+    times = np.arange(0.0, 4.0, 0.1)
+    modes = np.ones((len(times), 4), dtype=bool)
+    modes[1:-1:2, 1:3] = False
+    plan = replace(hop, contacts=ContactSchedule(tuple(times.tolist()), modes), swings=~modes)
+    way_back = SafeReturn(plan, 0.55)
+    assert way_back.target == pytest.approx(0.6)
+    while not way_back.is_over:
+        way_back.advance(TICK)
+    assert 0.6 <= way_back.t < 0.6 + 2 * TICK

@@ -14,7 +14,7 @@ from controller.behaviours.joints import Damped, ServoJoints
 from controller.loop import ControlLoop, Fault
 from controller.telemetry import Telemetry
 from go2_wbc.contacts import find_gait
-from go2_wbc.errors import PlantError, PlantTimeout, ResidualRow
+from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible, ResidualRow
 from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.reference import JointReference, Reference
@@ -22,6 +22,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
+from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.relaxation import LIMITS
 from go2_wbc.wbc.solution import WbcSolution
@@ -363,3 +364,26 @@ def test_engaging_a_behaviour_clears_the_fault(loop: ControlLoop) -> None:
     loop.abandon(Fault("a test"))
     loop.engage(Damped())
     assert loop.fault is None
+
+
+class Broken(WholeBodyController):
+    """Solves nothing."""
+
+    def solve(
+        self, snapshot: Snapshot, reference: Reference, *, relax: bool = False
+    ) -> WbcSolution:
+        raise QpInfeasible("condensed", "asked for nothing that it can do")
+
+
+@pytest.mark.parametrize("is_dynamic", [False, True])
+def test_a_dynamic_behaviour_is_followed_with_the_numbers_for_one(
+    plant: StillPlant, model: RobotModel, *, is_dynamic: bool
+) -> None:
+    config = WbcConfig()
+    usual, broken = WholeBodyController(model), Broken(model, config=config.for_dynamics)
+    loop = ControlLoop(plant, model, usual, Telemetry(model, 1000), SAFETY, broken)
+    behaviour = Balance(model)
+    behaviour.is_dynamic = is_dynamic
+    loop.engage(behaviour)
+    loop.tick()
+    assert loop.telemetry.qp_failures == is_dynamic

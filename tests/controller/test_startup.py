@@ -22,6 +22,7 @@ LATER = {
     "placo": "a motion is balanced",
     "trimesh": "the robot is drawn",
     "matplotlib": "a margin is drawn",
+    "glfw": "a window is opened",
     "meshcat": "a page is shown",
     "proxsuite": "it is asked for",
 }

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from go2_wbc.lazy import lazy_exports
+from go2_wbc.lazy import lazy_exports, without_collecting
 
 MODULE = """
 import gc
@@ -48,3 +48,17 @@ def test_an_import_that_fails_leaves_the_collector_as_it_was(is_collecting: bool
 def test_an_unknown_name_is_refused() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'Other'"):
         lazy_exports("go2_wbc", {"legs": ("Leg",)})("Other")
+
+
+def test_what_an_import_made_is_old_and_a_programs_frozen_objects_stay_frozen() -> None:
+    with without_collecting():
+        made = [[] for _ in range(5000)]
+    assert gc.get_count()[0] < len(made)
+    assert not gc.get_freeze_count()
+    gc.freeze()
+    try:
+        with without_collecting():
+            pass
+        assert gc.get_freeze_count()
+    finally:
+        gc.unfreeze()

@@ -18,7 +18,8 @@ from go2_wbc.legs import LEGS
 from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, load_motion, motion_names
-from motions.keys import BalanceShift, BodyKey, Frame, Key, LegKey, LegTarget
+from motions.keys import BalanceShift, BodyKey, Frame, Key, LegKey, LegTarget, StepKey
+from motions.phase_key import PhaseKey
 
 Mutator = Callable[[Timeline, np.random.Generator], Timeline | None]
 _KeyType = TypeVar("_KeyType", BodyKey, LegKey, BalanceShift)
@@ -28,6 +29,12 @@ JUMP = 0.6  # m/s or rad/s from one instant to the next: 150 m/s^2
 AWAY = 0.035  # m or rad off a posture at the end
 OUTSIDE = -0.005  # m; a CoM this near to the edge of its feet cannot be held up
 LONGEST = 0.445  # m, from the hip's centre to a foot: thigh, calf and the width of the hip
+STANDING = tuple(
+    name
+    for name in motion_names()
+    if not any(isinstance(key, StepKey | PhaseKey) for key in load_motion(name).keys)
+)
+"""Motions of the library that stay on three feet or four: what the oracle knows the rules of."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +72,7 @@ def _in_turn() -> Iterator[tuple[str, Mutator]]:
 
 
 def _mutated(mutate: Mutator, rng: np.random.Generator) -> Timeline | None:
-    line = load_motion(str(rng.choice(motion_names())))
+    line = load_motion(str(rng.choice(STANDING)))
     try:
         return mutate(line, rng)
     except Go2WbcError:  # the language itself refuses it: nothing is left to check

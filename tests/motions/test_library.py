@@ -10,6 +10,7 @@ from go2_wbc.legs import Leg
 from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import (
+    CompiledPlan,
     FeasibilityChecker,
     compile_timeline,
     find_motion,
@@ -17,6 +18,7 @@ from motions import (
     motion_names,
 )
 from motions.authoring import Choice
+from motions.compiler import LEAST_RAMP
 
 # Between a difference quotient over 2 ms and the derivative; the curves are smooth.
 DIFFERENCE_TOLERANCE = 2e-2
@@ -85,6 +87,9 @@ def test_velocities_are_the_derivatives_of_positions(model: RobotModel, name: st
     plan = compile_timeline(load_motion(name), model)
     rng = np.random.default_rng(1)
     for t in rng.uniform(STEP, plan.duration - STEP, 40):
+        if plan.swings.any():  # steps and jumps change accelerations from knot to knot
+            piece = int(np.searchsorted(plan.curves.x, t)) - 1
+            t = plan.curves.x[piece : piece + 2].mean()
         before, now, after = (plan.at(float(t) + shift) for shift in (-STEP, 0.0, STEP))
         p_rate = (after.body.p_world - before.body.p_world) / (2 * STEP)
         q_rate = (after.q_joints - before.q_joints) / (2 * STEP)
@@ -106,8 +111,14 @@ def test_a_foot_is_unloaded_before_it_lifts_and_loaded_only_after_it_lands(
     loads = np.array([plan.at(float(t)).normal_force_max for t in times])
     stances = np.array([plan.at(float(t)).stance for t in times])
     assert not loads[~stances].any()
-    change = np.abs(np.diff(loads, axis=0)).max()
-    assert change < 0.05 * loads.max()
+    change = np.abs(np.diff(loads, axis=0)).max(axis=1)
+    written = np.array([not within_dynamic(plan, float(t)) for t in times[1:]])
+    assert plan.ramp >= LEAST_RAMP
+    assert change[written].max() < 1.01 * 0.005 / plan.ramp * loads.max()
+
+
+def within_dynamic(plan: CompiledPlan, t: float) -> bool:
+    return any(span.start - STEP <= t <= span.end + STEP for span in plan.dynamic)
 
 
 def test_a_left_high_five_is_the_mirror_image_of_a_right_one(model: RobotModel) -> None:

@@ -11,7 +11,7 @@ from go2_wbc.robot.rotations import log_rotation
 from motions import Timeline, compile_timeline, deg
 from motions.placement import attitudes, configurations
 from motions.tracks import SAMPLE_PERIOD
-from motions.trajectory import _rates, trajectory_of
+from motions.trajectory import rates, trajectory_of
 
 STEP = 1e-3  # s; of the differences
 FINE_W, FINE_DW = 1e-4, 1e-3  # of a second derivative of about 1e2 /s^2 times the step squared
@@ -29,7 +29,7 @@ def test_angular_velocity_and_acceleration_are_those_of_the_turning_trunk() -> N
     rpy = np.array([angles(float(t)) for t in times])
     R, still = attitudes(rpy), np.zeros((len(times), 12))
     poses = np.hstack([0.0 * rpy, rpy])
-    v, a = _rates(times, configurations(poses, still), rpy, R)
+    v, a = rates(times, configurations(poses, still), rpy)
     for row in range(100, len(times) - 100, 100):
         w = log_rotation(R[row - 1].T @ R[row + 1]) / (2.0 * STEP)
         assert v[row, 3:6] == pytest.approx(w, abs=FINE_W)

@@ -17,19 +17,17 @@ from viz.replay.page_data import content_text, scene_text
 
 HTML_SUFFIXES = (".html", ".htm")
 PAGE_LIMIT = 4_000_000
-"""Largest page [bytes] without its sound."""
-SOUND_ROOM = 30_000
-"""What sound adds to the limit, for each second [bytes]: its samples as base64."""
+"""Largest page [bytes]."""
 _SCRIPTS = (
     "replay_data.js",
     "replay_stage.js",
     "replay_scene.js",
     "replay_ghost.js",
     "replay_steps.js",
-    "replay_sound.js",
     "replay_flags.js",
     "replay_charts.js",
     "replay_verdict.js",
+    "replay_sound.js",
     "replay_app.js",
 )
 _LIVE_SCRIPT = "replay_live.js"
@@ -48,18 +46,15 @@ def export_html(shown: Recording | ReplayContent, path: Path, *, title: str) -> 
 
     Raises:
         ConfigError: for a path that cannot be written, a recording that cannot be drawn, or one
-            so large that the page would exceed ``PAGE_LIMIT``, and ``SOUND_ROOM`` for its sound.
+            so large that the page would exceed ``PAGE_LIMIT``.
         DescriptionError: if the robot's files are missing.
     """
     target = checked_output(path, HTML_SUFFIXES)
     content = checked_content(shown)
     page = page_text(title, scene_text(), content_text(content, title)).encode()
-    limit = PAGE_LIMIT
-    if content.sound is not None:
-        limit += int(SOUND_ROOM * content.recording.duration)
-    if len(page) > limit:
+    if len(page) > PAGE_LIMIT:
         raise ConfigError(
-            f"the page would have {len(page)} bytes, limit {limit}; record a shorter run"
+            f"the page would have {len(page)} bytes, limit {PAGE_LIMIT}; record a shorter run"
         )
     return write_atomically(target, page)
 

@@ -15,7 +15,6 @@ from viz.render.robot_meshes import load_robot_visuals
 from viz.replay.meshcat_scene import robot_scene
 from viz.replay.packing import Pack
 from viz.replay.replay_data import ReplayFrames, reduced, replay_frames
-from viz.sound import PAGE_SAMPLE_RATE, packed_sound
 
 _FORCE_PERCENTILE = 99.5  # a touchdown spike beyond it may be cut off in the contact strip
 _LEAST_FORCE_SCALE = 50.0  # [N] a full row of the contact strip is at least this much
@@ -45,13 +44,13 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         "ghost_name": content.ghost_name,
         "judges_ghost": content.judges_ghost,
         "end_pose": content.end_pose,
+        "has_sound": bool(content.sound),
         "sliders": [asdict(slider) for slider in content.sliders],
-        "sound_rate": None if content.sound is None else PAGE_SAMPLE_RATE,
         "verdict": None,
         "ghost": None,
     }
-    if content.sound is not None:
-        pack.add("sound", packed_sound(content.sound, content.recording.duration))
+    if content.sound:
+        pack.add("sound", np.frombuffer(content.sound, np.uint8))
     if content.verdict is not None:
         header["verdict"] = _add_verdict(pack, content.verdict)
     if content.ghost is not None:

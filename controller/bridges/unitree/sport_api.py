@@ -1,12 +1,18 @@
-"""Unitree's sport service in names and numbers (unitree_sdk2, ``go2/sport`` and ``rpc``)."""
+"""Unitree's sport service in names and numbers (unitree_sdk2, ``go2/sport`` and ``rpc``).
+
+Unitree has renumbered its procedures more than once. These are those of unitree_sdk2_python,
+``unitree_sdk2py/go2/sport/sport_api.py`` (robots from V1.1.6 on), and, where a later SDK has taken
+a call out, of ``include/unitree/robot/go2/sport/sport_api.hpp`` in unitree_sdk2: 1018, 1026, 1033.
+"""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from itertools import pairwise
 from typing import Any, Final
 
 from go2_wbc.errors import CommandError
@@ -19,7 +25,10 @@ LEASE_TERM: Final = 1.0
 
 
 class Api(IntEnum):
-    """Procedures that are supported, and those of every service."""
+    """Procedures that are known here, and those of every service.
+
+    Which of them a robot does depends on the library's motions and on the gaits that there are.
+    """
 
     VERSION = 1
     LEASE_APPLY = 101
@@ -37,9 +46,22 @@ class Api(IntEnum):
     SPEED_LEVEL = 1015
     HELLO = 1016
     STRETCH = 1017
+    TRAJECTORY_FOLLOW = 1018
+    CONTENT = 1020
     DANCE1 = 1022
+    DANCE2 = 1023
+    GET_SPEED_LEVEL = 1026
     POSE = 1028
     SCRAPE = 1029
+    FRONT_JUMP = 1031
+    FRONT_POUNCE = 1032
+    WIGGLE_HIPS = 1033
+    HEART = 1036
+    STATIC_WALK = 1061
+    TROT_RUN = 1062
+    CROSS_STEP = 2051
+    AUTO_RECOVERY_SET = 2054
+    AUTO_RECOVERY_GET = 2055
 
 
 class SwitcherApi(IntEnum):
@@ -103,16 +125,32 @@ EULER_LIMITS: Final = (0.75, 0.75, 0.6)
 """Of ``Euler``: roll, pitch, yaw [rad], either way."""
 SPEED_LEVELS: Final[Mapping[int, float]] = {-1: 0.4, 0: 0.7, 1: 1.0}
 """Share of the walking envelope for ``Move``, by ``SpeedLevel``; ours, not the firmware's."""
+FAR: Final = 1e6
+"""No number of a parameter is as large: a mistake, infinity or not a number."""
+PATH_POINTS: Final = 30
+"""Points of a path: unitree_sdk2_python sends as many (``SPORT_PATH_POINT_SIZE``)."""
+PATH_FIELDS: Final = ("t_from_start", "x", "y", "yaw", "vx", "vy", "vyaw")
+"""What a point of a path says, in its JSON's words (``SportClient.TrajectoryFollow``)."""
 
 
 def vector(parameter: str) -> tuple[float, float, float]:
     """``x``, ``y`` and ``z`` of a parameter; CommandError unless they are finite numbers."""
-    fields = _fields(parameter)
-    values: list[Any] = [fields.get(name) for name in "xyz"]
-    if not all(type(value) in (int, float) and math.isfinite(value) for value in values):
-        raise CommandError(f"x, y and z must be finite numbers, got {values}")
-    x, y, z = map(float, values)
+    x, y, z = _numbers(_fields(parameter), "xyz")
     return x, y, z
+
+
+def path_points(parameter: str) -> list[list[float]]:
+    """The points of a path, a row of ``PATH_FIELDS`` each; CommandError if they make none."""
+    points = _parsed(parameter)
+    if not isinstance(points, list) or not 1 <= len(points) <= PATH_POINTS:
+        raise CommandError(f"a path must be a list of 1 to {PATH_POINTS} points")
+    if not all(isinstance(point, dict) for point in points):
+        raise CommandError(f"a point of a path must have {', '.join(PATH_FIELDS)}")
+    rows = [_numbers(point, PATH_FIELDS) for point in points]
+    times = [row[0] for row in rows]
+    if not all(a < b for a, b in pairwise([-math.ulp(0.0), *times])):
+        raise CommandError(f"t_from_start must begin at 0 or later and rise, got {times}")
+    return rows
 
 
 def flag(parameter: str) -> bool:
@@ -131,11 +169,27 @@ def level(parameter: str) -> int:
     return value
 
 
+def answer(value: bool | int) -> str:
+    """What a response says of one value."""
+    return json.dumps({"data": value})
+
+
+def _numbers(fields: Mapping[str, Any], names: Iterable[str]) -> list[float]:
+    values: dict[str, Any] = {name: fields.get(name) for name in names}
+    if not all(type(value) in (int, float) and abs(value) < FAR for value in values.values()):
+        raise CommandError(f"{', '.join(values)} must be finite numbers, got {values}")
+    return [float(value) for value in values.values()]
+
+
 def _fields(parameter: str) -> Mapping[str, Any]:
-    try:
-        fields = json.loads(parameter or "{}")
-    except ValueError as error:
-        raise CommandError(f"the parameter is not JSON: {error}") from error
+    fields = _parsed(parameter or "{}")
     if not isinstance(fields, dict):
         raise CommandError(f"the parameter must be a JSON object, got {fields!r}")
     return fields
+
+
+def _parsed(parameter: str) -> object:
+    try:
+        return json.loads(parameter)
+    except (ValueError, RecursionError) as error:
+        raise CommandError(f"the parameter is not JSON: {error}") from error

@@ -15,11 +15,21 @@ from controller.bridges.unitree.sport_api import Api
 from controller.modes import Mode
 from controller.procedures import ProcedureRunner
 from go2_wbc.config import Config
+from go2_wbc.contacts import GAITS
+from go2_wbc.errors import Go2WbcError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant.base import Plant
+from go2_wbc.reference import MotionPlan
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
-from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
+from motions import (
+    FeasibilityChecker,
+    Timeline,
+    compile_motion,
+    compile_timeline,
+    motion_names,
+)
 from motions.postures import lean
 
 _log = logging.getLogger(__name__)
@@ -27,10 +37,19 @@ _log = logging.getLogger(__name__)
 MOTIONS: Final[Mapping[int, str]] = {
     Api.HELLO: "wave",
     Api.STRETCH: "stretch",
+    Api.CONTENT: "content",
     Api.DANCE1: "dance",
+    Api.DANCE2: "dance2",
     Api.SCRAPE: "shake_paw",
+    Api.FRONT_JUMP: "jump_forward",
+    Api.FRONT_POUNCE: "pounce",
+    Api.WIGGLE_HIPS: "wiggle_hips",
+    Api.HEART: "heart",
+    Api.CROSS_STEP: "cross_step",
 }
-"""The motion of the library that stands for each of Unitree's."""
+"""The motion of the library that stands for each of Unitree's, if the library has it."""
+WALKS: Final[Mapping[int, str]] = {Api.STATIC_WALK: "walk", Api.TROT_RUN: "trot"}
+"""The gait that stands for each of Unitree's, if there is one of that name."""
 STANDING_UP: Final = frozenset({Api.STAND_UP, Api.BALANCE_STAND, Api.RECOVERY_STAND})
 POSE: Final = (0.12, -0.15, 0.2)
 """Roll, pitch, yaw [rad] of ``Pose``."""
@@ -49,6 +68,7 @@ class SportRobot:
     Attributes:
         is_locked: whether it stands with locked joints, after ``StandUp``, and does not walk.
         is_leaning: whether it holds an attitude, after ``Euler`` or ``Pose``.
+        unsupported: procedures for which the library has no motion, or for which there is no gait.
         pilot: runs the procedures.
     """
 
@@ -56,10 +76,10 @@ class SportRobot:
         """Take over a robot that lies on the ground."""
         self._config = config
         self._checker = FeasibilityChecker()  # with a model of its own: the loop is another thread
-        plans = {
-            api: compile_timeline(load_motion(name), self._checker.model)
-            for api, name in MOTIONS.items()
-        }
+        plans = playable_plans(self._checker.model)
+        walks = {api: name for api, name in WALKS.items() if name in GAITS}
+        self.unsupported = (MOTIONS.keys() | WALKS.keys()) - plans.keys() - walks.keys()
+        self._gait = "trot"
         settings = PilotSettings(realtime=True, recorded_time=0.0)
         self._assembly = build_pilot(plant, config, settings)
         self.pilot, self._runner = self._assembly.pilot, self._assembly.runner
@@ -73,7 +93,8 @@ class SportRobot:
             Api.RISE_SIT: self.pilot.stand,
             Api.STAND_DOWN: self.pilot.lie_down,
             Api.SIT: self.pilot.sit,
-            Api.MOVE: partial(self.pilot.walk, "trot"),
+            Api.MOVE: lambda: self._walk(self._gait),
+            **{api: partial(self._walk, gait) for api, gait in walks.items()},
             **{api: partial(self.pilot.play, plan) for api, plan in plans.items()},
         }
 
@@ -91,6 +112,11 @@ class SportRobot:
     def is_alive(self) -> bool:
         """Whether the control loop still runs."""
         return self._runner.is_alive
+
+    def _walk(self, gait: str) -> object:
+        """Enter walking mode; ``Move`` walks like this from now on."""
+        self._gait = gait
+        return self.pilot.walk(gait)
 
     def begin(self) -> None:
         """Begin an action: what makes the robot limp ends it; PlantError without a control loop."""
@@ -150,3 +176,16 @@ class SportRobot:
     def close(self) -> None:
         """Go limp and stop."""
         self._assembly.close()
+
+
+def playable_plans(model: RobotModel) -> Mapping[int, MotionPlan]:
+    """The plans of the calls for which the library has a motion that can be compiled here."""
+    plans = {}
+    for api, name in MOTIONS.items():
+        if name not in motion_names():
+            continue
+        try:
+            plans[api] = compile_motion(name, model)
+        except Go2WbcError as error:
+            _log.warning("%s will not be supported: %s", Api(api).name, error)
+    return plans

@@ -18,7 +18,8 @@ import numpy as np
 from controller.bridges.unitree import sport_api
 from controller.bridges.unitree.codec import Reply, Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode, SportStatus
-from controller.bridges.unitree.sport_robot import MOTIONS, POSE, STANDING_UP, SportRobot
+from controller.bridges.unitree.sport_path import SportPath
+from controller.bridges.unitree.sport_robot import MOTIONS, POSE, STANDING_UP, WALKS, SportRobot
 from controller.jobs import Answer, Job, JobServer
 from controller.modes import Mode
 from controller.procedures import Aborted, Measurements
@@ -33,7 +34,19 @@ HOLD: Final = 1.0
 """Time [s] for which a ``Move`` holds."""
 WAITING: Final = 8
 """Requests that may wait for the running action."""
-_SUPPORTED: Final = frozenset(map(int, Api))
+_KNOWN: Final = frozenset(map(int, Api))
+_AT_ONCE: Final = frozenset(
+    {
+        Api.STOP_MOVE,
+        Api.MOVE,
+        Api.TRAJECTORY_FOLLOW,
+        Api.SPEED_LEVEL,
+        Api.GET_SPEED_LEVEL,
+        Api.AUTO_RECOVERY_SET,
+        Api.AUTO_RECOVERY_GET,
+    }
+)
+"""What needs no action of its own."""
 _LIMP: Final = frozenset({Mode.LYING, Mode.DAMPED, Mode.FALLEN})
 _ON_FEET: Final = frozenset({Mode.STANDING, Mode.WALKING})
 _ENTRY: Final = {
@@ -42,6 +55,7 @@ _ENTRY: Final = {
     Api.EULER: _ON_FEET,
     Api.POSE: _ON_FEET,
     Api.MOVE: _ON_FEET,
+    **dict.fromkeys(WALKS, _ON_FEET),
     Api.RECOVERY_STAND: frozenset(Mode),
     **dict.fromkeys(MOTIONS, _ON_FEET),
 }
@@ -59,36 +73,54 @@ class SportService:
         self._rising: Api | None = None
         self._lock = threading.Lock()
         self._wanted, self._wanted_until = ZERO_COMMAND, 0.0
-        self._share = sport_api.SPEED_LEVELS[0]
+        self._path: SportPath | None = None
+        self._level = 0
+        self._recovers = self._has_tried_to_recover = False
         self._jobs.start("sport")
 
     # --- requests -------------------------------------------------------------------------
 
     def handle(self, request: Request, reply: Reply) -> None:
         """Answer a request, now or later; CommandError for a parameter that is not valid."""
-        if request.api_id not in _SUPPORTED:
+        if request.api_id not in _KNOWN or request.api_id in self._robot.unsupported:
             _log.warning("request %d is not supported", request.api_id)
             reply(Code.NOT_SUPPORTED, "")
             return
         api = Api(request.api_id)
         if api is Api.DAMP:
-            self._wanted = ZERO_COMMAND
+            self._halt()
             self._jobs.damp()
             reply(Code.OK, "")
         elif self._is_released():
             reply(Code.NOT_READY, "")
-        elif api is Api.STOP_MOVE:
-            self._wanted = ZERO_COMMAND
-            self._follow()
-            reply(Code.OK, "")
-        elif api is Api.MOVE:
-            self._move(sport_api.vector(request.parameter))
-            reply(Code.OK, "")
-        elif api is Api.SPEED_LEVEL:
-            self._share = sport_api.SPEED_LEVELS[sport_api.level(request.parameter)]
-            reply(Code.OK, "")
+        elif api in _AT_ONCE:
+            reply(Code.OK, self._do_at_once(api, request.parameter))
         else:
+            self._path = None  # what is asked now takes its place
             self._submit(api, self._procedure(api, request.parameter), reply)
+
+    def _do_at_once(self, api: Api, parameter: str) -> str:
+        """Do what needs no action of its own; what the response says besides."""
+        if api is Api.STOP_MOVE:
+            self._halt()
+            self._follow()
+        elif api is Api.MOVE:
+            self._move(sport_api.vector(parameter))
+        elif api is Api.TRAJECTORY_FOLLOW:
+            self._path = SportPath(np.array(sport_api.path_points(parameter)))
+            self._follow()
+        elif api is Api.SPEED_LEVEL:
+            self._level = sport_api.level(parameter)
+        elif api is Api.AUTO_RECOVERY_SET:
+            self._recovers = sport_api.flag(parameter)
+        elif api is Api.AUTO_RECOVERY_GET:
+            return sport_api.answer(self._recovers)
+        else:  # GET_SPEED_LEVEL
+            return sport_api.answer(self._level)
+        return ""
+
+    def _halt(self) -> None:
+        self._wanted, self._path = ZERO_COMMAND, None
 
     def _procedure(self, api: Api, parameter: str) -> Callable[[], None]:
         robot = self._robot
@@ -97,7 +129,7 @@ class SportService:
             return lambda: self._lean(rpy)
         if api is Api.POSE and sport_api.flag(parameter):
             return lambda: robot.lean_to(POSE)
-        if api is Api.POSE:
+        if api is Api.POSE or (api is Api.CROSS_STEP and not sport_api.flag(parameter)):
             return lambda: robot.perform(Api.BALANCE_STAND)
         if api in STANDING_UP:
             return lambda: self._rise(api)
@@ -157,6 +189,7 @@ class SportService:
     # --- walking --------------------------------------------------------------------------
 
     def _move(self, velocity: tuple[float, float, float]) -> None:
+        self._path = None
         self._wanted = VelocityCommand(
             *np.clip(velocity, sport_api.MOVE_LEAST, sport_api.MOVE_GREATEST)
         )
@@ -169,14 +202,26 @@ class SportService:
             self._wanted = ZERO_COMMAND
         if self._jobs.job is not None or self._is_released():
             return
+        wants_to_walk = self._path is not None or not self._wanted.is_zero
         if robot.mode is Mode.WALKING:
-            robot.steer(self._wanted, self._share)
-        elif not self._wanted.is_zero and robot.mode is Mode.STANDING and not robot.is_locked:
+            self._steer()
+        elif wants_to_walk and robot.mode is Mode.STANDING and not robot.is_locked:
             self._submit(Api.MOVE, lambda: robot.perform(Api.MOVE), lambda *_: None)
-        elif not self._wanted.is_zero:
+        elif wants_to_walk:
             what = "locked after StandUp" if robot.is_locked else robot.mode.value
-            _log.warning("Move ignored: the robot is %s; BalanceStand first", what)
-            self._wanted = ZERO_COMMAND
+            _log.warning("walking ignored: the robot is %s; BalanceStand first", what)
+            self._halt()
+
+    def _steer(self) -> None:
+        """Walk along the path, or as ``Move`` says; ``SpeedLevel`` is for the latter."""
+        robot, path = self._robot, self._path
+        if path is None:
+            robot.steer(self._wanted, sport_api.SPEED_LEVELS[self._level])
+            return
+        command = path.command(robot.state)
+        robot.steer(command or ZERO_COMMAND, 1.0)
+        if command is None and self._path is path:
+            self._path = None
 
     def patrol(self) -> None:
         """Look after what is pending; to be called every few hundredths of a second."""
@@ -185,6 +230,17 @@ class SportService:
             self._follow()
         except Go2WbcError as error:  # the robot fell or was damped in between
             _log.info("Move ended: %s", error)
+        self._recover()
+
+    def _recover(self) -> None:
+        """Get up after a fall, once, if ``AutoRecoverySet`` has asked for it."""
+        if self._robot.mode is not Mode.FALLEN:
+            self._has_tried_to_recover = False
+        elif self._recovers and not (self._has_tried_to_recover or self._jobs.job is not None):
+            self._has_tried_to_recover = True
+            self._submit(
+                Api.RECOVERY_STAND, lambda: self._rise(Api.RECOVERY_STAND), lambda *_: None
+            )
 
     # --- what it does ---------------------------------------------------------------------
 

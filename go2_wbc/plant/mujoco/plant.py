@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, unknown_name
+from go2_wbc.lazy import without_collecting
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.contacts import (
@@ -25,7 +26,8 @@ from go2_wbc.plant.mujoco.contacts import (
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Push, Pushes
-from go2_wbc.plant.mujoco.setup import LYING_DAMPING, PlantSetup, prepare, settle
+from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
+from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
 from go2_wbc.plant.sensors import ImuSample, SensorNoise
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
@@ -347,7 +349,8 @@ class MujocoPlant(Plant):
 
     def _bind_kernels(self) -> None:
         """Binds the kernels of a tick and the arrays of MuJoCo's that they read and fill."""
-        from go2_wbc.kernels import motor, simulation  # compiled; only who needs them waits
+        with without_collecting():
+            from go2_wbc.kernels import motor, simulation  # compiled; only who needs them waits
 
         motors, data, layout = self._motor, self._data, self._layout
         numbers = np.array([motors.peak, motors.knee_speed, motors.no_load_speed])

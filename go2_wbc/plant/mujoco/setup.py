@@ -1,4 +1,4 @@
-"""Turns a plant's settings into a compiled model and lays the robot on the ground."""
+"""Turns a plant's settings into a compiled model."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
-import numpy as np
 
 from go2_wbc.errors import ConfigError, DescriptionError, ModelMismatch
 from go2_wbc.legs import LEGS
@@ -21,20 +20,6 @@ from go2_wbc.validation import require_finite, require_not_negative, require_pos
 
 # Dry rubber on a hard floor; Unitree publishes none. The prototype's runs used it.
 DEFAULT_FRICTION = 0.8
-# Joint angles [rad] of the Go2 lying limp, belly down: where this model comes to rest within 1e-3
-# after 15 s of damped simulation. Gravity folds the calves onto their limit of -2.7227.
-LYING_POSE = (
-    *(0.053, 1.236, -2.722),
-    *(-0.053, 1.236, -2.722),
-    *(0.372, 1.239, -2.722),
-    *(-0.372, 1.239, -2.722),
-)
-LYING_DAMPING = 3.0  # N m s/rad of the joints while lying; the value of Unitree's damping mode
-_DROP_HEIGHT = 0.11  # m of the base above the ground; it rests at 0.085
-_SETTLE_LIMIT = 3.0  # s of simulation; it settles in well under one
-_SETTLED_SPEED = 1e-3  # rad/s and m/s, largest entry of the velocity
-_RAY_TOP = 20.0  # m above the world's origin from which the ground is looked for
-_FOOTPRINT = (-0.3, 0.0, 0.3)  # m; the grid, about the Go2's size, on which it is looked for
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,46 +98,3 @@ def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel
     layout = find_layout(spec, model, description.efforts)
     motor = replace(MotorModel.named(setup.motor, description), peak=layout.torque_limits)
     return model, layout, motor
-
-
-def settle(
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    layout: MujocoLayout,
-    setup: PlantSetup,
-    rng: np.random.Generator,
-) -> None:
-    """Lets the damped robot drop a few centimetres, belly down and legs folded, and come to rest.
-
-    Leaves ``data`` as ``mj_step1`` does.
-    """
-    _place(model, data, layout, setup.initial_yaw)
-    pose = np.array(LYING_POSE) + setup.initial_joint_noise * rng.standard_normal(12)
-    joints = model.dof_jntid[layout.joint_v]
-    is_limited, ranges = model.jnt_limited[joints, None], model.jnt_range[joints]
-    low, high = np.where(is_limited, ranges, (-np.inf, np.inf)).T
-    data.qpos[layout.joint_q] = np.clip(pose, low, high)
-    data.ctrl[:] = 0.0
-    limits = layout.torque_limits
-    mujoco.mj_step1(model, data)
-    for _ in range(round(_SETTLE_LIMIT / setup.timestep)):
-        tau = -LYING_DAMPING * data.qvel[layout.joint_v]
-        data.ctrl[layout.motors] = np.clip(tau, -limits, limits)
-        mujoco.mj_step2(model, data)
-        mujoco.mj_step1(model, data)
-        if data.ncon and np.abs(data.qvel).max() < _SETTLED_SPEED:
-            break
-
-
-def _place(model: mujoco.MjModel, data: mujoco.MjData, layout: MujocoLayout, yaw: float) -> None:
-    """Puts the base a little above the highest ground around the origin."""
-    base_q = data.qpos[layout.base_q]
-    base_q[:2] = 0.0
-    base_q[2] = 2.0 * _RAY_TOP  # out of the rays' way
-    base_q[3:] = (math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw))
-    mujoco.mj_kinematics(model, data)
-    geom, down = np.zeros(1, dtype=np.int32), np.array([0.0, 0.0, -1.0])
-    tops = [np.array([x, y, _RAY_TOP]) for x in _FOOTPRINT for y in _FOOTPRINT]
-    distances = [mujoco.mj_ray(model, data, top, down, None, True, -1, geom) for top in tops]
-    ground = max((_RAY_TOP - distance for distance in distances if distance >= 0.0), default=0.0)
-    base_q[2] = ground + _DROP_HEIGHT

@@ -185,6 +185,19 @@ def test_loading_takes_the_kernels_alone_and_nothing_of_the_compiler(tmp_path: P
     assert len(list((tmp_path / "kept").rglob("*.nbc"))) == 1
 
 
+def test_a_kernel_that_was_loaded_can_be_called_by_one_that_is_compiled(folder: Path) -> None:
+    assert compile_square() == 0
+    loaded = kernel("f8(f8)")(square)
+    assert sum(loaded.stats.cache_hits.values()) == 1  # pyright: ignore[reportFunctionMemberAccess]
+
+    @kernel("f8(f8)")
+    def next_square(x):  # noqa: ANN001, ANN202
+        return loaded(x) + 1.0
+
+    assert next_square(3.0) == 10.0
+    assert loaded(2.0) == 4.0
+
+
 def test_a_subroutine_is_compiled_for_its_signature_whoever_calls_it() -> None:
     @subroutine("f8(f8)")
     def half(x):  # noqa: ANN001, ANN202

@@ -68,7 +68,7 @@ def random_reference(rng: np.random.Generator, near: np.ndarray | None) -> Refer
 def test_a_playback_is_the_readable_one_tick_by_tick(config: CorrectionConfig) -> None:
     rng = np.random.default_rng(5)
     anchor = Anchor(np.array([0.31, -0.17, 0.043]), 1.3)
-    ours, theirs = Playback(anchor, config), ReadablePlayback(anchor, config)
+    ours, theirs = (kind(anchor, None, config) for kind in (Playback, ReadablePlayback))
     turn = rotations.yaw_rotation(-anchor.yaw)
     corrected = 0
     for tick in range(600):
@@ -79,8 +79,8 @@ def test_a_playback_is_the_readable_one_tick_by_tick(config: CorrectionConfig) -
         q[:3] = anchor.p_world + turn.T @ reference.body.p_world + rng.normal(scale=0.03, size=3)
         snapshot = MODEL.snapshot(replace(state, q=q))
         plan = reference.row.copy()
-        tracked = ours.follow(plan, snapshot, 0.02)
-        expected = theirs.follow(plan, snapshot, 0.02)
+        tracked = ours.follow(plan, snapshot, 0.02 * tick, 0.02)
+        expected = theirs.follow(plan, snapshot, 0.02 * tick, 0.02)
         np.testing.assert_allclose(tracked.row, expected.row, atol=ROUNDING, rtol=0)
         np.testing.assert_array_equal(plan, reference.row, "the plan's own row is changed")
         corrected += bool(np.abs(tracked.row - reference.placed(anchor).row).max() > 1e-6)
@@ -103,7 +103,7 @@ def test_a_trunk_that_a_load_leans_is_judged_by_the_plan_and_not_by_its_correcti
     playback = kind(Anchor(np.zeros(3), 0.0))
     tracked = upright
     for _ in range(2000):
-        tracked = playback.follow(upright.row, snapshot, TICK)
+        tracked = playback.follow(upright.row, snapshot, 0.0, TICK)
     assert np.arccos(tracked.body.R_world_base[2, 2]) > 0.25, "the correction pulls against it"
     assert playback.sag_and_lean[1] == pytest.approx(0.2, abs=1e-9)
 

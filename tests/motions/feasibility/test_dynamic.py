@@ -94,6 +94,7 @@ def random_trajectory(model: RobotModel, count: int, *, pace: float, seed: int) 
         load_share=load_share,
         p_feet=np.zeros((count, 4, 3)),
         miss=np.zeros((count, 4)),
+        is_dynamic=np.zeros(count, dtype=bool),
     )
 
 

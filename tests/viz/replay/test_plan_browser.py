@@ -14,15 +14,11 @@ from go2_wbc.recording import Recording
 from tests.viz.replay.browsing import DRAWN, Tab
 from tests.viz.verdicts import made_up_verdict
 from viz.content import ReplayContent
-from viz.sound import Sound
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
 _BEATS = (0.25, 0.75, 1.25, 2.25)
-_SOUND = Sound(0.5 * np.sin(np.linspace(0.0, 4000.0, 3 * 22050)), 22050)
-_LARGEST_STEP = 0.022
-"""Of the mu-law, as a share of the amplitude: the logarithm of 256 by 127 levels, of 0.5."""
 _BROKEN, _FINE = 1.7, 2.8
 """Times [s] at which the made-up verdict has a calf over its limit, and nothing broken."""
 
@@ -39,7 +35,6 @@ def browser(
         verdict=verdict,
         ghost=replace(recording, q=lower),
         beats=_BEATS,
-        sound=_SOUND,
         end_pose=(0.4, 0.1, 0.5),
     )
     file = tmp_path_factory.mktemp("browser") / "plan.html"
@@ -265,39 +260,6 @@ def test_beats_are_lines_on_the_time_strip_that_never_crowd(browser: Tab) -> Non
     crowd = browser.evaluate("ruled(Array.from({length: 3000}, (_, k) => k / 1000))")
     assert np.diff([x for x, _ in crowd]).min() >= 6.0
     assert len(crowd) > 20
-
-
-def test_the_sound_is_stored_as_it_was(browser: Tab) -> None:
-    played = browser.evaluate(
-        "wavFile(replay.data.sound, replay.data.header.sound_rate).arrayBuffer()"
-        ".then((bytes) => [...new Int16Array(bytes, 44)])"
-    )
-    samples = np.array(played) / 32767
-    assert len(samples) == len(_SOUND.samples)
-    assert np.abs(samples - _SOUND.samples).max() < _LARGEST_STEP / 2
-    assert np.abs(samples).max() > 0.48
-
-
-def test_the_picture_follows_the_sound(browser: Tab) -> None:
-    audio, button = "replay.sound.audio", browser.page.locator("[data-sound]")
-    browser.evaluate("replay.scrub(0); replay.play(true)")
-    assert browser.evaluate(f"{audio}.paused")
-    button.click()
-    browser.wait_for(f"{audio}.currentTime > 0.05 && replay.time > 0.05")
-    browser.evaluate(
-        "window.seen = []; window.ownMove = replay.moveTo; replay.moveTo = function (t) {"
-        f" ownMove.call(this, t); seen.push(this.time - {audio}.currentTime); }}; 0"
-    )
-    browser.evaluate(f"{audio}.currentTime = 2.2")
-    browser.wait_for("replay.time > 2.1 && seen.some((off) => Math.abs(off) < OUT_OF_STEP)")
-    browser.evaluate("delete replay.moveTo; replay.scrub(0.5); replay.setSpeed(0.5)")
-    browser.evaluate("replay.play(true)")
-    assert browser.evaluate(f"[{audio}.playbackRate, {audio}.paused]") == [0.5, False]
-    browser.evaluate("replay.setSpeed(1); replay.scrub(2.0)")
-    assert browser.evaluate(f"[{audio}.currentTime, {audio}.paused]") == [2.0, True]
-    button.click()
-    assert browser.text("[data-sound]") == "Sound: off"
-    assert browser.complaints == []
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 800), (640, 860), (420, 800)])

@@ -12,7 +12,7 @@ class Player {
     this.behaviour = document.getElementById("behaviour");
     charts.forEach((chart) => chart.onScrub((t) => this.scrub(t)));
     this.verdict = new VerdictPanel(data, (t) => this.scrub(t));
-    this.sound = new Soundtrack();
+    this.sound = new Sound();
     this.sound.use(data);
     this.describe();
     this.seek(0);
@@ -66,26 +66,20 @@ class Player {
     const passed = Math.min((now - this.last) / 1000, 0.1);
     this.last = now;
     if (this.isPlaying) this.advance(passed);
-    this.sound.follow(this);
     if (this.scene.shown.orbit) this.scene.orbit(passed);
     requestAnimationFrame((later) => this.tick(later));
   }
 
   advance(passed) {
     if (this.time < this.data.duration) {
-      this.moveTo(this.sound.steer(this.time + passed * this.speed));
+      this.seek(this.sound.follow(this.time + passed * this.speed));
       return;
     }
     this.rest += passed;
-    if (this.rest > END_PAUSE) this.seek(0);
+    if (this.rest > END_PAUSE) this.play(true);
   }
 
   seek(t) {
-    this.moveTo(t);
-    this.sound.jump(this.time);
-  }
-
-  moveTo(t) {
     this.rest = 0;
     this.time = this.data.clampTime(t);
     this.scene.show(this.time);
@@ -117,12 +111,13 @@ class Player {
   play(isPlaying) {
     if (isPlaying && this.time >= this.data.duration) this.seek(0);
     this.isPlaying = isPlaying;
-    this.sound.follow(this);
+    this.sound.play(isPlaying, this.time, this.speed);
     this.button.classList.toggle("playing", isPlaying);
   }
 
   setSpeed(speed) {
     this.speed = speed;
+    this.sound.play(this.isPlaying, this.time, speed);
     for (const button of document.querySelectorAll("[data-speed]")) {
       button.classList.toggle("on", Number(button.dataset.speed) === speed);
     }
@@ -150,7 +145,7 @@ function bindControls(player) {
   each("speed", (speed) => player.setSpeed(Number(speed)));
   each("step", (frames) => player.step(Number(frames)));
   each("ghost", () => player.cycleGhost());
-  each("sound", () => player.sound.turn(!player.sound.isOn));
+  each("sound", () => player.sound.toggle());
   each("open", (name) => player.openTab(name));
   player.button.addEventListener("click", () => {
     player.play(!player.isPlaying);
@@ -170,7 +165,7 @@ function bindControls(player) {
     else if (views[key]) player.scene.setView(views[key]);
     else if (toggles[key]) player.toggle(toggles[key]);
     else if (key === "g" && player.data.ghost) player.cycleGhost();
-    else if (key === "m" && player.data.sound) player.sound.turn(!player.sound.isOn);
+    else if (key === "m" && player.data.sound) player.sound.toggle();
     else if (key === "n" && player.data.annotations.length) player.jumpToNext();
     else return;
     event.preventDefault();
@@ -217,7 +212,8 @@ async function start() {
   }
   const player = new Player(data, scene, makeCharts(data));
   bindControls(player);
-  player.play(!window.matchMedia("(prefers-reduced-motion: reduce)").matches);
+  const isStill = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+  player.play(!isStill && !data.sound);
   window.replay = player; // for scripts and tests
   if (typeof listen === "function") listen(player);
 }

@@ -75,7 +75,7 @@ class ReplayData extends Run {
     this.header = { ...scene.header, ...pack.header };
     this.ghost = pack.header.ghost ? new Run(pack, "ghost.", pack.header.ghost) : null;
     this.duration = Math.max(this.end, this.ghost ? this.ghost.end : 0);
-    this.sound = pack.header.sound_rate ? pack.array("sound") : null;
+    this.sound = this.header.has_sound ? pack.array("sound") : null; // an MP3 file
     this.annotations = this.header.verdict ? this.header.verdict.annotations : [];
     this.curves = (this.header.verdict ? this.header.verdict.curves : []).map((curve, k) => ({
       ...curve,

@@ -61,7 +61,7 @@ def require_a_script_done(text: str) -> None:
     by_call = {answer["call"]: answer for answer in json_lines(text)}
     codes = {name: answer["code"] for name, answer in by_call.items()}
     assert codes.pop("FrontFlip", None) == Code.NOT_SUPPORTED, text
-    assert len(codes) == 7, text
+    assert len(codes) == 8, text
     assert set(codes.values()) == {0}, codes
     assert by_call["StandUp"]["mode"] == SportMode.JOINT_LOCK
     assert by_call["BalanceStand"]["mode"] == SportMode.BALANCE_STAND

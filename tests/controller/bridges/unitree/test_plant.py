@@ -20,10 +20,19 @@ from controller.bridges.unitree.guards import GuardConfig
 from controller.bridges.unitree.layout import seal
 from controller.bridges.unitree.low_level import low_cmd_message, low_state_message
 from controller.bridges.unitree.plant import UnitreePlant
-from go2_wbc.errors import CommandError, ConfigError, PlantError, PlantTimeout
+from go2_wbc.errors import (
+    CommandError,
+    ConfigError,
+    DynamicMotionRefused,
+    PlantError,
+    PlantTimeout,
+    StanceMismatch,
+)
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.base import Plant
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand
+from motions import Timeline, compile_timeline
 from tests.controller.bridges.unitree.support import needs_dds
 
 pytestmark = needs_dds
@@ -195,6 +204,17 @@ def test_silence_of_the_controller_damps_the_robot_for_good(robot: Robot, plant:
 def test_a_controller_that_would_pause_between_calls_is_refused(plant: Plant) -> None:
     with pytest.raises(ConfigError, match="UnitreePlant must get commands without a break"):
         GO2Controller(plant=plant)
+
+
+def test_a_dynamic_motion_is_refused_unless_it_is_allowed(plant: Plant) -> None:
+    assert plant.is_hardware
+    line = Timeline(balance=False).foot("FL", z=0.03, over=0.4).foot("RR", z=0.03, over=0.4)
+    two_feet = compile_timeline(line.home(over=0.4), RobotModel())
+    with GO2Controller(plant=plant, realtime=True) as go2:
+        with pytest.raises(DynamicMotionRefused, match="UnitreePlant may move a robot"):
+            go2.play(two_feet, check=False)
+        with pytest.raises(StanceMismatch, match="the robot is lying"):
+            go2.play(two_feet, check=False, allow_dynamic=True)
 
 
 def test_at_the_exit_damping_is_sent_many_times_then_nothing(robot: Robot) -> None:

@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import json
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 from unittest.mock import create_autospec
 
 import pytest
 
-from controller.bridges.unitree import sport_service
+from benchmarks.bridges.processes import wait_until
+from controller.bridges.unitree import sport_api, sport_robot, sport_service
 from controller.bridges.unitree.codec import Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
-from controller.bridges.unitree.sport_robot import SportRobot
+from controller.bridges.unitree.sport_robot import MOTIONS, WALKS, SportRobot
 from controller.bridges.unitree.sport_service import WAITING, SportService
 from controller.modes import Mode
+from controller.navigation import APPROACH
 from controller.procedures import Aborted
-from go2_wbc.errors import ClosedError, PlantError
+from go2_wbc.contacts import GAITS
+from go2_wbc.errors import ClosedError, CommandError, MissingDependency, PlantError
+from go2_wbc.reference import MotionPlan
+from go2_wbc.robot.model import RobotModel
+from motions import compile_timeline, load_motion, motion_names
 from tests.controller.plants import HANG_GUARD, lying_state
 
 LEAN = '{"x": 0.1, "y": 0.1, "z": 0.0}'
@@ -29,15 +37,18 @@ class Stage:
         self.robot: Any = create_autospec(SportRobot, instance=True)
         self.robot.state, self.robot.mode = lying_state(0.0), Mode.STANDING
         self.robot.is_locked = self.robot.is_leaning = False
+        self.robot.unsupported = frozenset({Api.FRONT_JUMP})
         self.robot.damp.side_effect = lambda: self.is_limp.set()
         self.is_limp, self.is_released = threading.Event(), False
         self.service = SportService(self.robot, lambda: self.is_released)
         self.codes: list[tuple[str, int]] = []
+        self.data = ""
         self.news = threading.Condition()
 
     def ask(self, api: Api, parameter: str = "", name: str = "") -> None:
-        def reply(code: int, _data: str) -> None:
+        def reply(code: int, data: str) -> None:
             with self.news:
+                self.data = data
                 self.codes.append((name or api.name, code))
                 self.news.notify_all()
 
@@ -217,3 +228,121 @@ def test_a_move_that_meets_a_standing_robot_starts_to_walk_first(stage: Stage) -
     wait_for(started)
     stage.robot.perform.assert_called_once_with(Api.MOVE)
     stage.robot.steer.assert_not_called()
+
+
+def test_what_the_library_has_no_motion_for_is_not_supported(stage: Stage) -> None:
+    assert stage.code(Api.FRONT_JUMP) == Code.NOT_SUPPORTED
+    assert stage.code(Api.FRONT_POUNCE) == Code.OK
+    assert [call.args for call in stage.robot.perform.call_args_list] == [(Api.FRONT_POUNCE,)]
+
+
+def test_at_least_twenty_four_calls_do_what_they_say() -> None:
+    there = motion_names()
+    calls = {api for api in Api if api >= Api.DAMP}
+    lacking = {api for api, name in MOTIONS.items() if name not in there}
+    lacking |= {api for api, gait in WALKS.items() if gait not in GAITS}
+    assert len(calls - lacking) >= 24
+
+
+def test_a_motion_that_cannot_be_compiled_here_is_not_supported(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    plan = compile_timeline(load_motion("bow"), RobotModel())
+
+    def compiled(name: str, _model: RobotModel) -> MotionPlan:
+        if name == "heart":
+            raise MissingDependency("install the extra")
+        return plan
+
+    monkeypatch.setattr(sport_robot, "compile_motion", compiled)
+    plans = sport_robot.playable_plans(RobotModel())
+    assert Api.HEART not in plans
+    assert Api.HELLO in plans
+    assert Api.FRONT_JUMP in plans or MOTIONS[Api.FRONT_JUMP] not in motion_names()
+    assert "HEART will not be supported: install the extra" in caplog.text
+
+
+def test_cross_step_is_switched_on_and_off(stage: Stage) -> None:
+    assert stage.code(Api.CROSS_STEP, '{"data": true}') == Code.OK
+    assert stage.code(Api.CROSS_STEP, '{"data": false}') == Code.OK
+    performed = [call.args[0] for call in stage.robot.perform.call_args_list]
+    assert performed == [Api.CROSS_STEP, Api.BALANCE_STAND]
+
+
+def test_the_speed_level_and_the_recovery_can_be_asked_for(stage: Stage) -> None:
+    for api, value in ((Api.GET_SPEED_LEVEL, 0), (Api.AUTO_RECOVERY_GET, False)):
+        assert stage.code(api) == Code.OK
+        assert json.loads(stage.data) == {"data": value}
+    assert stage.code(Api.SPEED_LEVEL, '{"data": 1}') == Code.OK
+    assert stage.code(Api.AUTO_RECOVERY_SET, '{"data": true}') == Code.OK
+    for api, value in ((Api.GET_SPEED_LEVEL, 1), (Api.AUTO_RECOVERY_GET, True)):
+        assert stage.code(api) == Code.OK
+        assert json.loads(stage.data) == {"data": value}
+
+
+def recoveries(stage: Stage) -> int:
+    """How often the robot has been told to get up, once what was asked is over."""
+    stage.service.patrol()
+    stage.ask(Api.SIT)  # answered after what came before it
+    stage.answers(len(stage.codes) + 1)
+    return [call.args[0] for call in stage.robot.perform.call_args_list].count(Api.RECOVERY_STAND)
+
+
+def test_a_fallen_robot_gets_up_by_itself_once_if_it_was_asked_to(stage: Stage) -> None:
+    stage.robot.mode = Mode.FALLEN
+    assert recoveries(stage) == 0
+    assert stage.code(Api.AUTO_RECOVERY_SET, '{"data": true}') == Code.OK
+    assert recoveries(stage) == 1
+    assert recoveries(stage) == 1  # it has not got up: not again and again
+    stage.robot.mode = Mode.DAMPED  # by Damp, which is no fall
+    assert recoveries(stage) == 1
+    stage.robot.mode = Mode.FALLEN
+    assert recoveries(stage) == 2
+
+
+def path_ahead(*, end: float = 1.0) -> str:
+    point = dict.fromkeys(sport_api.PATH_FIELDS, 0.0)
+    return json.dumps([point, {**point, "t_from_start": end, "x": 0.5, "vx": 0.5}])
+
+
+def test_a_path_is_followed_until_it_ends_or_something_else_is_asked(stage: Stage) -> None:
+    robot = stage.robot
+    assert stage.code(Api.TRAJECTORY_FOLLOW, path_ahead()) == Code.OK
+    assert wait_until(lambda: stage.service._jobs.job is None, HANG_GUARD)
+    robot.perform.assert_called_once_with(Api.MOVE)
+    robot.mode = Mode.WALKING
+    stage.service.patrol()
+    robot.state = replace(robot.state, time=0.5)
+    stage.service.patrol()
+    command, share = robot.steer.call_args.args
+    assert (command.linear_x, share) == (pytest.approx(0.25 + APPROACH * 0.25), 1.0)
+    assert stage.code(Api.STOP_MOVE) == Code.OK
+    assert robot.steer.call_args.args[0].is_zero
+    assert stage.code(Api.TRAJECTORY_FOLLOW, path_ahead(end=0.1)) == Code.OK
+    assert stage.code(Api.MOVE, '{"x": 0.3, "y": 0, "z": 0}') == Code.OK
+    stage.service.patrol()
+    assert robot.steer.call_args.args[0].linear_x == 0.3
+    assert stage.code(Api.TRAJECTORY_FOLLOW, path_ahead(end=9.0)) == Code.OK
+    assert stage.code(Api.STAND_DOWN) == Code.OK
+    stage.service.patrol()
+    assert robot.steer.call_args.args[0].linear_x == 0.3  # Move's still, and no path's
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "",
+        "[]",
+        "{}",
+        "[3]",
+        '[{"t_from_start": 0, "x": 0}]',
+        path_ahead(end=0.0),
+        path_ahead(end=-1.0),
+        path_ahead().replace("0.5", "NaN"),
+        path_ahead().replace("0.5", "1e7"),
+        json.dumps([dict.fromkeys(sport_api.PATH_FIELDS, 0.0)] * 31),
+    ],
+)
+def test_a_path_that_is_none_is_refused(stage: Stage, path: str) -> None:
+    with pytest.raises(CommandError):
+        stage.ask(Api.TRAJECTORY_FOLLOW, path)

@@ -14,6 +14,8 @@ from benchmarks.bridges.processes import wait_until
 from benchmarks.bridges.unitree_processes import Scene, client_of, scene
 from controller.bridges.unitree.sport_api import (
     LEASE_TERM,
+    PATH_FIELDS,
+    PATH_POINTS,
     SWITCHER_SERVICE,
     Api,
     Code,
@@ -113,6 +115,53 @@ def test_a_front_paw_is_raised_and_put_back(at: Scene, api: Api) -> None:
     assert least == 0.0
     at.require_standing()
     assert at.now()["error_code"][0] == Code.OK
+
+
+@pytest.mark.parametrize("api", [Api.CONTENT, Api.WIGGLE_HIPS, Api.HEART])
+def test_it_shows_how_it_feels_and_stands_again(at: Scene, api: Api) -> None:
+    begin(at, api)
+    most = np.zeros(3)
+    for _ in while_acting(at):
+        most = np.maximum(most, np.abs(rpy(at)))
+    assert most[{Api.CONTENT: 0, Api.WIGGLE_HIPS: 1, Api.HEART: 1}[api]] > 0.08
+    at.require_standing()
+    assert at.now()["error_code"][0] == Code.OK
+
+
+def test_a_path_is_followed_in_the_frame_of_the_state(at: Scene) -> None:
+    x0, y0, _ = at.now()["position"][0]
+    yaw0 = rpy(at)[2]
+    c, s = np.cos(yaw0), np.sin(yaw0)
+    times = np.linspace(0.0, 4.0, PATH_POINTS)
+    ahead, aside, turned = 0.25 * times, 0.05 * times, 0.1 * times
+    rows = np.column_stack(
+        [
+            times,
+            x0 + c * ahead - s * aside,
+            y0 + s * ahead + c * aside,
+            yaw0 + turned,
+            np.full(PATH_POINTS, c * 0.25 - s * 0.05),
+            np.full(PATH_POINTS, s * 0.25 + c * 0.05),
+            np.full(PATH_POINTS, 0.1),
+        ]
+    )
+    path = [dict(zip(PATH_FIELDS, row, strict=True)) for row in rows.tolist()]
+    assert at.call(Api.TRAJECTORY_FOLLOW, json.dumps(path)) == Code.OK
+    for _ in passing(at, 7.0):
+        pass
+    place = at.now()["position"][0][:2]
+    assert np.linalg.norm(place - rows[-1, 1:3]) < 0.05
+    assert np.sin(rpy(at)[2] - rows[-1, 3]) == pytest.approx(0.0, abs=0.06)
+    assert at.speed < 0.1
+
+
+def test_trot_run_walks_and_the_speed_level_can_be_asked_for(at: Scene) -> None:
+    assert at.call(Api.TROT_RUN) == Code.OK
+    at.wait_for_rest()
+    assert at.mode == SportMode.LOCOMOTION
+    assert at.call(Api.SPEED_LEVEL, '{"data": -1}') == Code.OK
+    assert json.loads(at.client.call(Api.GET_SPEED_LEVEL, "").data) == {"data": -1}
+    assert at.call(Api.SPEED_LEVEL, '{"data": 0}') == Code.OK
 
 
 def test_stretch_bows_and_comes_back(at: Scene) -> None:
@@ -226,7 +275,7 @@ def test_the_switcher_releases_a_robot_that_lies_only(at: Scene) -> None:
     at.stand_up()
 
 
-@pytest.mark.parametrize("api", [1011, 1030, 1031, 1042, 2049])
+@pytest.mark.parametrize("api", [1011, 1021, 1030, 1042, 2044, 2049])
 def test_what_the_library_lacks_is_not_supported(simulated: Scene, api: int) -> None:
     assert simulated.call(api) == Code.NOT_SUPPORTED
 
@@ -239,6 +288,8 @@ def test_what_the_library_lacks_is_not_supported(simulated: Scene, api: int) -> 
         (Api.EULER, "rubbish"),
         (Api.POSE, '{"data": "yes"}'),
         (Api.SPEED_LEVEL, '{"data": 7}'),
+        (Api.TRAJECTORY_FOLLOW, "[]"),
+        (Api.AUTO_RECOVERY_SET, '{"data": 0.5}'),
     ],
 )
 def test_a_parameter_that_is_wrong_is_refused(simulated: Scene, api: Api, parameter: str) -> None:

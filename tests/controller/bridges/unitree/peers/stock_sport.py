@@ -71,6 +71,7 @@ def main() -> None:
     report("StopMove", client.StopMove())
     time.sleep(1.0)
     report("Hello", client.Hello())
+    report("Content", client.Content())
     report("Euler", client.Euler(0.1, 0.15, 0.1))
     report("FrontFlip", client.FrontFlip())
     report("StandDown", client.StandDown())

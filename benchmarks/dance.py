@@ -1,0 +1,134 @@
+"""``python -m benchmarks dance``: dances to songs whose true beats are known.
+
+Every trial is another song at another tempo, another dance, floor and mass. The songs are written
+to a file and found again: what is judged is the whole way from the file to the feet. The beat
+finder and the lead of the choreography were tuned on songs with seeds below 100.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario, chosen_scenarios
+from benchmarks.session import add_options, positive, run_and_report, tasks_of
+from benchmarks.trials import Trial, TrialRobot
+from controller.cli.common import Subparsers, add_parser
+from controller.motion_measurement import during_motion
+from motions import FeasibilityChecker
+from motions.music import Beats, Song, beats, click_track, danced, feasible_dance, made_song
+
+SECONDS = 30.0
+"""Length [s] of a song."""
+TEMPI = (62.0, 178.0)
+"""Tempi [beats/min] that are drawn."""
+FIRST_SONG = 5000
+"""Seed of the first song that is judged."""
+LEAST_MOVES = 20
+SEEDS, QUICK_SEEDS = 20, 3
+EXAMPLES = """
+python -m benchmarks dance            everything; minutes on two cores
+python -m benchmarks dance --quick    three seeds
+python -m benchmarks dance --rows clicks --json
+python -m benchmarks dance --list     the metrics and their thresholds
+"""
+
+
+def song_of(kind: str, seed: int) -> Song:
+    """The song of a trial: clicks, or a made song."""
+    bpm = float(np.random.default_rng([FIRST_SONG, seed]).uniform(*TEMPI))
+    if kind == "clicks":
+        return click_track(bpm, SECONDS)
+    return made_song(bpm, SECONDS, FIRST_SONG + seed)
+
+
+def heard(song: Song) -> Beats:
+    """What the beat finder says of a song, from its file."""
+    with TemporaryDirectory() as folder:
+        return beats(song.save(Path(folder) / "song.wav"))
+
+
+def metrics_of(kind: str, item: str) -> tuple[Metric, ...]:
+    """What is counted in every trial."""
+    at_least = Direction.AT_LEAST
+    return (
+        Metric(f"{kind}.moves", item, "moves", "", LEAST_MOVES, at_least),
+        Metric(f"{kind}.on_beat", item, "accents within 40 ms", "", 0.95, at_least),
+        Metric(f"{kind}.late", item, "accent off its beat, mean", "ms", None),
+        Metric(f"{kind}.heard", item, "heard beat off the true, mean", "ms", None),
+    )
+
+
+def measure(trial: Trial, kind: str) -> Measurement:
+    """Find the beats, compose, dance, and compare with the beats that the song was made with.
+
+    - moves: of the dance;
+    - accents within 40 ms: of a true beat; one that did not happen is none of them;
+    - accent off its beat: of those that happened;
+    - heard beat off the true: of the pulses on which the dance is composed.
+    """
+    song = song_of(kind, trial.seed)
+    checker = _checker()
+    dance, checked = feasible_dance(heard(song), trial.seed, checker)
+    with TrialRobot(trial) as robot:
+        robot.require(robot.go2.stand())
+        robot.truth.clear()
+        robot.require(robot.go2.play(checked))
+        recorded = during_motion(robot.go2, robot.truth, checked.plan.name)
+    result = danced(recorded, dance)
+    off = np.abs(dance.pulses[1:, None] - song.beats).min(axis=1)
+    values = {
+        "moves": float(len(dance.moves)),
+        "on_beat": result.share_on(song.beats),
+        "late": 1000.0 * float(np.nanmean(np.abs(result.errors(song.beats)))),
+        "heard": 1000.0 * float(off.mean()),
+    }
+    return Measurement({f"{kind}.{quantity}": value for quantity, value in values.items()})
+
+
+@cache
+def _checker() -> FeasibilityChecker:
+    """Made once for all trials of a process."""
+    return FeasibilityChecker()
+
+
+def _scenario(kind: str, item: str) -> Scenario:
+    measured: Callable[[Trial], Measurement] = partial(measure, kind=kind)
+    return Scenario(kind, metrics_of(kind, item), measured)
+
+
+SCENARIOS = (
+    _scenario("clicks", "dance to a click track, 30 s"),
+    _scenario("song", "dance to a made song, 30 s"),
+)
+"""In the order of the report."""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``dance``."""
+    parser = add_parser(
+        subparsers,
+        "dance",
+        "Dances to songs whose true beats are known: how many accents of the measured\n"
+        "robot are on a beat. Needs the extra [music].\n"
+        "Exit code 0 if every threshold is met, 1 if one is not.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument("--seeds", metavar="N", type=positive, help=f"default {SEEDS}")
+    parser.add_argument("--quick", action="store_true", help=f"{QUICK_SEEDS} seeds")
+    parser.add_argument(
+        "--rows", metavar="NAME", nargs="+", default=[], help="only these scenarios; see --list"
+    )
+    add_options(parser, has_jobs=True, has_list=True)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run what was asked for, report, and say by the exit code whether all thresholds are met."""
+    scenarios = chosen_scenarios(SCENARIOS, args.rows)
+    seeds = args.seeds or (QUICK_SEEDS if args.quick else SEEDS)
+    return run_and_report(args, scenarios, tasks_of(scenarios, seeds))

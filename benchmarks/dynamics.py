@@ -1,0 +1,205 @@
+"""``python -m benchmarks dynamics``: what solving dynamic motions takes, and what comes of it.
+
+Plans are made from cold, by processor time and without imports. The moves are those on which the
+planner's numbers were chosen, so their rows say what it costs, not how far it generalises. That is
+for the rows of refused motions: fast sways and lifted feet from a seeded generator that was not
+used for tuning, which today's check refuses and the planner turns into the nearest that can be
+done.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario, chosen_scenarios
+from benchmarks.session import add_options, positive, run_and_report, tasks_of
+from benchmarks.trials import Trial
+from controller.cli.common import Subparsers, add_parser
+from go2_wbc.errors import PlanNotFound
+from go2_wbc.legs import LEGS
+from go2_wbc.robot.model import RobotModel
+from motions import FeasibilityChecker, Timeline, compile_timeline
+from motions.dynamics import (
+    DynamicTrajectory,
+    Phase,
+    PhaseProblem,
+    audit,
+    moves,
+    solve,
+    solve_cached,
+)
+from motions.dynamics.nearest import Written, nearest
+from motions.dynamics.solver import require_crocoddyl
+from motions.trajectory import trajectory_of
+
+PLANNING, SLOW_PLANNING = 4.0, 10.0
+"""Processor time [s] that a plan may take."""
+FROM_CACHE = 50.0
+"""Processor time [ms] that a kept plan may take."""
+FIRST_REFUSED = 4100
+"""Seed of the first refused motion."""
+SHARE_FOUND = 80.0
+"""Percent of the refused motions for which a plan must be found."""
+REFUSED_SEEDS = 20
+EXAMPLES = """
+python -m benchmarks dynamics             everything; some minutes
+python -m benchmarks dynamics jump rear --json
+python -m benchmarks dynamics --list      the metrics and their thresholds
+"""
+Make = Callable[[], tuple[Phase, ...]]
+
+MOVES: dict[str, tuple[str, Make, float]] = {
+    "jump": ("jump up 0.15 m", moves.jump, PLANNING),
+    "forward": ("jump 0.5 m ahead", partial(moves.jump, x=0.5), PLANNING),
+    "sideways": ("jump 0.3 m sideways", partial(moves.jump, y=0.3), PLANNING),
+    "back": ("jump 0.3 m back", partial(moves.jump, x=-0.3), PLANNING),
+    "turn": ("jump turning 90 deg", partial(moves.jump, yaw=math.pi / 2), PLANNING),
+    "hops": ("three hops", moves.hop, PLANNING),
+    "rear": ("rear up by 25 deg", moves.rear, PLANNING),
+    "rear40": ("rear up by 40 deg", partial(moves.rear, math.radians(-40.0)), SLOW_PLANNING),
+    "lift": ("lift two diagonal feet", moves.lift, PLANNING),
+}
+
+
+def metrics_of(name: str, item: str, limit: float) -> tuple[Metric, ...]:
+    """What is asked of planning one move."""
+    return (
+        Metric(f"{name}.cpu", item, "processor time", "s", limit),
+        Metric(f"{name}.iterations", item, "iterations", "", None),
+        Metric(f"{name}.cached", item, "from the cache", "ms", FROM_CACHE),
+        Metric(f"{name}.deviation", item, "off what was asked", "mm", 50.0),
+        Metric(f"{name}.torque", item, "torque at speed", "", 1.0),
+        Metric(f"{name}.friction", item, "friction", "", None),
+    )
+
+
+def measure_move(name: str, trial: Trial) -> Measurement:
+    """Plan one move from cold, and read it back."""
+    _, make, _ = MOVES[name]
+    model, problem = RobotModel(), PhaseProblem(make())
+    _warm(model)
+    before = time.process_time()
+    try:
+        plan = solve(problem, model)
+    except PlanNotFound as error:
+        return Measurement({}, reason=str(error))
+    values = {f"{name}.cpu": time.process_time() - before, **_readings(name, plan, model)}
+    with tempfile.TemporaryDirectory() as folder:
+        solve_cached(problem, model, folder=Path(folder))
+        before = time.process_time()
+        solve_cached(problem, model, folder=Path(folder))
+        values[f"{name}.cached"] = 1e3 * (time.process_time() - before)
+    return Measurement(values)
+
+
+def _warm(model: RobotModel) -> None:
+    """Import the solver and load the kernels: neither is planning."""
+    require_crocoddyl()
+    solve(PhaseProblem(moves.lift()), model)
+
+
+def _readings(name: str, plan: DynamicTrajectory, model: RobotModel) -> dict[str, float]:
+    worst = {reading.name: reading.value for reading in audit(plan, model)}
+    return {
+        f"{name}.iterations": float(plan.iterations),
+        f"{name}.deviation": 1e3 * plan.position_deviation,
+        f"{name}.torque": worst["torque share"],
+        f"{name}.friction": worst["friction"],
+    }
+
+
+REFUSED = "refused motions"
+REFUSED_METRICS = (
+    Metric("refused.found", REFUSED, "plan found", "%", SHARE_FOUND, Direction.AT_LEAST),
+    Metric("refused.cpu", REFUSED, "processor time", "s", None),
+    Metric("refused.deviation", REFUSED, "off what was written", "mm", None),
+    Metric("refused.angle", REFUSED, "off what was written", "deg", None),
+    Metric("refused.lag", REFUSED, "late", "ms", None),
+)
+
+
+def refused_motion(rng: np.random.Generator, checker: FeasibilityChecker) -> Timeline:
+    """A motion of two or three quick poses, made quicker until the check refuses it."""
+    largest = {"x": 0.05, "y": 0.05, "z": 0.05, "roll": 0.25, "pitch": 0.25, "yaw": 0.35}
+    poses: list[dict[str, float]] = [
+        {
+            name: float(rng.uniform(-1.0, 1.0)) * largest[name]
+            for name in rng.choice(list(largest), size=2, replace=False).tolist()
+        }
+        for _ in range(int(rng.integers(2, 4)))
+    ]
+    time_of_pose = 0.30
+    while True:
+        line = Timeline().hold(0.1)
+        for pose in poses:
+            x, y, z, roll, pitch, yaw = (pose.get(channel) for channel in largest)
+            line = line.body(x=x, y=y, z=z, roll=roll, pitch=pitch, yaw=yaw, over=time_of_pose)
+        line = line.home(over=2.0 * time_of_pose).hold(0.1)
+        if not checker.check(line).ok:
+            return line
+        time_of_pose *= 0.85
+
+
+def measure_refused(trial: Trial) -> Measurement:
+    """Find the nearest to one refused motion."""
+    rng = np.random.default_rng(FIRST_REFUSED + trial.seed)
+    model = RobotModel()
+    line = refused_motion(rng, FeasibilityChecker(model))
+    _warm(model)
+    wanted = compile_timeline(line, model)
+    path = trajectory_of(wanted, model)
+    stance = np.ones((len(path.times), len(LEGS)), dtype=bool)
+    before = time.process_time()
+    try:
+        plan = nearest(Written(path.times, path.q, stance), model)
+    except PlanNotFound as error:
+        values = {"refused.found": 0.0, "refused.cpu": time.process_time() - before}
+        return Measurement(values, reason=str(error))
+    return Measurement(
+        {
+            "refused.found": 100.0,
+            "refused.cpu": time.process_time() - before,
+            "refused.deviation": 1e3 * plan.position_deviation,
+            "refused.angle": math.degrees(plan.angle_deviation),
+            "refused.lag": 1e3 * plan.lag,
+        }
+    )
+
+
+SCENARIOS = (
+    *(
+        Scenario(name, metrics_of(name, item, limit), partial(measure_move, name))
+        for name, (item, _, limit) in MOVES.items()
+    ),
+    Scenario("refused", REFUSED_METRICS, measure_refused, seed_factor=REFUSED_SEEDS),
+)
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``dynamics``."""
+    parser = add_parser(
+        subparsers,
+        "dynamics",
+        "Solve jumps, hops, rears and lifts from cold, and the nearest to motions that\n"
+        "the check refuses: processor time, deviation, torque. Needs\n"
+        "go2-wbc[dynamics].",
+        examples=EXAMPLES,
+    )
+    names = ", ".join(scenario.name for scenario in SCENARIOS)
+    parser.add_argument("names", metavar="NAME", nargs="*", help=f"{names}; default: all")
+    parser.add_argument("--runs", metavar="N", type=positive, default=1, help="default %(default)s")
+    add_options(parser, has_list=True)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure what was asked for, and report."""
+    scenarios = chosen_scenarios(SCENARIOS, args.names)
+    return run_and_report(args, scenarios, tasks_of(scenarios, args.runs))

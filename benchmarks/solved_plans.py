@@ -1,0 +1,75 @@
+"""``python -m benchmarks solve``: solves the library's dynamic motions anew, into the package.
+
+To be run whenever a dynamic motion of the library, the planner's limits or the robot change; a test
+says so. Plans that no motion needs any more are removed.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.progress import ProgressLine
+from go2_wbc.robot.model import RobotModel
+from motions import Timeline, compile_timeline, find_motion, motion_names
+from motions.authoring import Choice
+from motions.dynamics.cache import SHIPPED, problem_key, ship
+from motions.dynamics.limits import PlanLimits
+from motions.dynamics.phases import PhaseProblem
+
+EXAMPLES = """
+python -m benchmarks solve
+"""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``solve``."""
+    add_parser(
+        subparsers,
+        "solve",
+        "Solve the library's dynamic motions anew and keep the plans in the package.",
+        examples=EXAMPLES,
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Solve and write, remove what is left over."""
+    model = RobotModel()
+    problems = shipped_problems(model)
+    SHIPPED.mkdir(exist_ok=True)
+    left_over = set(SHIPPED.glob("*.npz"))
+    with ProgressLine() as progress:
+        for number, problem in enumerate(problems.values()):
+            progress.update(number / len(problems), "solving")
+            left_over.discard(ship(problem, model, SHIPPED))
+    for file in left_over:
+        file.unlink()
+    size = sum(file.stat().st_size for file in SHIPPED.glob("*.npz"))
+    print(f"{len(problems)} plans in {_shown(SHIPPED)}, {size / 1e3:.0f} kB")
+    return ExitCode.OK
+
+
+def shipped_problems(model: RobotModel) -> dict[str, PhaseProblem]:
+    """The problems of all motions of the library, by their keys."""
+    found = {}
+    for line in _timelines():
+        for span in compile_timeline(line, model).dynamic:
+            if isinstance(span.asked, PhaseProblem):
+                found[problem_key(span.asked, model, PlanLimits())] = span.asked
+    return found
+
+
+def _timelines() -> Iterator[Timeline]:
+    """Every motion, with every word that its parameters know."""
+    for name in motion_names():
+        motion = find_motion(name)
+        yield motion()
+        for parameter in motion.parameters:
+            if isinstance(parameter.valid, Choice):
+                yield from (motion(**{parameter.name: word}) for word in parameter.valid.words)
+
+
+def _shown(path: Path) -> Path:
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path

@@ -1,0 +1,172 @@
+"""``go2-wbc dance``: a dance on the beats of a song, checked, played, and measured against them."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from controller.cli.common import ExitCode, Subparsers, add_parser, print_json, shown_path
+from controller.cli.motion_run import teller
+from controller.cli.progress import ProgressLine
+
+if TYPE_CHECKING:
+    from motions import CheckedMotion, FeasibilityChecker
+    from motions.music import Beats, Dance, DancedAccents
+
+EXAMPLES = """
+go2-wbc dance song.wav
+go2-wbc dance song.wav --seed 3 --html dance.html
+go2-wbc dance song.wav --moves nod sway twist tap_FR
+go2-wbc dance song.wav --no-play --json    its moves and their times
+"""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``dance``."""
+    parser = add_parser(
+        subparsers,
+        "dance",
+        "Find the beats of a song, compose a dance on them, check it, play it in\n"
+        "MuJoCo, and print how well it was on the beat. Needs the extra [music].\n"
+        "Exit code 0 if it was done, 1 if it is infeasible or was not done.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument("song", metavar="SONG", type=Path, help="a WAV, FLAC, OGG or MP3 file")
+    parser.add_argument(
+        "--seed", metavar="N", type=_seed, default=0, help="another seed is another dance"
+    )
+    parser.add_argument(
+        "--moves", metavar="NAME", nargs="+", default=[], help="only these; a wrong name lists all"
+    )
+    parser.add_argument("--no-play", action="store_true", help="compose and check it only")
+    parser.add_argument(
+        "--html", metavar="FILE", type=Path, help="write a 3D replay page with the music"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def _seed(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"must be 0 or more, got {value}")
+    return value
+
+
+def run(args: argparse.Namespace) -> int:
+    """Find the beats, compose, check, play, print."""
+    from controller.report_view import planned
+    from go2_wbc.files import checked_output
+    from motions import FeasibilityChecker
+    from motions.music import beats, feasible_dance
+    from viz import HTML_SUFFIXES, export_html
+
+    target = None if args.html is None else checked_output(args.html, HTML_SUFFIXES)
+    with ProgressLine() as line:
+        line.update(0.0, f"listening to {args.song.name}")
+        found = beats(args.song)
+        line.update(0.1, "composing")
+        checker = FeasibilityChecker()
+        dance, checked = feasible_dance(found, args.seed, checker, args.moves)
+        told = _told(args.song, found, dance)
+        if args.no_play:
+            content, ok = planned(checked), True
+        else:
+            content, measured = _played(dance, checked, checker, line)
+            told |= measured
+            ok = bool(measured["ok"])
+        if target is not None:
+            shown = replace(content, beats=tuple(found.times.tolist()), sound=_music(args.song))
+            export_html(shown, target, title=dance.timeline.name)
+    if args.json:
+        print_json(told)
+    else:
+        _print(told)
+        if target is not None:
+            print(f"3D replay, offline: {shown_path(target)}")
+    return ExitCode.OK if ok else ExitCode.FAILED
+
+
+def _played(
+    dance: Dance, checked: CheckedMotion, checker: FeasibilityChecker, line: ProgressLine
+) -> tuple[Any, dict[str, Any]]:
+    """What to show of the run, and what was measured."""
+    from contextlib import closing
+
+    from controller.go2_controller import GO2Controller
+    from controller.motion_measurement import during_motion, measure_motion
+    from controller.report_view import performed
+    from go2_wbc.errors import PlantError
+    from go2_wbc.plant import MujocoPlant
+    from go2_wbc.plant.mujoco.ground_truth import GroundTruth
+    from motions.music import danced
+
+    plan = checked.plan
+    with closing(GroundTruth(MujocoPlant())) as truth, GO2Controller(plant=truth) as go2:
+        truth.on_tick = teller(line, truth.control_period, plan.name, plan.duration)
+        if not go2.stand() or truth.fall():
+            raise PlantError(f"the robot did not get ready: {go2.last_outcome.reason}")
+        result = measure_motion(go2, truth, plan, checker.model)
+        heard = danced(during_motion(go2, truth, plan.name), dance)
+        content = performed(checked, go2.recording(), checker.model)
+    reason = "" if result.ok else result.fall or result.reason
+    return content, {"ok": result.ok, "reason": reason, **_accents(dance, heard)}
+
+
+def _music(song: Path) -> bytes:
+    """As much of the song as can be danced, for the page."""
+    from motions.music.choreography import LONGEST
+    from motions.music.sound import RATE, mp3_of, read_sound
+
+    return mp3_of(read_sound(song)[: round(LONGEST * RATE)])
+
+
+def _accents(dance: Dance, heard: DancedAccents) -> dict[str, Any]:
+    """How well the accents were on the beat, together and each."""
+    late = 1000.0 * heard.errors(heard.wanted)
+    return {
+        "on_beat": heard.share_on(heard.wanted),
+        "accents": [
+            {"time": round(dance.time(accent), 3), "part": accent.part, "late_ms": _rounded(error)}
+            for accent, error in zip(dance.accents, late.tolist(), strict=True)
+        ],
+    }
+
+
+def _rounded(error: float) -> float | None:
+    return round(error, 1) if error == error else None  # nan: it did not happen
+
+
+def _told(song: Path, found: Beats, dance: Dance) -> dict[str, Any]:
+    """What was heard and composed."""
+    return {
+        "song": str(song),
+        "tempo": round(found.tempo, 2),
+        "beats": len(found.times),
+        "duration": round(found.duration, 3),
+        "dance": dance.timeline.name,
+        "feasible": True,
+        "moves": [
+            {"name": item.move.name, "time": round(float(dance.pulses[item.pulse]), 3)}
+            for item in dance.moves
+        ],
+    }
+
+
+def _print(told: dict[str, Any]) -> None:
+    print(f"{told['song']}: {told['beats']} beats, {told['tempo']:.0f} a minute")
+    print("-" * 80)
+    for move in told["moves"]:
+        print(f"  {move['time']:>7.2f} s  {move['name']}")
+    print("-" * 80)
+    if "accents" not in told:
+        print(f"{told['dance']}: {len(told['moves'])} moves, feasible, not played")
+        return
+    late = [abs(item["late_ms"]) for item in told["accents"] if item["late_ms"] is not None]
+    print(f"  {'accents within 40 ms of a beat':<38}{100 * told['on_beat']:>10.0f} %")
+    if late:
+        print(f"  {'accent off its beat, mean':<38}{sum(late) / len(late):>10.1f} ms")
+        print(f"  {'accent off its beat, at most':<38}{max(late):>10.1f} ms")
+    print("-" * 80)
+    print("done" if told["ok"] else f"NOT done: {told['reason']}")

@@ -1,0 +1,183 @@
+"""Builders of phases: jumps, hops, rears and lifts, each from standing to standing at rest.
+
+Their numbers are own choices that solve, and land in simulation; whoever wants others writes the
+phases. Durations are whole knots where nothing else decides them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.errors import TimelineError
+from go2_wbc.legs import LEGS, Leg
+from go2_wbc.robot.rotations import yaw_rotation
+from motions.arguments import is_number
+from motions.dynamics.phases import ALL_FEET, GRAVITY, KNOT_PERIOD, Phase
+
+FOOTPRINT = np.array([[0.1934, 0.142], [0.1934, -0.142], [-0.1934, 0.142], [-0.1934, -0.142]])
+"""Where the feet stand [m] around their middle, ahead and to the left: below the hips."""
+REAR_FEET, FRONT_FEET = frozenset({Leg.RL, Leg.RR}), frozenset({Leg.FL, Leg.FR})
+CROUCH, LEAN = -0.06, -0.02
+"""Heights of the trunk [m] from which it jumps and rears."""
+GATHER, PUSH, LAND, RECOVER = 0.30, 0.20, 0.20, 0.30
+"""Times [s] for crouching, pushing off, taking the landing, and rising to stand."""
+LEAN_BACK = 0.40
+"""Time [s] in which the weight goes to the rear feet before rearing."""
+PENDULUM_TIME = 0.175
+"""sqrt(h / g) [s] of a CoM 0.30 m above its feet, as which a trunk on two feet tips."""
+REAR_RISE = 0.03
+"""By how much [m] the trunk's middle rises when rearing."""
+FARTHEST = {"x": 1.0, "y": 0.6, "yaw": math.pi, "height": 0.40}
+"""Beyond these a jump is refused unsolved [m, rad]; nearer ones may still have no plan."""
+LOWEST = 0.02
+"""Least height [m] of a jump's feet: less is a step."""
+_HERE = (0.0, 0.0, 0.0)
+_HOME = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def jump(
+    x: float = 0.0,
+    y: float = 0.0,
+    yaw: float = 0.0,
+    height: float = 0.15,
+    *,
+    footprint: Float[np.ndarray, "4 2"] = FOOTPRINT,
+) -> tuple[Phase, ...]:
+    """A jump from four feet to four feet.
+
+    Args:
+        x: how far ahead it lands [m].
+        y: how far to the left [m].
+        yaw: turn [rad], positive to the left.
+        height: of the feet at the top [m]; the trunk rises as much above where it takes off.
+        footprint: where the feet stand around their middle [m].
+
+    Raises:
+        TimelineError: for what no Go2 can jump.
+    """
+    for name, value in (("x", x), ("y", y), ("yaw", yaw), ("height", height)):
+        _require(f"a jump's {name}", value, -FARTHEST[name], FARTHEST[name])
+    _require("a jump's height", height, LOWEST, FARTHEST["height"])
+    half = _half_flight(height)
+    return (
+        Phase(GATHER, body=_at(z=CROUCH), label="crouch"),
+        Phase(PUSH, label="push"),
+        Phase(half, frozenset(), feet=_moved(footprint, 0.5, (x, y, yaw), height), label="rise"),
+        Phase(half, frozenset(), feet=_moved(footprint, 1.0, (x, y, yaw), 0.0), label="fall"),
+        Phase(LAND, label="land"),
+        Phase(RECOVER, body=(x, y, 0.0, 0.0, 0.0, yaw), label="stand"),
+    )
+
+
+def hop(times: int = 3, period: float = 0.5, height: float = 0.05) -> tuple[Phase, ...]:
+    """Hops in place; the feet touch down once a period.
+
+    Args:
+        times: how many.
+        period: time [s] from one touchdown to the next.
+        height: of the feet at the top [m].
+
+    Raises:
+        TimelineError: for no hop, or a period that leaves no time on the ground.
+    """
+    if isinstance(times, bool) or not isinstance(times, int) or not 1 <= times <= 10:
+        raise TimelineError(f"hops must be a whole number from 1 to 10, got {times!r}")
+    _require("a hop's height", height, LOWEST, FARTHEST["height"])
+    half = _half_flight(height)
+    _require("the period of hops", period, 2.0 * half + PUSH, 5.0)
+    up, down = (_moved(FOOTPRINT, 1.0, (0.0, 0.0, 0.0), z) for z in (height, 0.0))
+    phases = [Phase(GATHER, body=_at(z=CROUCH), label="crouch")]
+    for count in range(1, times + 1):
+        ground = PUSH if count == 1 else period - 2.0 * half
+        phases += [
+            Phase(ground, label=f"push {count}"),
+            Phase(half, frozenset(), feet=up, label=f"rise {count}"),
+            Phase(half, frozenset(), feet=down, label=f"fall {count}"),
+        ]
+    return (*phases, Phase(LAND, label="land"), Phase(RECOVER, body=_HOME, label="stand"))
+
+
+def rear(pitch: float = math.radians(-25.0), hold: float = 0.6) -> tuple[Phase, ...]:
+    """Rears up on the rear feet and comes down again.
+
+    The trunk goes up and back like a pendulum on its head, so that it returns by itself: the longer
+    the front feet are to be off the ground, the nearer it comes to above the rear feet.
+
+    Args:
+        pitch: of the trunk at the top [rad]; negative is front up.
+        hold: time [s] for which the front feet are off the ground.
+
+    Raises:
+        TimelineError: for a pitch or time that the robot cannot do.
+    """
+    _require("the pitch of rearing", pitch, math.radians(-60.0), math.radians(-5.0))
+    _require("the time of rearing", hold, 0.2, 1.0)
+    half = _whole(0.5 * hold)
+    back = float(FOOTPRINT[Leg.RL, 0]) * (1.0 - 1.0 / math.cosh(half / PENDULUM_TIME))
+    return (
+        Phase(LEAN_BACK, body=_at(z=LEAN), label="lean"),
+        Phase(PUSH, label="push"),
+        Phase(half, REAR_FEET, body=(back, 0.0, REAR_RISE, 0.0, pitch, 0.0), label="rear up"),
+        Phase(half, REAR_FEET, feet=dict.fromkeys(FRONT_FEET, _HERE), label="come down"),
+        Phase(LAND, label="land"),
+        Phase(RECOVER, body=_HOME, label="stand"),
+    )
+
+
+def lift(
+    legs: Collection[Leg] = (Leg.FL, Leg.RR), hold: float = 0.35, height: float = 0.06
+) -> tuple[Phase, ...]:
+    """Lifts feet together and puts them down where they stood.
+
+    Args:
+        legs: one or two of them.
+        hold: time [s] for which they are off the ground.
+        height: to which they are lifted [m].
+
+    Raises:
+        TimelineError: for more legs, or a time or height that the robot cannot do.
+    """
+    if not 1 <= len(set(legs)) <= 2:
+        raise TimelineError(f"lift one or two legs, got {len(set(legs))}; with all four, jump")
+    _require("the time of lifting", hold, 0.1, 1.0)
+    _require("the height of lifting", height, LOWEST, 0.15)
+    stance, half = ALL_FEET - frozenset(legs), 0.5 * hold
+    up: Mapping[Leg, tuple[float, float, float]] = dict.fromkeys(legs, (0.0, 0.0, height))
+    return (
+        Phase(LEAN_BACK, label="shift"),
+        Phase(half, stance, feet=up, label="lift"),
+        Phase(half, stance, feet=dict.fromkeys(legs, _HERE), label="lower"),
+        Phase(LAND, label="land"),
+        Phase(RECOVER, body=_HOME, label="stand"),
+    )
+
+
+def _at(z: float) -> tuple[float, float, float, float, float, float]:
+    return 0.0, 0.0, z, 0.0, 0.0, 0.0
+
+
+def _half_flight(height: float) -> float:
+    """Time [s] to fall from ``height``, in whole knots."""
+    return _whole(math.sqrt(2.0 * height / GRAVITY))
+
+
+def _whole(time: float) -> float:
+    return max(round(time / KNOT_PERIOD), 1) * KNOT_PERIOD
+
+
+def _moved(
+    footprint: Float[np.ndarray, "4 2"], share: float, way: tuple[float, float, float], z: float
+) -> dict[Leg, tuple[float, float, float]]:
+    """Shifts of the feet after ``share`` of the way x, y [m], yaw [rad], at height ``z``."""
+    x, y, yaw = (share * part for part in way)
+    moved = footprint @ yaw_rotation(yaw)[:2, :2].T - footprint + [x, y]
+    return {leg: (float(moved[leg, 0]), float(moved[leg, 1]), z) for leg in LEGS}
+
+
+def _require(what: str, value: float, least: float, greatest: float) -> None:
+    if not (is_number(value) and least <= value <= greatest):
+        raise TimelineError(f"{what} must be from {least:.3g} to {greatest:.3g}, got {value!r}")

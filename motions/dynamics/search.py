@@ -1,0 +1,162 @@
+"""Solving a program: a ladder of starts, then rounds for the motors' line; in a time budget."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from itertools import product
+
+import crocoddyl
+import numpy as np
+
+from go2_wbc.errors import PlanNotFound
+from go2_wbc.legs import FOOT_NAMES, LEGS
+from motions.dynamics.knots import Found, Knots
+from motions.dynamics.program import Program
+
+ITERATIONS = 120
+"""Of one start; what converges does so in fewer (own experiments)."""
+REGULARISATIONS = (1e-2, 1e-1, 1e-3)
+"""First regularisations, in the order in which they are tried (own experiments)."""
+SOFT_STOP, STOP = 1e-2, 1e-3
+"""Expected improvement of the cost below which a softened and a full program are done."""
+LINE_ROUNDS = 4
+"""Rounds in which torque bounds and speeds are made to agree."""
+AGREED = 0.5
+"""Torque [N m] over the bounds of its own speed that counts as none."""
+_JOINT_RATES = slice(19 + 6, None)
+
+Progress = Callable[[int, float], None]
+
+
+class _Expired(Exception):
+    """The time is up."""
+
+
+class Search:
+    """Solves one program.
+
+    Attributes:
+        iterations: done so far, over all starts.
+    """
+
+    def __init__(
+        self,
+        soft: Program,
+        full: Program,
+        knots: Knots,
+        *,
+        is_good: Callable[[Found], bool],
+        budget: float,
+        progress: Progress | None,
+    ) -> None:
+        """Prepare; the budget, processor time [s], runs from here.
+
+        ``is_good`` says whether a solution may be taken although the solver has not converged: it
+        obeys the dynamics, and what more it could gain is only cost.
+        """
+        self.iterations = 0
+        self._is_good = is_good
+        self._full, self._knots, self._budget = full, knots, budget
+        self._deadline = time.thread_time() + budget
+        self._progress = progress
+        self._watch = _watch(self)
+        self._soft_solver, self._solver = self._solver_of(soft), self._solver_of(full)
+
+    def _solver_of(self, program: Program) -> crocoddyl.SolverBoxFDDP:
+        solver = crocoddyl.SolverBoxFDDP(program.problem)
+        solver.setCallbacks([self._watch])
+        return solver
+
+    def run(self) -> Found:
+        """A solution.
+
+        Raises:
+            PlanNotFound: if no start converges, or time is up.
+        """
+        try:
+            self._climb()
+            self._agree()
+        except _Expired:
+            raise PlanNotFound(
+                f"no dynamic plan within {self._budget:g} s of processor time "
+                f"({self.iterations} iterations); ask for less, or give a larger budget"
+            ) from None
+        return self._found()
+
+    def best(self) -> Found | None:
+        """Where the search is, if that obeys the dynamics."""
+        solver = self._solver
+        is_whole = bool(len(solver.xs)) and solver.isFeasible and np.isfinite(solver.cost)
+        return self._found() if is_whole else None
+
+    def step(self, cost: float) -> None:
+        """Count an iteration, tell, and stop when time is up."""
+        self.iterations += 1
+        if self._progress is not None:
+            self._progress(self.iterations, cost)
+        if time.thread_time() > self._deadline:
+            raise _Expired
+
+    def _climb(self) -> None:
+        """Starts, from the one that most often works to the last resort."""
+        knots = self._knots
+        guess = list(np.hstack([knots.q, knots.v]))
+        still = [guess[0]] * len(guess)
+        us = [self._full.tau_hold] * (len(guess) - 1)
+        for xs, regularisation in product((guess, still), REGULARISATIONS):
+            soft = self._soft_solver
+            self._solve(soft, xs, us, regularisation, SOFT_STOP)
+            if self._solve(self._solver, list(soft.xs), list(soft.us), regularisation, STOP):
+                return
+            best = self.best()
+            if best is not None and self._is_good(best):
+                return
+        raise PlanNotFound(
+            f"no dynamic plan: none of the starts converges ({self.iterations} iterations); the "
+            "phases ask for more than the robot can do"
+        )
+
+    def _agree(self) -> None:
+        """Bound the torques by the speeds of the solution until both agree."""
+        for _ in range(LINE_ROUNDS):
+            x, us = np.array(self._solver.xs), np.array(self._solver.us)
+            lower, upper = self._full.bound(x[:-1, _JOINT_RATES])
+            if max(np.max(lower - us), np.max(us - upper)) < AGREED:
+                return
+            us = np.clip(us, lower, upper)
+            self._solve(self._solver, list(x), list(us), REGULARISATIONS[0], STOP)
+
+    def _solve(
+        self,
+        solver: crocoddyl.SolverBoxFDDP,
+        xs: list[np.ndarray],
+        us: list[np.ndarray],
+        regularisation: float,
+        stop: float,
+    ) -> bool:
+        solver.th_stop = stop
+        converged = solver.solve(xs, us, ITERATIONS, False, regularisation)
+        return bool(converged and solver.isFeasible and np.isfinite(solver.cost))
+
+    def _found(self) -> Found:
+        solver, problem = self._solver, self._full.problem
+        problem.calc(solver.xs, solver.us)
+        forces = np.zeros((len(self._knots.stance), 4, 3))
+        for row, data in enumerate(problem.runningDatas):
+            contacts = data.differential.multibody.contacts.contacts.todict()
+            for leg in LEGS:
+                if self._knots.stance[row, leg]:
+                    forces[row, leg] = contacts[FOOT_NAMES[leg]].f.linear
+        return Found(
+            np.array(solver.xs), np.array(solver.us), forces, np.array(solver.K),
+            self.iterations, float(solver.cost),
+        )  # fmt: skip
+
+
+def _watch(search: Search) -> crocoddyl.CallbackAbstract:
+    class Watch(crocoddyl.CallbackAbstract):
+        def __call__(self, solver: crocoddyl.SolverBoxFDDP) -> None:
+            search.step(float(solver.cost))
+
+    return Watch()

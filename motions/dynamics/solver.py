@@ -1,0 +1,184 @@
+"""Dynamic motions from their phases."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Float
+
+from go2_wbc.errors import MissingDependency, PlanNotFound
+from go2_wbc.legs import FOOT_NAMES, LEGS
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
+from motions.dynamics.knots import Found, Knots, feet_at, knots_of
+from motions.dynamics.limits import PlanLimits, Weights
+from motions.dynamics.phases import PhaseProblem, Tolerance
+from motions.dynamics.trajectory import DynamicTrajectory, Miss
+from motions.dynamics.verdict import audit
+
+INSTALL_LINE = "pip install go2-wbc[dynamics]"
+BUDGET = 20.0
+"""Processor time [s] that solving may take."""
+
+
+def solve(
+    problem: PhaseProblem,
+    model: RobotModel,
+    *,
+    budget: float = BUDGET,
+    progress: Callable[[int, float], None] | None = None,
+    limits: PlanLimits | None = None,
+    weights: Weights | None = None,
+) -> DynamicTrajectory:
+    """The motion that does what the phases ask, within what the robot can do.
+
+    Box-constrained feasibility-driven differential dynamic programming (Mastalli et al. 2022). The
+    result depends on the arguments only; the time, on whether there is one.
+
+    Args:
+        problem: what is asked.
+        model: the robot.
+        budget: processor time [s] after which to give up.
+        progress: called after every iteration with their number and the cost.
+        limits: what the plan keeps.
+        weights: what being off costs.
+
+    Raises:
+        MissingDependency: if crocoddyl is not installed.
+        PlanNotFound: if no plan is found in time, or the best one breaks a limit or is farther from
+            what was asked than the problem's tolerance; says what binds, and where.
+    """
+    limits = limits or PlanLimits()
+    knots = knots_of(problem, model, limits)
+    task = Task(knots, model, limits, weights or Weights(), problem.tolerance, _misses)
+    return optimum(task, budget=budget, progress=progress)
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What is solved, and what is then asked of the plan.
+
+    Attributes:
+        knots: the problem.
+        model: the robot.
+        limits: what the plan keeps.
+        weights: what being off costs.
+        tolerance: how far it may be from what was asked.
+        misses: measures how far that is.
+    """
+
+    knots: Knots
+    model: RobotModel
+    limits: PlanLimits
+    weights: Weights
+    tolerance: Tolerance
+    misses: Callable[[Knots, DynamicTrajectory], tuple[Miss, ...]]
+
+    def plan(self, found: Found) -> DynamicTrajectory:
+        """The plan of what the search found."""
+        q = found.x[:, :19]
+        plan = DynamicTrajectory(
+            times=self.knots.times,
+            q=q,
+            v=found.x[:, 19:],
+            tau=found.tau,
+            forces=found.forces,
+            stance=self.knots.stance,
+            gains=found.gains,
+            p_feet=feet_at(self.model, q),
+            iterations=found.iterations,
+            cost=found.cost,
+            misses=(),
+        )
+        return replace(plan, misses=self.misses(self.knots, plan))
+
+
+def optimum(
+    task: Task, *, budget: float, progress: Callable[[int, float], None] | None
+) -> DynamicTrajectory:
+    """The best plan for ``task``; raises what ``solve`` does."""
+    require_crocoddyl()
+    from motions.dynamics.program import Program
+    from motions.dynamics.search import Search
+
+    def objections(found: Found) -> list[str]:
+        plan = task.plan(found)
+        return broken_limits(plan, task.model) + far_misses(plan, task.tolerance)
+
+    knots, model, limits, weights = task.knots, task.model, task.limits, task.weights
+    soft = Program(knots, model, limits, weights.softened())
+    full = Program(knots, model, limits, weights)
+    search = Search(
+        soft, full, knots,
+        is_good=lambda found: not objections(found), budget=budget, progress=progress,
+    )  # fmt: skip
+    try:
+        plan = task.plan(search.run())
+    except PlanNotFound as error:
+        best = search.best()
+        raise PlanNotFound(str(error), [] if best is None else objections(best)) from None
+    accept(plan, task.tolerance, model)
+    return plan
+
+
+def require_crocoddyl() -> None:
+    """Raise MissingDependency unless crocoddyl can be imported."""
+    try:
+        import crocoddyl  # noqa: F401
+    except ImportError as error:
+        raise MissingDependency(
+            f"dynamic motions are solved with crocoddyl, which cannot be imported ({error}): "
+            f"{INSTALL_LINE}"
+        ) from error
+
+
+def _misses(knots: Knots, plan: DynamicTrajectory) -> tuple[Miss, ...]:
+    misses = []
+    for goal in knots.goals:
+        time = float(knots.times[goal.knot])
+        if goal.pose is not None:
+            R_des = rotation_from_rpy(*goal.pose[3:].tolist())
+            place, angle = trunk_miss(plan.q[goal.knot], goal.pose[:3], R_des)
+            misses.append(Miss("trunk", goal.label, time, place, angle))
+        for leg in LEGS:
+            if goal.asked[leg]:
+                off = np.linalg.norm(plan.p_feet[goal.knot, leg] - goal.p_feet[leg])
+                misses.append(Miss(FOOT_NAMES[leg], goal.label, time, float(off), 0.0))
+    return tuple(misses)
+
+
+def trunk_miss(
+    q: Float[np.ndarray, "19"], p: Float[np.ndarray, "3"], R: Float[np.ndarray, "3 3"]
+) -> tuple[float, float]:
+    """Distance [m] and angle [rad] between the trunk at ``q`` and a wanted pose."""
+    angle = log_rotation(R.T @ pin.Quaternion(q[3:7]).toRotationMatrix())
+    return float(np.linalg.norm(q[:3] - p)), float(np.linalg.norm(angle))
+
+
+def accept(plan: DynamicTrajectory, tolerance: Tolerance, model: RobotModel) -> None:
+    """Raise PlanNotFound for a plan that breaks a limit or is too far from what was asked."""
+    if broken := broken_limits(plan, model):
+        raise PlanNotFound("no dynamic plan: the best one breaks what the robot can do", broken)
+    if far := far_misses(plan, tolerance):
+        raise PlanNotFound(
+            f"no dynamic plan within {1e3 * tolerance.position:.0f} mm and "
+            f"{np.degrees(tolerance.angle):.0f} deg of what was asked; the nearest one is off:",
+            far,
+        )
+
+
+def broken_limits(plan: DynamicTrajectory, model: RobotModel) -> list[str]:
+    """What a plan breaks, in words."""
+    return [str(reading) for reading in audit(plan, model) if not reading.is_kept]
+
+
+def far_misses(plan: DynamicTrajectory, tolerance: Tolerance) -> list[str]:
+    """Where a plan is too far from what was asked, in words."""
+    return [
+        str(miss)
+        for miss in plan.misses
+        if miss.position > tolerance.position or miss.angle > tolerance.angle
+    ]

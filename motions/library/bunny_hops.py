@@ -1,0 +1,13 @@
+"""Bunny hops."""
+
+from __future__ import annotations
+
+from motions.authoring import motion
+from motions.timeline import Timeline
+
+
+@motion
+def bunny_hops() -> Timeline:
+    """Bunny hops: three little jumps ahead, one after the other."""
+    hop = Timeline().jump(x=0.15, height=0.04)
+    return hop.repeat(3).hold(0.3)

@@ -1,0 +1,13 @@
+"""Paw pair."""
+
+from __future__ import annotations
+
+from motions.authoring import motion
+from motions.timeline import Timeline
+
+
+@motion
+def paw_pair() -> Timeline:
+    """Paw pair: lift a front paw and the hind paw across, then the other two."""
+    pair = Timeline().lift(("FL", "RR"), hold=0.35).hold(0.3)
+    return pair.then(pair.mirror())

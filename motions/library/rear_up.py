@@ -1,0 +1,12 @@
+"""Rear up."""
+
+from __future__ import annotations
+
+from motions.authoring import motion
+from motions.timeline import Timeline, deg
+
+
+@motion
+def rear_up() -> Timeline:
+    """Rear up: balance on the hind feet for a moment, the front feet in the air."""
+    return Timeline().rear(deg(-25)).hold(0.3)

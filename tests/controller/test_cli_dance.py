@@ -1,0 +1,93 @@
+"""``go2-wbc dance``: composed, checked, played, measured; every way to fail has its message."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.cli.common import ExitCode
+from controller.cli.main import main
+from motions.music import Beats, click_track
+from motions.music.sound import RATE, read_sound
+from tests.viz.page_reader import read_data
+
+SECONDS, BPM = 7.0, 96.0
+
+
+@pytest.fixture
+def song(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A song whose beats are known, not found: what follows needs no extra."""
+    clicks = click_track(BPM, SECONDS)
+    found = Beats(BPM, clicks.beats, np.ones(len(clicks.beats)), SECONDS, 1.0)
+    monkeypatch.setattr("motions.music.finding.beats", lambda _: found)
+    return clicks.save(tmp_path / "song.wav")
+
+
+def test_a_dance_is_played_on_the_beats_and_measured(
+    song: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["dance", str(song), "--seed", "3", "--json"]) == ExitCode.OK
+    told = json.loads(capsys.readouterr().out)
+    assert told["ok"]
+    assert told["tempo"] == BPM
+    assert len(told["moves"]) >= 5
+    assert len(told["accents"]) >= len(told["moves"])
+    assert told["on_beat"] == 1.0
+    assert max(abs(accent["late_ms"]) for accent in told["accents"]) < 40.0
+
+
+def test_the_page_of_a_dance_has_its_beats_and_its_music(song: Path, tmp_path: Path) -> None:
+    pytest.importorskip("librosa", reason="needs the extra [music]")
+    page = tmp_path / "dance.html"
+    assert main(["dance", str(song), "--no-play", "--html", str(page)]) == ExitCode.OK
+    header, arrays = read_data(page.read_text(encoding="utf-8"))
+    assert header["title"] == "dance 0"
+    assert header["beats"] == pytest.approx(click_track(BPM, SECONDS).beats)
+    path = tmp_path / "again.mp3"
+    path.write_bytes(arrays["sound"].tobytes())
+    assert len(read_sound(path)) == pytest.approx(SECONDS * RATE, abs=1)
+
+
+def test_without_playing_the_moves_and_their_times_are_told(
+    song: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    chosen = ["--moves", "nod", "sway", "tap_FR"]
+    assert main(["dance", str(song), "--no-play", *chosen]) == ExitCode.OK
+    text = capsys.readouterr().out
+    assert "96 a minute" in text
+    assert "feasible, not played" in text
+    assert "nod" in text
+    assert "twist" not in text
+    assert main(["dance", str(song), "--no-play", "--json"]) == ExitCode.OK
+    assert "accents" not in json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "message"),
+    [
+        (["--moves", "moonwalk"], ExitCode.USAGE, "unknown move 'moonwalk'; valid: bob"),
+        (["--html", "dance.txt"], ExitCode.USAGE, "valid: .html"),
+        (["--seed", "-1"], ExitCode.USAGE, "must be 0 or more"),
+    ],
+)
+def test_what_cannot_be_danced_is_said(
+    arguments: list[str],
+    code: ExitCode,
+    message: str,
+    song: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["dance", str(song), *arguments]) == code
+    assert message in capsys.readouterr().err
+
+
+def test_without_the_extra_the_install_line_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "librosa", None)
+    assert main(["dance", str(tmp_path / "song.wav")]) == ExitCode.RUNTIME
+    assert 'install -e ".[music]"' in capsys.readouterr().err

@@ -1,0 +1,122 @@
+"""The snapshot's kernel is held to Pinocchio's own functions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.spatial.transform import Rotation
+
+from go2_wbc.kernels.layout import SNAPSHOT
+from go2_wbc.robot.description import find_description
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.robot.state import RobotState
+from tests.engine_helpers import random_state, state_of
+
+ROUNDING = 1e-12  # [SI] of values up to 1000; measured 1e-13
+FAST_ROUNDING = 1e-10  # [SI] of values up to 20,000; measured 1e-11
+STATES = 1000
+NAMES = list(SNAPSHOT.start)[2:]
+PAYLOAD = """<link name="payload"><inertial><origin xyz="0.1 -0.05 0.12" rpy="0.3 0.2 0.1"/>
+<mass value="4.0"/><inertia ixx="0.05" ixy="0.01" ixz="0.005" iyy="0.07" iyz="0.002" izz="0.03"/>
+</inertial></link><joint name="payload_joint" type="fixed"><parent link="{link}"/>
+<child link="payload"/><origin xyz="0.02 0.03 0.04" rpy="0.5 0.4 0.3"/></joint></robot>"""
+
+
+def difference(a: Snapshot, b: Snapshot) -> float:
+    """Largest difference of any number of two snapshots."""
+    return max(float(np.abs(getattr(a, n) - getattr(b, n)).max()) for n in NAMES)
+
+
+def fast_state(rng: np.random.Generator) -> RobotState:
+    """Any attitude, any joint angles, and faster than any Go2."""
+    attitude = Rotation.random(rng=rng).as_quat()
+    q = np.concatenate([rng.normal(size=3), attitude, rng.uniform(-np.pi, np.pi, size=12)])
+    return state_of(q, np.concatenate([rng.normal(scale=5.0, size=6), 30.0 * rng.normal(size=12)]))
+
+
+@pytest.mark.parametrize("foot_radius", [0.022, 0.0])
+def test_every_quantity_is_what_pinocchio_says(foot_radius: float) -> None:
+    model = RobotModel(foot_radius=foot_radius)
+    rng = np.random.default_rng(3)
+    for _ in range(STATES):
+        state = random_state(rng, tilt=0.7)
+        assert difference(model.snapshot(state), model.readable_snapshot(state)) < ROUNDING
+
+
+def test_it_is_in_any_attitude_at_any_speed() -> None:
+    model, rng = RobotModel(), np.random.default_rng(6)
+    for _ in range(STATES):
+        state = fast_state(rng)
+        assert difference(model.snapshot(state), model.readable_snapshot(state)) < FAST_ROUNDING
+
+
+@pytest.mark.parametrize("link", ["base", "FR_hip", "RL_thigh", "RR_calf"])
+def test_it_is_for_a_robot_that_carries_something(tmp_path: Path, link: str) -> None:
+    path = tmp_path / "robot.urdf"
+    urdf = find_description().urdf_path.read_text(encoding="utf-8")
+    path.write_text(urdf.replace("</robot>", PAYLOAD.format(link=link)), encoding="utf-8")
+    model = RobotModel(find_description(path), armature=np.linspace(0.001, 0.012, 12))
+    rng = np.random.default_rng(7)
+    assert model.mass == pytest.approx(RobotModel().mass + 4.0)
+    for _ in range(100):
+        state = fast_state(rng)
+        assert difference(model.snapshot(state), model.readable_snapshot(state)) < FAST_ROUNDING
+
+
+def test_a_robot_with_other_joints_gets_pinocchios_snapshot() -> None:
+    """The kernel knows hips that turn about x, not about an axis tilted by 0.1 rad."""
+    model, same = RobotModel(), RobotModel()
+    for robot, angle in ((model, 0.1), (same, 0.0)):
+        place = robot.pin_model.jointPlacements[3]
+        tilted = pin.SE3(pin.utils.rotate("x", angle), place.translation)
+        robot.pin_model.jointPlacements[3] = tilted
+    state = random_state(np.random.default_rng(8))
+    assert difference(model.snapshot(state), model.readable_snapshot(state)) == 0.0
+    assert 0.0 < difference(same.snapshot(state), same.readable_snapshot(state)) < ROUNDING
+    assert model.snapshot(state).row.shape == same.snapshot(state).row.shape
+    assert difference(model.snapshot(state), same.snapshot(state)) > 0.01
+
+
+def test_the_comparison_notices_a_wrong_number() -> None:
+    model = RobotModel()
+    snapshot = model.snapshot(random_state(np.random.default_rng(0)))
+    drift = snapshot.drift_contacts + 1e-9
+    assert difference(snapshot, replace(snapshot, drift_contacts=drift)) > ROUNDING
+
+
+def test_a_snapshot_stays_as_it_was_when_the_next_one_is_made() -> None:
+    model, rng = RobotModel(), np.random.default_rng(1)
+    first = model.snapshot(random_state(rng))
+    before = first.row.copy()
+    model.snapshot(random_state(rng))
+    model.forward_kinematics(random_state(rng).q)
+    np.testing.assert_array_equal(first.row, before)
+
+
+def test_states_of_any_memory_layout_are_taken() -> None:
+    model = RobotModel()
+    state = random_state(np.random.default_rng(2))
+    strided = replace(state, q=np.repeat(state.q, 2)[::2], v=np.repeat(state.v, 3)[::3])
+    frozen = replace(state, q=state.q.copy(), v=state.v.copy())
+    frozen.q.flags.writeable = frozen.v.flags.writeable = False
+    for other in (strided, frozen):
+        np.testing.assert_array_equal(model.snapshot(other).row, model.snapshot(state).row)
+
+
+def test_the_row_follows_an_array_that_was_replaced() -> None:
+    snapshot = RobotModel().snapshot(random_state(np.random.default_rng(4)))
+    lifted = replace(snapshot, p_world_feet=snapshot.p_world_feet + 1.0)
+    start = SNAPSHOT.start["p_world_feet"]
+    assert lifted.row[start] == snapshot.row[start] + 1.0
+
+
+def test_a_nan_in_the_state_is_seen_in_the_snapshot() -> None:
+    state = random_state(np.random.default_rng(5))
+    q = state.q.copy()
+    q[8] = np.nan
+    assert np.isnan(RobotModel().snapshot(replace(state, q=q)).p_world_feet).any()

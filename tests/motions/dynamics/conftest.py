@@ -1,0 +1,40 @@
+"""Solved once for all tests: a jump, a rear and a lift, each a second of processor time."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import pytest
+
+from go2_wbc.legs import Leg
+from go2_wbc.robot.model import RobotModel
+from motions.dynamics import DynamicTrajectory, PhaseProblem, moves, solve
+
+PROBLEMS = {
+    "jump": PhaseProblem(moves.jump(x=-0.3, yaw=0.5)),
+    "hop": PhaseProblem(moves.hop(times=1)),
+    "rear": PhaseProblem(moves.rear()),
+    "lift": PhaseProblem(moves.lift((Leg.FR, Leg.RL))),
+}
+
+
+@pytest.fixture(scope="session")
+def model() -> RobotModel:
+    return RobotModel()
+
+
+@pytest.fixture(scope="session")
+def plans(model: RobotModel) -> dict[str, DynamicTrajectory]:
+    if find_spec("crocoddyl") is None:
+        pytest.skip("crocoddyl is not installed: pip install go2-wbc[dynamics]")
+    return {name: solve(problem, model) for name, problem in PROBLEMS.items()}
+
+
+@pytest.fixture(params=PROBLEMS)
+def name(request: pytest.FixtureRequest) -> str:
+    return request.param
+
+
+@pytest.fixture
+def plan(plans: dict[str, DynamicTrajectory], name: str) -> DynamicTrajectory:
+    return plans[name]

@@ -1,0 +1,72 @@
+"""Builders of phases put the feet where they say, and refuse what no Go2 can do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from go2_wbc.errors import TimelineError
+from go2_wbc.legs import LEGS, Leg
+from go2_wbc.reference import Anchor
+from go2_wbc.robot.model import RobotModel
+from motions.dynamics import Phase, PhaseProblem, moves
+from motions.dynamics.moves import FOOTPRINT
+from motions.dynamics.phases import ALL_FEET, KNOT_PERIOD
+
+
+def test_the_footprint_is_that_of_the_standing_robot(model: RobotModel) -> None:
+    assert model.p_base_feet_nominal[:, :2] == pytest.approx(FOOTPRINT, abs=1e-3)
+
+
+def test_a_jump_lands_at_the_place_and_heading_asked_for() -> None:
+    problem = PhaseProblem(moves.jump(x=0.3, y=-0.2, yaw=1.1))
+    feet = np.column_stack([FOOTPRINT, np.zeros(4)]) + problem.shift
+    landed = Anchor.of_feet(feet, 0.0)
+    assert landed.p_world == pytest.approx([0.3, -0.2, 0.0])
+    assert landed.yaw == pytest.approx(1.1)
+    stand = problem.phases[-1]
+    assert stand.body == pytest.approx((0.3, -0.2, 0.0, 0.0, 0.0, 1.1))
+
+
+def test_hops_touch_down_once_a_period() -> None:
+    times, landed, before = [], 0.0, ALL_FEET
+    for phase in moves.hop(times=4, period=0.47):
+        if phase.stance and not before:
+            times.append(landed)
+        landed, before = landed + phase.duration, phase.stance
+    assert np.diff(times) == pytest.approx([0.47] * 3)
+
+
+def test_flights_last_whole_knots() -> None:
+    for phase in (*moves.jump(height=0.11), *moves.rear(hold=0.7)):
+        assert phase.duration / KNOT_PERIOD == pytest.approx(round(phase.duration / KNOT_PERIOD))
+
+
+def test_a_lift_holds_the_other_feet_down() -> None:
+    phases = moves.lift((Leg.FL, Leg.RR))
+    assert {phase.stance for phase in phases} == {ALL_FEET, frozenset({Leg.FR, Leg.RL})}
+    assert not PhaseProblem(phases).shift.any()
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda: moves.jump(x=2.0),
+        lambda: moves.jump(y=math.nan),
+        lambda: moves.jump(height=0.0),
+        lambda: moves.jump(height=2.0),
+        lambda: moves.jump(yaw=7.0),
+        lambda: moves.hop(times=0),
+        lambda: moves.hop(period=0.1),
+        lambda: moves.rear(pitch=0.4),
+        lambda: moves.rear(hold=5.0),
+        lambda: moves.lift(LEGS),
+        lambda: moves.lift((Leg.FL,), height=-0.1),
+    ],
+)
+def test_what_no_go2_can_do_is_refused(ask: Callable[[], tuple[Phase, ...]]) -> None:
+    with pytest.raises(TimelineError, match=r"must be|lift one or two"):
+        ask()

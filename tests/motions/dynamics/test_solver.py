@@ -1,0 +1,139 @@
+"""Plans obey the equations of motion and every limit, computed here without the planner's code."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from go2_wbc.errors import MissingDependency, PlanNotFound
+from go2_wbc.legs import FOOT_NAMES, LEGS
+from go2_wbc.reference import Anchor
+from go2_wbc.robot.model import RobotModel
+from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, moves, solve
+from motions.dynamics.limits import PlanLimits
+from motions.dynamics.standing import standing_feet
+from tests.motions.dynamics.conftest import PROBLEMS
+
+DEFECT = 1e-6  # N, N m: rounding of sums of forces of 1e3 N
+SLACK = 1.02  # the barriers are quadratic: forces pass them by a few newtons
+ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+def test_every_knot_obeys_the_equations_of_motion(
+    plan: DynamicTrajectory, model: RobotModel
+) -> None:
+    data = model.pin_model.createData()
+    for row, dt in enumerate(np.diff(plan.times)):
+        q, v = plan.q[row], plan.v[row]
+        M = pin.crba(model.pin_model, data, q)
+        M = np.triu(M) + np.triu(M, 1).T
+        rest = M @ (plan.v[row + 1] - v) / dt + pin.nonLinearEffects(model.pin_model, data, q, v)
+        rest[6:] -= plan.tau[row]
+        pin.computeJointJacobians(model.pin_model, data, q)
+        for foot, force in zip(FOOT_NAMES, plan.forces[row], strict=True):
+            frame = model.pin_model.getFrameId(foot)
+            rest -= pin.getFrameJacobian(model.pin_model, data, frame, ALIGNED)[:3].T @ force
+        assert np.abs(rest).max() < DEFECT
+        reached = pin.integrate(model.pin_model, q, dt * plan.v[row + 1])
+        assert plan.q[row + 1] == pytest.approx(reached, abs=1e-9)
+
+
+def test_only_standing_feet_push_and_within_the_cone(plan: DynamicTrajectory) -> None:
+    limits = PlanLimits()
+    assert not plan.forces[~plan.stance].any()
+    normal, tangential = plan.forces[..., 2], np.linalg.norm(plan.forces[..., :2], axis=-1)
+    assert normal.min() > -1.0
+    assert normal.max() < limits.force_max * SLACK
+    assert (tangential <= SLACK * limits.friction * normal + 1.0).all()
+
+
+def test_torques_stay_below_the_motors_line(plan: DynamicTrajectory, model: RobotModel) -> None:
+    lower, upper = model.motor.limits(plan.v[:-1, 6:])
+    assert (plan.tau >= lower).all()
+    assert (plan.tau <= upper).all()
+    assert (np.abs(plan.tau) <= 0.85 * model.torque_limits + 1e-9).all()
+    assert (np.abs(plan.v[:, 6:]) <= model.speed_limits).all()
+    assert (plan.q[:, 7:] >= model.q_lower).all()
+    assert (plan.q[:, 7:] <= model.q_upper).all()
+
+
+def test_feet_stand_still_or_are_above_the_ground(
+    plan: DynamicTrajectory, model: RobotModel
+) -> None:
+    for leg in LEGS:
+        for row, stands in enumerate(plan.stance[:, leg]):
+            before, after = plan.p_feet[row, leg], plan.p_feet[row + 1, leg]
+            if stands:
+                assert np.linalg.norm(after - before) < 0.006  # in the knot of its touchdown
+            else:
+                assert after[2] > model.foot_radius - 0.005
+
+
+def test_the_trunk_turns_as_far_as_its_rates_say(plan: DynamicTrajectory) -> None:
+    turned = pin.Quaternion(plan.q[0, 3:7]).toRotationMatrix()
+    for dt, v in zip(np.diff(plan.times), plan.v[1:], strict=True):
+        turned = turned @ pin.exp3(dt * v[3:6])
+    end = pin.Quaternion(plan.q[-1, 3:7]).toRotationMatrix()
+    assert turned == pytest.approx(end, abs=1e-6)
+
+
+def test_a_plan_ends_at_rest_where_it_was_asked_to(
+    plan: DynamicTrajectory, name: str, model: RobotModel
+) -> None:
+    ends = Anchor.of_feet(plan.p_feet[-1], model.foot_radius)
+    wanted = Anchor.of_feet(standing_feet(model) + PROBLEMS[name].shift, model.foot_radius)
+    assert ends.p_world == pytest.approx(wanted.p_world, abs=0.01)
+    assert ends.yaw == pytest.approx(wanted.yaw, abs=math.radians(1.0))
+    assert np.abs(plan.v[-1]).max() < 0.3
+    assert plan.position_deviation < 0.05
+    assert plan.angle_deviation < math.radians(8.0)
+
+
+def test_a_jump_leaves_the_ground_by_what_was_asked(plans: dict[str, DynamicTrajectory]) -> None:
+    height = plans["jump"].p_feet[:, :, 2].min(axis=1).max() - plans["jump"].p_feet[0, 0, 2]
+    assert height == pytest.approx(0.15, abs=0.02)
+    assert not plans["jump"].stance.any(axis=1).all()
+
+
+def test_rearing_turns_the_trunk_and_frees_the_front_feet(
+    plans: dict[str, DynamicTrajectory],
+) -> None:
+    rear = plans["rear"]
+    pitch = [pin.rpy.matrixToRpy(pin.Quaternion(q[3:7]).matrix())[1] for q in rear.q]
+    assert min(pitch) < math.radians(-24.0)
+    off = ~rear.stance[:, :2].any(axis=1)
+    assert np.diff(rear.times)[off].sum() >= 0.5
+
+
+def test_the_same_question_has_the_same_answer(
+    plans: dict[str, DynamicTrajectory], model: RobotModel
+) -> None:
+    assert solve(PROBLEMS["lift"], model).to_bytes() == plans["lift"].to_bytes()
+
+
+def test_progress_is_told_and_a_budget_kept(
+    plans: dict[str, DynamicTrajectory], model: RobotModel
+) -> None:
+    told: list[int] = []
+    with pytest.raises(PlanNotFound, match=r"within 0\.05 s of processor time"):
+        solve(PROBLEMS["jump"], model, budget=0.05, progress=lambda count, _: told.append(count))
+    assert told == list(range(1, len(told) + 1))
+
+
+def test_a_near_miss_is_no_plan(plans: dict[str, DynamicTrajectory], model: RobotModel) -> None:
+    problem = PhaseProblem(moves.lift(), tolerance=Tolerance(position=1e-6))
+    with pytest.raises(PlanNotFound, match=r"nearest one is off") as caught:
+        solve(problem, model)
+    assert any("trunk at" in reason or "foot at" in reason for reason in caught.value.reasons)
+
+
+def test_without_crocoddyl_the_extra_is_named(
+    monkeypatch: pytest.MonkeyPatch, model: RobotModel
+) -> None:
+    monkeypatch.setitem(sys.modules, "crocoddyl", None)
+    with pytest.raises(MissingDependency, match=r"pip install go2-wbc\[dynamics\]"):
+        solve(PROBLEMS["lift"], model)

@@ -1,0 +1,90 @@
+"""``physics="nearest"``: what the robot cannot do is done nearly, with its deviation told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from go2_wbc.errors import PlanNotFound, TimelineError
+from go2_wbc.robot.model import RobotModel
+from motions import CompiledPlan, FeasibilityChecker, Timeline, deg
+from motions.dynamics.phases import Tolerance
+
+needs_solver = pytest.mark.skipif(
+    find_spec("crocoddyl") is None, reason="needs crocoddyl: pip install go2-wbc[dynamics]"
+)
+SWAY = (
+    Timeline(physics="nearest")
+    .body(y=0.06, over=0.2)
+    .body(y=-0.06, over=0.2)
+    .home(over=0.4)
+    .hold(0.2)
+)
+"""Faster than friction allows."""
+
+
+@pytest.fixture(scope="module")
+def checker() -> FeasibilityChecker:
+    return FeasibilityChecker(RobotModel())
+
+
+def test_as_it_is_written_it_is_refused(checker: FeasibilityChecker) -> None:
+    assert not checker.check(replace(SWAY, physics="as_written")).ok
+
+
+@needs_solver
+def test_the_nearest_motion_is_feasible_and_says_how_far_off_it_is(
+    checker: FeasibilityChecker,
+) -> None:
+    plan = checker.plan(SWAY)
+    assert isinstance(plan, CompiledPlan)
+    assert plan.has_dynamic_spans
+    assert plan.duration == pytest.approx(SWAY.end)
+    report = checker.check(plan)
+    assert report.ok, report.table()
+    own = plan.dynamic[0].trajectory.position_deviation
+    assert 0.01 < own < 0.05
+    assert report.margins["off by"].value == pytest.approx(1e3 * own, abs=1.0)
+
+
+@needs_solver
+def test_a_narrow_tolerance_refuses_it_with_what_was_written_and_how_near_one_gets(
+    checker: FeasibilityChecker,
+) -> None:
+    report = checker.check(replace(SWAY, tolerance=Tolerance(position=0.005)))
+    checks = [one.check for one in report.failures]
+    assert checks[0] == "nearest motion"
+    assert "mm" in report.failures[0].note
+    assert len(checks) > 1
+
+
+def test_what_can_be_done_stays_as_it_is_written(
+    checker: FeasibilityChecker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*args: object, **others: object) -> None:
+        raise PlanNotFound("it was solved")
+
+    monkeypatch.setattr("motions.feasibility.nearest.nearest_cached", refuse)
+    slow = Timeline().body(y=0.03, over=0.8).home(over=0.8)
+    near, written = checker.plan(replace(slow, physics="nearest")), checker.plan(slow)
+    for t in np.linspace(0.0, slow.end, 20):
+        np.testing.assert_allclose(near.at(float(t)).row, written.at(float(t)).row)
+
+
+def test_what_is_no_motion_to_be_near_to_is_a_failure_in_words(
+    checker: FeasibilityChecker,
+) -> None:
+    line = Timeline(balance=False, physics="nearest").foot("FL", z=0.04, over=0.2)
+    failure = checker.check(line.home(over=0.2)).failures[0]
+    assert failure.check == "nearest motion"
+    assert "must start and end on four feet" in failure.note
+
+
+def test_physics_and_tolerance_are_checked_where_they_are_given() -> None:
+    with pytest.raises(TimelineError, match=r"unknown physics 'nearly'.*as_written, nearest"):
+        Timeline(physics="nearly")
+    with pytest.raises(TimelineError, match=r"tolerance position must be a number above 0"):
+        Timeline(tolerance=Tolerance(position=0.0, angle=deg(5)))

@@ -1,0 +1,106 @@
+"""Dances: on the beats of any song, different by seed, feasible, and never the same move twice."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from go2_wbc.curves import Ease
+from go2_wbc.errors import CommandError, MotionInfeasible
+from motions import FeasibilityChecker
+from motions.keys import BodyKey, LegKey
+from motions.music import MOVES, Beats, compose, feasible_dance
+from motions.music.choreography import LEAD, pulses_of
+from motions.music.moves import Strokes
+
+CHECKER = FeasibilityChecker()
+TEMPI = (55.0, 83.0, 110.0, 139.0, 176.0)
+EXACT = 1e-9
+
+
+def steady(bpm: float, seconds: float = 30.0, strengths: Sequence[float] = (1.0,)) -> Beats:
+    times = np.arange(0.4, seconds - 0.1, 60.0 / bpm)
+    strong = np.resize(np.array(strengths), len(times))
+    return Beats(bpm, times, strong, seconds, 1.0)
+
+
+@pytest.mark.parametrize("bpm", TEMPI)
+def test_half_a_minute_has_twenty_moves_at_any_tempo(bpm: float) -> None:
+    for seed in range(5):
+        dance = compose(steady(bpm), seed)
+        assert len(dance.moves) >= 20
+        assert dance.timeline.end <= 30.0 + 60.0 / bpm
+
+
+@pytest.mark.parametrize("bpm", TEMPI)
+def test_every_accent_is_written_on_a_beat(bpm: float) -> None:
+    found = steady(bpm)
+    dance = compose(found, 3)
+    turns = {round(key.end, 6) for key in dance.timeline.keys if isinstance(key, BodyKey | LegKey)}
+    for accent in dance.accents:
+        instant = dance.time(accent)
+        assert np.abs(found.times - instant).min() < EXACT
+        assert round(instant - LEAD, 6) in turns
+
+
+def test_a_foot_comes_down_with_speed_and_the_trunk_turns_back_without_a_rest() -> None:
+    """What comes to rest on its beat has no instant of which one could say that it is the one."""
+    dance = compose(steady(100.0), 0, ["tap_FL", "nod"])
+    downs = [key for key in dance.timeline.in_order(LegKey) if key.target.is_on_ground]
+    assert {key.ease for key in downs} == {Ease.IN}
+    assert {key.ease for key in dance.timeline.in_order(BodyKey)} >= {Ease.CUBIC}
+
+
+def test_a_seed_is_a_dance_and_no_move_follows_itself() -> None:
+    names = [[item.move.name for item in compose(steady(120.0), seed).moves] for seed in (1, 1, 2)]
+    assert names[0] == names[1] != names[2]
+    for seed in range(20):
+        moves = compose(steady(97.0), seed).moves
+        assert all(first.move is not second.move for first, second in pairwise(moves))
+
+
+def test_one_dances_on_the_strong_beats_of_a_fast_song() -> None:
+    """A song that was counted twice as fast as it is played is danced on its beats."""
+    fast = steady(160.0, strengths=(0.2, 1.0))
+    assert pulses_of(fast) == pytest.approx(fast.times[1::2])
+    slow = steady(90.0, strengths=(0.2, 1.0))
+    assert pulses_of(slow) == pytest.approx(slow.times)
+
+
+def test_a_beat_that_comes_too_soon_is_left_out() -> None:
+    times = np.sort(np.append(np.arange(1.0, 20.0, 0.75), 5.9))
+    found = Beats(80.0, times, np.ones(len(times)), 20.0, 1.0)
+    assert len(pulses_of(found)) == len(times) - 1
+
+
+@pytest.mark.parametrize("bpm", TEMPI)
+def test_a_dance_of_all_moves_is_feasible(bpm: float) -> None:
+    for seed in range(3):
+        _, checked = feasible_dance(steady(bpm), seed, CHECKER)
+        assert checked.report.ok
+
+
+def test_a_move_that_is_refused_is_replaced_by_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    wild = Strokes("wild", ({"y": 0.2},))
+    monkeypatch.setattr("motions.music.choreography.MOVES", {**MOVES, "wild": wild})
+    names = ["wild", "nod", "bob", "lunge"]
+    assert wild in [item.move for item in compose(steady(80.0), 0, names).moves]
+    dance, checked = feasible_dance(steady(80.0), 0, CHECKER, names)
+    assert checked.report.ok
+    assert wild not in [item.move for item in dance.moves]
+    with pytest.raises(MotionInfeasible, match="dance 0"):
+        feasible_dance(steady(80.0), 0, CHECKER, ["wild"])
+
+
+def test_a_long_song_is_danced_for_three_minutes() -> None:
+    assert 175.0 < compose(steady(90.0, 400.0), 0).timeline.end < 182.0
+
+
+def test_an_unknown_move_and_a_short_song_are_refused() -> None:
+    with pytest.raises(CommandError, match=r"unknown move 'moonwalk'; valid: bob, bow"):
+        compose(steady(100.0), 0, ["moonwalk"])
+    with pytest.raises(CommandError, match="too short for a dance"):
+        compose(steady(100.0, 2.2), 0)
