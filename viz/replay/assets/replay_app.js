@@ -39,7 +39,7 @@ class Player {
     document.getElementById("total").textContent = ` / ${data.duration.toFixed(2)} s`;
     document.getElementById("app").classList.toggle("has-ghost", data.ghost !== null);
     document.getElementById("force-key").textContent = isPlan ? "planned force" : "measured force";
-    document.getElementById("ghost-key").textContent = isPlan ? "force of the ghost" : "planned force";
+    document.querySelector(".ghost-key").hidden = isPlan;
     const solid = isPlan ? "the plan" : "what was measured";
     document.getElementById("who").textContent = `Solid: ${solid}. Blue: ${data.header.ghost_name}.`;
   }

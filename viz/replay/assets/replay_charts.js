@@ -174,7 +174,7 @@ class Timeline extends TimeCanvas {
     paint.lineTo(this.xAt(data.end), top + height);
     paint.fill();
     paint.globalAlpha = 1;
-    if (!data.ghost) return;
+    if (!data.ghost || data.header.is_plan) return; // forces of what was written are not known
     paint.strokeStyle = INK;
     paint.lineWidth = 1;
     paint.beginPath();
@@ -226,7 +226,7 @@ class Curve extends TimeCanvas {
 
   use(data) {
     const { style } = this;
-    const runs = data.ghost ? [data, data.ghost] : [data];
+    const runs = this.showsGhost(data) ? [data, data.ghost] : [data];
     const finite = runs.flatMap((run) => Array.from(run[style.name]))
       .filter(Number.isFinite).map((v) => v * style.scale);
     if (style.limit !== undefined) finite.push(style.limit * style.scale);
@@ -236,6 +236,11 @@ class Curve extends TimeCanvas {
     this.low = Number.isFinite(low) ? low - room : 0;
     this.high = Number.isFinite(high) ? high + room : 1;
     super.use(data);
+  }
+
+  // Of a motion that was written and not planned only the movement is known.
+  showsGhost(data) {
+    return data.ghost && (!data.header.is_plan || this.style.name === "height");
   }
 
   yAt(value) {
@@ -252,7 +257,7 @@ class Curve extends TimeCanvas {
       this.horizontal(paint, style.limit * style.scale);
       paint.setLineDash([]);
     }
-    if (data.ghost) {
+    if (this.showsGhost(data)) {
       paint.setLineDash([5, 3]);
       this.drawRun(paint, data.ghost, GHOST);
       paint.setLineDash([]);
