@@ -26,6 +26,7 @@ _AFTERWARDS = 1.0
 _TOGETHER = 0.05
 """Annotations on one limit that are this close in time [s] become one."""
 _LEAST_SAMPLES = 2
+_WRITTEN = "what was written; the plan is the nearest that the robot can do"
 _HALF_SAMPLE = 0.005
 """Half the time [s] between two samples of a plan's recording."""
 _MOVED, _TURNED = 0.02, np.radians(2.0)
@@ -37,10 +38,8 @@ def planned(checked: CheckedMotion) -> ReplayContent:
     plan, shown = checked.plan, checked.recording()
     content = ReplayContent(shown, is_plan=True, verdict=verdict_of(checked.report))
     if isinstance(plan, CompiledPlan) and (mended := _mended(plan)):
-        said = "; ".join(span.trajectory.deviation for span, _ in mended)
-        name = f"what was written; the plan is the nearest that the robot can do: {said}"
         ghost = _as_written(shown, mended)
-        content = replace(content, ghost=ghost, ghost_name=name, judges_ghost=False)
+        content = replace(content, ghost=ghost, ghost_name=_WRITTEN, judges_ghost=False)
     return _shown(plan, content)
 
 

@@ -236,5 +236,5 @@ def test_the_beats_are_saved_and_older_files_have_none(tmp_path: Path) -> None:
     assert load_plan(file, model=MODEL).beats == plan.beats
     assert load_plan(changed(file, lambda f: f["plan"].pop("beats")), model=MODEL).beats == ()
     wrong = changed(file, lambda f: f["plan"].update(beats=[1.0, 0.5]))
-    with pytest.raises(MotionFileError, match="must rise from 0 s to 1.5 s"):
+    with pytest.raises(MotionFileError, match="must rise from 0 s to"):
         load_plan(wrong, model=MODEL)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,6 @@ import pytest
 import viz
 from go2_wbc.recording import Recording
 from tests.viz.replay.browsing import DRAWN, Tab
-from viz.content import ReplayContent
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
