@@ -12,10 +12,12 @@ from go2_wbc.errors import PlantError
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.ground_truth import true_runs
 from go2_wbc.recording import Recording
-from go2_wbc.reference import Anchor
+from go2_wbc.reference import Anchor, MotionPlan
 from go2_wbc.robot.model import RobotModel
-from motions import CheckedMotion, FeasibilityReport, Finding
+from motions import CheckedMotion, CompiledPlan, FeasibilityReport, Finding
 from motions.authoring import Choice, Parameter
+from motions.dynamic_span import DynamicSpan
+from motions.dynamics.nearest import Written
 from motions.feasibility import Series
 from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Slider, Verdict
 
@@ -24,11 +26,21 @@ _AFTERWARDS = 1.0
 _TOGETHER = 0.05
 """Annotations on one limit that are this close in time [s] become one."""
 _LEAST_SAMPLES = 2
+_WRITTEN = "what was written; the plan is the nearest that the robot can do"
+_HALF_SAMPLE = 0.005
+"""Half the time [s] between two samples of a plan's recording."""
+_MOVED, _TURNED = 0.02, np.radians(2.0)
+"""A motion that ends farther from its start, [m] and [rad], moves on."""
 
 
 def planned(checked: CheckedMotion) -> ReplayContent:
     """The plan with its verdict."""
-    return ReplayContent(checked.recording(), is_plan=True, verdict=verdict_of(checked.report))
+    plan, shown = checked.plan, checked.recording()
+    content = ReplayContent(shown, is_plan=True, verdict=verdict_of(checked.report))
+    if isinstance(plan, CompiledPlan) and (mended := _mended(plan)):
+        ghost = _as_written(shown, mended)
+        content = replace(content, ghost=ghost, ghost_name=_WRITTEN, judges_ghost=False)
+    return _shown(plan, content)
 
 
 def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> ReplayContent:
@@ -46,7 +58,42 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
     plan = checked.recording()
     labels = (*plan.labels, "afterwards")
     own = replace(own, labels=tuple(labels[row] for row in np.searchsorted(plan.time, own.time)))
-    return ReplayContent(own, verdict=verdict_of(checked.report), ghost=plan)
+    shown = ReplayContent(own, verdict=verdict_of(checked.report), ghost=plan)
+    return _shown(checked.plan, shown)
+
+
+def _mended(plan: CompiledPlan) -> list[tuple[DynamicSpan, Written]]:
+    """The parts that the robot cannot do as they were written, with what was."""
+    return [(span, span.asked) for span in plan.dynamic if isinstance(span.asked, Written)]
+
+
+def _as_written(shown: Recording, mended: Sequence[tuple[DynamicSpan, Written]]) -> Recording:
+    """The movement that was written; its forces and torques are not known."""
+    q = shown.q.copy()
+    for span, written in mended:
+        inside = (shown.time >= span.start) & (shown.time <= span.end)
+        nearest = np.searchsorted(written.times, shown.time[inside] - span.start - _HALF_SAMPLE)
+        part = written.q[np.minimum(nearest, len(written.times) - 1)]
+        turn = Rotation.from_euler("z", span.frame.yaw)
+        q[inside] = part
+        q[inside, :3] = turn.apply(part[:, :3]) + span.frame.p_world
+        q[inside, 3:7] = (turn * Rotation.from_quat(part[:, 3:7])).as_quat()
+    return replace(
+        shown,
+        q=q,
+        tau=np.zeros_like(shown.tau),
+        foot_forces=np.zeros_like(shown.foot_forces),
+        support_margin=np.full_like(shown.support_margin, np.nan),
+    )
+
+
+def _shown(plan: MotionPlan, content: ReplayContent) -> ReplayContent:
+    """With the beats that a plan counts in, and where it is to end if it moves on."""
+    if not isinstance(plan, CompiledPlan):
+        return content
+    x, y, yaw = plan.end_pose
+    moves_on = np.hypot(x, y) > _MOVED or abs(yaw) > _TURNED
+    return replace(content, beats=plan.beats, end_pose=(x, y, yaw) if moves_on else None)
 
 
 def slider(parameter: Parameter, value: float | str) -> Slider:

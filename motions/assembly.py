@@ -227,6 +227,7 @@ class _Maker:
             problems=tuple(self._problems),
             spans={mark.name: (mark.start, mark.end) for mark in line.in_order(Mark)},
             dynamic=tuple(self._spans),
+            beats=line.beats,
         )
 
     def _compiled(self, stretch: Timeline, keys: Sequence[Key]) -> CompiledPlan:

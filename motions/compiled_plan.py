@@ -50,6 +50,7 @@ class CompiledPlan(MotionPlan):
         ramp: time [s] over which a foot is unloaded before lift-off and loaded after touchdown.
         problems: what could not be done as written.
         spans: start and end [s] of the named holds.
+        beats: instants [s] that it counts in.
         dynamic: its parts that obey the whole robot's dynamics.
     """
 
@@ -62,6 +63,7 @@ class CompiledPlan(MotionPlan):
     ramp: float
     problems: tuple[Problem, ...]
     spans: Mapping[str, tuple[float, float]]
+    beats: tuple[float, ...] = ()
     dynamic: tuple[DynamicSpan, ...] = ()
     _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
 

@@ -103,6 +103,7 @@ def compile_quasi_static(
         ramp=_ramp(timeline),
         problems=tuple(problems),
         spans={mark.name: (mark.start, mark.end) for mark in timeline.in_order(Mark)},
+        beats=timeline.beats,
     )
 
 

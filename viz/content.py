@@ -127,18 +127,24 @@ class ReplayContent:
         is_plan: it is a plan; otherwise it was measured.
         verdict: what to say about the motion.
         ghost: another movement, shown translucent; its clock starts with the first one's.
+        ghost_name: what the ghost is, in words.
+        judges_ghost: the verdict is on the ghost; otherwise on ``recording``.
         beats: instants [s] that the motion counts in, drawn as a ruler.
         sliders: parameters that a live page lets one choose.
         sound: an MP3 file that starts with the recording, played in step with it; empty for none.
+        end_pose: where the movement shall end: x, y [m] and yaw [rad] of the frame of the feet.
     """
 
     recording: Recording
     is_plan: bool = False
     verdict: Verdict | None = None
     ghost: Recording | None = None
+    ghost_name: str = "the plan, which was checked"
+    judges_ghost: bool = True
     beats: tuple[float, ...] = ()
     sliders: tuple[Slider, ...] = ()
     sound: bytes = b""
+    end_pose: tuple[float, float, float] | None = None
 
 
 def checked_content(shown: Recording | ReplayContent) -> ReplayContent:

@@ -11,7 +11,7 @@ from go2_wbc.errors import TimelineError
 from motions.arguments import is_number, positive
 from motions.keys import BODY_CHANNELS, Mark
 from motions.language.clock import BeatClock
-from motions.language.written import Written
+from motions.language.written import Written, distinct
 
 _Line = TypeVar("_Line", bound="Arrangement")
 
@@ -64,9 +64,13 @@ class Arrangement(Written):
         return self._counted(BeatClock.of(times), shift_time)
 
     def _counted(self: _Line, clock: BeatClock, shift_time: float | None) -> _Line:
-        if shift_time is None:
-            return replace(self, clock=clock, shift_beats=float(clock.fewest(self.shift_time)))
-        return replace(self, clock=clock, shift_beats=positive("shift_time", shift_time))
+        beats = float(clock.fewest(self.shift_time))
+        if shift_time is not None:
+            beats = positive("shift_time", shift_time)
+        counted = self._beats_until(self.cursor)
+        return replace(
+            self, clock=clock, shift_beats=beats, counted=counted, counted_from=self.cursor
+        )
 
     # --- putting motions together ---------------------------------------------------------
 
@@ -84,7 +88,9 @@ class Arrangement(Written):
                     f"{other.entry.value}"
                 )
             line._require_home("then()")
-            line = replace(line._joined(other, line.end), exit=other.exit)
+            counted = distinct(*line.beats, *(line.end + beat for beat in other.beats))
+            line = replace(line._joined(other, line.end), exit=other.exit, counted=counted)
+            line = replace(line, counted_from=line.end)
         return line
 
     def together(self: _Line, *others: Written) -> _Line:

@@ -12,6 +12,10 @@ from motions.arguments import is_number
 
 SAME = 1e-9
 """Times this close [s] are the same: absorbs rounding of sums."""
+LEAST_BEAT = 0.05
+"""Beats that follow closer [s] are no ruler: own choice, 1200 a minute; nobody counts so fast."""
+MOST_BEATS = 10_000
+"""Nor are more than so many: own choice, an hour at 160 a minute."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +70,28 @@ class BeatClock:
                     return now + left * (second - first)
                 left, now = left - share, second
         return now + left * (self.instants[-1] - self.instants[-2])
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether beats are evenly apart from the start on: a tempo, not a song."""
+        return len(self.instants) == 2 and self.instants[0] == 0.0
+
+    def between(self, start: float, end: float) -> tuple[float, ...]:
+        """The beats from ``start`` to ``end`` [s], both included.
+
+        Of a tempo they are counted from ``start`` on, as ``after`` counts; of a song they are where
+        they are. None if they follow each other closer than ``LEAST_BEAT``, or
+        are more than ``MOST_BEATS``.
+        """
+        first = start if self.is_steady else self.instants[0]
+        least = min(late - early for early, late in pairwise(self.instants))
+        if least < LEAST_BEAT or end - min(first, start) > MOST_BEATS * least:
+            return ()
+        gap = self.instants[-1] - self.instants[-2]
+        known = (start,) if self.is_steady else self.instants
+        more = range(1, int((end - known[-1]) / gap + 1.0) + 1)
+        times = (*known, *(known[-1] + beat * gap for beat in more))
+        return tuple(time for time in times if start - SAME <= time <= end + SAME)
 
     def fewest(self, seconds: float) -> int:
         """The fewest whole beats that are nowhere shorter than ``seconds``."""

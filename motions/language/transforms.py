@@ -23,6 +23,7 @@ from motions.language.arrangement import Arrangement
 from motions.language.clock import SAME, BeatClock
 
 _Line = TypeVar("_Line", bound="Transforms")
+_TIMES = ("cursor", "last_start", "floor", "counted_from")
 
 
 class Transforms(Arrangement):
@@ -38,7 +39,8 @@ class Transforms(Arrangement):
             keys=tuple(key.slower(longer) for key in self.keys),
             clock=BeatClock(tuple(longer * t for t in self.clock.instants)),
             shift_time=longer * self.shift_time,
-            **{name: longer * getattr(self, name) for name in ("cursor", "last_start", "floor")},
+            counted=tuple(longer * beat for beat in self.counted),
+            **{name: longer * getattr(self, name) for name in _TIMES},
         )
 
     def scale(self: _Line, amplitude: float) -> _Line:
@@ -60,9 +62,9 @@ class Transforms(Arrangement):
         keys = list[Key]()
         for key in sorted(self.keys, key=lambda key: key.start):
             keys.append(_backwards(key, last, self, end))
-        return replace(
-            self, keys=tuple(keys), entry=self.exit, exit=self.entry, cursor=end, floor=0.0
-        )
+        counted = tuple(end - beat for beat in reversed(self.beats))
+        line = replace(self, keys=tuple(keys), entry=self.exit, exit=self.entry)
+        return replace(line, cursor=end, floor=0.0, counted=counted, counted_from=end)
 
     def loop(self: _Line, until: float) -> _Line:
         """This whole motion, over and over, as often as it fits into ``until`` seconds.

@@ -38,6 +38,8 @@ class Written:
         balance: whether the body moves over the standing feet before one is raised.
         shift_time: how long [s] that takes, before a tempo is set.
         shift_beats: how many beats it takes with a tempo; 0 without one.
+        counted: beats [s] of what was written before the present tempo.
+        counted_from: since when [s] the present tempo counts.
         physics: "as_written", or "nearest": what the robot cannot do as written is solved as the
             nearest motion that it can.
         tolerance: how far what is solved may be from what is asked.
@@ -59,6 +61,8 @@ class Written:
     cursor: float = field(default=0.0, kw_only=True)
     clock: BeatClock = field(default=BeatClock(), kw_only=True)
     shift_beats: float = field(default=0.0, kw_only=True)
+    counted: tuple[float, ...] = field(default=(), kw_only=True)
+    counted_from: float = field(default=0.0, kw_only=True)
     last_start: float = field(default=0.0, kw_only=True)
     floor: float = field(default=0.0, kw_only=True)
 
@@ -83,6 +87,11 @@ class Written:
     def end(self) -> float:
         """When [s] the last part ends."""
         return max([self.cursor, *(key.end for key in self.keys)])
+
+    @property
+    def beats(self) -> tuple[float, ...]:
+        """When [s] the beats are that it counts in; none without a tempo."""
+        return self._beats_until(self.end)
 
     @property
     def raised(self) -> frozenset[Leg]:
@@ -128,8 +137,21 @@ class Written:
     def _joined(self: _Line, other: Written, start: float) -> _Line:
         return self._longer([key.later(start) for key in other.keys], start + other.end)
 
+    def _beats_until(self, end: float) -> tuple[float, ...]:
+        now = self.clock.between(self.counted_from, end) if self.shift_beats else ()
+        return distinct(*self.counted, *now)
+
     def _span(self, over: float) -> tuple[float, float]:
         return self.cursor, self.clock.after(self.cursor, positive("over", over))
+
+
+def distinct(*instants: float) -> tuple[float, ...]:
+    """The increasing ``instants`` [s], each once."""
+    kept = list[float]()
+    for instant in instants:
+        if not kept or instant > kept[-1] + SAME:
+            kept.append(instant)
+    return tuple(kept)
 
 
 def _require_no_overlap(keys: Sequence[Key]) -> None:

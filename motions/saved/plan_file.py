@@ -16,6 +16,7 @@ from go2_wbc.robot.fingerprint import fingerprint
 from go2_wbc.robot.model import RobotModel
 from motions.compiled_plan import CompiledPlan
 from motions.dynamics.trajectory import UNREADABLE
+from motions.language.clock import SAME
 from motions.saved.envelope import Format, content_of, fields_of
 from motions.saved.values import Decoder, Encoder
 
@@ -116,5 +117,8 @@ def _require_sane(plan: CompiledPlan) -> None:
         )
     if contacts.period is not None:
         raise MotionFileError(f"plan.contacts must not repeat, got a period of {contacts.period}")
+    ends = (0.0, *plan.beats, curves.x[-1])
+    if not (np.diff(ends) > -SAME).all():
+        raise MotionFileError(f"plan.beats must rise from 0 s to {curves.x[-1]:g} s")
     if not plan.ramp > 0.0:
         raise MotionFileError(f"plan.ramp must be above 0 s, got {plan.ramp}")

@@ -137,3 +137,34 @@ def _elsewhere(plan: Recording) -> Recording:
         support_margin=plan.support_margin[rows],
         labels=labels,
     )
+
+
+def test_the_page_shows_what_was_written_beside_the_nearest_feasible(
+    checker: FeasibilityChecker,
+) -> None:
+    line = Timeline(name="sway", physics="nearest")
+    for side in (1.0, -1.0, 1.0):
+        line = line.body(y=0.06 * side, over=0.22)
+    checked = checker.evaluate(line.home(over=0.3))
+    assert checked.report.ok
+    content = planned(checked)
+    assert content.ghost is not None
+    assert not content.judges_ghost
+    assert content.ghost_name.startswith("what was written; the plan is the nearest")
+    aside = content.ghost.q[:, 1]
+    turns = [float(aside[np.argmin(np.abs(content.ghost.time - t))]) for t in (0.22, 0.44, 0.66)]
+    assert turns == pytest.approx([0.06, -0.06, 0.06], abs=2e-3)
+    off = np.abs(aside - content.recording.q[:, 1]).max()
+    assert 0.005 < off <= 0.05
+
+
+def test_the_page_shows_the_beats_and_the_end_of_a_motion_that_moves_on(
+    checker: FeasibilityChecker,
+) -> None:
+    line = Timeline(name="on").bpm(120).body(z=-0.01, over=2).home(over=2)
+    still = planned(checker.evaluate(line))
+    assert still.beats == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
+    assert still.end_pose is None
+    moved = planned(checker.evaluate(Timeline(name="walk").walk(x=0.2)))
+    assert moved.beats == ()
+    assert moved.end_pose == pytest.approx((0.2, 0.0, 0.0), abs=1e-6)

@@ -68,3 +68,30 @@ def test_beats_that_pass_one_after_the_other_pass_together(gaps: list[float], ov
 def test_beats_that_are_none_are_refused(times: tuple[float, ...], words: str) -> None:
     with pytest.raises(TimelineError, match=words):
         Timeline().on_beats(times)
+
+
+def test_a_motion_knows_the_beats_of_its_song() -> None:
+    line = Timeline().on_beats(SONG).at(1).body(z=-0.05, over=1).hold(1).home(over=1)
+    assert line.beats == pytest.approx([0.5, 1.0, 1.6, 2.4, 3.2])
+
+
+def test_without_a_tempo_there_are_no_beats() -> None:
+    assert Timeline().body(z=-0.05, over=1.0).beats == ()
+
+
+def test_beats_are_counted_from_where_the_tempo_was_set() -> None:
+    line = Timeline().hold(0.7).bpm(120).hold(2).bpm(60).hold(2)
+    assert line.beats == pytest.approx([0.7, 1.2, 1.7, 2.7, 3.7])
+
+
+def test_a_motion_that_follows_keeps_its_own_beats() -> None:
+    slow, fast = Timeline().bpm(60).hold(1), Timeline().bpm(120).hold(2)
+    line = slow.then(Timeline().hold(0.4), fast).hold(1)
+    assert line.beats == pytest.approx([0.0, 1.0, 1.4, 1.9, 2.4, 3.4])
+    assert line.scale_time(2.0).beats == pytest.approx([2.0 * beat for beat in line.beats])
+    assert line.reverse().beats == pytest.approx([0.0, 1.0, 1.5, 2.0, 2.4, 3.4])
+
+
+@pytest.mark.parametrize("line", [Timeline().bpm(1e9).hold(1e9), Timeline().bpm(60).hold(1e12)])
+def test_beats_that_nobody_counts_are_left_out(line: Timeline) -> None:
+    assert line.then(line).beats == ()

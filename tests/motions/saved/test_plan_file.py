@@ -98,7 +98,7 @@ def test_a_plan_for_another_robot_is_refused(file: Path) -> None:
         (lambda d: d.pop("plan"), "plan must be an object, got None"),
         (lambda d: d["plan"].pop("ramp"), "plan lacks ramp"),
         (lambda d: d["plan"].update(ramp=0.0), "plan.ramp must be above 0 s"),
-        (lambda d: d["plan"].update(wings=4), "plan: unknown field 'wings'; valid: contacts"),
+        (lambda d: d["plan"].update(wings=4), "plan: unknown field 'wings'; valid: beats"),
         (lambda d: d["plan"]["curves"]["c"].update(array="b"), "the array 'b', which is not there"),
         (lambda d: d["plan"]["contacts"].update(times=[0.0, 0.0]), "need increasing times"),
         (lambda d: d["plan"]["contacts"].update(period=1.0), "contacts must not repeat"),
@@ -215,3 +215,14 @@ def test_a_plan_is_dynamic_if_fewer_than_three_feet_stand() -> None:
     two_feet = Timeline(balance=False).foot("FL", z=0.03, over=0.5).foot("RR", z=0.03, over=0.5)
     assert compile_timeline(two_feet.home(over=0.5), MODEL).is_dynamic
     assert not compile_timeline(load_motion("wave"), MODEL).is_dynamic
+
+
+def test_the_beats_are_saved_and_older_files_have_none(tmp_path: Path) -> None:
+    plan = compile_timeline(Timeline().bpm(120).body(roll=0.05, over=2).home(over=1), MODEL)
+    assert plan.beats == pytest.approx([0.0, 0.5, 1.0, 1.5])
+    file = save_plan(plan, tmp_path / "counted.plan", model=MODEL)
+    assert load_plan(file, model=MODEL).beats == plan.beats
+    assert load_plan(changed(file, lambda f: f["plan"].pop("beats")), model=MODEL).beats == ()
+    wrong = changed(file, lambda f: f["plan"].update(beats=[1.0, 0.5]))
+    with pytest.raises(MotionFileError, match="must rise from 0 s to"):
+        load_plan(wrong, model=MODEL)

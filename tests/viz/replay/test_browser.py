@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +11,6 @@ import pytest
 import viz
 from go2_wbc.recording import Recording
 from tests.viz.replay.browsing import DRAWN, Tab
-from viz.content import ReplayContent
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -149,33 +147,8 @@ def test_every_place_where_a_foot_came_down_has_its_footprint(
     touchdowns = int((changes[walked] > 0).sum())
     assert touchdowns > 4
     assert len(prints) >= touchdowns
-    pale, clear = (
-        browser.evaluate(
-            f"replay.seek({t}); replay.scene.steps.prints.map(one => one.material.opacity)"
-        )
-        for t in (0.2, recording.duration)
-    )
-    assert min(pale) < min(clear)
-    assert browser.evaluate("replay.scene.steps.prints.every(one => one.material.opacity > 0.5)")
-
-
-def test_beats_are_lines_on_the_time_strip(
-    recording: Recording, chromium_browser: Browser, tmp_path: Path
-) -> None:
-    read = (
-        "(() => {const c = replay.charts[0].picture; return Array.from("
-        "c.getContext('2d').getImageData(0, c.height - 40, c.width, 1).data)})()"
-    )
-    content = ReplayContent(
-        recording, beats=tuple(np.arange(0.25, recording.duration, 0.5).tolist())
-    )
-    page = viz.export_html(content, tmp_path / "beats.html", title="beats")
-    with Tab(chromium_browser) as tab:
-        tab.open(page.as_uri())
-        tab.evaluate("replay.play(false)")
-        ruled = np.array(tab.evaluate(read)).reshape(-1, 4)
-        tab.evaluate("replay.data.header.beats = []; replay.charts[0].redraw()")
-        bare = np.array(tab.evaluate(read)).reshape(-1, 4)
-        assert tab.complaints == []
-    columns = np.flatnonzero((ruled != bare).any(axis=1))
-    assert len(np.split(columns, np.flatnonzero(np.diff(columns) > 5) + 1)) == len(content.beats)
+    landed = [
+        browser.evaluate(f"replay.seek({t}); replay.scene.steps.landed.count")
+        for t in (0.2, 0.9, recording.duration)
+    ]
+    assert landed == [4, sum(start <= 0.9 for start in prints), len(prints)]

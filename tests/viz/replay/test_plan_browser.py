@@ -18,6 +18,7 @@ from viz.content import ReplayContent
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
+_BEATS = (0.25, 0.75, 1.25, 2.25)
 _BROKEN, _FINE = 1.7, 2.8
 """Times [s] at which the made-up verdict has a calf over its limit, and nothing broken."""
 
@@ -29,7 +30,13 @@ def browser(
     verdict = made_up_verdict(recording.duration)
     lower = recording.q.copy()
     lower[:, 2] += 0.03
-    content = ReplayContent(recording, verdict=verdict, ghost=replace(recording, q=lower))
+    content = ReplayContent(
+        recording,
+        verdict=verdict,
+        ghost=replace(recording, q=lower),
+        beats=_BEATS,
+        end_pose=(0.4, 0.1, 0.5),
+    )
     file = tmp_path_factory.mktemp("browser") / "plan.html"
     page = viz.export_html(content, file, title="A plan")
     with Tab(chromium_browser, offline=True) as tab:
@@ -213,6 +220,46 @@ def test_the_legend_tells_measured_from_planned(browser: Tab) -> None:
     shown = "getComputedStyle(document.querySelector('{}')).display !== 'none'"
     assert browser.evaluate(shown.format(".ghost-key"))
     assert browser.evaluate(shown.format("#who"))
+
+
+def test_the_ghost_is_called_what_it_is(browser: Tab) -> None:
+    said = "Solid: what was measured. Blue: the plan, which was checked."
+    assert browser.text("#who") == said
+    told = "replay.data.header"
+    browser.evaluate(f"{told}.is_plan = true; {told}.ghost_name = 'what was written'")
+    browser.evaluate(f"{told}.judges_ghost = false; replay.use(replay.data)")
+    assert browser.text("#who") == "Solid: the plan. Blue: what was written."
+    assert browser.evaluate("replay.scene.flags.judged() === replay.scene.flags.parts")
+    browser.evaluate(f"{told}.is_plan = false; {told}.judges_ghost = true")
+    browser.evaluate(f"{told}.ghost_name = 'the plan, which was checked'; replay.use(replay.data)")
+    assert browser.text("#who") == said
+
+
+def test_an_outline_shows_where_the_motion_is_to_end(browser: Tab) -> None:
+    goal = "replay.scene.steps.group.children.find(({name}) => name === 'goal')"
+    place = browser.evaluate(f"(({{position: p, rotation: r}}) => [p.x, p.y, r.z])({goal})")
+    assert place == pytest.approx([0.4, 0.1, 0.5])
+    browser.evaluate("replay.scrub(0); replay.scene.setView('top')")
+    shown = browser.stage()
+    browser.evaluate(f"{goal}.visible = false; replay.scrub(0)")
+    assert (np.abs(browser.stage() - shown).max(axis=2) > 20).sum() > 300
+    browser.evaluate(f"{goal}.visible = true; replay.scene.setView('corner')")
+
+
+def test_beats_are_lines_on_the_time_strip_that_never_crowd(browser: Tab) -> None:
+    browser.evaluate(
+        "window.ruled = (beats) => { const seen = [], own = replay.data.header.beats;"
+        " replay.data.header.beats = beats;"
+        " replay.charts[0].drawBeats({fillRect: (x, y) => seen.push([x, y])}, 100);"
+        " replay.data.header.beats = own; return seen; }; 0"
+    )
+    lines = browser.evaluate("ruled(replay.data.header.beats)")
+    wanted = browser.evaluate("replay.data.header.beats.map((t) => replay.charts[0].xAt(t))")
+    assert [x for x, _ in lines] == pytest.approx(wanted, abs=1.0)
+    assert lines[0][1] < lines[1][1]
+    crowd = browser.evaluate("ruled(Array.from({length: 3000}, (_, k) => k / 1000))")
+    assert np.diff([x for x, _ in crowd]).min() >= 6.0
+    assert len(crowd) > 20
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 800), (640, 860), (420, 800)])

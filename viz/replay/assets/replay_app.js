@@ -39,6 +39,9 @@ class Player {
     document.getElementById("total").textContent = ` / ${data.duration.toFixed(2)} s`;
     document.getElementById("app").classList.toggle("has-ghost", data.ghost !== null);
     document.getElementById("force-key").textContent = isPlan ? "planned force" : "measured force";
+    document.querySelector(".ghost-key").hidden = isPlan;
+    const solid = isPlan ? "the plan" : "what was measured";
+    document.getElementById("who").textContent = `Solid: ${solid}. Blue: ${data.header.ghost_name}.`;
   }
 
   cycleGhost() {
@@ -142,6 +145,7 @@ function bindControls(player) {
   each("speed", (speed) => player.setSpeed(Number(speed)));
   each("step", (frames) => player.step(Number(frames)));
   each("ghost", () => player.cycleGhost());
+  each("sound", () => player.sound.toggle());
   each("open", (name) => player.openTab(name));
   player.button.addEventListener("click", () => {
     player.play(!player.isPlaying);
@@ -161,6 +165,7 @@ function bindControls(player) {
     else if (views[key]) player.scene.setView(views[key]);
     else if (toggles[key]) player.toggle(toggles[key]);
     else if (key === "g" && player.data.ghost) player.cycleGhost();
+    else if (key === "m" && player.data.sound) player.sound.toggle();
     else if (key === "n" && player.data.annotations.length) player.jumpToNext();
     else return;
     event.preventDefault();

@@ -4,6 +4,7 @@
 const INK = "#1f2937", MUTED = "#6b7280", LINE = "#e3e8f0", ACCENT = "#2563eb", BAD = "#dc2626";
 const FONT = "Inter, system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
 const WARN = "#f59e0b", GHOST = "#7c93d6";
+const BEAT_ROOM = 7; // px, least distance of two lines of the beats
 const LANE = 9; // px, height of the strip that shows when limits are broken
 const LABEL_COLORS = ["#dbe6ff", "#fde9cf", "#d5f2e3", "#fbdcea", "#e6e0fb", "#d7eff5"];
 
@@ -94,13 +95,19 @@ class Timeline extends TimeCanvas {
   }
 
   // The beats that the motion counts in: a line for each, a longer and darker one for every fourth.
+  // Where they would crowd, only every fourth, or sixteenth ... is drawn.
   drawBeats(paint, bottom) {
-    this.data.header.beats.forEach((t, k) => {
-      const isFirst = k % 4 === 0;
-      paint.globalAlpha = isFirst ? 0.55 : 0.28;
-      paint.fillStyle = INK;
-      paint.fillRect(this.xAt(t) - 0.5, isFirst ? 22 : 26, 1, bottom - (isFirst ? 22 : 26));
-    });
+    const { beats } = this.data.header;
+    if (beats.length < 2) return;
+    const apart = (this.xAt(beats[beats.length - 1]) - this.xAt(beats[0])) / (beats.length - 1);
+    const every = 4 ** Math.max(0, Math.ceil(Math.log(BEAT_ROOM / apart) / Math.log(4)));
+    paint.fillStyle = INK;
+    for (let k = 0; k < beats.length; k += every) {
+      const isFirst = k % (4 * every) === 0;
+      const top = isFirst ? 22 : 26;
+      paint.globalAlpha = isFirst ? 0.42 : 0.2;
+      paint.fillRect(Math.round(this.xAt(beats[k])) - 0.5, top, 1, bottom - top + (isFirst ? 4 : 0));
+    }
     paint.globalAlpha = 1;
   }
 
@@ -110,7 +117,8 @@ class Timeline extends TimeCanvas {
     paint.textBaseline = "middle";
     paint.textAlign = "left";
     for (const [start, end, label] of this.data.header.labels) {
-      const [x, width] = [this.xAt(start), Math.max(this.xAt(end) - this.xAt(start) - 1.5, 1)];
+      const [x, room] = [this.xAt(start), this.xAt(end) - this.xAt(start)];
+      const width = Math.max(room - Math.min(1.5, 0.2 * room), 0.5);
       paint.fillStyle = LABEL_COLORS[names.indexOf(label) % LABEL_COLORS.length];
       roundedBox(paint, x, 0, width, height, 5);
       const text = readable(label);
@@ -166,7 +174,7 @@ class Timeline extends TimeCanvas {
     paint.lineTo(this.xAt(data.end), top + height);
     paint.fill();
     paint.globalAlpha = 1;
-    if (!data.ghost) return;
+    if (!data.ghost || data.header.is_plan) return; // forces of what was written are not known
     paint.strokeStyle = INK;
     paint.lineWidth = 1;
     paint.beginPath();
@@ -218,7 +226,7 @@ class Curve extends TimeCanvas {
 
   use(data) {
     const { style } = this;
-    const runs = data.ghost ? [data, data.ghost] : [data];
+    const runs = this.showsGhost(data) ? [data, data.ghost] : [data];
     const finite = runs.flatMap((run) => Array.from(run[style.name]))
       .filter(Number.isFinite).map((v) => v * style.scale);
     if (style.limit !== undefined) finite.push(style.limit * style.scale);
@@ -228,6 +236,11 @@ class Curve extends TimeCanvas {
     this.low = Number.isFinite(low) ? low - room : 0;
     this.high = Number.isFinite(high) ? high + room : 1;
     super.use(data);
+  }
+
+  // Of a motion that was written and not planned only the movement is known.
+  showsGhost(data) {
+    return data.ghost && (!data.header.is_plan || this.style.name === "height");
   }
 
   yAt(value) {
@@ -244,7 +257,7 @@ class Curve extends TimeCanvas {
       this.horizontal(paint, style.limit * style.scale);
       paint.setLineDash([]);
     }
-    if (data.ghost) {
+    if (this.showsGhost(data)) {
       paint.setLineDash([5, 3]);
       this.drawRun(paint, data.ghost, GHOST);
       paint.setLineDash([]);

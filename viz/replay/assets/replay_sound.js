@@ -6,6 +6,8 @@ const OUT_OF_STEP = 0.03; // s, from which on the picture follows the music
 class Sound {
   constructor() {
     this.audio = null;
+    this.isMuted = false;
+    this.button = document.querySelector("[data-sound]");
   }
 
   use(data) {
@@ -13,6 +15,15 @@ class Sound {
     if (this.audio) URL.revokeObjectURL(this.audio.src);
     const file = data.sound && new Blob([data.sound], { type: "audio/mpeg" });
     this.audio = file && new Audio(URL.createObjectURL(file));
+    if (this.audio) this.audio.muted = this.isMuted;
+    document.getElementById("app").classList.toggle("has-sound", this.audio !== null);
+  }
+
+  // Silent, but still what the picture follows.
+  toggle() {
+    this.isMuted = this.audio.muted = !this.isMuted;
+    this.button.textContent = this.isMuted ? "Sound: off" : "Sound: on";
+    this.button.classList.toggle("on", !this.isMuted);
   }
 
   // A browser lets a page sound once it was clicked; before that the picture moves alone.

@@ -1,10 +1,11 @@
 "use strict";
-// Where feet come down, and how the CoM flies: shown on the floor and in the air, for motions that
-// step or jump.
+// Where feet come down, how the CoM flies and where all ends: shown on the floor and in the air, for
+// motions that step, jump or move on.
 
 const STEP = 0.012; // m, a foot that comes down this far from where it stood has stepped
 const LEAST_STAND = 0.04; // s, a shorter stance leaves no footprint
 const PRINT = { radius: 0.024, lift: 0.001, faint: 0.25, clear: 0.8 };
+const GOAL = { room: 0.05, line: 0.008, arrow: 0.09, color: 0x2563eb, opacity: 0.32 }; // m
 const FLIGHT_COLOR = 0x7c3aed;
 
 class Steps {
@@ -15,20 +16,50 @@ class Steps {
 
   use(data) {
     const { THREE } = MeshCat;
-    const { viewer, legs } = this.scene;
     const group = new THREE.Group();
-    this.prints = legs.flatMap((_, k) => this.landings(data, k)).map(({ leg, from, x, y, z }) => {
-      const material = new THREE.MeshBasicMaterial({
-        color: data.header.leg_colors[leg], transparent: true, depthWrite: false,
-      });
-      const disc = new THREE.Mesh(new THREE.CircleGeometry(PRINT.radius, 24), material);
-      disc.position.set(x, y, z + PRINT.lift);
-      group.add(disc);
-      return { from, material };
-    });
+    this.prints = this.scene.legs.flatMap((_, k) => this.landings(data, k)).sort((a, b) => a.from - b.from);
+    this.coming = this.discs(data, PRINT.faint);
+    this.landed = this.discs(data, PRINT.clear);
+    group.add(this.coming, this.landed);
     for (const [from, to] of flights(data)) group.add(this.arc(data, from, to));
-    viewer.set_object(["meshcat", "steps"], group);
+    if (data.header.end_pose) group.add(this.goal(data));
+    this.scene.viewer.set_object(["meshcat", "steps"], group);
     this.group = group;
+  }
+
+  // A disc for every footprint, all drawn at once: a long walk has hundreds.
+  discs(data, opacity) {
+    const { THREE } = MeshCat;
+    const material = new THREE.MeshBasicMaterial({ opacity, transparent: true, depthWrite: false });
+    const discs = new THREE.InstancedMesh(
+      new THREE.CircleGeometry(PRINT.radius, 24), material, this.prints.length);
+    this.prints.forEach(({ leg, x, y, z }, k) => {
+      discs.setMatrixAt(k, new THREE.Matrix4().makeTranslation(x, y, z + PRINT.lift));
+      discs.setColorAt(k, new THREE.Color(data.header.leg_colors[leg]));
+    });
+    discs.frustumCulled = false;
+    return discs;
+  }
+
+  // Where the motion is to end: the outline of the feet as they stand at first, and an arrow ahead.
+  goal(data) {
+    const { THREE } = MeshCat;
+    const [x, y, yaw] = data.header.end_pose;
+    const reach = (axis) => Math.max(...[0, 1, 2, 3].map((leg) => Math.abs(data.feet[3 * leg + axis])));
+    const [length, width] = [reach(0) + GOAL.room, reach(1) + GOAL.room];
+    const box = (a, b) => [[a, b], [-a, b], [-a, -b], [a, -b]].map((corner) => new THREE.Vector2(...corner));
+    const frame = new THREE.Shape(box(length, width));
+    frame.holes.push(new THREE.Path(box(length - GOAL.line, width - GOAL.line)));
+    const tip = length + GOAL.arrow;
+    const arrow = new THREE.Shape([[length, 0.6 * GOAL.arrow], [tip, 0], [length, -0.6 * GOAL.arrow]]
+      .map((corner) => new THREE.Vector2(...corner)));
+    const mesh = new THREE.Mesh(new THREE.ShapeGeometry([frame, arrow]), new THREE.MeshBasicMaterial({
+      color: GOAL.color, opacity: GOAL.opacity, transparent: true, depthWrite: false, side: THREE.DoubleSide,
+    }));
+    mesh.position.set(x, y, PRINT.lift);
+    mesh.rotation.z = yaw;
+    mesh.name = "goal";
+    return mesh;
   }
 
   // Each stance of a foot whose place differs from the ones before; none if it never steps.
@@ -56,9 +87,8 @@ class Steps {
 
   show(t) {
     this.group.visible = this.scene.shown.paths;
-    for (const { from, material } of this.prints) {
-      material.opacity = t >= from ? PRINT.clear : PRINT.faint;
-    }
+    const after = this.prints.findIndex(({ from }) => t < from);
+    this.landed.count = after < 0 ? this.prints.length : after;
   }
 }
 
