@@ -84,7 +84,7 @@ def test_what_is_no_motion_to_be_near_to_is_a_failure_in_words(
 
 
 def test_physics_and_tolerance_are_checked_where_they_are_given() -> None:
-    with pytest.raises(TimelineError, match="unknown physics 'nearly'.*as_written, nearest"):
+    with pytest.raises(TimelineError, match=r"unknown physics 'nearly'.*as_written, nearest"):
         Timeline(physics="nearly")
     with pytest.raises(TimelineError, match="tolerance position must be a number above 0"):
         Timeline(tolerance=Tolerance(position=0.0, angle=deg(5)))
