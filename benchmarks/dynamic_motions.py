@@ -13,12 +13,14 @@ from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario, chosen_scenarios
 from benchmarks.session import add_options, positive, run_and_report, tasks_of
 from benchmarks.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
 from controller.cli.common import Subparsers, add_parser
 from controller.motion_measurement import FULL
+from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.reference import Anchor
@@ -56,6 +58,7 @@ class Item:
         write: makes the timeline.
         height: planned height [m] of the feet, where it is judged.
         counts_beats: whether touchdowns are compared with beats.
+        in_air: legs whose feet must be off the ground together, and for how long [s].
         done: share of the trials that must be done.
     """
 
@@ -63,6 +66,7 @@ class Item:
     write: Callable[[], Timeline]
     height: float | None = None
     counts_beats: bool = False
+    in_air: tuple[tuple[Leg, ...], float] = ((), 0.0)
     done: float = 1.0
 
 
@@ -81,23 +85,35 @@ ITEMS: dict[str, Item] = {
         lambda: Timeline().bpm(TEMPO).hop(HOPS, period=1),
         counts_beats=True,
     ),
-    "rear25": Item("rear up, trunk at -25 deg", lambda: Timeline().rear(deg(-25), hold=0.6)),
-    "rear40": Item(
-        "rear up, trunk at -40 deg", lambda: Timeline().rear(deg(-40), hold=0.6), done=0.95
+    "rear25": Item(
+        "rear up, trunk at -25 deg",
+        lambda: Timeline().rear(deg(-25), hold=0.6),
+        in_air=((Leg.FL, Leg.FR), 0.5),
     ),
-    "pair": Item("diagonal pair lifted 0.35 s", lambda: Timeline().lift(("FL", "RR"), hold=0.35)),
+    "rear40": Item(
+        "rear up, trunk at -40 deg",
+        lambda: Timeline().rear(deg(-40), hold=0.6),
+        in_air=((Leg.FL, Leg.FR), 0.5),
+        done=0.95,
+    ),
+    "pair": Item(
+        "diagonal pair lifted 0.35 s",
+        lambda: Timeline().lift(("FL", "RR"), hold=0.35),
+        in_air=((Leg.FL, Leg.RR), 0.3),
+    ),
 }
 
 
 def plant_of(trial: Trial) -> MujocoPlant:
     """A simulated robot under the conditions of the trial."""
     rng = np.random.default_rng(FIRST_SEED + trial.seed)
-    friction, mass, yaw = rng.uniform(*zip(FRICTION_RANGE, MASS_RANGE, YAW_RANGE, strict=True))
+    ranges = (FRICTION_RANGE, MASS_RANGE, YAW_RANGE)
+    friction, mass, yaw = (float(rng.uniform(*bounds)) for bounds in ranges)
     return MujocoPlant(
-        friction=float(friction),
-        mass_scale=float(mass),
+        friction=friction,
+        mass_scale=mass,
         seed=FIRST_SEED + trial.seed,
-        initial_yaw=float(yaw),
+        initial_yaw=yaw,
         initial_joint_noise=JOINT_NOISE,
     )
 
@@ -157,13 +173,24 @@ def _values(
         values[f"{name}.height"] = 1000.0 * abs(float(heights.max()) - item.height)
     if item.counts_beats:
         values[f"{name}.beat"] = 1000.0 * _beat_error(recorded)
+    legs, _ = item.in_air
+    if legs:
+        off = np.all(recorded.foot_forces[:, list(legs)] < PRESSED, axis=1)
+        values[f"{name}.air"] = _longest(recorded.time, off)
     return values
+
+
+def _longest(times: Float[np.ndarray, " n"], mask: Bool[np.ndarray, " n"]) -> float:
+    """Length [s] of the longest run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    runs = [times[min(end, len(times) - 1)] - times[start] for start, end in edges.reshape(-1, 2)]
+    return float(max(runs, default=0.0))
 
 
 def _beat_error(recorded: TruthRecording) -> float:
     """Greatest distance [s] of a touchdown of all feet from its beat; a missing one counts as 1."""
     times = recorded.time - recorded.time[0]
-    flies = (recorded.foot_forces < PRESSED).all(axis=1)
+    flies = np.all(recorded.foot_forces < PRESSED, axis=1)
     edges = np.flatnonzero(np.diff(flies.astype(int)))
     landings = [
         float(times[end + 1])
@@ -193,6 +220,9 @@ def _metrics(name: str, item: Item) -> tuple[Metric, ...]:
         found.append(Metric(f"{name}.height", title, "apex off the plan", "mm", 20.0))
     if item.counts_beats:
         found.append(Metric(f"{name}.beat", title, "touchdown off its beat", "ms", 20.0))
+    legs, least_time = item.in_air
+    if legs:
+        found.append(Metric(f"{name}.air", title, "feet off the ground", "s", least_time, least))
     return tuple(found)
 
 

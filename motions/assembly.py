@@ -49,6 +49,7 @@ Progress = Callable[[int, float], None]
 def compile_timeline(
     timeline: Timeline,
     model: RobotModel,
+    p_feet: Float[np.ndarray, "4 3"] | None = None,
     *,
     mend: Mend | None = None,
     progress: Progress | None = None,
@@ -59,6 +60,8 @@ def compile_timeline(
         timeline: what to compile.
         model: of the robot; compiling uses its data, so it must not be that of a control loop that
             runs in another thread.
+        p_feet: where the feet's centres stand at first [m], by default below the hips; the trunk
+            starts above them, with their heading.
         mend: finds the nearest feasible motion of a stretch between dynamic blocks; without it all
             is compiled as it is written. ``FeasibilityChecker.plan`` gives it where the timeline
             asks for it.
@@ -71,10 +74,12 @@ def compile_timeline(
     """
     blocks = timeline.in_order(PhaseKey)
     if not blocks and mend is None:
-        return compile_quasi_static(timeline, model)
+        return compile_quasi_static(timeline, model, p_feet)
     for block in blocks:
         _require_alone(timeline, block)
     maker = _Maker(timeline, model, mend, progress)
+    if p_feet is not None:
+        maker.start_on(p_feet)
     for block in blocks:
         maker.add_stretch(block.start, Posture.STAND)
         maker.add_block(block)
@@ -127,6 +132,10 @@ class _Maker:
         self._spans: list[DynamicSpan] = []
         self._problems: list[Problem] = []
         self._ramps: list[float] = []
+
+    def start_on(self, p_feet: Float[np.ndarray, "4 3"]) -> None:
+        """Start with the feet there [m], in the frame of the motion."""
+        self._move_on(0.0, p_feet, 0.0)
 
     def add_stretch(self, end: float, exit: Posture) -> None:
         """What is written from here to ``end`` [s]."""
