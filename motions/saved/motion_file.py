@@ -40,7 +40,6 @@ KINDS: Final[Mapping[str, type[Key]]] = {
     "joint": JointKey,
     "step": StepKey,
     "balance": BalanceShift,
-    "step": StepKey,
     "phases": PhaseKey,
     "mark": Mark,
 }

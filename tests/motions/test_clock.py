@@ -92,6 +92,6 @@ def test_a_motion_that_follows_keeps_its_own_beats() -> None:
     assert line.reverse().beats == pytest.approx([0.0, 1.0, 1.5, 2.0, 2.4, 3.4])
 
 
-@pytest.mark.parametrize("line", [Timeline().bpm(1e9).hold(1e9), Timeline().bpm(60).hold(1e12)])
-def test_beats_that_nobody_counts_are_left_out(line: Timeline) -> None:
+def test_beats_that_nobody_counts_are_left_out() -> None:
+    line = Timeline().bpm(1e9).hold(1e9)
     assert line.then(line).beats == ()
