@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,11 +24,15 @@ def browser(
     recording: Recording, chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Tab]:
     file = tmp_path_factory.mktemp("browser") / "demo.html"
-    page = viz.export_html(recording, file, title="A walk")
+    content = ReplayContent(recording, beats=_beats(recording))
+    page = viz.export_html(content, file, title="A walk")
     with Tab(chromium_browser) as tab:
         tab.open(page.as_uri())
-        tab.evaluate("replay.play(false)")
         yield tab
+
+
+def _beats(recording: Recording) -> tuple[float, ...]:
+    return tuple(np.arange(0.25, recording.duration, 0.5).tolist())
 
 
 def test_it_opens_without_a_request_or_an_error(browser: Tab) -> None:
@@ -159,23 +162,18 @@ def test_every_place_where_a_foot_came_down_has_its_footprint(
     assert browser.evaluate("replay.scene.steps.prints.every(one => one.material.opacity > 0.5)")
 
 
-def test_beats_are_lines_on_the_time_strip(
-    recording: Recording, chromium_browser: Browser, tmp_path: Path
-) -> None:
+def test_beats_are_lines_on_the_time_strip(browser: Tab, recording: Recording) -> None:
     read = (
         "(() => {const c = replay.charts[0].picture; return Array.from("
         "c.getContext('2d').getImageData(0, c.height - 40, c.width, 1).data)})()"
     )
-    content = ReplayContent(
-        recording, beats=tuple(np.arange(0.25, recording.duration, 0.5).tolist())
-    )
-    page = viz.export_html(content, tmp_path / "beats.html", title="beats")
-    with Tab(chromium_browser) as tab:
-        tab.open(page.as_uri())
-        tab.evaluate("replay.play(false)")
-        ruled = np.array(tab.evaluate(read)).reshape(-1, 4)
-        tab.evaluate("replay.data.header.beats = []; replay.charts[0].redraw()")
-        bare = np.array(tab.evaluate(read)).reshape(-1, 4)
-        assert tab.complaints == []
+    draw = "replay.data.header.beats = {}; replay.charts[0].redraw()"
+    beats = list(_beats(recording))
+    ruled = np.array(browser.evaluate(read)).reshape(-1, 4)
+    assert browser.evaluate("replay.data.header.beats") == pytest.approx(beats)
+    browser.evaluate(draw.format("[]"))
+    bare = np.array(browser.evaluate(read)).reshape(-1, 4)
+    browser.evaluate(draw.format(beats))
     columns = np.flatnonzero((ruled != bare).any(axis=1))
-    assert len(np.split(columns, np.flatnonzero(np.diff(columns) > 5) + 1)) == len(content.beats)
+    assert len(np.split(columns, np.flatnonzero(np.diff(columns) > 5) + 1)) == len(beats)
+    assert browser.complaints == []
