@@ -20,7 +20,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import types
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -59,7 +58,7 @@ def run_script(
 def _server() -> subprocess.Popen[str]:
     """One for each process of tests; it ends with its input."""
     server = subprocess.Popen(
-        [sys.executable, str(Path(__file__))],
+        [sys.executable, "-c", f"from {__name__} import serve; serve()"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
@@ -69,7 +68,8 @@ def _server() -> subprocess.Popen[str]:
     return server
 
 
-def _serve() -> None:
+def serve() -> None:
+    """Read requests, run each in a fork, answer with its exit code."""
     for library in LIBRARIES:
         with contextlib.suppress(ImportError):
             importlib.import_module(library)
@@ -101,7 +101,8 @@ def _become(request: Mapping[str, Any]) -> None:
         sys.argv, sys.path[0] = rest, request["folder"]
         runpy.run_module(rest[0], run_name="__main__", alter_sys=True)
         return
-    main = sys.modules["__main__"] = types.ModuleType("__main__")
+    main = sys.modules["__main__"]
+    del main.serve
     if first == "-c":
         sys.argv, sys.path[0] = [first, *rest[1:]], ""
         code = compile(rest[0], "<string>", "exec")
@@ -110,7 +111,3 @@ def _become(request: Mapping[str, Any]) -> None:
         sys.argv, sys.path[0] = [first, *rest], str(Path(main.__file__).parent)
         code = compile(Path(first).read_bytes(), main.__file__, "exec")
     exec(code, vars(main))
-
-
-if __name__ == "__main__":
-    _serve()

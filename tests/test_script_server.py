@@ -16,7 +16,8 @@ TELLS = """
 import atexit, os, sys, warnings
 print(__name__, sys.argv, sys.path[:2], os.getcwd(), os.environ["MARK"], sys.stdin.read())
 print(sorted(name for name in sys.modules if name.split(".")[0] in
-      ("go2_wbc", "controller", "motions", "viz", "tests")))
+      ("go2_wbc", "controller", "motions", "viz")))
+print(sorted(name for name in globals() if not name.startswith("__")))
 print(sys.modules["__main__"].__dict__ is globals(), globals().get("__file__"))
 atexit.register(print, "the end")
 print("aloud", file=sys.stderr)
