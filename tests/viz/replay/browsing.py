@@ -128,8 +128,10 @@ class Tab:
         """The 3D view now."""
         self.draw()
         left, top, right, bottom = STAGE
-        clip = {"x": left, "y": top, "width": right - left, "height": bottom - top}
-        with Image.open(io.BytesIO(self.page.screenshot(clip=clip))) as image:
+        picture = self.page.screenshot(
+            clip={"x": left, "y": top, "width": right - left, "height": bottom - top}
+        )
+        with Image.open(io.BytesIO(picture)) as image:
             return np.asarray(image.convert("RGB"), dtype=float)
 
     def __enter__(self) -> Tab:
