@@ -102,7 +102,7 @@ def _become(request: Mapping[str, Any]) -> None:
         runpy.run_module(rest[0], run_name="__main__", alter_sys=True)
         return
     main = sys.modules["__main__"]
-    del main.serve
+    vars(main).pop("serve")
     if first == "-c":
         sys.argv, sys.path[0] = [first, *rest[1:]], ""
         code = compile(rest[0], "<string>", "exec")
