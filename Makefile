@@ -31,7 +31,7 @@ demo: $(VENV)/.stamp-run ## install, then run the demo headless
 	$(BIN)/go2-wbc demo $(ARGS)
 
 test: $(VENV)/.stamp-dev ## install with the test tools, then run every test
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
+	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(ARGS)
 
 test-ros2: ## build the ROS 2 interfaces, install the extra [ros2], run its tests
 	WORKERS=$(WORKERS) ros2/test.sh $(ARGS)

@@ -18,8 +18,26 @@ from go2_wbc.kernels.loading import load_kernels
 from tests import typechecker
 
 ROOT = Path(__file__).resolve().parent.parent
-SCENARIOS = ROOT / "tests" / "scenarios"
-"""Where the longest tests are."""
+LONGEST = tuple(
+    ROOT / "tests" / name
+    for name in (
+        "scenarios/test_behaviour.py",
+        "test_examples.py",
+        "test_notebooks.py",
+        "controller/bridges/unitree/test_foreign_peers.py",
+        "test_docs.py",
+        "test_site.py",
+        "viz/replay/test_plan_browser.py",
+        "viz/replay/test_live_browser.py",
+        "viz/replay/test_browser.py",
+        "controller/test_cli_demo.py",
+        "scenarios/test_always_an_answer.py",
+        "scenarios/test_recovery.py",
+        "scenarios/test_joint_friction.py",
+    )
+)
+"""The files with the longest tests, the longest first. The workers take whole files, so that what
+a file's tests share is made once."""
 PACKAGES = ("go2_wbc", "controller", "motions", "viz")
 # Small functions and values that the control loop uses many times in a tick: checking these five
 # modules as well makes a tick half as slow again. Their callers are checked.
@@ -69,8 +87,9 @@ def checked_modules() -> list[str]:
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Files with long tests first, so that no worker is left with one when the others are done."""
+    rank = {path: place for place, path in enumerate(LONGEST)}
     slow = {item.path for item in items if item.get_closest_marker("slow")}
-    items.sort(key=lambda item: (SCENARIOS not in item.path.parents, item.path not in slow))
+    items.sort(key=lambda item: (rank.get(item.path, len(LONGEST)), item.path not in slow))
 
 
 def pytest_runtest_setup() -> None:

@@ -21,6 +21,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.script_server import run_script
+
 ROOT = Path(__file__).resolve().parent.parent
 BRIDGES = tuple(f"docs/{name}.md" for name in ("ros2", "unitree", "real_robot"))
 MADE = ("docs/reference/api/", "docs/_build/")
@@ -104,7 +106,7 @@ def command_lines(name: str) -> list[list[str]]:
 
 def run_python(text: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a Python block alone, in ``folder``."""
-    return _run(["-W", "error::DeprecationWarning:__main__", "-c", text], folder)
+    return run_script(["-c", text], folder, _environment())
 
 
 def run_command(words: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
@@ -114,24 +116,26 @@ def run_command(words: Sequence[str], folder: Path) -> subprocess.CompletedProce
         "pytest": ["-m", "pytest", "-p", "motions.pytest_plugin"],
         "python": [],
     }[words[0]]
-    return _run([*program, *words[1:]], folder)
+    arguments = [*program, *words[1:]]
+    if words[0] != "pytest":  # it takes hold of modules as they are loaded
+        return run_script(arguments, folder, _environment())
+    return subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder,
+        env=_environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
-def _run(arguments: Sequence[str], folder: Path) -> subprocess.CompletedProcess[str]:
-    environment = {
+def _environment() -> dict[str, str]:
+    return {
         **os.environ,
         "PYTHONPATH": str(ROOT),
         "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
         "COLUMNS": "80",
     }
-    return subprocess.run(
-        [sys.executable, *arguments],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
 
 
 def difference(shown: str, printed: str, tolerance: float = NEAR) -> str:

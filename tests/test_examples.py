@@ -7,10 +7,11 @@ import importlib.util
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.script_server import run_script
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "examples"
@@ -18,8 +19,6 @@ SCRIPTS = sorted(FOLDER.glob("*.py"))
 LEAST, MOST = 10, 60
 """Lines of an example."""
 FEWEST = 24
-HANGS = 600.0
-"""Time [s] after which a script counts as hanging; the longest takes 20 s of CPU."""
 NEEDS = {
     "19_log_to_a_data_frame": "pandas",
     "24_motion_in_pytest": "pytest",
@@ -91,15 +90,7 @@ def name_of(script: Path) -> str:
 
 def run(arguments: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
     """Run this Python in ``folder`` on the packages of this checkout."""
-    return subprocess.run(
-        [sys.executable, *arguments],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "100"},
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=HANGS,
-    )
+    return run_script(arguments, folder, {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "100"})
 
 
 def must_run(script: Path) -> bool:

@@ -21,8 +21,8 @@ from controller.modes import Mode
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError, ModeError
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
-from motions.authoring import parse_values
 from motions.assembly import compile_timeline
+from motions.authoring import parse_values
 from motions.feasibility.report import FeasibilityReport
 from tests.controller.fake_go2 import FakeGo2
 from tests.controller.plants import PERIOD, WatchedPlant

@@ -32,8 +32,8 @@ def test_the_page_follows_every_save(tmp_path: Path, chromium_browser: Browser) 
         file.write_text(TOO_HIGH, encoding="utf-8")
         browser.wait_for(f"{_BADGE}.includes('broken')")
         assert browser.evaluate("replay.time") == 1.0
-        assert _camera(browser) == pytest.approx(camera, abs=1e-5)
         after = browser.stage()
+        assert _camera(browser) == pytest.approx(camera, abs=1e-5)
         assert np.abs(after - before).mean() > 2.0
         assert browser.evaluate("document.querySelectorAll('.annotation.broken').length") > 0
 

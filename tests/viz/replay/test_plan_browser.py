@@ -41,7 +41,6 @@ def browser(
     page = viz.export_html(content, file, title="A plan")
     with Tab(chromium_browser, offline=True) as tab:
         tab.open(page.as_uri())
-        tab.evaluate("replay.play(false)")
         yield tab
 
 
@@ -92,11 +91,11 @@ def test_a_broken_limit_is_red_where_and_when_it_is_broken(browser: Tab) -> None
 
 def test_a_note_points_at_its_part(browser: Tab) -> None:
     browser.evaluate(f"replay.scrub({_FINE}); replay.scene.setView('corner')")
-    browser.evaluate(DRAWN)
+    browser.draw()
     browser.evaluate(f"replay.scrub({_BROKEN})")
     path = browser.evaluate("document.querySelector('#notes path').getAttribute('d')")
     x, y = (float(value) for value in path.split("L")[1].split("m")[0].split())
-    browser.evaluate(DRAWN)
+    browser.draw()
     seen = browser.evaluate(
         "(() => { const {x, y} = replay.scene.flags.placeOf('FR_calf')"
         ".project(replay.scene.viewer.camera); const pane = replay.scene.pane;"
