@@ -23,15 +23,10 @@ def browser(
     recording: Recording, chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Tab]:
     file = tmp_path_factory.mktemp("browser") / "demo.html"
-    content = ReplayContent(recording, beats=_beats(recording))
-    page = viz.export_html(content, file, title="A walk")
+    page = viz.export_html(recording, file, title="A walk")
     with Tab(chromium_browser) as tab:
         tab.open(page.as_uri())
         yield tab
-
-
-def _beats(recording: Recording) -> tuple[float, ...]:
-    return tuple(np.arange(0.25, recording.duration, 0.5).tolist())
 
 
 def test_it_opens_without_a_request_or_an_error(browser: Tab) -> None:
