@@ -166,6 +166,6 @@ class StanceMismatch(MotionError):
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
     """Message for a name that does not exist, with all that do, and the nearest."""
     names = sorted(valid)
-    nearest = get_close_matches(name, names, 1)
+    nearest = get_close_matches(str(name), names, 1)
     hint = f"; did you mean {nearest[0]!r}?" if nearest else ""
     return f"unknown {kind} {name!r}; valid: {', '.join(names)}{hint}"
