@@ -94,4 +94,4 @@ def test_a_motion_that_follows_keeps_its_own_beats() -> None:
 
 @pytest.mark.parametrize("line", [Timeline().bpm(1e9).hold(1e9), Timeline().bpm(60).hold(1e12)])
 def test_beats_that_nobody_counts_are_left_out(line: Timeline) -> None:
-    assert line.then(line).beats == ()
+    assert line.beats == ()
