@@ -72,6 +72,14 @@ def test_the_picture_follows_the_music_when_it_is_slow(tab: Tab) -> None:
     tab.evaluate("replay.play(false)")
 
 
+def test_the_music_can_be_silent_and_still_leads(tab: Tab) -> None:
+    tab.page.click("[data-sound]")
+    assert tab.evaluate("replay.sound.audio.muted")
+    assert tab.text("[data-sound]") == "Sound: off"
+    tab.page.click("[data-sound]")
+    assert not tab.evaluate("replay.sound.audio.muted")
+
+
 def test_a_page_without_music_plays_by_itself(
     recording: Recording, chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
