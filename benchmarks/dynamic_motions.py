@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -194,7 +195,7 @@ def _beat_error(recorded: TruthRecording) -> float:
     edges = np.flatnonzero(np.diff(flies.astype(int)))
     landings = [
         float(times[end + 1])
-        for start, end in zip(edges[:-1], edges[1:], strict=True)
+        for start, end in pairwise(edges.tolist())
         if flies[end] and times[end] - times[start] >= FLOWN
     ]
     beat = 60.0 / TEMPO

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from go2_wbc.robot.model import RobotModel
-from motions import FeasibilityChecker, load_motion, motion_names
-from tests.motions.mutations import MUTATORS, Fault, faults, limit_broken
+from motions import FeasibilityChecker, load_motion
+from tests.motions.mutations import MUTATORS, Fault, faults, limit_broken, slow_names
 
 COUNT, CAUGHT = 60, 58
 
@@ -34,6 +34,6 @@ def test_the_faults_are_of_every_kind_and_on_many_motions(broken: list[Fault]) -
     assert len({fault.broken for fault in broken}) >= 6
 
 
-@pytest.mark.parametrize("name", motion_names())
+@pytest.mark.parametrize("name", slow_names())
 def test_the_oracle_finds_nothing_wrong_with_the_library(model: RobotModel, name: str) -> None:
     assert limit_broken(load_motion(name), model) == ""
