@@ -43,10 +43,10 @@ FLOWN = 0.06
 TEMPO, HOPS = 120.0, 3
 SEEDS, QUICK_SEEDS = 20, 3
 EXAMPLES = """
-python -m benchmarks dynamic_motions            everything; minutes on two cores
+python -m benchmarks dynamic_motions            everything; some minutes
 python -m benchmarks dynamic_motions --quick    three seeds
 python -m benchmarks dynamic_motions --rows up turn --json
-python -m benchmarks dynamic_motions --list     the metrics and their thresholds
+python -m benchmarks dynamic_motions --list     the metrics, their thresholds
 """
 
 

@@ -134,11 +134,11 @@ def test_the_reference_names_every_method_of_the_language_with_its_arguments() -
     written = {field.name for field in dataclasses.fields(Timeline)}
     for name in (name for name in dir(Timeline) if not name.startswith("_")):
         member = inspect.getattr_static(Timeline, name)
-        if name in described:
+        if name in described and callable(member):
             shown = re.findall(r"\w+", described[name])
             real = [p for p in inspect.signature(member).parameters if p != "self"]
             assert [word for word in shown if word in real] == real, name
-        elif name not in written:
+        elif name not in written:  # a property may share its name with a call of another module
             assert re.search(rf"`{name}[`(]", text), f"{name} is not in {LANGUAGE}"
     assert len(described) >= 15
 

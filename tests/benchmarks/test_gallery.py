@@ -16,7 +16,7 @@ from motions import motion_names
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 PICTURES = DOCS / "images" / "gallery"
-MOST_BYTES = 1_000_000
+MOST_BYTES = 2_000_000
 LEAST_CONTRAST = 20.0  # of 255; a blank page has 0
 
 

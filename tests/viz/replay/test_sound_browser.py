@@ -85,6 +85,7 @@ def test_a_page_without_music_plays_by_itself(
 ) -> None:
     page = viz.export_html(recording, tmp_path_factory.mktemp("page") / "run.html", title="run")
     with Tab(chromium_browser) as opened:
+        opened.page.emulate_media(reduced_motion="no-preference")
         opened.open(page.as_uri())
         assert opened.evaluate("replay.isPlaying")
         assert opened.evaluate("replay.sound.audio === null")
