@@ -29,6 +29,8 @@ COMMAND_TIME = 60.0
 """Robot time [s] of random velocity commands, a new one each second."""
 FASTEST = (1.0, 0.4, 1.5)
 """Ahead and sideways [m/s], turning [rad/s]: the greatest of these commands."""
+REPEATS = 3
+"""How often the same walk is done."""
 TRACED_TICKS = 500
 """Ticks whose memory is traced."""
 
@@ -56,6 +58,7 @@ COMMAND_METRICS = (
     Metric("commands.median", _COMMANDS, "tick, median", "us", None),
     Metric("commands.p99", _COMMANDS, "99 of 100, by median", "", None),
     Metric("commands.worst", _COMMANDS, "worst by median", "", 5.0),
+    Metric("commands.least", _COMMANDS, "worst of the least of three runs", "", None),
     Metric("commands.bare", _COMMANDS, "of a bare loop beside it", "", None),
     Metric("commands.collections", _COMMANDS, "garbage collections", "", None),
     Metric("commands.peak", _COMMANDS, "allocated in a tick", "kB", None),
@@ -109,13 +112,40 @@ def _prepared(go2: GO2Controller, mode: str) -> Callable[[], object]:
 
 
 def measure_commands(trial: Trial) -> Measurement:
-    """The worst tick of a walk with a new command each second, and the memory that ticks take."""
+    """The worst tick of a walk with a new command each second, and the memory that ticks take.
+
+    The same walk is done several times: the least that each of its ticks took is what the code
+    needs, more is what the machine adds now and then.
+    """
+    collections: list[str] = []
+    walks = [_walked(trial, collections) for _ in range(REPEATS)]
+    spent, bare, (peak, kept) = walks[0]
+    median = float(np.median(spent))
+    ticks = min(len(walk[0]) for walk in walks)
+    least = np.min([walk[0][:ticks] for walk in walks], axis=0)
+    return Measurement(
+        {
+            "commands.median": median,
+            "commands.p99": float(np.quantile(spent, 0.99)) / median,
+            "commands.worst": float(spent.max()) / median,
+            "commands.least": float(least.max()) / float(np.median(least)),
+            "commands.bare": float(bare.max()) / float(np.median(bare)),
+            "commands.collections": float(len(collections)),
+            "commands.peak": peak / 1e3,
+            "commands.kept": kept,
+        }
+    )
+
+
+def _walked(
+    trial: Trial, collections: list[str]
+) -> tuple[np.ndarray, np.ndarray, tuple[float, float]]:
+    """Time [us] of ticks and of bare work, and what ``_memory`` says; a fresh robot."""
     ends: list[int] = []
-    passes: list[str] = []
 
     def note(phase: str, info: dict[str, int]) -> None:
         if phase == "start":
-            passes.append(str(info["generation"]))
+            collections.append(str(info["generation"]))
 
     plant, random = trial.plant(), np.random.default_rng(trial.seed)
     with (
@@ -126,19 +156,7 @@ def measure_commands(trial: Trial) -> Measurement:
         gc.callbacks.append(note)
         spent, bare = _walk(go2, random, ends)
         gc.callbacks.remove(note)
-        median = float(np.median(spent))
-        peak, kept = _memory(plant, go2, ends)
-    return Measurement(
-        {
-            "commands.median": median,
-            "commands.p99": float(np.quantile(spent, 0.99)) / median,
-            "commands.worst": float(spent.max()) / median,
-            "commands.bare": float(bare.max()) / float(np.median(bare)),
-            "commands.collections": float(len(passes)),
-            "commands.peak": peak / 1e3,
-            "commands.kept": kept,
-        }
-    )
+        return spent, bare, _memory(plant, go2, ends)
 
 
 def _walk(
