@@ -95,11 +95,15 @@ SPEED_LINES: tuple[Line, ...] = (
     Line("part.record", "part: telemetry", "{:.1f} us", "17 us"),
     Line("part.rest", "part: the rest (checks, glue)", "{:.1f} us", "71 us"),
     Line("commands.worst", "60 s of random commands: worst tick by the median", "{:.1f}"),
+    Line("commands.least", "the least of three identical runs: worst by the median", "{:.1f}"),
+    Line("commands.bare", "a bare loop beside it: worst by the median", "{:.1f}"),
     Line("commands.peak", "memory allocated in a tick, at most at a time", "{:.1f} kB"),
     Line("startup.robot.cpu", "`GO2Controller()`, with its import", "{:.2f} s", "1.17 s"),
     Line("startup.stand.cpu", "the same, and the first `stand()`", "{:.2f} s", "1.54 s"),
+    Line("startup.libraries.cpu", "numpy, Pinocchio, MuJoCo and Numba alone", "{:.2f} s"),
     Line("startup.demo.cpu", "`go2-wbc demo --no-media`", "{:.1f} s"),
     Line("realtime.missed", "500 Hz at the wall clock's pace: late ticks", "{:.2f} %"),
+    Line("realtime.bare", "a bare loop after it", "{:.2f} %"),
 )
 TABLES = {BEGIN: (HEAD, LINES), SPEED_BEGIN: (SPEED_HEAD, SPEED_LINES)}
 """Head and lines by the mark above the table."""
