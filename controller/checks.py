@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from go2_wbc.legs import LEGS, Leg
@@ -29,6 +31,9 @@ PLACE_DEVIATION = 0.03
 """Distance [m] that the tracked point may be off its plan, on the average."""
 ATTITUDE_DEVIATION = 0.1
 """Angle [rad] that the trunk may be off its plan, on the average."""
+DYNAMIC_PLACE, DYNAMIC_ATTITUDE = 0.05, math.radians(8.0)
+"""The same of plans with jumps, rears and lifts: as far as a plan may be from what was asked
+(``motions.dynamics.Tolerance``). A rear at -25 deg was up to 32 mm and 6.6 deg off."""
 JOINT_DEVIATION = 0.2
 """Angle [rad] that the worst joint of a raised leg may be off its plan, on the average."""
 END_PLACE = 0.05
@@ -105,11 +110,18 @@ def posture_measurements(snapshot: Snapshot) -> dict[str, float]:
     }
 
 
-def is_small(deviation: Deviation) -> bool:
-    """Whether the robot can be said to have done what was planned."""
+def is_small(deviation: Deviation, *, is_dynamic: bool = False) -> bool:
+    """Whether the robot can be said to have done what was planned.
+
+    Args:
+        deviation: of the motion.
+        is_dynamic: the plan has spans that are solved.
+    """
+    place = DYNAMIC_PLACE if is_dynamic else PLACE_DEVIATION
+    attitude = DYNAMIC_ATTITUDE if is_dynamic else ATTITUDE_DEVIATION
     return (
-        deviation.place < PLACE_DEVIATION
-        and deviation.attitude < ATTITUDE_DEVIATION
+        deviation.place < place
+        and deviation.attitude < attitude
         and deviation.joints < JOINT_DEVIATION
     )
 

@@ -283,7 +283,7 @@ class Pilot:
             measured |= arrival_measurements(*arrival)
             if not has_arrived(*arrival):
                 raise Aborted(f"{name} ended elsewhere: {listed(measured)}", measured)
-        if not is_small(deviation):
+        if not is_small(deviation, is_dynamic=played.plan.has_dynamic_spans):
             raise Aborted(f"{name} went another way: {listed(measured)}", measured)
         return measured
 

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.checks import is_lying, is_sitting, is_standing, posture_measurements
+from controller.checks import is_lying, is_sitting, is_small, is_standing, posture_measurements
 from go2_wbc.legs import LEGS
+from go2_wbc.planning.playback import Deviation
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
@@ -67,3 +68,20 @@ def test_a_foot_in_the_air_is_no_posture_on_four_feet(posture: Posture) -> None:
     touching = np.array([True, True, False, True])
     raised = replace(snapshot, state=replace(snapshot.state, feet_in_contact=touching))
     assert not CHECKS[posture](raised)
+
+
+@pytest.mark.parametrize(
+    ("deviation", "standing", "solved"),
+    [
+        (Deviation(place=0.02, attitude=0.05, joints=0.0), True, True),
+        (Deviation(place=0.04, attitude=0.12, joints=0.0), False, True),
+        (Deviation(place=0.06, attitude=0.0, joints=0.0), False, False),
+        (Deviation(place=0.0, attitude=0.15, joints=0.0), False, False),
+        (Deviation(place=0.0, attitude=0.0, joints=0.3), False, False),
+    ],
+)
+def test_a_solved_motion_may_be_as_far_off_as_its_plan_may_be_from_what_was_asked(
+    deviation: Deviation, *, standing: bool, solved: bool
+) -> None:
+    assert is_small(deviation) is standing
+    assert is_small(deviation, is_dynamic=True) is solved
