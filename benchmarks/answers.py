@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Float
 
 from benchmarks.pushes import PUSH_TIME
-from benchmarks.scenario import Measurement, Metric, Scenario, chosen_scenarios
-from benchmarks.session import add_options, positive, run_and_report, tasks_of
+from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.seeded import add_seeded_options, run_seeded
 from benchmarks.trials import Trial, TrialRobot
 from controller.cli.common import Subparsers, add_parser
 from controller.modes import Mode
@@ -46,7 +46,6 @@ AFTERMATH = 1.0
 """Time [s] for which a robot that gave up is watched, to see whether it reports a fall."""
 UPRIGHT = np.radians(30.0)
 """Tilt below which a robot that was damped had no reason to be: the limit of ``SafetyConfig``."""
-SEEDS, QUICK_SEEDS = 20, 3
 EXAMPLES = """
 python -m benchmarks answers            everything; minutes on two cores
 python -m benchmarks answers --quick    three seeds
@@ -210,16 +209,9 @@ def register(subparsers: Subparsers) -> None:
         "Exit code 0 if every threshold is met, 1 if one is not.",
         examples=EXAMPLES,
     )
-    parser.add_argument("--seeds", metavar="N", type=positive, help=f"default {SEEDS}")
-    parser.add_argument("--quick", action="store_true", help=f"{QUICK_SEEDS} seeds")
-    parser.add_argument(
-        "--rows", metavar="NAME", nargs="+", default=[], help="only these scenarios; see --list"
-    )
-    add_options(parser, has_jobs=True, has_list=True)
+    add_seeded_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run what was asked for, report, and say by the exit code whether all thresholds are met."""
-    scenarios = chosen_scenarios(SCENARIOS, args.rows)
-    seeds = args.seeds or (QUICK_SEEDS if args.quick else SEEDS)
-    return run_and_report(args, scenarios, tasks_of(scenarios, seeds))
+    """Run what was asked for; see ``run_seeded``."""
+    return run_seeded(args, SCENARIOS)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 
 from benchmarks import goals, high_fives, library, model, postures, sequence, slaps, trotting
-from benchmarks.scenario import Scenario, chosen_scenarios
-from benchmarks.session import add_options, positive, run_and_report, tasks_of
+from benchmarks.scenario import Scenario
+from benchmarks.seeded import add_seeded_options, run_seeded
 from controller.cli.common import Subparsers, add_parser
 
 SCENARIOS: tuple[Scenario, ...] = (
@@ -31,7 +31,6 @@ python -m benchmarks behaviour --list     the metrics and their thresholds
 python -m benchmarks behaviour --rows stand trot --jobs 4
 python -m benchmarks behaviour --json --out behaviour.json
 """
-SEEDS, QUICK_SEEDS = 20, 3
 
 
 def register(subparsers: Subparsers) -> None:
@@ -44,18 +43,9 @@ def register(subparsers: Subparsers) -> None:
         "Exit code 0 if every threshold is met, 1 if one is not.",
         examples=EXAMPLES,
     )
-    parser.add_argument(
-        "--seeds", metavar="N", type=positive, help=f"default {SEEDS}; the demo takes 5 times N"
-    )
-    parser.add_argument("--quick", action="store_true", help=f"{QUICK_SEEDS} seeds")
-    parser.add_argument(
-        "--rows", metavar="NAME", nargs="+", default=[], help="only these scenarios; see --list"
-    )
-    add_options(parser, has_jobs=True, has_list=True)
+    add_seeded_options(parser, "; the demo takes 5 times N")
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run what was asked for, report, and say by the exit code whether all thresholds are met."""
-    scenarios = chosen_scenarios(SCENARIOS, args.rows)
-    seeds = args.seeds or (QUICK_SEEDS if args.quick else SEEDS)
-    return run_and_report(args, scenarios, tasks_of(scenarios, seeds))
+    """Run what was asked for; see ``run_seeded``."""
+    return run_seeded(args, SCENARIOS)

@@ -14,8 +14,8 @@ from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario, chosen_scenarios
-from benchmarks.session import add_options, positive, run_and_report, tasks_of
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.seeded import add_seeded_options, run_seeded
 from benchmarks.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
 from controller.cli.common import Subparsers, add_parser
 from controller.motion_measurement import FULL
@@ -33,7 +33,6 @@ MASS_RANGE = (0.95, 1.05)
 """Factor on every mass and inertia of the robot; the controller is not told."""
 STEP_AHEAD, STEP_ASIDE = 0.06, 0.03
 """Greatest way [m] of a random step, in either direction."""
-SEEDS, QUICK_SEEDS = 20, 3
 ROUNDS = 3
 """Times that a walk is played."""
 EXAMPLES = """
@@ -222,16 +221,9 @@ def register(subparsers: Subparsers) -> None:
         "Exit code 0 if every threshold is met, 1 if one is not.",
         examples=EXAMPLES,
     )
-    parser.add_argument("--seeds", metavar="N", type=positive, help=f"default {SEEDS}")
-    parser.add_argument("--quick", action="store_true", help=f"{QUICK_SEEDS} seeds")
-    parser.add_argument(
-        "--rows", metavar="NAME", nargs="+", default=[], help="only these scenarios; see --list"
-    )
-    add_options(parser, has_jobs=True, has_list=True)
+    add_seeded_options(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run what was asked for, report, and say by the exit code whether all thresholds are met."""
-    scenarios = chosen_scenarios(SCENARIOS, args.rows)
-    seeds = args.seeds or (QUICK_SEEDS if args.quick else SEEDS)
-    return run_and_report(args, scenarios, tasks_of(scenarios, seeds))
+    """Run what was asked for; see ``run_seeded``."""
+    return run_seeded(args, SCENARIOS)
