@@ -39,7 +39,7 @@ JOINT_DEVIATION = 0.2
 END_PLACE = 0.05
 """Distance [m] from its planned end at which a motion that moves on may end: what is asked of a
 walk of 2 m."""
-END_HEADING = np.radians(4.0)
+END_HEADING = math.radians(4.0)
 """Angle [rad] by which its end may be turned."""
 
 

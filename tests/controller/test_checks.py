@@ -8,8 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.checks import is_lying, is_sitting, is_small, is_standing, posture_measurements
+from controller.checks import (
+    has_arrived,
+    is_lying,
+    is_sitting,
+    is_small,
+    is_standing,
+    posture_measurements,
+)
 from go2_wbc.legs import LEGS
+from go2_wbc.planning.landing import Landings
 from go2_wbc.planning.playback import Deviation
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
@@ -85,3 +93,18 @@ def test_a_solved_motion_may_be_as_far_off_as_its_plan_may_be_from_what_was_aske
 ) -> None:
     assert is_small(deviation) is standing
     assert is_small(deviation, is_dynamic=True) is solved
+
+
+@pytest.mark.parametrize(
+    ("place", "heading", "missed", "arrived"),
+    [
+        (0.04, 0.06, 0, True),
+        (0.06, 0.0, 0, False),
+        (0.0, 0.08, 0, False),
+        (0.0, 0.0, 1, False),
+    ],
+)
+def test_a_motion_that_moves_on_has_arrived_near_its_end_with_every_foot_landed(
+    place: float, heading: float, missed: int, *, arrived: bool
+) -> None:
+    assert has_arrived(place, heading, Landings(missed=missed, error=0.0)) is arrived
