@@ -17,8 +17,10 @@ if TYPE_CHECKING:
         FeasibilityReport,
         Finding,
         Playable,
+        Suggestion,
         check,
         compile_motion,
+        suggest,
     )
     from motions.music.finding import Beats, beats
     from motions.registry import find_motion, load_file, load_motion, motion_names
@@ -37,6 +39,7 @@ __all__ = [
     "Motion",
     "Playable",
     "Range",
+    "Suggestion",
     "Timeline",
     "Tolerance",
     "beats",
@@ -52,6 +55,7 @@ __all__ = [
     "motion_names",
     "save_motion",
     "save_plan",
+    "suggest",
 ]
 
 __getattr__ = lazy_exports(
@@ -67,8 +71,10 @@ __getattr__ = lazy_exports(
             "FeasibilityReport",
             "Finding",
             "Playable",
+            "Suggestion",
             "check",
             "compile_motion",
+            "suggest",
         ),
         "music.finding": ("Beats", "beats"),
         "registry": ("find_motion", "load_file", "load_motion", "motion_names"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import TypeVar
@@ -16,6 +17,7 @@ BODY_CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw")
 _FLIPPED = frozenset({"y", "roll", "yaw"})
 
 _KeyType = TypeVar("_KeyType", bound="Key")
+_BodyKeyType = TypeVar("_BodyKeyType", bound="BodyKey")
 
 
 class Frame(Enum):
@@ -86,6 +88,10 @@ class Key(ABC):
         """The same key, all times multiplied."""
         return replace(self, start=factor * self.start, end=factor * self.end)
 
+    def retimed(self: _KeyType, when: Callable[[float], float]) -> _KeyType:
+        """The same key, its instants where ``when`` puts them."""
+        return replace(self, start=when(self.start), end=when(self.end))
+
     @property
     @abstractmethod
     def track(self) -> str:
@@ -123,6 +129,10 @@ class BodyKey(Key):
         """Its offset multiplied."""
         return replace(self, value=amplitude * self.value)
 
+    def moved(self: _BodyKeyType, offset: float) -> _BodyKeyType:
+        """Its goal ``offset`` farther."""
+        return replace(self, value=self.value + offset)
+
 
 @dataclass(frozen=True, slots=True)
 class BodyPathKey(BodyKey):
@@ -140,6 +150,11 @@ class BodyPathKey(BodyKey):
         """Its offsets multiplied."""
         through = tuple(amplitude * value for value in self.through)
         return replace(self, value=amplitude * self.value, through=through)
+
+    def moved(self, offset: float) -> BodyPathKey:
+        """All that it goes through ``offset`` farther."""
+        through = tuple(value + offset for value in self.through)
+        return replace(self, value=self.value + offset, through=through)
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,6 +234,10 @@ class StepKey(Key):
         """The same key, all times multiplied."""
         start, end, since = (factor * t for t in (self.start, self.end, self.since))
         return replace(self, start=start, end=end, since=since, lead=factor * self.lead)
+
+    def retimed(self, when: Callable[[float], float]) -> StepKey:
+        """The same key, its instants where ``when`` puts them."""
+        return replace(self, start=when(self.start), end=when(self.end), since=when(self.since))
 
     def scaled(self, amplitude: float) -> StepKey:
         """Its way multiplied."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,6 +41,10 @@ class PhaseKey(Key):
             f"scale_time({factor:g}) does not work with a dynamic block, whose pace gravity sets; "
             "give its calls other numbers"
         )
+
+    def retimed(self, when: Callable[[float], float]) -> PhaseKey:
+        """The same block, started when ``when`` says; it lasts what it lasts."""
+        return self.later(when(self.start) - self.start)
 
     def scaled(self, amplitude: float) -> PhaseKey:
         """Nor do heights scale without times."""

@@ -4,6 +4,7 @@ from motions.feasibility.check import FeasibilityChecker, check
 from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import FeasibilityReport, Finding, Series
+from motions.feasibility.suggestions import Suggestion, suggest
 
 __all__ = [
     "CheckedMotion",
@@ -13,6 +14,8 @@ __all__ = [
     "Finding",
     "Playable",
     "Series",
+    "Suggestion",
     "check",
     "compile_motion",
+    "suggest",
 ]

@@ -6,8 +6,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, TypeVar
 
+from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError
-from motions.arguments import positive
+from motions.arguments import positive, quantity
 from motions.easing import backwards
 from motions.keys import (
     BalanceShift,
@@ -21,6 +22,7 @@ from motions.keys import (
 )
 from motions.language.arrangement import Arrangement
 from motions.language.clock import SAME, BeatClock
+from motions.phase_key import PhaseKey
 
 _Line = TypeVar("_Line", bound="Transforms")
 _TIMES = ("cursor", "last_start", "floor", "counted_from")
@@ -50,6 +52,55 @@ class Transforms(Arrangement):
         """
         share = positive("amplitude", amplitude)
         return replace(self, keys=tuple(key.scaled(share) for key in self.keys))
+
+    def scale_shifts(self: _Line, factor: float) -> _Line:
+        """The same motion, its moves over the feet that stay, and back, ``factor`` times as long.
+
+        What follows comes later; what goes on meanwhile takes as much longer. See ``shift_time``.
+        """
+        longer = positive("factor", factor) - 1.0
+        shifts = [
+            (key.start, key.end)
+            for key in self.keys
+            if isinstance(key, BalanceShift) and not key.is_swaying
+        ]
+
+        def when(t: float) -> float:
+            return t + longer * sum(min(max(t - start, 0.0), end - start) for start, end in shifts)
+
+        return replace(
+            self,
+            keys=tuple(key.retimed(when) for key in self.keys),
+            clock=BeatClock(tuple(map(when, self.clock.instants))),
+            shift_time=(1.0 + longer) * self.shift_time,
+            counted=tuple(map(when, self.counted)),
+            **{name: when(getattr(self, name)) for name in _TIMES},
+        )
+
+    def shift_height(self: _Line, z: float) -> _Line:
+        """The same motion with the trunk ``z`` [m] higher; negative: lower.
+
+        It goes there in the first move and comes back in the last.
+
+        Raises:
+            TimelineError: of a motion of fewer than two moves, one after the other, or with a
+                dynamic block, which starts and ends at its own height.
+        """
+        offset, moves = quantity("z", z), [key for key in self.keys if not isinstance(key, Mark)]
+        first = min(moves, key=lambda key: (key.start, -key.end), default=None)
+        last = max(moves, key=lambda key: (key.end, -key.start), default=None)
+        if first is None or last is None or last.start < first.end - SAME:
+            raise TimelineError("shift_height() needs two moves, one after the other")
+        if any(isinstance(key, PhaseKey) for key in moves):
+            raise TimelineError("shift_height() does not work with a dynamic block")
+        heights = [key for key in moves if isinstance(key, BodyKey) and key.channel == "z"]
+        before = [key for key in heights if key.end <= last.start + SAME]
+        keys: list[Key] = [key for key in self.keys if key not in before]
+        keys += [key.moved(offset) for key in before]
+        for move, goal in ((first, offset), (last, self.body_value("z"))):
+            if not any(key.start < move.end and move.start < key.end for key in heights):
+                keys.append(BodyKey(move.start, move.end, Ease.MINIMUM_JERK, "z", goal))
+        return replace(self, keys=tuple(keys))
 
     def reverse(self: _Line) -> _Line:
         """The same motion backwards; it must end at home.

@@ -67,6 +67,24 @@ def test_check_prints_a_table_for_one_motion_and_a_line_each_for_more(
     assert "no   fall_over" in capsys.readouterr().out
 
 
+def test_check_says_what_would_make_a_motion_feasible(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    hasty = tmp_path / "hasty.py"
+    hasty.write_text(
+        "from motions import Timeline, deg, motion\n\n\n@motion\ndef hasty() -> Timeline:\n"
+        '    """Too fast."""\n    return Timeline().body(roll=deg(25), over=0.2).home(over=0.2)\n'
+    )
+    assert main(["check", str(hasty), "bow", "--fix"]) == ExitCode.FAILED
+    said = capsys.readouterr().out
+    assert "hasty is feasible with one of these appended" in said
+    assert "    .scale_time(" in said
+    assert max(map(len, said.splitlines())) <= 80
+    assert main(["check", str(hasty), "--fix", "--json"]) == ExitCode.FAILED
+    (report,) = json.loads(capsys.readouterr().out)
+    assert {one["kind"] for one in report["suggestions"]} == {"tempo", "amplitude"}
+
+
 def test_check_gives_json_with_every_margin(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "high_five", "--set", "side=left", "--json"]) == ExitCode.OK
     (report,) = json.loads(capsys.readouterr().out)

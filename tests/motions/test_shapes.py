@@ -119,6 +119,30 @@ def test_half_the_amplitude_is_half_the_way() -> None:
     assert half_path.keys == Timeline().body_path([{"x": 0.01}, {"x": 0.02}], over=1.0).keys
 
 
+def test_a_trunk_that_is_shifted_in_height_keeps_its_own_moves_of_height() -> None:
+    low, middle, high = 1 / 128, 2 / 128, 3 / 128  # exact in binary
+    line = Timeline().body(z=high, over=1.0).body(pitch=0.1, over=1.0).home(over=1.0)
+    lower = Timeline().body(z=low, over=1.0).body(pitch=0.1, over=1.0).home(over=1.0)
+    assert written(line.shift_height(-middle)) == written(lower)
+    path = Timeline().body_path([{"z": low}, {"z": middle}], over=1.0).home(over=1.0)
+    moved = Timeline().body_path([{"z": middle}, {"z": high}], over=1.0).home(over=1.0)
+    assert written(path.shift_height(low)) == written(moved)
+
+
+def test_longer_shifts_delay_what_follows_and_stretch_what_goes_on_meanwhile() -> None:
+    line = Timeline(shift_time=0.5).body(pitch=0.1, over=0.5).also()
+    short = Timeline(shift_time=0.5).foot("FR", z=0.05, over=0.7).hold(0.2).home(over=0.7)
+    long = Timeline(shift_time=1.0).foot("FR", z=0.05, over=0.7).hold(0.2).home(over=0.7)
+    twice = short.scale_shifts(2.0)
+    assert twice.keys[:3] == long.keys[:3]
+    assert twice.end == pytest.approx(long.end + 0.7)  # the way back takes longer too
+    assert line.foot("FR", z=0.05, over=0.7).scale_shifts(1.0).keys == (
+        line.foot("FR", z=0.05, over=0.7).keys
+    )
+    walked = Timeline().walk(x=0.1).foot("FR", z=0.05, over=0.7).home(over=0.7)
+    assert walked.scale_shifts(2.0).end_pose == pytest.approx(walked.end_pose)
+
+
 def test_backwards_a_motion_passes_the_same_places_in_turn() -> None:
     path = Timeline().body_path([{"x": 0.02}, {"x": -0.02}, {"x": 0.0}], over=2.0)
     for line in (NOD, WAVE, path):
@@ -167,6 +191,11 @@ def test_a_loop_is_as_many_whole_rounds_as_fit() -> None:
         (lambda: NOD.body(x=0.01, over=1.0, ease=lambda s: math.nan), "finite number"),
         (lambda: NOD.body(x=0.01, over=1.0, ease="minimum_jrek"), "minimum_jerk"),
         (lambda: NOD.scale_time(0.0), "above 0"),
+        (lambda: NOD.scale_shifts(-1.0), "above 0"),
+        (lambda: NOD.shift_height(3.0), "3"),
+        (lambda: Timeline().body(z=0.01, over=1.0).shift_height(0.01), "two moves"),
+        (lambda: Timeline().hold(1.0).shift_height(0.01), "two moves"),
+        (lambda: NOD.jump(height=0.1).shift_height(0.01), "dynamic block"),
         (lambda: NOD.scale(math.inf), "above 0"),
         (lambda: NOD.body(x=0.01, over=1.0).reverse(), "end at home"),
         (lambda: NOD.loop(until=1.0), "less than the motion takes"),

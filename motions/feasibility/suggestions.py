@@ -1,0 +1,217 @@
+"""What would make a refused motion feasible: the least change of tempo, size, height or shifts.
+
+Each kind of change is a call that the author can append to the motion. Its number is searched on a
+grid as coarse as what is printed: up a ladder until the check passes, then by bisection between the
+last number that was refused and the first that was not. So what is suggested is what was checked.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from go2_wbc.errors import CommandError, MotionError, TimelineError
+from motions.feasibility.check import FeasibilityChecker
+from motions.feasibility.checked_motion import Playable, timeline_of
+from motions.feasibility.report import FeasibilityReport
+from motions.keys import BalanceShift
+from motions.timeline import Timeline
+
+
+@dataclass(frozen=True, slots=True)
+class Suggestion:
+    """A change that makes a motion feasible, and the least of its kind.
+
+    Attributes:
+        kind: "tempo", "amplitude", "height", "shift time" or "tempo and amplitude".
+        call: what to append to the motion, as Python.
+        meaning: the same in words.
+        change: how large it is, as a share of the largest of its kind that is tried.
+        motion: the changed motion.
+        report: what the check says of it.
+    """
+
+    kind: str
+    call: str
+    meaning: str
+    change: float
+    motion: Timeline
+    report: FeasibilityReport
+
+    def __str__(self) -> str:
+        """A line to paste, with what it does."""
+        return f"{self.call:<32} # {self.meaning}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {
+            "kind": self.kind,
+            "call": self.call,
+            "meaning": self.meaning,
+            "duration": self.report.duration,
+            "end_pose": self.report.end_pose,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """One kind of change.
+
+    Attributes:
+        name: see ``Suggestion.kind``.
+        ladder: numbers of steps that are tried, increasing.
+        call: the call of a number of steps, as Python.
+        meaning: in words, of a number of steps and the duration [s] before.
+        apply: makes it.
+    """
+
+    name: str
+    ladder: Sequence[int]
+    call: Callable[[int], str]
+    meaning: Callable[[int, float], str]
+    apply: Callable[[Timeline, int], Timeline]
+
+
+def _slower(steps: int) -> float:
+    return round(1.0 + steps / 100, 2)
+
+
+def _smaller(steps: int) -> float:
+    return round(1.0 - steps / 100, 2)
+
+
+def _higher(steps: int) -> float:
+    return round(steps / 1000, 3)
+
+
+def _pace_for(steps: int) -> float:
+    return round(1.0 / _smaller(steps), 2)
+
+
+_RISE = (5, 10, 15, 20, 30, 40, 60, 80)
+"""mm; own choice: the trunk stands 0.29 m high."""
+_SHARES = (2, 5, 10, 15, 20, 30, 40, 50, 60, 70, 80, 90)
+"""Per cent."""
+_LONGER = (2, 5, 10, 20, 30, 40, 50, 75, 100, 150, 200, 300)
+"""Per cent."""
+
+TEMPO = _Kind(
+    "tempo",
+    _LONGER,
+    lambda steps: f".scale_time({_slower(steps):g})",
+    lambda steps, before: f"slower: {before * _slower(steps):.1f} s instead of {before:.1f} s",
+    lambda line, steps: line.scale_time(_slower(steps)),
+)
+AMPLITUDE = _Kind(
+    "amplitude",
+    _SHARES,
+    lambda steps: f".scale({_smaller(steps):g})",
+    lambda steps, _: f"all moves smaller by {steps} %",
+    lambda line, steps: line.scale(_smaller(steps)),
+)
+HIGHER = _Kind(
+    "height",
+    _RISE,
+    lambda steps: f".shift_height({_higher(steps):g})",
+    lambda steps, _: f"the trunk higher by {steps} mm",
+    lambda line, steps: line.shift_height(_higher(steps)),
+)
+LOWER = _Kind(
+    "height",
+    _RISE,
+    lambda steps: f".shift_height({-_higher(steps):g})",
+    lambda steps, _: f"the trunk lower by {steps} mm",
+    lambda line, steps: line.shift_height(-_higher(steps)),
+)
+SHIFT_TIME = _Kind(
+    "shift time",
+    _LONGER,
+    lambda steps: f".scale_shifts({_slower(steps):g})",
+    lambda steps, _: f"{steps} % more time to move over the feet that stay",
+    lambda line, steps: line.scale_shifts(_slower(steps)),
+)
+BOTH = _Kind(
+    "tempo and amplitude",
+    _SHARES,
+    lambda steps: f".scale({_smaller(steps):g}).scale_time({_pace_for(steps):g})",
+    lambda steps, before: f"smaller by {steps} % and slower: {before * _pace_for(steps):.1f} s",
+    lambda line, steps: line.scale(_smaller(steps)).scale_time(_pace_for(steps)),
+)
+
+
+def suggest(
+    motion: Playable, *, checker: FeasibilityChecker | None = None
+) -> tuple[Suggestion, ...]:
+    """The least changes that make ``motion`` feasible, of each kind, the smallest first.
+
+    Nothing is suggested for a motion that is feasible. If no kind alone is enough, the motion is
+    made smaller and slower at once; if that is not enough either, there is no suggestion.
+
+    Args:
+        motion: a name of the library, a motion, a timeline, or the file of a saved motion.
+        checker: what checks, with its robot and limits; by default the installed Go2.
+
+    Raises:
+        CommandError: for an unknown name, or for a plan, which has no calls to change.
+    """
+    line, checker = timeline_of(motion), checker or FeasibilityChecker()
+    if line is None:
+        raise CommandError(
+            "suggest() needs a motion as it is written, a name, a function with @motion before it "
+            f"or a Timeline, got {type(motion).__name__}"
+        )
+    if _report(line, checker) is not None:
+        return ()
+    alone = [_least(line, kind, checker) for kind in (TEMPO, AMPLITUDE, HIGHER, LOWER, SHIFT_TIME)]
+    found = [one for one in alone if one is not None]
+    if not found:
+        found = [one for one in [_least(line, BOTH, checker)] if one is not None]
+    return tuple(sorted(found, key=lambda one: one.change))
+
+
+def _least(line: Timeline, kind: _Kind, checker: FeasibilityChecker) -> Suggestion | None:
+    """The least change of one kind after which ``line`` passes, if there is any."""
+    if kind is SHIFT_TIME and not any(isinstance(key, BalanceShift) for key in line.keys):
+        return None
+
+    def tried(steps: int) -> Suggestion | None:
+        changed = kind.apply(line, steps)
+        if (report := _report(changed, checker)) is None:
+            return None
+        meaning, share = kind.meaning(steps, line.end), steps / kind.ladder[-1]
+        return Suggestion(kind.name, kind.call(steps), meaning, share, changed, report)
+
+    try:
+        return _first(tried, kind.ladder)
+    except TimelineError:  # the motion has calls that this cannot change
+        return None
+
+
+def _first(tried: Callable[[int], Suggestion | None], ladder: Sequence[int]) -> Suggestion | None:
+    """Up the ``ladder`` to the first that passes, then by bisection to the least."""
+    refused = 0
+    for steps in ladder:
+        if (best := tried(steps)) is not None:
+            break
+        refused = steps
+    else:
+        return None
+    while steps - refused > 1:
+        middle = (refused + steps) // 2
+        if (less := tried(middle)) is None:
+            refused = middle
+        else:
+            best, steps = less, middle
+    return best
+
+
+def _report(line: Timeline, checker: FeasibilityChecker) -> FeasibilityReport | None:
+    """What the check says of ``line`` if it passes."""
+    try:
+        report = checker.check(line)
+    except TimelineError:
+        raise
+    except MotionError:  # no plan was found: not feasible
+        return None
+    return report if report.ok else None
