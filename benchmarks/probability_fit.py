@@ -1,0 +1,186 @@
+"""Fits the model of ``motions.feasibility.probability`` to outcomes, and judges its calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.optimize import minimize
+from scipy.special import expit, log_expit
+
+from motions.feasibility.probability import ProbabilityModel, Rise
+
+LEAST_SAMPLES = 20
+"""Runs in which a check must have looked at something for its curve to be fitted."""
+CENTRE_SPREAD = 1.0
+"""Standard deviation of a centre about 0 before anything is seen, in spreads of the margin."""
+USUAL_WIDTH = 0.1
+"""Width before anything is seen, in spreads of the margin."""
+WIDTH_SPREAD = 1.5
+"""Standard deviation of the logarithm of a width before anything is seen."""
+REST_SPREAD = 5.0
+"""Standard deviation of the log odds of the rest."""
+BINS = 10
+RESAMPLES = 1000
+_LEAST = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One motion in one world.
+
+    Attributes:
+        motion: which motion; runs of one are not independent.
+        margins: the least margin of every check.
+        is_done: whether it was done.
+    """
+
+    motion: str
+    margins: Mapping[str, float]
+    is_done: bool
+
+
+def fit(samples: Sequence[Sample]) -> ProbabilityModel:
+    """The model of greatest posterior density (MAP), by L-BFGS.
+
+    Log likelihood of outcomes y in {0, 1} with P of the model, plus normal priors on each centre,
+    on the logarithm of each width, and on the rest. Margins are taken in their own spread (10th to
+    90th percentile), so that priors are of no unit.
+    """
+    names = _fitted_names(samples)
+    margins = _table(samples, names)
+    low, high = np.nanpercentile(margins, [10.0, 90.0], axis=0)
+    spread = np.maximum(high - low, _LEAST + 1e-3 * np.abs(high))
+    x = margins / spread
+    done = np.array([sample.is_done for sample in samples])
+    start = np.concatenate([np.zeros(len(names)), np.full(len(names), np.log(USUAL_WIDTH)), [3.0]])
+    found = minimize(_loss, start, args=(x, done), jac=True, method="L-BFGS-B")
+    centres, widths, rest = _split(found.x, len(names))
+    rises = {
+        name: Rise(float(centre * unit), float(width * unit))
+        for name, centre, width, unit in zip(names, centres, widths, spread, strict=True)
+    }
+    return ProbabilityModel(rises, float(rest))
+
+
+def _fitted_names(samples: Sequence[Sample]) -> list[str]:
+    counts: dict[str, int] = {}
+    for sample in samples:
+        for name, margin in sample.margins.items():
+            counts[name] = counts.get(name, 0) + bool(np.isfinite(margin))
+    return sorted(name for name, count in counts.items() if count >= LEAST_SAMPLES)
+
+
+def _table(samples: Sequence[Sample], names: Sequence[str]) -> Float[np.ndarray, "n k"]:
+    return np.array([[s.margins.get(name, np.nan) for name in names] for s in samples])
+
+
+def _split(
+    parameters: Float[np.ndarray, " p"], k: int
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], float]:
+    return parameters[:k], np.exp(parameters[k : 2 * k]), float(parameters[2 * k])
+
+
+def _loss(
+    parameters: Float[np.ndarray, " p"], x: Float[np.ndarray, "n k"], done: Bool[np.ndarray, " n"]
+) -> tuple[float, Float[np.ndarray, " p"]]:
+    """The negative log posterior and its gradient.
+
+    With z = (x - c) / w and L = log P = log s(b) + sum log s(z):
+    d log s(z) / dz = s(-z), and for a run that failed d log(1 - P) / dL = -P / (1 - P).
+    """
+    k = x.shape[1]
+    centres, widths, rest = _split(parameters, k)
+    is_seen = np.isfinite(x)
+    z = np.where(is_seen, (np.nan_to_num(x) - centres) / widths, 0.0)
+    log_p = log_expit(rest) + np.where(is_seen, log_expit(z), 0.0).sum(axis=1)
+    log_p = np.minimum(log_p, -_LEAST)
+    p = np.exp(log_p)
+    log_q = np.log1p(-p)
+    likelihood = np.where(done, log_p, log_q).sum()
+    pull = np.where(done, 1.0, -p / (1.0 - p))  # d likelihood / d log p
+    slope = pull[:, None] * np.where(is_seen, expit(-z), 0.0)
+    d_centre = -(slope / widths).sum(axis=0)
+    d_width = -(slope * z).sum(axis=0)  # of the logarithm of the width
+    d_rest = float((pull * expit(-rest)).sum())
+    away = (parameters[k : 2 * k] - np.log(USUAL_WIDTH)) / WIDTH_SPREAD
+    prior = (
+        0.5 * float(((centres / CENTRE_SPREAD) ** 2).sum())
+        + 0.5 * float((away**2).sum())
+        + 0.5 * (rest / REST_SPREAD) ** 2
+    )
+    gradient = np.concatenate(
+        [
+            -d_centre + centres / CENTRE_SPREAD**2,
+            -d_width + away / WIDTH_SPREAD,
+            [-d_rest + rest / REST_SPREAD**2],
+        ]
+    )
+    return prior - float(likelihood), gradient
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """How well chances foretell outcomes.
+
+    Attributes:
+        error: expected calibration error in 10 bins of equal width (Naeini et al., AAAI 2015).
+        error_interval: of 95 %, by resampling motions (bootstrap).
+        brier: mean squared difference of chance and outcome (Brier, 1950).
+        brier_of_base_rate: the same of one who always says the share of motions done.
+        bins: of each bin that holds any: mean chance, share done, runs.
+    """
+
+    error: float
+    error_interval: tuple[float, float]
+    brier: float
+    brier_of_base_rate: float
+    bins: tuple[tuple[float, float, int], ...]
+
+
+def calibration(
+    chances: Float[np.ndarray, " n"],
+    done: Bool[np.ndarray, " n"],
+    motions: Sequence[str],
+    *,
+    seed: int = 0,
+) -> Calibration:
+    """Compare chances with outcomes; runs of one motion are resampled together."""
+    rng = np.random.default_rng(seed)
+    names, owner = np.unique(np.array(motions), return_inverse=True)
+    rows = [np.flatnonzero(owner == number) for number in range(len(names))]
+    errors = []
+    for _ in range(RESAMPLES):
+        drawn = np.concatenate([rows[i] for i in rng.integers(len(rows), size=len(rows))])
+        errors.append(_error(_bins(chances[drawn], done[drawn])))
+    low, high = np.percentile(errors, [2.5, 97.5])
+    rate = done.mean()
+    bins = _bins(chances, done)
+    return Calibration(
+        error=_error(bins),
+        error_interval=(float(low), float(high)),
+        brier=float(((chances - done) ** 2).mean()),
+        brier_of_base_rate=float(rate * (1.0 - rate)),
+        bins=bins,
+    )
+
+
+def _bins(
+    chances: Float[np.ndarray, " n"], done: Bool[np.ndarray, " n"]
+) -> tuple[tuple[float, float, int], ...]:
+    number: Int[np.ndarray, " n"] = np.minimum((chances * BINS).astype(int), BINS - 1)
+    found = []
+    for index in range(BINS):
+        inside = number == index
+        if inside.any():
+            found.append(
+                (float(chances[inside].mean()), float(done[inside].mean()), int(inside.sum()))
+            )
+    return tuple(found)
+
+
+def _error(bins: tuple[tuple[float, float, int], ...]) -> float:
+    total = sum(count for *_, count in bins)
+    return sum(count * abs(chance - share) for chance, share, count in bins) / total
