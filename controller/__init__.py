@@ -9,10 +9,16 @@ from go2_wbc.lazy import lazy_exports
 if TYPE_CHECKING:
     from controller.go2_controller import GO2Controller
     from controller.modes import Mode, Outcome
+    from controller.sweeps.run import sweep
 
-__all__ = ["GO2Controller", "Mode", "Outcome"]
+__all__ = ["GO2Controller", "Mode", "Outcome", "sweep"]
 
 
 __getattr__ = lazy_exports(
-    __name__, {"go2_controller": ("GO2Controller",), "modes": ("Mode", "Outcome")}
+    __name__,
+    {
+        "go2_controller": ("GO2Controller",),
+        "modes": ("Mode", "Outcome"),
+        "sweeps.run": ("sweep",),
+    },
 )

@@ -9,6 +9,7 @@
     ├── ModeError               a call that the present mode does not allow
     ├── ClosedError             a call after close()
     ├── BridgeError             other middleware cannot be reached or used
+    ├── SweepError              a run over seeds cannot begin or go on; says what is kept
     ├── QpError
     │   ├── QpInfeasible        no solution satisfies the constraints; carries residuals
     │   └── SolverUnavailable   unknown or uninstalled QP solver; lists the valid ones
@@ -67,6 +68,10 @@ class ClosedError(Go2WbcError):
 
 class BridgeError(Go2WbcError):
     """Other middleware cannot be reached or used; says why."""
+
+
+class SweepError(Go2WbcError):
+    """A run over seeds cannot begin or go on; says why, and that the finished rows are kept."""
 
 
 class QpError(Go2WbcError):

@@ -36,13 +36,18 @@ FENCES: dict[str, tuple[str, ...]] = {
     "soundfile": ("motions/music/*",),
     "rclpy": ("controller/bridges/*",),
     "cyclonedds": ("controller/bridges/*",),
+    "ray": ("controller/sweeps/ray_engine.py",),
+    "pyarrow": ("controller/sweeps/export.py",),
+    "sqlite3": ("controller/sweeps/sweep_file.py",),
 }
 """The only files that may import each of these libraries."""
 
 DISTRIBUTIONS = {"pinocchio": "pin", "PIL": "pillow", "collada": "pycollada"}
 """What to install for an import name, where the two differ."""
 
-OPTIONAL = frozenset({"rclpy", "cyclonedds", "pytest", "crocoddyl", "librosa", "soundfile"})
+OPTIONAL = frozenset(
+    {"rclpy", "cyclonedds", "pytest", "crocoddyl", "librosa", "soundfile", "ray", "pyarrow"}
+)
 """Libraries that are imported only by those who have them; their fences keep them apart."""
 
 PRINTERS = (

@@ -9,7 +9,9 @@ from go2_wbc.lazy import lazy_exports
 if TYPE_CHECKING:
     from viz.content import Annotation, MarginCurve, ReplayContent, Verdict
     from viz.render.animation import ANIMATION_SUFFIXES, export_animation
-    from viz.render.margin_plot import PLOT_SUFFIXES, export_plot, margin_figure
+    from viz.render.distribution_plot import export_distributions
+    from viz.render.figure_style import PLOT_SUFFIXES
+    from viz.render.margin_plot import export_plot, margin_figure
     from viz.render.still import export_filmstrip
     from viz.replay.html_page import HTML_SUFFIXES, export_html
 
@@ -22,6 +24,7 @@ __all__ = [
     "ReplayContent",
     "Verdict",
     "export_animation",
+    "export_distributions",
     "export_filmstrip",
     "export_html",
     "export_plot",
@@ -33,7 +36,9 @@ __getattr__ = lazy_exports(
     {
         "content": ("Annotation", "MarginCurve", "ReplayContent", "Verdict"),
         "render.animation": ("ANIMATION_SUFFIXES", "export_animation"),
-        "render.margin_plot": ("PLOT_SUFFIXES", "export_plot", "margin_figure"),
+        "render.distribution_plot": ("export_distributions",),
+        "render.figure_style": ("PLOT_SUFFIXES",),
+        "render.margin_plot": ("export_plot", "margin_figure"),
         "render.still": ("export_filmstrip",),
         "replay.html_page": ("HTML_SUFFIXES", "export_html"),
     },

@@ -52,6 +52,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("preview", "controller.cli.motion_preview", "watch a motion, live in the browser"),
     Command("ros2", "controller.cli.ros2", "the simulated robot as a ROS 2 node"),
     Command("run", "controller.cli.motion_run", "check a motion, then play it in MuJoCo"),
+    Command("sweep", "controller.cli.sweep", "a motion, a gait or a function over many seeds"),
     Command("teleop", "controller.cli.teleop", "drive the robot with the keyboard"),
     Command("unitree-drive", "controller.cli.unitree_drive", "drive a Go2 through its low level"),
     Command("unitree-sim", "controller.cli.unitree_sim", "simulate a Go2 for Unitree's SDK"),

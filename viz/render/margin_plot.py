@@ -5,9 +5,7 @@ Draws on a ``Figure`` of its own, without pyplot: no window system, and no state
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
-from typing import Any
 
 import matplotlib
 import numpy as np
@@ -15,27 +13,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from go2_wbc.errors import ConfigError
-from go2_wbc.files import checked_output, write_atomically
+from go2_wbc.files import checked_output
 from viz.content import MarginCurve, Verdict
-from viz.palette import ACCENT, ALARM, BROKEN_FILL, GOOD, INK, MUTED, TIGHT, TRACK
+from viz.palette import ACCENT, ALARM, BROKEN_FILL, GOOD, INK, MUTED, TIGHT
+from viz.render.figure_style import PLOT_SUFFIXES, STYLE, save_figure
 
-PLOT_SUFFIXES = (".svg", ".png", ".pdf")
 _COLUMNS = 3
 _PANEL = (3.6, 1.75)  # [inch] width and height of one curve with its words
 _HEAD, _FOOT = 1.05, 0.45  # [inch] above and below the curves
 _ZERO_SHARE = 0.22  # least share of a curve's height below the limit, so that it shows
 _ABOVE, _BELOW = "#f6f8fc", "#fdeeee"
-_STYLE: dict[Any, Any] = {
-    "font.family": "sans-serif",
-    "font.size": 8.0,
-    "svg.fonttype": "none",  # words stay words: they can be searched and copied
-    "svg.hashsalt": "go2_wbc",  # the same verdict gives the same file
-    "axes.edgecolor": TRACK,
-    "axes.labelcolor": MUTED,
-    "xtick.color": MUTED,
-    "ytick.color": MUTED,
-}
-_UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {"Software": None}}
 
 
 def export_plot(verdict: Verdict, path: Path, *, title: str) -> Path:
@@ -53,11 +40,7 @@ def export_plot(verdict: Verdict, path: Path, *, title: str) -> Path:
         ConfigError: for a path that cannot be written, or a verdict without a curve.
     """
     target = checked_output(path, PLOT_SUFFIXES)
-    figure = margin_figure(verdict, title=title)
-    kind, stream = target.suffix[1:].lower(), io.BytesIO()
-    with matplotlib.rc_context(_STYLE):
-        figure.savefig(stream, format=kind, dpi=160, metadata=_UNDATED[kind])
-    return write_atomically(target, stream.getvalue())
+    return save_figure(margin_figure(verdict, title=title), target)
 
 
 def margin_figure(verdict: Verdict, *, title: str) -> Figure:
@@ -72,7 +55,7 @@ def margin_figure(verdict: Verdict, *, title: str) -> Figure:
     rows = -(-len(curves) // _COLUMNS)
     width, height = _COLUMNS * _PANEL[0], _HEAD + rows * _PANEL[1] + _FOOT
     end = max(float(curve.time[-1]) for curve in curves)
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(width, height))
         grid = figure.add_gridspec(rows, _COLUMNS, wspace=0.24, hspace=0.72)
         grid.update(left=0.6 / width, right=1 - 0.25 / width)

@@ -1,0 +1,211 @@
+"""``sweep``: a function of a seed over many seeds, in many processes, its rows kept as they end."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from controller.sweeps.engine import Engine, Failure
+from controller.sweeps.local import LocalEngine, processors
+from controller.sweeps.rows import Columns, Row
+from controller.sweeps.sweep_file import SweepFile
+from controller.sweeps.targets import about_of, job_of, target_of
+from go2_wbc.errors import CommandError, SweepError, unknown_name
+
+FOLDER = Path("out/sweeps")
+"""Where rows are kept if nothing else is said."""
+ENGINES = ("local", "ray")
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a sweep has come.
+
+    Attributes:
+        done: seeds that have ended, those of earlier runs among them.
+        total: seeds that were asked for.
+        rate: seeds a second, in this run.
+        failure: why the seed that ended last has no row, or None.
+    """
+
+    done: int
+    total: int
+    rate: float
+    failure: Failure | None = None
+
+    @property
+    def share(self) -> float:
+        """What is done, 0 to 1."""
+        return self.done / self.total
+
+    @property
+    def remaining(self) -> float:
+        """Time [s] that the rest will take at this rate; infinite before the first seed."""
+        return (self.total - self.done) / self.rate if self.rate else math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class SweepResult:
+    """The rows of a sweep.
+
+    Attributes:
+        path: of the file that keeps them.
+        name: of what was swept.
+        columns: names and kinds of the values.
+        rows: in the order of their seeds, which are the first value of each.
+        failures: why seeds gave no row.
+    """
+
+    path: Path
+    name: str
+    columns: Columns
+    rows: list[Row]
+    failures: dict[int, str]
+
+
+def sweep(
+    what: object,
+    n: int = 1000,
+    *,
+    first_seed: int = 0,
+    workers: int | None = None,
+    engine: str = "local",
+    address: str | None = None,
+    out: Path | str | None = None,
+    fresh: bool = False,
+    keep_going: bool = False,
+    on_progress: Callable[[Progress], None] = lambda progress: None,
+) -> SweepResult:
+    """Run ``what`` over ``n`` seeds, each in a worker process, and keep every row at once.
+
+    A sweep that was interrupted, however that came, goes on where it ended: call it again. The rows
+    depend on the seeds only: not on the number and kind of workers, on one kind of processor.
+
+    Args:
+        what: a function ``(seed) -> row`` of a module or file, where a row is a dict of floats,
+            ints, bools and strings; a motion, as ``GO2Controller.play`` takes it; or a word as
+            ``go2-wbc sweep`` takes it: ``"gait:trot@0.5"``, ``"push:12"``, ``"my.py:trial"``.
+        n: how many seeds.
+        first_seed: the first of them; the others follow.
+        workers: processes at a time, each with one thread; by default as many as processors, and
+            with Ray as many as its cluster has.
+        engine: "local", or "ray" for more than one machine (needs the extra [cluster]).
+        address: of the Ray cluster; by default the one in ``RAY_ADDRESS``, or one of this machine.
+        out: file for the rows, ``.sqlite`` or ``.db``; by default in ``out/sweeps``.
+        fresh: begin anew instead of going on.
+        keep_going: let a seed that fails cost no other one its run; its reason is kept.
+        on_progress: is told after every seed.
+
+    Raises:
+        CommandError: for an argument that is not valid.
+        ConfigError: for a file that cannot be used, or holds rows that depend on something else.
+        MissingDependency: for Ray if it is not installed.
+        SweepError: if a seed fails, without ``keep_going``, or the engine or the disk does. What
+            is finished is kept.
+    """
+    _require_count("n", n, least=1)
+    _require_count("first_seed", first_seed, least=0)
+    runner = engine_of(engine, workers, address)
+    target = target_of(what)
+    file = FOLDER / f"{_slug(target.name)}.sqlite" if out is None else Path(out)
+    if fresh:
+        remove_sweep(file)
+    seeds = range(first_seed, first_seed + n)
+    with SweepFile(file, about_of(target)) as rows:
+        finished = rows.finished
+        left = [seed for seed in seeds if seed not in finished]
+        progress = _Meter(len(seeds), len(left), on_progress)
+        progress.tell(None)
+        for ended in runner.run(job_of(target), left):
+            if ended.failure is None:
+                rows.add(ended.item, ended.value)
+            else:
+                rows.add_failure(ended.item, ended.failure.text)
+                if not keep_going:
+                    raise SweepError(_told(ended.item, ended.failure, rows))
+            progress.tell(ended.failure)
+        return _result(rows, seeds)
+
+
+def read_sweep(path: Path | str) -> SweepResult:
+    """What a file of a sweep holds.
+
+    Raises:
+        ConfigError: if there is no such file, or it is something else.
+    """
+    with SweepFile(path) as rows:
+        return _result(rows, None)
+
+
+def remove_sweep(path: Path | str) -> None:
+    """Remove the file of a sweep and SQLite's logs beside it, if it is one.
+
+    Raises:
+        ConfigError: if it is something else.
+    """
+    file = Path(path).expanduser()
+    if file.exists():
+        SweepFile(file).close()
+        for ending in ("", "-wal", "-shm"):
+            Path(f"{file}{ending}").unlink(missing_ok=True)
+
+
+def engine_of(name: str, workers: int | None, address: str | None = None) -> Engine:
+    """The engine of that name.
+
+    Raises:
+        CommandError: for an unknown name, a number of workers that is not valid, or an address
+            without Ray.
+    """
+    if workers is not None:
+        _require_count("workers", workers, least=1)
+    if name not in ENGINES:
+        raise CommandError(unknown_name("engine", name, ENGINES))
+    if name == "ray":
+        from controller.sweeps.ray_engine import RayEngine
+
+        return RayEngine(workers, address)
+    if address is not None:
+        raise CommandError("an address is that of a Ray cluster: choose the engine ray")
+    return LocalEngine(workers or processors())
+
+
+class _Meter:
+    """Counts what has ended, and how fast."""
+
+    def __init__(self, total: int, left: int, listener: Callable[[Progress], None]) -> None:
+        self._total, self._left, self._listener = total, left, listener
+        self._ended, self._start = -1, time.monotonic()
+
+    def tell(self, failure: Failure | None) -> None:
+        self._ended += 1
+        elapsed = time.monotonic() - self._start
+        rate = self._ended / elapsed if elapsed > 0.0 else 0.0
+        done = self._total - self._left + self._ended
+        self._listener(Progress(done, self._total, rate, failure))
+
+
+def _result(rows: SweepFile, seeds: Sequence[int] | None) -> SweepResult:
+    wanted = None if seeds is None else frozenset(seeds)
+    failures = {s: text for s, text in rows.failures.items() if wanted is None or s in wanted}
+    name = str(rows.about.get("what", rows.path.stem))
+    return SweepResult(rows.path, name, rows.columns, rows.rows(wanted), failures)
+
+
+def _told(seed: int, failure: Failure, rows: SweepFile) -> str:
+    kept = f"{len(rows.finished)} finished rows are kept in {rows.path}"
+    return "\n".join(filter(None, [f"seed {seed}: {failure.text}; {kept}", failure.details]))
+
+
+def _require_count(name: str, value: object, *, least: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise CommandError(f"{name} must be a whole number, at least {least}, got {value!r}")
+
+
+def _slug(name: str) -> str:
+    """``name`` as the name of a file."""
+    return re.sub(r"[^\w.@+-]+", "_", Path(name).name).strip("._") or "sweep"

@@ -1,0 +1,209 @@
+"""What can be swept by name: a motion, a gait or a push, each a function from a seed to a row.
+
+What a seed varies is in ``trials.py``: friction, mass, heading, and the pose from which the robot
+gets up. A robot that fails is a row, too: it says why, and what was not measured is nan.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from controller.motion_measurement import MotionMeasurement, measure_motion
+from controller.sweeps.rows import Row, Value
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
+from go2_wbc.contacts import GAITS
+from go2_wbc.errors import Go2WbcError
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.reference import Posture
+from go2_wbc.robot.model import RobotModel
+from motions import CompiledPlan, load_plan, save_plan
+
+START_TIME = 1.5
+"""Time [s] after a command that is left out: the ramp takes 0.7 s, settling the rest."""
+WINDOW = 5.0
+"""Time [s] over which the velocity is compared with the command."""
+PUSH_TIME = 0.1
+"""Duration [s] of a push."""
+RECOVERY_TIME = 2.0
+"""Time [s] after a push until the robot is looked at."""
+_STREAM = 1
+"""Keeps the numbers of a push apart from those of the robot and its world."""
+
+
+def archive_of(plan: CompiledPlan) -> bytes:
+    """A plan as the content of its file: plays as it does, number by number."""
+    with tempfile.TemporaryDirectory() as folder:
+        return save_plan(plan, Path(folder, "swept.plan")).read_bytes()
+
+
+@cache
+def plan_of(archive: bytes) -> CompiledPlan:
+    """The plan of an archive, read once in each process."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "swept.plan")
+        file.write_bytes(archive)
+        return load_plan(file)
+
+
+@cache
+def _model() -> RobotModel:
+    return RobotModel()
+
+
+@dataclass(frozen=True, slots=True)
+class MotionStudy:
+    """Plays a motion, unchecked, on a robot that has got up.
+
+    Attributes:
+        archive: its compiled plan, as ``archive_of`` gives it.
+    """
+
+    archive: bytes
+
+    def __call__(self, seed: int) -> Row:
+        """What was measured: ``MotionMeasurement``, lengths in m, times in s."""
+        trial = Trial(seed)
+        with TrialRobot(trial) as robot:
+            try:
+                measured = self.play(robot)
+            except (TrialFailed, Go2WbcError) as error:
+                measured = replace(_NOTHING, fall=str(error))
+        values = {**measured.as_dict(), "fall": measured.fall or ""}
+        return {**_world(trial), **{k: v for k, v in values.items() if v is not None}}
+
+    def play(self, robot: TrialRobot) -> MotionMeasurement:
+        """Get up and play it.
+
+        Raises:
+            TrialFailed: if the robot does not get into the motion's entry posture.
+        """
+        plan = plan_of(self.archive)
+        go2 = robot.go2
+        robot.require(go2.sit() if plan.entry is Posture.SIT else go2.stand())
+        return measure_motion(go2, robot.truth, plan, _model())
+
+
+_NOTHING = MotionMeasurement(
+    None, False, "", *[math.nan for field in fields(MotionMeasurement) if field.type == "float"]
+)
+"""What is measured of a robot that did not get up."""
+
+
+@dataclass(frozen=True, slots=True)
+class GaitStudy:
+    """Walks with a velocity, on flat ground.
+
+    Attributes:
+        gait: its name.
+        command: forward and left [m/s], turning left [rad/s].
+    """
+
+    gait: str
+    command: VelocityCommand
+
+    def __call__(self, seed: int) -> Row:
+        """Velocity errors [m/s], [rad/s] over 5 s, loads as shares of the limits."""
+        trial = Trial(seed)
+        row: dict[str, Value] = {
+            "ok": False,
+            "fall": "",
+            "speed_error": math.nan,
+            "side_error": math.nan,
+        }
+        row |= {"turn_error": math.nan, "speed_ripple": math.nan, "torque": math.nan}
+        try:
+            with TrialRobot(trial) as robot:
+                set_off(robot, self.gait, self.command)
+                robot.wait(START_TIME + WINDOW)
+                row |= self._measured(robot)
+        except (TrialFailed, Go2WbcError) as error:
+            row["fall"] = str(error)
+        return {**_world(trial), **row}
+
+    def _measured(self, robot: TrialRobot) -> Row:
+        recorded = robot.truth.recording()
+        window = recorded.since(recorded.time[0] + START_TIME)
+        ahead, left = window.com_velocity[:, 0], window.com_velocity[:, 1]
+        turned = (window.rpy[-1, 2] - window.rpy[0, 2]) / (window.time[-1] - window.time[0])
+        return {
+            "ok": True,
+            "speed_error": float(ahead.mean()) - self.command.linear_x,
+            "side_error": float(left.mean()) - self.command.linear_y,
+            "turn_error": float(turned) - self.command.angular_z,
+            "speed_ripple": float(ahead.std()),
+            "torque": float(recorded.torque_shares(_model()).max()),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class PushStudy:
+    """Pushes the base of a trotting or standing robot, from any side, at any time of the stride.
+
+    Attributes:
+        impulse: of the push [N s], over 0.1 s.
+        speed: at which the robot trots [m/s]; 0 stands.
+    """
+
+    impulse: float
+    speed: float
+
+    def __call__(self, seed: int) -> Row:
+        """Whether it stayed up, where the push came from, how far [m] and fast [m/s] it went."""
+        trial = Trial(seed)
+        angle, phase = np.random.default_rng([_STREAM, seed]).random(2) * (2.0 * math.pi, 1.0)
+        row: dict[str, Value] = {
+            "ok": False,
+            "fall": "",
+            "angle": float(angle),
+            "phase": float(phase),
+        }
+        row |= {"distance": math.nan, "speed_error": math.nan}
+        try:
+            with TrialRobot(trial) as robot:
+                row |= self._pushed(robot, float(angle), float(phase))
+        except (TrialFailed, Go2WbcError) as error:
+            row["fall"] = str(error)
+        return {**_world(trial), **row}
+
+    def _pushed(self, robot: TrialRobot, angle: float, phase: float) -> Row:
+        period = GAITS["trot"].period
+        if self.speed:
+            set_off(robot, "trot", VelocityCommand(self.speed))
+        else:
+            robot.require(robot.go2.stand())
+        robot.wait(START_TIME + phase * period)
+        start, heading = robot.truth.p_world_com, float(robot.plant.read().rpy[2])
+        force = self.impulse / PUSH_TIME * np.array([math.cos(angle), math.sin(angle), 0.0])
+        robot.push(force, PUSH_TIME)
+        robot.wait(RECOVERY_TIME)
+        moved = robot.truth.p_world_com - start
+        wanted = self.speed * RECOVERY_TIME * np.array([math.cos(heading), math.sin(heading)])
+        last = robot.truth.recording(since=robot.plant.time - 2.0 * period)
+        return {
+            "ok": True,
+            "distance": float(np.linalg.norm(moved[:2] - wanted)),
+            "speed_error": float(last.com_velocity[:, 0].mean()) - self.speed,
+        }
+
+
+def set_off(robot: TrialRobot, gait: str, command: VelocityCommand) -> None:
+    """Stand up and walk; the record begins with the command.
+
+    Raises:
+        TrialFailed: if the robot does not get that far.
+    """
+    robot.require(robot.go2.stand())
+    robot.require(robot.go2.walk(gait))
+    robot.go2.move(command.linear_x, command.angular_z, linear_y=command.linear_y)
+    robot.truth.clear()
+
+
+def _world(trial: Trial) -> Row:
+    """What the seed has drawn."""
+    return {"friction": trial.friction, "mass_scale": trial.mass_scale}

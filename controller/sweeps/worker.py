@@ -1,0 +1,97 @@
+"""A worker: a process that takes a function and items from its parent, and answers each.
+
+Messages are lengths and pickles, over the standard streams. What the function prints goes to
+standard error. When the parent ends, however it came, so does the worker, at once.
+"""
+
+from __future__ import annotations
+
+import gc
+import logging
+import os
+import pickle
+import struct
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from queue import SimpleQueue
+from typing import IO, Any
+
+from controller.sweeps.engine import Failure
+
+_LENGTH = struct.Struct("<Q")
+
+
+def write_message(stream: IO[bytes], content: bytes) -> None:
+    """Send a message, at once."""
+    stream.write(_LENGTH.pack(len(content)) + content)
+    stream.flush()
+
+
+def read_message(stream: IO[bytes]) -> bytes | None:
+    """The next message; None if there is none, or not all of it: the other end has gone."""
+    head = stream.read(_LENGTH.size)
+    if len(head) < _LENGTH.size:
+        return None
+    (length,) = _LENGTH.unpack(head)
+    content = stream.read(length)
+    return content if len(content) == length else None
+
+
+def order_of(function: Callable[[Any], Any]) -> bytes:
+    """The message that tells a worker what to call, and where to look for it."""
+    return pickle.dumps((sys.path, pickle.dumps(function)))
+
+
+def answer(order: bytes, item: bytes) -> bytes:
+    """The message that says what came of an item: the value, or the ``Failure``."""
+    try:
+        return pickle.dumps((_ordered(order)(pickle.loads(item)), None))
+    except (Exception, SystemExit) as error:
+        text = traceback.format_exception_only(error)[-1].strip()
+        return pickle.dumps((None, Failure(text, traceback.format_exc())))
+    finally:
+        _tidy_up()
+
+
+def _tidy_up() -> None:
+    """Free what the item has left: robots hold tens of megabytes of records, in cycles.
+
+    What the first one has imported and kept is not looked through again: that takes long.
+    """
+    gc.collect()
+    if not gc.get_freeze_count():
+        gc.freeze()
+
+
+@lru_cache(maxsize=1)
+def _ordered(order: bytes) -> Callable[[Any], Any]:
+    """The function of an order: unpickled once, so that what it keeps is kept."""
+    path, function = pickle.loads(order)
+    follow(path)
+    return pickle.loads(function)
+
+
+def follow(path: Sequence[str]) -> None:
+    """Find modules where the parent does, after the places of one's own."""
+    sys.path += [place for place in path if place not in sys.path]
+
+
+def main() -> None:
+    """Answer what comes in until the parent closes the stream."""
+    source, sink = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    logging.getLogger().addHandler(logging.NullHandler())  # a fall is told by its row
+    items: SimpleQueue[bytes] = SimpleQueue()
+    threading.Thread(target=_receive, args=(source, items), name="parent", daemon=True).start()
+    order = items.get()
+    while True:
+        write_message(sink, answer(order, items.get()))
+
+
+def _receive(source: IO[bytes], items: SimpleQueue[bytes]) -> None:
+    while (content := read_message(source)) is not None:
+        items.put(content)
+    os._exit(0)
