@@ -11,6 +11,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import functools
+import gc
 import importlib
 import json
 import multiprocessing.process
@@ -26,8 +27,18 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
-LIBRARIES = ("numpy", "numba", "mujoco", "pinocchio")
-"""What nearly every program loads; this project's packages are loaded by each on its own."""
+LIBRARIES = (
+    "numpy",
+    "numba",
+    "mujoco",
+    "pinocchio",
+    "coal",
+    "jaxtyping",
+    "scipy.interpolate",
+    "scipy.spatial",
+    "placo",
+)
+"""What most programs load; this project's packages are loaded by each on its own."""
 HANGS = 600
 """Time [s] after which a program counts as hanging and is ended; the longest takes 20 s of CPU."""
 
@@ -73,6 +84,7 @@ def serve() -> None:
     for library in LIBRARIES:
         with contextlib.suppress(ImportError):
             importlib.import_module(library)
+    gc.freeze()  # a program's collector, the last one at its end too, passes over the libraries
     for line in sys.stdin:
         with warnings.catch_warnings():  # the threads of the libraries rest
             warnings.simplefilter("ignore", DeprecationWarning)

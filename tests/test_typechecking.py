@@ -30,19 +30,40 @@ def test_an_argument_of_the_wrong_type_is_refused() -> None:
         unknown_name("side", 3, ("left", "right"))  # pyright: ignore[reportArgumentType]
 
 
-@checking
-def test_of_the_repetitions_in_a_long_loop_some_are_checked_too(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    assert typechecker.Ration.calls < typechecker.CHECKED_CALLS, "or a test would begin unchecked"
-    monkeypatch.setattr(typechecker.Ration, "calls", typechecker.CHECKED_CALLS)
+def refusals(calls: int) -> int:
+    """How many of so many wrong calls from one place are refused."""
     refused = 0
-    for _ in range(10 * typechecker.STRIDE):
+    for _ in range(calls):
         try:
             unknown_name("side", 3, ("left", "right"))  # pyright: ignore[reportArgumentType]
         except TypeCheckError:
             refused += 1
-    assert refused == 10
+    return refused
+
+
+@checking
+def test_of_the_repetitions_in_a_long_loop_some_are_checked_too() -> None:
+    assert refusals(typechecker.CHECKED_CALLS) == typechecker.CHECKED_CALLS
+    assert refusals(10 * typechecker.STRIDE) == 10
+
+
+@checking
+def test_a_place_that_is_reached_late_in_a_long_run_is_checked_from_its_first_call() -> None:
+    for _ in range(10 * typechecker.STRIDE):
+        unknown_name("side", "middle", ("left", "right"))
+    with pytest.raises(TypeCheckError):
+        unknown_name("side", 3, ("left", "right"))  # pyright: ignore[reportArgumentType]
+
+
+@pytest.fixture(params=range(2))
+def spent() -> int:
+    """Refusals while a test is set up."""
+    return refusals(typechecker.STRIDE - 1)
+
+
+@checking
+def test_every_phase_of_a_test_begins_with_its_first_calls(spent: int) -> None:
+    assert spent == refusals(typechecker.STRIDE - 1) == typechecker.CHECKED_CALLS
 
 
 @checking

@@ -1,38 +1,56 @@
 """The check of every argument under pytest: as types say it, a whole number is a number too.
 
 A check costs many times what most functions do, and a scenario of a minute makes the same calls
-tens of thousands of times. So in each phase of a test (setting up, the test itself) the first
-``CHECKED_CALLS`` calls are all checked, and of the later ones every ``STRIDE``-th.
+tens of thousands of times. A wrong call is wrong because of the place that makes it. So in each
+phase of a test (setting up, the test itself) the first ``CHECKED_CALLS`` calls that a place in the
+code makes are all checked, and of its later ones every ``STRIDE``-th.
 """
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
+from typing import Any
+
 from beartype import BeartypeConf, beartype
 from jaxtyping import config
 
-checked = beartype(conf=BeartypeConf(is_pep484_tower=True))
-"""Decorator of each function of the modules that ``conftest.py`` names."""
-
-CHECKED_CALLS = 10_000
-"""About 0.3 s; all that a test makes which is not a scenario."""
+CHECKED_CALLS = 10
+"""Of each place: a tick of the control loop has 400, and a check takes 25 us."""
 STRIDE = 61
 """Prime, so that the calls of a loop come up in turn, whatever their number."""
+_check = beartype(conf=BeartypeConf(is_pep484_tower=True))
+_LONGEST_CODE = 1 << 20
+"""Bytes; the longest function has a fraction of it."""
+_calls: dict[int, int] = {}
+"""By place: how many calls it has made since the last ``renew``."""
+
+
+def checked(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The decorator of each function of the modules that ``conftest.py`` names.
+
+    Its checks are made when they are first needed: most functions are not called by a test.
+    """
+    made: list[Callable[..., Any]] = []
+
+    def check(*args: object, **kwargs: object) -> object:
+        if not made:
+            made.append(_check(function))
+        return made[0](*args, **kwargs)
+
+    return check
 
 
 class Ration(type(config)):
-    """Tells jaxtyping, before each call that it would check, whether to go without.
-
-    Attributes:
-        calls: how many there were since the last ``renew``.
-    """
-
-    calls = 0
+    """Tells jaxtyping, before each call that it would check, whether to go without."""
 
     @property
     def jaxtyping_disable(self) -> bool:
-        """Whether this call goes unchecked; asked once a call."""
-        Ration.calls += 1
-        return Ration.calls > CHECKED_CALLS and Ration.calls % STRIDE != 0
+        """Whether this call goes unchecked; asked once a call, by the wrapper of the function."""
+        caller = sys._getframe(2)
+        place = id(caller.f_code) * _LONGEST_CODE + caller.f_lasti
+        calls = _calls[place] = _calls.get(place, 0) + 1
+        return calls > CHECKED_CALLS and calls % STRIDE != 0
 
 
 def ration() -> None:
@@ -41,5 +59,5 @@ def ration() -> None:
 
 
 def renew() -> None:
-    """Check all of the next ``CHECKED_CALLS`` calls again."""
-    Ration.calls = 0
+    """Check the first calls of every place again."""
+    _calls.clear()
