@@ -164,6 +164,7 @@ def _values(
         f"{name}.place": 1000.0 * math.hypot(moved[0] - x, moved[1] - y),
         f"{name}.yaw": abs(math.degrees(wrap_angle(after.yaw - before.yaw - yaw))),
         f"{name}.torque": float(shares.max()),
+        f"{name}.asked": float(recorded.asked_shares(model).max()),
         f"{name}.speed": recorded.peak_speed_share(model),
         f"{name}.saturated": 100.0 * float(is_full.mean()),
     }
@@ -212,7 +213,8 @@ def _metrics(name: str, item: Item) -> tuple[Metric, ...]:
         Metric(f"{name}.done", title, "done, stands 1 s later", "", item.done, least),
         Metric(f"{name}.place", title, "lands off its place", "mm", 40.0),
         Metric(f"{name}.yaw", title, "lands off its heading", "deg", 3.0),
-        Metric(f"{name}.torque", title, "peak torque / limit", "", 1.0),
+        Metric(f"{name}.torque", title, "peak torque / motors' line", "", 1.0),
+        Metric(f"{name}.asked", title, "peak torque asked for / motors' line", "", 1.0),
         Metric(f"{name}.speed", title, "peak joint speed / limit", "", 1.0),
         Metric(f"{name}.saturated", title, "saturated ticks", "%", 2.0),
     ]

@@ -13,6 +13,7 @@ from go2_wbc.geometry import moving_support_margins
 from go2_wbc.kernels.layout import Layout
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.motor import LEAST_SHARE
 from go2_wbc.robot.snapshot import Snapshot
 
 BLOCK = 4096
@@ -42,7 +43,13 @@ class Telemetry:
         self._blocks: list[Float[np.ndarray, "k size"]] = []
         self._labels = np.empty(capacity, dtype=object)
         self._count = 0
-        self._peak_torque, self._peak_speed = np.zeros(12), np.zeros(12)
+        from go2_wbc.kernels.motor import note_peaks  # compiled; importing this module is not
+
+        self._note_peaks, self._peaks = note_peaks, np.zeros((3, 12))
+        motor = model.motor
+        least = LEAST_SHARE * motor.peak
+        self._motor = np.array([motor.peak, motor.knee_speed, motor.no_load_speed, least])
+        self._v_before: Float[np.ndarray, "12"] | None = None
         self.qp_failures = self.relaxed_ticks = self.grave_ticks = self.missed_deadlines = 0
 
     def record(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"], label: str) -> None:
@@ -57,18 +64,29 @@ class Telemetry:
         row[_COM], row[_FEET] = snapshot.p_world_com, snapshot.p_world_feet.ravel()
         self._labels[i] = label
         self._count += 1
-        np.maximum(self._peak_torque, np.abs(state.tau), out=self._peak_torque)
-        np.maximum(self._peak_speed, np.abs(state.v[6:]), out=self._peak_speed)
+        v = state.joint_velocities
+        before = v if self._v_before is None else self._v_before
+        self._note_peaks(state.tau, v, before, self._motor, self._peaks)
+        self._v_before = v
 
     @property
     def peak_torque_ratio(self) -> float:
         """Greatest |tau| / limit of any joint so far."""
-        return float(np.max(self._peak_torque / self._model.torque_limits))
+        return float(np.max(self._peaks[0] / self._model.torque_limits))
+
+    @property
+    def peak_motor_ratio(self) -> float:
+        """Greatest |tau| of any joint so far, over what its motor gives at its speed.
+
+        That is the speed in the tick before the torque was measured, from which on it acted; what
+        is available counts as at least ``robot.motor.LEAST_SHARE`` of the peak.
+        """
+        return float(np.max(self._peaks[2]))
 
     @property
     def peak_speed_ratio(self) -> float:
         """Greatest |joint velocity| / limit of any joint so far."""
-        return float(np.max(self._peak_speed / self._model.speed_limits))
+        return float(np.max(self._peaks[1] / self._model.speed_limits))
 
     def samples(self, rate: float = 100.0, since: float = -math.inf) -> Samples:
         """What the ring holds from ``since`` [s] on, thinned to about ``rate`` samples a second.

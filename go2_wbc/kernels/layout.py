@@ -239,6 +239,8 @@ FRICTION = Layout(
     viscous=(12,),
     transition=(),
     lookahead=(),
-    torque_limits=(12,),
+    peak_torque=(12,),
+    knee_speed=(12,),
+    no_load_speed=(12,),
 )
-"""Of ``robot.joint_friction.JointFriction``, and the torques that no motor may exceed."""
+"""Of ``robot.joint_friction.JointFriction``, and of the ``MotorModel`` that no torque exceeds."""

@@ -21,6 +21,7 @@ from jaxtyping import Float
 from go2_wbc.errors import ConfigError
 from go2_wbc.kernels.layout import FRICTION
 from go2_wbc.legs import JOINT_NAMES
+from go2_wbc.robot.motor import MotorModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_not_negative, require_positive
 
@@ -84,22 +85,24 @@ class JointFriction:
 
 
 class FrictionFeedForward:
-    """Turns the torques of the dynamics into the motors', within their limits.
+    """Turns the torques of the dynamics into the motors', within what these give at their speeds.
 
     Attributes:
         numbers: the same for ``kernels.friction``.
     """
 
-    def __init__(self, friction: JointFriction, torque_limits: Float[np.ndarray, "12"]) -> None:
-        """Feed ``friction`` forward, up to ``torque_limits`` [N m]."""
-        self._friction, self._limits = friction, torque_limits
+    def __init__(self, friction: JointFriction, motor: MotorModel) -> None:
+        """Feed ``friction`` forward, up to what ``motor`` gives."""
+        self._friction, self._motor = friction, motor
         self.numbers = FRICTION.pack(
             [
                 friction.dry,
                 friction.viscous,
                 friction.transition,
                 friction.lookahead,
-                torque_limits,
+                motor.peak,
+                motor.knee_speed,
+                motor.no_load_speed,
             ]
         )
 
@@ -107,5 +110,5 @@ class FrictionFeedForward:
         self, snapshot: Snapshot, qdd: Float[np.ndarray, "18"], tau: Float[np.ndarray, "12"]
     ) -> Float[np.ndarray, "12"]:
         """``tau`` [N m] and the friction at the acceleration ``qdd``."""
-        friction = self._friction.torque(snapshot.state.joint_velocities, qdd[6:])
-        return np.clip(tau + friction, -self._limits, self._limits)
+        v = snapshot.state.joint_velocities
+        return np.clip(tau + self._friction.torque(v, qdd[6:]), *self._motor.limits(v))

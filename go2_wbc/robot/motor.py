@@ -89,8 +89,7 @@ class MotorModel:
 
         What a plant applies at every physics step, compiled in ``kernels.motor``.
         """
-        wanted = command.kp * (command.q_des - q) + command.tau + command.kd * (command.v_des - v)
-        return np.clip(wanted, *self.limits(v))
+        return np.clip(command.asked(q, v), *self.limits(v))
 
     def share(
         self, tau: Float[np.ndarray, "*n 12"], v: Float[np.ndarray, "*n 12"]

@@ -100,6 +100,12 @@ class JointCommand:
     kp: Float[np.ndarray, "12"]
     kd: Float[np.ndarray, "12"]
 
+    def asked(
+        self, q: Float[np.ndarray, "12"], v: Float[np.ndarray, "12"]
+    ) -> Float[np.ndarray, "12"]:
+        """Torques [N m] asked for at angles ``q`` and velocities ``v``, before any limit."""
+        return self.kp * (self.q_des - q) + self.tau + self.kd * (self.v_des - v)
+
     @staticmethod
     def torque(tau: Float[np.ndarray, "12"]) -> JointCommand:
         """Pure torque: no stiffness, no damping."""

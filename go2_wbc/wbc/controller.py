@@ -79,8 +79,8 @@ class WholeBodyController:
             StanceFeetStill(self.config.stance_damping),
         )
         self.inequalities = _inequalities(model, self.config)
-        limits = model.torque_limits * self.config.torque_share
-        self._friction = FrictionFeedForward(self.config.joint_friction, limits)
+        motor = model.motor.scaled(self.config.torque_share)
+        self._friction = FrictionFeedForward(self.config.joint_friction, motor)
         self._task_weights = np.array([task.weight for task in self.tasks])
         self.backend_name = backend
         self._backend = self._make_backend(backend)

@@ -24,7 +24,7 @@ class WbcSolution:
     Attributes:
         tau: joint torques [N m] of the dynamics, without friction: M qdd + h = S' tau + J' f.
         tau_motors: what the motors are told [N m]: ``tau`` and the friction of the joints, within
-            the torque limits.
+            what they give at their speeds.
         solve_time: seconds of assembly and solution.
         backend: which back end solved it.
         is_relaxed: whether constraints had to give way, see ``violations``.

@@ -101,6 +101,20 @@ def test_the_peaks_are_those_of_the_whole_run_as_shares_of_the_limits(model: Rob
         telemetry.record(model.snapshot(lying_state(tick * PERIOD)), ALL, "calm")
     assert telemetry.peak_torque_ratio == pytest.approx(0.8)
     assert telemetry.peak_speed_ratio == pytest.approx(0.6)
+    assert telemetry.peak_motor_ratio == pytest.approx(0.8), "it acted on a joint at rest"
+
+
+@pytest.mark.parametrize(("direction", "ratio"), [(1.0, 0.6), (-1.0, 0.3)])
+def test_a_torque_is_compared_with_the_line_at_the_speed_from_which_it_acted(
+    model: RobotModel, direction: float, ratio: float
+) -> None:
+    telemetry, tau, v = Telemetry(model, CAPACITY), np.zeros(12), np.zeros(18)
+    v[6 + 4] = direction * 0.725 * model.speed_limits[4]  # half way from the knee to no load
+    telemetry.record(model.snapshot(replace(lying_state(0.0), v=v)), ALL, "fast")
+    tau[4] = 0.3 * model.torque_limits[4]
+    telemetry.record(model.snapshot(replace(lying_state(PERIOD), tau=tau)), ALL, "driven, braked")
+    assert telemetry.peak_motor_ratio == pytest.approx(ratio)
+    assert telemetry.peak_torque_ratio == pytest.approx(0.3)
 
 
 def test_the_support_margin_is_that_of_the_planned_stance_feet(model: RobotModel) -> None:

@@ -78,7 +78,7 @@ class Guards:
         limits = model.pin_model
         self._lower = np.array(limits.lowerPositionLimit[7:])
         self._upper = np.array(limits.upperPositionLimit[7:])
-        self._torque = model.torque_limits
+        self._motor = model.motor
         self._limp_since = -math.inf
         self._active_since: float | None = None
 
@@ -97,7 +97,7 @@ class Guards:
         return None
 
     def soften(self, command: JointCommand, state: RobotState) -> JointCommand:
-        """``command`` within the motors' torque, not pushing past a joint's limit, ramped in."""
+        """``command`` within what the motors give, not pushing past a joint's limit, ramped in."""
         if is_passive(command):
             if self._active_since is not None:
                 self._active_since, self._limp_since = None, state.time
@@ -107,7 +107,7 @@ class Guards:
             self._active_since = state.time if has_rested else -math.inf
         share = min(1.0, (state.time - self._active_since) / self._config.ramp_time)
         q = state.joint_positions
-        tau = np.clip(command.tau, -self._torque, self._torque)
+        tau = np.clip(command.tau, *self._motor.limits(state.joint_velocities))
         tau = np.where(q >= self._upper, np.minimum(tau, 0.0), tau)
         tau = np.where(q <= self._lower, np.maximum(tau, 0.0), tau)
         return JointCommand(

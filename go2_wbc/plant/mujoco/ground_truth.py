@@ -34,6 +34,8 @@ class TruthRecording:
         q, v: configuration and velocity as in ``RobotState``.
         rpy: attitude of the base [rad], yaw unwrapped.
         tau: joint torques [N m] that acted.
+        tau_asked: those that the command asked for when the tick began [N m], before the motors'
+            limits; 0 in a row that no command led to.
         foot_forces: normal forces [N] on the feet.
         p_world_com: centre of mass [m], by MuJoCo.
         p_world_feet: centres of the feet [m].
@@ -49,6 +51,7 @@ class TruthRecording:
     v: Float[np.ndarray, "n 18"]
     rpy: Float[np.ndarray, "n 3"]
     tau: Float[np.ndarray, "n 12"]
+    tau_asked: Float[np.ndarray, "n 12"]
     foot_forces: Float[np.ndarray, "n 4"]
     p_world_com: Float[np.ndarray, "n 3"]
     p_world_feet: Float[np.ndarray, "n 4 3"]
@@ -83,8 +86,16 @@ class TruthRecording:
 
         That depends on the joint's speed and direction at the start of the tick.
         """
-        v = np.vstack([self.v[:1], self.v[:-1]])[:, 6:]
-        return model.motor.share(self.tau, v).max(axis=1)
+        return model.motor.share(self.tau, self._v_before).max(axis=1)
+
+    def asked_shares(self, model: RobotModel) -> Float[np.ndarray, " n"]:
+        """The same of the torques asked for: above 1 where a command was more than motors give."""
+        return model.motor.share(self.tau_asked, self._v_before).max(axis=1)
+
+    @property
+    def _v_before(self) -> Float[np.ndarray, "n 12"]:
+        """Joint velocities [rad/s] at the start of every tick."""
+        return np.vstack([self.v[:1], self.v[:-1]])[:, 6:]
 
     def peak_speed_share(self, model: RobotModel) -> float:
         """Largest |joint velocity| / limit of any joint."""
@@ -131,8 +142,9 @@ class GroundTruth(Plant):
 
     def write(self, command: JointCommand) -> None:
         """Apply ``command`` for one control period, and record what came of it."""
+        state = self._plant.read()
         self._plant.write(command)
-        self._record()
+        self._record(command.asked(state.joint_positions, state.joint_velocities))
         if self.on_tick is not None:
             self.on_tick()
 
@@ -144,7 +156,7 @@ class GroundTruth(Plant):
         """Forget what was recorded; begin again with the present state."""
         self.start = self._plant.time
         self._instants: list[_Instant] = []
-        self._record()
+        self._record(np.zeros(12))
 
     def fall(self) -> str | None:
         """Why the robot counts as fallen at this moment, or None."""
@@ -168,12 +180,12 @@ class GroundTruth(Plant):
         self.cpu_time += time.thread_time() - began
         return recorded
 
-    def _record(self) -> None:
+    def _record(self, tau_asked: Float[np.ndarray, "12"]) -> None:
         began = time.thread_time()
         plant = self._plant
         forces = plant.base_contact_force, plant.limb_contact_force
         feet = plant.p_world_feet
-        self._instants.append(_Instant(plant.read(), feet, forces, plant.contacts()))
+        self._instants.append(_Instant(plant.read(), tau_asked, feet, forces, plant.contacts()))
         self.cpu_time += time.thread_time() - began
 
 
@@ -184,6 +196,7 @@ class _Instant(NamedTuple):
     """
 
     state: RobotState
+    tau_asked: Float[np.ndarray, "12"]
     p_world_feet: Float[np.ndarray, "4 3"]
     forces: tuple[float, float]
     contacts: Contacts
@@ -201,6 +214,7 @@ def _recording(instants: Sequence[_Instant]) -> TruthRecording:
         v=np.array([state.v for state in states]),
         rpy=rpy,
         tau=np.array([state.tau for state in states]),
+        tau_asked=np.array([i.tau_asked for i in instants]),
         foot_forces=np.array([state.foot_forces for state in states]),
         p_world_com=np.array([contact.p_world_com for contact in contacts]),
         p_world_feet=np.array([i.p_world_feet for i in instants]),

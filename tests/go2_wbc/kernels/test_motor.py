@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from go2_wbc.kernels.motor import available, drive
+from go2_wbc.kernels.motor import available, drive, note_peaks
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.motor import MOTORS
+from go2_wbc.robot.motor import LEAST_SHARE, MOTORS
 from go2_wbc.robot.state import JointCommand
 
 COUNT = 1000
@@ -34,6 +34,18 @@ def test_torques_are_those_of_the_readable_model(name: str) -> None:
         lower, upper = motor.limits(v)
         cut += bool((((expected == upper) | (expected == lower)) & (upper - lower > 0.0)).any())
     assert cut > COUNT / 10
+
+
+@pytest.mark.parametrize("name", MOTORS)
+def test_peaks_are_those_of_all_ticks_so_far(name: str) -> None:
+    motor, rng = RobotModel(motor=name).motor, np.random.default_rng(32)
+    numbers = [motor.peak, motor.knee_speed, motor.no_load_speed, LEAST_SHARE * motor.peak]
+    tau, v, before = (size * rng.normal(size=(COUNT, 12)) for size in (15.0, 12.0, 12.0))
+    peaks = np.zeros((3, 12))
+    for rows in zip(tau, v, before, strict=True):
+        note_peaks(*rows, np.array(numbers), peaks)
+    expected = [np.abs(tau), np.abs(v), motor.share(tau, before)]
+    np.testing.assert_allclose(peaks, [rows.max(axis=0) for rows in expected], rtol=EXACT)
 
 
 @pytest.mark.parametrize("name", MOTORS)

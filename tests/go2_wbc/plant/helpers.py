@@ -45,6 +45,7 @@ def empty_recording(n: int, v_contacts: np.ndarray) -> TruthRecording:
         v=np.zeros((n, 18)),
         rpy=np.zeros((n, 3)),
         tau=np.zeros((n, 12)),
+        tau_asked=np.zeros((n, 12)),
         foot_forces=np.zeros((n, 4)),
         p_world_com=np.zeros((n, 3)),
         p_world_feet=np.zeros((n, 4, 3)),

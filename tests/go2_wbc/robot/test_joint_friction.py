@@ -11,6 +11,7 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.kernels.friction import motor_torques
 from go2_wbc.robot.joint_friction import FrictionFeedForward, JointFriction
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from tests.engine_helpers import cases, random_state
@@ -24,6 +25,12 @@ ODD = JointFriction(
     lookahead=0.013,
 )
 """No two numbers alike, so that one in another's place is seen."""
+
+
+def turning(state: RobotState, rng: np.random.Generator) -> RobotState:
+    """The same with joints as fast as in a jump."""
+    speeds = 0.9 * MODEL.speed_limits * rng.uniform(-1.0, 1.0, 12)
+    return replace(state, v=np.concatenate([state.v[:6], speeds]))
 
 
 def test_friction_opposes_the_motion_and_is_fed_forward_with_it() -> None:
@@ -62,18 +69,20 @@ def test_a_number_out_of_range_is_refused(wrong: dict[str, object], message: str
 
 def test_the_kernel_says_what_the_readable_form_says() -> None:
     rng = np.random.default_rng(31)
-    feed_forward = FrictionFeedForward(ODD, MODEL.torque_limits)
+    feed_forward = FrictionFeedForward(ODD, MODEL.motor)
     saturated = 0
     for _ in range(300):
-        snapshot = MODEL.snapshot(random_state(rng))
+        snapshot = MODEL.snapshot(turning(random_state(rng), rng))
         z, tau = rng.normal(scale=20.0, size=30), rng.normal(scale=20.0, size=12)
         readable = feed_forward.motor_torques(snapshot, z[:18], tau)
         motors = np.empty(12)
         motor_torques(snapshot.row, z, tau, feed_forward.numbers, motors)
         np.testing.assert_allclose(motors, readable, atol=ROUNDING)
-        assert (np.abs(readable) <= MODEL.torque_limits).all()
-        saturated += int((np.abs(readable) == MODEL.torque_limits).sum())
-    assert saturated > 100, "or the limits are not tested"
+        lower, upper = MODEL.motor.limits(snapshot.state.joint_velocities)
+        assert ((lower <= readable) & (readable <= upper)).all()
+        is_slowed = upper - lower < 2.0 * MODEL.torque_limits
+        saturated += int(is_slowed[(readable == lower) | (readable == upper)].sum())
+    assert saturated > 100, "or the line is not tested"
 
 
 @pytest.mark.parametrize("backend", ["condensed", "full", "placo"])
@@ -82,10 +91,27 @@ def test_every_back_end_feeds_the_same_friction_forward(backend: str) -> None:
     for snapshot, reference in cases(MODEL, 20, seed=32):
         solution = wbc.solve(snapshot, reference, relax=True)
         friction = ODD.torque(snapshot.state.joint_velocities, solution.qdd[6:])
-        limits = MODEL.torque_limits
-        expected = np.clip(solution.tau + friction, -limits, limits)
+        limits = MODEL.motor.limits(snapshot.state.joint_velocities)
+        expected = np.clip(solution.tau + friction, *limits)
         np.testing.assert_allclose(solution.tau_motors, expected, atol=ROUNDING)
         np.testing.assert_array_equal(solution.command.tau, solution.tau_motors)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.6])
+def test_friction_asks_no_motor_for_more_than_it_gives_at_its_speed(share: float) -> None:
+    """Added after the QP, it once went beyond the line of a motor that was at it already."""
+    friction = JointFriction.by_part((3.0, 3.0, 3.0))
+    config = replace(WbcConfig(), joint_friction=friction, torque_share=share)
+    wbc, motor = WholeBodyController(MODEL, config=config), MODEL.motor.scaled(share)
+    cut, rng = 0, np.random.default_rng(35)
+    for slow, reference in cases(MODEL, 40, seed=34):
+        snapshot = MODEL.snapshot(turning(slow.state, rng))
+        solution = wbc.solve(snapshot, reference, relax=True)
+        v = snapshot.state.joint_velocities
+        asked = solution.tau + friction.torque(v, solution.qdd[6:])
+        cut += int((motor.share(asked, v) > 1.0).sum())
+        assert motor.share(solution.tau_motors, v).max() <= 1.0
+    assert cut > 10, "or nothing is cut"
 
 
 @pytest.mark.parametrize("backend", ["condensed", "full"])

@@ -61,6 +61,10 @@ def test_torque_is_limited_and_never_pushes_past_a_joints_limit(guards: Guards) 
     guards.soften(TAU, at(0.0))
     strong = JointCommand.torque(np.full(12, 400.0))
     assert np.array_equal(guards.soften(strong, at(RAMP)).tau, model.torque_limits)
+    turning = replace(at(RAMP), v=np.concatenate([np.zeros(6), 0.8 * model.speed_limits]))
+    given = model.motor.limits(turning.joint_velocities)[1]
+    assert np.array_equal(guards.soften(strong, turning).tau, given)
+    assert given.max() < 0.5 * model.torque_limits.max()
     joints = TUCKED_JOINTS.copy()
     joints[2] = upper[2] + 0.01
     assert guards.soften(strong, at(RAMP, joints)).tau[2] == 0.0
