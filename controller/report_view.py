@@ -200,7 +200,7 @@ def parts_of(subject: str) -> tuple[str, ...]:
     leg, _, part = subject.partition(" ")
     if leg not in legs:
         return ("base",)
-    places = {"": ("foot", "calf"), "foot": ("foot",)}.get(part, ("calf",))
+    places = (part,) if part else ("foot", "calf")
     return tuple(f"{leg}_{place}" for place in places)
 
 

@@ -12,6 +12,7 @@ from motions.compiled_plan import CompiledPlan
 from motions.feasibility import dynamic, flight, kinematic
 from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion, timeline_of
 from motions.feasibility.collision import SelfCollision, self_distance
+from motions.feasibility.hulls import LinkHulls
 from motions.feasibility.limits import FeasibilityLimits, FlightLimits
 from motions.feasibility.nearest import mending
 from motions.feasibility.report import FeasibilityReport, Series
@@ -37,6 +38,7 @@ class FeasibilityChecker:
         self.model = model or RobotModel()
         self._limits = limits or FeasibilityLimits()
         self._collision = SelfCollision(self.model)
+        self._hulls = LinkHulls(self.model, self._collision.geometry)
 
     def plan(self, motion: Playable, *, check: bool = True) -> MotionPlan:
         """The plan of ``motion``, compiled and checked no more often than needed.
@@ -115,7 +117,7 @@ class FeasibilityChecker:
             kinematic.reach(path, limits),
             kinematic.joint_position(path, model),
             self_distance(path, self._collision, limits),
-            kinematic.clearance(path, model, limits),
+            kinematic.clearance(path, model, self._hulls, limits),
             kinematic.dragging(path, model, limits),
             landing_place,
             kinematic.ends(plan, path, model, limits),

@@ -45,6 +45,7 @@ class SelfCollision:
     """The robot's collision geometry, without the pairs that its SRDF lets touch.
 
     Attributes:
+        geometry: convex bodies.
         names: of the two bodies of each pair.
         levers: (pairs, 12) greatest distance [m] of a point of one body of a pair from a joint's
             axis, for the joints between the two; else 0.
@@ -54,10 +55,10 @@ class SelfCollision:
         """Load the meshes: a tenth of a second."""
         self._model = model.pin_model
         self._data = self._model.createData()
-        self._geometry = _load(model.pin_model, model.description)
-        self._results = self._geometry.createData()
-        objects = self._geometry.geometryObjects
-        pairs = self._geometry.collisionPairs
+        self.geometry = _load(model.pin_model, model.description)
+        self._results = self.geometry.createData()
+        objects = self.geometry.geometryObjects
+        pairs = self.geometry.collisionPairs
         self.names = [(objects[pair.first].name, objects[pair.second].name) for pair in pairs]
         arms = np.array([_lever_arms(self._model, item) for item in objects])
         both = [(arms[pair.first], arms[pair.second]) for pair in pairs]
@@ -75,7 +76,7 @@ class SelfCollision:
         last, seen = np.full(len(self.names), -np.inf), np.zeros_like(self.levers)
         for row in range(len(q)):
             pin.updateGeometryPlacements(
-                self._model, self._data, self._geometry, self._results, q[row]
+                self._model, self._data, self.geometry, self._results, q[row]
             )
             bounds = last - (self.levers * np.abs(joints[row] - seen)).sum(axis=1)
             likely = int(np.argmin(bounds))
@@ -92,7 +93,7 @@ class SelfCollision:
         return found
 
     def _distance(self, pair: int) -> float:
-        return float(pin.computeDistance(self._geometry, self._results, pair).min_distance)
+        return float(pin.computeDistance(self.geometry, self._results, pair).min_distance)
 
     def _name(self, pair: int) -> str:
         first, second = (name.rsplit("_", 1)[0] for name in self.names[pair])

@@ -5,8 +5,6 @@ Everything is geometry of the ``Trajectory``, in the frame of the motion: z up, 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from jaxtyping import Float
 
@@ -15,17 +13,14 @@ from go2_wbc.reference import Anchor, MotionPlan, Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from motions.feasibility.hulls import LinkHulls
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
 from motions.tracks import home_poses
 from motions.trajectory import Trajectory
 
-BELLY = np.array([[x, y, -0.085] for x in (0.15, -0.15) for y in (0.05, -0.05)])
-"""Corners [m] of the trunk's underside in the base frame; lying, the base rests 0.085 m high."""
 JOINTS = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 FEET = tuple(leg.name for leg in LEGS)
-FOOT_COLUMNS = slice(2, None, 2)
-"""Of the heights: the trunk, then knee and foot of every leg."""
 ENDS = ("entry", "exit")
 TIGHT_ANGLE, TIGHT_SPEED = 0.03, 0.1
 """Margins below which a warning is due: rad, and share of the least speed limit; own choice."""
@@ -52,20 +47,23 @@ def joint_speed(motion: Trajectory, model: RobotModel) -> Series:
     return Series.against(*what, model.speed_limits, tight=tight)
 
 
-def clearance(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) -> Series:
-    """Heights of the trunk's underside, the knees and the feet in the air.
-
-    A point p_b of the base is at z of p + R p_b; knees and feet by the legs' forward kinematics.
-    """
-    corners = [motion.placed(np.tile(corner, (len(motion.times), 1))) for corner in BELLY]
-    belly = np.min([corner[:, 2] for corner in corners], axis=0)
-    knees = _feet(motion, model, are_knees=True)[:, :, 2]
+def clearance(
+    motion: Trajectory, model: RobotModel, hulls: LinkHulls, limits: FeasibilityLimits
+) -> Series:
+    """Heights of the lowest points of the links, and of the feet in the air, over the ground."""
     feet = _feet(motion, model)[:, :, 2] - model.foot_radius
-    values = np.column_stack([belly, np.stack([knees, feet], axis=2).reshape(-1, 8)])
-    floor = np.array([limits.clearance, *[limits.clearance, -limits.swing_depth] * len(LEGS)])
+    links, count = hulls.heights(motion), len(hulls.links)
+    is_calf = np.array([name.endswith("calf") for name in hulls.names])
+    floor = np.concatenate(
+        [
+            np.where(is_calf, limits.calf_clearance, limits.clearance),
+            np.full(len(LEGS), -limits.swing_depth),
+        ]
+    )
+    values = np.hstack([links, feet])
     is_checked = np.ones_like(values, dtype=bool)
-    is_checked[:, FOOT_COLUMNS] = ~motion.stance
-    subjects = ("trunk", *(f"{leg.name} {part}" for leg in LEGS for part in ("knee", "foot")))
+    is_checked[:, count:] = ~motion.stance
+    subjects = (*hulls.names, *(f"{leg.name} foot" for leg in LEGS))
     what = ("clearance", "m", subjects, motion.times, values)
     return Series.against(*what, floor, is_floor=True, where=is_checked)
 
@@ -151,13 +149,10 @@ def ends(
     return Series.against("entry and exit", "m, rad", names, times, table, bounds, where=own)
 
 
-def _feet(
-    motion: Trajectory, model: RobotModel, *, are_knees: bool = False
-) -> Float[np.ndarray, "n 4 3"]:
-    """Places [m] of the feet's centres, or of the knees, in the frame of the motion."""
+def _feet(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "n 4 3"]:
+    """Places [m] of the feet's centres in the frame of the motion."""
     places = []
     for leg in LEGS:
         geometry = LegGeometry.of(model, leg)
-        end = replace(geometry, calf=0.0) if are_knees else geometry
-        places.append(motion.placed(foot_places(end, motion.q[:, 7:][:, leg.joints])))
+        places.append(motion.placed(foot_places(geometry, motion.q[:, 7:][:, leg.joints])))
     return np.stack(places, axis=1)

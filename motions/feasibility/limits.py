@@ -26,7 +26,9 @@ class FeasibilityLimits:
         wrench: greatest part [N] of the force that no contact forces can give, 3 % of the weight;
             of the moment as much on an arm of 0.2 m.
         self_distance: least distance [m] between links that must not touch.
-        clearance: least height [m] of knees and trunk.
+        clearance: least height [m] of trunk, hips and thighs: every point of their hulls.
+        calf_clearance: the same of the calves, which end 14 mm above the ground where they stand
+            upright, and below which the foot is.
         swing_depth: how deep [m] the lowest point of a foot in the air may be below the ground.
         drag_height: height [m] of a foot's lowest point below which it is on the ground; planned
             heights are exact, so this only absorbs rounding.
@@ -51,6 +53,7 @@ class FeasibilityLimits:
     wrench: float = 5.0
     self_distance: float = 0.005
     clearance: float = 0.02
+    calf_clearance: float = 0.002
     swing_depth: float = 0.005
     drag_height: float = 0.0005
     drag: float = 0.02

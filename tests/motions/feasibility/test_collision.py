@@ -38,9 +38,9 @@ def random_configurations(model: RobotModel, count: int, seed: int) -> np.ndarra
 
 def all_distances(bodies: SelfCollision, q: np.ndarray) -> np.ndarray:
     """Distance [m] of every pair, by looking at every pair."""
-    parts = (bodies._model, bodies._data, bodies._geometry, bodies._results)
+    parts = (bodies._model, bodies._data, bodies.geometry, bodies._results)
     pin.updateGeometryPlacements(*parts, q)
-    pin.computeDistances(bodies._geometry, bodies._results)
+    pin.computeDistances(bodies.geometry, bodies._results)
     return np.array([result.min_distance for result in bodies._results.distanceResults])
 
 
