@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from controller.go2_controller import GO2Controller
+from controller.written_motion import off_written
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.ground_truth import TOUCH, GroundTruth, TruthRecording, true_runs
 from go2_wbc.reference import Anchor, LegTask, MotionPlan, TrackedPoint
@@ -39,7 +40,15 @@ class MotionMeasurement:
         ends_off: largest distance [m] of the trunk's ends from their plan, seen from its middle.
         feet_off: largest distance [m] of a raised foot from its plan, seen from the trunk.
         joint_distance: least distance [rad] of a joint to its limit.
+        stopped: time [s] in which a joint pressed against the stop at its limit.
         touched: time [s] in which a knee or the trunk touched the ground, or a link another.
+        trunk_off: largest distance [m] of the trunk from what was written.
+        turned_off: largest angle [rad] of the trunk from what was written.
+        paw_off: largest distance [m] of a foot in the air from its place in the world.
+        landed_off: largest distance [m] of a foot that came down from its place.
+
+    The last four count from where the robot stood at first, and where a part is solved, from where
+    it stood then: at the ends of its phases, what was asked there.
     """
 
     fall: str | None
@@ -53,7 +62,12 @@ class MotionMeasurement:
     ends_off: float
     feet_off: float
     joint_distance: float
+    stopped: float
     touched: float
+    trunk_off: float
+    turned_off: float
+    paw_off: float
+    landed_off: float
 
     @property
     def ok(self) -> bool:
@@ -105,7 +119,9 @@ def measure_motion(
         ends_off=HALF_LENGTH * attitude,
         feet_off=feet,
         joint_distance=recorded.joint_distance(model),
+        stopped=dt * float((recorded.joint_distances(model) <= 0.0).sum()),
         touched=dt * float((recorded.touches_itself | (force > TOUCH)).sum()),
+        **asdict(off_written(recorded, plan, model)),
     )
 
 

@@ -1,4 +1,4 @@
-"""The benchmark of the feasibility check: its motions, its reading of physics, its matrix."""
+"""The benchmark of the feasibility check: the command, its judgement, its cache of physics."""
 
 from __future__ import annotations
 
@@ -10,170 +10,116 @@ import pytest
 
 from benchmarks import feasibility
 from benchmarks.__main__ import main
-from benchmarks.feasibility import CLEAR_MOTIONS, ConfusionMatrix, render, what_went_wrong
-from benchmarks.generated_motions import BROKEN, GOOD, NEAR, generated_motion, near_limit_motion
+from benchmarks.exam.cases import Case
+from benchmarks.exam.drawing import TEST, TRAIN
+from benchmarks.exam.outcome import STRICT, Outcome
+from benchmarks.feasibility import EXAM, OUTCOMES, PLAN, REFUSED, ask, exam, judged
 from benchmarks.runner import run_trial
 from benchmarks.scenario import Measurement
 from benchmarks.trials import Trial
 from controller.cli.common import ExitCode
 from controller.go2_controller import GO2Controller
-from controller.motion_measurement import MotionMeasurement
 from go2_wbc.robot.model import RobotModel
-from motions import Timeline, compile_timeline
 
-COUNT = 160
-CLEAN = MotionMeasurement(
-    fall=None,
-    said=True,
-    reason="done",
-    slip=0.001,
-    torque=0.4,
-    speed=0.2,
-    saturated=0.0,
-    tracking=0.004,
-    ends_off=0.002,
-    feet_off=0.003,
-    joint_distance=0.2,
-    touched=0.0,
-)
+FINE, BAD = Outcome((), (), (), ()), Outcome(("fell",), ("fell",), ("fell",), ("fell",))
+COUNT = 12
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
+def case(refused: bool, failed: bool, stratum: str = "border") -> Case:
+    refusal = ("friction",) if refused else ()
+    return Case("a 0 1", "a", TEST, stratum, False, refusal, BAD if failed else FINE)
 
 
-def test_there_are_as_many_good_motions_as_broken_ones_of_every_kind() -> None:
-    made = [generated_motion(seed) for seed in range(COUNT)]
-    kinds = [one.kind for one in made]
-    assert [kind in BROKEN for kind in kinds].count(True) == COUNT / 2
-    assert set(kinds) == {*GOOD, *BROKEN}
-    assert {kinds.count(kind) for kind in kinds} == {COUNT // (len(GOOD) + len(BROKEN))}
+def test_the_bars_are_those_of_the_test_half() -> None:
+    right = [*(30 * [case(True, True)]), *(30 * [case(False, False)])]
+    assert judged(right, len(right))[0]
+    train = [replace(case(True, False), half=TRAIN)]
+    assert judged([*right, *train], len(right) + 1)[0]
 
 
-def test_a_seed_gives_the_same_motion_every_time_and_another_seed_another_one() -> None:
-    assert generated_motion(7) == generated_motion(7)
-    assert generated_motion(7).line.keys != generated_motion(7 + 2 * len(BROKEN)).line.keys
+@pytest.mark.parametrize("mistake", [(True, False), (False, True)])
+def test_too_many_mistakes_of_either_kind_are_not_ok(mistake: tuple[bool, bool]) -> None:
+    right = [*(30 * [case(True, True)]), *(30 * [case(False, False)])]
+    assert judged([*right, case(*mistake)], 61)[0]
+    assert not judged([*right, *(2 * [case(*mistake)])], 62)[0]
 
 
-def test_near_the_limits_there_are_motions_of_every_kind() -> None:
-    assert {near_limit_motion(seed).kind for seed in range(len(NEAR))} == set(NEAR)
-
-
-def test_a_wrong_entry_begins_where_the_robot_is_not(model: RobotModel) -> None:
-    seed = 1 + 2 * list(BROKEN).index("wrong entry")
-    made = generated_motion(seed)
-    plan, whole = made.plan(model), compile_timeline(made.line, model)
-    assert plan.duration == pytest.approx(whole.duration - made.start)
-    assert plan.at(0.0).body.p_world == pytest.approx(whole.at(made.start).body.p_world)
-
-
-def test_nothing_is_held_against_a_clean_run(model: RobotModel) -> None:
-    assert what_went_wrong(CLEAN, generated_motion(0).plan(model)) == []
-
-
-@pytest.mark.parametrize(
-    ("run", "word"),
-    [
-        (replace(CLEAN, fall="fell at t=3.20 s"), "fell"),
-        (replace(CLEAN, slip=0.012), "slipped 12 mm"),
-        (replace(CLEAN, saturated=0.02), "saturated for 20 ms"),
-        (replace(CLEAN, joint_distance=-0.05), "0.050 rad beyond"),
-        (replace(CLEAN, speed=1.1), "110 % of its speed"),
-        (replace(CLEAN, tracking=0.06), "6 cm off"),
-        (replace(CLEAN, ends_off=0.07), "7 cm off"),
-        (replace(CLEAN, feet_off=0.08), "8 cm off"),
-        (replace(CLEAN, touched=0.1), "touched itself"),
-    ],
-)
-def test_what_physics_shows_is_said_in_words(
-    model: RobotModel, run: MotionMeasurement, word: str
-) -> None:
-    (harm,) = what_went_wrong(run, generated_motion(0).plan(model))
-    assert word in harm
-
-
-def test_a_place_out_of_reach_counts_although_the_leg_follows_its_plan(model: RobotModel) -> None:
-    line = Timeline(name="too high").foot("FR", x=0.1, z=1.0, over=1.5).home(over=1.5)
-    (harm,) = what_went_wrong(CLEAN, compile_timeline(line, model))
-    assert "cm off what was written" in harm
-
-
-def result(refused: float, failed: float) -> Measurement:
-    return Measurement(
-        {"feasibility.refused": refused, "feasibility.failed": failed},
-        {"feasibility.failed": "fell"} if failed else {},
-    )
-
-
-NONE = ConfusionMatrix((), {})
-
-
-def matrix(*pairs: tuple[float, float]) -> ConfusionMatrix:
-    measured = {seed: result(*pair) for seed, pair in enumerate(pairs)}
-    return ConfusionMatrix.of(measured, generated_motion)
-
-
-def test_precision_and_recall_are_shares_of_the_refused_and_of_the_failed() -> None:
-    found = matrix((1, 1), (1, 1), (1, 1), (1, 0), (0, 1), (0, 1), (0, 0))
-    assert found.precision == pytest.approx(3 / 4)
-    assert found.recall == pytest.approx(3 / 5)
-    assert [case.seed for case in found.wrong] == [3, 4, 5]
-    assert not found.ok
-    assert "precision 0.750, recall 0.600" in render(found, NONE)
-    assert max(map(len, render(found, NONE).splitlines())) <= 80
-
-
-def test_all_right_is_ok_and_a_lost_run_is_not() -> None:
-    assert matrix((1, 1), (0, 0)).ok
-    trials = {0: result(1, 1), 1: Measurement({}, reason="fell")}
-    lost = ConfusionMatrix.of(trials, generated_motion)
-    assert not lost.ok
-    assert "seed 1: no result, fell" in render(lost, NONE)
+def test_a_motion_without_a_result_is_not_ok() -> None:
+    right = [*(30 * [case(True, True)]), *(30 * [case(False, False)])]
+    is_ok, said = judged(right, len(right) + 1)
+    assert not is_ok
+    assert "1 without a result" in said
 
 
 def fake(trial: Trial) -> Measurement:
-    return result(float(trial.seed % 2), float(trial.seed % 2))
+    failed = float(trial.seed % 2)
+    values = {REFUSED.name: failed, **{metric.name: failed for metric in OUTCOMES.values()}}
+    reasons = dict.fromkeys(values, "friction; fell") if failed else {}
+    return Measurement(values, notes={**reasons, PLAN: f"{trial.seed}"})
 
 
-def test_the_command_reports_and_writes_the_matrix(
+def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     tmp_path: Path,
     results_folder: Path,
 ) -> None:
-    for name in ("CLEAR_MOTIONS", "NEAR_LIMITS"):
-        monkeypatch.setattr(feasibility, name, replace(getattr(feasibility, name), measure=fake))
-    file = tmp_path / "matrix.json"
-    arguments = ["feasibility", "--motions", "6", "--near", "4", "--jobs", "1", "--json"]
+    monkeypatch.setattr(feasibility, "STORED", replace(feasibility.STORED, measure=fake))
+    file = tmp_path / "scores.json"
+    arguments = ["feasibility", "--motions", str(COUNT), "--jobs", "1", "--json"]
     assert main([*arguments, "--out", str(file)]) == ExitCode.OK
-    printed = json.loads(capsys.readouterr().out)
+    first = capsys.readouterr()
+    printed = json.loads(first.out)
     assert printed == json.loads(file.read_text())
-    assert printed["matrix"] == {
-        "refused_failed": 3,
-        "refused_done": 0,
-        "accepted_failed": 0,
-        "accepted_done": 3,
-    }
-    assert len(printed["near_limits"]["cases"]) == 4
-    capsys.readouterr()
+    asked = exam()[:COUNT]
+    halves = [question.family.half for question in asked]
+    assert printed["scores"]["test strict"]["n"] == halves.count(TEST)
+    assert printed["scores"]["train strict"]["n"] == halves.count(TRAIN)
+    names = [question.name for question in asked if question.family.half == TEST]
+    assert not [name for name in names if name in first.out + first.err]
     assert main([*arguments, "--resume"]) == ExitCode.OK
     again = capsys.readouterr()
     assert json.loads(again.out) == printed
-    assert "10 finished trials are taken" in again.err
+    assert f"{COUNT} finished trials are taken" in again.err
+
+
+def test_what_is_remade_is_stored_beside_what_was_stored(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
+) -> None:
+    kept: dict[str, Outcome] = {}
+    monkeypatch.setattr(feasibility, "REMADE", replace(feasibility.REMADE, measure=fake))
+    monkeypatch.setattr(feasibility, "write_outcomes", kept.update)
+    monkeypatch.setattr(feasibility, "_known", lambda: {"old": FINE, "1": FINE})
+    main(["feasibility", "--motions", "2", "--jobs", "1", "--remake"])
+    assert kept == {"old": FINE, "0": FINE, "1": Outcome(*(4 * [("friction", "fell")]))}
+    assert "2 motions" in capsys.readouterr().out
+
+
+def test_physics_is_asked_only_where_no_outcome_is_stored(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    played: list[int] = []
+
+    def play(_plan: object, _model: RobotModel, seed: int) -> object:
+        played.append(seed)
+        return object()
+
+    monkeypatch.setattr(feasibility, "play", play)
+    monkeypatch.setattr(feasibility, "outcome_of", lambda _run, _plan: BAD)
+    first = ask(Trial(0), of=EXAM, is_played=False)
+    assert len(played) == 1
+    assert first.notes[f"feasibility.{STRICT}"] == "fell"
+    monkeypatch.setattr(feasibility, "_known", lambda: {first.notes[PLAN]: FINE})
+    stored = ask(Trial(0), of=EXAM, is_played=False)
+    assert len(played) == 1
+    assert stored.values[f"feasibility.{STRICT}"] == 0.0
+    ask(Trial(0), of=EXAM, is_played=True)
+    assert len(played) == 2
 
 
 def test_a_robot_that_does_not_get_ready_is_a_lost_run_and_not_a_bug(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(GO2Controller, "stand", lambda _go2: False)
-    measured = run_trial(CLEAR_MOTIONS.measure, 0)
+    measured = run_trial(feasibility.REMADE.measure, 0)
     assert (measured.values, measured.reason) == ({}, "lying, nothing asked yet")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(0, 2 * len(BROKEN), 3))
-def test_the_check_foresees_what_physics_does(seed: int) -> None:
-    measured, is_broken = CLEAR_MOTIONS.measure(Trial(seed)), generated_motion(seed).kind in BROKEN
-    assert measured.values["feasibility.failed"] == float(is_broken)
-    assert measured.values["feasibility.refused"] == float(is_broken)

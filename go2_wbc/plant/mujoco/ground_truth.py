@@ -103,8 +103,12 @@ class TruthRecording:
 
     def joint_distance(self, model: RobotModel) -> float:
         """Least distance [rad] of any joint to its limit; negative beyond it."""
+        return float(self.joint_distances(model).min())
+
+    def joint_distances(self, model: RobotModel) -> Float[np.ndarray, " n"]:
+        """The same at every tick."""
         q = self.q[:, 7:]
-        return float(np.minimum(q - model.q_lower, model.q_upper - q).min())
+        return np.minimum(q - model.q_lower, model.q_upper - q).min(axis=1)
 
 
 def true_runs(flags: Bool[np.ndarray, " n"]) -> list[slice]:

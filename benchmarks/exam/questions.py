@@ -1,0 +1,106 @@
+"""The exam's motions: which family, which draw, which amplitude, and from which stratum."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from benchmarks.exam.drawing import Draw, Family
+from benchmarks.exam.families import FAMILIES
+from go2_wbc.reference import MotionPlan, Posture, Reference
+from go2_wbc.robot.model import RobotModel
+from motions import FeasibilityChecker, Timeline
+
+EASY, BORDER, IMPOSSIBLE = "easy", "border", "impossible"
+STRATA = (EASY, BORDER, IMPOSSIBLE)
+EASY_SHARE, BORDER_SHARE, IMPOSSIBLE_SHARE = (0.3, 0.7), (0.10, 0.25), (1.6, 2.5)
+"""Amplitudes as shares of the one at which physics changes its mind; borders, off it."""
+
+
+@dataclass(frozen=True, slots=True)
+class LateStart(MotionPlan):
+    """A plan without its first ``start`` seconds, as if it began where that leaves the robot."""
+
+    name: str
+    entry: Posture
+    exit: Posture
+    duration: float
+    inner: MotionPlan
+    start: float
+
+    def at(self, t: float) -> Reference:
+        """The reference ``t`` seconds after the late start."""
+        return self.inner.at(max(t, 0.0) + self.start)
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """One motion.
+
+    Attributes:
+        family: its structure.
+        draw: number of the draw of its free numbers.
+        amplitude: of what the family scales.
+        stratum: how it was chosen.
+    """
+
+    family: Family
+    draw: int
+    amplitude: float
+    stratum: str = ""
+
+    @property
+    def name(self) -> str:
+        """Unique: family, draw and amplitude."""
+        return f"{self.family.name} {self.draw} {self.amplitude:.4f}"
+
+    @property
+    def line(self) -> Timeline:
+        """As it is written."""
+        draw = Draw(self.family.name, self.draw)
+        return replace(self.family.write(draw, self.amplitude), name=self.name)
+
+    def plan(self, model: RobotModel) -> MotionPlan:
+        """What is checked and played."""
+        plan = FeasibilityChecker(model).plan(self.line, check=False)
+        late = self.family.late
+        if late == 0.0:
+            return plan
+        return LateStart(plan.name, plan.entry, plan.exit, plan.duration - late, plan, late)
+
+
+def draws() -> list[tuple[Family, int]]:
+    """All draws of all families, the first draw of each family first."""
+    most = max(family.draws for family in FAMILIES.values())
+    return [(f, k) for k in range(most) for f in FAMILIES.values() if k < f.draws]
+
+
+def questions(borders: Mapping[str, float | None]) -> list[Question]:
+    """The exam: of each draw an easy motion, an impossible one, and one at its border.
+
+    Args:
+        borders: by family and draw (see ``draw_name``), the amplitude at which physics changes its
+            mind; None where it does not between the family's bounds. Then there is none at the
+            border, and the others are near the bounds.
+    """
+    found: list[Question] = []
+    for family, number in draws():
+        if draw_name(family, number) not in borders:
+            continue
+        flip = borders[draw_name(family, number)]
+        rng = Draw(f"strata of {family.name}", number)
+        easy, impossible = rng.between(*EASY_SHARE), rng.between(*IMPOSSIBLE_SHARE)
+        border = 1.0 + rng.either(*BORDER_SHARE)
+        if flip is None:
+            amplitudes = {EASY: family.low * 2.0 * easy, IMPOSSIBLE: family.high}
+        else:
+            amplitudes = {EASY: flip * easy, BORDER: flip * border, IMPOSSIBLE: flip * impossible}
+        for stratum, amplitude in amplitudes.items():
+            s = round(min(amplitude, family.high), 4)
+            found.append(Question(family, number, s, stratum))
+    return found
+
+
+def draw_name(family: Family, number: int) -> str:
+    """The key of a draw in the file of borders."""
+    return f"{family.name} {number}"

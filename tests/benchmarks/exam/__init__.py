@@ -1,0 +1,1 @@
+"""The exam of the feasibility check, mirrored."""

@@ -1,0 +1,118 @@
+"""How far a robot was from what was written: a recording that follows a plan, and is then moved."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controller.written_motion import LANDED, OffWritten, off_written
+from go2_wbc.legs import Leg
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from go2_wbc.reference import Anchor
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import rpy_from_rotation
+from motions import CompiledPlan, Timeline, compile_timeline
+from motions.dynamics.moves import FOOTPRINT
+from motions.dynamics.phases import PhaseProblem
+from tests.go2_wbc.plant.helpers import empty_recording
+
+PERIOD = 0.002
+SHIFT = 0.02  # m
+WHERE = Anchor(np.array([0.3, -0.2, 0.0]), 0.7)
+"""Where the robot stands in the world: a plan is in a frame of its own."""
+
+
+@pytest.fixture(scope="module")
+def model() -> RobotModel:
+    return RobotModel()
+
+
+@pytest.fixture(scope="module")
+def raised(model: RobotModel) -> CompiledPlan:
+    """A paw that is raised and put down again."""
+    line = Timeline(name="raise").foot("FR", z=0.06, over=0.5).hold(0.2).home(over=0.5)
+    return compile_timeline(line, model)
+
+
+def followed(plan: CompiledPlan) -> TruthRecording:
+    """What MuJoCo would say of a robot that follows ``plan`` exactly."""
+    n = round(plan.duration / PERIOD)
+    references = [plan.at(PERIOD * tick).placed(WHERE) for tick in range(n)]
+    return replace(
+        empty_recording(n, np.zeros((n, 4, 3))),
+        rpy=np.array([rpy_from_rotation(r.body.R_world_base) for r in references]),
+        p_world_com=np.array([r.body.p_world for r in references]),
+        p_world_feet=np.array([r.p_world_feet for r in references]),
+    )
+
+
+def touchdown(plan: CompiledPlan) -> int:
+    """The tick in which the right front foot comes down."""
+    n = round(plan.duration / PERIOD)
+    in_air = [k for k in range(n) if not plan.at(PERIOD * k).stance[Leg.FR]]
+    return in_air[-1] + 1
+
+
+def test_a_robot_that_does_what_is_written_is_nowhere_off(
+    raised: CompiledPlan, model: RobotModel
+) -> None:
+    found = off_written(followed(raised), raised, model)
+    assert max(getattr(found, name) for name in OffWritten.__slots__) < 1e-6
+
+
+def test_a_trunk_beside_its_place_or_turned_is_seen(
+    raised: CompiledPlan, model: RobotModel
+) -> None:
+    truth = followed(raised)
+    p, rpy = truth.p_world_com.copy(), truth.rpy.copy()
+    p[300:310, 1] += SHIFT
+    rpy[400:410, 2] += 0.1
+    found = off_written(replace(truth, p_world_com=p, rpy=rpy), raised, model)
+    assert found.trunk_off == pytest.approx(SHIFT)
+    assert found.turned_off == pytest.approx(0.1)
+    assert found.paw_off == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_foot_in_the_air_counts_as_paw_and_one_that_has_come_down_as_landed(
+    raised: CompiledPlan, model: RobotModel
+) -> None:
+    truth, down = followed(raised), touchdown(raised)
+    in_air, landed = truth.p_world_feet.copy(), truth.p_world_feet.copy()
+    in_air[: down - 1, Leg.FR, 2] += SHIFT
+    landed[down + 10 :, Leg.FR, 0] += SHIFT
+    in_air[0], landed[0] = truth.p_world_feet[0], truth.p_world_feet[0]
+    found = off_written(replace(truth, p_world_feet=in_air), raised, model)
+    assert (found.paw_off, found.landed_off) == pytest.approx((SHIFT, 0.0), abs=1e-6)
+    found = off_written(replace(truth, p_world_feet=landed), raised, model)
+    assert (found.paw_off, found.landed_off) == pytest.approx((0.0, SHIFT), abs=1e-6)
+
+
+def test_a_foot_that_settles_in_time_has_landed_well(
+    raised: CompiledPlan, model: RobotModel
+) -> None:
+    truth, down = followed(raised), touchdown(raised)
+    late = truth.p_world_feet.copy()
+    late[down : down + round(0.5 * LANDED / PERIOD), Leg.FR, 2] += SHIFT
+    found = off_written(replace(truth, p_world_feet=late), raised, model)
+    assert found.landed_off == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_jump_is_compared_with_where_it_was_to_land(model: RobotModel) -> None:
+    plan = compile_timeline(Timeline().jump(height=0.15), model)  # ships solved
+    (span,) = plan.dynamic
+    states, n = span.trajectory, round(plan.duration / PERIOD)
+    rows = np.minimum(np.searchsorted(states.times, PERIOD * np.arange(n)), len(states.times) - 1)
+    feet = np.zeros((n, 4, 3))
+    feet[:, :, :2], feet[:, :, 2] = FOOTPRINT, model.foot_radius
+    truth = replace(empty_recording(n, np.zeros((n, 4, 3))), q=states.q[rows], p_world_feet=feet)
+    assert isinstance(span.asked, PhaseProblem)
+    lands = float(np.cumsum([phase.duration for phase in span.asked.phases])[3])
+    there, beside = off_written(truth, plan, model), feet.copy()
+    assert there.landed_off < 1e-6
+    assert there.trunk_off < span.tolerance.position
+    assert there.paw_off == pytest.approx(0.15, abs=1e-6)  # these feet have not left the ground
+    beside[round(lands / PERIOD) - 20 :, Leg.RL, 0] += SHIFT
+    found = off_written(replace(truth, p_world_feet=beside), plan, model)
+    assert found.landed_off == pytest.approx(SHIFT, abs=1e-3)
