@@ -18,7 +18,7 @@ from benchmarks.exam.borders import BORDER, BORDERS
 from benchmarks.exam.cases import Case
 from benchmarks.exam.causes import CAUSES, examples, render_causes
 from benchmarks.exam.drawing import TEST
-from benchmarks.exam.outcome import FELL, LENIENT, STOPS, STRICT, Outcome, outcome_of, play
+from benchmarks.exam.outcome import play
 from benchmarks.exam.questions import Question, draw_name, draws, questions
 from benchmarks.exam.stored import (
     digest,
@@ -32,6 +32,7 @@ from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.session import add_options, measure_all, positive, publish
 from benchmarks.trials import Trial
 from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.motion_outcome import FELL, LENIENT, STOPS, STRICT, Outcome, outcome_of
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
-from benchmarks.exam.outcome import outcome_of, play
+from benchmarks.exam.outcome import play
 from benchmarks.exam.questions import Question, draws
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.trials import Trial
+from controller.motion_outcome import outcome_of
 from go2_wbc.robot.model import RobotModel
 
 NEAR, NEAR_SOLVED = 1.05, 1.10

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from benchmarks.exam.outcome import STRICT, UNPLANNED, Outcome
+from controller.motion_outcome import STRICT, UNPLANNED, Outcome
 
 Z = 1.96
 """Quantile of the normal distribution for intervals of 95 %."""
@@ -103,7 +103,7 @@ class Score:
 
     @staticmethod
     def of(cases: Iterable[Case], definition: str = STRICT) -> Score:
-        """The score on ``cases`` by a definition of ``benchmarks.exam.outcome``."""
+        """The score on ``cases`` by a definition of ``controller.motion_outcome``."""
         pairs = [(bool(case.refusal), bool(case.outcome.by(definition))) for case in cases]
         both, neither = pairs.count((True, True)), pairs.count((False, False))
         refused, failed = sum(r for r, _ in pairs), sum(f for _, f in pairs)

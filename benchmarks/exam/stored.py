@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.exam.outcome import Outcome
 from benchmarks.results_log import ROOT, settings_header
+from controller.motion_outcome import Outcome
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import write_atomically
 from go2_wbc.kernels.layout import REFERENCE

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 from benchmarks.exam.cases import Case, Score, chosen
 from benchmarks.exam.drawing import TEST, TRAIN
-from benchmarks.exam.outcome import FELL, LENIENT, STOPS, STRICT
 from benchmarks.exam.questions import STRATA
+from controller.motion_outcome import FELL, LENIENT, STOPS, STRICT
 
 _ROW = "{name:<17}{n:>4}{done:>5}" + "".join(f"{{shares[{k}]:>13}}" for k in range(4))
 _HEADS = ("refused", "wrong:", "passed", "done:")

@@ -12,13 +12,13 @@ from benchmarks import feasibility
 from benchmarks.__main__ import main
 from benchmarks.exam.cases import Case
 from benchmarks.exam.drawing import TEST, TRAIN
-from benchmarks.exam.outcome import STRICT, Outcome
 from benchmarks.feasibility import EXAM, OUTCOMES, PLAN, REFUSED, ask, exam, judged
 from benchmarks.runner import run_trial
 from benchmarks.scenario import Measurement
 from benchmarks.trials import Trial
 from controller.cli.common import ExitCode
 from controller.go2_controller import GO2Controller
+from controller.motion_outcome import STRICT, Outcome
 from go2_wbc.robot.model import RobotModel
 
 FINE, BAD = Outcome((), (), (), ()), Outcome(("fell",), ("fell",), ("fell",), ("fell",))

@@ -6,8 +6,8 @@ import pytest
 
 from benchmarks.exam.cases import Case, Score, Share
 from benchmarks.exam.drawing import TEST, TRAIN
-from benchmarks.exam.outcome import FELL, LENIENT, STRICT, UNPLANNED, Outcome
 from benchmarks.exam.table import render, scores, wrong_ones
+from controller.motion_outcome import FELL, LENIENT, STRICT, UNPLANNED, Outcome
 
 
 def case(refused: bool, failed: bool, *, half: str = TEST, why: str = "slip 12 mm") -> Case:

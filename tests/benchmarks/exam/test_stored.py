@@ -9,7 +9,6 @@ import pytest
 
 from benchmarks.exam import stored
 from benchmarks.exam.families import FAMILIES
-from benchmarks.exam.outcome import Outcome
 from benchmarks.exam.questions import Question, draw_name, draws, questions
 from benchmarks.exam.stored import (
     digest,
@@ -18,6 +17,7 @@ from benchmarks.exam.stored import (
     write_borders,
     write_outcomes,
 )
+from controller.motion_outcome import Outcome
 from go2_wbc.errors import ConfigError
 from go2_wbc.robot.model import RobotModel
 
