@@ -9,9 +9,10 @@ from go2_wbc.lazy import lazy_exports
 if TYPE_CHECKING:
     from controller.go2_controller import GO2Controller
     from controller.modes import Mode, Outcome
+    from controller.sweeps.certify import Certificate, certify
     from controller.sweeps.run import sweep
 
-__all__ = ["GO2Controller", "Mode", "Outcome", "sweep"]
+__all__ = ["Certificate", "GO2Controller", "Mode", "Outcome", "certify", "sweep"]
 
 
 __getattr__ = lazy_exports(
@@ -19,6 +20,7 @@ __getattr__ = lazy_exports(
     {
         "go2_controller": ("GO2Controller",),
         "modes": ("Mode", "Outcome"),
+        "sweeps.certify": ("Certificate", "certify"),
         "sweeps.run": ("sweep",),
     },
 )

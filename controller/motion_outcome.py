@@ -60,24 +60,33 @@ def outcome_of(run: MotionMeasurement, plan: MotionPlan) -> Outcome:
     return Outcome(strict, (*strict, *pressed), _leniently(run, plan), fell)
 
 
-def _strictly(run: MotionMeasurement, plan: MotionPlan) -> tuple[str, ...]:
+def shares_of(run: MotionMeasurement, plan: MotionPlan) -> dict[str, tuple[float, str]]:
+    """What the strict definition looks at, by name: its share of what is allowed, and in words.
+
+    A share above 1 is wrong.
+    """
     is_solved = isinstance(plan, CompiledPlan) and bool(plan.dynamic)
     off, landing = (SOLVED_OFF, SOLVED_LANDING) if is_solved else (OFF_TRUNK, OFF_LANDING)
     paw, landed = max(run.paw_off, _short(plan)), run.landed_off
-    return _true(
-        {
-            "fell": run.fall is not None,
-            "not done": not run.said,
-            f"slip {1e3 * run.slip:.0f} mm": run.slip > SLIP,
-            f"trunk {1e3 * run.trunk_off:.0f} mm off": run.trunk_off > off,
-            f"trunk {math.degrees(run.turned_off):.1f} deg off": run.turned_off > OFF_TURN,
-            f"paw {1e3 * paw:.0f} mm off": paw > (off if is_solved else OFF_PAW),
-            f"landed {1e3 * landed:.0f} mm beside": landed > landing,
-            f"touch {1e3 * run.touched:.0f} ms": run.touched > MOMENT,
-            f"saturated {1e3 * run.saturated:.0f} ms": run.saturated > MOMENT,
-            f"joint {-run.joint_distance:.3f} rad past": run.joint_distance < -BEYOND,
-        }
-    )
+    beyond = -run.joint_distance
+    return {
+        "slip": (run.slip / SLIP, f"slip {1e3 * run.slip:.0f} mm"),
+        "place": (run.trunk_off / off, f"trunk {1e3 * run.trunk_off:.0f} mm off"),
+        "attitude": (
+            run.turned_off / OFF_TURN,
+            f"trunk {math.degrees(run.turned_off):.1f} deg off",
+        ),
+        "paw": (paw / (off if is_solved else OFF_PAW), f"paw {1e3 * paw:.0f} mm off"),
+        "landing": (landed / landing, f"landed {1e3 * landed:.0f} mm beside"),
+        "touch": (run.touched / MOMENT, f"touch {1e3 * run.touched:.0f} ms"),
+        "torque": (run.saturated / MOMENT, f"saturated {1e3 * run.saturated:.0f} ms"),
+        "joints": (beyond / BEYOND, f"joint {beyond:.3f} rad past"),
+    }
+
+
+def _strictly(run: MotionMeasurement, plan: MotionPlan) -> tuple[str, ...]:
+    ends = _true({"fell": run.fall is not None, "not done": not run.said})
+    return (*ends, *(words for share, words in shares_of(run, plan).values() if share > 1.0))
 
 
 def _leniently(run: MotionMeasurement, plan: MotionPlan) -> tuple[str, ...]:

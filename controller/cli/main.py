@@ -39,6 +39,7 @@ class Command:
 
 
 COMMANDS: tuple[Command, ...] = (
+    Command("certify", "controller.cli.certify", "how often a motion is done in random worlds"),
     Command("check", "controller.cli.motion_check", "can the robot do this motion?"),
     Command("dance", "controller.cli.dance", "a dance on the beats of a song"),
     Command("demo", "controller.cli.demo", "stand, sit, walk, turn, high five; measured, in 3D"),

@@ -98,7 +98,7 @@ def run(args: argparse.Namespace) -> int:
             out=args.out,
             fresh=args.fresh,
             keep_going=args.keep_going,
-            on_progress=lambda progress: _tell(line, progress),
+            on_progress=lambda progress: tell(line, progress),
         )
     summary = summarise(result.rows, result.columns)
     written = [export_rows(result, path) for path in args.export]
@@ -120,7 +120,8 @@ def _target(args: argparse.Namespace) -> object:
     return motion_target(the_motion(args.what, args.values), " ".join([args.what, *args.values]))
 
 
-def _tell(line: ProgressLine, progress: Progress) -> None:
+def tell(line: ProgressLine, progress: Progress) -> None:
+    """Show how far a sweep has come."""
     place = f"{progress.done}/{progress.total}"
     if progress.rate:
         left = _duration(progress.remaining)

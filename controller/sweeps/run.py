@@ -6,12 +6,14 @@ import math
 import re
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from controller.sweeps.engine import Engine, Failure
+from controller.sweeps.identity import digest
 from controller.sweeps.local import LocalEngine, processors
-from controller.sweeps.rows import Columns, Row
+from controller.sweeps.rows import SEED, Columns, Row
 from controller.sweeps.sweep_file import SweepFile
 from controller.sweeps.targets import about_of, job_of, target_of
 from go2_wbc.errors import CommandError, SweepError, unknown_name
@@ -58,6 +60,7 @@ class SweepResult:
         columns: names and kinds of the values.
         rows: in the order of their seeds, which are the first value of each.
         failures: why seeds gave no row.
+        about: what the rows depend on, by name: versions, digests.
     """
 
     path: Path
@@ -65,6 +68,7 @@ class SweepResult:
     columns: Columns
     rows: list[Row]
     failures: dict[int, str]
+    about: dict[str, str]
 
 
 def sweep(
@@ -78,6 +82,7 @@ def sweep(
     out: Path | str | None = None,
     fresh: bool = False,
     keep_going: bool = False,
+    is_enough: Callable[[Sequence[Row]], bool] | None = None,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> SweepResult:
     """Run ``what`` over ``n`` seeds, each in a worker process, and keep every row at once.
@@ -98,6 +103,8 @@ def sweep(
         out: file for the rows, ``.sqlite`` or ``.db``; by default in ``out/sweeps``.
         fresh: begin anew instead of going on.
         keep_going: let a seed that fails cost no other one its run; its reason is kept.
+        is_enough: is asked with the rows of the first seeds, without a gap, and ends the sweep when
+            it says so; rows beyond, if workers were ahead, are kept.
         on_progress: is told after every seed.
 
     Raises:
@@ -116,19 +123,24 @@ def sweep(
         remove_sweep(file)
     seeds = range(first_seed, first_seed + n)
     with SweepFile(file, about_of(target)) as rows:
-        finished = rows.finished
-        left = [seed for seed in seeds if seed not in finished]
+        known = _FirstRows(seeds, {int(row[SEED]): row for row in rows.rows(seeds)}, is_enough)
+        left = [seed for seed in seeds if seed not in known.all]
         progress = _Meter(len(seeds), len(left), on_progress)
         progress.tell(None)
-        for ended in runner.run(job_of(target), left):
-            if ended.failure is None:
-                rows.add(ended.item, ended.value)
-            else:
-                rows.add_failure(ended.item, ended.failure.text)
-                if not keep_going:
-                    raise SweepError(_told(ended.item, ended.failure, rows))
-            progress.tell(ended.failure)
-        return _result(rows, seeds)
+        ends = runner.run(job_of(target), [] if known.are_enough else left)
+        with closing(ends):
+            for ended in ends:
+                if ended.failure is None:
+                    rows.add(ended.item, ended.value)
+                    known.add(ended.item, ended.value)
+                else:
+                    rows.add_failure(ended.item, ended.failure.text)
+                    if not keep_going:
+                        raise SweepError(_told(ended.item, ended.failure, rows))
+                progress.tell(ended.failure)
+                if known.are_enough:
+                    break
+        return _result(rows, known.seeds)
 
 
 def read_sweep(path: Path | str) -> SweepResult:
@@ -174,6 +186,37 @@ def engine_of(name: str, workers: int | None, address: str | None = None) -> Eng
     return LocalEngine(workers or processors())
 
 
+class _FirstRows:
+    """The rows of the first seeds, as far as there is no gap, and whether they are enough.
+
+    Attributes:
+        all: every row, by its seed.
+        seeds: that the result is about: all, or the fewest that are enough.
+        are_enough: whether the sweep may end.
+    """
+
+    def __init__(
+        self, seeds: range, rows: dict[int, Row], is_enough: Callable[[Sequence[Row]], bool] | None
+    ) -> None:
+        self.all, self.seeds, self.are_enough = rows, seeds, False
+        self._first, self._is_enough = list[Row](), is_enough
+        self._look()
+
+    def add(self, seed: int, row: Row) -> None:
+        self.all[seed] = row
+        self._look()
+
+    def _look(self) -> None:
+        while self._is_enough is not None and not self.are_enough:
+            if (count := len(self._first)) == len(self.seeds):
+                return
+            if (row := self.all.get(self.seeds[count])) is None:
+                return
+            self._first.append(row)
+            if self._is_enough(self._first):
+                self.are_enough, self.seeds = True, self.seeds[: count + 1]
+
+
 class _Meter:
     """Counts what has ended, and how fast."""
 
@@ -193,7 +236,11 @@ def _result(rows: SweepFile, seeds: Sequence[int] | None) -> SweepResult:
     wanted = None if seeds is None else frozenset(seeds)
     failures = {s: text for s, text in rows.failures.items() if wanted is None or s in wanted}
     name = str(rows.about.get("what", rows.path.stem))
-    return SweepResult(rows.path, name, rows.columns, rows.rows(wanted), failures)
+    about = {
+        key: digest(value) if isinstance(value, bytes) else value
+        for key, value in rows.about.items()
+    }
+    return SweepResult(rows.path, name, rows.columns, rows.rows(wanted), failures, about)
 
 
 def _told(seed: int, failure: Failure, rows: SweepFile) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from controller.motion_measurement import MotionMeasurement, measure_motion
+from controller.motion_outcome import outcome_of, shares_of
 from controller.sweeps.rows import Row, Value
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
@@ -67,15 +68,23 @@ class MotionStudy:
     archive: bytes
 
     def __call__(self, seed: int) -> Row:
-        """What was measured: ``MotionMeasurement``, lengths in m, times in s."""
+        """Whether it was done, what went wrong, and what was measured.
+
+        See ``motion_outcome`` (strict) and ``MotionMeasurement``; lengths in m, times in s.
+        """
         trial = Trial(seed)
         with TrialRobot(trial) as robot:
             try:
                 measured = self.play(robot)
             except (TrialFailed, Go2WbcError) as error:
                 measured = replace(_NOTHING, fall=str(error))
+        plan = plan_of(self.archive)
+        harm, shares = outcome_of(measured, plan).strict, shares_of(measured, plan)
+        closest, (share, _) = max(shares.items(), key=lambda item: np.nan_to_num(item[1][0]))
         values = {**measured.as_dict(), "fall": measured.fall or ""}
-        return {**_world(trial), **{k: v for k, v in values.items() if v is not None}}
+        row: Row = {"done": not harm, "harm": "; ".join(harm)}
+        row |= {"closest": closest, "closest_share": share, **_world(trial)}
+        return row | {name: value for name, value in values.items() if value is not None}
 
     def play(self, robot: TrialRobot) -> MotionMeasurement:
         """Get up and play it.

@@ -115,8 +115,10 @@ def test_a_file_that_does_not_run_is_told_with_its_line(folder: Path) -> None:
 
 def test_the_plugin_is_announced_and_loads_nothing_heavy() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert project["entry-points"]["pytest11"] == {"go2_motions": "motions.pytest_plugin"}
-    code = "import motions.pytest_plugin, sys; print(sorted(sys.modules))"
+    plugins = project["entry-points"]["pytest11"]
+    assert plugins["go2_motions"] == "motions.pytest_plugin"
+    assert plugins["go2_certificates"] == "controller.pytest_plugin"
+    code = f"import sys, {', '.join(plugins.values())}; print(sorted(sys.modules))"
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )

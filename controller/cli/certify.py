@@ -1,0 +1,91 @@
+"""``go2-wbc certify``: how often a motion is done in randomised simulated runs."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from controller.cli.common import ExitCode, Subparsers, add_parser, print_json, shown_path
+from controller.cli.motion_args import add_motion, the_motion
+from controller.cli.progress import ProgressLine
+from controller.cli.sweep import tell
+from go2_wbc.errors import CommandError
+
+RUNS = 200
+EXAMPLES = """
+go2-wbc certify high_five
+go2-wbc certify my_motion.py:bow --at-least 0.95
+go2-wbc certify jump_up --n 1000 --width 0.05
+go2-wbc certify wave --set times=5 --json
+"""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``certify``."""
+    parser = add_parser(
+        subparsers,
+        "certify",
+        "Play a motion in many random worlds in MuJoCo (friction, mass, heading and\n"
+        "start differ) and say how often it is done, with the 95 % interval of the\n"
+        "rate (Clopper-Pearson) and the worst runs. Exit code 1 if the rate is below\n"
+        "--at-least.",
+        examples=EXAMPLES,
+    )
+    add_motion(parser)
+    parser.add_argument(
+        "--n", metavar="N", type=int, default=RUNS, help="runs, default %(default)s"
+    )
+    parser.add_argument(
+        "--width",
+        metavar="SHARE",
+        type=float,
+        help="end early once the interval is no wider than this, such as 0.05",
+    )
+    parser.add_argument(
+        "--at-least",
+        metavar="RATE",
+        type=float,
+        help="the lower end of the interval must reach this, such as 0.95",
+    )
+    parser.add_argument(
+        "--first-seed", metavar="K", type=int, default=0, help="the first of them, default 0"
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=int, help="processes, default: all processors"
+    )
+    parser.add_argument("--engine", metavar="NAME", default="local", help="local (default) or ray")
+    parser.add_argument(
+        "--out", metavar="FILE", type=Path, help="keep the rows here, default: in out/sweeps"
+    )
+    parser.add_argument("--fresh", action="store_true", help="begin anew, do not go on")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run it, print the certificate, and say by the exit code whether it is good enough."""
+    from controller.sweeps.certify import certify
+
+    if args.at_least is not None and not 0.0 < args.at_least < 1.0:
+        raise CommandError(f"--at-least must be between 0 and 1, got {args.at_least:g}")
+    with ProgressLine() as line:
+        line.update(0.0, "starting")
+        found = certify(
+            the_motion(args.motion, args.values),
+            args.n,
+            width=args.width,
+            first_seed=args.first_seed,
+            workers=args.workers,
+            engine=args.engine,
+            out=args.out,
+            fresh=args.fresh,
+            on_progress=lambda progress: tell(line, progress),
+        )
+    if args.json:
+        print_json(found.as_dict())
+    else:
+        print(found.table())
+        print(f"rows: {shown_path(found.path)}")
+    is_enough = args.at_least is None or found.meets(args.at_least)
+    if not is_enough and not args.json:
+        print(f"below {args.at_least:g}: the interval begins at {found.interval[0]:.3f}")
+    return ExitCode.OK if is_enough else ExitCode.FAILED

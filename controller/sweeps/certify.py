@@ -1,0 +1,173 @@
+"""``certify``: how often a motion is done in randomised simulated runs, with its interval.
+
+The interval of the rate is that of Clopper and Pearson (Biometrika, 1934): it holds the true rate
+with at least the confidence that is stated, whatever the rate is. If runs may end early, they end
+at the first number of runs, in the order of their seeds, at which the interval is as narrow as
+asked: so the result depends on the seeds only. An interval that is looked at again and again is a
+little too sure; who needs the exact confidence has all runs done.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from controller.sweeps.rows import SEED, Row
+from controller.sweeps.run import Progress, sweep
+from controller.sweeps.summary import CONFIDENCE, rate_interval
+from controller.sweeps.targets import motion_target
+from go2_wbc.errors import CommandError
+
+RUNS = 200
+WORST = 5
+"""How many of the worst runs are named."""
+FEWEST = 20
+"""Runs before which nothing ends early."""
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """How often a motion was done.
+
+    Attributes:
+        motion: its name.
+        n: runs that were looked at.
+        done: runs in which it was done.
+        interval: of 95 % of the true rate.
+        worst: the worst runs, the worst first: their rows in ``path``.
+        about: what the certificate holds for: versions, and digests of code and plan.
+        path: the file with all rows; each can be replayed.
+    """
+
+    motion: str
+    n: int
+    done: int
+    interval: tuple[float, float]
+    worst: tuple[Row, ...]
+    about: Mapping[str, str]
+    path: Path
+
+    @property
+    def rate(self) -> float:
+        """Share of the runs in which it was done."""
+        return self.done / self.n
+
+    def meets(self, least: float) -> bool:
+        """Whether the rate is at least ``least``, with 95 % confidence."""
+        return self.interval[0] >= least
+
+    def table(self) -> str:
+        """Rate, interval, the worst runs and what it holds for, at most 80 columns wide."""
+        low, high = (100.0 * bound for bound in self.interval)
+        lines = [
+            f"{self.motion:.50}: done in {self.done} of {self.n} runs, {100.0 * self.rate:.1f} %",
+            f"95 % interval of the rate: {low:.1f} to {high:.1f} %",
+            "",
+            f"{'seed':>6}  {'friction':>8} {'mass':>6}  worst runs",
+            "-" * 80,
+        ]
+        for row in self.worst:
+            world = f"{row['friction']:>8.2f} {row['mass_scale']:>6.2f}"
+            lines.append(f"{row[SEED]:>6}  {world}  {_told(row):.54}")
+        lines.append("-" * 80)
+        lines += [f"{name}: {value}"[:80] for name, value in self.about.items()]
+        return "\n".join(lines)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON; what was not measured is None."""
+        return {
+            "motion": self.motion,
+            "n": self.n,
+            "done": self.done,
+            "rate": self.rate,
+            "interval": list(self.interval),
+            "confidence": CONFIDENCE,
+            "worst": [{name: _finite(value) for name, value in row.items()} for row in self.worst],
+            "about": dict(self.about),
+            "file": str(self.path),
+        }
+
+
+def certify(
+    motion: object,
+    n: int = RUNS,
+    *,
+    width: float | None = None,
+    first_seed: int = 0,
+    workers: int | None = None,
+    engine: str = "local",
+    out: Path | str | None = None,
+    fresh: bool = False,
+    on_progress: Callable[[Progress], None] = lambda progress: None,
+) -> Certificate:
+    """Play ``motion`` in ``n`` random worlds, unchecked, and count how often it is done.
+
+    Runs that are kept in ``out`` and depend on the same code, libraries and plan are not repeated.
+
+    Args:
+        motion: as ``GO2Controller.play`` takes it.
+        n: runs; each has its own friction, mass, heading and start, drawn by its seed.
+        width: ends early once the interval of the rate is no wider, 0 to 1; None: all runs.
+        first_seed, workers, engine, out, fresh, on_progress: see ``sweep``.
+
+    Raises:
+        CommandError: for an argument that is not valid, or what stands for no motion.
+        SweepError: if a run breaks off, or the disk refuses. What is finished is kept.
+    """
+    if width is not None and not (isinstance(width, int | float) and 0.0 < width <= 1.0):
+        raise CommandError(f"width must be a share between 0 and 1, got {width!r}")
+    target = motion_target(motion)
+    result = sweep(
+        target,
+        n,
+        first_seed=first_seed,
+        workers=workers,
+        engine=engine,
+        out=out,
+        fresh=fresh,
+        is_enough=None if width is None else _narrow(width),
+        on_progress=on_progress,
+    )
+    rows = result.rows
+    done = sum(bool(row["done"]) for row in rows)
+    return Certificate(
+        motion=result.name,
+        n=len(rows),
+        done=done,
+        interval=rate_interval(done, len(rows)),
+        worst=tuple(sorted(rows, key=_goodness)[:WORST]),
+        about=result.about,
+        path=result.path,
+    )
+
+
+def _narrow(width: float) -> Callable[[Sequence[Row]], bool]:
+    def is_enough(rows: Sequence[Row]) -> bool:
+        if len(rows) < FEWEST:
+            return False
+        low, high = rate_interval(sum(bool(row["done"]) for row in rows), len(rows))
+        return high - low <= width
+
+    return is_enough
+
+
+def _goodness(row: Row) -> tuple[bool, bool, float]:
+    """Failed runs first, falls before others, then whatever is nearest to what is allowed."""
+    share = float(row["closest_share"])
+    return bool(row["done"]), not row["fall"], -share if math.isfinite(share) else 0.0
+
+
+def _told(row: Row) -> str:
+    """What went wrong in a run, or what came nearest to it."""
+    if not row["done"]:
+        return str(row["harm"])
+    return (
+        f"done; closest: {row['closest']}, {100.0 * float(row['closest_share']):.0f} % of allowed"
+    )
+
+
+def _finite(value: object) -> object:
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,139 @@
+"""Certificates: counted in random worlds, the same however they are run, and judged by truth."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from controller import Certificate, certify, sweep
+from controller.cli.common import ExitCode
+from controller.cli.main import main
+from controller.sweeps.rows import Row
+from go2_wbc.errors import CommandError
+from motions import Timeline, deg
+from tests.controller.sweeps import swept
+
+ROOT = Path(__file__).resolve().parents[3]
+BOW = Timeline(name="bow").body(pitch=deg(8), over=0.4).home(over=0.4)
+LEAP = Timeline(name="leap").body(y=0.12, over=0.1).body(y=-0.12, over=0.1).home(over=0.1)
+"""Asks for far more than friction gives."""
+MOTIONS = '''
+from motions import Timeline, deg, motion
+
+@motion
+def leap() -> Timeline:
+    """Leap: more than friction gives."""
+    return Timeline().body(y=0.12, over=0.1).body(y=-0.12, over=0.1).home(over=0.1)
+'''
+TESTS = """
+import pytest
+from mine import leap
+
+@pytest.mark.certify(0.9, n=2)
+def test_leap(certify_motion):
+    certify_motion(leap)
+
+@pytest.mark.certify(90)
+def test_percent(certify_motion):
+    certify_motion(leap)
+
+def test_no_marker(certify_motion):
+    certify_motion(leap)
+"""
+
+
+@pytest.fixture(scope="module")
+def bows(tmp_path_factory: pytest.TempPathFactory) -> Certificate:
+    return certify(BOW, 4, workers=2, out=tmp_path_factory.mktemp("bows") / "rows.sqlite")
+
+
+def test_a_motion_that_is_done_is_certified_with_its_interval(bows: Certificate) -> None:
+    assert (bows.motion, bows.n, bows.done, bows.rate) == ("bow", 4, 4, 1.0)
+    assert bows.interval == pytest.approx((0.025 ** (1 / 4), 1.0))  # Clopper-Pearson, n of n
+    assert bows.meets(0.39)
+    assert not bows.meets(0.4)
+    assert {"code", "version", "plan", "libraries"} <= set(bows.about)
+    assert len({row["friction"] for row in bows.worst}) == 4
+    assert max(map(len, bows.table().splitlines())) <= 80
+    assert "done in 4 of 4 runs" in bows.table()
+    assert json.loads(json.dumps(bows.as_dict(), allow_nan=False))["rate"] == 1.0
+
+
+def test_finished_runs_are_not_repeated_and_one_worker_gives_the_same(
+    bows: Certificate, tmp_path: Path
+) -> None:
+    told: list[float] = []
+    again = certify(BOW, 4, out=bows.path, on_progress=lambda p: told.append(p.rate))
+    assert told == [0.0]  # nothing was left to do
+    assert again == bows
+    alone = certify(BOW, 2, workers=1, out=tmp_path / "one.sqlite")
+    assert set(map(str, alone.worst)) <= set(map(str, bows.worst))
+
+
+def test_what_physics_does_not_give_is_counted_and_named(tmp_path: Path) -> None:
+    found = certify(LEAP, 2, out=tmp_path / "rows.sqlite")
+    assert (found.done, found.rate) == (0, 0.0)
+    assert not found.meets(0.1)
+    assert all("trunk" in str(row["harm"]) for row in found.worst)
+    assert not any(row["done"] for row in found.worst)
+
+
+def test_a_sweep_ends_with_the_fewest_first_rows_that_are_enough(tmp_path: Path) -> None:
+    def is_enough(rows: list[Row]) -> bool:
+        return sum(bool(row["ok"]) for row in rows) >= 3
+
+    for workers in (1, 3):
+        found = sweep(
+            swept.trial,
+            40,
+            workers=workers,
+            out=tmp_path / f"{workers}.sqlite",
+            is_enough=is_enough,
+        )
+        assert [row["seed"] for row in found.rows] == list(range(7))  # 0, 3 and 6 are ok
+    again = sweep(swept.trial, 40, out=tmp_path / "3.sqlite", is_enough=is_enough)
+    assert len(again.rows) == 7
+
+
+@pytest.mark.parametrize("width", [0.0, 1.5, -0.1])
+def test_a_width_that_is_none_is_refused(width: float, tmp_path: Path) -> None:
+    with pytest.raises(CommandError, match="width"):
+        certify(BOW, 2, width=width, out=tmp_path / "rows.sqlite")
+
+
+def test_the_command_fails_below_the_rate_that_is_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(MOTIONS, encoding="utf-8")
+    words = ["certify", f"{tmp_path / 'mine.py'}:leap", "--n", "2"]
+    words += ["--out", str(tmp_path / "rows.sqlite")]
+    assert main(words) == ExitCode.OK
+    assert "leap: done in 0 of 2 runs" in capsys.readouterr().out
+    assert main([*words, "--at-least", "0.5", "--json"]) == ExitCode.FAILED
+    assert json.loads(capsys.readouterr().out)["done"] == 0
+    assert main([*words, "--at-least", "95"]) == ExitCode.USAGE
+
+
+def test_the_marker_requires_a_rate_and_says_what_is_missing(tmp_path: Path) -> None:
+    (tmp_path / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
+    (tmp_path / "mine.py").write_text(MOTIONS, encoding="utf-8")
+    (tmp_path / "test_mine.py").write_text(TESTS, encoding="utf-8")
+    paths = os.pathsep.join([str(ROOT), str(tmp_path)])
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-p", "controller.pytest_plugin", "-rfE", "test_mine.py"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": paths, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "'leap' must be done in 90 % of the runs" in done.stdout
+    assert "done in 0 of 2 runs" in done.stdout
+    assert "got 90" in done.stdout
+    assert "certify_motion needs the marker" in done.stdout
+    assert "Traceback" not in done.stdout
