@@ -18,6 +18,7 @@ from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.mujoco.visuals import add_visuals
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.description import BASE_LINK, RobotDescription
+from go2_wbc.robot.payload import payload_inertia
 from go2_wbc.validation import require_not_negative
 
 FOOT_RADIUS = 0.022  # m; radius of the foot in the URDF's foot mesh and in every published MJCF
@@ -29,9 +30,6 @@ ACCELEROMETER = "go2_wbc_accelerometer"
 ORIENTATION = "go2_wbc_orientation"
 PAYLOAD_BODY = "go2_wbc_payload"
 IMU_POSITION = (-0.02557, 0.0, 0.04232)  # m in the base frame; URDF joint imu_joint
-
-# The payload is a solid box of about a battery's or computer's size.
-PAYLOAD_HALF_SIZE = (0.10, 0.06, 0.04)  # m
 
 # Torsional (m) and rolling (m) friction: MuJoCo's defaults; unused by point contacts (condim 3).
 _TORSIONAL, _ROLLING = 0.005, 0.0001
@@ -218,11 +216,13 @@ def _add_boxes(spec: mujoco.MjSpec, terrain: Boxes) -> None:
         )
 
 
-def add_payload(spec: mujoco.MjSpec, base: str, payload: float) -> None:
-    """Fixes ``payload`` kg, a solid box, to the origin of the body ``base``."""
-    x, y, z = (2.0 * half for half in PAYLOAD_HALF_SIZE)
-    body = spec.body(base).add_body(name=PAYLOAD_BODY, mass=payload)
-    body.inertia = [payload / 12.0 * s for s in (y * y + z * z, x * x + z * z, x * x + y * y)]
+def add_payload(
+    spec: mujoco.MjSpec, base: str, payload: float, place: tuple[float, float, float]
+) -> None:
+    """Fixes ``payload`` kg, a solid box, to the body ``base``, with its middle at ``place`` [m]."""
+    body = spec.body(base).add_body(name=PAYLOAD_BODY, mass=payload, pos=place)
+    body.ipos = np.zeros(3)  # of the body; MuJoCo would take its place once more
+    body.inertia = payload_inertia(payload)
     body.explicitinertial = True
 
 

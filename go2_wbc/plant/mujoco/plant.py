@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections import deque
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -25,7 +23,8 @@ from go2_wbc.plant.mujoco.contacts import (
 )
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
-from go2_wbc.plant.mujoco.pushes import Push, Pushes
+from go2_wbc.plant.mujoco.pushes import Pushes
+from go2_wbc.plant.mujoco.saved import SavedPhysics
 from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
 from go2_wbc.plant.sensors import ImuSample, SensorNoise
@@ -37,20 +36,6 @@ _logger = logging.getLogger(__name__)
 
 # N; a foot reads a contact above this. A standing foot carries about 40 N, so 1 N is "touching".
 FOOT_CONTACT_THRESHOLD = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class SavedPhysics:
-    """Everything that decides how a ``MujocoPlant`` goes on; see ``MujocoPlant.save``."""
-
-    integration: Float[np.ndarray, " n"]
-    ticks: int
-    pushes: tuple[Push, ...]
-    tau: Float[np.ndarray, "12"]
-    forces: Float[np.ndarray, "6"]
-    noise_state: Mapping[str, Any]
-    state: RobotState | None
-    imu: ImuSample | None
 
 
 class MujocoPlant(Plant):
@@ -67,7 +52,8 @@ class MujocoPlant(Plant):
         control_period: seconds per ``write``, an integer multiple of ``timestep``.
         friction: sliding friction coefficient; ``None`` is 0.8, or what ``mjcf`` says. With
             ``mjcf`` a number applies to the feet's contacts.
-        payload: extra mass [kg], a solid box fixed at the base's origin.
+        payload: extra mass [kg], a solid box fixed to the base.
+        payload_place: where its middle is [m] in the frame of the base.
         mass_scale: factor on every mass and inertia of the robot, payload excepted.
         terrain: boxes to strew on the floor; only without ``mjcf``.
         sensors: ``"ideal"``, or ``"noisy"`` for white noise on everything measured.
@@ -78,6 +64,7 @@ class MujocoPlant(Plant):
         joint_dynamics: friction, damping, armature; ``None`` is ``JointDynamics()``, or what
             ``mjcf`` says.
         motor: ``"torque-speed"``, or ``"ideal"`` for the peak torque at every speed.
+        delay: time [s] from ``write`` until a command acts, a multiple of ``control_period``.
         urdf: another URDF instead of the installed one.
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
 
@@ -95,6 +82,7 @@ class MujocoPlant(Plant):
         control_period: float = 0.002,
         friction: float | None = None,
         payload: float = 0.0,
+        payload_place: tuple[float, float, float] = (0.0, 0.0, 0.0),
         mass_scale: float = 1.0,
         terrain: Boxes | None = None,
         sensors: str = "ideal",
@@ -104,6 +92,7 @@ class MujocoPlant(Plant):
         initial_joint_noise: float = 0.0,
         joint_dynamics: JointDynamics | None = None,
         motor: str = TORQUE_SPEED,
+        delay: float = 0.0,
         urdf: Path | str | None = None,
         visuals: bool = False,
     ) -> None:
@@ -116,12 +105,14 @@ class MujocoPlant(Plant):
             control_period=control_period,
             friction=friction,
             payload=payload,
+            payload_place=payload_place,
             mass_scale=mass_scale,
             terrain=terrain,
             initial_yaw=initial_yaw,
             initial_joint_noise=initial_joint_noise,
             joint_dynamics=joint_dynamics,
             motor=motor,
+            delay=delay,
             visuals=visuals,
             seed=seed,
         )
@@ -142,8 +133,10 @@ class MujocoPlant(Plant):
         self._warnings = data.warning.number
         self._bind_kernels()
         settle(self._model, data, layout, setup, start_rng)
+        lying = JointCommand.damping(LYING_DAMPING)
+        self._waiting = deque([_rows(lying)] * round(delay / control_period))
         # One period in the lying state, so that the first read has forces and torques.
-        self.write(JointCommand.damping(LYING_DAMPING))
+        self.write(lying)
         self._ticks, self._data.time = 0, 0.0
 
     @property
@@ -311,6 +304,7 @@ class MujocoPlant(Plant):
             noise_state=self._rng.bit_generator.state,
             state=self._state,
             imu=self._imu,
+            waiting=tuple(self._waiting),
         )
 
     def restore(self, saved: SavedPhysics) -> None:
@@ -325,6 +319,7 @@ class MujocoPlant(Plant):
         self._tau, self._forces = saved.tau, saved.forces
         self._rng.bit_generator.state = dict(saved.noise_state)
         self._state, self._imu = saved.state, saved.imu
+        self._waiting = deque(saved.waiting)
 
     def close(self) -> None:
         """Ends the plant; every later call but ``close`` raises ``ClosedError``."""
@@ -336,16 +331,16 @@ class MujocoPlant(Plant):
 
     def _accept(self, command: JointCommand) -> None:
         """Copies ``command`` if it is good."""
-        rows = (command.tau, command.q_des, command.v_des, command.kp, command.kd)
-        for name, row in zip(_FIELDS, rows, strict=True):
-            if row.shape != (12,):
-                raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
-        accepted = np.array(rows, dtype=float)
+        for name in _FIELDS:
+            if (shape := getattr(command, name).shape) != (12,):
+                raise CommandError(f"command.{name} must have shape (12,), got {shape}")
+        accepted = _rows(command)
         if not math.isfinite(np.vdot(accepted, accepted)):  # cheap, but huge numbers overflow
-            for name, row in zip(_FIELDS, rows, strict=True):
+            for name, row in zip(_FIELDS, accepted, strict=True):
                 if not np.isfinite(row).all():
                     raise CommandError(f"command.{name} is not finite: {row}")
-        self._command = accepted
+        self._waiting.append(accepted)
+        self._command = self._waiting.popleft()
 
     def _bind_kernels(self) -> None:
         """Binds the kernels of a tick and the arrays of MuJoCo's that they read and fill."""
@@ -394,6 +389,11 @@ class MujocoPlant(Plant):
         if np.count_nonzero(counts):
             raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(counts)]
             raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
+
+
+def _rows(command: JointCommand) -> Float[np.ndarray, "5 12"]:
+    """A command's numbers, in the order of ``_FIELDS``."""
+    return np.array([getattr(command, name) for name in _FIELDS], dtype=float)
 
 
 _FIELDS = ("tau", "q_des", "v_des", "kp", "kd")
