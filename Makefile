@@ -4,7 +4,7 @@
 SHELL := bash
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-ros2 test-unitree test-dist gates format docs bench doctor clean
+.PHONY: help demo test test-ros2 test-unitree test-cluster test-dist gates format docs bench doctor clean
 
 # A shell that has sourced another robot stack would put its own Pinocchio before ours.
 unexport PYTHONPATH
@@ -14,6 +14,7 @@ PYTHON ?=
 WORKERS ?= 2
 ARGS ?=
 VENV := .venv
+COMMA := ,
 BIN := $(VENV)/bin
 
 help: ## show this list
@@ -43,6 +44,10 @@ test-unitree: $(VENV)/.stamp-unitree ## the tests of Unitree's protocol, with it
 	GO2_WBC_CPP_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/cpp/bin/python \
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal tests/controller/bridges/unitree \
 		'tests/test_examples.py::test_an_example_runs_and_prints_its_point[30_sport_client]' $(ARGS)
+
+test-cluster: $(VENV)/.stamp-cluster ## the tests of sweeps, on a Ray cluster of two nodes too
+	GO2_WBC_REQUIRE_CLUSTER=1 \
+	$(BIN)/python -m pytest -n 0 tests/controller/sweeps tests/controller/test_cli_sweep.py $(ARGS)
 
 test-dist: $(VENV)/.stamp-dev ## build wheel and sdist, use each in an empty environment
 	tests/distribution.sh $(BIN)/python
@@ -95,6 +100,10 @@ $(VENV)/.stamp-unitree: $(VENV)/.stamp-dev
 	$(BIN)/python -m venv $(VENV)/peers/cpp
 	$(VENV)/peers/cpp/bin/python -m pip install --quiet far-unitree-sdk==0.1.8 numpy || { \
 		rm -rf $(VENV)/peers/cpp; echo "The C++ SDK is not tested: no wheel for this Python"; }
+	@touch $@
+
+$(VENV)/.stamp-cluster: $(VENV)/.stamp-dev
+	$(call install,.[sweep$(COMMA)cluster])
 	@touch $@
 
 $(VENV)/.stamp-run: pyproject.toml $(VENV)/.stamp-venv

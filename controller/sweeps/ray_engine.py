@@ -1,0 +1,154 @@
+"""Workers on many machines: tasks of a Ray cluster, which ships items and gathers values.
+
+What a task calls is what a local worker calls, in the same environment: the rows are the same.
+Without an address a cluster of this machine is started, which listens on the loopback only.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import socket
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, final
+
+from controller.sweeps.engine import ONE_THREAD, Ended, Engine, Failure, Item
+from controller.sweeps.local import processors
+from controller.sweeps.worker import answer, order_of
+from go2_wbc.errors import MissingDependency, SweepError
+
+ATTEMPTS = 4
+"""How often an item is tried whose process or machine dies: it takes a moment until a machine is
+missed, and it may be given the same item once more."""
+QUEUED = 2
+"""Items in the hands of the cluster for each of its processors: none waits for the next."""
+QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_NUM_REDIS_GET_RETRIES": "3"}
+"""Ray tells nobody of its use, and does not look for minutes for a cluster that does not answer."""
+PATIENCE = 10.0
+"""Time [s] in which something must listen at the address of a cluster."""
+ON_LOOPBACK = {"RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0"}
+"""Ray on this machine only listens on 127.0.0.1, as it does elsewhere than on Linux by default. Its
+argument for the address does not: it replaces 127.0.0.1 by one that others reach."""
+INSTALL_LINE = 'pip install "go2-wbc[cluster]"'
+
+
+@final
+class RayEngine(Engine):
+    """Runs items on the processors of a Ray cluster.
+
+    A process or machine that dies costs no item its result: its items are tried again elsewhere.
+    """
+
+    def __init__(self, workers: int | None = None, address: str | None = None) -> None:
+        """Use a cluster; nothing is started yet.
+
+        Args:
+            workers: at most so many processors; by default all of them.
+            address: of the cluster, as ``ray.init`` takes it: "auto", or "HOST:PORT". By default
+                the one in ``RAY_ADDRESS``, or one that is started on this machine.
+
+        Raises:
+            MissingDependency: if Ray is not installed.
+        """
+        self._workers = workers
+        self._address = address or os.environ.get("RAY_ADDRESS") or None
+        _ray(QUIET if self._address else QUIET | ON_LOOPBACK)
+
+    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[Ended[Item]]:
+        """What came of each item; see ``Engine.run``.
+
+        Raises:
+            SweepError: if the cluster cannot be reached.
+        """
+        if not items:
+            return
+        with self._connected() as ray:
+            tasks = _Tasks(ray, order_of(function), [pickle.dumps(item) for item in items])
+            processors_there = int(ray.cluster_resources().get("CPU", 1))
+            size = self._workers or max(QUEUED * processors_there, 1)
+            while tasks.fill(size):
+                for number, value, failure in tasks.wait():
+                    yield Ended(items[number], value, failure)
+
+    @contextmanager
+    def _connected(self) -> Iterator[Any]:
+        """Ray, connected to the cluster; afterwards not."""
+        ray = _ray(QUIET)
+        started = {"num_cpus": self._workers or processors(), "include_dashboard": False}
+        try:
+            _require_listener(self._address or "")
+            ray.init(
+                self._address,
+                log_to_driver=False,
+                logging_level="ERROR",
+                **({} if self._address else started),
+            )
+        except Exception as error:  # what it raises depends on where it fails
+            where = self._address or "this machine"
+            why = str(error).partition("\n")[0]
+            raise SweepError(f"no Ray cluster at {where}: {type(error).__name__}: {why}") from error
+        try:
+            yield ray
+        finally:
+            ray.shutdown()
+
+
+class _Tasks:
+    """The items that the cluster has, and those that it will get."""
+
+    def __init__(self, ray: Any, order: bytes, items: Sequence[bytes]) -> None:  # noqa: ANN401
+        self._ray, self._items = ray, items
+        self._order = ray.put(order)
+        self._waiting, self._deaths = deque(range(len(items))), Counter[int]()
+        self._running: dict[Any, int] = {}
+        self._call = ray.remote(
+            num_cpus=1, max_retries=0, runtime_env={"env_vars": ONE_THREAD}
+        )(answer)  # fmt: skip
+
+    def fill(self, size: int) -> bool:
+        """Let the cluster have ``size`` items; whether it has any."""
+        while self._waiting and len(self._running) < size:
+            number = self._waiting.popleft()
+            self._running[self._call.remote(self._order, self._items[number])] = number
+        return bool(self._running)
+
+    def wait(self) -> Iterator[tuple[int, Any, Failure | None]]:
+        """The items that have ended since, at least one unless a process has died."""
+        done, _ = self._ray.wait(list(self._running), num_returns=1)
+        for task in done:
+            number = self._running.pop(task)
+            try:
+                yield number, *pickle.loads(self._ray.get(task))
+            except self._ray.exceptions.RayError as error:
+                self._deaths[number] += 1
+                if self._deaths[number] < ATTEMPTS:
+                    self._waiting.append(number)
+                    continue
+                why = f"{type(error).__name__}: {error}".partition("\n")[0]
+                text = f"its process died {ATTEMPTS} times: {why}"
+                yield number, None, Failure(text, has_died=True)
+
+
+def _require_listener(address: str) -> None:
+    """Raise OSError if nothing listens at HOST:PORT; Ray itself would try for many minutes."""
+    host, _, port = address.rpartition("://")[2].rpartition(":")
+    if host and port.isdecimal():
+        socket.create_connection((host, int(port)), PATIENCE).close()
+
+
+def _ray(settings: Mapping[str, str]) -> Any:  # noqa: ANN401 - a module of an extra
+    """Ray; it reads its settings when it is imported first.
+
+    Raises:
+        MissingDependency: if it is not installed.
+    """
+    for name, value in settings.items():
+        os.environ.setdefault(name, value)
+    try:
+        import ray
+        import ray.exceptions
+    except ImportError as error:
+        raise MissingDependency(f"Ray is not here ({error}): {INSTALL_LINE}") from error
+    return ray
