@@ -32,7 +32,12 @@ _DRAW_WHEN_LOOKED_AT = """(() => {
 STAGE = (20, 60, 955, 440)
 """Left, top, right, bottom [px] of the 3D view without its buttons, in a window of 1280 by 720."""
 _SIZE = (1280, 720)
-_SOFTWARE_GL = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+_SOFTWARE_GL = [
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",  # else the page around the 3D view is drawn through it as well
+]
 _PATIENCE = 60_000.0  # [ms] software rendering on a busy machine is slow
 
 
