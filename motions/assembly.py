@@ -19,7 +19,7 @@ from go2_wbc.errors import PlanNotFound, TimelineError
 from go2_wbc.reference import Anchor, Posture
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
-from motions.compiled_plan import CompiledPlan
+from motions.compiled_plan import CompiledPlan, event_at
 from motions.compiler import UNLOAD_TIME, compile_quasi_static
 from motions.dynamic_span import DynamicSpan, attitude_angles, curves_of, placed
 from motions.dynamics.cache import solve_cached
@@ -30,9 +30,11 @@ from motions.dynamics.trajectory import DynamicTrajectory
 from motions.keys import BodyKey, Key, Mark
 from motions.language.clock import SAME
 from motions.language.flight import away_from_home
+from motions.mending import Mend, pieces_to_mend, without_vain_shifts
 from motions.phase_key import PhaseKey
 from motions.problem import Problem
 from motions.timeline import Timeline
+from motions.trajectory import trajectory_of
 
 SHORTEST = 1e-6
 """Time [s] between dynamic blocks below which there is none: absorbs rounding of sums."""
@@ -40,9 +42,6 @@ SAME_PLACE = 1e-3
 """Distance [m] below which feet count as standing below the hips: less than what tracking adds."""
 _RESTING = BodyKey(0.0, 0.0, Ease.LINEAR, "z", 0.0)
 
-
-Mend = Callable[[CompiledPlan], tuple[Written, DynamicTrajectory] | None]
-"""What the robot cannot do as it is written, and the nearest that it can; nothing if it can."""
 Progress = Callable[[int, float], None]
 
 
@@ -62,9 +61,9 @@ def compile_timeline(
             runs in another thread.
         p_feet: where the feet's centres stand at first [m], by default below the hips; the trunk
             starts above them, with their heading.
-        mend: finds the nearest feasible motion of a stretch between dynamic blocks; without it all
-            is compiled as it is written. ``FeasibilityChecker.plan`` gives it where the timeline
-            asks for it.
+        mend: finds what is infeasible between dynamic blocks, and the nearest motion that is not;
+            without it all is compiled as it is written. ``FeasibilityChecker.plan`` gives it where
+            the timeline asks for it.
         progress: called while something is solved, with the number of iterations and the cost.
 
     Raises:
@@ -150,33 +149,61 @@ class _Maker:
         entry = line.entry if start == 0.0 else Posture.STAND
         stretch = replace(line, cursor=end - start, entry=entry, exit=exit)
         plan = self._compiled(stretch, keys or [replace(_RESTING, end=end - start)])
-        if not (keys and self._is_mended(plan)):
-            curves = _moved(plan.curves, self._frame)
-            times, modes = np.array(plan.contacts.times), plan.contacts.modes
-            self._parts.append(_Part(start, curves, times, modes, plan.swings))
-            self._problems += [replace(one, time=one.time + start) for one in plan.problems]
-            self._ramps.append(plan.ramp)
+        done = 0.0
+        if self._mend is not None and keys:
+            done = self._add_mended(self._mend, plan, replace(stretch, keys=tuple(keys)))
+        self._add_written(plan, done, plan.duration)
         last = plan.curves(plan.duration)
         self._move_on(end, last[18:].reshape(4, 3), last[5])
 
-    def _is_mended(self, plan: CompiledPlan) -> bool:
-        """Whether what is wrong with ``plan`` has been put right, as a dynamic part."""
-        try:
-            mended = None if self._mend is None else self._mend(plan)
-        except PlanNotFound as error:
-            self._fail("nearest motion", error)
-            return False
-        if mended is None:
-            return False
-        written, found = mended
-        self._solved(
-            found, written, _moved(plan.curves, self._frame)(plan.duration), self._time, self._frame
-        )
-        return True
+    def _add_mended(self, mend: Mend, plan: CompiledPlan, line: Timeline) -> float:
+        """``plan``, which ``line`` was compiled to, up to the last part that is mended.
 
-    def _fail(self, check: str, error: PlanNotFound) -> None:
+        Returns how far that goes [s]; a part to which nothing is near stays as it is written.
+        """
+        broken, done = mend.broken(plan), 0.0
+        if not len(broken):
+            return done
+        path = as_checked = trajectory_of(plan, self._model)
+        asked = without_vain_shifts(line)
+        if len(asked.keys) < len(line.keys):
+            path = trajectory_of(self._compiled(asked, asked.keys), self._model)
+        for piece in pieces_to_mend(path, as_checked, broken):
+            try:
+                written = piece.written(path)
+                found = mend.solve(written)
+            except PlanNotFound as error:
+                self._fail("nearest motion", error, self._time + piece.start)
+                continue
+            self._add_written(plan, done, piece.start)
+            rest = _moved(plan.curves, self._frame)(piece.end)
+            self._solved(found, written, rest, self._time + piece.start, self._frame)
+            done = piece.end
+        return done
+
+    def _add_written(self, plan: CompiledPlan, start: float, end: float) -> None:
+        """What ``plan``, from here on, does from ``start`` to ``end`` [s] of it."""
+        if end - start < SHORTEST:
+            return
+        first, last = np.searchsorted(plan.curves.x, [start - SHORTEST, end - SHORTEST]).tolist()
+        knots = plan.curves.x[first : last + 1]
+        curves = PPoly(plan.curves.c[:, first:last], knots - knots[0])
+        times = np.array(plan.contacts.times)
+        during = times[(times > start) & (times < end)]
+        rows = event_at(plan.contacts, np.array([start, *during]))
+        times, modes = np.maximum(times[rows] - start, 0.0), plan.contacts.modes[rows]
+        curves, swings = _moved(curves, self._frame), plan.swings[rows]
+        self._parts.append(_Part(self._time + start, curves, times, modes, swings))
+        self._problems += [
+            replace(one, time=one.time + self._time)
+            for one in plan.problems
+            if start <= one.time <= end
+        ]
+        self._ramps.append(plan.ramp)
+
+    def _fail(self, check: str, error: PlanNotFound, time: float) -> None:
         reason = "; ".join([str(error).split("\n")[0], *error.reasons])
-        self._problems.append(Problem(check, "trunk", self._time, reason=reason))
+        self._problems.append(Problem(check, "trunk", time, reason=reason))
 
     def add_block(self, block: PhaseKey) -> None:
         """A dynamic block, solved; one that cannot be is rest and a problem."""
@@ -186,7 +213,7 @@ class _Maker:
         try:
             found = solve_cached(problem, self._model, progress=self._progress)
         except PlanNotFound as error:
-            self._fail("dynamic plan", error)
+            self._fail("dynamic plan", error, self._time)
             self.add_stretch(block.end, Posture.STAND)
             return
         start, frame = self._time, self._frame

@@ -8,7 +8,9 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 from scipy.interpolate import CubicHermiteSpline, PPoly
+from scipy.spatial.transform import Rotation
 
+from go2_wbc.errors import MotionError
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
@@ -43,6 +45,20 @@ class DynamicSpan:
     def end(self) -> float:
         """When [s] it ends in the plan."""
         return self.start + self.trajectory.duration
+
+    def written(self, times: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k 19"]:
+        """Configurations at ``times`` [s] of the plan as they were written, in its frame.
+
+        Raises:
+            MotionError: if phases were asked, not a whole motion.
+        """
+        if not isinstance(self.asked, Written):
+            raise MotionError("of a span that was asked by phases no way was written")
+        q = self.asked.at(times - self.start)
+        turn = Rotation.from_euler("z", self.frame.yaw)
+        q[:, :3] = turn.apply(q[:, :3]) + self.frame.p_world
+        q[:, 3:7] = (turn * Rotation.from_quat(q[:, 3:7])).as_quat()
+        return q
 
     def at(self, times: Float[np.ndarray, " k"], model: RobotModel) -> SpanSamples:
         """States, torques and forces at ``times`` [s] of the plan, within the span."""

@@ -22,6 +22,7 @@ from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.compiled_plan import CompiledPlan
 from motions.dynamic_span import DynamicSpan
+from motions.dynamics.nearest import Written
 from motions.footing import standing_feet
 from motions.placement import (
     Wanted,
@@ -121,6 +122,20 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     for span in spans:
         _fill(path, span, model)
     return path
+
+
+def as_written(plan: MotionPlan, path: Trajectory) -> Float[np.ndarray, "n 19"]:
+    """Configurations along ``path``, the trajectory of ``plan``, as they were written.
+
+    They differ where the robot could not do what was written, and the nearest motion that it can do
+    was planned.
+    """
+    q = path.q.copy()
+    for span in plan.dynamic if isinstance(plan, CompiledPlan) else ():
+        if isinstance(span.asked, Written):
+            inside = (path.times >= span.start) & (path.times <= span.end)
+            q[inside] = span.written(path.times[inside])
+    return q
 
 
 def _are_within(

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+from controller.behaviours.anchoring import Approach, anchor_of
 from controller.behaviours.base import Behaviour
 from controller.behaviours.safe_return import SafeReturn
 from go2_wbc.planning.correction import tracked_position
@@ -28,6 +29,7 @@ class PlayPlan(Behaviour):
 
     _anchor: Anchor
     _follower: PlanFollower
+    _approach: Approach
 
     def __init__(self, plan: MotionPlan) -> None:
         """Play ``plan``."""
@@ -41,8 +43,9 @@ class PlayPlan(Behaviour):
         """Anchor the plan at the feet."""
         super().start(snapshot)
         self._last = self._start
-        self._anchor = Anchor.of_feet(snapshot.p_world_feet, FOOT_RADIUS)
+        self._anchor = anchor_of(self.plan, snapshot.p_world_feet)
         self._follower = Playback(self._anchor, self.plan.footsteps)
+        self._approach = Approach.of(self.plan, self._anchor, snapshot)
 
     def return_safely(self) -> None:
         """Leave the plan: go to its nearest instant on four loaded feet; any thread may call."""
@@ -95,7 +98,9 @@ class PlayPlan(Behaviour):
             row = self._return.advance(now - self._last).row
             return row, self._return.t
         t = now - self._start
-        return self.plan.row_at(t), t
+        row = self.plan.row_at(t)
+        self._approach.add_to(row, t)
+        return row, t
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the plan is over, or the way back from it."""

@@ -156,7 +156,7 @@ def _trunk_path(
     """
     first, last = (pose_of(state.q) for state in ends)
     origin = Anchor.of_feet(p_feet, 0.0)
-    flights = _spans(np.logical_not(stance.any(axis=1)))
+    flights = true_spans(np.logical_not(stance.any(axis=1)))
     edges = {knot for span in flights for knot in span}
     known = [goal for goal in goals if goal.pose is not None or goal.knot in edges]
     known += [goals[-1]] if goals[-1] not in known else []
@@ -197,7 +197,7 @@ def _over_feet(
     return pose
 
 
-def _spans(mask: Bool[np.ndarray, " n"]) -> list[tuple[int, int]]:
+def true_spans(mask: Bool[np.ndarray, " n"]) -> list[tuple[int, int]]:
     """First row of every run of True, and the row after it."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
@@ -232,7 +232,7 @@ def _clearances(
     """The least heights of the feet's centres: on the ground, and higher once under way."""
     least = np.full((len(stance) + 1, 4), model.foot_radius)
     for leg in LEGS:
-        for begin, end in _spans(~stance[:, leg]):
+        for begin, end in true_spans(~stance[:, leg]):
             least[begin + 2 : end - 1, leg] += limits.clearance
     return least
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Bool, Float
+from scipy.spatial.transform import Rotation, Slerp
 
 from go2_wbc.errors import PlanNotFound, TimelineError
 from go2_wbc.legs import FOOT_NAMES, LEGS
@@ -64,6 +65,13 @@ class Written:
         if not (self.stance[0].all() and self.stance[-1].all()):
             raise TimelineError("a motion must start and end on four feet")
 
+    def at(self, times: Float[np.ndarray, " k"]) -> Float[np.ndarray, "k 19"]:
+        """Configurations at ``times`` [s], between the instants that are known."""
+        inside = np.clip(times, 0.0, self.times[-1])
+        q = np.column_stack([np.interp(inside, self.times, column) for column in self.q.T])
+        q[:, 3:7] = Slerp(self.times, Rotation.from_quat(self.q[:, 3:7]))(inside).as_quat()
+        return q
+
 
 def nearest(
     written: Written,
@@ -111,7 +119,7 @@ def _knots(written: Written, model: RobotModel) -> Knots:
     duration = float(written.times[-1])
     count = max(round(duration / KNOT_PERIOD), 1)
     times = np.linspace(0.0, duration, count + 1)
-    q = np.array([_between(written, model, t) for t in times.tolist()])
+    q = written.at(times)
     rows = np.searchsorted(written.times, times[:-1] + 1e-9, side="right") - 1
     stance = written.stance[rows]
     stance[0] = True  # a foot that leaves at once needs a knot to do so
@@ -129,13 +137,6 @@ def _knots(written: Written, model: RobotModel) -> Knots:
         initial=FullState(q[0], still),
         final=FullState(q[-1], still),
     )
-
-
-def _between(written: Written, model: RobotModel, t: float) -> Float[np.ndarray, "19"]:
-    row = int(np.clip(np.searchsorted(written.times, t, "right") - 1, 0, len(written.times) - 2))
-    share = (t - written.times[row]) / (written.times[row + 1] - written.times[row])
-    q = pin.interpolate(model.pin_model, written.q[row], written.q[row + 1], min(share, 1.0))
-    return np.array(q)
 
 
 def _standing_places(

@@ -14,7 +14,7 @@ from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.hulls import LinkHulls
 from motions.feasibility.limits import FeasibilityLimits, FlightLimits
-from motions.feasibility.nearest import mending
+from motions.feasibility.nearest import Progress, mending
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.language.written import NEAREST
 from motions.problem import Problem
@@ -32,10 +32,19 @@ class FeasibilityChecker:
     """
 
     def __init__(
-        self, model: RobotModel | None = None, limits: FeasibilityLimits | None = None
+        self,
+        model: RobotModel | None = None,
+        limits: FeasibilityLimits | None = None,
+        *,
+        progress: Progress | None = None,
     ) -> None:
-        """Prepare for ``model``, by default the installed Go2."""
+        """Prepare for ``model``, by default the installed Go2.
+
+        ``progress`` is called while a dynamic motion is solved, with the number of iterations and
+        the cost.
+        """
         self.model = model or RobotModel()
+        self._progress = progress
         self._limits = limits or FeasibilityLimits()
         self._collision = SelfCollision(self.model)
         self._hulls = LinkHulls(self.model, self._collision.geometry)
@@ -81,10 +90,15 @@ class FeasibilityChecker:
     def _compiled(self, motion: object) -> MotionPlan:
         """The plan of ``motion``, the nearest feasible one where its timeline asks for that."""
         line = timeline_of(motion)
-        if line is None or line.physics != NEAREST:
-            return compile_motion(motion if line is None else line, self.model)
-        mend = mending(self.evaluate, self.model, line.tolerance)
-        return compile_timeline(line, self.model, mend=mend)
+        if line is None:
+            return compile_motion(motion, self.model)
+        mend = None
+        if line.physics == NEAREST:
+            mend = mending(self._judged, self.model, line.tolerance, self._progress)
+        return compile_timeline(line, self.model, mend=mend, progress=self._progress)
+
+    def _judged(self, plan: CompiledPlan) -> FeasibilityReport:
+        return self.evaluate(plan).report
 
     def evaluate(self, motion: Playable) -> CheckedMotion:
         """Compile and check ``motion``, once: its plan, the report, the movement and the forces.

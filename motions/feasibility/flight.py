@@ -173,7 +173,7 @@ class _Judge:
         places = feet_at(plan.q, plan.v, self.model)[0]
         if isinstance(asked, PhaseProblem):
             return of_phases(plan, asked, self.span.frame, places)
-        return of_written(plan, asked, self.span.frame, places, self.model)
+        return of_written(self.span, places, self.model)
 
     def _at_knots(
         self, check: str, unit: str, subjects: tuple[str, ...], values: _Columns, limit: float,

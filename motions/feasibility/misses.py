@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from jaxtyping import Float
+from scipy.spatial.transform import Rotation
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import log_rotation, yaw_rotation
-from motions.dynamic_span import attitude_angles, feet_at
-from motions.dynamics.nearest import Written
+from go2_wbc.robot.rotations import yaw_rotation
+from motions.dynamic_span import DynamicSpan, attitude_angles, feet_at
 from motions.dynamics.phases import PhaseProblem
 from motions.dynamics.trajectory import DynamicTrajectory
 
@@ -65,22 +64,22 @@ def of_phases(
     return Misses(ends, away, turned)
 
 
-def of_written(
-    plan: DynamicTrajectory, asked: Written, frame: Anchor, places: _Places, model: RobotModel
-) -> Misses:
-    """What the trunk misses at every knot, and the feet where they land."""
-    R, turn = yaw_rotation(frame.yaw), pin.Quaternion(yaw_rotation(frame.yaw))
-    rows = [int(np.argmin(np.abs(asked.times - t))) for t in plan.times]
-    wanted = asked.q[rows]
-    away, turned = (np.full((len(rows), 5), np.nan) for _ in range(2))
-    for row, (q, goal) in enumerate(zip(plan.q, wanted, strict=True)):
-        away[row, 0] = np.linalg.norm(q[:3] - frame.p_world - R @ goal[:3])
-        R_goal = (turn * pin.Quaternion(goal[3:7])).toRotationMatrix()
-        off = log_rotation(R_goal.T @ pin.Quaternion(q[3:7]).toRotationMatrix())
-        turned[row, 0] = np.linalg.norm(off)
-    feet = feet_at(wanted, np.zeros((len(rows), 18)), model)[0]
+def of_written(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses:
+    """What the trunk misses at every knot, and the feet where they land.
+
+    Args:
+        span: which was asked to do what was written.
+        places: (n+1, 4, 3) of its feet [m].
+        model: the robot.
+    """
+    plan = span.trajectory
+    wanted = span.written(span.start + plan.times)
+    away, turned = (np.full((len(wanted), 5), np.nan) for _ in range(2))
+    away[:, 0] = np.linalg.norm(plan.q[:, :3] - wanted[:, :3], axis=1)
+    asked, done = (Rotation.from_quat(q[:, 3:7]) for q in (wanted, plan.q))
+    turned[:, 0] = (asked.inv() * done).magnitude()
+    feet = feet_at(wanted, np.zeros((len(wanted), 18)), model)[0]
     lands = plan.stance[1:] & ~plan.stance[:-1]
     for row, leg in np.argwhere(lands) + [1, 0]:
-        goal = frame.p_world + R @ feet[row, leg]
-        away[row, 1 + leg] = np.linalg.norm(places[row, leg] - goal)
+        away[row, 1 + leg] = np.linalg.norm(places[row, leg] - feet[row, leg])
     return Misses(plan.times, away, turned)

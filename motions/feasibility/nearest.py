@@ -4,31 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from go2_wbc.errors import PlanNotFound, TimelineError
+import numpy as np
+from jaxtyping import Float
+
 from go2_wbc.robot.model import RobotModel
-from motions.assembly import Mend
 from motions.compiled_plan import CompiledPlan
 from motions.dynamics.cache import nearest_cached
 from motions.dynamics.nearest import Written
 from motions.dynamics.phases import Tolerance
 from motions.dynamics.trajectory import DynamicTrajectory
-from motions.feasibility.checked_motion import CheckedMotion
+from motions.feasibility.report import FeasibilityReport
+from motions.mending import Mend
+
+Progress = Callable[[int, float], None]
 
 
 def mending(
-    evaluate: Callable[[CompiledPlan], CheckedMotion], model: RobotModel, tolerance: Tolerance
+    check: Callable[[CompiledPlan], FeasibilityReport],
+    model: RobotModel,
+    tolerance: Tolerance,
+    progress: Progress | None = None,
 ) -> Mend:
-    """Solves what ``evaluate`` finds infeasible, within ``tolerance``."""
+    """Solves what ``check`` finds infeasible, within ``tolerance``."""
 
-    def mend(plan: CompiledPlan) -> tuple[Written, DynamicTrajectory] | None:
-        checked = evaluate(plan)
-        if checked.report.ok:
-            return None
-        path = checked.path
-        try:
-            written = Written(path.times, path.q, path.stance)
-        except TimelineError as error:
-            raise PlanNotFound("there is no nearest motion", [str(error)]) from error
-        return written, nearest_cached(written, model, tolerance=tolerance)
+    def broken(plan: CompiledPlan) -> Float[np.ndarray, " k"]:
+        report = check(plan)
+        found = [
+            one.times[(one.margins < 0.0).any(axis=1)] for one in report.series
+        ]  # nan, nothing to check, is not below 0
+        return np.concatenate([[], *found])
 
-    return mend
+    def solve(written: Written) -> DynamicTrajectory:
+        return nearest_cached(written, model, tolerance=tolerance, progress=progress)
+
+    return Mend(broken, solve)

@@ -74,6 +74,38 @@ def test_what_can_be_done_stays_as_it_is_written(
         np.testing.assert_allclose(near.at(float(t)).row, written.at(float(t)).row)
 
 
+@needs_solver
+def test_before_and_after_a_part_that_is_mended_all_stays_as_it_is_written(
+    checker: FeasibilityChecker,
+) -> None:
+    paw = Timeline().foot("FR", z=0.05, over=0.7).home(over=0.7)
+    line = paw.then(replace(SWAY, physics="as_written"), paw)
+    near, written = checker.plan(replace(line, physics="nearest")), checker.plan(line, check=False)
+    assert isinstance(near, CompiledPlan)
+    (span,) = near.dynamic
+    assert span.start == pytest.approx(paw.end, abs=0.02)
+    assert span.end == pytest.approx(paw.end + SWAY.end, abs=0.3)
+    outside = [*np.arange(0.0, span.start, 0.3), *np.arange(span.end + 0.01, line.end, 0.3)]
+    for t in outside:
+        np.testing.assert_allclose(near.at(float(t)).row, written.at(float(t)).row, atol=1e-9)
+    during = span.start + 0.2
+    assert not np.allclose(near.at(during).row, written.at(during).row)
+
+
+@needs_solver
+def test_two_feet_at_once_are_raised_where_the_trunk_was_written_not_balanced(
+    checker: FeasibilityChecker,
+) -> None:
+    line = Timeline(physics="nearest", shift_time=0.3).hold(0.3).foot("FL", z=0.04, over=0.2).also()
+    line = line.foot("RR", z=0.04, over=0.2).hold(0.1).home(over=0.4).hold(0.3)
+    plan = checker.plan(line)
+    assert isinstance(plan, CompiledPlan)
+    (span,) = plan.dynamic
+    level = span.written(np.linspace(span.start, span.end, 20))
+    np.testing.assert_allclose(level[:, 1], level[0, 1], atol=1e-6)
+    assert span.trajectory.position_deviation < 0.03
+
+
 def test_what_is_no_motion_to_be_near_to_is_a_failure_in_words(
     checker: FeasibilityChecker,
 ) -> None:
