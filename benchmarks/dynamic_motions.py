@@ -132,43 +132,69 @@ def measure(trial: Trial, name: str) -> Measurement:
     if not is_feasible:
         return Measurement({f"{name}.done": 0.0}, reason="the check refuses the plan")
     model = RobotModel()
-    with TrialRobot(plant_of(trial)) as robot:
+    try:
+        played = play(plant_of(trial), plan, model)
+    except TrialFailed as failed:
+        done = f"{name}.done"
+        return Measurement({done: 0.0}, {done: str(failed)}, str(failed))
+    return Measurement(_values(name, plan, played, model))
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """What came of a plan.
+
+    Attributes:
+        recorded: while it was played.
+        moved: way of the middle of the feet [m], along the heading at first.
+        turned: change of their heading [rad], in (-pi, pi].
+    """
+
+    recorded: TruthRecording
+    moved: Float[np.ndarray, "3"]
+    turned: float
+
+    @property
+    def height(self) -> float:
+        """Greatest height [m] of the lowest foot's centre above where it stood."""
+        lowest = self.recorded.p_world_feet[:, :, 2].min(axis=1)
+        return float(lowest.max() - lowest[0])
+
+    def values(self, name: str, plan: CompiledPlan, model: RobotModel) -> dict[str, float]:
+        """The metrics that every jump has, of the item ``name``."""
+        x, y, yaw = plan.end_pose
+        shares = self.recorded.torque_shares(model)
+        return {
+            f"{name}.done": 1.0,
+            f"{name}.place": 1000.0 * math.hypot(self.moved[0] - x, self.moved[1] - y),
+            f"{name}.yaw": abs(math.degrees(wrap_angle(self.turned - yaw))),
+            f"{name}.torque": float(shares.max()),
+            f"{name}.asked": float(self.recorded.asked_shares(model).max()),
+            f"{name}.speed": self.recorded.peak_speed_share(model),
+            f"{name}.saturated": 100.0 * float((shares >= FULL).mean()),
+        }
+
+
+def play(plant: MujocoPlant, plan: CompiledPlan, model: RobotModel) -> Played:
+    """Stand, play the plan unchecked, stand for a second.
+
+    Raises:
+        TrialFailed: if the robot falls or does not do it.
+    """
+    with TrialRobot(plant) as robot:
         robot.require(robot.go2.stand())
         before = _feet_frame(robot, model)
         robot.truth.clear()
-        try:
-            robot.require(robot.go2.play(plan, check=False))
-            recorded = robot.truth.recording()
-            robot.wait(AFTERWARDS)
-        except TrialFailed as failed:
-            done = f"{name}.done"
-            return Measurement({done: 0.0}, {done: str(failed)}, str(failed))
+        robot.require(robot.go2.play(plan, check=False))
+        recorded = robot.truth.recording()
+        robot.wait(AFTERWARDS)
         after = _feet_frame(robot, model)
-    return Measurement(_values(name, plan, recorded, (before, after), model))
-
-
-def _values(
-    name: str,
-    plan: CompiledPlan,
-    recorded: TruthRecording,
-    frames: tuple[Anchor, Anchor],
-    model: RobotModel,
-) -> dict[str, float]:
-    before, after = frames
-    x, y, yaw = plan.end_pose
     moved = yaw_rotation(before.yaw).T @ (after.p_world - before.p_world)
-    shares = recorded.torque_shares(model)
-    is_full = (shares >= FULL).any(axis=tuple(range(1, shares.ndim)))
-    values = {
-        f"{name}.done": 1.0,
-        f"{name}.place": 1000.0 * math.hypot(moved[0] - x, moved[1] - y),
-        f"{name}.yaw": abs(math.degrees(wrap_angle(after.yaw - before.yaw - yaw))),
-        f"{name}.torque": float(shares.max()),
-        f"{name}.asked": float(recorded.asked_shares(model).max()),
-        f"{name}.speed": recorded.peak_speed_share(model),
-        f"{name}.saturated": 100.0 * float(is_full.mean()),
-    }
-    item = ITEMS[name]
+    return Played(recorded, moved, wrap_angle(after.yaw - before.yaw))
+
+
+def _values(name: str, plan: CompiledPlan, played: Played, model: RobotModel) -> dict[str, float]:
+    values, recorded, item = played.values(name, plan, model), played.recorded, ITEMS[name]
     if item.height is not None:
         heights = recorded.p_world_feet[:, :, 2].min(axis=1) - model.foot_radius
         values[f"{name}.height"] = 1000.0 * abs(float(heights.max()) - item.height)
@@ -207,17 +233,22 @@ def _feet_frame(robot: TrialRobot, model: RobotModel) -> Anchor:
     return Anchor.of_feet(model.snapshot(robot.plant.read()).p_world_feet, model.foot_radius)
 
 
-def _metrics(name: str, item: Item) -> tuple[Metric, ...]:
-    title, least = item.title, Direction.AT_LEAST
-    found = [
-        Metric(f"{name}.done", title, "done, stands 1 s later", "", item.done, least),
+def metrics_of(name: str, title: str, done: float) -> list[Metric]:
+    """The metrics that every jump has; ``done`` is the threshold of the trials that are done."""
+    return [
+        Metric(f"{name}.done", title, "done, stands 1 s later", "", done, Direction.AT_LEAST),
         Metric(f"{name}.place", title, "lands off its place", "mm", 40.0),
         Metric(f"{name}.yaw", title, "lands off its heading", "deg", 3.0),
         Metric(f"{name}.torque", title, "peak torque / motors' line", "", 1.0),
-        Metric(f"{name}.asked", title, "peak torque asked for / motors' line", "", 1.0),
+        Metric(f"{name}.asked", title, "torque asked / motors' line", "", 1.0),
         Metric(f"{name}.speed", title, "peak joint speed / limit", "", 1.0),
         Metric(f"{name}.saturated", title, "saturated ticks", "%", 2.0),
     ]
+
+
+def _metrics(name: str, item: Item) -> tuple[Metric, ...]:
+    title, least = item.title, Direction.AT_LEAST
+    found = metrics_of(name, title, item.done)
     if item.height is not None:
         found.append(Metric(f"{name}.height", title, "apex off the plan", "mm", 20.0))
     if item.counts_beats:

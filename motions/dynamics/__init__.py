@@ -12,6 +12,7 @@ from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from motions.dynamics.cache import solve_cached
+    from motions.dynamics.continuation import Solved
     from motions.dynamics.curves import pieces
     from motions.dynamics.limits import PlanLimits
     from motions.dynamics.phases import FullState, Phase, PhaseProblem, Tolerance
@@ -27,6 +28,7 @@ __all__ = [
     "PhaseProblem",
     "PlanLimits",
     "Reading",
+    "Solved",
     "Tolerance",
     "audit",
     "pieces",
@@ -40,6 +42,7 @@ __getattr__ = lazy_exports(
         "cache": ("solve_cached",),
         "limits": ("PlanLimits",),
         "phases": ("FullState", "Phase", "PhaseProblem", "Tolerance"),
+        "continuation": ("Solved",),
         "curves": ("pieces",),
         "solver": ("solve",),
         "trajectory": ("DynamicTrajectory", "Miss"),

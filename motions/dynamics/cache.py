@@ -116,6 +116,11 @@ def ship(problem: PhaseProblem, model: RobotModel, folder: Path) -> Path:
     return write_atomically(path, found.to_bytes(is_small=True))
 
 
+def keep(problem: PhaseProblem, model: RobotModel, plan: DynamicTrajectory) -> None:
+    """Keep ``plan``, found in another way, as what ``solve_cached`` answers to ``problem``."""
+    _write(plan_folder() / f"{_key(problem, model, PlanLimits(), Weights())}.npz", plan)
+
+
 def _read(path: Path) -> DynamicTrajectory | None:
     try:
         return DynamicTrajectory.from_bytes(path.read_bytes())

@@ -33,6 +33,8 @@ REAR_RISE = 0.03
 """By how much [m] the trunk's middle rises when rearing."""
 FARTHEST = {"x": 1.0, "y": 0.6, "yaw": math.pi, "height": 0.40}
 """Beyond these a jump is refused unsolved [m, rad]; nearer ones may still have no plan."""
+LONGEST_FLIGHT = 1.0
+"""Time [s] in the air beyond which a jump is refused unsolved: twice that of the highest."""
 LOWEST = 0.02
 """Least height [m] of a jump's feet: less is a step."""
 _HERE = (0.0, 0.0, 0.0)
@@ -45,6 +47,7 @@ def jump(
     yaw: float = 0.0,
     height: float = 0.15,
     *,
+    flight: float | None = None,
     footprint: Float[np.ndarray, "4 2"] = FOOTPRINT,
 ) -> tuple[Phase, ...]:
     """A jump from four feet to four feet.
@@ -53,7 +56,9 @@ def jump(
         x: how far ahead it lands [m].
         y: how far to the left [m].
         yaw: turn [rad], positive to the left.
-        height: of the feet at the top [m]; the trunk rises as much above where it takes off.
+        height: of the feet at the top [m].
+        flight: time in the air [s], in whole knots. By default what a fall from ``height`` takes,
+            so the trunk rises by that much; in less, the legs are drawn up for the rest.
         footprint: where the feet stand around their middle [m].
 
     Raises:
@@ -63,6 +68,9 @@ def jump(
         _require(f"a jump's {name}", value, -FARTHEST[name], FARTHEST[name])
     _require("a jump's height", height, LOWEST, FARTHEST["height"])
     half = _half_flight(height)
+    if flight is not None:
+        _require("a jump's time in the air", flight, 2.0 * KNOT_PERIOD, LONGEST_FLIGHT)
+        half = _whole(0.5 * flight)
     return (
         Phase(GATHER, body=_at(z=CROUCH), label="crouch"),
         Phase(PUSH, label="push"),

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import product
 
 import crocoddyl
 import numpy as np
+from jaxtyping import Float
 
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.legs import FOOT_NAMES, LEGS
+from motions.dynamics.continuation import Start
 from motions.dynamics.knots import Found, Knots
 from motions.dynamics.program import Program
 
@@ -28,6 +30,7 @@ the motors give with ``PlanLimits.torque_share`` at 0.85. Exact agreement takes 
 _JOINT_RATES = slice(19 + 6, None)
 
 Progress = Callable[[int, float], None]
+_Rows = list[Float[np.ndarray, " n"]]
 
 
 class _Expired(Exception):
@@ -50,8 +53,9 @@ class Search:
         is_good: Callable[[Found], bool],
         budget: float,
         progress: Progress | None,
+        start: Start | None = None,
     ) -> None:
-        """Prepare; the budget, processor time [s], runs from here.
+        """Prepare; the budget, processor time [s], runs from here; ``start`` is tried first.
 
         ``is_good`` says whether a solution may be taken although the solver has not converged: it
         obeys the dynamics, and what more it could gain is only cost.
@@ -59,6 +63,7 @@ class Search:
         self.iterations = 0
         self._is_good = is_good
         self._full, self._knots, self._budget = full, knots, budget
+        self._start = start
         self._deadline = time.thread_time() + budget
         self._progress = progress
         self._watch = _watch(self)
@@ -101,14 +106,8 @@ class Search:
 
     def _climb(self) -> None:
         """Starts, from the one that most often works to the last resort."""
-        knots = self._knots
-        guess = list(np.hstack([knots.q, knots.v]))
-        still = [guess[0]] * len(guess)
-        us = [self._full.tau_hold] * (len(guess) - 1)
-        for xs, regularisation in product((guess, still), REGULARISATIONS):
-            soft = self._soft_solver
-            self._solve(soft, xs, us, regularisation, SOFT_STOP)
-            if self._solve(self._solver, list(soft.xs), list(soft.us), regularisation, STOP):
+        for xs, us, regularisation in self._starts():
+            if self._solve(self._solver, xs, us, regularisation, STOP):
                 return
             best = self.best()
             if best is not None and self._is_good(best):
@@ -117,6 +116,21 @@ class Search:
             f"no dynamic plan: none of the starts converges ({self.iterations} iterations); the "
             "phases ask for more than the robot can do"
         )
+
+    def _starts(self) -> Iterator[tuple[_Rows, _Rows, float]]:
+        """States, torques and regularisation of every start of the full program."""
+        knots, soft = self._knots, self._soft_solver
+        if self._start is not None:
+            xs, us = list(self._start.x), list(self._start.tau)
+            yield xs, us, REGULARISATIONS[0]
+            self._solve(soft, xs, us, REGULARISATIONS[0], SOFT_STOP)
+            yield list(soft.xs), list(soft.us), REGULARISATIONS[0]
+        guess = list(np.hstack([knots.q, knots.v]))
+        still = [guess[0]] * len(guess)
+        us = [self._full.tau_hold] * (len(guess) - 1)
+        for xs, regularisation in product((guess, still), REGULARISATIONS):
+            self._solve(soft, xs, us, regularisation, SOFT_STOP)
+            yield list(soft.xs), list(soft.us), regularisation
 
     def _agree(self) -> None:
         """Bound the torques by the greatest speeds of the solutions until they agree."""

@@ -13,6 +13,7 @@ from go2_wbc.errors import MissingDependency, PlanNotFound
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
+from motions.dynamics.continuation import Solved, Start, continued
 from motions.dynamics.knots import Found, Knots, feet_at, knots_of
 from motions.dynamics.limits import PlanLimits, Weights
 from motions.dynamics.phases import PhaseProblem, Tolerance
@@ -32,6 +33,7 @@ def solve(
     progress: Callable[[int, float], None] | None = None,
     limits: PlanLimits | None = None,
     weights: Weights | None = None,
+    start: Solved | None = None,
 ) -> DynamicTrajectory:
     """The motion that does what the phases ask, within what the robot can do.
 
@@ -45,8 +47,11 @@ def solve(
         progress: called after every iteration with their number and the cost.
         limits: what the plan keeps.
         weights: what being off costs.
+        start: a plan of the same phases for something a little easier, from which to begin; jumps
+            that are not found from scratch are found in such steps.
 
     Raises:
+        TimelineError: if the phases of ``start`` are others.
         MissingDependency: if crocoddyl is not installed.
         PlanNotFound: if no plan is found in time, or the best one breaks a limit or is farther from
             what was asked than the problem's tolerance; says what binds, and where.
@@ -54,7 +59,8 @@ def solve(
     limits = limits or PlanLimits()
     knots = knots_of(problem, model, limits)
     task = Task(knots, model, limits, weights or Weights(), problem.tolerance, _misses)
-    return optimum(task, budget=budget, progress=progress)
+    first = None if start is None else continued(start, problem, knots.times, model)
+    return optimum(task, budget=budget, progress=progress, start=first)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +103,11 @@ class Task:
 
 
 def optimum(
-    task: Task, *, budget: float, progress: Callable[[int, float], None] | None
+    task: Task,
+    *,
+    budget: float,
+    progress: Callable[[int, float], None] | None,
+    start: Start | None = None,
 ) -> DynamicTrajectory:
     """The best plan for ``task``; raises what ``solve`` does."""
     require_crocoddyl()
@@ -113,7 +123,7 @@ def optimum(
     full = Program(knots, model, limits, weights)
     search = Search(
         soft, full, knots,
-        is_good=lambda found: not objections(found), budget=budget, progress=progress,
+        is_good=lambda found: not objections(found), budget=budget, progress=progress, start=start,
     )  # fmt: skip
     try:
         plan = task.plan(search.run())

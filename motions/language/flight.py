@@ -44,13 +44,21 @@ class Flight(Written):
         return any(isinstance(key, PhaseKey) for key in self.keys)
 
     def jump(
-        self: _Line, x: float = 0.0, y: float = 0.0, yaw: float = 0.0, height: float = 0.1
+        self: _Line,
+        x: float = 0.0,
+        y: float = 0.0,
+        yaw: float = 0.0,
+        height: float = 0.1,
+        *,
+        flight: float | None = None,
     ) -> _Line:
         """Jump to a place [m] and heading [rad] from here, the feet ``height`` [m] over the ground.
 
-        Offsets count from where it lands.
+        Offsets count from where it lands. ``flight`` is the time in the air [s, beats], by default
+        what a fall from ``height`` takes; in less, the legs are drawn up.
         """
-        return self._to_beats(moves.jump(x, y, yaw, height))
+        time = None if flight is None else self._seconds("jump(): flight", flight)
+        return self._to_beats(moves.jump(x, y, yaw, height, flight=time))
 
     def spin_jump(self: _Line, angle: float, *, height: float = 0.12) -> _Line:
         """Jump up and turn by ``angle`` [rad] in the air, to the left if it is positive."""

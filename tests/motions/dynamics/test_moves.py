@@ -41,8 +41,14 @@ def test_hops_touch_down_once_a_period() -> None:
 
 
 def test_flights_last_whole_knots() -> None:
-    for phase in (*moves.jump(height=0.11), *moves.rear(hold=0.7)):
+    for phase in (*moves.jump(height=0.11), *moves.rear(hold=0.7), *moves.jump(flight=0.33)):
         assert phase.duration / KNOT_PERIOD == pytest.approx(round(phase.duration / KNOT_PERIOD))
+
+
+def test_a_jump_takes_the_time_in_the_air_that_it_is_given() -> None:
+    for given, taken in ((None, 0.36), (0.32, 0.32), (0.45, 0.44)):
+        flight = [phase.duration for phase in moves.jump(flight=given) if not phase.stance]
+        assert sum(flight) == pytest.approx(taken)
 
 
 def test_a_lift_holds_the_other_feet_down() -> None:
@@ -59,6 +65,8 @@ def test_a_lift_holds_the_other_feet_down() -> None:
         lambda: moves.jump(height=0.0),
         lambda: moves.jump(height=2.0),
         lambda: moves.jump(yaw=7.0),
+        lambda: moves.jump(flight=0.0),
+        lambda: moves.jump(flight=3.0),
         lambda: moves.hop(times=0),
         lambda: moves.hop(period=0.1),
         lambda: moves.rear(pitch=0.4),

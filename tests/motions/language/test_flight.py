@@ -52,6 +52,11 @@ def test_a_jump_flies_and_lands_where_it_says_and_time_goes_on() -> None:
     assert max(one.feet[Leg.RR][2] for one in flown) == pytest.approx(0.1)
 
 
+def test_the_time_in_the_air_may_be_given_in_beats() -> None:
+    flown = [one for one in phases(Timeline().bpm(120).jump(flight=0.8)) if not one.stance]
+    assert sum(one.duration for one in flown) == pytest.approx(0.4)
+
+
 def test_a_spin_jump_ends_turned_and_its_mirror_turned_the_other_way() -> None:
     left = phases(Timeline().spin_jump(deg(90)))
     right = phases(Timeline().spin_jump(deg(90)).mirror())

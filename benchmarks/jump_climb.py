@@ -1,0 +1,179 @@
+"""Climbing: a kind of jump asked for ever more, until the planner finds none.
+
+Every plan is the start of the search for the next (continuation), and the time in the air is
+searched. Between the last two sizes it is bisected. No random number takes part.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from go2_wbc.errors import PlanNotFound
+from go2_wbc.robot.model import RobotModel
+from motions.dynamics import PhaseProblem, Solved, moves, solve
+from motions.dynamics.cache import keep
+from motions.dynamics.phases import GRAVITY, KNOT_PERIOD
+
+BISECTIONS = 2
+"""Between the greatest size that is found and the least that is not."""
+FLIGHT_STEPS = (0, 2, -2)
+"""Knots by which the time in the air is changed, in this order, where there is no plan."""
+DRAWN_UP = 0.10
+"""Height [m] that the feet gain by drawing up the legs, for which the trunk need not rise."""
+
+
+class Jump(NamedTuple):
+    """What ``Timeline.jump`` takes."""
+
+    x: float
+    yaw: float
+    height: float
+    flight: float
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What is asked for ever more of.
+
+    Attributes:
+        title: in the report.
+        unit: of the size that is shown.
+        scale: from the size [m, rad] to that unit.
+        sizes: increasing; the first is easy.
+        ask: the jump of a size.
+    """
+
+    title: str
+    unit: str
+    scale: float
+    sizes: tuple[float, ...]
+    ask: Callable[[float], Jump]
+
+
+def high(size: float) -> Jump:
+    """Straight up, the feet ``size`` [m] over the ground."""
+    rise = max(size - DRAWN_UP, DRAWN_UP)
+    return Jump(0.0, 0.0, size, 2.0 * math.sqrt(2.0 * rise / GRAVITY))
+
+
+def far(size: float) -> Jump:
+    """``size`` [m] ahead."""
+    return Jump(size, 0.0, 0.1, 0.28)
+
+
+def round_about(size: float) -> Jump:
+    """Up, and round by ``size`` [rad]."""
+    return Jump(0.0, size, 0.15, 0.36)
+
+
+HALF_TURN = math.pi
+KINDS: dict[str, Kind] = {
+    "high": Kind("jump up", "m", 1.0, (0.15, 0.20, 0.25, 0.30, 0.35, 0.40), high),
+    "far": Kind("jump ahead", "m", 1.0, (0.5, 0.6, 0.7, 0.8, 0.9), far),
+    "round": Kind(
+        "jump and turn", "deg", math.degrees(1.0),
+        tuple(share * HALF_TURN for share in (1 / 2, 2 / 3, 5 / 6, 1.0)), round_about,
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """One question to the planner.
+
+    Attributes:
+        size: in the kind's unit.
+        flight: time in the air [s].
+        reason: why there is no plan; empty if there is one.
+    """
+
+    size: float
+    flight: float
+    reason: str
+
+    def __str__(self) -> str:
+        """For progress."""
+        return f"{self.size:.3g}, {self.flight:.2f} s in the air: {self.reason or 'planned'}"
+
+
+@dataclass(frozen=True, slots=True)
+class Climb:
+    """How far the sizes of a kind were climbed.
+
+    Attributes:
+        size: the greatest [m, rad] for which there is a plan.
+        jump: that jump.
+        attempts: all, in their order.
+    """
+
+    size: float
+    jump: Jump
+    attempts: tuple[Attempt, ...]
+
+
+class Climber:
+    """Climbs the sizes of one kind; plans are kept where ``compile_timeline`` looks for them."""
+
+    def __init__(
+        self, kind: Kind, model: RobotModel, budget: float, tell: Callable[[str], None]
+    ) -> None:
+        """Ask for jumps of ``kind``, each for ``budget`` seconds of processor time.
+
+        ``tell`` is called with every attempt in words.
+        """
+        self._kind, self._model, self._budget, self._tell = kind, model, budget, tell
+        self._attempts: list[Attempt] = []
+        self._last: Solved | None = None
+        self._longer = 0.0
+
+    def climb(self) -> Climb:
+        """The greatest size.
+
+        Raises:
+            PlanNotFound: if there is no plan for the first one.
+        """
+        found, jump, least = self._kind.sizes[0], None, math.inf
+        for size in self._kind.sizes:
+            if (planned := self._find(size)) is None:
+                least = size
+                break
+            found, jump = size, planned
+        if jump is None:
+            raise PlanNotFound(f"{self._kind.title}: {self._attempts[-1]}")
+        for _ in range(BISECTIONS if math.isfinite(least) else 0):
+            middle = 0.5 * (found + least)
+            if (planned := self._find(middle)) is None:
+                least = middle
+            else:
+                found, jump = middle, planned
+        return Climb(found, jump, tuple(self._attempts))
+
+    def _find(self, size: float) -> Jump | None:
+        """A jump of this size for which there is a plan, over the times in the air."""
+        asked, longer = self._kind.ask(size), self._longer
+        for steps in FLIGHT_STEPS:
+            self._longer = longer + steps * KNOT_PERIOD
+            halves = max(round(0.5 * (asked.flight + self._longer) / KNOT_PERIOD), 1)
+            jump = asked._replace(flight=2.0 * KNOT_PERIOD * halves)
+            if self._is_planned(size, jump):
+                return jump
+        self._longer = longer
+        return None
+
+    def _is_planned(self, size: float, jump: Jump) -> bool:
+        phases = moves.jump(jump.x, 0.0, jump.yaw, jump.height, flight=jump.flight)
+        problem, reason = PhaseProblem(phases), ""
+        try:
+            plan = solve(problem, self._model, budget=self._budget, start=self._last)
+        except PlanNotFound as error:
+            reason = "; ".join([str(error).split("\n")[0], *error.reasons])
+        else:
+            keep(problem, self._model, plan)
+            self._last = Solved(problem, plan)
+        attempt = Attempt(self._kind.scale * size, jump.flight, reason)
+        self._attempts.append(attempt)
+        self._tell(f"{self._kind.title}, {attempt}")
+        return not reason

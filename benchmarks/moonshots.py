@@ -1,0 +1,130 @@
+"""``python -m benchmarks moonshots``: how high, how far, how far round, and what forbids more.
+
+The greatest jump of each kind that the planner finds (``jump_climb``) is played over seeds on which
+nothing was tuned. There are no thresholds: what was reached is told, beside what the legs and the
+motors' line permit (``jump_physics``).
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from functools import cache, partial
+
+from benchmarks.dynamic_motions import Played, metrics_of, plant_of, play
+from benchmarks.jump_climb import KINDS, Climb, Climber, Jump
+from benchmarks.jump_physics import PhysicsRow, physics_rows
+from benchmarks.report import WIDTH, render, summarise
+from benchmarks.scenario import Measurement, Metric, Scenario, chosen_scenarios
+from benchmarks.seeded import QUICK_SEEDS, SEEDS, add_seeded_options
+from benchmarks.session import measure_all, publish, run_and_report, tasks_of
+from benchmarks.trials import Trial, TrialFailed
+from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.progress import ProgressLine
+from go2_wbc.robot.model import RobotModel
+from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline
+
+OFFSET = 200
+"""Seeds from which these trials are away from those of ``dynamic_motions``."""
+BUDGET = 20.0
+"""Processor time [s] of one attempt."""
+EXAMPLES = """
+python -m benchmarks moonshots                  everything; some minutes
+python -m benchmarks moonshots --rows high --seeds 5
+python -m benchmarks moonshots --budget 40      40 s for every attempt
+python -m benchmarks moonshots --json
+"""
+
+
+@cache
+def plan_of(jump: Jump) -> tuple[CompiledPlan, bool]:
+    """The plan of a jump, and whether the check lets it pass; once for all trials of a process."""
+    model = RobotModel()
+    line = Timeline().jump(x=jump.x, yaw=jump.yaw, height=jump.height, flight=jump.flight)
+    plan = compile_timeline(line, model)
+    return plan, FeasibilityChecker(model).check(plan).ok
+
+
+def measure(trial: Trial, name: str, jump: Jump) -> Measurement:
+    """Play it, stand for a second, look what came of it."""
+    plan, passes = plan_of(jump)
+    planned = {f"{name}.planned": _size(name, jump), f"{name}.check": float(passes)}
+    model, done = RobotModel(), f"{name}.done"
+    try:
+        played = play(plant_of(Trial(trial.seed + OFFSET)), plan, model)
+    except TrialFailed as failed:
+        return Measurement({**planned, done: 0.0}, {done: str(failed)}, str(failed))
+    values = played.values(name, plan, model)
+    return Measurement({**planned, **values, f"{name}.reached": _reached(name, played)})
+
+
+def _size(name: str, jump: Jump) -> float:
+    return KINDS[name].scale * {"high": jump.height, "far": jump.x, "round": jump.yaw}[name]
+
+
+def _reached(name: str, played: Played) -> float:
+    turned = played.turned % (2.0 * math.pi)
+    sizes = {"high": played.height, "far": float(played.moved[0]), "round": turned}
+    return KINDS[name].scale * sizes[name]
+
+
+def scenario_of(name: str, jump: Jump) -> Scenario:
+    """The trials of the greatest jump of a kind."""
+    kind = KINDS[name]
+    title = f"{kind.title}, the greatest that is planned"
+    planned = [
+        Metric(f"{name}.planned", title, "planned", kind.unit, None),
+        Metric(f"{name}.reached", title, "reached", kind.unit, None),
+        Metric(f"{name}.check", title, "the check lets it pass", "", None),
+    ]
+    common = [replace(metric, threshold=None) for metric in metrics_of(name, title, 1.0)]
+    return Scenario(name, (*planned, *common), partial(measure, name=name, jump=jump))
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``moonshots``."""
+    parser = add_parser(
+        subparsers,
+        "moonshots",
+        "The greatest jumps: planned, played, and beside what physics permits.\nExit code 0.",
+        examples=EXAMPLES,
+    )
+    add_seeded_options(parser)
+    parser.add_argument(
+        "--budget", metavar="S", type=float, default=BUDGET,
+        help="processor time of one attempt to plan [s], default %(default)g",
+    )  # fmt: skip
+
+
+def run(args: argparse.Namespace) -> int:
+    """Climb, play, and tell."""
+    easy = [scenario_of(name, kind.ask(kind.sizes[0])) for name, kind in KINDS.items()]
+    chosen = chosen_scenarios(easy, args.rows)
+    if args.list:
+        return run_and_report(args, chosen, [])
+    model = RobotModel()
+    climbs = _climbs([scenario.name for scenario in chosen], model, args.budget)
+    scenarios = [scenario_of(name, climb.jump) for name, climb in climbs.items()]
+    seeds = args.seeds or (QUICK_SEEDS if args.quick else SEEDS)
+    report = summarise(scenarios, measure_all(args, tasks_of(scenarios, seeds)))
+    rows = physics_rows(model)
+    values = {
+        **report.as_dict(),
+        "climbs": {name: asdict(climb) for name, climb in climbs.items()},
+        "physics": [asdict(row) for row in rows],
+    }
+    publish(args, values, f"{render(report)}\n\n{_physics_table(rows)}")
+    return ExitCode.OK
+
+
+def _climbs(names: list[str], model: RobotModel, budget: float) -> Mapping[str, Climb]:
+    with ProgressLine() as line:
+        return {name: Climber(KINDS[name], model, budget, line.done).climb() for name in names}
+
+
+def _physics_table(rows: tuple[PhysicsRow, ...]) -> str:
+    lines = ["what legs and motors permit, legs without inertia", "-" * WIDTH]
+    lines += [f"  {row.what:<52}{row.value:>9.3g} {row.unit}" for row in rows]
+    return "\n".join(lines)

@@ -1,0 +1,103 @@
+"""The climb finds the greatest size that is planned, and its jump is what is played."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+from benchmarks import jump_climb, moonshots
+from benchmarks.jump_climb import BISECTIONS, KINDS, Climber, Kind
+from benchmarks.jump_physics import best_take_off
+from benchmarks.trials import Trial
+from go2_wbc.errors import PlanNotFound
+from go2_wbc.kernels.compilation import CACHE_VARIABLE
+from go2_wbc.robot.model import RobotModel
+from motions.dynamics import PhaseProblem, Solved
+from motions.dynamics.limits import PlanLimits
+
+MODEL = RobotModel()
+ASKED = 0.32  # m; the planner of the tests finds what is lower
+
+
+class Planner:
+    """Finds jumps up to a height, and only with one time in the air."""
+
+    def __init__(self, longest: float = 9.0) -> None:
+        self.longest = longest
+        self.starts: list[Solved | None] = []
+        self.kept: list[object] = []
+
+    def solve(
+        self, problem: PhaseProblem, model: RobotModel, *, budget: float, start: Solved | None
+    ) -> str:
+        self.starts.append(start)
+        rise = problem.phases[2]
+        height = max(place[2] for place in rise.feet.values())
+        if height > ASKED or 2.0 * rise.duration > self.longest:
+            raise PlanNotFound("no dynamic plan", [f"asked for {height:g} m"])
+        return f"plan of {height:g} m"
+
+    def keep(self, problem: PhaseProblem, model: RobotModel, plan: object) -> None:
+        self.kept.append(plan)
+
+
+@pytest.fixture
+def planner(monkeypatch: pytest.MonkeyPatch) -> Planner:
+    planner = Planner()
+    monkeypatch.setattr(jump_climb, "solve", planner.solve)
+    monkeypatch.setattr(jump_climb, "keep", planner.keep)
+    monkeypatch.setattr(jump_climb, "Solved", lambda problem, plan: plan)
+    return planner
+
+
+def climb(kind: Kind, told: list[str]) -> jump_climb.Climb:
+    return Climber(kind, MODEL, 1.0, told.append).climb()
+
+
+def test_a_climb_ends_within_a_bisected_step_of_what_is_planned(planner: Planner) -> None:
+    told: list[str] = []
+    found = climb(KINDS["high"], told)
+    step = KINDS["high"].sizes[1] - KINDS["high"].sizes[0]
+    assert ASKED - step / 2**BISECTIONS <= found.size <= ASKED
+    assert found.jump.height == found.size
+    assert len(told) == len(found.attempts)
+    assert "asked for 0.35 m" in " ".join(told)
+
+
+def test_every_plan_is_the_start_for_the_next_one(planner: Planner) -> None:
+    climb(KINDS["high"], [])
+    assert planner.starts[:4] == [None, "plan of 0.15 m", "plan of 0.2 m", "plan of 0.25 m"]
+    assert planner.kept == [*planner.starts[1:5], "plan of 0.3125 m"]
+
+
+def test_the_time_in_the_air_is_searched(planner: Planner) -> None:
+    planner.longest = 0.37
+    found = climb(KINDS["high"], [])
+    assert found.size > 0.3
+    assert found.jump.flight < planner.longest < KINDS["high"].ask(found.size).flight
+
+
+def test_a_kind_of_which_nothing_is_found_says_so(planner: Planner) -> None:
+    planner.longest = 0.0
+    with pytest.raises(PlanNotFound, match=r"jump up: 0\.15"):
+        climb(KINDS["high"], [])
+
+
+@pytest.mark.skipif(find_spec("crocoddyl") is None, reason="needs crocoddyl")
+def test_a_small_climb_is_planned_and_played(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
+    kind = KINDS["high"]
+    small = Kind(kind.title, kind.unit, kind.scale, kind.sizes[:2], kind.ask)
+    found = climb(small, [])
+    assert found.size == 0.2
+    monkeypatch.setattr("motions.dynamics.cache.solve", None)  # what is kept is played
+    values = moonshots.measure(Trial(0), "high", found.jump).values
+    assert values["high.done"] == 1.0
+    assert values["high.reached"] == pytest.approx(values["high.planned"], abs=0.02)
+    assert values["high.asked"] <= 1.0
+    motor = MODEL.motor.scaled(PlanLimits().torque_share)
+    assert values["high.reached"] < best_take_off(MODEL, motor, PlanLimits()).feet
