@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
@@ -21,6 +22,7 @@ from benchmarks.exam.drawing import TEST
 from benchmarks.exam.outcome import play
 from benchmarks.exam.questions import Question, draw_name, draws, questions
 from benchmarks.exam.stored import (
+    borders_version,
     digest,
     read_borders,
     read_outcomes,
@@ -42,13 +44,14 @@ THRESHOLD = 0.95
 BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
 """The same of refusals among the motions at the border."""
 EXAMPLES = """
-python -m benchmarks feasibility              the exam; half an hour on two cores if
-                                              physics has to be asked, minutes if not
+python -m benchmarks feasibility              the exam: ten minutes on two cores, most
+                                              of it for motions that have no plan;
+                                              twenty if physics has to be asked
 python -m benchmarks feasibility --motions 60
 python -m benchmarks feasibility --rows causes
 python -m benchmarks feasibility --wrong      also the wrong verdicts of the train half
 python -m benchmarks feasibility --remake     play everything, store the outcomes
-python -m benchmarks feasibility --borders    bisect the borders anew, store them; hours
+python -m benchmarks feasibility --borders    bisect the borders anew: half an hour
 """
 REFUSED = Metric("feasibility.refused", "verdict", "refused by the check", "", None)
 OUTCOMES = {
@@ -94,7 +97,8 @@ def run(args: argparse.Namespace) -> int:
         wrong = sum(bool(case.refusal) is not bool(case.outcome.strict) for case in cases)
         publish(args, {"wrong": wrong, "cases": _plain(cases)}, render_causes(cases))
         return ExitCode.OK if not wrong else ExitCode.FAILED
-    scenario = REMADE if args.remake else STORED
+    chosen = REMADE if args.remake else STORED
+    scenario = replace(chosen, name=f"{chosen.name} {borders_version()}")
     if not args.remake and (why := read_outcomes()[1]):
         print(f"{why}: physics is asked again", file=sys.stderr)
     cases = _measured(args, scenario, exam())
@@ -163,7 +167,7 @@ def _measured(
         print(f"{asked[seed].name}: no result, {reason}", file=sys.stderr)
     answered = {seed: one for seed, one in sorted(found.items()) if one.values}
     cases = {seed: _case(asked[seed], one) for seed, one in answered.items()}
-    if args.remake and scenario is REMADE:
+    if args.remake and asked is exam():
         names = {seed: one.notes[PLAN] for seed, one in answered.items()}
         new = {names[seed]: case.outcome for seed, case in cases.items()}
         write_outcomes({**_known(), **new})

@@ -11,8 +11,10 @@ from benchmarks.trials import Trial
 from controller.motion_outcome import outcome_of
 from go2_wbc.robot.model import RobotModel
 
-NEAR, NEAR_SOLVED = 1.05, 1.10
+NEAR, NEAR_SOLVED = 1.06, 1.13
 """Ratio of amplitudes, one done and one failed, at which the search ends."""
+STEP, STEP_SOLVED = 1.6, 1.25
+"""Ratio of amplitudes in the search for two that differ."""
 BORDER = Metric("feasibility.border", "border", "amplitude at which physics fails", "", None)
 PLAYS = Metric("feasibility.plays", "border", "motions played to find it", "", None)
 
@@ -25,21 +27,30 @@ def is_done(question: Question) -> bool:
 
 
 def measure_border(trial: Trial) -> Measurement:
-    """The border of draw number ``trial.seed``, or why there is none."""
+    """The border of draw number ``trial.seed``, or why there is none.
+
+    From amplitude 1 in steps to the first one at which physics changes its mind, then by bisection.
+    """
     family, number = draws()[trial.seed]
-    low, high, plays = family.low, family.high, 2
-    if not is_done(Question(family, number, low)):
-        return Measurement({PLAYS.name: 1.0}, reason="already the lowest amplitude fails")
-    if is_done(Question(family, number, high)):
-        return Measurement({PLAYS.name: 2.0}, reason="even the highest amplitude is done")
-    near = NEAR_SOLVED if family.is_dynamic else NEAR
-    while high / low > near:
-        middle, plays = math.sqrt(low * high), plays + 1
+    step, near = (STEP_SOLVED, NEAR_SOLVED) if family.is_dynamic else (STEP, NEAR)
+    done, failed, plays = family.low, family.high, 0
+    is_low_done = is_high_failed = False
+    middle = 1.0
+    while not (is_low_done and is_high_failed) or failed / done > near:
+        plays += 1
         if is_done(Question(family, number, middle)):
-            low = middle
+            done, is_low_done = middle, True
         else:
-            high = middle
-    return Measurement({BORDER.name: math.sqrt(low * high), PLAYS.name: float(plays)})
+            failed, is_high_failed = middle, True
+        if is_low_done and is_high_failed:
+            middle = math.sqrt(done * failed)
+        elif middle in (family.low, family.high):
+            why = "even the highest amplitude is done" if is_low_done else "the lowest one fails"
+            return Measurement({PLAYS.name: float(plays)}, reason=why)
+        else:
+            onwards = middle * step if is_low_done else middle / step
+            middle = min(max(onwards, family.low), family.high)
+    return Measurement({BORDER.name: math.sqrt(done * failed), PLAYS.name: float(plays)})
 
 
 BORDERS = Scenario("borders", (BORDER, PLAYS), measure_border)

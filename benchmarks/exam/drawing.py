@@ -76,7 +76,7 @@ class Family:
         low, high: amplitudes between which physics is expected to change its mind; own guesses.
         is_dynamic: whether it is solved, or the robot leaves the ground.
         late: time [s] into the plan at which it is entered; above 0 for a wrong entry.
-        draws: how many.
+        draws: how many of its borders are bisected.
     """
 
     name: str
@@ -85,7 +85,7 @@ class Family:
     high: float = 4.0
     is_dynamic: bool = False
     late: float = 0.0
-    draws: int = 3
+    draws: int = 1
 
     @property
     def half(self) -> str:

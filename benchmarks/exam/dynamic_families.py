@@ -42,8 +42,8 @@ def _higher_hops(draw: Draw, s: float) -> Timeline:
 
 
 def _faster_hops(draw: Draw, s: float) -> Timeline:
-    height = draw.between(0.03, 0.04)
-    return Timeline().hop(draw.count(2, 3), height=height, period=0.3 + 0.2 / s)
+    height = draw.between(0.05, 0.07)
+    return Timeline().hop(draw.count(2, 3), height=height, period=0.45 + 0.1 / s)
 
 
 def _hops_to_beats(draw: Draw, s: float) -> Timeline:
@@ -125,7 +125,7 @@ def _lift_then_sway(draw: Draw, s: float) -> Timeline:
 
 
 def _nearest_sway(draw: Draw, s: float) -> Timeline:
-    y, over, line = draw.between(0.03, 0.05), 0.25 / s, Timeline(physics="nearest")
+    y, over, line = draw.between(0.06, 0.09), 0.2 / s, Timeline(physics="nearest")
     for _ in range(draw.count(1, 2)):
         line = line.body(y=y, over=over).body(y=-y, over=over)
     return line.home(over=0.4)
@@ -165,6 +165,6 @@ _BOUNDS = {
     _nearest_pair: (0.4, 4.0),
 }
 DYNAMIC = tuple(
-    Family(writer_name(write), write, low, high, is_dynamic=True, draws=2)
+    Family(writer_name(write), write, low, high, is_dynamic=True)
     for write, (low, high) in _BOUNDS.items()
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from benchmarks.exam.drawing import BODY_SIZES, Draw, Family, moved, to_and_fro, writer_name
 from go2_wbc.legs import LEGS
-from go2_wbc.reference import Posture
 from motions import Timeline, load_motion
 
 LIBRARY = (
@@ -33,7 +32,7 @@ def _reach_aside(draw: Draw, s: float) -> Timeline:
 
 def _taps(draw: Draw, s: float) -> Timeline:
     leg, line, z = draw.leg(), Timeline(), draw.between(0.03, 0.07)
-    up, down = draw.between(0.3, 0.5) / s, draw.between(0.25, 0.4) / s
+    up, down = draw.between(0.16, 0.24) / s, draw.between(0.12, 0.2) / s
     for _ in range(draw.count(1, 4)):
         line = line.foot(leg, z=z, over=up).down(leg, over=down)
     return line.home(over=0.8)
@@ -105,9 +104,9 @@ def _faster_wave(draw: Draw, s: float) -> Timeline:
 
 def _one_joint(draw: Draw, s: float) -> Timeline:
     leg, which = draw.front(), draw.one_of(("hip", "thigh", "calf"))
-    rest = {"hip": 0.0, "thigh": 0.84, "calf": -1.66}
-    size = {"hip": leg.side * 0.6, "thigh": -1.5, "calf": 0.6}[which]
-    line = Timeline().leg(leg, hip=0.0, thigh=0.6, calf=-1.7, over=0.8)
+    rest = {"hip": 0.0, "thigh": 0.3, "calf": -1.7}
+    size = {"hip": leg.side * 0.6, "thigh": -1.0, "calf": 0.6}[which]
+    line = Timeline().leg(leg, hip=0.0, thigh=0.3, calf=-1.7, over=0.8)
     line = line.joint(leg, which, rest[which] + s * size, over=draw.between(0.6, 1.0))
     return line.hold(0.2).home(over=1.0)
 
@@ -139,7 +138,7 @@ def _low_pass(draw: Draw, s: float) -> Timeline:
 
 def _kick_back(draw: Draw, s: float) -> Timeline:
     leg = draw.one_of(LEGS[2:])
-    x, z, over = draw.between(0.06, 0.12), draw.between(0.05, 0.10), draw.between(0.4, 0.7)
+    x, z, over = draw.between(0.15, 0.25), draw.between(0.08, 0.12), draw.between(0.4, 0.7)
     line = Timeline().foot(leg, z=z, over=0.6).foot(leg, x=-s * x, z=(0.5 + 0.5 * s) * z, over=over)
     return line.hold(0.2).home(over=0.9)
 
@@ -164,7 +163,7 @@ def _unweight_sooner(draw: Draw, s: float) -> Timeline:
 
 
 def _paw_circle(draw: Draw, s: float) -> Timeline:
-    leg, size, over = draw.front(), draw.between(0.03, 0.05), draw.between(0.25, 0.4) / s
+    leg, size, over = draw.front(), draw.between(0.05, 0.08), draw.between(0.12, 0.2) / s
     line = Timeline().foot(leg, z=0.12, over=0.8)
     corners = ((size, 0.12), (size, 0.12 + size), (0.0, 0.12 + size), (0.0, 0.12))
     for _ in range(draw.count(1, 3)):
@@ -178,13 +177,6 @@ def _two_feet_at_once(draw: Draw, s: float) -> Timeline:
     z, over = 0.03, 0.12 * s
     line = Timeline(balance=False).foot(first, z=z, over=over).also().foot(second, z=z, over=over)
     return line.down(first, over=over).also().down(second, over=over).home(over=0.8)
-
-
-def _paw_sitting(draw: Draw, s: float) -> Timeline:
-    leg = draw.front()
-    line = Timeline(entry=Posture.SIT, exit=Posture.SIT)
-    line = line.foot(leg, z=0.10 * s, x=0.03 * s, over=draw.between(0.6, 1.0)).hold(0.2)
-    return line.down(leg, over=0.7).home(over=0.6)
 
 
 def _paws_to_beats(draw: Draw, s: float) -> Timeline:
@@ -229,7 +221,7 @@ _WRITERS = (
     _paw_up, _reach_ahead, _reach_aside, _taps, _stamps, _high_stamps, _lifts_in_turn,
     _higher_lifts_in_turn, _nod_on_three, _shift_on_three, _wave_a_leg, _faster_wave, _one_joint,
     _high_five, _slide, _low_pass, _kick_back, _paw_with_trunk, _lean_and_lift, _unweight_sooner,
-    _paw_circle, _two_feet_at_once, _paw_sitting, _paws_to_beats, _bow_sway_paw, _random_paws,
+    _paw_circle, _two_feet_at_once,  _paws_to_beats, _bow_sway_paw, _random_paws,
     _random_paws_faster, _library_faster, _library_larger,
 )  # fmt: skip
 _TURNING = {_wave_a_leg: 2.5, _one_joint: 2.0, _high_five: 2.5}

@@ -16,7 +16,7 @@ def _long_step(draw: Draw, s: float) -> Timeline:
 
 
 def _hasty_step(draw: Draw, s: float) -> Timeline:
-    x, y, over = draw.either(0.02, 0.07), draw.either(0.01, 0.05), draw.between(0.35, 0.5) / s
+    x, y, over = draw.either(0.02, 0.07), draw.either(0.01, 0.05), draw.between(0.15, 0.25) / s
     return Timeline().step(draw.leg(), x, y, over=over).home(over=0.8)
 
 

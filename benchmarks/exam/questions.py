@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from benchmarks.exam.drawing import Draw, Family
@@ -15,6 +15,9 @@ EASY, BORDER, IMPOSSIBLE = "easy", "border", "impossible"
 STRATA = (EASY, BORDER, IMPOSSIBLE)
 EASY_SHARE, BORDER_SHARE, IMPOSSIBLE_SHARE = (0.3, 0.7), (0.10, 0.25), (1.6, 2.5)
 """Amplitudes as shares of the one at which physics changes its mind; borders, off it."""
+
+FRESH = 100
+"""Number of the first draw that is not bisected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,29 +79,40 @@ def draws() -> list[tuple[Family, int]]:
 
 
 def questions(borders: Mapping[str, float | None]) -> list[Question]:
-    """The exam: of each draw an easy motion, an impossible one, and one at its border.
+    """The exam: of each border motions on both sides of it, and as many easy and impossible ones.
+
+    These have free numbers of their own, and the same border stands for them. Of solved motions
+    there are fewer: to see that there is no plan takes 20 s.
 
     Args:
         borders: by family and draw (see ``draw_name``), the amplitude at which physics changes its
-            mind; None where it does not between the family's bounds. Then there is none at the
-            border, and the others are near the bounds.
+            mind; None where it does not between the family's bounds: then these stand for it, and
+            there is no motion at the border.
     """
-    found: list[Question] = []
-    for family, number in draws():
-        if draw_name(family, number) not in borders:
-            continue
-        flip = borders[draw_name(family, number)]
-        rng = Draw(f"strata of {family.name}", number)
-        easy, impossible = rng.between(*EASY_SHARE), rng.between(*IMPOSSIBLE_SHARE)
-        border = 1.0 + rng.either(*BORDER_SHARE)
-        if flip is None:
-            amplitudes = {EASY: family.low * 2.0 * easy, IMPOSSIBLE: family.high}
-        else:
-            amplitudes = {EASY: flip * easy, BORDER: flip * border, IMPOSSIBLE: flip * impossible}
-        for stratum, amplitude in amplitudes.items():
-            s = round(min(amplitude, family.high), 4)
-            found.append(Question(family, number, s, stratum))
-    return found
+    found = [
+        question
+        for family, number in draws()
+        if draw_name(family, number) in borders
+        for question in _around(family, number, borders[draw_name(family, number)])
+    ]
+    return list({question.name: question for question in found}.values())
+
+
+def _around(family: Family, number: int, flip: float | None) -> Iterator[Question]:
+    """The motions that belong to one border."""
+    rng = Draw(f"strata of {family.name}", number)
+    count, fresh = (1, FRESH + number) if family.is_dynamic else (2, FRESH + 2 * number)
+    below, above = (1.0 + side * rng.between(*BORDER_SHARE) for side in (-1.0, 1.0))
+    asked: list[tuple[int, float, str]] = []
+    if flip is not None:
+        asked += [(number, flip * below, BORDER), (number, flip * above, BORDER)]
+    for draw in range(fresh, fresh + count):
+        easy, beyond = rng.between(*EASY_SHARE), rng.between(*IMPOSSIBLE_SHARE)
+        asked.append((draw, (flip or 2.0 * family.low) * easy, EASY))
+        asked.append((draw, (flip or family.high) * beyond, IMPOSSIBLE))
+    for draw, amplitude, stratum in asked:
+        s = round(min(max(amplitude, family.low), family.high), 4)
+        yield Question(family, draw, s, stratum)
 
 
 def draw_name(family: Family, number: int) -> str:

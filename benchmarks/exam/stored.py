@@ -56,6 +56,11 @@ def read_borders(path: Path = BORDERS_FILE) -> dict[str, float | None]:
     return {name: None if flip is None else float(flip) for name, flip in kept.items()}
 
 
+def borders_version(path: Path = BORDERS_FILE) -> str:
+    """A short hash of the file of borders: with others, the exam asks other questions."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:8] if path.exists() else "none"
+
+
 def write_borders(borders: Mapping[str, float | None], path: Path = BORDERS_FILE) -> None:
     """Keep borders, one a line."""
     _write(path, {name: value and round(value, 4) for name, value in borders.items()})

@@ -82,9 +82,9 @@ def _three_tracks(draw: Draw, s: float) -> Timeline:
     return line.home(over=over)
 
 
-def _tempo(channel: str, draw: Draw, s: float) -> Timeline:
+def _tempo(channel: str, draw: Draw, s: float, wide: float = 1.0) -> Timeline:
     """To and fro; the amplitude is the tempo."""
-    size, over = draw.between(0.3, 0.6) * BODY_SIZES[channel], draw.between(0.25, 0.35) / s
+    size, over = wide * draw.between(0.3, 0.6) * BODY_SIZES[channel], draw.between(0.25, 0.35) / s
     line = Timeline()
     for _ in range(draw.count(2, 4)):
         line = to_and_fro(line, channel, size, over)
@@ -108,7 +108,7 @@ def _fast_twist(draw: Draw, s: float) -> Timeline:
 
 
 def _fast_rock(draw: Draw, s: float) -> Timeline:
-    return _tempo("roll", draw, s)
+    return _tempo("roll", draw, s, 2.0)
 
 
 def _sway_to_beats(draw: Draw, s: float) -> Timeline:
@@ -128,7 +128,7 @@ def _circle(draw: Draw, s: float) -> Timeline:
 
 
 def _nose_path(draw: Draw, s: float) -> Timeline:
-    pitch, yaw, over = s * draw.between(0.1, 0.2), s * draw.either(0.1, 0.2), draw.between(1.0, 2.0)
+    pitch, yaw, over = s * draw.between(0.2, 0.3), s * draw.either(0.2, 0.3), draw.between(1.0, 2.0)
     points = [
         {"pitch": pitch, "yaw": 0.0},
         {"pitch": 0.0, "yaw": yaw},

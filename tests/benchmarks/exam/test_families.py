@@ -24,8 +24,7 @@ from benchmarks.exam.questions import (
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
 
-DRAWS = 600 // len(STRATA)
-LEAST_DYNAMIC = 100
+LEAST, LEAST_DYNAMIC = 600, 100
 FLIP = 1.0
 
 
@@ -57,8 +56,9 @@ def test_an_amplitude_scales_what_is_drawn_and_draws_nothing_else() -> None:
 
 def test_there_are_enough_motions_and_enough_of_them_are_dynamic() -> None:
     asked = questions(all_borders())
-    assert len(draws()) >= DRAWS
-    assert len(asked) == len(STRATA) * len(draws())
+    assert len(asked) >= LEAST
+    for stratum in STRATA:
+        assert sum(q.stratum == stratum for q in asked) >= 0.31 * len(asked)
     assert sum(q.family.is_dynamic for q in asked) >= LEAST_DYNAMIC
     assert len({q.name for q in asked}) == len(asked)
 
@@ -82,7 +82,7 @@ def test_strata_lie_around_the_amplitude_at_which_physics_changes_its_mind() -> 
         if question.stratum == BORDER:
             assert low - 1e-4 <= abs(question.amplitude - FLIP) <= high + 1e-4
         elif question.stratum == EASY:
-            assert question.amplitude <= 0.7
+            assert question.amplitude <= max(0.7, question.family.low)
         else:
             assert question.stratum == IMPOSSIBLE
             assert question.amplitude >= min(1.6, question.family.high)
@@ -91,7 +91,7 @@ def test_strata_lie_around_the_amplitude_at_which_physics_changes_its_mind() -> 
 def test_a_draw_without_a_border_gives_no_motion_there() -> None:
     family, number = draws()[0]
     found = questions({draw_name(family, number): None})
-    assert [question.stratum for question in found] == [EASY, IMPOSSIBLE]
+    assert {question.stratum for question in found} == {EASY, IMPOSSIBLE}
 
 
 def test_a_late_entry_begins_where_the_robot_is_not() -> None:

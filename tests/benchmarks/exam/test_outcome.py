@@ -131,12 +131,18 @@ def test_no_border_is_made_up_where_physics_does_not_change_its_mind(
     assert word in found.reason
 
 
-def test_a_border_is_searched_within_the_bounds_of_the_family(
+def test_a_border_is_searched_for_its_own_draw_from_amplitude_1(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     asked: list[Question] = []
-    monkeypatch.setattr(borders, "is_done", lambda q: asked.append(q) or q.amplitude < 1.0)
-    measure_border(Trial(len(FAMILIES)))
-    family, number = draws()[len(FAMILIES)]
-    assert (asked[0].family, asked[0].draw, number) == (family, number, 1)
-    assert {q.amplitude for q in asked[:2]} == {family.low, family.high}
+
+    def is_done(question: Question) -> bool:
+        asked.append(question)
+        return question.amplitude < 0.5
+
+    monkeypatch.setattr(borders, "is_done", is_done)
+    row = next(row for row, (_, number) in enumerate(draws()) if number == 1)
+    measure_border(Trial(row))
+    assert {(q.family, q.draw) for q in asked} == {draws()[row]}
+    assert asked[0].amplitude == 1.0
+    assert min(q.amplitude for q in asked) >= draws()[row][0].low
