@@ -60,6 +60,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.loads",
         "go2_wbc.kernels.locomotion",
         "go2_wbc.kernels.motor",
+        "go2_wbc.kernels.mpc",
         "go2_wbc.kernels.playing",
         "go2_wbc.kernels.rigid_body",
         "go2_wbc.kernels.simulation",

@@ -193,6 +193,22 @@ LOCOMOTION = Layout(
 )
 """Numbers of the locomotion planner: gait, configuration, robot."""
 
+MPC_NODES = 12
+"""Nodes of the MPC's horizon."""
+
+MPC = Layout(
+    step=(),
+    mass=(),
+    gravity=(),
+    pose_weights=(6,),
+    rate_weights=(6,),
+    force_weight=(),
+    friction=(),
+    force_max=(),
+    least_share=(),
+)
+"""Numbers of the MPC: the turn's axes before those of the way."""
+
 PLAN_CURVES = 30
 """Curves of a plan: CoM, roll pitch yaw, twelve joints, and the places of the four feet."""
 

@@ -10,6 +10,7 @@ KERNELS = (
     "loads",
     "locomotion",
     "motor",
+    "mpc",
     "playing",
     "rigid_body",
     "simulation",
