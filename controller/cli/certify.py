@@ -9,12 +9,14 @@ from controller.cli.common import ExitCode, Subparsers, add_parser, print_json, 
 from controller.cli.motion_args import add_motion, the_motion
 from controller.cli.progress import ProgressLine
 from controller.cli.sweep import tell
+from controller.cli.world_args import add_world, the_world
 from go2_wbc.errors import CommandError
 
 RUNS = 200
 EXAMPLES = """
 go2-wbc certify high_five
 go2-wbc certify my_motion.py:bow --at-least 0.95
+go2-wbc certify bow --friction 0.4 --payload 3 --payload-at 0.05,0,0.08
 go2-wbc certify jump_up --n 1000 --width 0.05
 go2-wbc certify wave --set times=5 --json
 """
@@ -35,6 +37,7 @@ def register(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--n", metavar="N", type=int, default=RUNS, help="runs, default %(default)s"
     )
+    add_world(parser)
     parser.add_argument(
         "--width",
         metavar="SHARE",
@@ -72,6 +75,7 @@ def run(args: argparse.Namespace) -> int:
         found = certify(
             the_motion(args.motion, args.values),
             args.n,
+            world=the_world(args),
             width=args.width,
             first_seed=args.first_seed,
             workers=args.workers,

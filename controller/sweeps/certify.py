@@ -20,6 +20,7 @@ from controller.sweeps.run import Progress, sweep
 from controller.sweeps.summary import CONFIDENCE, rate_interval
 from controller.sweeps.targets import motion_target
 from go2_wbc.errors import CommandError
+from go2_wbc.world import World
 
 RUNS = 200
 WORST = 5
@@ -95,6 +96,7 @@ def certify(
     motion: object,
     n: int = RUNS,
     *,
+    world: World | None = None,
     width: float | None = None,
     first_seed: int = 0,
     workers: int | None = None,
@@ -109,7 +111,8 @@ def certify(
 
     Args:
         motion: as ``GO2Controller.play`` takes it.
-        n: runs; each has its own friction, mass, heading and start, drawn by its seed.
+        n: runs; each has its own heading and start.
+        world: where; each run is in a sample of it. By default the usual one, ``World()``.
         width: ends early once the interval of the rate is no wider, 0 to 1; None: all runs.
         first_seed, workers, engine, out, fresh, on_progress: see ``sweep``.
 
@@ -119,7 +122,7 @@ def certify(
     """
     if width is not None and not (isinstance(width, int | float) and 0.0 < width <= 1.0):
         raise CommandError(f"width must be a share between 0 and 1, got {width!r}")
-    target = motion_target(motion)
+    target = motion_target(motion, world=world)
     result = sweep(
         target,
         n,

@@ -1,4 +1,4 @@
-"""What can be swept by name: a motion, a gait or a push, each a function from a seed to a row.
+"""What can be swept by name: a gait or a push, each a function from a seed to a row.
 
 What a seed varies is in ``trials.py``: friction, mass, heading, and the pose from which the robot
 gets up. A robot that fails is a row, too: it says why, and what was not measured is nan.
@@ -7,23 +7,17 @@ gets up. A robot that fails is a row, too: it says why, and what was not measure
 from __future__ import annotations
 
 import math
-import tempfile
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
-from controller.motion_measurement import MotionMeasurement, measure_motion
-from controller.motion_outcome import outcome_of, shares_of
 from controller.sweeps.rows import Row, Value
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
-from motions import CompiledPlan, load_plan, save_plan
 
 START_TIME = 1.5
 """Time [s] after a command that is left out: the ramp takes 0.7 s, settling the rest."""
@@ -37,71 +31,9 @@ _STREAM = 1
 """Keeps the numbers of a push apart from those of the robot and its world."""
 
 
-def archive_of(plan: CompiledPlan) -> bytes:
-    """A plan as the content of its file: plays as it does, number by number."""
-    with tempfile.TemporaryDirectory() as folder:
-        return save_plan(plan, Path(folder, "swept.plan")).read_bytes()
-
-
-@cache
-def plan_of(archive: bytes) -> CompiledPlan:
-    """The plan of an archive, read once in each process."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "swept.plan")
-        file.write_bytes(archive)
-        return load_plan(file)
-
-
 @cache
 def _model() -> RobotModel:
     return RobotModel()
-
-
-@dataclass(frozen=True, slots=True)
-class MotionStudy:
-    """Plays a motion, unchecked, on a robot that has got up.
-
-    Attributes:
-        archive: its compiled plan, as ``archive_of`` gives it.
-    """
-
-    archive: bytes
-
-    def __call__(self, seed: int) -> Row:
-        """Whether it was done, what went wrong, and what was measured.
-
-        See ``motion_outcome`` (strict) and ``MotionMeasurement``; lengths in m, times in s.
-        """
-        trial = Trial(seed)
-        with TrialRobot(trial) as robot:
-            try:
-                measured = self.play(robot)
-            except (TrialFailed, Go2WbcError) as error:
-                measured = replace(_NOTHING, fall=str(error))
-        plan = plan_of(self.archive)
-        harm, shares = outcome_of(measured, plan).strict, shares_of(measured, plan)
-        closest, (share, _) = max(shares.items(), key=lambda item: np.nan_to_num(item[1][0]))
-        values = {**measured.as_dict(), "fall": measured.fall or ""}
-        row: Row = {"done": not harm, "harm": "; ".join(harm)}
-        row |= {"closest": closest, "closest_share": share, **_world(trial)}
-        return row | {name: value for name, value in values.items() if value is not None}
-
-    def play(self, robot: TrialRobot) -> MotionMeasurement:
-        """Get up and play it.
-
-        Raises:
-            TrialFailed: if the robot does not get into the motion's entry posture.
-        """
-        plan = plan_of(self.archive)
-        go2 = robot.go2
-        robot.require(go2.sit() if plan.entry is Posture.SIT else go2.stand())
-        return measure_motion(go2, robot.truth, plan, _model())
-
-
-_NOTHING = MotionMeasurement(
-    None, False, "", *[math.nan for field in fields(MotionMeasurement) if field.type == "float"]
-)
-"""What is measured of a robot that did not get up."""
 
 
 @dataclass(frozen=True, slots=True)

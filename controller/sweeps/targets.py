@@ -10,10 +10,14 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from types import FunctionType, ModuleType
+from typing import TYPE_CHECKING
 
 from controller.sweeps.identity import digest, identity
 from controller.sweeps.rows import Row, row_of
 from go2_wbc.errors import CommandError, Go2WbcError, SweepError, unknown_name
+
+if TYPE_CHECKING:
+    from go2_wbc.world import World
 
 FORMS = (
     "a motion (a name of the library, FILE.py[:NAME], a saved FILE.json or FILE.plan), "
@@ -151,16 +155,19 @@ def target_of(what: object) -> Target:
     return motion_target(what)
 
 
-def motion_target(motion: object, name: str = "") -> Target:
-    """The target that plays a motion; ``motion`` is a ``Playable``, and compiled here.
+def motion_target(motion: object, name: str = "", world: World | None = None) -> Target:
+    """The target that plays a motion in samples of a world, by default of the usual one.
+
+    ``motion`` is a ``Playable``, and compiled here.
 
     Raises:
         CommandError: for what stands for no motion, or starts lying.
         TimelineError, MotionFileError: for a motion that cannot be used.
     """
-    from controller.sweeps.studies import MotionStudy, archive_of
+    from controller.sweeps.motion_study import MotionStudy, archive_of
     from go2_wbc.reference import Posture
     from go2_wbc.robot.model import RobotModel
+    from go2_wbc.world import World
     from motions import CompiledPlan
     from motions.feasibility import compile_motion
 
@@ -170,7 +177,9 @@ def motion_target(motion: object, name: str = "") -> Target:
     if plan.entry not in (Posture.STAND, Posture.SIT):
         raise CommandError(f"{plan.name} starts from {plan.entry.value}: cannot be swept")
     archive = archive_of(plan)
-    return Target(name or plan.name, MotionStudy(archive), {"kind": "motion", "plan": archive})
+    world = World() if world is None else world
+    about: dict[str, str | bytes] = {"kind": "motion", "plan": archive, "world": repr(world)}
+    return Target(name or plan.name, MotionStudy(archive, world), about)
 
 
 def _of_callable(function: FunctionType) -> Target:

@@ -14,7 +14,8 @@ from controller import Certificate, certify, sweep
 from controller.cli.common import ExitCode
 from controller.cli.main import main
 from controller.sweeps.rows import Row
-from go2_wbc.errors import CommandError
+from go2_wbc import World
+from go2_wbc.errors import CommandError, ConfigError
 from motions import Timeline, deg
 from tests.controller.sweeps import swept
 
@@ -83,6 +84,15 @@ def test_what_physics_does_not_give_is_counted_and_named(tmp_path: Path) -> None
     assert not any(row["done"] for row in found.worst)
 
 
+def test_runs_are_in_samples_of_the_world_that_is_stated(tmp_path: Path) -> None:
+    world = World(friction=0.3, payload=2.0, payload_place=(0.05, 0.0, 0.05))
+    found = certify(BOW, 2, world=world, out=tmp_path / "rows.sqlite")
+    assert all(0.27 <= float(row["friction"]) <= 0.33 for row in found.worst)
+    assert found.about["world"] == repr(world)
+    with pytest.raises(ConfigError, match="depend on something else"):
+        certify(BOW, 2, out=tmp_path / "rows.sqlite")
+
+
 def test_a_sweep_ends_with_the_fewest_first_rows_that_are_enough(tmp_path: Path) -> None:
     def is_enough(rows: list[Row]) -> bool:
         return sum(bool(row["ok"]) for row in rows) >= 3
@@ -117,6 +127,9 @@ def test_the_command_fails_below_the_rate_that_is_asked_for(
     assert main([*words, "--at-least", "0.5", "--json"]) == ExitCode.FAILED
     assert json.loads(capsys.readouterr().out)["done"] == 0
     assert main([*words, "--at-least", "95"]) == ExitCode.USAGE
+    assert main([*words, "--payload-at", "0.1,0.2"]) == ExitCode.USAGE
+    assert "three numbers" in capsys.readouterr().err
+    assert main([*words, "--friction", "9"]) == ExitCode.USAGE
 
 
 def test_the_marker_requires_a_rate_and_says_what_is_missing(tmp_path: Path) -> None:

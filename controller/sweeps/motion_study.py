@@ -1,0 +1,104 @@
+"""A motion as a function from a seed to a row: played in a sample of a world."""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from dataclasses import dataclass, fields, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from controller.motion_measurement import MotionMeasurement, measure_motion
+from controller.motion_outcome import outcome_of, shares_of
+from controller.sweeps.rows import Row
+from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, TrialFailed, TrialRobot
+from go2_wbc.errors import Go2WbcError
+from go2_wbc.plant import MujocoPlant, plant_in
+from go2_wbc.reference import Posture
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.world import World
+from motions import CompiledPlan, load_plan, save_plan
+
+
+def archive_of(plan: CompiledPlan) -> bytes:
+    """A plan as the content of its file: plays as it does, number by number."""
+    with tempfile.TemporaryDirectory() as folder:
+        return save_plan(plan, Path(folder, "swept.plan")).read_bytes()
+
+
+@cache
+def plan_of(archive: bytes) -> CompiledPlan:
+    """The plan of an archive, read once in each process."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "swept.plan")
+        file.write_bytes(archive)
+        return load_plan(file)
+
+
+@cache
+def _model() -> RobotModel:
+    return RobotModel()
+
+
+@dataclass(frozen=True, slots=True)
+class MotionStudy:
+    """Plays a motion, unchecked, on a robot that has got up.
+
+    Attributes:
+        archive: its compiled plan, as ``archive_of`` gives it.
+        world: each seed plays in a sample of it.
+    """
+
+    archive: bytes
+    world: World
+
+    def __call__(self, seed: int) -> Row:
+        """Whether it was done, what went wrong, and what was measured.
+
+        See ``motion_outcome`` (strict) and ``MotionMeasurement``; lengths in m, times in s.
+        """
+        world, plant = self._drawn(seed)
+        with TrialRobot(plant) as robot:
+            try:
+                measured = self.play(robot)
+            except (TrialFailed, Go2WbcError) as error:
+                measured = replace(_NOTHING, fall=str(error))
+        plan = plan_of(self.archive)
+        harm, shares = outcome_of(measured, plan).strict, shares_of(measured, plan)
+        closest, (share, _) = max(shares.items(), key=lambda item: np.nan_to_num(item[1][0]))
+        values = {**measured.as_dict(), "fall": measured.fall or ""}
+        row: Row = {"done": not harm, "harm": "; ".join(harm)}
+        row |= {"closest": closest, "closest_share": share, **_told(world)}
+        return row | {name: value for name, value in values.items() if value is not None}
+
+    def _drawn(self, seed: int) -> tuple[World, MujocoPlant]:
+        """The world of a seed, and the robot in it: heading and start differ, too."""
+        rng = np.random.default_rng(seed)
+        world, yaw = self.world.sample(rng), rng.uniform(*YAW_RANGE)
+        noise = JOINT_NOISE
+        return world, plant_in(world, seed=seed, initial_yaw=yaw, initial_joint_noise=noise)
+
+    def play(self, robot: TrialRobot) -> MotionMeasurement:
+        """Get up and play it.
+
+        Raises:
+            TrialFailed: if the robot does not get into the motion's entry posture.
+        """
+        plan = plan_of(self.archive)
+        go2 = robot.go2
+        robot.require(go2.sit() if plan.entry is Posture.SIT else go2.stand())
+        return measure_motion(go2, robot.truth, plan, _model())
+
+
+_NOTHING = MotionMeasurement(
+    None, False, "", *[math.nan for field in fields(MotionMeasurement) if field.type == "float"]
+)
+"""What is measured of a robot that did not get up."""
+
+
+def _told(world: World) -> Row:
+    """What the seed has drawn."""
+    names = ("friction", "mass_scale", "joint_friction")
+    return {name: getattr(world, name) for name in names}
