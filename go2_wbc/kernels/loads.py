@@ -56,15 +56,16 @@ def weigh(A, wrench, shares, scale, numbers, H, g):
 
 @subroutine("void(f8[::1], f8[:,::1], f8, f8[:,::1], f8[::1], f8[::1])")
 def bound(shares, pyramid, force_max, C, lower, upper):
-    """Fill the rows of friction and normal force of the loaded feet."""
+    """Fill the rows of friction and normal force, which is the last of them, of the loaded feet."""
+    rows = len(pyramid)
     for row in range(len(lower)):
-        foot, kind = row // 5, row % 5
+        foot, kind = row // rows, row % rows
         for column in range(C.shape[1]):
             C[row, column] = 0.0
         for axis in range(3):
             C[row, 3 * foot + axis] = pyramid[kind, axis]
-        lower[row] = -np.inf if kind < 4 else 0.0
-        upper[row] = 0.0 if kind < 4 else force_max * shares[foot]
+        lower[row] = -np.inf if kind < rows - 1 else 0.0
+        upper[row] = 0.0 if kind < rows - 1 else force_max * shares[foot]
 
 
 @subroutine("void(f8[:,::1], f8[:,::1], i8, f8[:,::1])")
@@ -94,6 +95,48 @@ def relieve(points, R, f, tau):
             tau[joint] -= points[4, 1] * (a2 * f0 - a0 * f2) + points[4, 2] * (a0 * f1 - a1 * f0)
 
 
+@subroutine(
+    "i8(f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8, f8[:,:,::1], i8[::1], f8[::1], f8[:,::1])"
+)
+def gather(joints, R, load_share, legs, radius, points, loaded, shares, A):
+    """Fill the loaded feet's numbers, shares and columns of A; returns how many there are."""
+    k = 0
+    for leg in range(4):
+        if load_share[leg] > 0.0:
+            loaded[k], shares[k] = leg, load_share[leg]
+            place_leg(legs[leg], joints[3 * leg : 3 * leg + 3], R, radius, points[leg])
+            press(points[leg], R, k, A)
+            k += 1
+    return k
+
+
+@subroutine("void(f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1])")
+def share(A, wrench, shares, pyramid, scale, numbers, x):
+    """Fill the forces of the loaded feet; zeros if there are none."""
+    n, m = len(x), len(pyramid) * len(shares)
+    H, g, C, lower, upper = (
+        np.empty((n, n)),
+        np.empty(n),
+        np.empty((m, n)),
+        np.empty(m),
+        np.empty(m),
+    )
+    weigh(A, wrench, shares, scale, numbers, H, g)
+    bound(shares, pyramid, numbers[2], C, lower, upper)
+    if solve_qp(H, g, np.empty((0, 12)), np.empty(0), C, lower, upper, x, np.empty(m)) != SOLVED:
+        for j in range(n):
+            x[j] = 0.0
+
+
+@subroutine("void(f8[:,::1], f8[::1], f8[::1], f8[::1])")
+def remain(A, wrench, x, left):
+    """Fill what the forces leave of the wrench."""
+    for r in range(6):
+        left[r] = wrench[r]
+        for j in range(len(x)):
+            left[r] -= A[r, j] * x[j]
+
+
 @kernel(
     "void(f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], "
     "f8[:,:,::1], f8[:,::1], f8[:,::1])",
@@ -108,36 +151,97 @@ def share_loads(
     [m]. ``contact`` comes with zeros, ``tau`` with the joints' rows of ``needed``.
     """
     points, loaded, shares = np.empty((4, 5, 3)), np.empty(4, dtype=np.int64), np.empty(4)
-    left, E, e = np.empty(6), np.empty((0, 12)), np.empty(0)
+    left, whole = np.empty(6), np.empty((6, 12))
     for i in range(len(joints)):
-        k = 0
-        for leg in range(4):
-            if load_share[i, leg] > 0.0:
-                loaded[k], shares[k] = leg, load_share[i, leg]
-                k += 1
-        n, m = 3 * k, 5 * k
-        A, x = np.empty((6, n)), np.empty(n)
-        for foot in range(k):
-            leg = loaded[foot]
-            q = joints[i, 3 * leg : 3 * leg + 3]
-            place_leg(legs[leg], q, R[i], numbers[3], points[leg])
-            press(points[leg], R[i], foot, A)
+        k = gather(joints[i], R[i], load_share[i], legs, numbers[3], points, loaded, shares, whole)
+        n = 3 * k
+        A, x = whole[:, :n].copy(), np.zeros(n)
         if k > 0:
-            H, g, C = np.empty((n, n)), np.empty(n), np.empty((m, n))
-            lower, upper = np.empty(m), np.empty(m)
-            weigh(A, needed[i], shares[:k], scale, numbers, H, g)
-            bound(shares[:k], pyramid, numbers[2], C, lower, upper)
-            if solve_qp(H, g, E, e, C, lower, upper, x, np.empty(m)) != SOLVED:
-                for j in range(n):
-                    x[j] = 0.0
+            share(A, needed[i], shares[:k], pyramid, scale, numbers, x)
         for foot in range(k):
             leg, f = loaded[foot], x[3 * foot : 3 * foot + 3]
             relieve(points[leg], R[i], f, tau[i, 3 * leg : 3 * leg + 3])
             for axis in range(3):
                 contact[i, leg, axis] = f[axis]
-        for r in range(6):
-            left[r] = needed[i, r]
-            for j in range(n):
-                left[r] -= A[r, j] * x[j]
+        remain(A, needed[i], x, left)
         missing[i, 0] = np.sqrt(left[0] ** 2 + left[1] ** 2 + left[2] ** 2)
         missing[i, 1] = np.sqrt(left[3] ** 2 + left[4] ** 2 + left[5] ** 2)
+
+
+@kernel(
+    "void(f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], "
+    "f8[::1], f8, f8[::1])",
+    nogil=True,
+)
+def least_friction(
+    joints, R, needed, load_share, legs, cone, scale, numbers, highest, tolerance, friction
+):
+    """Fill the least friction coefficient with which the feet can give the wrench.
+
+    ``cone``: facets at a coefficient of 1. ``highest``: what is enough; 0 where nothing is asked.
+    ``tolerance``: greatest part of the scaled wrench [N] that may be missing. By bisection: the
+    forces that a coefficient allows are among those that a greater one does.
+    """
+    points, loaded, shares = np.empty((4, 5, 3)), np.empty(4, dtype=np.int64), np.empty(4)
+    left, whole, facets = np.empty(6), np.empty((6, 12)), cone.copy()
+    for i in range(len(joints)):
+        low, high = 0.0, highest[i]
+        if high == 0.0:
+            continue
+        k = gather(joints[i], R[i], load_share[i], legs, numbers[3], points, loaded, shares, whole)
+        A, x = whole[:, : 3 * k].copy(), np.zeros(3 * k)
+        for _ in range(7 if k > 0 else 0):
+            middle = 0.5 * (low + high)
+            for facet in range(len(cone) - 1):
+                facets[facet, 2] = middle * cone[facet, 2]
+            share(A, needed[i], shares[:k], facets, scale, numbers, x)
+            remain(A, needed[i], x, left)
+            missing = 0.0
+            for r in range(6):
+                missing += (scale[r] * left[r]) ** 2
+            if missing > tolerance * tolerance:
+                low = middle
+            else:
+                high = middle
+        friction[i] = high
+
+
+@kernel("void(f8[:,:,::1], b1[:,::1], f8, f8, f8, f8[:,::1])", nogil=True)
+def slide(forces, counts, friction, mass, dt, ways):
+    """Fill how far every foot has slid since it began to count.
+
+    A sliding block (Newmark 1965): what a force along the ground exceeds friction by accelerates
+    the foot, which friction then stops.
+    """
+    for leg in range(4):
+        vx, vy, x, y = 0.0, 0.0, 0.0, 0.0
+        for i in range(len(forces)):
+            if not counts[i, leg]:
+                vx, vy, x, y = 0.0, 0.0, 0.0, 0.0
+                continue
+            fx, fy = forces[i, leg, 0], forces[i, leg, 1]
+            holds = friction * max(forces[i, leg, 2], 0.0)
+            speed, force = np.hypot(vx, vy), np.hypot(fx, fy)
+            if speed == 0.0 and force <= holds:
+                ux, uy = fx, fy
+            elif speed == 0.0:
+                ux, uy = holds * fx / force, holds * fy / force
+            else:
+                ux, uy = holds * vx / speed, holds * vy / speed
+            nx, ny = vx + dt * (fx - ux) / mass, vy + dt * (fy - uy) / mass
+            if force <= holds and nx * vx + ny * vy <= 0.0:
+                nx, ny = 0.0, 0.0
+            vx, vy = nx, ny
+            x, y = x + dt * vx, y + dt * vy
+            ways[i, leg] = np.hypot(x, y)
+
+
+@kernel("void(f8[:,::1], f8[::1], f8[::1], f8, f8[:,::1])", nogil=True)
+def lag(pushes, kp, kd, dt, errors):
+    """Fill errors e that obey e'' + kd e' + kp e = push, from rest."""
+    for axis in range(pushes.shape[1]):
+        e, rate = 0.0, 0.0
+        for i in range(len(pushes)):
+            errors[i, axis] = e
+            rate += dt * (pushes[i, axis] - kp[axis] * e - kd[axis] * rate)
+            e += dt * rate

@@ -9,7 +9,7 @@ from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.assembly import compile_timeline
 from motions.compiled_plan import CompiledPlan
-from motions.feasibility import dynamic, flight, kinematic
+from motions.feasibility import dynamic, flight, friction, kinematic
 from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion, timeline_of
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.hulls import LinkHulls
@@ -124,24 +124,33 @@ class FeasibilityChecker:
             problems = plan.problems
             forces = flight.with_spans(forces, path, plan, model)
             in_flight = flight.flight(plan, model, FlightLimits())
+        lag = dynamic.lagging(path, forces, model, limits)
         com, zero_moment_point = dynamic.support(path, forces, limits)
+        slip = friction.slip(path, forces, limits)
+        is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
+        wrench, load = dynamic.contacts(path, forces, limits)
+        grip = friction.friction(path, forces, model, limits)
         landing_place, landing_speed = kinematic.landing(path, model, limits)
         in_order_of_causes = [
             *(_failed(problem) for problem in problems if problem.check != "balance"),
             kinematic.reach(path, limits),
-            kinematic.joint_position(path, model),
+            kinematic.joint_position(path, model, limits),
             self_distance(path, self._collision, limits),
             kinematic.clearance(path, model, self._hulls, limits),
             kinematic.dragging(path, model, limits),
             landing_place,
             kinematic.ends(plan, path, model, limits),
-            *(_failed(problem) for problem in problems if problem.check == "balance"),
+            *(_failed(problem) for problem in problems if is_off and problem.check == "balance"),
             com,
             kinematic.joint_speed(path, model),
             landing_speed,
             kinematic.smoothness(path, limits),
-            zero_moment_point,
-            *dynamic.contacts(path, forces, limits),
+            zero_moment_point if lag.is_broken else zero_moment_point.excused(),
+            wrench if lag.is_broken else wrench.excused(),
+            load,
+            lag,
+            grip if slips else grip.excused(),
+            slip,
             *dynamic.torque(path, forces, model, limits),
             *in_flight,
         ]

@@ -32,7 +32,7 @@ from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from motions.feasibility.kinematic import FEET, JOINTS
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
-from motions.placement import attitudes
+from motions.placement import attitudes, turned
 from motions.plan import NORMAL_FORCE_MAX
 from motions.trajectory import Trajectory, zero_moment_points
 
@@ -66,6 +66,7 @@ class Forces:
         tau: (n, 12) joint torques [N m].
         missing: (n, 2) part of the force [N] and of the moment [N m] that the feet cannot give.
         zmp: (n, 2) zero-moment point on the ground [m].
+        wrench: (n, 6) what the trunk needs, in its frame [N, N m].
         v_motors: (n, 12) joint speeds [rad/s] at which the torques are given; those of the path
             unless said.
     """
@@ -74,6 +75,7 @@ class Forces:
     tau: Float[np.ndarray, "n 12"]
     missing: Float[np.ndarray, "n 2"]
     zmp: Float[np.ndarray, "n 2"]
+    wrench: Float[np.ndarray, "n 6"]
     v_motors: Float[np.ndarray, "n 12"] | None = None
 
 
@@ -86,11 +88,21 @@ def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     contact, tau = np.zeros((len(needed), 4, 3)), needed[:, 6:].copy()
     missing = np.empty((len(needed), 2))
     joints, load_share = (np.array(a, order="C") for a in (motion.q[:, 7:], motion.load_share))
-    numbers = np.array([EVENNESS, model.mass * model.gravity, NORMAL_FORCE_MAX, model.foot_radius])
-    given = (joints, attitudes(motion.rpy), needed, load_share)
-    tables = (leg_table(model), friction_pyramid(PYRAMID), _SCALE, numbers)
+    given = (joints, attitudes(motion.rpy), needed[:, :6].copy(), load_share)
+    tables = (leg_table(model), friction_pyramid(PYRAMID), scale_of_wrench(), numbers_of(model))
     share_loads(*given, *tables, contact, tau, missing)
-    return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, needed[:, :6]))
+    wrench = given[2]
+    return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench), wrench)
+
+
+def numbers_of(model: RobotModel) -> Float[np.ndarray, "4"]:
+    """Evenness, weight [N], greatest normal force [N] and foot radius [m], for the kernels."""
+    return np.array([EVENNESS, model.mass * model.gravity, NORMAL_FORCE_MAX, model.foot_radius])
+
+
+def scale_of_wrench() -> Float[np.ndarray, "6"]:
+    """By what forces and moments are multiplied to be compared."""
+    return np.repeat([1.0, 1.0 / ARM], 3)
 
 
 def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:
@@ -105,7 +117,7 @@ def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:
         contact[row], missing[row] = _share(snapshot, needed[:6], motion.load_share[row], model)
         J = snapshot.J_contacts.reshape(12, 18)
         tau[row] = needed[6:] - J[:, 6:].T @ contact[row].ravel()
-    return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench))
+    return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench), wrench)
 
 
 def torque(
@@ -130,26 +142,51 @@ def torque(
 
 def contacts(
     motion: Trajectory, forces: Forces, limits: FeasibilityLimits
-) -> tuple[Series, Series, Series]:
-    """What the feet cannot give, the least load of three standing ones, and the friction needed.
-
-    Friction is max(|f_x|, |f_y|) / f_z, in the axes of the pyramid that the controller keeps.
-    """
+) -> tuple[Series, Series]:
+    """What the feet cannot give, and the least load of three standing ones."""
     times, normal = motion.times, forces.contact[:, :, 2]
     written = ~motion.is_dynamic[:, None]
     is_needed = written & ~motion.stance.all(axis=1, keepdims=True)  # of four one may be unloaded
     stands = (motion.load_share > LOADED) & is_needed
-    sideways = np.abs(forces.contact[:, :, :2]).max(axis=2)
-    pressed = normal > PRESSED
-    needed = np.where(pressed, sideways / np.where(pressed, normal, 1.0), 0.0)
     wrench = ("contact wrench", "N", ("force", "moment"), times, forces.missing)
     load = ("foot load", "N", FEET, times, normal)
-    grip = ("friction", "", FEET, times, needed)
     return (
         Series.against(*wrench, np.array([limits.wrench, limits.wrench * ARM]), where=written),
         Series.against(*load, limits.foot_load, is_floor=True, where=stands, tight=TIGHT_LOAD),
-        Series.against(*grip, limits.friction, where=pressed & written, tight=TIGHT_FRICTION),
     )
+
+
+def lagging(
+    motion: Trajectory, forces: Forces, model: RobotModel, limits: FeasibilityLimits
+) -> Series:
+    """How far the trunk is off its plan, since the ground cannot give what it needs: m, rad.
+
+    The controller pulls it back, with the gains that it has, so that the error obeys
+    e'' + kd e' + kp e = w / m, with the missing force over the mass and the missing moment over the
+    moments of inertia of the robot as it stands at first. A moment without them moves little.
+    """
+    from go2_wbc.kernels.loads import lag  # compiled; only who needs it waits for it
+
+    config = WbcConfig()
+    gains = (config.body_position.arrays, config.body_orientation.arrays)
+    kp, kd = (np.concatenate(pair) for pair in zip(*gains, strict=True))
+    inertia = np.diag(model.snapshot(_state(motion, 0)).mass_matrix)[:6]
+    pushes = _left(motion, forces, model) / inertia
+    pushes[motion.is_dynamic] = 0.0
+    errors, dt = np.zeros(pushes.shape), float(np.mean(np.diff(motion.times)))
+    lag(pushes, kp, kd, dt, errors)
+    values = np.column_stack([np.linalg.norm(e, axis=1) for e in (errors[:, :3], errors[:, 3:])])
+    bounds, subjects = np.array([limits.lag, limits.lag_angle]), ("trunk", "trunk turning")
+    return Series.against("lag", "m, rad", subjects, motion.times, values, bounds)
+
+
+def _left(motion: Trajectory, forces: Forces, model: RobotModel) -> Float[np.ndarray, "n 6"]:
+    """Force [N] and moment [N m] about the base that the feet do not give, along world axes."""
+    R, p = attitudes(motion.rpy), motion.q[:, :3]
+    arms = motion.p_feet - [0.0, 0.0, model.foot_radius] - p[:, None]
+    force = turned(R, forces.wrench[:, :3]) - forces.contact.sum(axis=1)
+    moment = turned(R, forces.wrench[:, 3:]) - np.cross(arms, forces.contact).sum(axis=1)
+    return np.hstack([force, moment])
 
 
 def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tuple[Series, Series]:
@@ -231,9 +268,9 @@ def _share(
         even = np.zeros((len(legs), 3))
         shares = load_share[legs]
         even[:, 2] = model.mass * model.gravity * shares / shares.sum()
-        weighted = _SCALE[:, None] * A
+        weighted = scale_of_wrench()[:, None] * A
         H = weighted.T @ weighted + EVENNESS * np.eye(3 * len(legs))
-        g = -weighted.T @ (_SCALE * wrench) - EVENNESS * even.ravel()
+        g = -weighted.T @ (scale_of_wrench() * wrench) - EVENNESS * even.ravel()
         C = _PYRAMIDS[len(legs) - 1]
         lower = np.tile([-np.inf] * 4 + [0.0], len(legs))
         upper = np.zeros((len(legs), 5))
@@ -248,6 +285,5 @@ def _share(
 
 
 _PAIR = 2
-_SCALE = np.repeat([1.0, 1.0 / ARM], 3)
 _PYRAMIDS = tuple(np.kron(np.eye(feet), friction_pyramid(PYRAMID)) for feet in (1, 2, 3, 4))
 """Rows of one to four feet."""

@@ -6,9 +6,9 @@ Everything is geometry of the ``Trajectory``, in the frame of the motion: z up, 
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from go2_wbc.legs import JOINT_NAMES, LEGS
+from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
 from go2_wbc.reference import Anchor, MotionPlan, Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
@@ -31,13 +31,47 @@ def reach(motion: Trajectory, limits: FeasibilityLimits) -> Series:
     return Series.against("reach", "m", FEET, motion.times, motion.miss, limits.reach)
 
 
-def joint_position(motion: Trajectory, model: RobotModel) -> Series:
-    """Joint angles against the tighter of the URDF's and the published limits."""
+def joint_position(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) -> Series:
+    """Joint angles against the tighter of the URDF's and the published limits.
+
+    A joint that is asked to go beyond its stop stays at it. Where its foot, or the trunk above a
+    standing one, is off by no more than ``limits.stop`` for it, the margin counts as 0: a warning.
+    """
     q = motion.q[:, 7:]
     to_lower, to_upper = q - model.q_lower, model.q_upper - q
     bounds = np.where(to_lower < to_upper, model.q_lower, model.q_upper)
     margins = np.minimum(to_lower, to_upper)
+    for leg in LEGS:
+        own = margins[:, leg.joints]
+        beyond = own.min(axis=1) < 0.0
+        if beyond.any():
+            stands = motion.stance[beyond, leg]
+            harmless = np.zeros(len(q), dtype=bool)
+            harmless[beyond] = _stopped(leg, q[beyond], stands, model) <= limits.stop
+            own[harmless] = np.maximum(own[harmless], 0.0)
     return Series("joint position", "rad", JOINTS, motion.times, q, bounds, margins, TIGHT_ANGLE)
+
+
+def _stopped(
+    leg: Leg, q: Float[np.ndarray, "k 12"], stands: Bool[np.ndarray, " k"], model: RobotModel
+) -> Float[np.ndarray, " k"]:
+    """How far a foot, or the trunk over it, is off [m] if the leg's joints stay at their stops.
+
+    A raised foot by as much as the leg's end moves. The joints of a standing leg give way to each
+    other: what a stopped knee takes from the distance of foot and hip is missing, and what a
+    stopped hip or thigh takes from the angle, times that distance.
+    """
+    geometry = LegGeometry.of(model, leg)
+    asked = q[:, leg.joints]
+    kept = np.clip(asked, model.q_lower[leg.joints], model.q_upper[leg.joints])
+    moved = np.linalg.norm(foot_places(geometry, asked) - foot_places(geometry, kept), axis=1)
+    thigh, calf = geometry.thigh, geometry.calf
+    reach, left = (
+        np.sqrt(thigh**2 + calf**2 + 2.0 * thigh * calf * np.cos(angles[:, 2]))
+        for angles in (asked, kept)
+    )
+    turned = np.abs(asked[:, :2] - kept[:, :2]).sum(axis=1)
+    return np.where(stands, np.abs(reach - left) + turned * reach, moved)
 
 
 def joint_speed(motion: Trajectory, model: RobotModel) -> Series:
@@ -114,7 +148,7 @@ def smoothness(motion: Trajectory, limits: FeasibilityLimits) -> Series:
     """
     jumps = np.vstack([np.zeros(18), np.abs(np.diff(motion.v, axis=0))])
     values = np.maximum.reduceat(jumps, (0, 3, 6), axis=1)
-    bounds = np.array([limits.body_jump, limits.body_jump, limits.joint_jump])
+    bounds = np.array([limits.body_jump, limits.turn_jump, limits.joint_jump])
     subjects = ("trunk", "trunk turning", "joints")
     written = ~motion.is_dynamic
     written[1:] &= ~motion.is_dynamic[:-1]

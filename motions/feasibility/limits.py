@@ -15,16 +15,21 @@ class FeasibilityLimits:
         reach: distance [m] by which a foot's place may be out of the leg's reach: what rounding of
             the trunk's place makes of one at the end of the reach.
         torque_share: share of the torque limit that a plan may use; 15 % are for feedback.
-        friction: friction coefficient that the ground is counted on for; the floor of the
-            benchmark, on which verdicts were compared, has 0.5.
-        foot_load: least normal force [N] of a foot that stands: 6 % of the weight.
+        friction: friction coefficient of the ground: the floor of the benchmark, on which verdicts
+            were compared.
+        slip: greatest distance [m] that a standing foot may slide.
+        foot_load: least normal force [N] of a foot that stands: 2 % of the weight; leans with 4 N
+            were done.
         support: least distance [m] of the CoM to the edges of the support polygon.
         zero_moment: the same for the zero-moment point.
         off_line: greatest distance [m] of the zero-moment point from the line between two feet.
         pair_time: longest time [s] on two feet; in it a trunk that is off balance falls four times
             as far off, exp(t / sqrt(0.29 m / g)).
-        wrench: greatest part [N] of the force that no contact forces can give, 3 % of the weight;
-            of the moment as much on an arm of 0.2 m.
+        wrench: greatest part [N] of the force that no contact forces can give for longer; of the
+            moment as much on an arm of 0.2 m.
+        lag, lag_angle: how far [m, rad] the trunk may be off its plan for what the ground cannot
+            give. In MuJoCo it was off by up to twice as much.
+        stop: how far [m] a foot, or the trunk over it, may be off for a joint at its stop.
         self_distance: least distance [m] between links that must not touch.
         clearance: least height [m] of trunk, hips and thighs: every point of their hulls.
         calf_clearance: the same of the calves, which end 14 mm above the ground where they stand
@@ -37,20 +42,25 @@ class FeasibilityLimits:
         landing: distance [m] by which a foot may land beside its place.
         landing_speed: greatest speed [m/s] of a foot at touchdown.
         joint_jump: greatest change [rad/s] of a joint's speed between samples of 10 ms.
-        body_jump: the same of the trunk's speed [m/s, rad/s]: 4 times gravity.
+        body_jump, turn_jump: the same of the trunk's speed [m/s, rad/s]: a plan that jumps. What is
+            merely quick shows in forces, torques and slips.
         stance_position, stance_angle: how far [m, rad] the ends may be from their postures.
         end_speed: greatest speed [m/s, rad/s] of trunk and joints at the ends.
     """
 
     reach: float = 0.002
     torque_share: float = 0.85
-    friction: float = 0.45
-    foot_load: float = 10.0
-    support: float = 0.015
-    zero_moment: float = 0.01
+    friction: float = 0.5
+    slip: float = 0.01
+    foot_load: float = 3.0
+    support: float = 0.006
+    zero_moment: float = 0.005
     off_line: float = 0.01
     pair_time: float = 0.25
     wrench: float = 5.0
+    lag: float = 0.012
+    lag_angle: float = 0.03
+    stop: float = 0.022
     self_distance: float = 0.005
     clearance: float = 0.02
     calf_clearance: float = 0.002
@@ -58,9 +68,10 @@ class FeasibilityLimits:
     drag_height: float = 0.0005
     drag: float = 0.02
     landing: float = 0.01
-    landing_speed: float = 0.6
-    joint_jump: float = 4.0
-    body_jump: float = 0.4
+    landing_speed: float = 1.0
+    joint_jump: float = 8.0
+    body_jump: float = 1.0
+    turn_jump: float = 5.0
     stance_position: float = 0.02
     stance_angle: float = 0.05
     end_speed: float = 0.1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -89,6 +89,15 @@ class Series:
         left = values - bounds if is_floor else bounds - values
         margins = np.where(where, left, np.nan)
         return Series(check, unit, subjects, times, values, bounds, margins, tight)
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether any margin is negative."""
+        return bool((self.margins < 0.0).any())
+
+    def excused(self) -> Series:
+        """The same with 0 for negative margins: broken for so short that it does no harm."""
+        return replace(self, margins=np.maximum(self.margins, 0.0))
 
     def findings(self) -> list[Finding]:
         """The worst instant of every subject that was checked."""

@@ -52,8 +52,8 @@ def test_the_torque_at_speed_is_what_the_motors_of_the_plant_give(
     rng, count = np.random.default_rng(4), len(resting.times)
     v = np.hstack([np.zeros((count, 6)), rng.uniform(-1.2, 1.2, (count, 12)) * model.speed_limits])
     tau = rng.uniform(-1.2, 1.2, (count, 12)) * model.torque_limits
-    zeros = np.zeros((count, 4, 3)), np.zeros((count, 2)), np.zeros((count, 2))
-    forces = Forces(zeros[0], tau, *zeros[1:])
+    zeros = (np.zeros((count, size)) for size in (2, 2, 6))
+    forces = Forces(np.zeros((count, 4, 3)), tau, *zeros)
     _, at_speed = torque(replace(resting, v=v), forces, model, FeasibilityLimits())
     lower, upper = MujocoPlant().motor.limits(v[:, 6:])
     drives = tau * v[:, 6:] > 0.0
