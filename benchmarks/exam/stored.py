@@ -20,7 +20,7 @@ from go2_wbc.reference import MotionPlan
 
 FOLDER = Path(__file__).parent
 BORDERS_FILE, OUTCOMES_FILE = FOLDER / "borders.json", FOLDER / "outcomes.json"
-DECIDES = ("go2_wbc", "controller", "benchmarks/exam")
+DECIDES = ("go2_wbc", "controller", "benchmarks/trials.py", "benchmarks/exam/outcome.py")
 """Code that decides what physics makes of a plan. What makes plans is not among it: each outcome is
 kept under a digest of its plan."""
 INSTANTS = 80
@@ -30,7 +30,9 @@ INSTANTS = 80
 def physics_header() -> dict[str, str]:
     """What outcomes depend on besides the plans; stored ones hold only where it agrees."""
     code = hashlib.sha256()
-    for file in sorted(file for name in DECIDES for file in (ROOT / name).rglob("*.py")):
+    roots = [ROOT / name for name in DECIDES]
+    files = [file for root in roots for file in ([root] if root.is_file() else root.rglob("*.py"))]
+    for file in sorted(files):
         code.update(file.relative_to(ROOT).as_posix().encode() + b"\0" + file.read_bytes())
     header = settings_header()
     kept = {key: header[key] for key in ("libraries", "settings")}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import textwrap
 from collections import Counter
 from collections.abc import Sequence
 
@@ -50,13 +51,10 @@ def render(cases: Sequence[Case]) -> str:
 
 
 def _causes(cases: Sequence[Case]) -> list[str]:
-    """How often each thing went wrong, first named, in all motions."""
-    kinds = Counter(
-        re.sub(r" *[\d.]+ *(mm|ms|deg|rad|%)?", " ", case.outcome.strict[-1]).strip()
-        for case in cases
-        if case.outcome.by(STRICT)
-    )
-    return ["What went wrong, strictly: " + ", ".join(f"{k} {n}" for k, n in kinds.most_common())]
+    """How often each thing went wrong, in all motions; several may in one."""
+    kinds = Counter(re.sub(r"[\d.]+ ", "", why) for c in cases for why in c.outcome.by(STRICT))
+    counts = ", ".join(f"{kind} {n}" for kind, n in kinds.most_common())
+    return textwrap.wrap(f"What went wrong, strictly: {counts or 'nothing'}.", 80)
 
 
 def wrong_ones(cases: Sequence[Case]) -> list[str]:

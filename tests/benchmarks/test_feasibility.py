@@ -10,8 +10,10 @@ import pytest
 
 from benchmarks import feasibility
 from benchmarks.__main__ import main
+from benchmarks.exam.borders import BORDER, PLAYS
 from benchmarks.exam.cases import Case
 from benchmarks.exam.drawing import TEST, TRAIN
+from benchmarks.exam.questions import draw_name, draws
 from benchmarks.feasibility import EXAM, OUTCOMES, PLAN, REFUSED, ask, exam, judged
 from benchmarks.runner import run_trial
 from benchmarks.scenario import Measurement
@@ -93,6 +95,30 @@ def test_what_is_remade_is_stored_beside_what_was_stored(
     main(["feasibility", "--motions", "2", "--jobs", "1", "--remake"])
     assert kept == {"old": FINE, "0": FINE, "1": Outcome(*(4 * [("friction", "fell")]))}
     assert "2 motions" in capsys.readouterr().out
+
+
+def test_only_borders_that_are_not_stored_are_bisected(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
+) -> None:
+    names = [draw_name(*draw) for draw in draws()]
+    written: dict[str, float | None] = {}
+    monkeypatch.setattr(feasibility, "BORDERS", replace(feasibility.BORDERS, measure=found_border))
+    monkeypatch.setattr(feasibility, "read_borders", lambda: dict.fromkeys(names[3:], 1.5))
+    monkeypatch.setattr(feasibility, "write_borders", written.update)
+    assert main(["feasibility", "--borders", "--jobs", "1"]) == ExitCode.OK
+    assert list(written.items())[:4] == [
+        (names[0], 0.25),
+        (names[1], None),
+        (names[2], 0.25),
+        (names[3], 1.5),
+    ]
+    assert f"{len(names)} of {len(names)} borders, 1 beyond" in capsys.readouterr().out
+
+
+def found_border(trial: Trial) -> Measurement:
+    """Every second draw has a border."""
+    values = {PLAYS.name: 3.0} if trial.seed % 2 else {PLAYS.name: 3.0, BORDER.name: 0.25}
+    return Measurement(values)
 
 
 def test_physics_is_asked_only_where_no_outcome_is_stored(

@@ -67,7 +67,11 @@ def test_a_played_motion_is_measured_from_its_begin_to_its_end(
     assert 0.0 < found.slip < 0.005
     assert 0.0 < found.tracking < 0.02
     assert 0.0 < found.torque < 1.0
-    assert found.touched == 0.0
+    assert found.touched == found.stopped == 0.0
+    assert 0.0 < found.trunk_off < 0.02
+    assert 0.0 < found.turned_off < 0.1
+    assert 0.0 < found.paw_off < 0.03
+    assert 0.0 < found.landed_off < 0.01
     assert found.as_dict() == {
         "ok": True,
         **{name: getattr(found, name) for name in found.__slots__},

@@ -106,6 +106,14 @@ def test_physics_decides(name: str, is_done: bool) -> None:
     assert bool(outcome_of(play(made, model, 0), made).strict) is not is_done
 
 
+def test_a_joint_that_physics_holds_at_its_stop_is_seen() -> None:
+    question, model = Question(FAMILIES["nose_up"], 0, 2.0), RobotModel()
+    plan = question.plan(model)
+    found = outcome_of(play(plan, model, 0), plan)
+    assert any(why.startswith("on a stop") for why in found.stops)
+    assert set(found.stops) > set(found.strict)
+
+
 def test_a_border_is_found_between_what_is_done_and_what_fails(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
