@@ -19,6 +19,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
     Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
     Command("moonshots", "benchmarks.moonshots", "the greatest jumps, and what forbids more"),
+    Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),
     Command("solve", "benchmarks.solved_plans", "solve the library's dynamic plans, to ship them"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
     Command("evidence", "benchmarks.evidence", "fill the table of docs/evidence.md"),

@@ -1,0 +1,149 @@
+"""``python -m benchmarks probability``: is the chance that the check states the one that it has?
+
+Every motion of the exam is checked and played in random worlds. ``--fit`` fits the model of
+``motions.feasibility.probability`` to the train half and stores it; what is reported is of the test
+half, whose families no threshold and no fit has seen.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.exam.drawing import TEST, TRAIN
+from benchmarks.probability_fit import Calibration, Sample, calibration, fit
+from benchmarks.probability_runs import WORLDS, exam, trial
+from benchmarks.session import publish
+from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.progress import ProgressLine
+from controller.cli.sweep import tell
+from controller.sweeps.rows import Row
+from controller.sweeps.run import sweep
+from controller.sweeps.summary import rate_interval
+from go2_wbc.files import write_atomically
+from motions.feasibility.probability import FILE, ProbabilityModel, fitted
+
+ERROR, BRIER_SHARE = 0.05, 0.5
+"""Greatest expected calibration error, and Brier score over that of the base rate."""
+EXAMPLES = """
+python -m benchmarks probability              all motions, five worlds each
+python -m benchmarks probability --motions 60
+python -m benchmarks probability --fit        also fit the model, and store it
+"""
+ROWS = Path("out/benchmarks/probability.sqlite")
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``probability``."""
+    parser = add_parser(
+        subparsers,
+        "probability",
+        "Is the chance that the check states the one that a motion has? The motions of\n"
+        "the exam are checked and played in random worlds. Exit code 0 if the test half\n"
+        "is calibrated and no motion that passed fell, 1 if not.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument("--motions", metavar="N", type=int, help="only the first N")
+    parser.add_argument("--fit", action="store_true", help="fit to the train half, and store")
+    parser.add_argument("--rows", metavar="FILE", type=Path, default=ROWS, help="keep rows here")
+    parser.add_argument("--jobs", metavar="N", type=int, default=2, help="default 2")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
+    parser.add_argument("--out", metavar="FILE", type=Path, help="also write the JSON here")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run what is not kept, fit if asked, and judge the test half."""
+    args.rows.parent.mkdir(parents=True, exist_ok=True)
+    with ProgressLine() as line:
+        result = sweep(
+            trial,
+            WORLDS * (args.motions or len(exam())),
+            workers=args.jobs,
+            out=args.rows,
+            keep_going=True,
+            on_progress=lambda progress: tell(line, progress),
+        )
+    model = fitted()
+    if args.fit:
+        model = fit(_samples(_of_half(result.rows, TRAIN)))
+        store(model, result.rows)
+    judged, falls = judge(model, _of_half(result.rows, TEST)), passed_that_fell(result.rows)
+    is_ok = is_calibrated(judged) and falls[0] == 0 and not result.failures
+    values = {
+        "passed": is_ok,
+        "error": judged.error,
+        "error_interval": judged.error_interval,
+        "brier": judged.brier,
+        "brier_of_base_rate": judged.brier_of_base_rate,
+        "bins": judged.bins,
+        "passed_that_fell": falls,
+        "lost": result.failures,
+    }
+    publish(args, values, render(judged, falls, result.failures))
+    return ExitCode.OK if is_ok else ExitCode.FAILED
+
+
+def _of_half(rows: Sequence[Row], half: str) -> list[Row]:
+    return [row for row in rows if row["half"] == half]
+
+
+def _samples(rows: Sequence[Row]) -> list[Sample]:
+    return [
+        Sample(str(row["motion"]), json.loads(str(row["margins"])), bool(row["done"]))
+        for row in rows
+    ]
+
+
+def store(model: ProbabilityModel, rows: Sequence[Row], file: Path = FILE) -> None:
+    """Write the model where the package looks for it, with what it was fitted to."""
+    motions = {row["motion"] for row in _of_half(rows, TRAIN)}
+    about = {
+        "fitted_by": "python -m benchmarks probability --fit",
+        "motions": len(motions),
+        "runs": len(_of_half(rows, TRAIN)),
+    }
+    text = json.dumps({"about": about, **model.as_dict()}, indent=1)
+    write_atomically(file, (text + "\n").encode())
+
+
+def judge(model: ProbabilityModel, rows: Sequence[Row]) -> Calibration:
+    """How well the chances of ``model`` foretell what happened."""
+    samples = _samples(rows)
+    chances = np.array([model.probability(sample.margins) for sample in samples])
+    done = np.array([sample.is_done for sample in samples])
+    return calibration(chances, done, [sample.motion for sample in samples])
+
+
+def is_calibrated(judged: Calibration) -> bool:
+    """Whether both bars are met."""
+    return judged.error <= ERROR and judged.brier <= BRIER_SHARE * judged.brier_of_base_rate
+
+
+def passed_that_fell(rows: Sequence[Row]) -> tuple[int, int]:
+    """How many of the motions that the check passed in their world fell there, of how many."""
+    passed = [row for row in rows if not row["refused"]]
+    return sum(bool(row["fell"]) for row in passed), len(passed)
+
+
+def render(judged: Calibration, falls: tuple[int, int], lost: dict[int, str]) -> str:
+    """The reliability table and the verdicts, at most 80 columns wide."""
+    lines = ["chance stated    done    runs", "-" * 80]
+    for chance, share, count in judged.bins:
+        low, high = rate_interval(round(share * count), count)
+        bar = "#" * round(40 * share)
+        lines.append(f"{chance:>13.2f}{share:>8.2f}{count:>8}   {low:.2f}-{high:.2f}  {bar}")
+    low, high = judged.error_interval
+    lines += [
+        "-" * 80,
+        f"expected calibration error {judged.error:.3f} (95 %: {low:.3f} to {high:.3f}), "
+        f"bar {ERROR:g}",
+        f"Brier score {judged.brier:.3f}, of the base rate {judged.brier_of_base_rate:.3f}, "
+        f"bar half of it",
+        f"motions that passed in their world and fell there: {falls[0]} of {falls[1]}",
+    ]
+    lines += [f"seed {seed} gave no row: {why:.55}" for seed, why in lost.items()]
+    return "\n".join(lines)
