@@ -70,19 +70,18 @@ class MotionStudy:
         """What was measured: ``MotionMeasurement``, lengths in m, times in s."""
         trial = Trial(seed)
         with TrialRobot(trial) as robot:
-            try:
-                measured = self.play(robot)
-            except (TrialFailed, Go2WbcError) as error:
-                measured = replace(_NOTHING, fall=str(error))
+            return self.row(trial, robot)
+
+    def row(self, trial: Trial, robot: TrialRobot) -> Row:
+        """Play it on ``robot``, which lies in the world of ``trial``; what was measured."""
+        try:
+            measured = self._played(robot)
+        except (TrialFailed, Go2WbcError) as error:
+            measured = replace(_NOTHING, fall=str(error))
         values = {**measured.as_dict(), "fall": measured.fall or ""}
         return {**_world(trial), **{k: v for k, v in values.items() if v is not None}}
 
-    def play(self, robot: TrialRobot) -> MotionMeasurement:
-        """Get up and play it.
-
-        Raises:
-            TrialFailed: if the robot does not get into the motion's entry posture.
-        """
+    def _played(self, robot: TrialRobot) -> MotionMeasurement:
         plan = plan_of(self.archive)
         go2 = robot.go2
         robot.require(go2.sit() if plan.entry is Posture.SIT else go2.stand())
