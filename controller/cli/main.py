@@ -51,6 +51,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("list", "controller.cli.motion_list", "the motions, and what can be set"),
     Command("new", "controller.cli.motion_new", "write a small motion to start from"),
     Command("preview", "controller.cli.motion_preview", "watch a motion, live in the browser"),
+    Command("replay", "controller.cli.replay", "a row of a motion's sweep, run again and shown"),
     Command("ros2", "controller.cli.ros2", "the simulated robot as a ROS 2 node"),
     Command("run", "controller.cli.motion_run", "check a motion, then play it in MuJoCo"),
     Command("sweep", "controller.cli.sweep", "a motion, a gait or a function over many seeds"),

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 import tempfile
-from dataclasses import dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 
@@ -59,12 +60,16 @@ class MotionStudy:
 
         See ``motion_outcome`` (strict) and ``MotionMeasurement``; lengths in m, times in s.
         """
-        world, plant = self._drawn(seed)
+        world, plant = self.drawn(seed)
         with TrialRobot(plant) as robot:
-            try:
-                measured = self.play(robot)
-            except (TrialFailed, Go2WbcError) as error:
-                measured = replace(_NOTHING, fall=str(error))
+            return self.row(world, robot)
+
+    def row(self, world: World, robot: TrialRobot) -> Row:
+        """The row of a robot that lies in a sample ``world``."""
+        try:
+            measured = self._played(robot)
+        except (TrialFailed, Go2WbcError) as error:
+            measured = replace(_NOTHING, fall=str(error))
         plan = plan_of(self.archive)
         harm, shares = outcome_of(measured, plan).strict, shares_of(measured, plan)
         closest, (share, _) = max(shares.items(), key=lambda item: np.nan_to_num(item[1][0]))
@@ -73,21 +78,15 @@ class MotionStudy:
         row |= {"closest": closest, "closest_share": share, **_told(world)}
         return row | {name: value for name, value in values.items() if value is not None}
 
-    def _drawn(self, seed: int) -> tuple[World, MujocoPlant]:
+    def drawn(self, seed: int) -> tuple[World, MujocoPlant]:
         """The world of a seed, and the robot in it: heading and start differ, too."""
         rng = np.random.default_rng(seed)
         world, yaw = self.world.sample(rng), rng.uniform(*YAW_RANGE)
         noise = JOINT_NOISE
         return world, plant_in(world, seed=seed, initial_yaw=yaw, initial_joint_noise=noise)
 
-    def play(self, robot: TrialRobot) -> MotionMeasurement:
-        """Get up and play it.
-
-        Raises:
-            TrialFailed: if the robot does not get into the motion's entry posture.
-        """
-        plan = plan_of(self.archive)
-        go2 = robot.go2
+    def _played(self, robot: TrialRobot) -> MotionMeasurement:
+        plan, go2 = plan_of(self.archive), robot.go2
         robot.require(go2.sit() if plan.entry is Posture.SIT else go2.stand())
         return measure_motion(go2, robot.truth, plan, _model())
 
@@ -102,3 +101,14 @@ def _told(world: World) -> Row:
     """What the seed has drawn."""
     names = ("friction", "mass_scale", "joint_friction")
     return {name: getattr(world, name) for name in names}
+
+
+def text_of(world: World) -> str:
+    """A world as the text that a file of a sweep keeps."""
+    return json.dumps(asdict(world))
+
+
+def world_of(text: str) -> World:
+    """The world of such a text."""
+    values = json.loads(text)
+    return World(**{**values, "payload_place": tuple(values["payload_place"])})

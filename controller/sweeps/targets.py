@@ -164,7 +164,7 @@ def motion_target(motion: object, name: str = "", world: World | None = None) ->
         CommandError: for what stands for no motion, or starts lying.
         TimelineError, MotionFileError: for a motion that cannot be used.
     """
-    from controller.sweeps.motion_study import MotionStudy, archive_of
+    from controller.sweeps.motion_study import MotionStudy, archive_of, text_of
     from go2_wbc.reference import Posture
     from go2_wbc.robot.model import RobotModel
     from go2_wbc.world import World
@@ -178,7 +178,7 @@ def motion_target(motion: object, name: str = "", world: World | None = None) ->
         raise CommandError(f"{plan.name} starts from {plan.entry.value}: cannot be swept")
     archive = archive_of(plan)
     world = World() if world is None else world
-    about: dict[str, str | bytes] = {"kind": "motion", "plan": archive, "world": repr(world)}
+    about: dict[str, str | bytes] = {"kind": "motion", "plan": archive, "world": text_of(world)}
     return Target(name or plan.name, MotionStudy(archive, world), about)
 
 
