@@ -36,9 +36,9 @@ def run(args: argparse.Namespace) -> int:
     from motions import FeasibilityChecker
 
     lines = meant(args.motion, args.values)
-    checker = FeasibilityChecker()
     reports = []
-    with ProgressLine() as progress:
+    with ProgressLine(is_quiet=args.json) as progress:
+        checker = FeasibilityChecker(progress=progress.solving)
         for number, line in enumerate(lines):
             progress.update(number / len(lines), line.name)
             reports.append(checker.check(line))
