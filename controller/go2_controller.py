@@ -243,7 +243,12 @@ class GO2Controller:
         self._check_open()
         with self._planning:  # one thread at a time
             plan = self._checker.plan(motion, check=check)
-        return self._call("play", lambda: self._pilot.play(plan, allow_dynamic=allow_dynamic))
+            departed = self._checker.departure(plan)
+
+        def play() -> Measurements:
+            return {**self._pilot.play(plan, allow_dynamic=allow_dynamic), **departed}
+
+        return self._call("play", play)
 
     def cancel(self) -> None:
         """From another thread or the plant: leave the motion that plays, safely, and stand.

@@ -16,9 +16,9 @@ from go2_wbc.reference import Anchor, MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import CheckedMotion, CompiledPlan, FeasibilityReport, Finding
 from motions.authoring import Choice, Parameter
-from motions.dynamic_span import DynamicSpan
 from motions.dynamics.nearest import Written
 from motions.feasibility import Series
+from motions.trajectory import as_written
 from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Slider, Verdict
 
 _AFTERWARDS = 1.0
@@ -27,8 +27,6 @@ _TOGETHER = 0.05
 """Annotations on one limit that are this close in time [s] become one."""
 _LEAST_SAMPLES = 2
 _WRITTEN = "what was written; the plan is the nearest that the robot can do"
-_HALF_SAMPLE = 0.005
-"""Half the time [s] between two samples of a plan's recording."""
 _MOVED, _TURNED = 0.02, np.radians(2.0)
 """A motion that ends farther from its start, [m] and [rad], moves on."""
 
@@ -37,8 +35,8 @@ def planned(checked: CheckedMotion) -> ReplayContent:
     """The plan with its verdict."""
     plan, shown = checked.plan, checked.recording()
     content = ReplayContent(shown, is_plan=True, verdict=verdict_of(checked.report))
-    if isinstance(plan, CompiledPlan) and (mended := _mended(plan)):
-        ghost = _as_written(shown, mended)
+    if _is_mended(plan):
+        ghost = _as_written(checked)
         content = replace(content, ghost=ghost, ghost_name=_WRITTEN, judges_ghost=False)
     return _shown(plan, content)
 
@@ -62,25 +60,18 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
     return _shown(checked.plan, shown)
 
 
-def _mended(plan: CompiledPlan) -> list[tuple[DynamicSpan, Written]]:
-    """The parts that the robot cannot do as they were written, with what was."""
-    return [(span, span.asked) for span in plan.dynamic if isinstance(span.asked, Written)]
+def _is_mended(plan: MotionPlan) -> bool:
+    """Whether there are parts that the robot cannot do as they were written."""
+    spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
+    return any(isinstance(span.asked, Written) for span in spans)
 
 
-def _as_written(shown: Recording, mended: Sequence[tuple[DynamicSpan, Written]]) -> Recording:
+def _as_written(checked: CheckedMotion) -> Recording:
     """The movement that was written; its forces and torques are not known."""
-    q = shown.q.copy()
-    for span, written in mended:
-        inside = (shown.time >= span.start) & (shown.time <= span.end)
-        nearest = np.searchsorted(written.times, shown.time[inside] - span.start - _HALF_SAMPLE)
-        part = written.q[np.minimum(nearest, len(written.times) - 1)]
-        turn = Rotation.from_euler("z", span.frame.yaw)
-        q[inside] = part
-        q[inside, :3] = turn.apply(part[:, :3]) + span.frame.p_world
-        q[inside, 3:7] = (turn * Rotation.from_quat(part[:, 3:7])).as_quat()
+    shown = checked.recording()
     return replace(
         shown,
-        q=q,
+        q=as_written(checked.plan, checked.path),
         tau=np.zeros_like(shown.tau),
         foot_forces=np.zeros_like(shown.foot_forces),
         support_margin=np.full_like(shown.support_margin, np.nan),

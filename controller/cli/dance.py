@@ -63,11 +63,11 @@ def run(args: argparse.Namespace) -> int:
     from viz import HTML_SUFFIXES, export_html
 
     target = None if args.html is None else checked_output(args.html, HTML_SUFFIXES)
-    with ProgressLine() as line:
+    with ProgressLine(is_quiet=args.json) as line:
         line.update(0.0, f"listening to {args.song.name}")
         found = beats(args.song)
         line.update(0.1, "composing")
-        checker = FeasibilityChecker()
+        checker = FeasibilityChecker(progress=line.solving)
         dance, checked = feasible_dance(found, args.seed, checker, args.moves)
         told = _told(args.song, found, dance)
         if args.no_play:

@@ -47,10 +47,10 @@ def run(args: argparse.Namespace) -> int:
     from motions import FeasibilityChecker, suggest
 
     lines = meant(args.motion, args.values)
-    checker = FeasibilityChecker()
     reports: list[FeasibilityReport] = []
     changes: dict[str, Sequence[Suggestion]] = {}
-    with ProgressLine() as progress:
+    with ProgressLine(is_quiet=args.json) as progress:
+        checker = FeasibilityChecker(progress=progress.solving)
         for number, line in enumerate(lines):
             progress.update(number / len(lines), line.name)
             reports.append(checker.check(line))

@@ -11,6 +11,7 @@ import numpy as np
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from controller.cli.motion_args import SAVED_MOTION, SAVED_PLAN, add_motion, the_motion
+from controller.cli.progress import ProgressLine
 from go2_wbc.legs import JOINT_NAMES, LEGS
 
 if TYPE_CHECKING:
@@ -61,7 +62,9 @@ def run(args: argparse.Namespace) -> int:
     if target.suffix == SAVED_MOTION:
         save_motion(motion, target)
     else:
-        rows = _write_compiled(motion, target)
+        with ProgressLine(is_quiet=args.json) as line:
+            line.update(0.0, f"compiling {motion.name}")
+            rows = _write_compiled(motion, target, line)
     if args.json:
         print_json({"motion": motion.name, "file": str(target), **rows})
     else:
@@ -70,15 +73,16 @@ def run(args: argparse.Namespace) -> int:
     return ExitCode.OK
 
 
-def _write_compiled(motion: Timeline | CompiledPlan, target: Path) -> dict[str, object]:
+def _write_compiled(
+    motion: Timeline | CompiledPlan, target: Path, line: ProgressLine
+) -> dict[str, object]:
     """Write the plan or its trajectory; returns the number of rows of the latter."""
     from go2_wbc.files import write_atomically
-    from go2_wbc.robot.model import RobotModel
-    from motions import compile_motion, save_plan
+    from motions import FeasibilityChecker, save_plan
     from motions.trajectory import trajectory_of
 
-    model = RobotModel()
-    plan = compile_motion(motion, model)
+    checker = FeasibilityChecker(progress=line.solving)
+    plan, model = checker.plan(motion, check=False), checker.model
     if target.suffix == SAVED_PLAN:
         save_plan(plan, target, model=model)
         return {}

@@ -34,9 +34,11 @@ def write_files(args: argparse.Namespace) -> int:
         "video": (args.video, viz.ANIMATION_SUFFIXES),
     }
     files = {kind: checked_output(*item) for kind, item in wanted.items() if item[0] is not None}
-    checked = FeasibilityChecker().evaluate(the_motion(args.motion, args.values))
-    report, content, title = checked.report, planned(checked), checked.plan.name
-    with ProgressLine() as line:
+    motion = the_motion(args.motion, args.values)
+    with ProgressLine(is_quiet=args.json) as line:
+        line.update(0.0, f"checking {motion.name}")
+        checked = FeasibilityChecker(progress=line.solving).evaluate(motion)
+        report, content, title = checked.report, planned(checked), checked.plan.name
         if page := files.get("html"):
             line.update(0.0, f"writing {page.name}")
             viz.export_html(content, page, title=title)
@@ -62,8 +64,9 @@ def write_files(args: argparse.Namespace) -> int:
 
 def serve(args: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C; the exit code is that of what was saved last."""
-    source, checker = MotionSource(args.motion, args.values), FeasibilityChecker()
-    checked = checker.evaluate(source.motion())
+    source, line = MotionSource(args.motion, args.values), ProgressLine(is_quiet=args.json)
+    checker = FeasibilityChecker(progress=line.solving)
+    checked = _evaluated(source, checker, line)
     content = _content(source, checked)
     with PreviewServer(content, source.name, args.port, source.choose) as server:
         ok = checked.report.ok
@@ -79,17 +82,31 @@ def serve(args: argparse.Namespace) -> int:
             while True:
                 time.sleep(POLL_PERIOD)
                 if source.has_changed():
-                    ok = _show_again(source, checker, server, as_json=args.json)
+                    ok = _show_again(source, checker, server, line, as_json=args.json)
         except KeyboardInterrupt:
             return ExitCode.OK if ok else ExitCode.FAILED
 
 
+def _evaluated(
+    source: MotionSource, checker: FeasibilityChecker, line: ProgressLine
+) -> CheckedMotion:
+    """The motion as its file says now; ``line`` is away afterwards."""
+    with line:
+        line.update(0.0, f"checking {source.name}")
+        return checker.evaluate(source.motion())
+
+
 def _show_again(
-    source: MotionSource, checker: FeasibilityChecker, server: PreviewServer, *, as_json: bool
+    source: MotionSource,
+    checker: FeasibilityChecker,
+    server: PreviewServer,
+    line: ProgressLine,
+    *,
+    as_json: bool,
 ) -> bool:
     """Check and show what the file says now; whether the robot can do it."""
     try:
-        checked = checker.evaluate(source.motion())
+        checked = _evaluated(source, checker, line)
         server.publish(_content(source, checked))
     except (Go2WbcError, OSError) as error:
         server.publish_error(str(error))

@@ -62,13 +62,15 @@ def run(args: argparse.Namespace) -> int:
 
     motion = the_motion(args.motion, args.values)
     target = None if args.html is None else checked_output(args.html, HTML_SUFFIXES)
-    checker = FeasibilityChecker()
-    checked = checker.evaluate(motion)
+    with ProgressLine(is_quiet=args.json) as line:
+        line.update(0.0, f"checking {motion.name}")
+        checker = FeasibilityChecker(progress=line.solving)
+        checked = checker.evaluate(motion)
     plan, report = checked.plan, checked.report
     if not args.force:
         report.raise_if_infeasible()
     with (
-        ProgressLine() as line,
+        line,
         closing(GroundTruth(MujocoPlant(friction=args.friction))) as truth,
         GO2Controller(plant=truth) as go2,
     ):

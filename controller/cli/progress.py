@@ -6,6 +6,8 @@ import shutil
 import sys
 
 BAR_WIDTH = 20
+TELL_EVERY = 5
+"""Iterations of a solver from one look at the line to the next: some ten times a second."""
 _CLEAR = "\r\x1b[2K"
 
 
@@ -16,18 +18,37 @@ class ProgressLine:
     takes its place. Elsewhere (a file, a pipe, CI) only finished pieces are printed.
     """
 
-    def __init__(self) -> None:
-        self._is_live = sys.stderr.isatty()
+    def __init__(self, *, is_quiet: bool = False) -> None:
+        """With ``is_quiet`` nothing is told, as beside output for a program."""
+        self._is_live = sys.stderr.isatty() and not is_quiet
+        self._is_quiet = is_quiet
+        self._share, self._text = 0.0, ""
 
     def update(self, share: float, text: str) -> None:
         """Show that ``share`` (0 to 1) is finished and ``text`` is going on."""
+        self._share, self._text = share, text
+        self._show(text)
+
+    def solving(self, iterations: int, cost: float) -> None:
+        """Show how far the solver is on which what is going on waits.
+
+        Plans that were solved before do not call it.
+
+        Args:
+            iterations: of the solver, so far.
+            cost: of its best plan.
+        """
+        if iterations % TELL_EVERY == 1:
+            self._show(f"{self._text}: solving, iteration {iterations}, cost {cost:.3g}")
+
+    def _show(self, text: str) -> None:
         if self._is_live:
-            shown = f"{progress_bar(share)} {text}"[: shutil.get_terminal_size().columns - 1]
+            shown = f"{progress_bar(self._share)} {text}"[: shutil.get_terminal_size().columns - 1]
             print(f"{_CLEAR}{shown}\r", end="", file=sys.stderr, flush=True)
 
     def done(self, text: str) -> None:
         """Say that a piece of work is finished; on a terminal the next update replaces it."""
-        if not self._is_live:
+        if not (self._is_live or self._is_quiet):
             print(text, file=sys.stderr, flush=True)
 
     def __enter__(self) -> ProgressLine:

@@ -12,6 +12,7 @@ from motions.compiled_plan import CompiledPlan
 from motions.feasibility import dynamic, flight, friction, kinematic
 from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion, timeline_of
 from motions.feasibility.collision import SelfCollision, self_distance
+from motions.feasibility.departure import departure_measurements, departures
 from motions.feasibility.hulls import LinkHulls
 from motions.feasibility.limits import FeasibilityLimits, FlightLimits
 from motions.feasibility.nearest import Progress, mending
@@ -100,6 +101,13 @@ class FeasibilityChecker:
     def _judged(self, plan: CompiledPlan) -> FeasibilityReport:
         return self.evaluate(plan).report
 
+    def departure(self, plan: MotionPlan) -> dict[str, float]:
+        """How far ``plan`` is from what was written, at most, by name with unit.
+
+        Nothing if it is what was written; by parts, and in words, it stands in the report.
+        """
+        return departure_measurements(plan, self.model)
+
     def evaluate(self, motion: Playable) -> CheckedMotion:
         """Compile and check ``motion``, once: its plan, the report, the movement and the forces.
 
@@ -155,7 +163,9 @@ class FeasibilityChecker:
             *in_flight,
         ]
         end_pose = plan.end_pose if isinstance(plan, CompiledPlan) else None
-        report = FeasibilityReport.of(plan.name, plan.duration, in_order_of_causes, end_pose)
+        report = FeasibilityReport.of(
+            plan.name, plan.duration, in_order_of_causes, end_pose, departures(plan, model)
+        )
         return CheckedMotion(plan, report, path, forces)
 
 

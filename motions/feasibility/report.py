@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.errors import MotionInfeasible
+from motions.feasibility.departure import Departure
 
 NOISE = 1e-6
 """A value below this is nothing but rounding, and is shown as 0."""
@@ -134,6 +135,7 @@ class FeasibilityReport:
         margins: worst finding of every check.
         end_pose: where the motion ends: x, y [m] and yaw [rad] of the frame of the feet, seen from
             its start; None of a plan that does not say.
+        departures: how far the parts that are the nearest to what was written are from it.
     """
 
     motion: str
@@ -143,6 +145,7 @@ class FeasibilityReport:
     warnings: tuple[Finding, ...]
     margins: Mapping[str, Finding]
     end_pose: tuple[float, float, float] | None = None
+    departures: tuple[Departure, ...] = ()
 
     @staticmethod
     def of(
@@ -150,6 +153,7 @@ class FeasibilityReport:
         duration: float,
         series: Sequence[Series],
         end_pose: tuple[float, float, float] | None = None,
+        departures: tuple[Departure, ...] = (),
     ) -> FeasibilityReport:
         """Draw the conclusions from ``series``, which has causes before their consequences."""
         failures, warnings, margins = [], [], {}
@@ -161,9 +165,8 @@ class FeasibilityReport:
             broken = [finding for finding in found if not finding.margin >= 0.0]
             failures += sorted(broken, key=lambda finding: finding.time)
             warnings += [finding for finding in found if 0.0 <= finding.margin < item.tight]
-        return FeasibilityReport(
-            motion, duration, tuple(series), tuple(failures), tuple(warnings), margins, end_pose
-        )
+        findings = tuple(failures), tuple(warnings), margins
+        return FeasibilityReport(motion, duration, tuple(series), *findings, end_pose, departures)
 
     @property
     def ok(self) -> bool:
@@ -196,7 +199,7 @@ class FeasibilityReport:
             lines.append(
                 f"It ends at x {x:.3f} m, y {y:.3f} m, turned by {np.degrees(yaw):.1f} deg."
             )
-        return "\n".join(lines)
+        return "\n".join([*lines, *map(str, self.departures)])
 
     def summary(self) -> str:
         """One line: the verdict, and what is closest to its limit."""
@@ -217,6 +220,7 @@ class FeasibilityReport:
             "end_pose": self.end_pose,
             "failures": [asdict(finding) for finding in self.failures],
             "warnings": [asdict(finding) for finding in self.warnings],
+            "departures": [asdict(one) for one in self.departures],
             "margins": {check: asdict(finding) for check, finding in self.margins.items()},
         }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 
 from controller.cli.common import ExitCode
 from controller.cli.main import main
-from motions import motion_names
+from motions import load_plan, motion_names
 from tests.viz.page_reader import read_data
 
 CLUMSY = '''
@@ -32,6 +33,27 @@ def second() -> Timeline:
 
 GHOST_DISTANCE = 0.03
 """How far [m] the trunk of a run may be from its plan: posture and timing of the tracking."""
+
+
+QUICK = '''
+from motions import Timeline, motion
+
+@motion
+def quick() -> Timeline:
+    """Too quick."""
+    line = Timeline(physics="nearest").body(y=0.06, over=0.2).body(y=-0.06, over=0.2)
+    return line.home(over=0.4).hold(0.2)
+'''
+
+
+@pytest.fixture
+def quick(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A motion whose nearest is not known from before."""
+    pytest.importorskip("crocoddyl", reason="needs crocoddyl: pip install go2-wbc[dynamics]")
+    monkeypatch.setattr("motions.dynamics.cache.plan_folder", lambda: tmp_path / "plans")
+    path = tmp_path / "quick.py"
+    path.write_text(QUICK, encoding="utf-8")
+    return path
 
 
 @pytest.fixture
@@ -177,3 +199,30 @@ def test_run_plays_a_motion_and_measures_it(
     result = json.loads(capsys.readouterr().out)
     assert not result["ok"]
     assert not result["feasible"]
+
+
+@pytest.mark.parametrize("command", ["check", "preview", "export"])
+def test_a_terminal_is_told_of_solving_what_was_not_solved_before(
+    command: str,
+    quick: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    more = {
+        "check": [],
+        "preview": ["--html", str(tmp_path / "quick.html")],
+        "export": ["--out", str(tmp_path / "quick.plan")],
+    }
+    assert main([command, str(quick), *more[command]]) == ExitCode.OK
+    assert "quick: solving, iteration 1, cost " in capsys.readouterr().err
+    assert main([command, str(quick), *more[command], "--json"]) == ExitCode.OK
+    assert capsys.readouterr().err == ""
+
+
+def test_what_is_exported_is_the_nearest_motion(quick: Path, tmp_path: Path) -> None:
+    saved = tmp_path / "quick.plan"
+    assert main(["export", str(quick), "--out", str(saved)]) == ExitCode.OK
+    plan = load_plan(saved)
+    assert plan.has_dynamic_spans

@@ -84,6 +84,35 @@ def test_on_a_terminal_progress_is_one_line_in_place(
     assert text.endswith("\r\x1b[2K")
 
 
+def test_while_something_is_solved_the_line_says_how_far_that_is(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    with ProgressLine() as line:
+        line.update(0.5, "checking sway")
+        for iteration in range(1, 13):
+            line.solving(iteration, 1234.5)
+    shown = [part.rstrip("\r") for part in capsys.readouterr().err.split("\x1b[2K")]
+    assert [text for text in shown if "solving" in text] == [
+        f"{progress_bar(0.5)} checking sway: solving, iteration {n}, cost 1.23e+03"
+        for n in (1, 6, 11)
+    ]
+
+
+@pytest.mark.parametrize(("is_terminal", "is_quiet"), [(False, False), (True, True)])
+def test_into_a_pipe_or_beside_json_nothing_is_said_of_solving(
+    is_terminal: bool,
+    is_quiet: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: is_terminal)
+    with ProgressLine(is_quiet=is_quiet) as line:
+        line.update(0.5, "checking sway")
+        line.solving(1, 1.0)
+    assert capsys.readouterr().err == ""
+
+
 def test_elsewhere_progress_is_one_line_for_each_finished_piece(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from importlib.util import find_spec
 
@@ -48,6 +49,28 @@ def test_the_nearest_motion_is_feasible_and_says_how_far_off_it_is(
     own = plan.dynamic[0].trajectory.position_deviation
     assert 0.01 < own < 0.05
     assert report.margins["off by"].value == pytest.approx(1e3 * own, abs=1.0)
+    (departed,) = report.departures
+    assert 1e3 * departed.place == pytest.approx(report.margins["off by"].value)
+    assert departed.subject == report.margins["off by"].subject
+    assert departed.place_time == report.margins["off by"].time
+    assert np.degrees(departed.angle) == pytest.approx(report.margins["turned off by"].value)
+    assert departed.lag == plan.dynamic[0].trajectory.lag
+    assert report.as_dict()["departures"][0]["place"] == departed.place
+
+
+@needs_solver
+def test_the_table_ends_with_how_far_it_had_to_go_where_and_how_late(
+    checker: FeasibilityChecker,
+) -> None:
+    report = checker.check(SWAY)
+    *_, first, second = lines = report.table().splitlines()
+    assert re.fullmatch(r"0.00 to 1.00 s is the nearest to what was written: \d+ mm off", first)
+    said = r"\(trunk at 0.\d\d s\), [\d.]+ deg \(at 0.\d\d s\), \d+ ms (late|early)\."
+    assert re.fullmatch(said, second)
+    assert max(map(len, lines)) <= 80
+    slow = checker.check(Timeline(physics="nearest").body(y=0.03, over=0.8).home(over=0.8))
+    assert not slow.departures
+    assert "nearest" not in slow.table()
 
 
 @needs_solver
