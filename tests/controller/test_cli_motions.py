@@ -95,7 +95,7 @@ def test_check_says_what_would_make_a_motion_feasible(
     hasty = tmp_path / "hasty.py"
     hasty.write_text(
         "from motions import Timeline, deg, motion\n\n\n@motion\ndef hasty() -> Timeline:\n"
-        '    """Too fast."""\n    return Timeline().body(roll=deg(25), over=0.2).home(over=0.2)\n'
+        '    """Too fast."""\n    return Timeline().body(yaw=deg(25), over=0.12).home(over=0.12)\n'
     )
     assert main(["check", str(hasty), "bow", "--fix"]) == ExitCode.FAILED
     said = capsys.readouterr().out

@@ -20,10 +20,10 @@ from motions import (
 from motions.feasibility.suggestions import AMPLITUDE, BOTH, HIGHER, LOWER, SHIFT_TIME, TEMPO
 
 CHECKER = FeasibilityChecker()
-FAST_ROLL = Timeline(name="fast roll").body(roll=deg(25), over=0.2).home(over=0.2)
-TALL = Timeline(name="tall").body(z=0.10, over=1.0).body(roll=deg(15), over=0.8).home(over=1.0)
+FAST_TWIST = Timeline(name="twist").body(yaw=deg(25), over=0.12).home(over=0.12)
+TALL = Timeline(name="tall").body(z=0.12, over=1.0).body(roll=deg(15), over=0.8).home(over=1.0)
 HASTY_PAW = Timeline(name="paw", shift_time=0.2).foot("FL", z=0.08, over=0.5).home(over=0.6)
-SWAY = Timeline(name="sway").body(y=0.06, over=0.14).body(y=-0.06, over=0.14).home(over=0.3)
+SWAY = Timeline(name="sway").body(y=0.1, over=0.08).body(y=-0.1, over=0.08).home(over=0.2)
 FEASIBLE = Timeline(name="bow").body(pitch=deg(5), over=1.0).home(over=1.0)
 
 
@@ -36,7 +36,7 @@ def _suggested(line: Timeline) -> dict[str, Suggestion]:
     return {one.kind: one for one in _found(line)}
 
 
-@pytest.mark.parametrize("line", [FAST_ROLL, TALL, HASTY_PAW, SWAY], ids=lambda line: line.name)
+@pytest.mark.parametrize("line", [FAST_TWIST, TALL, HASTY_PAW, SWAY], ids=lambda line: line.name)
 def test_what_is_pasted_is_feasible_and_is_what_was_checked(line: Timeline) -> None:
     found = _found(line)
     assert found
@@ -49,7 +49,7 @@ def test_what_is_pasted_is_feasible_and_is_what_was_checked(line: Timeline) -> N
         assert one.as_dict()["duration"] == pytest.approx(pasted.end)
 
 
-@pytest.mark.parametrize("line", [FAST_ROLL, TALL, HASTY_PAW, SWAY], ids=lambda line: line.name)
+@pytest.mark.parametrize("line", [FAST_TWIST, TALL, HASTY_PAW, SWAY], ids=lambda line: line.name)
 def test_one_step_less_is_refused(line: Timeline) -> None:
     for one in _found(line):
         kinds = [kind for kind in (TEMPO, AMPLITUDE, SHIFT_TIME, BOTH) if kind.name == one.kind]
@@ -60,7 +60,7 @@ def test_one_step_less_is_refused(line: Timeline) -> None:
 
 
 def test_each_kind_is_found_where_it_helps() -> None:
-    assert {"tempo", "amplitude"} <= set(_suggested(FAST_ROLL))
+    assert {"tempo", "amplitude"} <= set(_suggested(FAST_TWIST))
     assert {"height", "amplitude"} <= set(_suggested(TALL))
     assert "(-" in _suggested(TALL)["height"].call
     assert "tempo" not in _suggested(TALL)
