@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from go2_wbc.wbc.controller import WholeBodyController
     from go2_wbc.wbc.solution import WbcSolution
     from go2_wbc.wbc.tasks import Task
+    from go2_wbc.world import World
 
 __all__ = [
     "GAITS",
@@ -55,6 +56,7 @@ __all__ = [
     "WbcConfig",
     "WbcSolution",
     "WholeBodyController",
+    "World",
     "__version__",
     "load_config",
 ]
@@ -80,6 +82,7 @@ _public = lazy_exports(
         "wbc.controller": ("WholeBodyController",),
         "wbc.solution": ("WbcSolution",),
         "wbc.tasks": ("Task",),
+        "world": ("World",),
     },
 )
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
-from controller.cli.motion_args import add_motion, meant, print_verdict
+from controller.cli.motion_args import add_motion, add_world, meant, print_verdict, world_of
 from controller.cli.progress import ProgressLine
 
 EXAMPLES = """
 go2-wbc check                     every motion of the library, a line each
 go2-wbc check wave                one motion, every limit
 go2-wbc check wave --set times=5
+go2-wbc check wave --friction 0.4 --payload 3
 go2-wbc check my_motion.py        every motion of your own file
 go2-wbc check bow --json          the same for a program to read
 """
@@ -28,6 +29,7 @@ def register(subparsers: Subparsers) -> None:
         examples=EXAMPLES,
     )
     add_motion(parser, many=True)
+    add_world(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -36,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     from motions import FeasibilityChecker
 
     lines = meant(args.motion, args.values)
-    checker = FeasibilityChecker()
+    checker = FeasibilityChecker(world=world_of(args))
     reports = []
     with ProgressLine() as progress:
         for number, line in enumerate(lines):

@@ -24,6 +24,7 @@ from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
+from go2_wbc.world import PAYLOAD_HALF_SIZE, World
 
 FOOT_RADIUS = 0.022
 """Radius [m] of the spherical foot: the foot mesh's, see the robot description."""
@@ -61,6 +62,7 @@ class RobotModel:
         armature: Float[np.ndarray, "12"] = ROTOR_ARMATURE,
         foot_radius: float = FOOT_RADIUS,
         motor: str = TORQUE_SPEED,
+        world: World | None = None,
     ) -> None:
         """Load the robot.
 
@@ -69,6 +71,7 @@ class RobotModel:
             armature: reflected rotor inertias [kg m^2].
             foot_radius: radius [m] of the spherical feet; 0 puts contacts at the foot frames.
             motor: "torque-speed", or "ideal" for the peak torque at every speed.
+            world: whose load the robot carries, and by whose factor it is heavier; none by default.
 
         Raises:
             ConfigError: for an unknown motor.
@@ -78,6 +81,8 @@ class RobotModel:
         self.motor = MotorModel.named(motor, self.description)
         self.foot_radius = foot_radius
         self.pin_model = _load(self.description.urdf_path)
+        if world is not None:
+            _burden(self.pin_model, world)
         self.pin_model.armature = np.concatenate([np.zeros(6), armature])
         self._data = self.pin_model.createData()
         self._foot_frames = [self.pin_model.getFrameId(name) for name in FOOT_NAMES]
@@ -183,6 +188,18 @@ class RobotModel:
     ) -> Float[np.ndarray, "18"]:
         """Generalised force M(q) a + h(q, v) [N, N m]."""
         return np.array(pin.rnea(self.pin_model, self._data, q, v, a))
+
+
+def _burden(model: pin.Model, world: World) -> None:
+    """Make the robot as heavy as it is in ``world``, with its payload on the trunk."""
+    for joint in range(1, model.njoints):
+        own = model.inertias[joint]
+        scale = world.mass_scale
+        model.inertias[joint] = pin.Inertia(scale * own.mass, own.lever, scale * own.inertia)
+    if world.payload > 0.0:
+        box = pin.Inertia.FromBox(world.payload, *(2.0 * half for half in PAYLOAD_HALF_SIZE))
+        place = pin.SE3(np.eye(3), np.array(world.payload_place))
+        model.inertias[1] = model.inertias[1] + place.act(box)
 
 
 def _about_joint(inertia: pin.Inertia) -> Float[np.ndarray, "10"]:

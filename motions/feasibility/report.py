@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.errors import MotionInfeasible
+from go2_wbc.world import World
 
 NOISE = 1e-6
 """A value below this is nothing but rounding, and is shown as 0."""
@@ -132,6 +133,7 @@ class FeasibilityReport:
             of one check the earliest first.
         warnings: limits that are met by little.
         margins: worst finding of every check.
+        world: in which it holds.
         end_pose: where the motion ends: x, y [m] and yaw [rad] of the frame of the feet, seen from
             its start; None of a plan that does not say.
     """
@@ -142,6 +144,7 @@ class FeasibilityReport:
     failures: tuple[Finding, ...]
     warnings: tuple[Finding, ...]
     margins: Mapping[str, Finding]
+    world: World
     end_pose: tuple[float, float, float] | None = None
 
     @staticmethod
@@ -150,6 +153,7 @@ class FeasibilityReport:
         duration: float,
         series: Sequence[Series],
         end_pose: tuple[float, float, float] | None = None,
+        world: World | None = None,
     ) -> FeasibilityReport:
         """Draw the conclusions from ``series``, which has causes before their consequences."""
         failures, warnings, margins = [], [], {}
@@ -162,7 +166,14 @@ class FeasibilityReport:
             failures += sorted(broken, key=lambda finding: finding.time)
             warnings += [finding for finding in found if 0.0 <= finding.margin < item.tight]
         return FeasibilityReport(
-            motion, duration, tuple(series), tuple(failures), tuple(warnings), margins, end_pose
+            motion=motion,
+            duration=duration,
+            series=tuple(series),
+            failures=tuple(failures),
+            warnings=tuple(warnings),
+            margins=margins,
+            world=world or World(),
+            end_pose=end_pose,
         )
 
     @property
@@ -191,6 +202,8 @@ class FeasibilityReport:
         verdict = "can do it" if self.ok else f"cannot do it: {_count(len(self.failures), 'limit')}"
         tight = f", {_count(len(self.warnings), 'tight margin')}" if self.warnings else ""
         lines += ["-" * 80, f"{self.motion}, {self.duration:.1f} s: the robot {verdict}{tight}."]
+        if self.world != World():
+            lines.append(f"That holds for {self.world}.")
         if self.end_pose is not None and max(map(abs, self.end_pose)) > STAYS:
             x, y, yaw = self.end_pose
             lines.append(
@@ -215,6 +228,7 @@ class FeasibilityReport:
             "duration": self.duration,
             "ok": self.ok,
             "end_pose": self.end_pose,
+            "world": asdict(self.world),
             "failures": [asdict(finding) for finding in self.failures],
             "warnings": [asdict(finding) for finding in self.warnings],
             "margins": {check: asdict(finding) for check, finding in self.margins.items()},

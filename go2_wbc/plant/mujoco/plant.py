@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections import deque
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -18,39 +16,23 @@ from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, u
 from go2_wbc.lazy import without_collecting
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
-from go2_wbc.plant.mujoco.contacts import (
-    Contacts,
-    FootContacts,
-    foot_contacts,
-)
+from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
-from go2_wbc.plant.mujoco.pushes import Push, Pushes
+from go2_wbc.plant.mujoco.pushes import Pushes
+from go2_wbc.plant.mujoco.saved import SavedPhysics
 from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
 from go2_wbc.plant.sensors import ImuSample, SensorNoise
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.state import JointCommand, RobotState
+from go2_wbc.world import SENSORS
 
 _logger = logging.getLogger(__name__)
 
 # N; a foot reads a contact above this. A standing foot carries about 40 N, so 1 N is "touching".
 FOOT_CONTACT_THRESHOLD = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class SavedPhysics:
-    """Everything that decides how a ``MujocoPlant`` goes on; see ``MujocoPlant.save``."""
-
-    integration: Float[np.ndarray, " n"]
-    ticks: int
-    pushes: tuple[Push, ...]
-    tau: Float[np.ndarray, "12"]
-    forces: Float[np.ndarray, "6"]
-    noise_state: Mapping[str, Any]
-    state: RobotState | None
-    imu: ImuSample | None
 
 
 class MujocoPlant(Plant):
@@ -67,7 +49,8 @@ class MujocoPlant(Plant):
         control_period: seconds per ``write``, an integer multiple of ``timestep``.
         friction: sliding friction coefficient; ``None`` is 0.8, or what ``mjcf`` says. With
             ``mjcf`` a number applies to the feet's contacts.
-        payload: extra mass [kg], a solid box fixed at the base's origin.
+        payload: extra mass [kg], a solid box.
+        payload_place: of its middle in the base frame [m].
         mass_scale: factor on every mass and inertia of the robot, payload excepted.
         terrain: boxes to strew on the floor; only without ``mjcf``.
         sensors: ``"ideal"``, or ``"noisy"`` for white noise on everything measured.
@@ -80,6 +63,7 @@ class MujocoPlant(Plant):
         motor: ``"torque-speed"``, or ``"ideal"`` for the peak torque at every speed.
         urdf: another URDF instead of the installed one.
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
+        delay: time [s] after which a command acts, rounded to whole control periods.
 
     Raises:
         ConfigError: for a value that is out of range.
@@ -95,6 +79,7 @@ class MujocoPlant(Plant):
         control_period: float = 0.002,
         friction: float | None = None,
         payload: float = 0.0,
+        payload_place: tuple[float, float, float] = (0.0, 0.0, 0.0),
         mass_scale: float = 1.0,
         terrain: Boxes | None = None,
         sensors: str = "ideal",
@@ -106,9 +91,10 @@ class MujocoPlant(Plant):
         motor: str = TORQUE_SPEED,
         urdf: Path | str | None = None,
         visuals: bool = False,
+        delay: float = 0.0,
     ) -> None:
-        if sensors not in ("ideal", "noisy"):
-            raise ConfigError(unknown_name("sensors", sensors, ("ideal", "noisy")))
+        if sensors not in SENSORS:
+            raise ConfigError(unknown_name("sensors", sensors, SENSORS))
         setup = PlantSetup(
             mjcf=mjcf,
             urdf=urdf,
@@ -116,6 +102,7 @@ class MujocoPlant(Plant):
             control_period=control_period,
             friction=friction,
             payload=payload,
+            payload_place=payload_place,
             mass_scale=mass_scale,
             terrain=terrain,
             initial_yaw=initial_yaw,
@@ -123,6 +110,7 @@ class MujocoPlant(Plant):
             joint_dynamics=joint_dynamics,
             motor=motor,
             visuals=visuals,
+            delay=delay,
             seed=seed,
         )
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
@@ -134,6 +122,8 @@ class MujocoPlant(Plant):
         self._period, self._substeps = control_period, round(control_period / timestep)
         self._closed = False
         self._ticks = 0
+        self._waiting: deque[Float[np.ndarray, "5 12"]] = deque()
+        self._delay = round(delay / control_period)
         self._pushes = Pushes(self._model, self._data, self._layout)
         # Views into MuJoCo's memory, made once because making them is slow.
         data, layout = self._data, self._layout
@@ -143,6 +133,7 @@ class MujocoPlant(Plant):
         self._bind_kernels()
         settle(self._model, data, layout, setup, start_rng)
         # One period in the lying state, so that the first read has forces and torques.
+        self._command = np.zeros((5, 12))  # until a delayed one arrives
         self.write(JointCommand.damping(LYING_DAMPING))
         self._ticks, self._data.time = 0, 0.0
 
@@ -278,13 +269,17 @@ class MujocoPlant(Plant):
 
     def foot_contacts(self) -> FootContacts:
         """Contact points of the feet and the velocities of their material there."""
-        points, velocities = foot_contacts([self.contacts()])
-        return FootContacts(points[0], velocities[0])
+        return FootContacts(*(rows[0] for rows in foot_contacts([self.contacts()])))
 
     def contacts(self) -> Contacts:
         """Every contact now, to be evaluated later."""
         self._check_open()
         return Contacts.of(self._data, self._layout)
+
+    @property
+    def body_contact_force(self) -> float | None:
+        """See ``Plant.body_contact_force``."""
+        return self.base_contact_force + self.limb_contact_force
 
     @property
     def base_contact_force(self) -> float:
@@ -306,6 +301,7 @@ class MujocoPlant(Plant):
             integration=integration,
             ticks=self._ticks,
             pushes=self._pushes.active,
+            waiting=tuple(self._waiting),
             tau=self._tau,
             forces=self._forces,
             noise_state=self._rng.bit_generator.state,
@@ -322,6 +318,7 @@ class MujocoPlant(Plant):
         self._warnings[:] = 0
         self._ticks = saved.ticks
         self._pushes.active = saved.pushes
+        self._waiting = deque(saved.waiting)
         self._tau, self._forces = saved.tau, saved.forces
         self._rng.bit_generator.state = dict(saved.noise_state)
         self._state, self._imu = saved.state, saved.imu
@@ -345,7 +342,9 @@ class MujocoPlant(Plant):
             for name, row in zip(_FIELDS, rows, strict=True):
                 if not np.isfinite(row).all():
                     raise CommandError(f"command.{name} is not finite: {row}")
-        self._command = accepted
+        self._waiting.append(accepted)
+        if len(self._waiting) > self._delay:
+            self._command = self._waiting.popleft()
 
     def _bind_kernels(self) -> None:
         """Binds the kernels of a tick and the arrays of MuJoCo's that they read and fill."""

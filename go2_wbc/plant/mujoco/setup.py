@@ -32,6 +32,7 @@ class PlantSetup:
     control_period: float
     friction: float | None
     payload: float
+    payload_place: tuple[float, float, float]
     mass_scale: float
     terrain: Boxes | None
     initial_yaw: float
@@ -39,6 +40,7 @@ class PlantSetup:
     joint_dynamics: JointDynamics | None
     motor: str
     visuals: bool
+    delay: float
     seed: int
 
     def __post_init__(self) -> None:
@@ -52,7 +54,8 @@ class PlantSetup:
         if self.friction is not None:
             require_positive(self, "friction")
         require_not_negative(self, "payload", "initial_joint_noise", "seed")
-        require_finite(self, "initial_yaw")
+        require_finite(self, "initial_yaw", "payload_place")
+        require_not_negative(self, "delay")
         require_motor(self.motor)
         ratio = self.control_period / self.timestep
         if not math.isclose(ratio, round(ratio)):  # only the two decimal numbers' rounding
@@ -86,7 +89,7 @@ def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel
         source, mistake = setup.mjcf, ModelMismatch
         spec, base = load_user_model(setup.mjcf, description, setup.joint_dynamics)
     if setup.payload > 0.0:
-        add_payload(spec, base, setup.payload)
+        add_payload(spec, base, setup.payload, setup.payload_place)
     try:
         model = finish(spec, timestep=setup.timestep, mass_scale=setup.mass_scale)
     except ValueError as error:

@@ -1,0 +1,116 @@
+"""The world that a motion meets: the floor, the load, and how far the robot is from its model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from go2_wbc.errors import ConfigError, unknown_name
+from go2_wbc.validation import require_between
+
+SENSORS = ("ideal", "noisy")
+PAYLOAD_HALF_SIZE = (0.10, 0.06, 0.04)
+"""Of the payload [m]: a solid box of about a battery's or computer's size."""
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """What a check counts on, and what a simulated robot meets.
+
+    The controller is told nothing of it: it works with the robot as its description has it.
+
+    Attributes:
+        friction: coefficient of feet and floor, 0.05 to 2. Wet tiles have 0.5, dry rubber on
+            concrete 1; below the least, none of the project's robots stands.
+        payload: extra mass [kg] on the trunk, 0 to 12: Unitree's greatest.
+        payload_place: of its middle in the base frame [m], within 0.5 of the base's origin.
+        mass_scale: factor on the robot's mass and inertia, 0.25 to 3.
+        mass_uncertainty: share by which it may be more or less, 0 to 0.5.
+        joint_friction: factor on dry friction and damping of the joints, 0 to 10; those of the
+            motors of robots differ by half (``plant.mujoco.model.JointDynamics``).
+        joint_friction_uncertainty: share by which it may be more or less, 0 to 1.
+        delay: time [s] after which a command acts, 0 to 0.05; a round trip of the robot's bus takes
+            0.002. Only in simulation: the check has no equation for it.
+        sensors: "ideal", or "noisy" for ``plant.sensors.SensorNoise``. Only in simulation.
+    """
+
+    friction: float = 0.5
+    payload: float = 0.0
+    payload_place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mass_scale: float = 1.0
+    mass_uncertainty: float = 0.0
+    joint_friction: float = 1.0
+    joint_friction_uncertainty: float = 0.0
+    delay: float = 0.0
+    sensors: str = "ideal"
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a value that is out of range."""
+        if not isinstance(self.payload_place, tuple) or len(self.payload_place) != 3:
+            raise ConfigError(f"World.payload_place must be (x, y, z), got {self.payload_place!r}")
+        for name, (low, high) in _RANGES.items():
+            require_between(self, low, high, name)
+        if self.sensors not in SENSORS:
+            raise ConfigError(unknown_name("World.sensors", str(self.sensors), SENSORS))
+
+    @staticmethod
+    def of(friction: float | None, payload: float | None, world: World | None = None) -> World:
+        """``world``, or the usual one, with this friction and payload where they are given."""
+        own = world or World()
+        if friction is not None:
+            own = replace(own, friction=friction)
+        return own if payload is None else replace(own, payload=payload)
+
+    def sample(self, rng: np.random.Generator) -> World:
+        """A world within the uncertainties, without any of its own; each is drawn evenly."""
+        mass, joints = (
+            value * (1.0 + share * float(rng.uniform(-1.0, 1.0)))
+            for value, share in (
+                (self.mass_scale, self.mass_uncertainty),
+                (self.joint_friction, self.joint_friction_uncertainty),
+            )
+        )
+        return replace(
+            self,
+            mass_scale=mass,
+            mass_uncertainty=0.0,
+            joint_friction=joints,
+            joint_friction_uncertainty=0.0,
+        )
+
+    @property
+    def worst(self) -> World:
+        """The one within the uncertainties that asks most of the motors: heavy and stiff."""
+        return replace(
+            self,
+            mass_scale=self.mass_scale * (1.0 + self.mass_uncertainty),
+            mass_uncertainty=0.0,
+            joint_friction=self.joint_friction * (1.0 + self.joint_friction_uncertainty),
+            joint_friction_uncertainty=0.0,
+        )
+
+    def __str__(self) -> str:
+        """In words, what is not as usual."""
+        words = [f"friction {self.friction:g}"]
+        if self.payload:
+            words.append(f"payload {self.payload:g} kg")
+        words += [
+            f"{name.replace('_', ' ')} {getattr(self, name):g}"
+            for name in ("mass_scale", "mass_uncertainty", "joint_friction")
+            if getattr(self, name) != getattr(_USUAL, name)
+        ]
+        return ", ".join(words)
+
+
+_RANGES = {
+    "friction": (0.05, 2.0),
+    "payload": (0.0, 12.0),
+    "payload_place": (-0.5, 0.5),
+    "mass_scale": (0.25, 3.0),
+    "mass_uncertainty": (0.0, 0.5),
+    "joint_friction": (0.0, 10.0),
+    "joint_friction_uncertainty": (0.0, 1.0),
+    "delay": (0.0, 0.05),
+}
+_USUAL = World()

@@ -1,0 +1,83 @@
+"""A world is checked, drawn from, and met by a simulated robot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from go2_wbc.errors import ConfigError
+from go2_wbc.plant import MujocoPlant, plant_in_world
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.state import JointCommand
+from go2_wbc.world import World
+from tests.engine_helpers import standing_q
+
+EXACT = 1e-9
+
+
+@pytest.mark.parametrize(
+    ("setting", "says"),
+    [
+        ({"friction": 0.0}, "World.friction must be between 0.05 and 2, got 0.0"),
+        ({"friction": float("nan")}, "World.friction must be between"),
+        ({"payload": -1.0}, "World.payload must be between 0 and 12"),
+        ({"payload_place": (0.0, 0.0, 0.9)}, "World.payload_place must be between -0.5 and 0.5"),
+        ({"mass_uncertainty": 0.6}, "World.mass_uncertainty must be between 0 and 0.5"),
+        ({"delay": 1.0}, "World.delay must be between 0 and 0.05"),
+        ({"sensors": "lidar"}, "unknown World.sensors 'lidar'; valid: ideal, noisy"),
+    ],
+)
+def test_a_world_out_of_range_is_refused(setting: dict, says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        World(**setting)
+
+
+def test_a_drawn_world_lies_within_the_uncertainties_and_follows_its_seed() -> None:
+    world = World(mass_uncertainty=0.1, joint_friction=1.2, joint_friction_uncertainty=0.5)
+    drawn = [world.sample(np.random.default_rng(seed)) for seed in range(200)]
+    assert drawn[3] == world.sample(np.random.default_rng(3))
+    masses = [own.mass_scale for own in drawn]
+    joints = [own.joint_friction for own in drawn]
+    assert 0.9 <= min(masses) < 0.91
+    assert 1.09 < max(masses) <= 1.1
+    assert 0.6 <= min(joints) < 0.63
+    assert 1.77 < max(joints) <= 1.8
+    assert all(own.sample(np.random.default_rng(0)) == own for own in drawn)
+    assert (world.worst.mass_scale, world.worst.joint_friction) == pytest.approx((1.1, 1.8))
+
+
+def test_the_loaded_model_is_the_simulated_one() -> None:
+    world = World(payload=3.0, payload_place=(0.1, -0.05, 0.07), mass_scale=1.07)
+    plant, model = plant_in_world(world), RobotModel(world=world)
+    assert model.mass == pytest.approx(plant.total_mass, rel=EXACT)
+    q = standing_q()
+    plant.place(q)
+    com = plant.data.subtree_com[plant.model.body("base").id]
+    assert model.center_of_mass(q) == pytest.approx(com, abs=1e-8)
+
+
+def test_a_plant_has_the_friction_of_its_world() -> None:
+    usual = MujocoPlant()
+    plant = plant_in_world(World(friction=0.37, joint_friction=2.0))
+    assert plant.model.geom_friction[:, 0] == pytest.approx(0.37)
+    for name in ("dof_damping", "dof_frictionloss"):
+        own, other = getattr(plant.model, name), getattr(usual.model, name)
+        assert own[6:] == pytest.approx(2.0 * other[6:])
+
+
+def test_a_delayed_command_acts_later_and_a_saved_plant_keeps_what_waits() -> None:
+    plant = MujocoPlant(delay=0.006)
+    command = JointCommand.torque(np.full(12, 1.5))
+    acted = []
+    for _ in range(2):
+        plant.write(command)
+        acted.append(plant.read().tau.copy())
+    saved = plant.save()
+    for _ in range(2):
+        plant.write(command)
+        acted.append(plant.read().tau.copy())
+    assert not np.allclose(acted[1], 1.5)
+    assert np.allclose(acted[3], 1.5)
+    plant.restore(saved)
+    plant.write(command)
+    assert np.array_equal(plant.read().tau, acted[2])
