@@ -30,7 +30,7 @@ from controller.checks import (
 )
 from controller.modes import Mode
 from controller.navigation import Goal
-from controller.procedures import Aborted, Measurements, ProcedureRunner, listed
+from controller.procedures import Aborted, Measurements, ProcedureRunner, Touches, listed
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
 from go2_wbc.config import Config
@@ -260,7 +260,10 @@ class Pilot:
         self._procedures.engage(behaviour)
         start, self.playing = self._loop.state.time, behaviour
 
+        touches = Touches(plant)
+
         def finished() -> bool:
+            touches.note()
             if watch is not None:
                 watch(self._loop.state.time - start)
             return behaviour.is_finished(self._loop.snapshot)
@@ -272,6 +275,7 @@ class Pilot:
             at_rest = self._settle(plan.exit, plan.name)
         finally:
             self.playing = None
+        touches.require_few(plan)
         return self._judged(behaviour, at_rest)
 
     def _judged(self, played: PlayPlan, at_rest: Measurements) -> Measurements:

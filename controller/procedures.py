@@ -9,6 +9,8 @@ from controller.behaviours.base import Behaviour
 from controller.checks import posture_measurements
 from controller.loop import Fault
 from controller.runner import Runner
+from go2_wbc.plant import Plant
+from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.snapshot import Snapshot
 
 SETTLE_LIMIT = 3.0
@@ -17,6 +19,10 @@ CALM_TIME = 0.1
 """Time [s] for which a posture must hold without a break."""
 ROUNDING = 1e-9
 """Time [s] by which a sum of control periods may miss its end."""
+TOUCH_FORCE = 1.0
+"""Force [N] of the ground on trunk or legs that counts as a touch."""
+TOUCH_TIME = 0.01
+"""Time [s] for which they may touch it in a motion: what the benchmarks call a touch."""
 SINK_TIME = 1.0
 """Time [s] for which a robot that went limp on its feet is watched: it sinks, or it falls."""
 
@@ -101,6 +107,27 @@ class ProcedureRunner:
 
     def _aborted(self, reason: str) -> Aborted:
         return Aborted(reason, self.measurements())
+
+
+class Touches:
+    """Counts for how long more than the feet touches the ground, on a plant that can tell."""
+
+    def __init__(self, plant: Plant) -> None:
+        """Count on ``plant``."""
+        self._plant, self._time = plant, 0.0
+
+    def note(self) -> None:
+        """Once a tick."""
+        force = self._plant.body_contact_force
+        if force is not None and force > TOUCH_FORCE:
+            self._time += self._plant.control_period
+
+    def require_few(self, plan: MotionPlan) -> None:
+        """Raise ``Aborted`` if it was for longer than ``TOUCH_TIME``, unless the robot may lie."""
+        if self._time > TOUCH_TIME and Posture.LIE not in (plan.entry, plan.exit):
+            raise Aborted(
+                f"{plan.name} touched the ground with trunk or legs for {self._time:.2f} s"
+            )
 
 
 def listed(measured: Measurements) -> str:

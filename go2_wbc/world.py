@@ -1,105 +1,116 @@
-"""``World``: where a motion is to be done, as far as it is known.
-
-One value says it to all who need it: the feasibility check puts the least friction and the payload
-into its equations, ``plant_in`` simulates it, and ``sample`` draws the worlds that may
-be meant, in which ``certify`` plays.
-"""
+"""The world that a motion meets: the floor, the load, and how far the robot is from its model."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from go2_wbc.errors import ConfigError, unknown_name
-from go2_wbc.validation import require_between, require_finite
+from go2_wbc.validation import require_between
 
 SENSORS = ("ideal", "noisy")
+PAYLOAD_HALF_SIZE = (0.10, 0.06, 0.04)
+"""Of the payload [m]: a solid box of about a battery's or computer's size."""
 
 
 @dataclass(frozen=True, slots=True)
 class World:
-    """What is known of ground, load and robot; by default a slippery floor and no load.
+    """What a check counts on, and what a simulated robot meets.
 
-    Numbers with an uncertainty are the middle of an interval; it is a share of them.
+    The controller is told nothing of it: it works with the robot as its description has it.
 
     Attributes:
-        friction: sliding friction coefficient of feet and ground, 0.05 to 2. Wet tiles have 0.5,
-            dry rubber on concrete about 1.
-        friction_uncertainty: 0 to 0.9.
-        payload: extra mass [kg] that the controller does not know, 0 to 15; Unitree states 8.
-        payload_place: where its middle is [m] in the frame of the base, within 0.5.
-        mass_scale: factor on every mass and inertia of the robot, 0.5 to 2.
-        mass_uncertainty: 0 to 0.5; batteries and cables make 5 %.
-        joint_friction: factor on dry and viscous friction of the joints, 0 to 5; 1 is what
-            ``JointDynamics`` says.
-        joint_friction_uncertainty: 0 to 1; identified values of one type of motor differ by half.
-        delay: time [s] from a command to its torque, 0 to 0.02.
-        sensors: "ideal", or "noisy" for white noise on everything measured.
+        friction: coefficient of feet and floor, 0.05 to 2. Wet tiles have 0.5, dry rubber on
+            concrete 1; below the least, none of the project's robots stands.
+        friction_uncertainty: share by which it may be more or less, 0 to 0.9.
+        payload: extra mass [kg] on the trunk, 0 to 12: Unitree's greatest.
+        payload_place: of its middle in the base frame [m], within 0.5 of the base's origin.
+        mass_scale: factor on the robot's mass and inertia, 0.25 to 3.
+        mass_uncertainty: share by which it may be more or less, 0 to 0.5.
+        joint_friction: factor on dry friction and damping of the joints, 0 to 10; those of the
+            motors of robots differ by half (``plant.mujoco.model.JointDynamics``).
+        joint_friction_uncertainty: share by which it may be more or less, 0 to 1.
+        delay: time [s] after which a command acts, 0 to 0.05; a round trip of the robot's bus takes
+            0.002. Only in simulation: the check has no equation for it.
+        sensors: "ideal", or "noisy" for ``plant.sensors.SensorNoise``. Only in simulation.
     """
 
     friction: float = 0.5
-    friction_uncertainty: float = 0.1
+    friction_uncertainty: float = 0.0
     payload: float = 0.0
     payload_place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     mass_scale: float = 1.0
-    mass_uncertainty: float = 0.05
+    mass_uncertainty: float = 0.0
     joint_friction: float = 1.0
-    joint_friction_uncertainty: float = 0.5
+    joint_friction_uncertainty: float = 0.0
     delay: float = 0.0
     sensors: str = "ideal"
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range, or an unknown kind of sensors."""
-        require_between(self, 0.05, 2.0, "friction")
-        require_between(self, 0.0, 0.9, "friction_uncertainty")
-        require_between(self, 0.0, 15.0, "payload")
-        require_between(self, 0.5, 2.0, "mass_scale")
-        require_between(self, 0.0, 0.5, "mass_uncertainty")
-        require_between(self, 0.0, 5.0, "joint_friction")
-        require_between(self, 0.0, 1.0, "joint_friction_uncertainty")
-        require_between(self, 0.0, 0.02, "delay")
+        """Raise ConfigError for a value that is out of range."""
         if not isinstance(self.payload_place, tuple) or len(self.payload_place) != 3:
-            raise ConfigError(
-                f"World.payload_place must be a tuple of three lengths [m], "
-                f"got {self.payload_place!r}"
-            )
-        require_finite(self, "payload_place")
-        require_between(self, -0.5, 0.5, "payload_place")
+            raise ConfigError(f"World.payload_place must be (x, y, z), got {self.payload_place!r}")
+        for name, (low, high) in _RANGES.items():
+            require_between(self, low, high, name)
         if self.sensors not in SENSORS:
-            raise ConfigError(f"World.sensors: {unknown_name('kind', str(self.sensors), SENSORS)}")
+            raise ConfigError(unknown_name("World.sensors", str(self.sensors), SENSORS))
 
-    @property
-    def least_friction(self) -> float:
-        """The friction coefficient that can be counted on."""
-        return self.friction * (1.0 - self.friction_uncertainty)
+    @staticmethod
+    def of(friction: float | None, payload: float | None, world: World | None = None) -> World:
+        """``world``, or the usual one, with this friction and payload where they are given."""
+        own = world or World()
+        if friction is not None:
+            own = replace(own, friction=friction)
+        return own if payload is None else replace(own, payload=payload)
 
     def sample(self, rng: np.random.Generator) -> World:
-        """A world without uncertainty, one of those that may be meant: uniform in each interval."""
+        """A world within the uncertainties, without any of its own; each is drawn evenly."""
+        return self._shifted(rng.uniform(-1.0, 1.0, len(_UNCERTAIN)).tolist())
 
-        def drawn(value: float, uncertainty: float) -> float:
-            return float(value * (1.0 + uncertainty * rng.uniform(-1.0, 1.0)))
+    @property
+    def worst(self) -> World:
+        """The one within the uncertainties that asks most: heavy, stiff, on slippery ground."""
+        return self._shifted([1.0, 1.0, -1.0])
 
+    def _shifted(self, shares: Sequence[float]) -> World:
+        """The world at these shares, -1 to 1, of each uncertainty, in the order of _UNCERTAIN."""
+        values = {
+            name: getattr(self, name) * (1.0 + share * getattr(self, f"{part}_uncertainty"))
+            for (name, part), share in zip(_UNCERTAIN.items(), shares, strict=True)
+        }
         return replace(
-            self,
-            friction=drawn(self.friction, self.friction_uncertainty),
-            mass_scale=drawn(self.mass_scale, self.mass_uncertainty),
-            joint_friction=drawn(self.joint_friction, self.joint_friction_uncertainty),
-            friction_uncertainty=0.0,
-            mass_uncertainty=0.0,
-            joint_friction_uncertainty=0.0,
+            self, **values, **{f"{part}_uncertainty": 0.0 for part in _UNCERTAIN.values()}
         )
 
     def __str__(self) -> str:
-        """In words, what is stated: friction, and what is not as usual."""
-        said = [f"friction {self.friction:.3g}"]
+        """In words, what is not as usual."""
+        words = [f"friction {self.friction:g}"]
         if self.payload:
-            place = ", ".join(f"{length:g}" for length in self.payload_place)
-            said.append(f"payload {self.payload:.3g} kg at ({place}) m")
-        usual = World()
-        for name, unit in (("mass_scale", ""), ("joint_friction", ""), ("delay", " s")):
-            if (value := getattr(self, name)) != getattr(usual, name):
-                said.append(f"{name.replace('_', ' ')} {value:.3g}{unit}")
-        if self.sensors != usual.sensors:
-            said.append(f"{self.sensors} sensors")
-        return ", ".join(said)
+            words.append(f"payload {self.payload:g} kg")
+        words += [
+            f"{name.replace('_', ' ')} {getattr(self, name):g}"
+            for name in ("friction_uncertainty", "mass_scale", "mass_uncertainty", "joint_friction")
+            if getattr(self, name) != getattr(_USUAL, name)
+        ]
+        return ", ".join(words)
+
+
+_RANGES = {
+    "friction": (0.05, 2.0),
+    "friction_uncertainty": (0.0, 0.9),
+    "payload": (0.0, 12.0),
+    "payload_place": (-0.5, 0.5),
+    "mass_scale": (0.25, 3.0),
+    "mass_uncertainty": (0.0, 0.5),
+    "joint_friction": (0.0, 10.0),
+    "joint_friction_uncertainty": (0.0, 1.0),
+    "delay": (0.0, 0.05),
+}
+_UNCERTAIN = {"mass_scale": "mass", "joint_friction": "joint_friction", "friction": "friction"}
+"""What is uncertain, and the name of its uncertainty without the ending."""
+_USUAL = World()
+DOUBTFUL = World(friction_uncertainty=0.1, mass_uncertainty=0.05, joint_friction_uncertainty=0.5)
+"""What is usually not known: the floor within 10 %; the mass within 5 %, which batteries and cables
+make; the joints' friction within half, by which motors of one type differ."""

@@ -21,6 +21,7 @@ from go2_wbc.errors import Go2WbcError
 from go2_wbc.reference import Posture
 from go2_wbc.robot.motor import KNEE_SHARE
 from go2_wbc.wbc.tasks import Gains
+from go2_wbc.world import World
 from motions import FeasibilityChecker, Timeline, check, compile_timeline, load_motion
 from motions.feasibility import FeasibilityLimits
 from motions.keys import BODY_CHANNELS, Frame
@@ -241,13 +242,15 @@ def test_the_limits_in_the_table_are_those_of_the_checker() -> None:
         "support of ZMP": f">= {1000 * limits.zero_moment:g} mm",
         "contact wrench": f"<= {limits.wrench:g} N, <= {0.2 * limits.wrench:g} N m",
         "foot load": f">= {limits.foot_load:g} N",
-        "friction": f"<= {limits.friction:g}",
+        "slip": f"<= {1000 * limits.slip:g} mm",
+        "lag": f"<= {1000 * limits.lag:g} mm, {limits.lag_angle:g} rad",
+        "friction": f"<= {World().friction:g}",
         "self-collision": f">= {1000 * limits.self_distance:g} mm",
         "clearance": f">= {1000 * limits.clearance:g} mm; feet >= -{1000 * limits.swing_depth:g}",
         "dragging": f"<= {1000 * limits.drag:g} mm",
         "landing place": f"<= {1000 * limits.landing:g} mm",
         "landing speed": f"<= {limits.landing_speed:g} m/s",
-        "continuity": f"<= {limits.body_jump:g}, {limits.body_jump:g}, {limits.joint_jump:.1f}",
+        "continuity": f"<= {limits.body_jump:g}, {limits.turn_jump:g}, {limits.joint_jump:g}",
         "entry and exit": f"<= {limits.stance_position:g} m, {limits.stance_angle:g} rad, "
         f"{limits.end_speed:g}",
     }

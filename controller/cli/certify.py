@@ -6,17 +6,16 @@ import argparse
 from pathlib import Path
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json, shown_path
-from controller.cli.motion_args import add_motion, the_motion
+from controller.cli.motion_args import add_motion, add_world, the_motion, world_of
 from controller.cli.progress import ProgressLine
 from controller.cli.sweep import tell
-from controller.cli.world_args import add_world, the_world
 from go2_wbc.errors import CommandError
 
 RUNS = 200
 EXAMPLES = """
 go2-wbc certify high_five
 go2-wbc certify my_motion.py:bow --at-least 0.95
-go2-wbc certify bow --friction 0.4 --payload 3 --payload-at 0.05,0,0.08
+go2-wbc certify bow --friction 0.4 --payload 3
 go2-wbc certify jump_up --n 1000 --width 0.05
 go2-wbc certify wave --set times=5 --json
 """
@@ -67,6 +66,7 @@ def register(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Run it, print the certificate, and say by the exit code whether it is good enough."""
     from controller.sweeps.certify import certify
+    from go2_wbc.world import DOUBTFUL
 
     if args.at_least is not None and not 0.0 < args.at_least < 1.0:
         raise CommandError(f"--at-least must be between 0 and 1, got {args.at_least:g}")
@@ -75,7 +75,7 @@ def run(args: argparse.Namespace) -> int:
         found = certify(
             the_motion(args.motion, args.values),
             args.n,
-            world=the_world(args),
+            world=world_of(args, DOUBTFUL),
             width=args.width,
             first_seed=args.first_seed,
             workers=args.workers,

@@ -11,6 +11,7 @@ from go2_wbc.errors import CommandError, unknown_name
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from go2_wbc.world import World
     from motions import CompiledPlan, FeasibilityReport, Motion, Timeline
     from motions.authoring import Parameter, Value
 
@@ -31,6 +32,23 @@ def add_motion(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
         dest="values",
         help="a parameter of the motion; see `go2-wbc list`",
     )
+
+
+def add_world(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say in which world a motion is done."""
+    parser.add_argument("--friction", metavar="MU", type=float, help="of feet and floor")
+    parser.add_argument("--payload", metavar="KG", type=float, help="extra mass on the trunk")
+
+
+def world_of(args: argparse.Namespace, usual: World | None = None) -> World:
+    """The world that the options say; what they do not, is as in ``usual``.
+
+    Raises:
+        ConfigError: if it is out of range.
+    """
+    from go2_wbc.world import World
+
+    return World.of(args.friction, args.payload, usual)
 
 
 def meant(words: list[str], settings: list[str]) -> list[Timeline | CompiledPlan]:

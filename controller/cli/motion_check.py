@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
-from controller.cli.motion_args import add_motion, meant, print_verdict
+from controller.cli.motion_args import add_motion, add_world, meant, print_verdict, world_of
 from controller.cli.progress import ProgressLine
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ EXAMPLES = """
 go2-wbc check                     every motion of the library, a line each
 go2-wbc check wave                one motion, every limit
 go2-wbc check wave --set times=5
+go2-wbc check wave --friction 0.4 --payload 3
 go2-wbc check my_motion.py        every motion of your own file
 go2-wbc check my_motion.py --fix  what would make it feasible
 go2-wbc check bow --json          the same for a program to read
@@ -39,6 +40,7 @@ def register(subparsers: Subparsers) -> None:
         action="store_true",
         help="look for the least change that makes a refused motion feasible",
     )
+    add_world(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -50,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     reports: list[FeasibilityReport] = []
     changes: dict[str, Sequence[Suggestion]] = {}
     with ProgressLine(is_quiet=args.json) as progress:
-        checker = FeasibilityChecker(progress=progress.solving)
+        checker = FeasibilityChecker(world=world_of(args), progress=progress.solving)
         for number, line in enumerate(lines):
             progress.update(number / len(lines), line.name)
             reports.append(checker.check(line))

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
-from controller.cli.motion_args import add_motion, the_motion
+from controller.cli.motion_args import add_motion, add_world, the_motion, world_of
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import PlantError, StanceMismatch
 
@@ -41,7 +41,7 @@ def register(subparsers: Subparsers) -> None:
     )
     add_motion(parser)
     parser.add_argument("--force", action="store_true", help="play it even if it is infeasible")
-    parser.add_argument("--friction", metavar="MU", type=float, help="of the feet, default 0.8")
+    add_world(parser)
     parser.add_argument(
         "--html", metavar="FILE", type=Path, help="write a 3D replay page, the plan as a ghost"
     )
@@ -64,14 +64,16 @@ def run(args: argparse.Namespace) -> int:
     target = None if args.html is None else checked_output(args.html, HTML_SUFFIXES)
     with ProgressLine(is_quiet=args.json) as line:
         line.update(0.0, f"checking {motion.name}")
-        checker = FeasibilityChecker(progress=line.solving)
+        checker = FeasibilityChecker(world=world_of(args), progress=line.solving)
         checked = checker.evaluate(motion)
     plan, report = checked.plan, checked.report
     if not args.force:
         report.raise_if_infeasible()
     with (
         line,
-        closing(GroundTruth(MujocoPlant(friction=args.friction))) as truth,
+        closing(
+            GroundTruth(MujocoPlant(friction=args.friction, payload=args.payload or 0.0))
+        ) as truth,
         GO2Controller(plant=truth) as go2,
     ):
         truth.on_tick = teller(line, truth.control_period, plan.name, plan.duration)

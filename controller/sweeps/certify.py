@@ -112,7 +112,8 @@ def certify(
     Args:
         motion: as ``GO2Controller.play`` takes it.
         n: runs; each has its own heading and start.
-        world: where; each run is in a sample of it. By default the usual one, ``World()``.
+        world: where; each run is in a sample of it. By default ``DOUBTFUL``: a
+            slippery floor, and what is usually not known of floor and robot.
         width: ends early once the interval of the rate is no wider, 0 to 1; None: all runs.
         first_seed, workers, engine, out, fresh, on_progress: see ``sweep``.
 

@@ -16,7 +16,7 @@ from controller.motion_outcome import outcome_of, shares_of
 from controller.sweeps.rows import Row
 from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
-from go2_wbc.plant import MujocoPlant, plant_in
+from go2_wbc.plant import MujocoPlant, plant_in_world
 from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
@@ -83,7 +83,8 @@ class MotionStudy:
         rng = np.random.default_rng(seed)
         world, yaw = self.world.sample(rng), rng.uniform(*YAW_RANGE)
         noise = JOINT_NOISE
-        return world, plant_in(world, seed=seed, initial_yaw=yaw, initial_joint_noise=noise)
+        plant = plant_in_world(world, seed=seed, initial_yaw=yaw, initial_joint_noise=noise)
+        return world, plant
 
     def _played(self, robot: TrialRobot) -> MotionMeasurement:
         plan, go2 = plan_of(self.archive), robot.go2

@@ -156,7 +156,7 @@ def target_of(what: object) -> Target:
 
 
 def motion_target(motion: object, name: str = "", world: World | None = None) -> Target:
-    """The target that plays a motion in samples of a world, by default of the usual one.
+    """The target that plays a motion in samples of a world, by default ``DOUBTFUL``.
 
     ``motion`` is a ``Playable``, and compiled here.
 
@@ -167,7 +167,7 @@ def motion_target(motion: object, name: str = "", world: World | None = None) ->
     from controller.sweeps.motion_study import MotionStudy, archive_of, text_of
     from go2_wbc.reference import Posture
     from go2_wbc.robot.model import RobotModel
-    from go2_wbc.world import World
+    from go2_wbc.world import DOUBTFUL
     from motions import CompiledPlan
     from motions.feasibility import compile_motion
 
@@ -177,7 +177,7 @@ def motion_target(motion: object, name: str = "", world: World | None = None) ->
     if plan.entry not in (Posture.STAND, Posture.SIT):
         raise CommandError(f"{plan.name} starts from {plan.entry.value}: cannot be swept")
     archive = archive_of(plan)
-    world = World() if world is None else world
+    world = DOUBTFUL if world is None else world
     about: dict[str, str | bytes] = {"kind": "motion", "plan": archive, "world": text_of(world)}
     return Target(name or plan.name, MotionStudy(archive, world), about)
 

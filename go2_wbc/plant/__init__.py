@@ -4,6 +4,6 @@ from __future__ import annotations
 
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.plant import MujocoPlant
-from go2_wbc.plant.mujoco.worlds import plant_in
+from go2_wbc.plant.mujoco.worlds import plant_in_world
 
-__all__ = ["MujocoPlant", "Plant", "plant_in"]
+__all__ = ["MujocoPlant", "Plant", "plant_in_world"]

@@ -31,6 +31,11 @@ class Plant(ABC):
         """
         return self.is_live
 
+    @property
+    def body_contact_force(self) -> float | None:
+        """Normal force [N] of the ground on all but the feet; None of a plant that cannot tell."""
+        return None
+
     @abstractmethod
     def read(self) -> RobotState:
         """The newest measured state.

@@ -22,9 +22,9 @@ from go2_wbc.kernels.layout import ROBOT, SNAPSHOT
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
-from go2_wbc.robot.payload import payload_inertia
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
+from go2_wbc.world import PAYLOAD_HALF_SIZE, World
 
 FOOT_RADIUS = 0.022
 """Radius [m] of the spherical foot: the foot mesh's, see the robot description."""
@@ -62,9 +62,7 @@ class RobotModel:
         armature: Float[np.ndarray, "12"] = ROTOR_ARMATURE,
         foot_radius: float = FOOT_RADIUS,
         motor: str = TORQUE_SPEED,
-        payload: float = 0.0,
-        payload_place: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        mass_scale: float = 1.0,
+        world: World | None = None,
     ) -> None:
         """Load the robot.
 
@@ -73,9 +71,7 @@ class RobotModel:
             armature: reflected rotor inertias [kg m^2].
             foot_radius: radius [m] of the spherical feet; 0 puts contacts at the foot frames.
             motor: "torque-speed", or "ideal" for the peak torque at every speed.
-            payload: mass [kg] of a solid box on the base.
-            payload_place: where its middle is [m] in the frame of the base.
-            mass_scale: factor on every mass and inertia of the robot, payload excepted.
+            world: whose load the robot carries, and by whose factor it is heavier; none by default.
 
         Raises:
             ConfigError: for an unknown motor.
@@ -85,8 +81,9 @@ class RobotModel:
         self.motor = MotorModel.named(motor, self.description)
         self.foot_radius = foot_radius
         self.pin_model = _load(self.description.urdf_path)
+        if world is not None:
+            _burden(self.pin_model, world)
         self.pin_model.armature = np.concatenate([np.zeros(6), armature])
-        _load_up(self.pin_model, payload, payload_place, mass_scale)
         self._data = self.pin_model.createData()
         self._foot_frames = [self.pin_model.getFrameId(name) for name in FOOT_NAMES]
         self._zero_acceleration = np.zeros(18)
@@ -193,6 +190,18 @@ class RobotModel:
         return np.array(pin.rnea(self.pin_model, self._data, q, v, a))
 
 
+def _burden(model: pin.Model, world: World) -> None:
+    """Make the robot as heavy as it is in ``world``, with its payload on the trunk."""
+    for joint in range(1, model.njoints):
+        own = model.inertias[joint]
+        scale = world.mass_scale
+        model.inertias[joint] = pin.Inertia(scale * own.mass, own.lever, scale * own.inertia)
+    if world.payload > 0.0:
+        box = pin.Inertia.FromBox(world.payload, *(2.0 * half for half in PAYLOAD_HALF_SIZE))
+        place = pin.SE3(np.eye(3), np.array(world.payload_place))
+        model.inertias[1] = model.inertias[1] + place.act(box)
+
+
 def _about_joint(inertia: pin.Inertia) -> Float[np.ndarray, "10"]:
     """Mass, first moment and inertia (xx, xy, xz, yy, yz, zz) about the origin of the joint."""
     mass, c = inertia.mass, inertia.lever
@@ -203,21 +212,7 @@ def _about_joint(inertia: pin.Inertia) -> Float[np.ndarray, "10"]:
 _PARENTS = [0, 0, 1, 2, 3, 1, 5, 6, 1, 8, 9, 1, 11, 12]
 """The joint before each, in Pinocchio's order: universe, base, and four legs of three."""
 _CALVES = [4, 7, 10, 13]
-_BASE = 1
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-
-
-def _load_up(
-    model: pin.Model, payload: float, place: tuple[float, float, float], mass_scale: float
-) -> None:
-    """Scale the robot's masses and inertias, then fix the payload to its base."""
-    for joint in range(1, model.njoints):
-        robot = model.inertias[joint]
-        scaled = (mass_scale * robot.mass, robot.lever, mass_scale * robot.inertia)
-        model.inertias[joint] = pin.Inertia(*scaled)
-    if payload:
-        box = pin.Inertia(payload, np.array(place), np.diag(payload_inertia(payload)))
-        model.inertias[_BASE] += box
 
 
 def _load(urdf: Path) -> pin.Model:

@@ -7,6 +7,7 @@ import numpy as np
 from go2_wbc.errors import MotionError
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.world import World
 from motions.assembly import compile_timeline
 from motions.compiled_plan import CompiledPlan
 from motions.feasibility import dynamic, flight, friction, kinematic
@@ -15,11 +16,15 @@ from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.departure import departure_measurements, departures
 from motions.feasibility.hulls import LinkHulls
 from motions.feasibility.limits import FeasibilityLimits, FlightLimits
+from motions.feasibility.load import loaded, with_load
 from motions.feasibility.nearest import Progress, mending
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.language.written import NEAREST
 from motions.problem import Problem
 from motions.trajectory import trajectory_of
+
+FLIGHT_SHARE = 1.1
+"""What solved plans may use of the floor's friction: they are solved for 0.5, and reach 0.55."""
 
 
 class FeasibilityChecker:
@@ -30,6 +35,7 @@ class FeasibilityChecker:
 
     Attributes:
         model: the robot.
+        world: in which motions are checked.
     """
 
     def __init__(
@@ -37,16 +43,20 @@ class FeasibilityChecker:
         model: RobotModel | None = None,
         limits: FeasibilityLimits | None = None,
         *,
+        world: World | None = None,
         progress: Progress | None = None,
     ) -> None:
-        """Prepare for ``model``, by default the installed Go2.
+        """Prepare for ``model``, by default the installed Go2, in ``world``.
 
-        ``progress`` is called while a dynamic motion is solved, with the number of iterations and
-        the cost.
+        What is uncertain in it counts at its worst. Plans are made for ``model`` as it is: like the
+        controller, they know nothing of a payload. ``progress`` is called while a dynamic motion is
+        solved, with the number of iterations and the cost.
         """
         self.model = model or RobotModel()
+        self.world = world or World()
         self._progress = progress
         self._limits = limits or FeasibilityLimits()
+        self._loaded = loaded(self.model, self.world.worst)
         self._collision = SelfCollision(self.model)
         self._hulls = LinkHulls(self.model, self._collision.geometry)
 
@@ -86,7 +96,7 @@ class FeasibilityChecker:
             return self.evaluate(plan).report
         except MotionError as error:
             unknown = _failed(Problem("numbers", "plan", 0.0, reason=str(error)))
-            return FeasibilityReport.of(plan.name, plan.duration, [unknown])
+            return FeasibilityReport.of(plan.name, plan.duration, [unknown], world=self.world)
 
     def _compiled(self, motion: object) -> MotionPlan:
         """The plan of ``motion``, the nearest feasible one where its timeline asks for that."""
@@ -126,18 +136,21 @@ class FeasibilityChecker:
             return motion
         plan, model, limits = self._compiled(motion), self.model, self._limits
         path = trajectory_of(plan, model)
-        forces = dynamic.forces_of(path, model)
+        heavy, floor = self._loaded, self.world.worst.friction
+        carried = path if heavy is model else with_load(path, heavy)
+        forces = dynamic.forces_of(path, heavy)
         problems, in_flight = (), []
         if isinstance(plan, CompiledPlan):
             problems = plan.problems
             forces = flight.with_spans(forces, path, plan, model)
-            in_flight = flight.flight(plan, model, FlightLimits())
-        lag = dynamic.lagging(path, forces, model, limits)
-        com, zero_moment_point = dynamic.support(path, forces, limits)
-        slip = friction.slip(path, forces, limits)
+            in_flight = flight.flight(plan, model, FlightLimits(friction=FLIGHT_SHARE * floor))
+        forces = dynamic.resisted(forces, path, self.world.worst)
+        lag = dynamic.lagging(path, forces, heavy, limits)
+        com, zero_moment_point = dynamic.support(carried, forces, limits)
+        slip = friction.slip(path, forces, limits, floor)
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
         wrench, load = dynamic.contacts(path, forces, limits)
-        grip = friction.friction(path, forces, model, limits)
+        grip = friction.friction(path, forces, heavy, limits, floor)
         landing_place, landing_speed = kinematic.landing(path, model, limits)
         in_order_of_causes = [
             *(_failed(problem) for problem in problems if problem.check != "balance"),
@@ -155,7 +168,7 @@ class FeasibilityChecker:
             kinematic.smoothness(path, limits),
             zero_moment_point if lag.is_broken else zero_moment_point.excused(),
             wrench if lag.is_broken else wrench.excused(),
-            load,
+            load if slips else load.excused(),
             lag,
             grip if slips else grip.excused(),
             slip,
@@ -164,14 +177,35 @@ class FeasibilityChecker:
         ]
         end_pose = plan.end_pose if isinstance(plan, CompiledPlan) else None
         report = FeasibilityReport.of(
-            plan.name, plan.duration, in_order_of_causes, end_pose, departures(plan, model)
+            plan.name,
+            plan.duration,
+            in_order_of_causes,
+            end_pose,
+            departures=departures(plan, model),
+            world=self.world,
         )
         return CheckedMotion(plan, report, path, forces)
 
 
-def check(motion: Playable) -> FeasibilityReport:
-    """Whether the installed Go2 can do ``motion``; see ``FeasibilityChecker``."""
-    return FeasibilityChecker().check(motion)
+def check(
+    motion: Playable,
+    *,
+    friction: float | None = None,
+    payload: float | None = None,
+    world: World | None = None,
+) -> FeasibilityReport:
+    """Whether the installed Go2 can do ``motion``; see ``FeasibilityChecker``.
+
+    Args:
+        motion: what to check.
+        friction: coefficient of the floor, instead of that of ``world``.
+        payload: extra mass [kg], instead of that of ``world``.
+        world: in which it is checked, ``World()`` by default.
+
+    Raises:
+        ConfigError: for a world that is out of range.
+    """
+    return FeasibilityChecker(world=World.of(friction, payload, world)).check(motion)
 
 
 def _failed(problem: Problem) -> Series:

@@ -14,7 +14,7 @@ least from an even share of the weight is taken; see ``_share``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -29,6 +29,7 @@ from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import friction_pyramid
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
+from go2_wbc.world import World
 from motions.feasibility.kinematic import FEET, JOINTS
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
@@ -43,6 +44,9 @@ EVENNESS = 1e-4
 give the same wrench, and takes less than 0.01 N off that."""
 PYRAMID = WbcConfig().friction
 """Friction coefficient of the whole-body controller's pyramid: it would ask for no other forces."""
+DRY, VISCOUS, CREEP = 0.2, 0.1, 0.1
+"""Friction of a joint: N m, N m s/rad, and the speed [rad/s] below which the dry part is less. As
+the simulated robot has it (``plant.mujoco.model.JointDynamics``)."""
 LOADED = 0.999
 """Share of its load from which on a foot counts as standing fully: 1, less rounding."""
 PRESSED = 10.0
@@ -103,6 +107,13 @@ def numbers_of(model: RobotModel) -> Float[np.ndarray, "4"]:
 def scale_of_wrench() -> Float[np.ndarray, "6"]:
     """By what forces and moments are multiplied to be compared."""
     return np.repeat([1.0, 1.0 / ARM], 3)
+
+
+def resisted(forces: Forces, motion: Trajectory, world: World) -> Forces:
+    """``forces`` with what the motors need besides for the friction of their joints."""
+    v = motion.v[:, 6:]
+    friction = world.joint_friction * (DRY * np.tanh(v / CREEP) + VISCOUS * v)
+    return replace(forces, tau=forces.tau + np.where(motion.is_dynamic[:, None], 0.0, friction))
 
 
 def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:

@@ -15,8 +15,6 @@ class FeasibilityLimits:
         reach: distance [m] by which a foot's place may be out of the leg's reach: what rounding of
             the trunk's place makes of one at the end of the reach.
         torque_share: share of the torque limit that a plan may use; 15 % are for feedback.
-        friction: friction coefficient of the ground: the floor of the benchmark, on which verdicts
-            were compared.
         slip: greatest distance [m] that a standing foot may slide.
         foot_load: least normal force [N] of a foot that stands: 2 % of the weight; leans with 4 N
             were done.
@@ -50,7 +48,6 @@ class FeasibilityLimits:
 
     reach: float = 0.002
     torque_share: float = 0.85
-    friction: float = 0.5
     slip: float = 0.01
     foot_load: float = 3.0
     support: float = 0.006

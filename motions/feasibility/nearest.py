@@ -13,10 +13,12 @@ from motions.dynamics.cache import nearest_cached
 from motions.dynamics.nearest import Written
 from motions.dynamics.phases import Tolerance
 from motions.dynamics.trajectory import DynamicTrajectory
-from motions.feasibility.report import FeasibilityReport
+from motions.feasibility.report import FeasibilityReport, Series
 from motions.mending import Mend
 
 Progress = Callable[[int, float], None]
+SUMS = ("slip",)
+"""Checks whose values add up: what was too much stays so, but is wrong only while it grows."""
 
 
 def mending(
@@ -28,13 +30,18 @@ def mending(
     """Solves what ``check`` finds infeasible, within ``tolerance``."""
 
     def broken(plan: CompiledPlan) -> Float[np.ndarray, " k"]:
-        report = check(plan)
-        found = [
-            one.times[(one.margins < 0.0).any(axis=1)] for one in report.series
-        ]  # nan, nothing to check, is not below 0
-        return np.concatenate([[], *found])
+        return np.concatenate([[], *(_broken(one) for one in check(plan).series)])
 
     def solve(written: Written) -> DynamicTrajectory:
         return nearest_cached(written, model, tolerance=tolerance, progress=progress)
 
     return Mend(broken, solve)
+
+
+def _broken(series: Series) -> Float[np.ndarray, " k"]:
+    """Instants [s] at which a limit is broken; nan, nothing to check, breaks none."""
+    is_below = series.margins < 0.0
+    if series.check in SUMS:
+        before = np.vstack([np.full((1, series.margins.shape[1]), np.inf), series.margins[:-1]])
+        is_below &= ~(series.margins >= before)
+    return series.times[is_below.any(axis=1)]

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.errors import MotionInfeasible
+from go2_wbc.world import World
 from motions.feasibility.departure import Departure
 
 NOISE = 1e-6
@@ -133,6 +134,7 @@ class FeasibilityReport:
             of one check the earliest first.
         warnings: limits that are met by little.
         margins: worst finding of every check.
+        world: in which it holds.
         end_pose: where the motion ends: x, y [m] and yaw [rad] of the frame of the feet, seen from
             its start; None of a plan that does not say.
         departures: how far the parts that are the nearest to what was written are from it.
@@ -144,6 +146,7 @@ class FeasibilityReport:
     failures: tuple[Finding, ...]
     warnings: tuple[Finding, ...]
     margins: Mapping[str, Finding]
+    world: World
     end_pose: tuple[float, float, float] | None = None
     departures: tuple[Departure, ...] = ()
 
@@ -153,7 +156,9 @@ class FeasibilityReport:
         duration: float,
         series: Sequence[Series],
         end_pose: tuple[float, float, float] | None = None,
+        *,
         departures: tuple[Departure, ...] = (),
+        world: World | None = None,
     ) -> FeasibilityReport:
         """Draw the conclusions from ``series``, which has causes before their consequences."""
         failures, warnings, margins = [], [], {}
@@ -165,8 +170,17 @@ class FeasibilityReport:
             broken = [finding for finding in found if not finding.margin >= 0.0]
             failures += sorted(broken, key=lambda finding: finding.time)
             warnings += [finding for finding in found if 0.0 <= finding.margin < item.tight]
-        findings = tuple(failures), tuple(warnings), margins
-        return FeasibilityReport(motion, duration, tuple(series), *findings, end_pose, departures)
+        return FeasibilityReport(
+            motion=motion,
+            duration=duration,
+            series=tuple(series),
+            failures=tuple(failures),
+            warnings=tuple(warnings),
+            margins=margins,
+            world=world or World(),
+            end_pose=end_pose,
+            departures=departures,
+        )
 
     @property
     def ok(self) -> bool:
@@ -194,6 +208,8 @@ class FeasibilityReport:
         verdict = "can do it" if self.ok else f"cannot do it: {_count(len(self.failures), 'limit')}"
         tight = f", {_count(len(self.warnings), 'tight margin')}" if self.warnings else ""
         lines += ["-" * 80, f"{self.motion}, {self.duration:.1f} s: the robot {verdict}{tight}."]
+        if self.world != World():
+            lines.append(f"That holds for {self.world}.")
         if self.end_pose is not None and max(map(abs, self.end_pose)) > STAYS:
             x, y, yaw = self.end_pose
             lines.append(
@@ -218,6 +234,7 @@ class FeasibilityReport:
             "duration": self.duration,
             "ok": self.ok,
             "end_pose": self.end_pose,
+            "world": asdict(self.world),
             "failures": [asdict(finding) for finding in self.failures],
             "warnings": [asdict(finding) for finding in self.warnings],
             "departures": [asdict(one) for one in self.departures],

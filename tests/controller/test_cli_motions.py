@@ -160,7 +160,7 @@ def test_new_and_export_tell_a_program_what_they_wrote(
 
 
 def test_a_robot_that_cannot_get_up_is_a_message(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "bow", "--friction", "0.0001"]) == ExitCode.RUNTIME
+    assert main(["run", "bow", "--friction", "0.05", "--payload", "12"]) == ExitCode.RUNTIME
     assert "the robot did not get ready: " in capsys.readouterr().err
 
 

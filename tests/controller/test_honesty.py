@@ -14,6 +14,7 @@ from controller import runner as runner_module
 from go2_wbc.errors import PlantTimeout
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.state import JointCommand
+from motions import Timeline
 from tests.controller.plants import HANG_GUARD, PERIOD, WatchedPlant, in_thread
 
 # A share of the motors' torque with which a walking robot sinks to the ground.
@@ -108,3 +109,14 @@ def test_in_realtime_a_plant_that_blocks_keeps_nobody_waiting(
         assert go2.mode is Mode.CLOSED
     finally:
         released.set()
+
+
+def test_a_motion_that_kneels_on_the_ground_is_not_done() -> None:
+    # Trunk low and aside, a paw up: a thigh lay on the ground for a second, and play said True.
+    low = Timeline().body(roll=-0.141, z=-0.111, over=1.0)
+    line = low.foot("FR", z=0.07, over=0.6).hold(0.3).down("FR", over=0.4).home(over=0.9)
+    with GO2Controller() as go2:
+        assert go2.stand()
+        assert not go2.play(line, check=False)
+        assert "touched the ground with trunk or legs for" in go2.last_outcome.reason
+        assert go2.play("nod"), go2.last_outcome.reason

@@ -1,64 +1,92 @@
-"""A world says what is known, refuses what makes no sense, and draws the worlds that it may be."""
+"""A world is checked, drawn from, and met by a simulated robot."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from go2_wbc import World
 from go2_wbc.errors import ConfigError
+from go2_wbc.plant import MujocoPlant, plant_in_world
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.state import JointCommand
+from go2_wbc.world import World
+from tests.engine_helpers import standing_q
+
+EXACT = 1e-9
 
 
 @pytest.mark.parametrize(
-    ("settings", "named"),
+    ("setting", "says"),
     [
-        ({"friction": 0.0}, "friction must be between 0.05 and 2"),
-        ({"friction": float("nan")}, "friction"),
-        ({"friction_uncertainty": 1.0}, "friction_uncertainty"),
-        ({"payload": -1.0}, "payload"),
-        ({"payload": 40.0}, "payload"),
-        ({"payload_place": (0.0, 0.9, 0.0)}, "payload_place"),
-        ({"mass_scale": 0.0}, "mass_scale"),
-        ({"mass_uncertainty": 0.7}, "mass_uncertainty"),
-        ({"joint_friction": -0.1}, "joint_friction"),
-        ({"joint_friction_uncertainty": 2.0}, "joint_friction_uncertainty"),
-        ({"delay": 0.1}, "delay"),
-        ({"sensors": "nosy"}, "noisy"),
+        ({"friction": 0.0}, "World.friction must be between 0.05 and 2, got 0.0"),
+        ({"friction": float("nan")}, "World.friction must be between"),
+        ({"payload": -1.0}, "World.payload must be between 0 and 12"),
+        ({"payload_place": (0.0, 0.0, 0.9)}, "World.payload_place must be between -0.5 and 0.5"),
+        ({"mass_uncertainty": 0.6}, "World.mass_uncertainty must be between 0 and 0.5"),
+        ({"delay": 1.0}, "World.delay must be between 0 and 0.05"),
+        ({"sensors": "lidar"}, "unknown World.sensors 'lidar'; valid: ideal, noisy"),
     ],
 )
-@pytest.mark.filterwarnings("ignore::UserWarning")
-def test_what_no_world_has_is_refused_by_name(settings: dict, named: str) -> None:
-    with pytest.raises(ConfigError, match=named):
-        World(**settings)
+def test_a_world_out_of_range_is_refused(setting: dict, says: str) -> None:
+    with pytest.raises(ConfigError, match=says):
+        World(**setting)
 
 
-def test_samples_fill_the_intervals_that_are_stated_and_leave_none() -> None:
+def test_a_drawn_world_lies_within_the_uncertainties_and_follows_its_seed() -> None:
     world = World(
-        friction=0.6,
         friction_uncertainty=0.2,
-        payload=2.0,
         mass_uncertainty=0.1,
+        joint_friction=1.2,
         joint_friction_uncertainty=0.5,
     )
-    drawn = [world.sample(np.random.default_rng(seed)) for seed in range(300)]
-    for name, low, high in (
-        ("friction", 0.48, 0.72),
-        ("mass_scale", 0.9, 1.1),
-        ("joint_friction", 0.5, 1.5),
-    ):
-        values = [getattr(one, name) for one in drawn]
-        assert low <= min(values) < low + 0.02 * (high - low)
-        assert high - 0.02 * (high - low) < max(values) <= high
-    one = drawn[0]
-    assert one.payload == 2.0
-    assert one.sample(np.random.default_rng(7)) == one
-    assert one.least_friction == one.friction
-    assert world.least_friction == pytest.approx(0.48)
-    assert world.sample(np.random.default_rng(0)) == drawn[0]
+    drawn = [world.sample(np.random.default_rng(seed)) for seed in range(200)]
+    assert drawn[3] == world.sample(np.random.default_rng(3))
+    masses = [own.mass_scale for own in drawn]
+    joints = [own.joint_friction for own in drawn]
+    assert 0.9 <= min(masses) < 0.91
+    assert 1.09 < max(masses) <= 1.1
+    assert 0.6 <= min(joints) < 0.63
+    assert 1.77 < max(joints) <= 1.8
+    floors = [own.friction for own in drawn]
+    assert 0.4 <= min(floors) < 0.41
+    assert 0.59 < max(floors) <= 0.6
+    assert world.worst.friction == pytest.approx(0.4)
+    assert all(own.sample(np.random.default_rng(0)) == own for own in drawn)
+    assert (world.worst.mass_scale, world.worst.joint_friction) == pytest.approx((1.1, 1.8))
 
 
-def test_a_world_says_what_is_not_as_usual() -> None:
-    assert str(World()) == "friction 0.5"
-    said = str(World(friction=0.4, payload=3.0, payload_place=(0.1, 0.0, 0.05), delay=0.004))
-    assert said == "friction 0.4, payload 3 kg at (0.1, 0, 0.05) m, delay 0.004 s"
-    assert "noisy sensors" in str(World(sensors="noisy", joint_friction=2.0))
+def test_the_loaded_model_is_the_simulated_one() -> None:
+    world = World(payload=3.0, payload_place=(0.1, -0.05, 0.07), mass_scale=1.07)
+    plant, model = plant_in_world(world), RobotModel(world=world)
+    assert model.mass == pytest.approx(plant.total_mass, rel=EXACT)
+    q = standing_q()
+    plant.place(q)
+    com = plant.data.subtree_com[plant.model.body("base").id]
+    assert model.center_of_mass(q) == pytest.approx(com, abs=1e-8)
+
+
+def test_a_plant_has_the_friction_of_its_world() -> None:
+    usual = MujocoPlant()
+    plant = plant_in_world(World(friction=0.37, joint_friction=2.0))
+    assert plant.model.geom_friction[:, 0] == pytest.approx(0.37)
+    for name in ("dof_damping", "dof_frictionloss"):
+        own, other = getattr(plant.model, name), getattr(usual.model, name)
+        assert own[6:] == pytest.approx(2.0 * other[6:])
+
+
+def test_a_delayed_command_acts_later_and_a_saved_plant_keeps_what_waits() -> None:
+    plant = MujocoPlant(delay=0.006)
+    command = JointCommand.torque(np.full(12, 1.5))
+    acted = []
+    for _ in range(2):
+        plant.write(command)
+        acted.append(plant.read().tau.copy())
+    saved = plant.save()
+    for _ in range(2):
+        plant.write(command)
+        acted.append(plant.read().tau.copy())
+    assert not np.allclose(acted[1], 1.5)
+    assert np.allclose(acted[3], 1.5)
+    plant.restore(saved)
+    plant.write(command)
+    assert np.array_equal(plant.read().tau, acted[2])

@@ -140,6 +140,11 @@ class GroundTruth(Plant):
         """Seconds that pass in one ``write``."""
         return self._plant.control_period
 
+    @property
+    def body_contact_force(self) -> float | None:
+        """See ``Plant.body_contact_force``."""
+        return self._plant.body_contact_force
+
     def read(self) -> RobotState:
         """The measured state."""
         return self._plant.read()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -18,8 +18,8 @@ from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.mujoco.visuals import add_visuals
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.description import BASE_LINK, RobotDescription
-from go2_wbc.robot.payload import payload_inertia
 from go2_wbc.validation import require_not_negative
+from go2_wbc.world import PAYLOAD_HALF_SIZE
 
 FOOT_RADIUS = 0.022  # m; radius of the foot in the URDF's foot mesh and in every published MJCF
 FLOOR = "go2_wbc_floor"
@@ -60,6 +60,14 @@ class JointDynamics:
     def __post_init__(self) -> None:
         """Raise ConfigError for a negative number."""
         require_not_negative(self, "armature", "damping", "friction_loss")
+
+    def scaled(self, friction: float) -> JointDynamics:
+        """The same with friction and damping ``friction`` times as large."""
+        damping, loss = (
+            (friction * hip, friction * thigh, friction * calf)
+            for hip, thigh, calf in (self.damping, self.friction_loss)
+        )
+        return replace(self, damping=damping, friction_loss=loss)
 
     @staticmethod
     def none() -> JointDynamics:
@@ -219,10 +227,11 @@ def _add_boxes(spec: mujoco.MjSpec, terrain: Boxes) -> None:
 def add_payload(
     spec: mujoco.MjSpec, base: str, payload: float, place: tuple[float, float, float]
 ) -> None:
-    """Fixes ``payload`` kg, a solid box, to the body ``base``, with its middle at ``place`` [m]."""
-    body = spec.body(base).add_body(name=PAYLOAD_BODY, mass=payload, pos=place)
-    body.ipos = np.zeros(3)  # of the body; MuJoCo would take its place once more
-    body.inertia = payload_inertia(payload)
+    """Fixes ``payload`` kg, a solid box, to ``place`` [m] in the frame of the body ``base``."""
+    x, y, z = (2.0 * half for half in PAYLOAD_HALF_SIZE)
+    body = spec.body(base).add_body(name=PAYLOAD_BODY, mass=payload, pos=list(place))
+    body.inertia = [payload / 12.0 * s for s in (y * y + z * z, x * x + z * z, x * x + y * y)]
+    body.ipos = [0.0, 0.0, 0.0]
     body.explicitinertial = True
 
 

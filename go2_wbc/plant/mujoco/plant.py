@@ -16,11 +16,7 @@ from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, u
 from go2_wbc.lazy import without_collecting
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
-from go2_wbc.plant.mujoco.contacts import (
-    Contacts,
-    FootContacts,
-    foot_contacts,
-)
+from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Pushes
@@ -31,6 +27,7 @@ from go2_wbc.plant.sensors import ImuSample, SensorNoise
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.state import JointCommand, RobotState
+from go2_wbc.world import SENSORS
 
 _logger = logging.getLogger(__name__)
 
@@ -52,8 +49,8 @@ class MujocoPlant(Plant):
         control_period: seconds per ``write``, an integer multiple of ``timestep``.
         friction: sliding friction coefficient; ``None`` is 0.8, or what ``mjcf`` says. With
             ``mjcf`` a number applies to the feet's contacts.
-        payload: extra mass [kg], a solid box fixed to the base.
-        payload_place: where its middle is [m] in the frame of the base.
+        payload: extra mass [kg], a solid box.
+        payload_place: of its middle in the base frame [m].
         mass_scale: factor on every mass and inertia of the robot, payload excepted.
         terrain: boxes to strew on the floor; only without ``mjcf``.
         sensors: ``"ideal"``, or ``"noisy"`` for white noise on everything measured.
@@ -64,9 +61,9 @@ class MujocoPlant(Plant):
         joint_dynamics: friction, damping, armature; ``None`` is ``JointDynamics()``, or what
             ``mjcf`` says.
         motor: ``"torque-speed"``, or ``"ideal"`` for the peak torque at every speed.
-        delay: time [s] from ``write`` until a command acts, a multiple of ``control_period``.
         urdf: another URDF instead of the installed one.
         visuals: also load the visual meshes (slower), for the viewer and for rendering.
+        delay: time [s] after which a command acts, rounded to whole control periods.
 
     Raises:
         ConfigError: for a value that is out of range.
@@ -92,12 +89,12 @@ class MujocoPlant(Plant):
         initial_joint_noise: float = 0.0,
         joint_dynamics: JointDynamics | None = None,
         motor: str = TORQUE_SPEED,
-        delay: float = 0.0,
         urdf: Path | str | None = None,
         visuals: bool = False,
+        delay: float = 0.0,
     ) -> None:
-        if sensors not in ("ideal", "noisy"):
-            raise ConfigError(unknown_name("sensors", sensors, ("ideal", "noisy")))
+        if sensors not in SENSORS:
+            raise ConfigError(unknown_name("sensors", sensors, SENSORS))
         setup = PlantSetup(
             mjcf=mjcf,
             urdf=urdf,
@@ -112,8 +109,8 @@ class MujocoPlant(Plant):
             initial_joint_noise=initial_joint_noise,
             joint_dynamics=joint_dynamics,
             motor=motor,
-            delay=delay,
             visuals=visuals,
+            delay=delay,
             seed=seed,
         )
         start_rng, self._rng = np.random.default_rng(seed).spawn(2)
@@ -125,6 +122,8 @@ class MujocoPlant(Plant):
         self._period, self._substeps = control_period, round(control_period / timestep)
         self._closed = False
         self._ticks = 0
+        self._waiting: deque[Float[np.ndarray, "5 12"]] = deque()
+        self._delay = round(delay / control_period)
         self._pushes = Pushes(self._model, self._data, self._layout)
         # Views into MuJoCo's memory, made once because making them is slow.
         data, layout = self._data, self._layout
@@ -133,10 +132,9 @@ class MujocoPlant(Plant):
         self._warnings = data.warning.number
         self._bind_kernels()
         settle(self._model, data, layout, setup, start_rng)
-        lying = JointCommand.damping(LYING_DAMPING)
-        self._waiting = deque([_rows(lying)] * round(delay / control_period))
         # One period in the lying state, so that the first read has forces and torques.
-        self.write(lying)
+        self._command = np.zeros((5, 12))  # until a delayed one arrives
+        self.write(JointCommand.damping(LYING_DAMPING))
         self._ticks, self._data.time = 0, 0.0
 
     @property
@@ -271,13 +269,17 @@ class MujocoPlant(Plant):
 
     def foot_contacts(self) -> FootContacts:
         """Contact points of the feet and the velocities of their material there."""
-        points, velocities = foot_contacts([self.contacts()])
-        return FootContacts(points[0], velocities[0])
+        return FootContacts(*(rows[0] for rows in foot_contacts([self.contacts()])))
 
     def contacts(self) -> Contacts:
         """Every contact now, to be evaluated later."""
         self._check_open()
         return Contacts.of(self._data, self._layout)
+
+    @property
+    def body_contact_force(self) -> float | None:
+        """See ``Plant.body_contact_force``."""
+        return self.base_contact_force + self.limb_contact_force
 
     @property
     def base_contact_force(self) -> float:
@@ -299,12 +301,12 @@ class MujocoPlant(Plant):
             integration=integration,
             ticks=self._ticks,
             pushes=self._pushes.active,
+            waiting=tuple(self._waiting),
             tau=self._tau,
             forces=self._forces,
             noise_state=self._rng.bit_generator.state,
             state=self._state,
             imu=self._imu,
-            waiting=tuple(self._waiting),
         )
 
     def restore(self, saved: SavedPhysics) -> None:
@@ -316,10 +318,10 @@ class MujocoPlant(Plant):
         self._warnings[:] = 0
         self._ticks = saved.ticks
         self._pushes.active = saved.pushes
+        self._waiting = deque(saved.waiting)
         self._tau, self._forces = saved.tau, saved.forces
         self._rng.bit_generator.state = dict(saved.noise_state)
         self._state, self._imu = saved.state, saved.imu
-        self._waiting = deque(saved.waiting)
 
     def close(self) -> None:
         """Ends the plant; every later call but ``close`` raises ``ClosedError``."""
@@ -331,16 +333,18 @@ class MujocoPlant(Plant):
 
     def _accept(self, command: JointCommand) -> None:
         """Copies ``command`` if it is good."""
-        for name in _FIELDS:
-            if (shape := getattr(command, name).shape) != (12,):
-                raise CommandError(f"command.{name} must have shape (12,), got {shape}")
-        accepted = _rows(command)
+        rows = (command.tau, command.q_des, command.v_des, command.kp, command.kd)
+        for name, row in zip(_FIELDS, rows, strict=True):
+            if row.shape != (12,):
+                raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
+        accepted = np.array(rows, dtype=float)
         if not math.isfinite(np.vdot(accepted, accepted)):  # cheap, but huge numbers overflow
-            for name, row in zip(_FIELDS, accepted, strict=True):
+            for name, row in zip(_FIELDS, rows, strict=True):
                 if not np.isfinite(row).all():
                     raise CommandError(f"command.{name} is not finite: {row}")
         self._waiting.append(accepted)
-        self._command = self._waiting.popleft()
+        if len(self._waiting) > self._delay:
+            self._command = self._waiting.popleft()
 
     def _bind_kernels(self) -> None:
         """Binds the kernels of a tick and the arrays of MuJoCo's that they read and fill."""
@@ -389,11 +393,6 @@ class MujocoPlant(Plant):
         if np.count_nonzero(counts):
             raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(counts)]
             raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
-
-
-def _rows(command: JointCommand) -> Float[np.ndarray, "5 12"]:
-    """A command's numbers, in the order of ``_FIELDS``."""
-    return np.array([getattr(command, name) for name in _FIELDS], dtype=float)
 
 
 _FIELDS = ("tau", "q_des", "v_des", "kp", "kd")

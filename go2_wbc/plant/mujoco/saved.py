@@ -1,4 +1,4 @@
-"""All that decides how the simulation goes on."""
+"""What decides how a simulated robot goes on."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class SavedPhysics:
     integration: Float[np.ndarray, " n"]
     ticks: int
     pushes: tuple[Push, ...]
+    waiting: tuple[Float[np.ndarray, "5 12"], ...]
     tau: Float[np.ndarray, "12"]
     forces: Float[np.ndarray, "6"]
     noise_state: Mapping[str, Any]
     state: RobotState | None
     imu: ImuSample | None
-    waiting: tuple[Float[np.ndarray, "5 12"], ...]

@@ -128,8 +128,6 @@ def test_the_command_fails_below_the_rate_that_is_asked_for(
     assert main([*words, "--at-least", "0.5", "--json"]) == ExitCode.FAILED
     assert json.loads(capsys.readouterr().out)["done"] == 0
     assert main([*words, "--at-least", "95"]) == ExitCode.USAGE
-    assert main([*words, "--payload-at", "0.1,0.2"]) == ExitCode.USAGE
-    assert "three numbers" in capsys.readouterr().err
     assert main([*words, "--friction", "9"]) == ExitCode.USAGE
 
 
