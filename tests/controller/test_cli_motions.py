@@ -12,6 +12,7 @@ import pytest
 
 from controller.cli.common import ExitCode
 from controller.cli.main import main
+from go2_wbc.plant import MujocoPlant
 from motions import load_plan, motion_names
 from tests.viz.page_reader import read_data
 
@@ -159,8 +160,11 @@ def test_new_and_export_tell_a_program_what_they_wrote(
     assert len(table.read_text().splitlines()) == told["rows"] + 1
 
 
-def test_a_robot_that_cannot_get_up_is_a_message(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "bow", "--friction", "0.05", "--payload", "12"]) == ExitCode.RUNTIME
+def test_a_robot_that_cannot_get_up_is_a_message(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("go2_wbc.plant.MujocoPlant", lambda **_: MujocoPlant(friction=1e-4))
+    assert main(["run", "bow"]) == ExitCode.RUNTIME
     assert "the robot did not get ready: " in capsys.readouterr().err
 
 
