@@ -18,6 +18,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("dance", "benchmarks.dance", "dances against the true beats of their songs"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
     Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
+    Command("nearest", "benchmarks.nearest", "the nearest to motions that the check refuses"),
     Command("solve", "benchmarks.solved_plans", "solve the library's dynamic plans, to ship them"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
     Command("evidence", "benchmarks.evidence", "fill the table of docs/evidence.md"),
