@@ -1,10 +1,8 @@
 """``python -m benchmarks dynamics``: what solving dynamic motions takes, and what comes of it.
 
 Plans are made from cold, by processor time and without imports. The moves are those on which the
-planner's numbers were chosen, so their rows say what it costs, not how far it generalises. That is
-for the rows of refused motions: fast sways and lifted feet from a seeded generator that was not
-used for tuning, which today's check refuses and the planner turns into the nearest that can be
-done.
+planner's numbers were chosen, so their rows say what it costs, not how far it generalises; that is
+for ``python -m benchmarks nearest``.
 """
 
 from __future__ import annotations
@@ -17,16 +15,12 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario, chosen_scenarios
+from benchmarks.scenario import Measurement, Metric, Scenario, chosen_scenarios
 from benchmarks.session import add_options, positive, run_and_report, tasks_of
 from benchmarks.trials import Trial
 from controller.cli.common import Subparsers, add_parser
 from go2_wbc.errors import PlanNotFound
-from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
-from motions import FeasibilityChecker, Timeline, compile_timeline
 from motions.dynamics import (
     DynamicTrajectory,
     Phase,
@@ -36,19 +30,12 @@ from motions.dynamics import (
     solve,
     solve_cached,
 )
-from motions.dynamics.nearest import Written, nearest
 from motions.dynamics.solver import require_crocoddyl
-from motions.trajectory import trajectory_of
 
 PLANNING, SLOW_PLANNING = 4.0, 10.0
 """Processor time [s] that a plan may take."""
 FROM_CACHE = 50.0
 """Processor time [ms] that a kept plan may take."""
-FIRST_REFUSED = 4100
-"""Seed of the first refused motion."""
-SHARE_FOUND = 80.0
-"""Percent of the refused motions for which a plan must be found."""
-REFUSED_SEEDS = 20
 EXAMPLES = """
 python -m benchmarks dynamics             everything; some minutes
 python -m benchmarks dynamics jump rear --json
@@ -116,70 +103,9 @@ def _readings(name: str, plan: DynamicTrajectory, model: RobotModel) -> dict[str
     }
 
 
-REFUSED = "refused motions"
-REFUSED_METRICS = (
-    Metric("refused.found", REFUSED, "plan found", "%", SHARE_FOUND, Direction.AT_LEAST),
-    Metric("refused.cpu", REFUSED, "processor time", "s", None),
-    Metric("refused.deviation", REFUSED, "off what was written", "mm", None),
-    Metric("refused.angle", REFUSED, "off what was written", "deg", None),
-    Metric("refused.lag", REFUSED, "late", "ms", None),
-)
-
-
-def refused_motion(rng: np.random.Generator, checker: FeasibilityChecker) -> Timeline:
-    """A motion of two or three quick poses, made quicker until the check refuses it."""
-    largest = {"x": 0.05, "y": 0.05, "z": 0.05, "roll": 0.25, "pitch": 0.25, "yaw": 0.35}
-    poses: list[dict[str, float]] = [
-        {
-            name: float(rng.uniform(-1.0, 1.0)) * largest[name]
-            for name in rng.choice(list(largest), size=2, replace=False).tolist()
-        }
-        for _ in range(int(rng.integers(2, 4)))
-    ]
-    time_of_pose = 0.30
-    while True:
-        line = Timeline().hold(0.1)
-        for pose in poses:
-            x, y, z, roll, pitch, yaw = (pose.get(channel) for channel in largest)
-            line = line.body(x=x, y=y, z=z, roll=roll, pitch=pitch, yaw=yaw, over=time_of_pose)
-        line = line.home(over=2.0 * time_of_pose).hold(0.1)
-        if not checker.check(line).ok:
-            return line
-        time_of_pose *= 0.85
-
-
-def measure_refused(trial: Trial) -> Measurement:
-    """Find the nearest to one refused motion."""
-    rng = np.random.default_rng(FIRST_REFUSED + trial.seed)
-    model = RobotModel()
-    line = refused_motion(rng, FeasibilityChecker(model))
-    _warm(model)
-    wanted = compile_timeline(line, model)
-    path = trajectory_of(wanted, model)
-    stance = np.ones((len(path.times), len(LEGS)), dtype=bool)
-    before = time.process_time()
-    try:
-        plan = nearest(Written(path.times, path.q, stance), model)
-    except PlanNotFound as error:
-        values = {"refused.found": 0.0, "refused.cpu": time.process_time() - before}
-        return Measurement(values, reason=str(error))
-    return Measurement(
-        {
-            "refused.found": 100.0,
-            "refused.cpu": time.process_time() - before,
-            "refused.deviation": 1e3 * plan.position_deviation,
-            "refused.angle": math.degrees(plan.angle_deviation),
-            "refused.lag": 1e3 * plan.lag,
-        }
-    )
-
-
-SCENARIOS = (
-    *(
-        Scenario(name, metrics_of(name, item, limit), partial(measure_move, name))
-        for name, (item, _, limit) in MOVES.items()
-    ),
-    Scenario("refused", REFUSED_METRICS, measure_refused, seed_factor=REFUSED_SEEDS),
+SCENARIOS = tuple(
+    Scenario(name, metrics_of(name, item, limit), partial(measure_move, name))
+    for name, (item, _, limit) in MOVES.items()
 )
 
 
@@ -188,9 +114,8 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "dynamics",
-        "Solve jumps, hops, rears and lifts from cold, and the nearest to motions that\n"
-        "the check refuses: processor time, deviation, torque. Needs\n"
-        "go2-wbc[dynamics].",
+        "Solve jumps, hops, rears and lifts from cold: processor time, deviation, torque.\n"
+        "Needs go2-wbc[dynamics].",
         examples=EXAMPLES,
     )
     names = ", ".join(scenario.name for scenario in SCENARIOS)

@@ -29,6 +29,9 @@ POSTURE = 3.0
 """Weight of the legs' angles [1/rad^2], by which feet in the air follow what was written."""
 LATEST = 0.2
 """Greatest lag [s] that is looked for."""
+EXPLAINED = 0.8
+"""Share of the squared deviation that a lag must leave less than, to be one: a trunk that sways
+where none was written is not late by anything. Own choice."""
 LAG_STEP = 0.005
 """Between two lags [s] that are compared."""
 
@@ -193,4 +196,4 @@ def _lag(knots: Knots, plan: DynamicTrajectory) -> float:
         errors.append(float(np.square(done - np.array(moved).T).sum()))
     # Of equal ones the smallest delay: a motion that stands still has none.
     best = min(range(len(steps)), key=lambda row: (round(errors[row], 9), abs(steps[row])))
-    return float(steps[best])
+    return float(steps[best]) if errors[best] < EXPLAINED * errors[count] else 0.0

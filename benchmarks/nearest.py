@@ -1,0 +1,201 @@
+"""``python -m benchmarks nearest``: of motions that the check refuses, the nearest that is not.
+
+Each seed gives one motion that is refused as it is written (``refused_motions``). The nearest one
+is planned, and played in physics, by torques alone, on a robot and a floor of the seed's. How far
+the trunk was from what was written, at most, is measured and compared with the check's report.
+
+The planner, and how plans are met, were worked on with the motions of seeds 1000 to 1039; none of
+those that are judged here was looked at before.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from benchmarks.dynamic_motions import AFTERWARDS, plant_of
+from benchmarks.refused_motions import refused_motion
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.seeded import add_seeded_options, run_seeded
+from benchmarks.trials import Trial, TrialFailed, TrialRobot
+from controller.cli.common import Subparsers, add_parser
+from controller.motion_measurement import FULL, during_motion
+from go2_wbc.errors import MotionInfeasible
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from go2_wbc.reference import Anchor
+from go2_wbc.robot.model import RobotModel
+from motions import CheckedMotion, CompiledPlan, FeasibilityChecker, FeasibilityReport
+from motions.dynamic_span import DynamicSpan
+from motions.dynamics.nearest import Written, nearest
+from motions.trajectory import as_written
+
+FIRST_SEED = 7300
+"""Seed of the first motion that is judged."""
+FOUND = 80.0
+"""Percent of the motions for which a plan must be found."""
+AS_REPORTED = 10.0
+"""Difference [mm] between the measured and the reported deviation, of every motion."""
+PLANNING = 4.0
+"""Processor time [s] of planning, from cold and without imports."""
+EXAMPLES = """
+python -m benchmarks nearest            twenty motions, some minutes
+python -m benchmarks nearest --quick    three of them
+python -m benchmarks nearest --list     the metrics and their thresholds
+"""
+ITEM = "nearest to a refused motion"
+METRICS = (
+    Metric("nearest.found", ITEM, "plan found", "%", FOUND, Direction.AT_LEAST),
+    Metric("nearest.done", ITEM, "done, stands 1 s later", "", 1.0, Direction.AT_LEAST),
+    Metric("nearest.as_reported", ITEM, "off what was reported", "mm", AS_REPORTED),
+    Metric("nearest.reported", ITEM, "trunk off, as reported", "mm", None),
+    Metric("nearest.measured", ITEM, "trunk off, as measured", "mm", None),
+    Metric("nearest.angle", ITEM, "turned off, as reported", "deg", None),
+    Metric("nearest.angle_measured", ITEM, "turned off, as measured", "deg", None),
+    Metric("nearest.lag", ITEM, "late, as reported", "ms", None),
+    Metric("nearest.cpu", ITEM, "planning from cold", "s", PLANNING),
+    Metric("nearest.torque", ITEM, "peak torque / limit", "", 1.0),
+    Metric("nearest.speed", ITEM, "peak joint speed / limit", "", 1.0),
+    Metric("nearest.saturated", ITEM, "saturated ticks", "%", 2.0),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """A motion, played.
+
+    Attributes:
+        place, angle: greatest distance [m] and angle [rad] of the trunk from what was written.
+        torque, speed: largest share of a joint's torque and speed limit.
+        saturated: share of ticks in which some motor gave all it has.
+    """
+
+    place: float
+    angle: float
+    torque: float
+    speed: float
+    saturated: float
+
+
+def measure(trial: Trial) -> Measurement:
+    """Plan the nearest to one refused motion, and play it."""
+    model, seed = RobotModel(), FIRST_SEED + trial.seed
+    checker = FeasibilityChecker(model)
+    checked = checker.evaluate(refused_motion(seed, checker).nearest)
+    try:
+        checked.report.raise_if_infeasible()
+    except MotionInfeasible as error:
+        return Measurement({"nearest.found": 0.0}, reason=str(error))
+    values = {"nearest.found": 100.0, "nearest.cpu": planning_time(checked, model)}
+    reported = {name: reported_worst(checked.report, name) for name in ("off by", "turned off by")}
+    values["nearest.reported"], values["nearest.angle"] = reported.values()
+    values["nearest.lag"] = 1000.0 * max(late(checked), key=abs)
+    try:
+        played = play(trial, checked, model)
+    except TrialFailed as failed:
+        values["nearest.done"] = 0.0
+        return Measurement(values, {"nearest.done": str(failed)}, str(failed))
+    values |= {"nearest.done": 1.0, **summary(played, values["nearest.reported"])}
+    off = values["nearest.as_reported"]
+    failures = {"nearest.as_reported": f"{off:.1f} mm"} if off > AS_REPORTED else {}
+    return Measurement(values, failures)
+
+
+def summary(played: Played, reported: float) -> dict[str, float]:
+    """What was measured, by metric; ``reported``: distance [mm] from what was written."""
+    place = 1000.0 * played.place
+    return {
+        "nearest.as_reported": abs(place - reported),
+        "nearest.measured": place,
+        "nearest.angle_measured": math.degrees(played.angle),
+        "nearest.torque": played.torque,
+        "nearest.speed": played.speed,
+        "nearest.saturated": 100.0 * played.saturated,
+    }
+
+
+def planning_time(checked: CheckedMotion, model: RobotModel) -> float:
+    """Processor time [s] of solving all that had to be, which was done before: nothing is new."""
+    before = time.process_time()
+    for span in spans_of(checked):
+        if isinstance(span.asked, Written):
+            nearest(span.asked, model, tolerance=span.tolerance)
+    return time.process_time() - before
+
+
+def reported_worst(report: FeasibilityReport, check: str) -> float:
+    """The trunk's worst value in one check of the report, in its unit."""
+    (series,) = (item for item in report.series if item.check == check)
+    return float(np.max(series.values[:, series.subjects.index("trunk")]))
+
+
+def late(checked: CheckedMotion) -> list[float]:
+    """By how much [s] the parts that were solved are late."""
+    return [span.trajectory.lag for span in spans_of(checked)]
+
+
+def play(trial: Trial, checked: CheckedMotion, model: RobotModel) -> Played:
+    """Play it from a stand, and stand for a second.
+
+    Raises:
+        TrialFailed: if the robot falls, or says that it has not done it.
+    """
+    with TrialRobot(plant_of(trial)) as robot:
+        robot.require(robot.go2.stand())
+        robot.truth.clear()
+        robot.require(robot.go2.play(checked))
+        recorded = during_motion(robot.go2, robot.truth, checked.plan.name)
+        robot.wait(AFTERWARDS)
+    place, angle = off_written(recorded, checked, model)
+    shares = recorded.torque_shares(model)
+    speed = recorded.peak_speed_share(model)
+    return Played(place, angle, float(shares.max()), speed, float((shares >= FULL).mean()))
+
+
+def off_written(
+    recorded: TruthRecording, checked: CheckedMotion, model: RobotModel
+) -> tuple[float, float]:
+    """Greatest distance [m] and angle [rad] of the trunk from what was written for that instant.
+
+    In the frame of the feet as they stood at the start; over the whole motion, solved or not.
+    """
+    written, times = as_written(checked.plan, checked.path), checked.path.times
+    now = np.clip(recorded.time - recorded.time[0], 0.0, times[-1])
+    wanted = np.column_stack([np.interp(now, times, column) for column in written.T[:3]])
+    anchor = Anchor.of_feet(recorded.p_world_feet[0].copy(), model.foot_radius)
+    turn = Rotation.from_euler("z", -anchor.yaw)
+    away = turn.apply(recorded.q[:, :3] - anchor.p_world) - wanted
+    measured = turn * Rotation.from_quat(recorded.q[:, 3:7])
+    asked = Slerp(times, Rotation.from_quat(written[:, 3:7]))(now)
+    angles = (asked.inv() * measured).magnitude()
+    return float(np.linalg.norm(away, axis=1).max()), float(angles.max())
+
+
+def spans_of(checked: CheckedMotion) -> tuple[DynamicSpan, ...]:
+    """The parts of the plan that were solved."""
+    return checked.plan.dynamic if isinstance(checked.plan, CompiledPlan) else ()
+
+
+SCENARIOS = (Scenario("nearest", METRICS, measure),)
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``nearest``."""
+    parser = add_parser(
+        subparsers,
+        "nearest",
+        "Motions that the check refuses: is the nearest one found that it does not, is\n"
+        "it done in physics, and is it as far from what was written as reported? Needs\n"
+        "go2-wbc[dynamics]. Exit code 0 if every threshold is met, 1 if one is not.",
+        examples=EXAMPLES,
+    )
+    add_seeded_options(parser, ", each of another motion")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run what was asked for; see ``run_seeded``."""
+    return run_seeded(args, SCENARIOS)
