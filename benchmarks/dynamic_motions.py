@@ -134,6 +134,8 @@ def measure(trial: Trial, name: str) -> Measurement:
     model = RobotModel()
     try:
         played = play(plant_of(trial), plan, model)
+        if played.objection:
+            raise TrialFailed(played.objection)
     except TrialFailed as failed:
         done = f"{name}.done"
         return Measurement({done: 0.0}, {done: str(failed)}, str(failed))
@@ -148,11 +150,13 @@ class Played:
         recorded: while it was played.
         moved: way of the middle of the feet [m], along the heading at first.
         turned: change of their heading [rad], in (-pi, pi].
+        objection: why the controller says that it was not done; empty if it was.
     """
 
     recorded: TruthRecording
     moved: Float[np.ndarray, "3"]
     turned: float
+    objection: str
 
     @property
     def height(self) -> float:
@@ -179,18 +183,18 @@ def play(plant: MujocoPlant, plan: CompiledPlan, model: RobotModel) -> Played:
     """Stand, play the plan unchecked, stand for a second.
 
     Raises:
-        TrialFailed: if the robot falls or does not do it.
+        TrialFailed: if the robot falls.
     """
     with TrialRobot(plant) as robot:
         robot.require(robot.go2.stand())
         before = _feet_frame(robot, model)
         robot.truth.clear()
-        robot.require(robot.go2.play(plan, check=False))
+        objection = "" if robot.go2.play(plan, check=False) else robot.go2.last_outcome.reason
         recorded = robot.truth.recording()
         robot.wait(AFTERWARDS)
         after = _feet_frame(robot, model)
     moved = yaw_rotation(before.yaw).T @ (after.p_world - before.p_world)
-    return Played(recorded, moved, wrap_angle(after.yaw - before.yaw))
+    return Played(recorded, moved, wrap_angle(after.yaw - before.yaw), objection)
 
 
 def _values(name: str, plan: CompiledPlan, played: Played, model: RobotModel) -> dict[str, float]:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.robot.model import RobotModel
+from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline
 from motions.dynamics import PhaseProblem, Solved, moves, solve
 from motions.dynamics.cache import keep
 from motions.dynamics.phases import GRAVITY, KNOT_PERIOD
@@ -114,8 +115,23 @@ class Climb:
     attempts: tuple[Attempt, ...]
 
 
+def compiled(jump: Jump, model: RobotModel) -> CompiledPlan:
+    """The plan of a jump; what was kept is not solved again."""
+    line = Timeline().jump(x=jump.x, yaw=jump.yaw, height=jump.height, flight=jump.flight)
+    return compile_timeline(line, model)
+
+
+def objection(plan: CompiledPlan, model: RobotModel) -> str:
+    """What the check finds first, which judges torques by other speeds than the planner."""
+    failures = FeasibilityChecker(model).check(plan).failures
+    return f"the check: {failures[0]}" if failures else ""
+
+
 class Climber:
-    """Climbs the sizes of one kind; plans are kept where ``compile_timeline`` looks for them."""
+    """Climbs the sizes of one kind; plans are kept where ``compile_timeline`` looks for them.
+
+    A plan counts if the check lets it pass. One that it does not is still a start for the next.
+    """
 
     def __init__(
         self, kind: Kind, model: RobotModel, budget: float, tell: Callable[[str], None]
@@ -173,6 +189,7 @@ class Climber:
         else:
             keep(problem, self._model, plan)
             self._last = Solved(problem, plan)
+            reason = objection(compiled(jump, self._model), self._model)
         attempt = Attempt(self._kind.scale * size, jump.flight, reason)
         self._attempts.append(attempt)
         self._tell(f"{self._kind.title}, {attempt}")

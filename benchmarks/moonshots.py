@@ -1,8 +1,8 @@
 """``python -m benchmarks moonshots``: how high, how far, how far round, and what forbids more.
 
-The greatest jump of each kind that the planner finds (``jump_climb``) is played over seeds on which
-nothing was tuned. There are no thresholds: what was reached is told, beside what the legs and the
-motors' line permit (``jump_physics``).
+The greatest jump of each kind that the planner finds and the check lets pass (``jump_climb``) is
+played over seeds on which nothing was tuned. There are no thresholds: what was reached is told,
+beside what the legs and the motors' line permit (``jump_physics``).
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from dataclasses import asdict, replace
 from functools import cache, partial
 
 from benchmarks.dynamic_motions import Played, metrics_of, plant_of, play
-from benchmarks.jump_climb import KINDS, Climb, Climber, Jump
+from benchmarks.jump_climb import KINDS, Climb, Climber, Jump, compiled
 from benchmarks.jump_physics import PhysicsRow, physics_rows
 from benchmarks.report import WIDTH, render, summarise
-from benchmarks.scenario import Measurement, Metric, Scenario, chosen_scenarios
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario, chosen_scenarios
 from benchmarks.seeded import QUICK_SEEDS, SEEDS, add_seeded_options
 from benchmarks.session import measure_all, publish, run_and_report, tasks_of
 from benchmarks.trials import Trial, TrialFailed
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.cli.progress import ProgressLine
 from go2_wbc.robot.model import RobotModel
-from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline
+from motions import CompiledPlan
 
 OFFSET = 200
 """Seeds from which these trials are away from those of ``dynamic_motions``."""
@@ -39,25 +39,25 @@ python -m benchmarks moonshots --json
 
 
 @cache
-def plan_of(jump: Jump) -> tuple[CompiledPlan, bool]:
-    """The plan of a jump, and whether the check lets it pass; once for all trials of a process."""
-    model = RobotModel()
-    line = Timeline().jump(x=jump.x, yaw=jump.yaw, height=jump.height, flight=jump.flight)
-    plan = compile_timeline(line, model)
-    return plan, FeasibilityChecker(model).check(plan).ok
+def plan_of(jump: Jump) -> CompiledPlan:
+    """The plan of a jump; once for all trials of a process."""
+    return compiled(jump, RobotModel())
 
 
 def measure(trial: Trial, name: str, jump: Jump) -> Measurement:
     """Play it, stand for a second, look what came of it."""
-    plan, passes = plan_of(jump)
-    planned = {f"{name}.planned": _size(name, jump), f"{name}.check": float(passes)}
-    model, done = RobotModel(), f"{name}.done"
+    plan, model = plan_of(jump), RobotModel()
+    planned, done, stood = (f"{name}.{part}" for part in ("planned", "done", "stood"))
+    values, failures = {planned: _size(name, jump), done: 0.0, stood: 0.0}, {}
     try:
         played = play(plant_of(Trial(trial.seed + OFFSET)), plan, model)
     except TrialFailed as failed:
-        return Measurement({**planned, done: 0.0}, {done: str(failed)}, str(failed))
-    values = played.values(name, plan, model)
-    return Measurement({**planned, **values, f"{name}.reached": _reached(name, played)})
+        return Measurement(values, {done: str(failed), stood: str(failed)}, str(failed))
+    values |= {**played.values(name, plan, model), f"{name}.reached": _reached(name, played)}
+    values[stood] = 1.0
+    if played.objection:
+        values[done], failures[done] = 0.0, played.objection
+    return Measurement(values, failures)
 
 
 def _size(name: str, jump: Jump) -> float:
@@ -76,8 +76,8 @@ def scenario_of(name: str, jump: Jump) -> Scenario:
     title = f"{kind.title}, the greatest that is planned"
     planned = [
         Metric(f"{name}.planned", title, "planned", kind.unit, None),
-        Metric(f"{name}.reached", title, "reached", kind.unit, None),
-        Metric(f"{name}.check", title, "the check lets it pass", "", None),
+        Metric(f"{name}.reached", title, "reached", kind.unit, None, Direction.AT_LEAST),
+        Metric(f"{name}.stood", title, "stands 1 s later", "", None, Direction.AT_LEAST),
     ]
     common = [replace(metric, threshold=None) for metric in metrics_of(name, title, 1.0)]
     return Scenario(name, (*planned, *common), partial(measure, name=name, jump=jump))

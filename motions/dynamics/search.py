@@ -133,15 +133,20 @@ class Search:
             yield list(soft.xs), list(soft.us), regularisation
 
     def _agree(self) -> None:
-        """Bound the torques by the greatest speeds of the solutions until they agree."""
+        """Bound the torques by the greatest speeds of the solutions until they agree.
+
+        The speeds of a step are that of its knot and that of its middle, by which it is judged.
+        """
         program = self._full
         slowest = fastest = np.zeros((len(self._knots.stance), 12))
         for _ in range(LINE_ROUNDS):
             x, us = np.array(self._solver.xs), np.array(self._solver.us)
-            v = x[:-1, _JOINT_RATES]
-            if program.motor.share(us, v).max() <= AGREED:
+            rates = x[:, _JOINT_RATES]
+            v = np.stack([rates[:-1], 0.5 * (rates[:-1] + rates[1:])])
+            if max(program.motor.share(us, step).max() for step in v) <= AGREED:
                 return
-            slowest, fastest = np.minimum(slowest, v), np.maximum(fastest, v)
+            slowest = np.minimum(slowest, v.min(axis=0))
+            fastest = np.maximum(fastest, v.max(axis=0))
             us = np.clip(us, *program.bound(slowest, fastest))
             self._solve(self._solver, list(x), list(us), REGULARISATIONS[0], STOP)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import jump_climb, moonshots
-from benchmarks.jump_climb import BISECTIONS, KINDS, Climber, Kind
+from benchmarks.jump_climb import BISECTIONS, KINDS, Climber, Jump, Kind
 from benchmarks.jump_physics import best_take_off
 from benchmarks.trials import Trial
 from go2_wbc.errors import PlanNotFound
@@ -25,7 +25,7 @@ class Planner:
     """Finds jumps up to a height, and only with one time in the air."""
 
     def __init__(self, longest: float = 9.0) -> None:
-        self.longest = longest
+        self.longest, self.highest = longest, ASKED
         self.starts: list[Solved | None] = []
         self.kept: list[object] = []
 
@@ -39,6 +39,9 @@ class Planner:
             raise PlanNotFound("no dynamic plan", [f"asked for {height:g} m"])
         return f"plan of {height:g} m"
 
+    def objection(self, plan: Jump, model: RobotModel) -> str:
+        return "the check: torque at speed" if plan.height > self.highest else ""
+
     def keep(self, problem: PhaseProblem, model: RobotModel, plan: object) -> None:
         self.kept.append(plan)
 
@@ -49,6 +52,8 @@ def planner(monkeypatch: pytest.MonkeyPatch) -> Planner:
     monkeypatch.setattr(jump_climb, "solve", planner.solve)
     monkeypatch.setattr(jump_climb, "keep", planner.keep)
     monkeypatch.setattr(jump_climb, "Solved", lambda problem, plan: plan)
+    monkeypatch.setattr(jump_climb, "compiled", lambda jump, model: jump)
+    monkeypatch.setattr(jump_climb, "objection", planner.objection)
     return planner
 
 
@@ -70,6 +75,14 @@ def test_every_plan_is_the_start_for_the_next_one(planner: Planner) -> None:
     climb(KINDS["high"], [])
     assert planner.starts[:4] == [None, "plan of 0.15 m", "plan of 0.2 m", "plan of 0.25 m"]
     assert planner.kept == [*planner.starts[1:5], "plan of 0.3125 m"]
+
+
+def test_a_plan_that_the_check_refuses_does_not_count(planner: Planner) -> None:
+    planner.highest = 0.22
+    found = climb(KINDS["high"], [])
+    assert 0.2 <= found.size <= planner.highest
+    assert "the check: torque at speed" in [attempt.reason for attempt in found.attempts]
+    assert "plan of 0.25 m" in planner.starts, "it is a start all the same"
 
 
 def test_the_time_in_the_air_is_searched(planner: Planner) -> None:

@@ -20,6 +20,7 @@ from tests.motions.dynamics.conftest import PROBLEMS
 
 DEFECT = 1e-6  # N, N m: rounding of sums of forces of 1e3 N
 SLACK = 1.02  # the barriers are quadratic: forces pass them by a few newtons
+AGREED = 0.94  # of the motors' line, which a plan may use: 1.1 times its torque share
 ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
@@ -59,6 +60,16 @@ def test_torques_stay_below_the_motors_line(plan: DynamicTrajectory, model: Robo
     assert (np.abs(plan.v[:, 6:]) <= model.speed_limits).all()
     assert (plan.q[:, 7:] >= model.q_lower).all()
     assert (plan.q[:, 7:] <= model.q_upper).all()
+
+
+def test_torques_meet_the_motors_line_at_the_middle_of_a_step(
+    plans: dict[str, DynamicTrajectory], model: RobotModel
+) -> None:
+    """By that speed the check judges them; bounded by the knots' alone they reached 0.99."""
+    plan = solve(PhaseProblem(moves.jump(yaw=math.radians(90.0), height=0.12)), model)
+    middle = 0.5 * (plan.v[:-1, 6:] + plan.v[1:, 6:])
+    share = model.motor.share(plan.tau, middle).max()
+    assert 0.8 < share <= AGREED
 
 
 def test_feet_stand_still_or_are_above_the_ground(
