@@ -7,38 +7,26 @@ of one (scenario, seed), appended in one write as soon as it is there.
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import json
 import os
-import platform
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NoReturn
 
 from benchmarks.scenario import Measurement
+from controller.sweeps.identity import SOURCES, identity
 from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
 ROOT = Path(__file__).resolve().parent.parent
-SOURCES = ("go2_wbc", "motions", "controller", "benchmarks")
-"""Packages whose code decides what a trial gives."""
-LIBRARIES = ("mujoco", "pin", "placo", "proxsuite", "numpy")
 
 
 def settings_header() -> dict[str, str]:
     """What the results depend on besides scenario and seed; resumed is only what agrees."""
-    code = hashlib.sha256()
-    for file in sorted(file for name in SOURCES for file in (ROOT / name).rglob("*.py")):
-        code.update(file.relative_to(ROOT).as_posix().encode() + b"\0" + file.read_bytes())
-    return {
-        "version": importlib.metadata.version("go2-wbc"),
-        "python": platform.python_version(),
-        "libraries": ", ".join(f"{n} {importlib.metadata.version(n)}" for n in LIBRARIES),
-        "settings": hashlib.sha256(repr(Config()).encode()).hexdigest()[:12],
-        "code": code.hexdigest()[:12],
-    }
+    settings = hashlib.sha256(repr(Config()).encode()).hexdigest()[:12]
+    return {**identity(ROOT, (*SOURCES, "benchmarks")), "settings": settings}
 
 
 class ResultsLog:

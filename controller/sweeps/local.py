@@ -106,7 +106,7 @@ class _Worker:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, **ONE_THREAD},
-            start_new_session=True,  # out of reach of Ctrl-C
+            process_group=0,  # out of reach of Ctrl-C
         )
         self.give(order)
         threading.Thread(target=self._listen, args=(answers,), name="worker", daemon=True).start()

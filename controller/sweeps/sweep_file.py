@@ -33,8 +33,8 @@ _TABLES = (
     f"PRAGMA user_version = {FORMAT}",
 )
 _CAUSES = {
-    sqlite3.SQLITE_FULL: "the disk is full: free some space, then run the same command again",
-    sqlite3.SQLITE_IOERR: "the disk refuses: see that it has space, then run the command again",
+    sqlite3.SQLITE_FULL: "the disk is full; what is finished is kept: free some space and go on",
+    sqlite3.SQLITE_IOERR: "the disk refuses; what is finished is kept: see to it and go on",
     sqlite3.SQLITE_NOTADB: "it is no database of a sweep: choose another file",
     sqlite3.SQLITE_CORRUPT: "it is damaged: choose another file",
     sqlite3.SQLITE_READONLY: "it cannot be written to: choose another file",
