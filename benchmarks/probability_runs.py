@@ -60,11 +60,11 @@ def world_of(seed: int) -> World:
     """What is stated of the world of a seed."""
     rng = np.random.default_rng([_STREAM, seed])
     friction, load = rng.uniform(*FRICTION), rng.uniform(*PAYLOAD)
-    place = tuple(float(rng.uniform(*span)) for span in PLACE)
+    x, y, z = (float(rng.uniform(*span)) for span in PLACE)
     return World(
         friction=float(friction),
         payload=float(load) if rng.random() < 0.5 else 0.0,
-        payload_place=place,
+        payload_place=(x, y, z),
         mass_uncertainty=MASS_UNCERTAINTY,
         joint_friction_uncertainty=JOINT_FRICTION_UNCERTAINTY,
     )

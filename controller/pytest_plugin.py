@@ -18,6 +18,7 @@ import pytest
 if TYPE_CHECKING:
     from controller.sweeps.certify import Certificate
 
+RUNS = 200
 _USAGE = "certify(RATE, n=200, first_seed=0): the rate, between 0 and 1, that must be reached"
 
 
@@ -35,14 +36,14 @@ def certify_motion(
     The rows are kept in a temporary folder; nothing of an earlier run is used.
     """
     marker = request.node.get_closest_marker("certify")
-    rate, settings = _settings(marker)
+    rate, n, first_seed = _settings(marker)
 
     def certify_motion(motion: object) -> Certificate:
         __tracebackhide__ = True
         from controller.sweeps.certify import certify
 
         folder = tmp_path_factory.mktemp("certificate")
-        certificate = certify(motion, out=folder / "rows.sqlite", **settings)
+        certificate = certify(motion, n, first_seed=first_seed, out=folder / "rows.sqlite")
         if not certificate.meets(rate):
             text = (
                 f"{certificate.motion!r} must be done in {100.0 * rate:g} % of the runs, with 95 % "
@@ -54,11 +55,11 @@ def certify_motion(
     return certify_motion
 
 
-def _settings(marker: pytest.Mark | None) -> tuple[float, dict[str, int]]:
-    """The rate that is required, and how many runs; what is wrong with the marker is said."""
+def _settings(marker: pytest.Mark | None) -> tuple[float, int, int]:
+    """The rate that is required, how many runs, the first seed; says what is wrong with it."""
     if marker is None or len(marker.args) != 1 or not set(marker.kwargs) <= {"n", "first_seed"}:
         raise pytest.UsageError(f"certify_motion needs the marker {_USAGE}")
     (rate,) = marker.args
     if isinstance(rate, bool) or not isinstance(rate, int | float) or not 0.0 < rate < 1.0:
         raise pytest.UsageError(f"{_USAGE}; got {rate!r}")
-    return float(rate), dict(marker.kwargs)
+    return float(rate), marker.kwargs.get("n", RUNS), marker.kwargs.get("first_seed", 0)

@@ -119,7 +119,7 @@ def _off_asked(
         found = of_phases(happened, span.asked, span.frame, places)
         lands = _landings(span.asked)
     else:
-        found = of_written(happened, span.asked, span.frame, places, model)
+        found = of_written(replace(span, trajectory=happened), places, model)
         lands = np.ones((len(found.times), 4), dtype=bool)
     away = np.nan_to_num(found.away)
     feet = away[:, 1:]

@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float
 from go2_wbc.errors import MotionInfeasible
 from go2_wbc.world import World
 from motions.feasibility.departure import Departure
+from motions.feasibility.probability import fitted
 
 NOISE = 1e-6
 """A value below this is nothing but rounding, and is shown as 0."""
@@ -187,6 +188,12 @@ class FeasibilityReport:
         """Whether no limit is broken."""
         return not self.failures
 
+    @property
+    def probability(self) -> float:
+        """Chance, 0 to 1, that the motion is done in ``world``; see ``feasibility.probability``."""
+        margins = {check: finding.margin for check, finding in self.margins.items()}
+        return fitted().probability(margins)
+
     def raise_if_infeasible(self) -> None:
         """Raise MotionInfeasible with the failures, if there are any."""
         if self.failures:
@@ -235,6 +242,7 @@ class FeasibilityReport:
             "ok": self.ok,
             "end_pose": self.end_pose,
             "world": asdict(self.world),
+            "probability": self.probability,
             "failures": [asdict(finding) for finding in self.failures],
             "warnings": [asdict(finding) for finding in self.warnings],
             "departures": [asdict(one) for one in self.departures],

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -95,7 +96,7 @@ def test_runs_are_in_samples_of_the_world_that_is_stated(tmp_path: Path) -> None
 
 
 def test_a_sweep_ends_with_the_fewest_first_rows_that_are_enough(tmp_path: Path) -> None:
-    def is_enough(rows: list[Row]) -> bool:
+    def is_enough(rows: Sequence[Row]) -> bool:
         return sum(bool(row["ok"]) for row in rows) >= 3
 
     for workers in (1, 3):

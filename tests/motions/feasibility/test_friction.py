@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 
@@ -88,10 +90,14 @@ def test_a_lasting_push_is_held_by_the_gains_and_a_short_one_forgotten() -> None
     assert errors[-1, 1] == pytest.approx(0.0, abs=1e-6)
 
 
+def moved(line: Timeline, values: Mapping[str, float], over: float) -> Timeline:
+    return line.body(**values, over=over, ease="minimum_jerk")
+
+
 def to_and_fro(channel: str, size: float, over: float) -> Timeline:
     line = Timeline()
     for _ in range(2):
-        line = line.body(**{channel: size}, over=over).body(**{channel: -size}, over=over)
+        line = moved(moved(line, {channel: size}, over), {channel: -size}, over)
     return line.home(over=over)
 
 
