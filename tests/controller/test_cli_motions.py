@@ -67,6 +67,15 @@ def test_check_prints_a_table_for_one_motion_and_a_line_each_for_more(
     assert "no   fall_over" in capsys.readouterr().out
 
 
+def test_a_world_is_asked_for_by_its_friction_and_payload(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["check", "wiggle", "--friction", "0.05", "--payload", "2"]) == ExitCode.FAILED
+    assert "That holds for friction 0.05, payload 2 kg." in capsys.readouterr().out
+    assert main(["check", "nod", "--payload", "-1"]) == ExitCode.USAGE
+    assert "World.payload must be between 0 and 12, got -1" in capsys.readouterr().err
+
+
 def test_check_gives_json_with_every_margin(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "high_five", "--set", "side=left", "--json"]) == ExitCode.OK
     (report,) = json.loads(capsys.readouterr().out)
@@ -120,7 +129,7 @@ def test_new_and_export_tell_a_program_what_they_wrote(
 
 
 def test_a_robot_that_cannot_get_up_is_a_message(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "bow", "--friction", "0.0001"]) == ExitCode.RUNTIME
+    assert main(["run", "bow", "--friction", "0.0001", "--force"]) == ExitCode.RUNTIME
     assert "the robot did not get ready: " in capsys.readouterr().err
 
 
