@@ -22,8 +22,8 @@ class World:
     The controller is told nothing of it: it works with the robot as its description has it.
 
     Attributes:
-        friction: coefficient of feet and floor, 0.05 to 2. Wet tiles have 0.5, dry rubber on
-            concrete 1; below the least, none of the project's robots stands.
+        friction: coefficient of feet and floor, 0.0001 to 2. Wet tiles have 0.5, dry rubber on
+            concrete 1.
         friction_uncertainty: share by which it may be more or less, 0 to 0.9.
         payload: extra mass [kg] on the trunk, 0 to 12: Unitree's greatest.
         payload_place: of its middle in the base frame [m], within 0.5 of the base's origin.
@@ -98,7 +98,7 @@ class World:
 
 
 _RANGES = {
-    "friction": (0.05, 2.0),
+    "friction": (0.0001, 2.0),
     "friction_uncertainty": (0.0, 0.9),
     "payload": (0.0, 12.0),
     "payload_place": (-0.5, 0.5),

@@ -12,7 +12,6 @@ import pytest
 
 from controller.cli.common import ExitCode
 from controller.cli.main import main
-from go2_wbc.plant import MujocoPlant
 from motions import load_plan, motion_names
 from tests.viz.page_reader import read_data
 
@@ -108,6 +107,15 @@ def test_check_says_what_would_make_a_motion_feasible(
     assert {one["kind"] for one in report["suggestions"]} == {"tempo", "amplitude"}
 
 
+def test_a_world_is_asked_for_by_its_friction_and_payload(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["check", "wiggle", "--friction", "0.05", "--payload", "2"]) == ExitCode.FAILED
+    assert "That holds for friction 0.05, payload 2 kg." in capsys.readouterr().out
+    assert main(["check", "nod", "--payload", "-1"]) == ExitCode.USAGE
+    assert "World.payload must be between 0 and 12, got -1" in capsys.readouterr().err
+
+
 def test_check_gives_json_with_every_margin(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "high_five", "--set", "side=left", "--json"]) == ExitCode.OK
     (report,) = json.loads(capsys.readouterr().out)
@@ -160,11 +168,8 @@ def test_new_and_export_tell_a_program_what_they_wrote(
     assert len(table.read_text().splitlines()) == told["rows"] + 1
 
 
-def test_a_robot_that_cannot_get_up_is_a_message(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("go2_wbc.plant.MujocoPlant", lambda **_: MujocoPlant(friction=1e-4))
-    assert main(["run", "bow"]) == ExitCode.RUNTIME
+def test_a_robot_that_cannot_get_up_is_a_message(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "bow", "--friction", "0.0001", "--force"]) == ExitCode.RUNTIME
     assert "the robot did not get ready: " in capsys.readouterr().err
 
 

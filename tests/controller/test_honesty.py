@@ -113,7 +113,7 @@ def test_in_realtime_a_plant_that_blocks_keeps_nobody_waiting(
 
 def test_a_motion_that_kneels_on_the_ground_is_not_done() -> None:
     # Trunk low and aside, a paw up: a thigh lay on the ground for a second, and play said True.
-    low = Timeline().body(roll=-0.141, z=-0.111, over=1.0)
+    low = Timeline().body(roll=-0.141, z=-0.14, over=1.0)
     line = low.foot("FR", z=0.07, over=0.6).hold(0.3).down("FR", over=0.4).home(over=0.9)
     with GO2Controller() as go2:
         assert go2.stand()

@@ -70,5 +70,5 @@ def test_a_slippery_floor_is_refused_and_named() -> None:
 
 
 def test_a_world_out_of_range_is_told() -> None:
-    with pytest.raises(ConfigError, match=r"World\.friction must be between 0\.05 and 2, got 9"):
+    with pytest.raises(ConfigError, match=r"World\.friction must be between 0\.0001 and 2, got 9"):
         check(SWAY, friction=9.0)
