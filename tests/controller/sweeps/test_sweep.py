@@ -17,6 +17,7 @@ import pytest
 from controller import sweep
 from controller.sweeps import Progress, read_sweep
 from controller.sweeps.rows import Row
+from controller.sweeps.targets import Job, LoadedFunction
 from go2_wbc.errors import CommandError, ConfigError, SweepError
 from tests.controller.sweeps import swept
 
@@ -273,3 +274,15 @@ def test_what_cannot_be_swept_is_refused_with_what_can(
     with pytest.raises(CommandError, match=message):
         sweep(what, 1, out=out)
     assert not out.exists()
+
+
+def test_a_file_that_changes_during_the_sweep_is_told(tmp_path: Path) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text("def f(seed):\n    return {'x': 1.0}\n")
+    with pytest.raises(SweepError, match="has changed since the sweep began"):
+        LoadedFunction(str(file), "f", "another digest")(0)
+
+
+def test_a_worker_with_other_code_is_told() -> None:
+    with pytest.raises(SweepError, match="this worker has other code than the sweep"):
+        Job(swept.trial, ("another digest", "numpy 1"))(0)
