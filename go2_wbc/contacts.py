@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
 from go2_wbc.legs import LEGS
-from go2_wbc.validation import require_positive, require_share
+from go2_wbc.validation import require_not_negative, require_positive, require_share
 
 TIE = 1e-9
 """Times this close [s] to an event count as the event: absorbs rounding of summed time steps."""
@@ -118,6 +118,39 @@ class ContactSchedule:
 
 
 @dataclass(frozen=True, slots=True)
+class Stride:
+    """How a stride follows the speed: a foot stands as long as it takes to pass below the hip.
+
+    Attributes:
+        reach: way [m] of the trunk over a standing foot.
+        stance_min, stance_max: bounds [s] of the time that a foot stands.
+        swing: time [s] of the swing at 1 m/s.
+        swing_slope: what each m/s more adds to it [s^2/m].
+    """
+
+    reach: float = 0.20
+    stance_min: float = 0.08
+    stance_max: float = 0.16
+    swing: float = 0.18
+    swing_slope: float = 0.02
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a number that is out of range."""
+        require_positive(self, "reach", "stance_min", "stance_max", "swing")
+        require_not_negative(self, "swing_slope")
+        if self.stance_min > self.stance_max or self.swing <= self.swing_slope:
+            raise ConfigError(
+                f"Stride needs stance_min <= stance_max and swing > swing_slope, got {self}"
+            )
+
+    def at(self, speed: float) -> tuple[float, float]:
+        """Period [s] and duty at a ``speed`` [m/s]."""
+        stance = min(max(self.reach / max(speed, TIE), self.stance_min), self.stance_max)
+        period = stance + self.swing + self.swing_slope * (speed - 1.0)
+        return period, stance / period
+
+
+@dataclass(frozen=True, slots=True)
 class Gait:
     """A periodic pattern of steps.
 
@@ -126,12 +159,17 @@ class Gait:
         period: stride period [s].
         duty: share of the period that a foot is in stance, in (0, 1].
         offsets: phase in [0, 1) at which each foot (FL, FR, RL, RR) touches down.
+        stride: how period and duty follow the speed, where the forces are planned ahead by the
+            MPC; None if they are fixed.
+        needs_mpc: whether it can be walked only with the forces planned ahead.
     """
 
     name: str
     period: float
     duty: float
     offsets: tuple[float, float, float, float]
+    stride: Stride | None = None
+    needs_mpc: bool = False
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a period, duty or offset that is out of range."""
@@ -150,10 +188,17 @@ class Gait:
         """Seconds that a foot swings in each stride."""
         return (1.0 - self.duty) * self.period
 
+    @property
+    def lands_on_four(self) -> bool:
+        """Whether at some touchdown no other foot is in the air, so that the robot can stop."""
+        offsets = np.array(self.offsets)
+        phase = (offsets[:, None] - offsets + TIE) % 1.0 - TIE
+        return bool((phase <= self.duty + TIE).all(axis=1).any())
+
     def schedule(self) -> ContactSchedule:
         """This gait as a periodic schedule that starts at phase 0."""
         liftoffs = [(o + self.duty) % 1.0 for o in self.offsets]
-        phases = np.unique(np.round([0.0, *self.offsets, *liftoffs], 12))
+        phases = np.unique(np.round([0.0, *self.offsets, *liftoffs], 12) % 1.0)
         phase_of = (phases[:, None] - self.offsets + TIE) % 1.0
         return ContactSchedule(
             tuple(float(p) * self.period for p in phases), phase_of < self.duty, self.period
@@ -166,8 +211,21 @@ def standing() -> ContactSchedule:
 
 
 GAITS: dict[str, Gait] = {
-    "trot": Gait("trot", period=0.36, duty=0.5, offsets=(0.5, 0.0, 0.0, 0.5)),
+    gait.name: gait
+    for gait in (
+        Gait("trot", 0.36, 0.5, (0.5, 0.0, 0.0, 0.5), Stride()),
+        Gait("flying_trot", 0.30, 0.35, (0.5, 0.0, 0.0, 0.5), needs_mpc=True),
+        Gait("walk", 0.60, 0.70, (0.0, 0.5, 0.75, 0.25), needs_mpc=True),
+        Gait("pace", 0.24, 0.45, (0.0, 0.5, 0.0, 0.5), needs_mpc=True),
+        Gait("bound", 0.30, 0.40, (0.0, 0.0, 0.5, 0.5), needs_mpc=True),
+        Gait("pronk", 0.36, 0.50, (0.0, 0.0, 0.0, 0.0), needs_mpc=True),
+        Gait("gallop", 0.36, 0.40, (0.0, 0.15, 0.5, 0.65), needs_mpc=True),
+    )
 }
+"""The gaits by name. The trot is the one in which the robot starts to walk and comes to rest."""
+PERIOD_RATE, DUTY_RATE, OFFSET_RATE = 0.2, 0.5, 0.8
+"""Greatest change of a gait in a second: of its period [s/s], duty and offsets [1/s]. A foot's
+phase passes at 2 per second or more, so that no foot is put back to where it was."""
 
 
 def find_gait(name: str | Gait) -> Gait:

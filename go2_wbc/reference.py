@@ -21,6 +21,8 @@ from go2_wbc.errors import CommandError
 from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.robot.rotations import yaw_rotation
 
+LEAST_WEIGHT, MOST_WEIGHT = 1e-6, 1e2
+"""Of the force regularisation: beyond them accuracy is lost."""
 _set = object.__setattr__  # of a frozen value that is being made
 
 
@@ -93,6 +95,9 @@ class Reference:
         q_joints: desired joint angles [rad], used for legs in JOINTS.
         v_joints: their velocities [rad/s].
         a_joints: their accelerations [rad/s^2].
+        f_world_feet: forces [N] near which those of the stance feet are kept.
+        force_weight: by which they are, 1e-6 to 100; 0 for an even share of the robot's weight,
+            with the controller's own weight.
         stance: feet in stance, from ``legs``.
     """
 
@@ -106,6 +111,8 @@ class Reference:
     q_joints: Float[np.ndarray, "12"]
     v_joints: Float[np.ndarray, "12"]
     a_joints: Float[np.ndarray, "12"]
+    f_world_feet: Float[np.ndarray, "4 3"] = field(default_factory=partial(np.zeros, (4, 3)))
+    force_weight: float = 0.0
     stance: Bool[np.ndarray, "4"] = field(init=False)
     _row: Float[np.ndarray, " size"] | None = field(init=False, repr=False, default=None)
 
@@ -143,6 +150,8 @@ class Reference:
             return view("legs") == LegTask.STANCE
         if name == "legs":
             return tuple(_LEG_TASKS[int(task)] for task in view("legs").tolist())
+        if name == "force_weight":
+            return float(view(name))
         return view(name)
 
     @property
@@ -176,11 +185,19 @@ class Reference:
                 self.q_joints,
                 self.v_joints,
                 self.a_joints,
+                self.f_world_feet,
+                self.force_weight,
             ]
             try:
                 row = REFERENCE.pack(values)
             except ValueError as error:
                 raise CommandError(f"reference: {error}") from error
+            weight = float(row[-1])
+            if np.isfinite(weight) and weight != 0.0 and not LEAST_WEIGHT <= weight <= MOST_WEIGHT:
+                raise CommandError(
+                    f"reference: force_weight must be 0 or {LEAST_WEIGHT:g} to {MOST_WEIGHT:g}, "
+                    f"got {weight:g}"
+                )
             _set(self, "_row", row)
         return row
 
@@ -202,6 +219,7 @@ class Reference:
             p_world_feet=anchor.p_world + self.p_world_feet @ R.T,
             v_world_feet=self.v_world_feet @ R.T,
             a_world_feet=self.a_world_feet @ R.T,
+            f_world_feet=self.f_world_feet @ R.T,
         )
 
 

@@ -127,7 +127,7 @@ class CompiledPlan(MotionPlan):
         """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
         from go2_wbc.kernels.playing import planned_at
 
-        row = np.empty(REFERENCE.size)
+        row = np.zeros(REFERENCE.size)
         planned_at(*self._tables, self.ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, t, row)
         return row
 

@@ -67,7 +67,7 @@ def reference_row(point: TrackedPoint, body: CurvePoint) -> Float[np.ndarray, " 
     """The row of ``reference`` for four feet that stand, by a kernel."""
     from go2_wbc.kernels.playing import planned
 
-    row, curves = np.empty(REFERENCE.size), np.zeros((3, PLAN_CURVES))
+    row, curves = np.zeros(REFERENCE.size), np.zeros((3, PLAN_CURVES))
     curves[0, :6], curves[1, :6], curves[2, :6] = body.value, body.rate, body.acceleration
     is_com = 1.0 if point is TrackedPoint.COM else 0.0
     planned(is_com, curves, _STANCE, _ALL, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, row)

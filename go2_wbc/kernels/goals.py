@@ -30,6 +30,7 @@ _POSITION, _ORIENTATION, _SWING, _POSTURE = (
     _P[n] for n in ("position_kp", "orientation_kp", "swing_kp", "posture_kp")
 )
 _FORCE_WEIGHT, _WEIGHT_OF_ROBOT = _P["force_weight"], _P["weight_of_robot"]
+_FORCES, _PRIOR_WEIGHT = _T["f_world_feet"], _T["force_weight"]
 
 
 @subroutine("void(f8[:,::1], f8[::1], f8[::1], f8, f8)")
@@ -152,6 +153,8 @@ def add_leg_goals(snapshot, target, program, base, H, g):
                 desired += program[_POSTURE + 3 + i] * (target[_JOINT_V + n] - v[6 + n])
                 desired += program[_POSTURE + i] * (target[_JOINT_Q + n] - q[7 + n])
                 add_unknown_goal(H, g, n, desired, program[_POSTURE + 6])
+            elif target[_PRIOR_WEIGHT] > 0.0:
+                add_unknown_goal(H, g, n, target[_FORCES + n], target[_PRIOR_WEIGHT])
             else:
                 share = program[_WEIGHT_OF_ROBOT] / feet if i == 2 else 0.0
                 add_unknown_goal(H, g, n, share, program[_FORCE_WEIGHT])

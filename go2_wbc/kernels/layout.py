@@ -114,6 +114,8 @@ REFERENCE = Layout(
     q_joints=(12,),
     v_joints=(12,),
     a_joints=(12,),
+    f_world_feet=(4, 3),
+    force_weight=(),
 )
 """Of ``reference.Reference`` and its ``BodyTarget``."""
 
@@ -158,6 +160,9 @@ PLANNER = Layout(
     time=(),
     ground=(),
     height_offset=(),
+    period=(),
+    duty=(),
+    offsets=(4,),
     liftoff=(4, 3),
     was_stance=(4,),
     is_awaited=(4,),
@@ -168,6 +173,11 @@ LOCOMOTION = Layout(
     period=(),
     duty=(),
     offsets=(4,),
+    rest_period=(),
+    rest_duty=(),
+    rest_offsets=(4,),
+    stride=(5,),
+    adaptation=(3,),
     height=(),
     acceleration=(3,),
     velocity_feedback=(),
@@ -206,8 +216,13 @@ MPC = Layout(
     friction=(),
     force_max=(),
     least_share=(),
+    interval=(),
+    prior=(),
 )
 """Numbers of the MPC: the turn's axes before those of the way."""
+
+FORCES = Layout(next=(), forces=(4, 3))
+"""What the MPC has planned: when it plans again, and the force of each foot while it stands."""
 
 PLAN_CURVES = 30
 """Curves of a plan: CoM, roll pitch yaw, twelve joints, and the places of the four feet."""

@@ -12,6 +12,7 @@ KERNELS = (
     "motor",
     "mpc",
     "playing",
+    "preview",
     "rigid_body",
     "simulation",
     "supervision",

@@ -22,7 +22,9 @@ _YAW, _POSITION, _VELOCITY = (_S[n] for n in ("yaw", "position", "velocity"))
 _STEPPING, _PHASE_TIME, _TIME = (_S[n] for n in ("is_stepping", "phase_time", "time"))
 _GROUND, _HEIGHT_OFFSET = _S["ground"], _S["height_offset"]
 _LIFTOFF, _WAS_STANCE, _AWAITED = (_S[n] for n in ("liftoff", "was_stance", "is_awaited"))
-_PERIOD, _DUTY, _OFFSETS, _HEIGHT = (_C[n] for n in ("period", "duty", "offsets", "height"))
+_PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
+_GAIT, _REST, _STRIDE, _RATES = (_C[n] for n in ("period", "rest_period", "stride", "adaptation"))
+_HEIGHT = _C["height"]
 _ACCELERATION, _FEEDBACK = _C["acceleration"], _C["velocity_feedback"]
 _LEASH, _YAW_LEASH, _REACH = (_C[n] for n in ("position_leash", "yaw_leash", "foothold_reach"))
 _F_MIN, _F_MAX, _RAMP = (_C[n] for n in ("normal_force_min", "normal_force_max", "load_ramp"))
@@ -47,10 +49,9 @@ def yaw_of(q):
     return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-@subroutine("Tuple((b1, f8, f8))(f8, f8, f8[::1])")
-def foot_phase(t, offset, c):
-    """Whether a foot is in stance at ``t`` of the gait, since when, and for how long yet [s]."""
-    period, duty = c[_PERIOD], c[_DUTY]
+@subroutine("Tuple((b1, f8, f8))(f8, f8, f8, f8)")
+def foot_phase(t, offset, period, duty):
+    """Whether a foot is in stance at ``t`` of a gait, since when, and for how long yet [s]."""
     if duty >= 1.0:
         return True, np.inf, np.inf
     stance_time = duty * period
@@ -100,12 +101,12 @@ def must_step(snapshot, c):
     return np.hypot(offset[0], offset[1]) > c[_CAPTURE]
 
 
-@subroutine("b1(f8[::1], f8[::1])")
-def is_landing(s, c):
+@subroutine("b1(f8[::1])")
+def is_landing(s):
     """Whether feet touch down at this tick and no other one is in the air."""
     has_landed = False
     for leg in range(4):
-        stance, _, _ = foot_phase(s[_PHASE_TIME], c[_OFFSETS + leg], c)
+        stance, _, _ = foot_phase(s[_PHASE_TIME], s[_OFFSETS + leg], s[_PERIOD], s[_DUTY])
         was_stance = s[_WAS_STANCE + leg] != 0.0
         if not (stance or was_stance):
             return False
@@ -113,14 +114,18 @@ def is_landing(s, c):
     return has_landed
 
 
+@subroutine("b1(f8[::1], f8[::1])")
+def is_settled(s, c):
+    """Whether the ramped command has arrived at zero."""
+    x, y, turn = abs(s[_VELOCITY]), abs(s[_VELOCITY + 1]), abs(s[_VELOCITY + 2])
+    return x < c[_SETTLED] and y < c[_SETTLED] and turn < c[_SETTLED]
+
+
 @subroutine("b1(f8[::1], f8[::1], f8[::1])")
 def may_stop(snapshot, s, c):
     """Whether the robot is slow, no longer commanded, and stands squarely."""
-    for i in range(3):
-        if not abs(s[_VELOCITY + i]) < c[_SETTLED]:
-            return False
     slow = np.hypot(snapshot[_V_COM], snapshot[_V_COM + 1]) < c[_SETTLE_SPEED]
-    return slow and is_square(snapshot, c)
+    return is_settled(s, c) and slow and is_square(snapshot, c)
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
@@ -129,10 +134,42 @@ def advance_phase(snapshot, s, c, dt, command):
     is_zero = command[0] == 0.0 and command[1] == 0.0 and command[2] == 0.0
     if s[_STEPPING] != 0.0:
         s[_PHASE_TIME] += dt
-        if is_zero and is_landing(s, c) and may_stop(snapshot, s, c):
+        if is_zero and is_landing(s) and may_stop(snapshot, s, c):
             s[_STEPPING] = 0.0
     elif not is_zero or must_step(snapshot, c):
         s[_STEPPING], s[_PHASE_TIME] = 1.0, 0.0
+        s[_PERIOD : _PERIOD + 6] = c[_REST : _REST + 6]
+
+
+@subroutine("void(f8[::1], f8[::1], f8, f8[::1])")
+def adapt_gait(s, c, dt, command):
+    """Bring period, duty and offsets towards those wanted; the phases of the feet do not jump."""
+    wanted = np.empty(6)
+    wanted[:] = c[_GAIT : _GAIT + 6]
+    is_zero = command[0] == 0.0 and command[1] == 0.0 and command[2] == 0.0
+    if is_zero and is_settled(s, c):
+        wanted[:] = c[_REST : _REST + 6]
+    elif c[_STRIDE] > 0.0:
+        arm = np.hypot(c[_NOMINAL], c[_NOMINAL + 1])
+        speed = np.hypot(s[_VELOCITY], s[_VELOCITY + 1]) + arm * abs(s[_VELOCITY + 2])
+        stance = min(max(c[_STRIDE] / max(speed, TINY), c[_STRIDE + 1]), c[_STRIDE + 2])
+        wanted[0] = stance + c[_STRIDE + 3] + c[_STRIDE + 4] * (speed - 1.0)
+        wanted[1] = stance / wanted[0]
+    if wanted[0] != s[_PERIOD]:
+        most = c[_RATES] * dt
+        period = s[_PERIOD] + min(max(wanted[0] - s[_PERIOD], -most), most)
+        s[_PHASE_TIME] = s[_PHASE_TIME] % s[_PERIOD] * period / s[_PERIOD]
+        s[_PERIOD] = period
+    most = c[_RATES + 1] * dt
+    s[_DUTY] += min(max(wanted[1] - s[_DUTY], -most), most)
+    most = c[_RATES + 2] * dt
+    for leg in range(4):
+        if wanted[2 + leg] != s[_OFFSETS + leg]:
+            way = (wanted[2 + leg] - s[_OFFSETS + leg] + 0.5) % 1.0 - 0.5
+            if abs(way) <= most:
+                s[_OFFSETS + leg] = wanted[2 + leg]
+            else:
+                s[_OFFSETS + leg] = (s[_OFFSETS + leg] + (most if way > 0.0 else -most)) % 1.0
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
@@ -190,7 +227,7 @@ def cubic(x):
 @subroutine("void(i8, f8[::1], f8[::1], f8, f8[::1], f8[::1])")
 def swing(leg, s, c, progress, goal, target):
     """As ``planning.swing.swing_foot``, from the foot's lift-off to ``goal`` (3,)."""
-    duration = (1.0 - c[_DUTY]) * c[_PERIOD]
+    duration = (1.0 - s[_DUTY]) * s[_PERIOD]
     start = s[_LIFTOFF + 3 * leg : _LIFTOFF + 3 * leg + 3]
     k = 3 * leg
     x, dx, ddx = cubic(progress)
@@ -218,7 +255,7 @@ def foothold(leg, snapshot, s, c, nominal, remaining, goal):
     arm_x, arm_y = nominal[leg, 0] - snapshot[_Q], nominal[leg, 1] - snapshot[_Q + 1]
     v_x = snapshot[_V_COM] - s[_VELOCITY + 2] * arm_y
     v_y = snapshot[_V_COM + 1] + s[_VELOCITY + 2] * arm_x
-    half = c[_DUTY] * c[_PERIOD] / 2
+    half = s[_DUTY] * s[_PERIOD] / 2
     x = v_x * half + c[_FEEDBACK] * (snapshot[_V_COM] - ref_x)
     y = v_y * half + c[_FEEDBACK] * (snapshot[_V_COM + 1] - ref_y)
     share = min(1.0, c[_REACH] / max(np.hypot(x, y), TINY))
@@ -252,12 +289,14 @@ def plan(snapshot, time, contact, s, c, command, target):
     s[_TIME] = time
     advance_phase(snapshot, s, c, dt, command)
     integrate(snapshot, s, c, dt, command)
+    if s[_STEPPING] != 0.0:
+        adapt_gait(s, c, dt, command)
     stance = np.ones(4, dtype=np.bool_)
     elapsed, remaining = np.full(4, np.inf), np.full(4, np.inf)
     if s[_STEPPING] != 0.0:
         for leg in range(4):
             stance[leg], elapsed[leg], remaining[leg] = foot_phase(
-                s[_PHASE_TIME], c[_OFFSETS + leg], c
+                s[_PHASE_TIME], s[_OFFSETS + leg], s[_PERIOD], s[_DUTY]
             )
     note_liftoffs(snapshot, contact, s, c, stance)
     target[:] = 0.0

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import astuple
+
 import numpy as np
 
-from go2_wbc.contacts import Gait
-from go2_wbc.kernels.layout import LOCOMOTION, PLANNER, REFERENCE
+from go2_wbc.contacts import DUTY_RATE, OFFSET_RATE, PERIOD_RATE, Gait
+from go2_wbc.kernels.layout import FORCES, LOCOMOTION, PLANNER, REFERENCE
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.correction import CorrectionConfig
+from go2_wbc.planning.gait_clock import resting_gait
 from go2_wbc.planning.locomotion import (
     GROUND_SHARE,
     SETTLED_COMMAND,
@@ -19,6 +22,9 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 
 _STATE = PLANNER.start
+_FORM = slice(PLANNER.start["period"], PLANNER.start["offsets"] + 4)
+_RESTING = slice(LOCOMOTION.start["rest_period"], LOCOMOTION.start["rest_offsets"] + 4)
+"""Period, duty and offsets: those of the gait now, and those in which the robot comes to rest."""
 
 
 class CompiledPlanner(GaitPlanner):
@@ -28,7 +34,12 @@ class CompiledPlanner(GaitPlanner):
         """Prepare a planner; ``start`` sets it on its way."""
         from go2_wbc.kernels.locomotion import is_square, plan
 
-        self._plan, self._is_square = plan, is_square
+        self._plan, self._is_square, self._steer = plan, is_square, None
+        if config.plans_forces(gait):
+            from go2_wbc.kernels.preview import steer
+
+            self._steer = steer
+        self._mpc, self._forces = config.mpc.numbers(model.mass, model.gravity), _nothing_planned()
         self._foot_radius = model.foot_radius
         self._numbers = _numbers(model, gait, config)
         self._state = np.zeros(PLANNER.size)
@@ -37,7 +48,7 @@ class CompiledPlanner(GaitPlanner):
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state, standing."""
-        feet = snapshot.p_world_feet
+        feet, self._forces = snapshot.p_world_feet, _nothing_planned()
         self._state = PLANNER.pack(
             [
                 snapshot.state.yaw,
@@ -48,6 +59,7 @@ class CompiledPlanner(GaitPlanner):
                 snapshot.state.time,
                 float(np.mean(feet[:, 2])) - self._foot_radius,
                 0.0,
+                *LOCOMOTION.views(self._numbers)[3:6],
                 feet,
                 np.ones(4),
                 np.zeros(4),
@@ -69,6 +81,7 @@ class CompiledPlanner(GaitPlanner):
         stands = bool(self._is_square(snapshot.row, self._numbers))
         self._state[_STATE["is_stepping"]] = not stands
         self._state[_STATE["phase_time"]] = 0.0
+        self._state[_FORM] = self._numbers[_RESTING]
         return stands
 
     def update(self, snapshot: Snapshot, command: VelocityCommand) -> Reference:
@@ -77,17 +90,31 @@ class CompiledPlanner(GaitPlanner):
         wanted[0], wanted[1], wanted[2] = command.linear_x, command.linear_y, command.angular_z
         state = snapshot.state
         self._contact[:] = state.feet_in_contact
-        self._plan(snapshot.row, state.time, self._contact, self._state, self._numbers, wanted, row)
+        own, numbers = self._state, self._numbers
+        self._plan(snapshot.row, state.time, self._contact, own, numbers, wanted, row)
+        if self._steer is not None:
+            forces = self._forces
+            self._steer(snapshot.row, state.time, own, numbers, self._mpc, wanted, forces, row)
         return Reference.of_row(row)
 
 
+def _nothing_planned() -> np.ndarray:
+    return FORCES.pack([-np.inf, np.zeros((4, 3))])
+
+
 def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndarray:
-    correction = CorrectionConfig()
+    correction, rest = CorrectionConfig(), resting_gait(gait)
+    stride = gait.stride if config.plans_forces(gait) else None
     return LOCOMOTION.pack(
         [
             gait.period,
             gait.duty,
             gait.offsets,
+            rest.period,
+            rest.duty,
+            rest.offsets,
+            np.zeros(5) if stride is None else astuple(stride),
+            [PERIOD_RATE, DUTY_RATE, OFFSET_RATE],
             config.height,
             [config.linear_acceleration] * 2 + [config.angular_acceleration],
             config.velocity_feedback,
@@ -96,7 +123,7 @@ def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndar
             config.foothold_reach,
             config.normal_force_min,
             config.normal_force_max,
-            config.load_ramp,
+            config.ramp(gait),
             config.settle_speed,
             SETTLED_COMMAND,
             config.capture_margin,

@@ -30,6 +30,9 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.legs import LEGS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.correction import SteadyStateCorrection
+from go2_wbc.planning.gait_clock import GaitClock
+from go2_wbc.planning.mpc import MpcConfig
+from go2_wbc.planning.preview import Course, ForcePlanner
 from go2_wbc.planning.swing import SwingConfig, swing_foot
 from go2_wbc.reference import BodyTarget, LegTask, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
@@ -69,6 +72,7 @@ class LocomotionConfig:
         square_tolerance: distance [m] of a foot from below its hip at which the robot stands
             squarely enough to stop stepping.
         swing: shape of the swing.
+        mpc: planning of the forces ahead.
     """
 
     height: float = 0.29
@@ -85,11 +89,12 @@ class LocomotionConfig:
     capture_margin: float = 0.09
     square_tolerance: float = 0.02
     swing: SwingConfig = field(default_factory=SwingConfig)
+    mpc: MpcConfig = field(default_factory=MpcConfig)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a number that is out of range."""
         zero_is_valid = {"velocity_feedback", "normal_force_min"}
-        positive = {f.name for f in fields(self)} - zero_is_valid - {"swing"}
+        positive = {f.name for f in fields(self)} - zero_is_valid - {"swing", "mpc"}
         require_positive(self, *sorted(positive))
         require_not_negative(self, *sorted(zero_is_valid))
         if not LEAST_HEIGHT <= self.height <= GREATEST_HEIGHT:
@@ -102,6 +107,14 @@ class LocomotionConfig:
                 f"normal_force_min must be below normal_force_max, got {self.normal_force_min} "
                 f"and {self.normal_force_max} N"
             )
+
+    def plans_forces(self, gait: Gait) -> bool:
+        """Whether ``gait`` is walked with the forces planned ahead."""
+        return self.mpc.enabled or gait.needs_mpc
+
+    def ramp(self, gait: Gait) -> float:
+        """Time [s] over which a foot of ``gait`` takes up its load."""
+        return self.mpc.load_ramp if self.plans_forces(gait) else self.load_ramp
 
 
 class GaitPlanner(ABC):
@@ -136,9 +149,11 @@ class LocomotionPlanner(GaitPlanner):
     def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
         """Prepare a planner; ``start`` sets it on its way."""
         self._model = model
-        self._gait = gait
         self._config = config
-        self._gait_schedule = gait.schedule()
+        plans_forces = config.plans_forces(gait)
+        self._clock = GaitClock(gait, gait.stride if plans_forces else None)
+        self._ramp = config.ramp(gait)
+        self._forces = ForcePlanner(model, config.mpc) if plans_forces else None
         self._is_stepping = False
         self._yaw = 0.0
 
@@ -148,7 +163,9 @@ class LocomotionPlanner(GaitPlanner):
         self._position = snapshot.p_world_com[:2].copy()
         self._velocity = np.zeros(3)
         self._is_stepping = False
-        self._phase_time = 0.0
+        self._clock.restart()
+        if self._forces is not None:
+            self._forces.start()
         self._last_time = snapshot.state.time
         self._ground = float(np.mean(snapshot.p_world_feet[:, 2])) - self._model.foot_radius
         self._liftoff = snapshot.p_world_feet.copy()
@@ -170,7 +187,7 @@ class LocomotionPlanner(GaitPlanner):
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""
         self._is_stepping = not self._is_square(snapshot)
-        self._phase_time = 0.0
+        self._clock.restart()
         return not self._is_stepping
 
     def update(self, snapshot: Snapshot, command: VelocityCommand) -> Reference:
@@ -180,13 +197,13 @@ class LocomotionPlanner(GaitPlanner):
         self._advance_phase(snapshot, command, dt)
         self._integrate(snapshot, command, dt)
         self._correct_height(snapshot, dt)
-        phase = (self._gait_schedule if self._is_stepping else standing()).at(self._phase_time)
+        phase = self._phase(command, dt)
         self._note_liftoffs(snapshot, phase.stance)
         p, v, a = self._feet(snapshot, phase)
         legs = tuple(LegTask.STANCE if s else LegTask.SWING for s in phase.stance)
         q = snapshot.state.joint_positions
-        load = phase.load_share(self._config.load_ramp)
-        return Reference(
+        load = phase.load_share(self._ramp)
+        reference = Reference(
             body=self._body(),
             legs=legs,
             normal_force_min=self._config.normal_force_min * load,
@@ -198,19 +215,48 @@ class LocomotionPlanner(GaitPlanner):
             v_joints=np.zeros(12),
             a_joints=np.zeros(12),
         )
+        if self._forces is None or not self._is_stepping:
+            return reference
+        return self._forces.update(snapshot, self._course(snapshot, command, phase), reference)
+
+    def _phase(self, command: VelocityCommand, dt: float) -> ContactPhase:
+        if not self._is_stepping:
+            return standing().at(0.0)
+        x, y, turn = self._velocity
+        arm = np.hypot(*self._model.p_base_feet_nominal[0, :2])
+        is_resting = command.is_zero and self._is_settled()
+        self._clock.adapt(dt, float(np.hypot(x, y) + arm * abs(turn)), is_resting=is_resting)
+        return self._clock.now()
+
+    def _course(self, snapshot: Snapshot, command: VelocityCommand, phase: ContactPhase) -> Course:
+        config = self._config
+        remaining = np.where(phase.stance, 0.0, phase.remaining)
+        return Course(
+            gait=self._clock.gait,
+            time=self._clock.time,
+            yaw=self._yaw,
+            position=np.array(
+                [*self._position, self._ground + config.height + self._height_offset]
+            ),
+            velocity=self._velocity,
+            command=np.array([command.linear_x, command.linear_y, command.angular_z]),
+            acceleration=np.array([config.linear_acceleration] * 2 + [config.angular_acceleration]),
+            footholds=self._footholds(snapshot, remaining),
+            ground=self._ground,
+        )
 
     def _advance_phase(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> None:
         if self._is_stepping:
-            self._phase_time += dt
+            self._clock.time += dt
             if command.is_zero and self._is_landing() and self._may_stop(snapshot):
                 self._is_stepping = False
         elif not command.is_zero or self._must_step(snapshot):
             self._is_stepping = True
-            self._phase_time = 0.0
+            self._clock.restart()
 
     def _is_landing(self) -> bool:
         """Whether feet touch down at this tick and no other one is in the air."""
-        stance = self._gait_schedule.at(self._phase_time).stance
+        stance = self._clock.now().stance
         has_landed = (stance & ~self._was_stance).any()
         return bool(has_landed and (stance | self._was_stance).all())
 
@@ -307,7 +353,9 @@ class LocomotionPlanner(GaitPlanner):
         arms = hips - snapshot.state.p_world_base[:2]
         spin = self._velocity[2] * np.column_stack([-arms[:, 1], arms[:, 0]])
         velocity = v + spin
-        travel = velocity * self._gait.stance_time / 2 + config.velocity_feedback * (v - v_ref)
+        travel = velocity * self._clock.gait.stance_time / 2 + config.velocity_feedback * (
+            v - v_ref
+        )
         length = np.linalg.norm(travel, axis=1, keepdims=True)
         reach = config.foothold_reach
         travel *= np.minimum(1.0, reach / np.maximum(length, _TINY))
@@ -331,7 +379,7 @@ class LocomotionPlanner(GaitPlanner):
                     self._liftoff[leg],
                     goal,
                     float(progress[leg]),
-                    self._gait.swing_time,
+                    self._clock.gait.swing_time,
                     self._config.swing,
                 )
         return p, v, a

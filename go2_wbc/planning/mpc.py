@@ -81,6 +81,8 @@ class MpcConfig:
                 self.friction,
                 self.force_max,
                 self.least_share,
+                self.interval,
+                self.prior_weight,
             ]
         )
 

@@ -97,7 +97,7 @@ class Playback(PlanFollower):
         self, plan: Float[np.ndarray, " size"], snapshot: Snapshot, t: float, dt: float
     ) -> Reference:
         """See ``PlanFollower.follow``."""
-        row = np.empty(REFERENCE.size)
+        row = np.zeros(REFERENCE.size)
         steps, correction, state = self._steps, self._correction, self._state
         if steps is None:
             self._follow(plan, snapshot.row, dt, correction, state, row)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from go2_wbc.reference import LEAST_WEIGHT, MOST_WEIGHT
 from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.validation import (
     require_between,
@@ -16,7 +17,7 @@ from go2_wbc.wbc.tasks import Gains
 WEIGHTS = (1e-3, 1e3)
 """Least and greatest weight of a task. At all 16 corners of these ranges four solvers agree within
 5e-4 N m on 39 random problems; with 1e-4 to 1e4, some report success with 9 N m between them."""
-FORCE_WEIGHTS = (1e-6, 1e2)
+FORCE_WEIGHTS = (LEAST_WEIGHT, MOST_WEIGHT)
 """Least and greatest weight of the force regularisation, measured along."""
 
 

@@ -81,7 +81,6 @@ class WholeBodyController:
         self.inequalities = _inequalities(model, self.config)
         motor = model.motor.scaled(self.config.torque_share)
         self._friction = FrictionFeedForward(self.config.joint_friction, motor)
-        self._task_weights = np.array([task.weight for task in self.tasks])
         self.backend_name = backend
         self._backend = self._make_backend(backend)
         constraints = (*self.equalities, *self.inequalities)
@@ -112,7 +111,7 @@ class WholeBodyController:
             snapshot=snapshot,
             reference=reference,
             tasks=stacked(task_rows, self.tasks),
-            weights=np.repeat(self._task_weights, task_counts),
+            weights=np.repeat([task.weight_at(reference) for task in self.tasks], task_counts),
             equalities=stacked(equality_rows, self.equalities),
             bounds=Bounds(*(np.concatenate(parts) for parts in zip(*bounds, strict=True))),
             sources=(*self.tasks, *self.equalities, *self.inequalities),

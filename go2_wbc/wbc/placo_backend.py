@@ -40,7 +40,7 @@ from go2_wbc.wbc.backends import QpBackend
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import JointLimits, TorqueLimits
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem
-from go2_wbc.wbc.tasks import Gains
+from go2_wbc.wbc.tasks import Gains, forces_near
 
 REGULARISATION = 1e-12
 """Added by PlaCo to the diagonal of its Hessian; its default 1e-8 moves a force by 4 mN."""
@@ -101,6 +101,7 @@ class _Mode:
         self._position = self._add_position_task()
         self._orientation = self._solver.add_orientation_task(_BASE, np.eye(3))
         self._orientation.configure("orientation", "soft", config.orientation_weight)
+        self._pressing: list[placo.Contact] = []
         self._contacts = {leg: self._add_contact(leg) for leg in self._stance}
         self._swing = {leg: self._add_swing(leg) for leg in LEGS if legs[leg] is LegTask.SWING}
         self._posture = {leg: self._add_posture(leg) for leg in LEGS if legs[leg] is LegTask.JOINTS}
@@ -120,8 +121,8 @@ class _Mode:
         task.configure(f"{leg.name} contact", "hard", 1.0)
         contact = self._solver.add_unilateral_point_contact(task)
         contact.mu = self._config.friction
-        contact.weight_forces = self._config.force_weight / 2
         contact.weight_tangentials = 0.0
+        self._pressing.append(contact)
         return task
 
     def _add_swing(self, leg: Leg) -> placo.DynamicsPositionTask:
@@ -145,6 +146,8 @@ class _Mode:
         self._update_body(state, reference)
         for leg in self._stance:
             self._update_contact(leg, state)
+        for contact in self._pressing:
+            contact.weight_forces = self._force_weight(reference) / 2
         for leg, task in self._swing.items():
             p, v = self._robot.get_T_world_frame(leg.foot)[:3, 3], self._velocity(leg.foot, state)
             task.ddtarget_world = _acceleration(
@@ -212,7 +215,7 @@ class _Mode:
         if not self._solver.solve(False).success:
             raise QpInfeasible(SOLVER, "tasks, friction and torque limits contradict each other")
         qp = self._solver.problem
-        self._add_force_reference()
+        self._add_force_reference(problem.reference)
         self._add_bounds(problem)
         try:
             qp.solve()
@@ -230,16 +233,19 @@ class _Mode:
     def _force_columns(self) -> list[int]:
         return [FORCES.start + 3 * leg + axis for leg in self._stance for axis in range(3)]
 
-    def _add_force_reference(self) -> None:
+    def _force_weight(self, reference: Reference) -> float:
+        return reference.force_weight or self._config.force_weight
+
+    def _add_force_reference(self, reference: Reference) -> None:
         if not self._stance:
             return
         count = 3 * len(self._stance)
-        share = self._model.mass * self._model.gravity / len(self._stance)
+        near = forces_near(reference, self._model.mass * self._model.gravity)
         around = placo.Expression()
         around.A = np.eye(count, 18 + count, 18)
-        around.b = np.tile([0.0, 0.0, -2 * share], len(self._stance))
+        around.b = -2 * near[self._stance].ravel()
         row = self._solver.problem.add_constraint(around == 0.0)
-        row.configure("soft", self._config.force_weight / 2)
+        row.configure("soft", self._force_weight(reference) / 2)
 
     def _add_bounds(self, problem: Problem) -> None:
         columns = [*range(18), *self._force_columns]

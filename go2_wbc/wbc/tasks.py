@@ -59,6 +59,10 @@ class Task(ABC):
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
         """Rows A z = b of this task now; may be empty."""
 
+    def weight_at(self, reference: Reference) -> float:
+        """The weight of these rows; ``weight``, but for a reference that says otherwise."""
+        return self.weight
+
 
 @dataclass(frozen=True, slots=True)
 class BodyPosition(Task):
@@ -158,9 +162,10 @@ class LegPosture(Task):
 
 @dataclass(frozen=True, slots=True)
 class ForceRegularisation(Task):
-    """Keep the contact forces near an even share of the weight, so that the optimum is unique.
+    """Keep the contact forces near those of the reference, so that the optimum is unique.
 
-    Around zero instead, a weight of 1e-3 already sags the body.
+    A reference without forces means an even share of the weight: around zero, a weight of 1e-3
+    already sags the body.
     """
 
     weight_of_robot: float
@@ -172,9 +177,21 @@ class ForceRegularisation(Task):
         """Three rows per stance foot: its force, against weight / number of stance feet."""
         stance = np.flatnonzero(reference.stance)
         A = np.zeros((3 * len(stance), SIZE))
-        b = np.zeros(3 * len(stance))
         for i, leg in enumerate(stance):
             start = FORCES.start + 3 * leg
             A[3 * i : 3 * i + 3, start : start + 3] = _EYE
-            b[3 * i + 2] = self.weight_of_robot / len(stance)
+        b = forces_near(reference, self.weight_of_robot)[stance].ravel()
         return Rows(A, b)
+
+    def weight_at(self, reference: Reference) -> float:
+        """The reference's own weight, if it has one."""
+        return reference.force_weight or self.weight
+
+
+def forces_near(reference: Reference, weight_of_robot: float) -> Float[np.ndarray, "4 3"]:
+    """Forces [N] near which those of the stance feet are kept."""
+    if reference.force_weight:
+        return reference.f_world_feet
+    forces = np.zeros((4, 3))
+    forces[:, 2] = weight_of_robot / max(int(reference.stance.sum()), 1)
+    return forces

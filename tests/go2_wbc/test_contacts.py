@@ -11,7 +11,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from go2_wbc.contacts import GAITS, TIE, ContactSchedule, Gait, find_gait, standing
+from go2_wbc.contacts import GAITS, TIE, ContactSchedule, Gait, Stride, find_gait, standing
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.legs import LEGS
 
@@ -209,8 +209,8 @@ def test_events_out_of_order_are_refused(times: tuple[float, ...], rows: int) ->
 
 
 def test_an_unknown_gait_is_answered_with_the_known_names() -> None:
-    with pytest.raises(CommandError, match=r"unknown gait 'gallop'; valid: .*trot"):
-        find_gait("gallop")
+    with pytest.raises(CommandError, match=r"unknown gait 'moonwalk'; valid: .*trot"):
+        find_gait("moonwalk")
 
 
 @pytest.mark.parametrize(
@@ -224,6 +224,31 @@ def test_an_unknown_gait_is_answered_with_the_known_names() -> None:
 def test_a_gait_out_of_range_is_refused(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError, match=message):
         replace(GAITS["trot"], **changes)
+
+
+@pytest.mark.parametrize("gait", GAITS.values(), ids=lambda gait: gait.name)
+def test_a_gait_that_has_a_name_lands_on_four_feet_or_plans_its_forces(gait: Gait) -> None:
+    times = np.arange(0.0, gait.period, 0.001)
+    stance = gait.schedule().at_times(times).stance
+    assert gait.needs_mpc or gait.lands_on_four
+    if (~stance).all(axis=1).any():
+        assert gait.needs_mpc
+    assert gait.lands_on_four == (gait.name in ("trot", "pronk"))
+
+
+def test_a_stride_gets_shorter_with_the_speed_until_the_foot_cannot() -> None:
+    stride = Stride()
+    assert stride.at(0.0) == pytest.approx((0.32, 0.5))
+    assert stride.at(2.0) == pytest.approx((0.30, 1 / 3))
+    assert stride.at(4.0) == pytest.approx((0.32, 0.25))
+
+
+@pytest.mark.parametrize(
+    "changes", [{"stance_min": 0.2}, {"swing_slope": 0.2}, {"reach": 0.0}, {"swing_slope": -0.1}]
+)
+def test_a_stride_without_a_stance_or_a_swing_is_refused(changes: dict[str, float]) -> None:
+    with pytest.raises(ConfigError, match="Stride"):
+        Stride(**changes)
 
 
 def test_a_periodic_schedule_that_outlasts_its_period_is_refused() -> None:

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from go2_wbc.errors import CommandError
 from go2_wbc.reference import Anchor, LegTask, MotionPlan, Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
-from tests.engine_helpers import JO, ST, SW, random_reference, random_state, state_of
+from tests.engine_helpers import (
+    JO,
+    ST,
+    SW,
+    random_reference,
+    random_state,
+    state_of,
+    with_planned_forces,
+)
 
 EXACT = 1e-12  # rounding of numbers of order one
 METRES = st.floats(-10.0, 10.0)
@@ -23,14 +34,17 @@ anchors = st.builds(
 )
 MODEL = RobotModel()
 RNG = np.random.default_rng(3)
-REFERENCE = random_reference(MODEL.snapshot(random_state(RNG)), (ST, SW, JO, ST), 2.0, RNG)
+PLAIN = random_reference(MODEL.snapshot(random_state(RNG)), (ST, SW, JO, ST), 2.0, RNG)
+REFERENCE = with_planned_forces(PLAIN, RNG)
 
 
 def vectors(reference: Reference) -> np.ndarray:
     """Everything that turns but does not shift."""
     body = reference.body
     rows = [body.v_world, body.a_world, body.w_world, body.dw_world, *body.R_world_base.T]
-    return np.array([*rows, *reference.v_world_feet, *reference.a_world_feet])
+    return np.array(
+        [*rows, *reference.v_world_feet, *reference.a_world_feet, *reference.f_world_feet]
+    )
 
 
 def points(reference: Reference) -> np.ndarray:
@@ -110,3 +124,15 @@ def test_the_anchor_does_not_change_the_feet_it_was_given() -> None:
 def test_a_motion_plan_without_a_reference_cannot_be_made() -> None:
     with pytest.raises(TypeError, match="at"):
         MotionPlan()  # pyright: ignore[reportAbstractUsage]
+
+
+@pytest.mark.parametrize("weight", [-1e-3, 1e-9, 1e3])
+def test_a_weight_of_planned_forces_that_costs_accuracy_is_refused(weight: float) -> None:
+    with pytest.raises(CommandError, match="force_weight must be 0 or 1e-06 to 100, got"):
+        _ = replace(REFERENCE, force_weight=weight).row
+
+
+def test_the_row_of_a_reference_holds_its_planned_forces() -> None:
+    again = Reference.of_row(REFERENCE.row)
+    assert again.force_weight == REFERENCE.force_weight
+    np.testing.assert_array_equal(again.f_world_feet, REFERENCE.f_world_feet)

@@ -26,6 +26,7 @@ from tests.engine_helpers import (
     random_state,
     standing_q,
     state_of,
+    with_planned_forces,
 )
 
 AGREEMENT = 1e-6  # [N m] between two solvers; measured 2.3e-8
@@ -81,6 +82,23 @@ def test_torques_are_those_of_the_full_problem(config: WbcConfig) -> None:
         np.testing.assert_allclose(ours.forces, theirs.forces, atol=1e-4, rtol=0)
         np.testing.assert_allclose(ours.qdd, theirs.qdd, atol=1e-4, rtol=0)
     assert refused < COUNT / 4
+
+
+def test_planned_forces_are_kept_near_as_in_the_full_problem() -> None:
+    model, rng = RobotModel(), np.random.default_rng(27)
+    compiled = WholeBodyController(model)
+    readable = WholeBodyController(model, "full", WbcConfig(solver="daqp"))
+    moved = 0
+    for snapshot, plain in cases(model, 104, seed=26):
+        reference = with_planned_forces(plain, rng)
+        ours, without = (compiled.solve_compiled(snapshot, r) for r in (reference, plain))
+        theirs = solve_or_none(readable, snapshot, reference)
+        assert (ours is None) == (theirs is None)
+        if ours is None or theirs is None or without is None:
+            continue
+        np.testing.assert_allclose(ours.tau, theirs.tau, atol=AGREEMENT, rtol=0)
+        moved += bool(np.abs(ours.forces - without.forces).max() > 1.0)
+    assert moved > 50
 
 
 @pytest.mark.parametrize("share", [1.0, 0.4])

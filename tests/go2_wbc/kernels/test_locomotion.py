@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from go2_wbc.contacts import GAITS, ContactPhase, Gait
-from go2_wbc.kernels.layout import LOCOMOTION
 from go2_wbc.kernels.locomotion import foot_phase
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.compiled import CompiledPlanner
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
+from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.planning.swing import SwingConfig
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -20,6 +20,7 @@ from tests.engine_helpers import random_state, standing_q, state_of
 
 TICK = 0.002
 ROUNDING = 1e-8  # of accelerations up to 100 m/s^2; measured 2e-10
+OF_FORCES = 1e-6  # of planned forces up to 250 N and what they make of the trunk
 ODD = Gait("odd", period=0.37, duty=0.61, offsets=(0.13, 0.58, 0.0, 0.83))
 ODD_CONFIG = LocomotionConfig(
     height=0.27,
@@ -38,6 +39,7 @@ ODD_CONFIG = LocomotionConfig(
     swing=SwingConfig(apex=0.083, touchdown_depth=0.011),
 )
 """No two numbers alike, so that one in another's place is seen."""
+ODD_MPC = MpcConfig(step=0.028, interval=0.012, force_max=180.0, prior_weight=4e-3, load_ramp=0.02)
 
 
 def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.ndarray) -> Snapshot:
@@ -56,8 +58,13 @@ def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.nda
 
 @pytest.mark.parametrize(
     ("gait", "config"),
-    [(GAITS["trot"], LocomotionConfig()), (ODD, ODD_CONFIG)],
-    ids=["trot", "odd"],
+    [
+        (GAITS["trot"], LocomotionConfig()),
+        (ODD, ODD_CONFIG),
+        (GAITS["trot"], LocomotionConfig(mpc=MpcConfig(enabled=True))),
+        (GAITS["gallop"], replace(ODD_CONFIG, mpc=ODD_MPC)),
+    ],
+    ids=["trot", "odd", "trot by MPC", "gallop"],
 )
 def test_references_are_those_of_the_readable_planner(gait: Gait, config: LocomotionConfig) -> None:
     model, rng = RobotModel(), np.random.default_rng(8)
@@ -74,7 +81,8 @@ def test_references_are_those_of_the_readable_planner(gait: Gait, config: Locomo
         snapshot = stumbling(model, rng, tick, at)
         was_stepping = readable.is_stepping
         theirs, ours = readable.update(snapshot, command), compiled.update(snapshot, command)
-        np.testing.assert_allclose(ours.row, theirs.row, atol=ROUNDING, rtol=0)
+        rounding = OF_FORCES if theirs.force_weight else ROUNDING
+        np.testing.assert_allclose(ours.row, theirs.row, atol=rounding, rtol=0)
         assert ours.legs == theirs.legs
         assert compiled.is_stepping == readable.is_stepping
         assert compiled.heading == pytest.approx(readable.heading, abs=ROUNDING)
@@ -96,16 +104,13 @@ def test_references_are_those_of_the_readable_planner(gait: Gait, config: Locomo
     ids=lambda gait: gait.name,
 )
 def test_the_gait_is_that_of_the_contact_schedule(gait: Gait) -> None:
-    numbers = np.zeros(LOCOMOTION.size)
-    numbers[LOCOMOTION.start["period"]] = gait.period
-    numbers[LOCOMOTION.start["duty"]] = gait.duty
-    schedule = gait.schedule()
+    schedule, form = gait.schedule(), (gait.period, gait.duty)
     events = [event + shift for event in schedule.times for shift in (-2e-9, 0.0, 1e-10)]
     for t in (*np.arange(0.0, 3 * gait.period, 0.0007), *events, *np.add(events, gait.period)):
         time = max(float(t), 0.0)
         phase: ContactPhase = schedule.at(time)
         for leg in range(4):
-            stance, elapsed, remaining = foot_phase(time, gait.offsets[leg], numbers)
+            stance, elapsed, remaining = foot_phase(time, gait.offsets[leg], *form)
             assert stance == phase.stance[leg], (t, leg)
             assert elapsed == pytest.approx(phase.elapsed[leg], abs=2e-9)
             assert remaining == pytest.approx(phase.remaining[leg], abs=2e-9)

@@ -96,8 +96,10 @@ def standing(model: RobotModel) -> tuple[Snapshot, Reference]:
     return snapshot, holding_reference(snapshot)
 
 
-def spoilt(array: np.ndarray, value: float) -> tuple[np.ndarray, str]:
+def spoilt(array: np.ndarray | float, value: float) -> tuple[np.ndarray | float, str]:
     """A copy with ``value`` at one place, and that place as a message names it."""
+    if isinstance(array, float):
+        return value, f" is {value}"
     array, index = array.copy(), array.size // 2
     array.ravel()[index] = value
     place = ", ".join(str(i) for i in np.unravel_index(index, array.shape))

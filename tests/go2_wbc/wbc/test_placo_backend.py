@@ -18,7 +18,7 @@ from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.controller import WbcConfig, WholeBodyController
 from go2_wbc.wbc.solution import WbcSolution
-from tests.engine_helpers import fast_cases
+from tests.engine_helpers import fast_cases, with_planned_forces
 
 STATES = 120
 TORQUE_TOLERANCE = 1e-5  # [N m]; measured 1.4e-7 at force_weight 1e-4
@@ -116,6 +116,16 @@ def test_both_back_ends_find_the_same_torques_forces_and_accelerations(foot_radi
         np.testing.assert_allclose(a.qdd, b.qdd, atol=FORCE_TOLERANCE, rtol=1e-6)
         assert motion_error(snapshot, a) < MOTION_TOLERANCE
         assert motion_error(snapshot, b) < MOTION_TOLERANCE
+
+
+def test_both_back_ends_keep_near_the_planned_forces() -> None:
+    model, rng = RobotModel(), np.random.default_rng(8)
+    ours, oracle = WholeBodyController(model), WholeBodyController(model, "placo")
+    for snapshot, plain in cases(model, seed=9)[::3]:
+        for reference in (with_planned_forces(plain, rng), plain):  # and back again
+            a, b = ours.solve(snapshot, reference), oracle.solve(snapshot, reference)
+            np.testing.assert_allclose(a.tau, b.tau, atol=TORQUE_TOLERANCE, rtol=0)
+            np.testing.assert_allclose(a.forces, b.forces, atol=FORCE_TOLERANCE, rtol=0)
 
 
 def solved(

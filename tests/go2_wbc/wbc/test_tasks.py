@@ -29,6 +29,7 @@ from tests.engine_helpers import (
     moved,
     random_reference,
     random_state,
+    with_planned_forces,
 )
 
 MODEL = RobotModel()
@@ -143,6 +144,19 @@ def test_the_forces_are_regularised_around_an_even_share_of_the_weight(legs: tup
     found = residual(ForceRegularisation(160.0), snapshot, replace(reference, legs=legs), z)
     share = np.array([0.0, 0.0, 160.0 / max(stance.sum(), 1)])
     np.testing.assert_allclose(found, (z[18:].reshape(4, 3) - share)[stance].ravel(), atol=EXACT)
+
+
+@pytest.mark.parametrize("legs", MODES)
+def test_planned_forces_and_their_weight_take_the_place_of_the_even_share(legs: tuple) -> None:
+    snapshot, reference, z = scene(0)
+    task, stance = ForceRegularisation(160.0), np.array([kind is ST for kind in legs])
+    reference = replace(reference, legs=legs)
+    assert task.weight_at(reference) == task.weight
+    planned = with_planned_forces(reference, np.random.default_rng(1))
+    assert task.weight_at(planned) == planned.force_weight
+    found = residual(task, snapshot, planned, z)
+    wanted = (z[18:].reshape(4, 3) - planned.f_world_feet)[stance].ravel()
+    np.testing.assert_allclose(found, wanted, atol=EXACT)
 
 
 @pytest.mark.parametrize("legs", MODES)

@@ -1,0 +1,79 @@
+"""Where in its stride a gait is, while the gait itself may change.
+
+Period, duty and offsets are state: they move towards those that are wanted, at rates below that at
+which a foot's phase passes. So any gait becomes any other at any moment, and no foot that has
+lifted off is told that it still stands.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from go2_wbc.contacts import (
+    DUTY_RATE,
+    GAITS,
+    OFFSET_RATE,
+    PERIOD_RATE,
+    ContactPhase,
+    ContactSchedule,
+    Gait,
+    Stride,
+)
+
+
+def resting_gait(gait: Gait) -> Gait:
+    """The gait in which a robot that walks with ``gait`` starts and comes to rest."""
+    return gait if gait.lands_on_four else GAITS["trot"]
+
+
+class GaitClock:
+    """Phase and form of the gait.
+
+    Attributes:
+        gait: as it is now.
+        time: since the stride's start or a whole number of strides before [s].
+    """
+
+    def __init__(self, gait: Gait, stride: Stride | None) -> None:
+        """Args: gait: wanted; stride: how it follows the speed, or None."""
+        self._wanted, self._rest, self._stride = gait, resting_gait(gait), stride
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin the first stride."""
+        self.gait, self.time = self._rest, 0.0
+        self._schedule: ContactSchedule = self.gait.schedule()
+
+    def now(self) -> ContactPhase:
+        """The contacts of this instant."""
+        return self._schedule.at(self.time)
+
+    def adapt(self, dt: float, speed: float, *, is_resting: bool) -> None:
+        """Let ``dt`` [s] of change pass, towards the gait for ``speed`` [m/s] or for resting."""
+        wanted = self._rest if is_resting else self._wanted
+        period, duty = wanted.period, wanted.duty
+        if self._stride is not None and not is_resting:
+            period, duty = self._stride.at(speed)
+        before = self.gait
+        pairs = zip(before.offsets, wanted.offsets, strict=True)
+        offsets = tuple(_turned(now, goal, OFFSET_RATE * dt) for now, goal in pairs)
+        period = _moved(before.period, period, PERIOD_RATE * dt)
+        duty = _moved(before.duty, duty, DUTY_RATE * dt)
+        if (period, duty, offsets) == (before.period, before.duty, before.offsets):
+            return
+        if period != before.period:
+            self.time = self.time % before.period * period / before.period
+        self.gait = replace(wanted, period=period, duty=duty, offsets=offsets)
+        self._schedule = self.gait.schedule()
+
+
+def _moved(value: float, goal: float, most: float) -> float:
+    return value + min(max(goal - value, -most), most)
+
+
+def _turned(phase: float, goal: float, most: float) -> float:
+    """``phase`` moved the shorter way round to ``goal``, by ``most`` at the most."""
+    way = (goal - phase + 0.5) % 1.0 - 0.5
+    if abs(way) <= most:
+        return goal
+    return (phase + (most if way > 0.0 else -most)) % 1.0

@@ -1,0 +1,49 @@
+"""A gait becomes another at any moment, and no foot notices but by when it lands."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from go2_wbc.contacts import GAITS, Gait
+from go2_wbc.planning.gait_clock import GaitClock, resting_gait
+
+TICK = 0.002
+SECONDS = 2.0
+JUMP = 0.03  # of a swing's progress in one tick; the fastest swing takes 0.132 s
+
+
+@pytest.mark.parametrize("gait", GAITS.values(), ids=lambda gait: gait.name)
+def test_a_gait_is_reached_from_the_one_at_rest_and_left_again(gait: Gait) -> None:
+    clock = GaitClock(gait, None)
+    assert clock.gait == resting_gait(gait)
+    for wanted, is_resting in ((gait, False), (resting_gait(gait), True)):
+        run(clock, is_resting=is_resting)
+        assert clock.gait == wanted
+
+
+@pytest.mark.parametrize("gait", GAITS.values(), ids=lambda gait: gait.name)
+def test_no_foot_is_put_back_in_its_stride_while_the_gait_changes(gait: Gait) -> None:
+    rng = np.random.default_rng(5)
+    clock = GaitClock(gait, gait.stride)
+    phases = []
+    for _ in range(6):
+        phases += run(clock, seconds=rng.uniform(0.2, 1.0), is_resting=rng.random() < 0.5)
+    for before, after in pairwise(phases):
+        swings = ~before.stance & ~after.stance
+        steps = (after.progress - before.progress)[swings]
+        assert (steps > 0.0).all()
+        assert (steps < JUMP).all()
+        landed = ~before.stance & after.stance
+        assert (before.progress[landed] > 1.0 - JUMP).all()
+
+
+def run(clock: GaitClock, seconds: float = SECONDS, *, is_resting: bool) -> list:
+    phases = []
+    for _ in range(int(seconds / TICK)):
+        clock.time += TICK
+        clock.adapt(TICK, 2.0, is_resting=is_resting)
+        phases.append(clock.now())
+    return phases
