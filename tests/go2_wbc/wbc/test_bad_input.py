@@ -100,10 +100,10 @@ def spoilt(array: np.ndarray | float, value: float) -> tuple[np.ndarray | float,
     """A copy with ``value`` at one place, and that place as a message names it."""
     if isinstance(array, float):
         return value, f" is {value}"
-    array, index = array.copy(), array.size // 2
-    array.ravel()[index] = value
-    place = ", ".join(str(i) for i in np.unravel_index(index, array.shape))
-    return array, f"[{place}] is {value}"
+    copy, index = np.array(array), np.size(array) // 2
+    copy.ravel()[index] = value
+    place = ", ".join(str(i) for i in np.unravel_index(index, copy.shape))
+    return copy, f"[{place}] is {value}"
 
 
 def expect_refusal(ways: Ways, case: tuple[Snapshot, Reference], message: str) -> None:
