@@ -59,14 +59,18 @@ class Played:
     saturated: float
 
 
-def plant_of(trial: Trial) -> MujocoPlant:
+def plant_of(
+    trial: Trial,
+    first_seed: int = FIRST_SEED,
+    mass_range: tuple[float, float] = MASS_RANGE,
+) -> MujocoPlant:
     """A simulated robot under the conditions of the trial."""
-    rng = np.random.default_rng(FIRST_SEED + trial.seed)
-    friction, mass, yaw = (rng.uniform(*r) for r in (FRICTION_RANGE, MASS_RANGE, YAW_RANGE))
+    rng = np.random.default_rng(first_seed + trial.seed)
+    friction, mass, yaw = (rng.uniform(*r) for r in (FRICTION_RANGE, mass_range, YAW_RANGE))
     return MujocoPlant(
         friction=float(friction),
         mass_scale=float(mass),
-        seed=FIRST_SEED + trial.seed,
+        seed=first_seed + trial.seed,
         initial_yaw=float(yaw),
         initial_joint_noise=JOINT_NOISE,
     )

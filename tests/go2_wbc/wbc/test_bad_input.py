@@ -41,9 +41,8 @@ ROUNDING = 1e-6  # [N, N m, m/s^2]
 WITHOUT_BODY = WbcConfig(position_weight=0.0, orientation_weight=0.0)
 NOT_FINITE = [np.nan, np.inf, -np.inf]
 IN_BODY = [f.name for f in fields(BodyTarget) if f.name != "point"]
-IN_REFERENCE = [
-    f.name for f in fields(Reference) if f.name not in ("body", "legs", "stance", "_row")
-]
+NOT_NUMBERS = "body", "legs", "stance", "_row"
+IN_REFERENCE = [f.name for f in fields(Reference) if f.name not in NOT_NUMBERS]
 IN_SNAPSHOT = [f.name for f in fields(Snapshot) if f.name not in ("state", "_row")]
 
 

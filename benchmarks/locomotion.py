@@ -1,0 +1,171 @@
+"""``python -m benchmarks locomotion``: how fast, and how exactly, the robot walks in every gait.
+
+The forces are planned ahead by the MPC. A run takes ``WINDOW`` seconds, from ``START_TIME`` after
+the command on: ground truth as the state, motors with their torque-speed line, friction 0.6 to 1.0
+and masses within 10 %, of which the controller is not told. Gaits and weights were chosen on seeds
+0 to 9; those judged begin at ``FIRST_SEED``.
+
+- velocity: of MuJoCo's CoM in the heading frame, every tick;
+- mean velocity error: |mean - command| / |command|, in the direction of the command;
+- mean absolute error: mean of |velocity - command|, oscillation within the stride included;
+- turning: from the heading (unwrapped) at both ends of the window;
+- saturated ticks: share of ticks in which some motor gives all it has at its speed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.seeded import add_seeded_options, run_seeded
+from benchmarks.steps import plant_of
+from benchmarks.trials import Trial, TrialRobot
+from controller.cli.common import Subparsers, add_parser
+from controller.motion_measurement import FULL
+from go2_wbc.config import Config
+from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
+from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.mpc import MpcConfig
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from go2_wbc.robot.model import RobotModel
+
+FIRST_SEED = 4000
+"""Seed of the first trial that is judged."""
+MASS_RANGE = (0.9, 1.1)
+"""Factor on every mass and inertia of the robot; the controller is not told."""
+START_TIME, WINDOW = 3.0, 20.0
+"""Time [s] after a command that is left out, and that is measured."""
+CONFIG = Config(
+    locomotion=LocomotionConfig(mpc=MpcConfig(enabled=True)),
+    envelope=VelocityEnvelope(forward=4.0, backward=2.0, lateral=1.5, turning=8.0),
+)
+EXAMPLES = """
+python -m benchmarks locomotion            everything; about an hour on two cores
+python -m benchmarks locomotion --quick    three seeds
+python -m benchmarks locomotion --rows ahead-2.5 gaits --json
+python -m benchmarks locomotion --list     the metrics and their thresholds
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """One command to one gait, and what is asked of it.
+
+    Attributes:
+        name: of the scenario.
+        gait: its name.
+        command: what is followed.
+        mean: greatest mean error [%].
+        mae: greatest mean absolute error [m/s]; None if it only informs.
+        saturated: greatest share of saturated ticks [%]; None if it only informs.
+        group: of the scenario.
+    """
+
+    name: str
+    gait: str
+    command: VelocityCommand
+    mean: float
+    mae: float | None = None
+    saturated: float | None = None
+    group: str = "trot"
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        """The rows of the report."""
+        c = self.command
+        item = f"{self.gait} ({c.linear_x:g}, {c.linear_y:g}) m/s, {c.angular_z:g} rad/s, 20 s"
+        turning = [Metric(f"{self.name}.turn", item, "mean turning error", "%", self.mean)]
+        moving = [
+            Metric(f"{self.name}.mean", item, "mean velocity error", "%", self.mean),
+            Metric(f"{self.name}.mae", item, "mean absolute error", "m/s", self.mae),
+        ]
+        return (
+            *(moving if speed_of(c) else ()),
+            *(turning if c.angular_z else ()),
+            Metric(f"{self.name}.saturated", item, "saturated ticks", "%", self.saturated),
+            Metric(f"{self.name}.speed", item, "peak joint speed / limit", "", 1.0),
+        )
+
+
+def speed_of(command: VelocityCommand) -> float:
+    """Speed [m/s] of the command, turning aside."""
+    return math.hypot(command.linear_x, command.linear_y)
+
+
+def measure_run(trial: Trial, run: Run) -> Measurement:
+    """Follow the command; see the module's docstring for what is measured."""
+    command, plant = run.command, plant_of(trial, FIRST_SEED, MASS_RANGE)
+    with TrialRobot(plant, CONFIG) as robot:
+        robot.require(robot.go2.stand())
+        robot.require(robot.go2.walk(run.gait))
+        robot.go2.move(command.linear_x, command.angular_z, linear_y=command.linear_y)
+        robot.truth.clear()
+        robot.wait(START_TIME + WINDOW)
+        recorded = robot.truth.recording()
+    return Measurement(measured(run, recorded.since(recorded.time[0] + START_TIME)))
+
+
+def measured(run: Run, window: TruthRecording) -> dict[str, float]:
+    """The values of the run's metrics."""
+    command, model, name = run.command, RobotModel(), run.name
+    wanted = speed_of(command)
+    values = {
+        f"{name}.saturated": 100.0 * float((window.torque_shares(model) >= FULL).mean()),
+        f"{name}.speed": window.peak_speed_share(model),
+    }
+    if wanted:
+        direction = np.array([command.linear_x, command.linear_y]) / wanted
+        error = window.com_velocity[:, :2] @ direction - wanted
+        values[f"{name}.mean"] = 100.0 * abs(float(error.mean())) / wanted
+        values[f"{name}.mae"] = float(np.abs(error).mean())
+    if command.angular_z:
+        rate = (window.rpy[-1, 2] - window.rpy[0, 2]) / (window.time[-1] - window.time[0])
+        values[f"{name}.turn"] = 100.0 * abs(rate / command.angular_z - 1.0)
+    return values
+
+
+RUNS = (
+    Run("ahead-0.5", "trot", VelocityCommand(0.5), 1.0, 0.012, 5.0),
+    Run("ahead-1.0", "trot", VelocityCommand(1.0), 1.0, 0.02, 5.0),
+    Run("ahead-1.5", "trot", VelocityCommand(1.5), 1.0, 0.03, 5.0),
+    Run("ahead-2.0", "trot", VelocityCommand(2.0), 1.0, 0.04, 5.0),
+    Run("ahead-2.5", "trot", VelocityCommand(2.5), 1.0, 0.05, 5.0),
+    Run("ahead-3.0", "trot", VelocityCommand(3.0), 3.0, 0.08),
+    Run("aside-0.5", "trot", VelocityCommand(0.0, 0.5), 2.0),
+    Run("aside-1.0", "trot", VelocityCommand(0.0, 1.0), 2.0),
+    Run("turn-2", "trot", VelocityCommand(0.0, 0.0, 2.0), 2.0),
+    Run("turn-4", "trot", VelocityCommand(0.0, 0.0, 4.0), 2.0),
+    Run("curve", "trot", VelocityCommand(0.8, 0.3, 1.0), 2.0),
+    Run("flying-trot", "flying_trot", VelocityCommand(1.5), 5.0, None, 5.0, "gaits"),
+    Run("walk", "walk", VelocityCommand(0.4), 5.0, None, 5.0, "gaits"),
+    Run("pace", "pace", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
+    Run("bound", "bound", VelocityCommand(1.0), 5.0, None, 5.0, "gaits"),
+    Run("pronk", "pronk", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
+    Run("gallop", "gallop", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
+)
+SCENARIOS = tuple(
+    Scenario(run.name, run.metrics, partial(measure_run, run=run), group=run.group) for run in RUNS
+)
+"""In the order of the report."""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``locomotion``."""
+    parser = add_parser(
+        subparsers,
+        "locomotion",
+        "Every gait at its speeds: how exactly, and within which limits.\n"
+        "Exit code 0 if every threshold is met, 1 if one is not.",
+        examples=EXAMPLES,
+    )
+    add_seeded_options(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run what was asked for; see ``run_seeded``."""
+    return run_seeded(args, SCENARIOS)

@@ -1,0 +1,57 @@
+"""The benchmark of locomotion: what a recorded run is worth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.locomotion import CONFIG, RUNS, SCENARIOS, Run, measured
+from go2_wbc.contacts import GAITS
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.ground_truth import GroundTruth, TruthRecording
+from go2_wbc.robot.state import JointCommand
+
+
+@pytest.fixture(scope="module")
+def fallen() -> TruthRecording:
+    """Two seconds of a limp robot, of which what is measured is then written over."""
+    plant = MujocoPlant()
+    truth = GroundTruth(plant)
+    for _ in range(1000):
+        truth.write(JointCommand.damping(1.0))
+    recorded = truth.recording()
+    plant.close()
+    return recorded
+
+
+def test_errors_are_along_the_command_and_count_both_ways(fallen: TruthRecording) -> None:
+    n, dt = len(fallen.time), np.diff(fallen.time)[:, None]
+    along, across = np.array([0.6, 0.8, 0.0]), np.array([-0.8, 0.6, 0.0])
+    sway = np.where(np.arange(n - 1) % 2, 0.1, -0.1)[:, None]
+    steps = (0.49 * along + sway * along + 7.0 * across) * dt
+    p = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    run = Run("any", "trot", VelocityCommand(0.3, 0.4), 1.0)
+    values = measured(run, replace(fallen, p_world_com=p, rpy=np.zeros((n, 3))))
+    assert values["any.mean"] == pytest.approx(2.0, abs=0.1)
+    assert values["any.mae"] == pytest.approx(0.1, abs=1e-4)
+    assert set(values) == {metric.name for metric in run.metrics}
+
+
+def test_turning_is_judged_by_the_heading(fallen: TruthRecording) -> None:
+    rpy = np.zeros((len(fallen.time), 3))
+    rpy[:, 2] = 2.2 * fallen.time
+    run = Run("any", "trot", VelocityCommand(0.0, 0.0, 2.0), 1.0)
+    values = measured(run, replace(fallen, rpy=rpy))
+    assert values["any.turn"] == pytest.approx(10.0, abs=1e-6)
+    assert set(values) == {metric.name for metric in run.metrics}
+
+
+def test_every_named_gait_has_a_row_and_every_row_is_within_what_is_allowed() -> None:
+    assert {run.gait for run in RUNS} == set(GAITS)
+    for run in RUNS:
+        assert CONFIG.envelope.clip(run.command) == run.command
+    names = [metric.name for scenario in SCENARIOS for metric in scenario.metrics]
+    assert len(set(names)) == len(names)
