@@ -45,7 +45,7 @@ CONFIG = Config(
     envelope=VelocityEnvelope(forward=4.0, backward=2.0, lateral=1.5, turning=8.0),
 )
 EXAMPLES = """
-python -m benchmarks locomotion            everything; about an hour on two cores
+python -m benchmarks locomotion            everything; an hour on two cores
 python -m benchmarks locomotion --quick    three seeds
 python -m benchmarks locomotion --rows ahead-2.5 gaits --json
 python -m benchmarks locomotion --list     the metrics and their thresholds

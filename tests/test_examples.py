@@ -34,7 +34,7 @@ POINTS = {
     "03_velocity_and_state": (r"speed: 0\.(39|40)", r"turning: 0\.(29|30|31)"),
     "04_honest_outcomes": (r"high five: False.* fell at t=", "refused", "recovered: True"),
     "05_first_motion": ("played: True", r"nose went down by 1\d\.\d deg"),
-    "06_check_and_report": ("no   bow of 30 deg", r"FL_calf at 0\.80 s", "the robot can do it"),
+    "06_check_and_report": ("no   bow of 30 deg", r"FL calf at 0\.80 s", "the robot can do it"),
     "07_library_motion_with_parameters": ("refused: times must be 1 to 8, got 99", "paw: True"),
     "08_sequence_and_mirror_to_a_tempo": ("ok   dance", r"danced 7\.7 s: True"),
     "09_push_and_recovery": (r"largest tilt \d+\.\d deg", "still walking"),

@@ -53,7 +53,7 @@ class Trial:
         return self._draw(1, MASS_RANGE)
 
     @property
-    def yaw(self) -> float:
+    def initial_yaw(self) -> float:
         """Initial heading [rad]."""
         return self._draw(2, YAW_RANGE)
 
@@ -67,7 +67,7 @@ class Trial:
             friction=self.friction,
             mass_scale=self.mass_scale,
             seed=self.seed,
-            initial_yaw=self.yaw,
+            initial_yaw=self.initial_yaw,
             initial_joint_noise=JOINT_NOISE,
         )
 

@@ -56,7 +56,7 @@ def test_the_plant_of_a_trial_is_what_the_trial_says() -> None:
     trial = Trial(4)
     plant = trial.plant()
     assert plant.total_mass == pytest.approx(nominal_mass * trial.mass_scale, rel=1e-3)
-    assert plant.read().rpy[2] == pytest.approx(trial.yaw, abs=0.1)
+    assert plant.read().rpy[2] == pytest.approx(trial.initial_yaw, abs=0.1)
     plant.close()
 
 

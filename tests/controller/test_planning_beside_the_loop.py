@@ -63,8 +63,8 @@ def reports(monkeypatch: pytest.MonkeyPatch) -> list[FeasibilityReport]:
     made: list[FeasibilityReport] = []
     make: Callable[..., FeasibilityReport] = FeasibilityReport.of
 
-    def noted(*args: object) -> FeasibilityReport:
-        made.append(make(*args))
+    def noted(*args: object, **named: object) -> FeasibilityReport:
+        made.append(make(*args, **named))
         return made[-1]
 
     monkeypatch.setattr(FeasibilityReport, "of", noted)

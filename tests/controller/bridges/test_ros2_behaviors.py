@@ -135,9 +135,9 @@ def test_a_high_five_is_compiled_and_checked_once(monkeypatch: pytest.MonkeyPatc
     done: list[str] = []
 
     def counted(name: str, real: Callable[..., Any]) -> Callable[..., Any]:
-        def call(*args: Any) -> Any:
+        def call(*args: Any, **named: Any) -> Any:
             done.append(f"{name} in {threading.current_thread().name}")
-            return real(*args)
+            return real(*args, **named)
 
         return call
 
