@@ -45,14 +45,14 @@ THRESHOLD = 0.95
 BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
 """The same of refusals among the motions at the border."""
 EXAMPLES = """
-python -m benchmarks feasibility              the exam: ten minutes, two cores,
-                                              twenty if physics has to be asked
+python -m benchmarks feasibility              the exam: ten minutes, two cores;
+                                              twenty where nothing is stored
 python -m benchmarks feasibility --motions 60
 python -m benchmarks feasibility --rows causes
 python -m benchmarks feasibility --wrong      also what is wrong, train half
 python -m benchmarks feasibility --remake     play all, store the outcomes
-python -m benchmarks feasibility --borders    bisect the missing borders; all
-                                              with --remake: half an hour
+python -m benchmarks feasibility --borders    bisect missing borders, with
+                                              --remake all: half an hour
 """
 REFUSED = Metric("feasibility.refused", "verdict", "refused by the check", "", None)
 OUTCOMES = {

@@ -96,9 +96,11 @@ def _asked(number: int) -> tuple[Question, MotionPlan]:
 
 @lru_cache(maxsize=1)
 def exam() -> list[Question]:
-    """The motions of the exam, in its order, but for impossible ones that are to be solved.
+    """The motions of the exam, shuffled, but for impossible ones that are to be solved.
 
     To see that one has no plan takes 20 s, and the chance of what has none is clear.
     """
     asked = questions(read_borders())
-    return [one for one in asked if not (one.family.is_dynamic and one.stratum == IMPOSSIBLE)]
+    found = [one for one in asked if not (one.family.is_dynamic and one.stratum == IMPOSSIBLE)]
+    order = np.random.default_rng(_STREAM).permutation(len(found))
+    return [found[place] for place in order]
