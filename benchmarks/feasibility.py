@@ -45,7 +45,7 @@ THRESHOLD = 0.95
 BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
 """The same of refusals among the motions at the border."""
 EXAMPLES = """
-python -m benchmarks feasibility              the exam: ten minutes, two cores;
+python -m benchmarks feasibility              the exam: ten minutes, 2 cores;
                                               twenty where nothing is stored
 python -m benchmarks feasibility --motions 60
 python -m benchmarks feasibility --rows causes
