@@ -144,9 +144,7 @@ RUNS = (
     Run("flying-trot", "flying_trot", VelocityCommand(1.5), 5.0, None, 5.0, "gaits"),
     Run("walk", "walk", VelocityCommand(0.4), 5.0, None, 5.0, "gaits"),
     Run("pace", "pace", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
-    Run("bound", "bound", VelocityCommand(1.0), 5.0, None, 5.0, "gaits"),
     Run("pronk", "pronk", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
-    Run("gallop", "gallop", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
 )
 SCENARIOS = tuple(
     Scenario(run.name, run.metrics, partial(measure_run, run=run), group=run.group) for run in RUNS

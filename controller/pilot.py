@@ -37,7 +37,7 @@ from go2_wbc.config import Config
 from go2_wbc.contacts import Gait, find_gait
 from go2_wbc.errors import DynamicMotionRefused, ModeError, StanceMismatch
 from go2_wbc.legs import Leg
-from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.reference import MotionPlan, Posture
 from motions.postures import lie_down, rise, sit_down
 
@@ -168,8 +168,13 @@ class Pilot:
             raise ModeError(f"move() during a goal ({self._goal.name}): end it by stop()")
         if self.mode is not Mode.WALKING:
             raise ModeError(f"move() needs walking mode, not {self.mode.value}: call walk() first")
-        self._walking.command = self._config.envelope.clip(command)
+        self._walking.command = self._envelope.clip(command)
         return self._walking.command
+
+    @property
+    def _envelope(self) -> VelocityEnvelope:
+        """In which the gait that is walked follows commands."""
+        return self._config.envelope.scaled(self._walking.gait.envelope_share)
 
     def rest(self) -> Measurements:
         """Zero the command and let the walking robot come to rest."""
@@ -189,7 +194,7 @@ class Pilot:
             def is_over() -> bool:
                 if self._goal is None:
                     return True
-                self._walking.command = self._config.envelope.clip(goal.command(loop.state))
+                self._walking.command = self._envelope.clip(goal.command(loop.state))
                 return goal.is_done(loop.state)
 
             goal.begin(loop.state)

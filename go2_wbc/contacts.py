@@ -162,6 +162,7 @@ class Gait:
         stride: how period and duty follow the speed, where the forces are planned ahead by the
             MPC; None if they are fixed.
         needs_mpc: whether it can be walked only with the forces planned ahead.
+        envelope_share: share of the trot's velocity envelope in which it is walked, (0, 1].
     """
 
     name: str
@@ -170,11 +171,12 @@ class Gait:
     offsets: tuple[float, float, float, float]
     stride: Stride | None = None
     needs_mpc: bool = False
+    envelope_share: float = 1.0
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a period, duty or offset that is out of range."""
+        """Raise ConfigError for a period, duty, offset or share that is out of range."""
         require_positive(self, "period")
-        require_share(self, "duty")
+        require_share(self, "duty", "envelope_share")
         if len(self.offsets) != 4 or not all(0.0 <= offset < 1.0 for offset in self.offsets):
             raise ConfigError(f"Gait.offsets must be four phases in [0, 1), got {self.offsets}")
 
@@ -215,11 +217,9 @@ GAITS: dict[str, Gait] = {
     for gait in (
         Gait("trot", 0.36, 0.5, (0.5, 0.0, 0.0, 0.5), Stride()),
         Gait("flying_trot", 0.30, 0.35, (0.5, 0.0, 0.0, 0.5), needs_mpc=True),
-        Gait("walk", 0.60, 0.70, (0.0, 0.5, 0.75, 0.25), needs_mpc=True),
-        Gait("pace", 0.24, 0.45, (0.0, 0.5, 0.0, 0.5), needs_mpc=True),
-        Gait("bound", 0.30, 0.40, (0.0, 0.0, 0.5, 0.5), needs_mpc=True),
-        Gait("pronk", 0.36, 0.50, (0.0, 0.0, 0.0, 0.0), needs_mpc=True),
-        Gait("gallop", 0.36, 0.40, (0.0, 0.15, 0.5, 0.65), needs_mpc=True),
+        Gait("walk", 0.60, 0.70, (0.0, 0.5, 0.75, 0.25), needs_mpc=True, envelope_share=0.33),
+        Gait("pace", 0.24, 0.45, (0.0, 0.5, 0.0, 0.5), needs_mpc=True, envelope_share=0.53),
+        Gait("pronk", 0.36, 0.50, (0.0, 0.0, 0.0, 0.0), needs_mpc=True, envelope_share=0.53),
     )
 }
 """The gaits by name. The trot is the one in which the robot starts to walk and comes to rest."""

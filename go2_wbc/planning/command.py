@@ -68,6 +68,11 @@ class VelocityEnvelope:
         """Raise ConfigError for a bound that is not positive."""
         require_positive(self, "forward", "backward", "lateral", "turning")
 
+    def scaled(self, share: float) -> VelocityEnvelope:
+        """All bounds multiplied by ``share``."""
+        bounds = (self.forward, self.backward, self.lateral, self.turning)
+        return VelocityEnvelope(*(share * bound for bound in bounds))
+
     def clip(self, command: VelocityCommand) -> VelocityCommand:
         """``command``, scaled down if it lies outside."""
         parts = (command.linear_x, command.linear_y, command.angular_z)

@@ -42,6 +42,9 @@ ODD_CONFIG = LocomotionConfig(
 ODD_MPC = MpcConfig(step=0.028, interval=0.012, force_max=180.0, prior_weight=4e-3, load_ramp=0.02)
 
 
+GALLOP = Gait("gallop", 0.36, 0.40, (0.0, 0.15, 0.5, 0.65), needs_mpc=True)
+
+
 def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.ndarray) -> Snapshot:
     """A measured state near ``at``: calm for a while, then wild, now and then upright at rest."""
     state = random_state(rng, tilt=0.3 if tick % 1000 >= 500 else 0.02)
@@ -62,7 +65,7 @@ def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.nda
         (GAITS["trot"], LocomotionConfig()),
         (ODD, ODD_CONFIG),
         (GAITS["trot"], LocomotionConfig(mpc=MpcConfig(enabled=True))),
-        (GAITS["gallop"], replace(ODD_CONFIG, mpc=ODD_MPC)),
+        (GALLOP, replace(ODD_CONFIG, mpc=ODD_MPC)),
     ],
     ids=["trot", "odd", "trot by MPC", "gallop"],
 )

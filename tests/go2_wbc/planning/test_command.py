@@ -127,3 +127,11 @@ def test_clipping_keeps_the_direction_of_the_greatest_numbers_there_are() -> Non
     clipped = VelocityEnvelope().clip(VelocityCommand(greatest, -greatest, greatest))
     np.testing.assert_allclose(components(clipped), components(clipped)[0] * np.array([1, -1, 1]))
     assert load(VelocityEnvelope(), clipped) == pytest.approx(1.0)
+
+
+def test_a_share_of_the_envelope_scales_every_bound() -> None:
+    half = VelocityEnvelope().scaled(0.5)
+    whole = VelocityEnvelope()
+    assert half == VelocityEnvelope(
+        whole.forward / 2, whole.backward / 2, whole.lateral / 2, whole.turning / 2
+    )
