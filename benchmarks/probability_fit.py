@@ -14,12 +14,18 @@ from motions.feasibility.probability import ProbabilityModel, Rise
 
 LEAST_SAMPLES = 20
 """Runs in which a check must have looked at something for its curve to be fitted."""
-CENTRE_SPREAD = 1.0
-"""Standard deviation of a centre about 0 before anything is seen, in spreads of the margin."""
-USUAL_WIDTH = 0.1
-"""Width before anything is seen, in spreads of the margin."""
+CENTRE_SPREAD = 2.0
+"""Standard deviation of a centre about 0 before anything is seen, as of all that follow."""
+USUAL_WIDTH = 0.3
+"""Width before anything is seen."""
 WIDTH_SPREAD = 1.5
 """Standard deviation of the logarithm of a width before anything is seen."""
+FARTHEST, WIDTHS = (-10.0, 10.0), (1e-3, 3.0)
+"""Centres and the rest, and widths, that are looked at."""
+LEAST_SPREAD = 1e-2
+"""Of a margin, as a share of its size, below which it counts as the same in all runs."""
+MOST = 20.0
+"""Value of asinh beyond which more of it, or an infinite margin, tells nothing."""
 REST_SPREAD = 5.0
 """Standard deviation of the log odds of the rest."""
 BINS = 10
@@ -46,31 +52,40 @@ def fit(samples: Sequence[Sample]) -> ProbabilityModel:
     """The model of greatest posterior density (MAP), by L-BFGS.
 
     Log likelihood of outcomes y in {0, 1} with P of the model, plus normal priors on each centre,
-    on the logarithm of each width, and on the rest. Margins are taken in their own spread (10th to
-    90th percentile), so that priors are of no unit.
+    on the logarithm of each width, and on the rest; over asinh(margin / unit), of no unit.
     """
-    names = _fitted_names(samples)
-    margins = _table(samples, names)
-    low, high = np.nanpercentile(margins, [10.0, 90.0], axis=0)
-    spread = np.maximum(high - low, _LEAST + 1e-3 * np.abs(high))
-    x = margins / spread
+    names, units = _fitted(samples)
+    x = np.clip(np.arcsinh(_table(samples, names) / units), -MOST, MOST)
     done = np.array([sample.is_done for sample in samples])
     start = np.concatenate([np.zeros(len(names)), np.full(len(names), np.log(USUAL_WIDTH)), [3.0]])
-    found = minimize(_loss, start, args=(x, done), jac=True, method="L-BFGS-B")
+    bounds = [FARTHEST] * len(names) + [np.log(WIDTHS)] * len(names) + [FARTHEST]
+    found = minimize(_loss, start, args=(x, done), jac=True, method="L-BFGS-B", bounds=bounds)
     centres, widths, rest = _split(found.x, len(names))
     rises = {
-        name: Rise(float(centre * unit), float(width * unit))
-        for name, centre, width, unit in zip(names, centres, widths, spread, strict=True)
+        name: Rise(float(unit), float(centre), float(width))
+        for name, centre, width, unit in zip(names, centres, widths, units, strict=True)
     }
     return ProbabilityModel(rises, float(rest))
 
 
-def _fitted_names(samples: Sequence[Sample]) -> list[str]:
-    counts: dict[str, int] = {}
-    for sample in samples:
-        for name, margin in sample.margins.items():
-            counts[name] = counts.get(name, 0) + bool(np.isfinite(margin))
-    return sorted(name for name, count in counts.items() if count >= LEAST_SAMPLES)
+def _fitted(samples: Sequence[Sample]) -> tuple[list[str], Float[np.ndarray, " k"]]:
+    """The checks whose curves can be fitted, and the units of their margins: the 25th percentile.
+
+    A margin that is much the same in nearly all runs tells nothing of where chances change.
+    """
+    every = sorted({name for sample in samples for name in sample.margins})
+    margins = _table(samples, every)
+    names, units = [], []
+    for name, column in zip(every, margins.T, strict=True):
+        known = column[np.isfinite(column)]
+        if len(known) < LEAST_SAMPLES:
+            continue
+        low, high = np.percentile(known, [10.0, 90.0])
+        if high - low > LEAST_SPREAD * max(abs(low), abs(high)):
+            names.append(name)
+            sizes = np.abs(known[known != 0.0])
+            units.append(float(np.percentile(sizes, 25.0)))
+    return names, np.array(units)
 
 
 def _table(samples: Sequence[Sample], names: Sequence[str]) -> Float[np.ndarray, "n k"]:

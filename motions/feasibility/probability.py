@@ -1,10 +1,12 @@
 """How likely a motion is to be done: every margin of the check as a chance, multiplied.
 
 A limit that is met by much is no risk, one that is broken by much is no chance; between them the
-chance rises along a logistic curve. With the margin ``m_i`` of check ``i``, the margin ``c_i`` at
-which it holds in half of the cases, and the width ``w_i`` > 0 of the rise:
+chance rises along a logistic curve. Margins reach from a hair's breadth to a hundred times the
+limit, so the curve is over ``x_i = asinh(m_i / u_i)``, which is as the margin near 0 and as its
+logarithm far off. With ``c_i``, where check ``i`` holds in half of the cases, and ``w_i`` > 0, the
+width of the rise:
 
-    P = s(b) prod_i s((m_i - c_i) / w_i),    s(x) = 1 / (1 + exp(-x))
+    P = s(b) prod_i s((x_i - c_i) / w_i),    s(x) = 1 / (1 + exp(-x))
 
 So a wider margin never lowers the chance, causes that have nothing to do with each other multiply,
 and the least factor says what to mend. ``s(b)`` stands for what no margin tells. The numbers are in
@@ -18,32 +20,33 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 FILE = Path(__file__).with_name("probability.json")
-UNSEEN_WIDTH = 1e-3
-"""Width, in the margin's unit, for a check that the fit has never seen near its limit: a broken
-limit is then a certain failure, a margin that is kept no risk. Own choice."""
 
 
 @dataclass(frozen=True, slots=True)
 class Rise:
-    """The logistic curve of one check, in the unit of its margin.
+    """The curve of one check.
 
     Attributes:
-        centre: margin with an even chance.
+        unit: margin, in its own unit, up to which the curve is over the margin itself; above 0.
+        centre: ``asinh(margin / unit)`` with an even chance.
         width: of the rise; above 0.
     """
 
+    unit: float
     centre: float
     width: float
 
     def chance(self, margin: float) -> float:
-        """The chance that a margin stands for; that of nan, where nothing was checked, is 1."""
-        return 1.0 if math.isnan(margin) else logistic((margin - self.centre) / self.width)
+        """The chance that a margin stands for."""
+        if math.isinf(margin):
+            return float(margin > 0.0)
+        return logistic((math.asinh(margin / self.unit) - self.centre) / self.width)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,15 +69,21 @@ class ProbabilityModel:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
-        rises = {
-            name: {"centre": rise.centre, "width": rise.width} for name, rise in self.rises.items()
-        }
-        return {"rest": self.rest, "rises": rises}
+        return {"rest": self.rest, "rises": {n: asdict(rise) for n, rise in self.rises.items()}}
 
     def chances(self, margins: Mapping[str, float]) -> dict[str, float]:
-        """The chance of every check, by its least margin."""
-        unseen = Rise(0.0, UNSEEN_WIDTH)
-        return {name: self.rises.get(name, unseen).chance(m) for name, m in margins.items()}
+        """The chance of every check, by its least margin.
+
+        A check that the fit has seen only far from its limit is a yes or no; nan, where nothing was
+        checked, is no risk.
+        """
+        return {name: self._chance(name, margin) for name, margin in margins.items()}
+
+    def _chance(self, name: str, margin: float) -> float:
+        rise = self.rises.get(name)
+        if math.isnan(margin):
+            return 1.0
+        return float(margin >= 0.0) if rise is None else rise.chance(margin)
 
     def probability(self, margins: Mapping[str, float]) -> float:
         """The chance that a motion with these least margins is done, 0 to 1."""

@@ -217,6 +217,7 @@ class FeasibilityReport:
         lines += ["-" * 80, f"{self.motion}, {self.duration:.1f} s: the robot {verdict}{tight}."]
         if self.world != World():
             lines.append(f"That holds for {self.world}.")
+        lines.append(f"Chance that it is done so: {100.0 * self.probability:.0f} %.")
         if self.end_pose is not None and max(map(abs, self.end_pose)) > STAYS:
             x, y, yaw = self.end_pose
             lines.append(

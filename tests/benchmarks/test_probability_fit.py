@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
 from benchmarks.probability_fit import Sample, _loss, calibration, fit
 from motions.feasibility.probability import ProbabilityModel, Rise
 
-TRUTH = ProbabilityModel({"slip": Rise(0.02, 0.01), "torque": Rise(-1.0, 0.5)}, rest=3.0)
+TRUTH = ProbabilityModel({"slip": Rise(0.03, 0.5, 0.3), "torque": Rise(3.0, -0.4, 0.2)}, rest=3.0)
 
 
 def _samples(seed: int, n: int) -> list[Sample]:
@@ -39,8 +41,10 @@ def test_the_gradient_of_the_loss_is_that_of_finite_differences() -> None:
 def test_the_fit_finds_what_made_the_data_and_is_calibrated_on_others() -> None:
     model = fit(_samples(2, 4000))
     for name, rise in TRUTH.rises.items():
-        assert model.rises[name].centre == pytest.approx(rise.centre, abs=0.5 * rise.width)
-        assert model.rises[name].width == pytest.approx(rise.width, rel=0.3)
+        found, even = model.rises[name], rise.unit * math.sinh(rise.centre)
+        assert found.unit * math.sinh(found.centre) == pytest.approx(even, abs=0.3 * rise.unit)
+        for margin in np.linspace(-2.0, 3.0, 11) * rise.unit:
+            assert found.chance(margin) == pytest.approx(rise.chance(margin), abs=0.1)
     others = _samples(3, 2000)
     chances = np.array([model.probability(sample.margins) for sample in others])
     done = np.array([sample.is_done for sample in others])

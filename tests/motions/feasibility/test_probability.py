@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from motions.feasibility.probability import UNSEEN_WIDTH, ProbabilityModel, Rise
+from motions.feasibility.probability import ProbabilityModel, Rise
 
-MODEL = ProbabilityModel({"slip": Rise(0.02, 0.01), "torque": Rise(-1.0, 0.5)}, rest=3.0)
+MODEL = ProbabilityModel({"slip": Rise(0.01, 0.5, 0.4), "torque": Rise(2.0, -1.0, 0.5)}, rest=3.0)
 MARGINS = st.floats(-1e6, 1e6)
 
 
@@ -23,18 +23,17 @@ def test_a_wider_margin_never_lowers_the_chance(slip: float, torque: float, more
 
 
 def test_causes_multiply_and_what_was_not_checked_is_no_risk() -> None:
-    chances = MODEL.chances({"slip": 0.03, "torque": -1.0})
+    margins = {"slip": 0.01 * math.sinh(0.9), "torque": 2.0 * math.sinh(-1.0)}
+    chances = MODEL.chances(margins)
     assert chances == pytest.approx({"slip": 1 / (1 + math.exp(-1)), "torque": 0.5})
     rest = 1 / (1 + math.exp(-3))
-    assert MODEL.probability({"slip": 0.03, "torque": -1.0}) == pytest.approx(
-        rest * math.prod(chances.values())
-    )
+    assert MODEL.probability(margins) == pytest.approx(rest * math.prod(chances.values()))
     assert MODEL.probability({"slip": math.nan}) == pytest.approx(rest)
+    assert MODEL.probability({"slip": -math.inf}) == 0.0
 
 
 def test_a_check_that_no_fit_has_seen_is_a_yes_or_no() -> None:
-    assert MODEL.chances({"other": 20 * UNSEEN_WIDTH})["other"] == pytest.approx(1.0, abs=1e-6)
-    assert MODEL.chances({"other": -20 * UNSEEN_WIDTH})["other"] == pytest.approx(0.0, abs=1e-6)
+    assert MODEL.chances({"a": 1e-9, "b": 0.0, "c": -1e-9}) == {"a": 1.0, "b": 1.0, "c": 0.0}
 
 
 def test_a_model_comes_back_from_its_values() -> None:
