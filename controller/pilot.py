@@ -65,6 +65,7 @@ class Pilot:
         self._config = config
         self._procedures = ProcedureRunner(runner)
         self._walking = self._make_walking("trot")
+        self._envelope: VelocityEnvelope = self._config.envelope
         self._goal: Goal | None = None
         self.playing: PlayPlan | None = None
         self._must_return = False
@@ -171,11 +172,6 @@ class Pilot:
         self._walking.command = self._envelope.clip(command)
         return self._walking.command
 
-    @property
-    def _envelope(self) -> VelocityEnvelope:
-        """In which the gait that is walked follows commands."""
-        return self._config.envelope.scaled(self._walking.gait.envelope_share)
-
     def rest(self) -> Measurements:
         """Zero the command and let the walking robot come to rest."""
         if self.mode is Mode.WALKING:
@@ -226,6 +222,7 @@ class Pilot:
         walking = self._make_walking(gait)
         self._procedures.engage(walking)
         self._walking = walking
+        self._envelope = self._config.envelope.scaled(walking.gait.envelope_share)
 
     def _finish_steps(self, what: str) -> None:
         walking, loop = self._walking, self._loop

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json, shown_path
 from controller.cli.motion_args import add_motion, add_world, the_motion, world_of
 from controller.cli.progress import ProgressLine
-from controller.cli.sweep import tell
+from controller.cli.sweep import add_runs, tell
 from go2_wbc.errors import CommandError
 
 RUNS = 200
@@ -49,17 +48,7 @@ def register(subparsers: Subparsers) -> None:
         type=float,
         help="the lower end of the interval must reach this, such as 0.95",
     )
-    parser.add_argument(
-        "--first-seed", metavar="K", type=int, default=0, help="the first of them, default 0"
-    )
-    parser.add_argument(
-        "--workers", metavar="N", type=int, help="processes, default: all processors"
-    )
-    parser.add_argument("--engine", metavar="NAME", default="local", help="local (default) or ray")
-    parser.add_argument(
-        "--out", metavar="FILE", type=Path, help="keep the rows here, default: in out/sweeps"
-    )
-    parser.add_argument("--fresh", action="store_true", help="begin anew, do not go on")
+    add_runs(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -80,6 +69,7 @@ def run(args: argparse.Namespace) -> int:
             first_seed=args.first_seed,
             workers=args.workers,
             engine=args.engine,
+            address=args.address,
             out=args.out,
             fresh=args.fresh,
             on_progress=lambda progress: tell(line, progress),

@@ -42,20 +42,7 @@ def register(subparsers: Subparsers) -> None:
     )
     parser.add_argument("what", metavar="WHAT", help=WHAT)
     parser.add_argument("--n", metavar="N", type=int, default=1000, help="seeds, default 1000")
-    parser.add_argument(
-        "--first-seed", metavar="K", type=int, default=0, help="the first of them, default 0"
-    )
-    parser.add_argument(
-        "--workers", metavar="N", type=int, help="processes, default: all processors"
-    )
-    parser.add_argument(
-        "--engine", metavar="NAME", default="local", help="local (default) or ray: many machines"
-    )
-    parser.add_argument("--address", help="of the Ray cluster, default: one of this machine")
-    parser.add_argument(
-        "--out", metavar="FILE", type=Path, help="keep the rows here, default: in out/sweeps"
-    )
-    parser.add_argument("--fresh", action="store_true", help="begin anew, do not go on")
+    add_runs(parser)
     parser.add_argument(
         "--keep-going", action="store_true", help="a seed that fails does not end the sweep"
     )
@@ -72,6 +59,24 @@ def register(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--plot", metavar="FILE", type=Path, help=".svg, .png or .pdf")
     parser.add_argument("--json", action="store_true", help="print JSON")
+
+
+def add_runs(parser: argparse.ArgumentParser) -> None:
+    """Add the options that say which seeds run where, and where rows are kept."""
+    parser.add_argument(
+        "--first-seed", metavar="K", type=int, default=0, help="the first of them, default 0"
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=int, help="processes, default: all processors"
+    )
+    parser.add_argument(
+        "--engine", metavar="NAME", default="local", help="local (default) or ray: many machines"
+    )
+    parser.add_argument("--address", help="of the Ray cluster, default: one of this machine")
+    parser.add_argument(
+        "--out", metavar="FILE", type=Path, help="keep the rows here, default: in out/sweeps"
+    )
+    parser.add_argument("--fresh", action="store_true", help="begin anew, do not go on")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -101,6 +101,7 @@ def certify(
     first_seed: int = 0,
     workers: int | None = None,
     engine: str = "local",
+    address: str | None = None,
     out: Path | str | None = None,
     fresh: bool = False,
     on_progress: Callable[[Progress], None] = lambda progress: None,
@@ -115,7 +116,7 @@ def certify(
         world: where; each run is in a sample of it. By default ``DOUBTFUL``: a
             slippery floor, and what is usually not known of floor and robot.
         width: ends early once the interval of the rate is no wider, 0 to 1; None: all runs.
-        first_seed, workers, engine, out, fresh, on_progress: see ``sweep``.
+        first_seed, workers, engine, address, out, fresh, on_progress: see ``sweep``.
 
     Raises:
         CommandError: for an argument that is not valid, or what stands for no motion.
@@ -130,6 +131,7 @@ def certify(
         first_seed=first_seed,
         workers=workers,
         engine=engine,
+        address=address,
         out=out,
         fresh=fresh,
         is_enough=None if width is None else _narrow(width),

@@ -54,6 +54,10 @@ class Suggestion:
         }
 
 
+_Calls = dict[str, float]
+"""Calls of one number each, by their names, in their order."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Kind:
     """One kind of change.
@@ -61,32 +65,24 @@ class _Kind:
     Attributes:
         name: see ``Suggestion.kind``.
         ladder: numbers of steps that are tried, increasing.
-        call: the call of a number of steps, as Python.
-        meaning: in words, of a number of steps and the duration [s] before.
-        apply: makes it.
+        calls: what is called for a number of steps.
+        meaning: in words, of a number of steps and the duration [s] after them.
     """
 
     name: str
     ladder: Sequence[int]
-    call: Callable[[int], str]
+    calls: Callable[[int], _Calls]
     meaning: Callable[[int, float], str]
-    apply: Callable[[Timeline, int], Timeline]
 
+    def text(self, steps: int) -> str:
+        """The calls as Python, with the very numbers that ``apply`` uses."""
+        return "".join(f".{name}({value!r})" for name, value in self.calls(steps).items())
 
-def _slower(steps: int) -> float:
-    return round(1.0 + steps / 100, 2)
-
-
-def _smaller(steps: int) -> float:
-    return round(1.0 - steps / 100, 2)
-
-
-def _higher(steps: int) -> float:
-    return round(steps / 1000, 3)
-
-
-def _pace_for(steps: int) -> float:
-    return round(1.0 / _smaller(steps), 2)
+    def apply(self, line: Timeline, steps: int) -> Timeline:
+        """``line`` after the calls."""
+        for name, value in self.calls(steps).items():
+            line = getattr(line, name)(value)
+        return line
 
 
 _RISE = (5, 10, 15, 20, 30, 40, 60, 80)
@@ -99,44 +95,41 @@ _LONGER = (2, 5, 10, 20, 30, 40, 50, 75, 100, 150, 200, 300)
 TEMPO = _Kind(
     "tempo",
     _LONGER,
-    lambda steps: f".scale_time({_slower(steps):g})",
-    lambda steps, before: f"slower: {before * _slower(steps):.1f} s instead of {before:.1f} s",
-    lambda line, steps: line.scale_time(_slower(steps)),
+    lambda steps: {"scale_time": round(1.0 + steps / 100, 2)},
+    lambda _, lasts: f"slower: it takes {lasts:.1f} s",
 )
 AMPLITUDE = _Kind(
     "amplitude",
     _SHARES,
-    lambda steps: f".scale({_smaller(steps):g})",
+    lambda steps: {"scale": round(1.0 - steps / 100, 2)},
     lambda steps, _: f"all moves smaller by {steps} %",
-    lambda line, steps: line.scale(_smaller(steps)),
 )
 HIGHER = _Kind(
     "height",
     _RISE,
-    lambda steps: f".shift_height({_higher(steps):g})",
+    lambda steps: {"shift_height": round(steps / 1000, 3)},
     lambda steps, _: f"the trunk higher by {steps} mm",
-    lambda line, steps: line.shift_height(_higher(steps)),
 )
 LOWER = _Kind(
     "height",
     _RISE,
-    lambda steps: f".shift_height({-_higher(steps):g})",
+    lambda steps: {"shift_height": -round(steps / 1000, 3)},
     lambda steps, _: f"the trunk lower by {steps} mm",
-    lambda line, steps: line.shift_height(-_higher(steps)),
 )
 SHIFT_TIME = _Kind(
     "shift time",
     _LONGER,
-    lambda steps: f".scale_shifts({_slower(steps):g})",
+    lambda steps: {"scale_shifts": round(1.0 + steps / 100, 2)},
     lambda steps, _: f"{steps} % more time to move over the feet that stay",
-    lambda line, steps: line.scale_shifts(_slower(steps)),
 )
 BOTH = _Kind(
     "tempo and amplitude",
     _SHARES,
-    lambda steps: f".scale({_smaller(steps):g}).scale_time({_pace_for(steps):g})",
-    lambda steps, before: f"smaller by {steps} % and slower: {before * _pace_for(steps):.1f} s",
-    lambda line, steps: line.scale(_smaller(steps)).scale_time(_pace_for(steps)),
+    lambda steps: {
+        "scale": round(1.0 - steps / 100, 2),
+        "scale_time": round(1.0 / (1.0 - steps / 100), 2),
+    },
+    lambda steps, lasts: f"smaller by {steps} % and slower: {lasts:.1f} s",
 )
 
 
@@ -179,8 +172,8 @@ def _least(line: Timeline, kind: _Kind, checker: FeasibilityChecker) -> Suggesti
         changed = kind.apply(line, steps)
         if (report := _report(changed, checker)) is None:
             return None
-        meaning, share = kind.meaning(steps, line.end), steps / kind.ladder[-1]
-        return Suggestion(kind.name, kind.call(steps), meaning, share, changed, report)
+        meaning, share = kind.meaning(steps, report.duration), steps / kind.ladder[-1]
+        return Suggestion(kind.name, kind.text(steps), meaning, share, changed, report)
 
     try:
         return _first(tried, kind.ladder)

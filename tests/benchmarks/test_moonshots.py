@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -16,6 +15,7 @@ from go2_wbc.kernels.compilation import CACHE_VARIABLE
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics import PhaseProblem, Solved
 from motions.dynamics.limits import PlanLimits
+from tests.solver import needs_solver
 
 MODEL = RobotModel()
 ASKED = 0.32  # m; the planner of the tests finds what is lower
@@ -98,7 +98,7 @@ def test_a_kind_of_which_nothing_is_found_says_so(planner: Planner) -> None:
         climb(KINDS["high"], [])
 
 
-@pytest.mark.skipif(find_spec("crocoddyl") is None, reason="needs crocoddyl")
+@needs_solver
 def test_a_small_climb_is_planned_and_played(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -19,10 +18,8 @@ from go2_wbc.robot.rotations import yaw_rotation
 from motions import FeasibilityChecker, Timeline
 from motions.footing import standing_feet
 from tests.go2_wbc.plant.helpers import empty_recording
+from tests.solver import needs_solver
 
-needs_solver = pytest.mark.skipif(
-    find_spec("crocoddyl") is None, reason="needs crocoddyl: pip install go2-wbc[dynamics]"
-)
 SAMPLE = 1006
 """Two diagonal feet; one of the seeds that were worked with, not of those that are judged."""
 

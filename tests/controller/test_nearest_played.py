@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-
 import pytest
 
 from controller import GO2Controller
 from motions import FeasibilityChecker, Timeline
-
-needs_solver = pytest.mark.skipif(
-    find_spec("crocoddyl") is None, reason="needs crocoddyl: pip install go2-wbc[dynamics]"
-)
+from tests.solver import needs_solver
 
 
 @needs_solver

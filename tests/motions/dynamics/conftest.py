@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
-
 import pytest
 
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics import DynamicTrajectory, PhaseProblem, moves, solve
+from tests.solver import HAS_SOLVER, IS_REQUIRED
 
 PROBLEMS = {
     "jump": PhaseProblem(moves.jump(x=-0.3, yaw=0.5)),
@@ -25,7 +24,7 @@ def model() -> RobotModel:
 
 @pytest.fixture(scope="session")
 def plans(model: RobotModel) -> dict[str, DynamicTrajectory]:
-    if find_spec("crocoddyl") is None:
+    if not (HAS_SOLVER or IS_REQUIRED):
         pytest.skip("crocoddyl is not installed: pip install go2-wbc[dynamics]")
     return {name: solve(problem, model) for name, problem in PROBLEMS.items()}
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -13,10 +12,8 @@ from go2_wbc.errors import PlanNotFound, TimelineError
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, FeasibilityChecker, Timeline, deg
 from motions.dynamics.phases import Tolerance
+from tests.solver import needs_solver
 
-needs_solver = pytest.mark.skipif(
-    find_spec("crocoddyl") is None, reason="needs crocoddyl: pip install go2-wbc[dynamics]"
-)
 SWAY = (
     Timeline(physics="nearest")
     .body(y=0.06, over=0.2)
