@@ -45,6 +45,12 @@ def test_what_is_uncertain_counts_at_its_worst(model: RobotModel) -> None:
     assert torques[0] < torques[1] == pytest.approx(torques[2], rel=1e-9)
 
 
+def test_what_is_uncertain_of_the_floor_counts_at_its_worst(model: RobotModel) -> None:
+    world = World(friction=0.5, friction_uncertainty=0.2)
+    margin = FeasibilityChecker(model, world=world).check(SWAY).margins["friction"]
+    assert margin.limit == pytest.approx(0.4)
+
+
 def test_joint_friction_asks_more_of_the_motors(model: RobotModel) -> None:
     path = FeasibilityChecker(model).evaluate(SWAY).path
     forces = forces_of(path, model)
