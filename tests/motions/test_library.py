@@ -19,6 +19,7 @@ from motions import (
 )
 from motions.authoring import Choice
 from motions.compiler import LEAST_RAMP
+from tests.motions.library.plans import library_plan
 
 # Between a difference quotient over 2 ms and the derivative; the curves are smooth.
 DIFFERENCE_TOLERANCE = 2e-2
@@ -63,14 +64,14 @@ def test_every_motion_of_the_library_is_feasible_on_both_sides(
         if isinstance(parameter.valid, Choice)
     ]
     for side in sides[0] if sides else (None,):
-        line = load_motion(name) if side is None else load_motion(name, side=side)
-        report = checker.check(line)
+        usual = side is None
+        report = checker.check(library_plan(name) if usual else load_motion(name, side=side))
         assert report.ok, report.table()
 
 
 @pytest.mark.parametrize("name", motion_names())
-def test_every_motion_holds_its_ends(model: RobotModel, name: str) -> None:
-    plan = compile_timeline(load_motion(name), model)
+def test_every_motion_holds_its_ends(name: str) -> None:
+    plan = library_plan(name)
     assert plan.duration > 0.0
     assert plan.problems == ()
     for inside, outside in ((0.0, -5.0), (plan.duration, plan.duration + 5.0)):
@@ -83,8 +84,8 @@ def test_every_motion_holds_its_ends(model: RobotModel, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", motion_names())
-def test_velocities_are_the_derivatives_of_positions(model: RobotModel, name: str) -> None:
-    plan = compile_timeline(load_motion(name), model)
+def test_velocities_are_the_derivatives_of_positions(name: str) -> None:
+    plan = library_plan(name)
     rng = np.random.default_rng(1)
     for t in rng.uniform(STEP, plan.duration - STEP, 40):
         if plan.swings.any():  # steps and jumps change accelerations from knot to knot
@@ -103,13 +104,12 @@ def test_velocities_are_the_derivatives_of_positions(model: RobotModel, name: st
 
 
 @pytest.mark.parametrize("name", motion_names())
-def test_a_foot_is_unloaded_before_it_lifts_and_loaded_only_after_it_lands(
-    model: RobotModel, name: str
-) -> None:
-    plan = compile_timeline(load_motion(name), model)
+def test_a_foot_is_unloaded_before_it_lifts_and_loaded_only_after_it_lands(name: str) -> None:
+    plan = library_plan(name)
     times = np.arange(0.0, plan.duration, 0.005)
-    loads = np.array([plan.at(float(t)).normal_force_max for t in times])
-    stances = np.array([plan.at(float(t)).stance for t in times])
+    references = [plan.at(float(t)) for t in times]
+    loads = np.array([reference.normal_force_max for reference in references])
+    stances = np.array([reference.stance for reference in references])
     assert not loads[~stances].any()
     change = np.abs(np.diff(loads, axis=0)).max(axis=1)
     written = np.array([not within_dynamic(plan, float(t)) for t in times[1:]])

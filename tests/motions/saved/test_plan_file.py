@@ -27,6 +27,7 @@ from motions import (
     save_plan,
 )
 from tests.motions.doctored import with_body_aside
+from tests.motions.library.plans import library_plan
 
 MODEL = RobotModel()
 LEAN = Timeline(name="lean").body(roll=0.05, over=0.4).hold(0.2, name="held").home(over=0.4)
@@ -66,7 +67,7 @@ def require_same(again: CompiledPlan, plan: CompiledPlan) -> None:
 
 @pytest.mark.parametrize("name", motion_names())
 def test_every_motion_of_the_library_plays_the_same_row_for_row(tmp_path: Path, name: str) -> None:
-    plan = compile_timeline(load_motion(name), MODEL)
+    plan = library_plan(name)
     require_same(load_plan(save_plan(plan, tmp_path / "a.plan", model=MODEL), model=MODEL), plan)
 
 
