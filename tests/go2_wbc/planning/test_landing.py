@@ -136,7 +136,7 @@ def test_feet_come_down_in_their_places_if_the_body_is_near_its_own(kind: Kind) 
     player.contact[:] = False
     com = MODEL.snapshot(state_of(standing_q())).p_world_com
     player.shift = HOP.at(TAKE_OFF).body.p_world - com + [0.5 * NEAR, -0.5 * NEAR, 0.1]
-    flying = player.until(TAKE_OFF + 0.1)
+    flying = player.until(TAKE_OFF + 0.02)
     planned = HOP.at(player.t)
     np.testing.assert_allclose(flying.p_world_feet[:, :2], planned.p_world_feet[:, :2], atol=1e-12)
     np.testing.assert_allclose(flying.v_world_feet[:, :2], planned.v_world_feet[:, :2], atol=1e-12)
