@@ -61,14 +61,16 @@ class Piece:
     end: float
 
     def written(self, path: Trajectory) -> Written:
-        """What is written there.
+        """What is written there; a foot that leaves at the motion's first instant stands then.
 
         Raises:
             PlanNotFound: if that is no motion to be near to.
         """
         rows = slice(self.first, self.last + 1)
+        stance = path.stance[rows].copy()
+        stance[0] |= self.first == 0
         try:
-            return Written(path.times[rows] - self.start, path.q[rows], path.stance[rows])
+            return Written(path.times[rows] - self.start, path.q[rows], stance)
         except TimelineError as error:
             raise PlanNotFound("there is no nearest motion", [str(error)]) from error
 

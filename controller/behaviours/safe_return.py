@@ -163,7 +163,10 @@ def _next_on_four_feet(plan: MotionPlan, t: float) -> float:
 
 
 def retimed(reference: Reference, rate: float, change: float) -> Reference:
-    """``reference`` as it is when its time runs at ``rate``, which grows by ``change`` [1/s]."""
+    """``reference`` as it is when its time runs at ``rate``, which grows by ``change`` [1/s].
+
+    Forces that were planned for its own tempo are let go.
+    """
     body = reference.body
     return replace(
         reference,
@@ -178,4 +181,5 @@ def retimed(reference: Reference, rate: float, change: float) -> Reference:
         a_world_feet=rate**2 * reference.a_world_feet + change * reference.v_world_feet,
         v_joints=rate * reference.v_joints,
         a_joints=rate**2 * reference.a_joints + change * reference.v_joints,
+        force_weight=0.0,
     )

@@ -25,6 +25,7 @@ _IS_IN_AIR, _IS_AWAITED = _S["is_in_air"], _S["is_awaited"]
 _TOUCHDOWN, _MISSED, _ERROR = _S["touchdown"], _S["missed"], _S["landing_error"]
 _EARLIEST, _TIME_OUT, _SHARE = (_L[n] for n in ("earliest", "time_out", "ground_share"))
 _SPEED, _DEPTH, _RADIUS = (_L[n] for n in ("press_speed", "press_depth", "foot_radius"))
+_NEAR = _L["near"]
 _RAMP, _LEAST, _GREATEST = (_L[n] for n in ("ramp", "normal_force_min", "normal_force_max"))
 
 
@@ -67,14 +68,16 @@ def judge(leg, row, snapshot, state):
     state[_ERROR] = max(state[_ERROR], np.sqrt(off))
 
 
-@subroutine("void(f8[::1], f8[::1], f8[::1])")
-def carry(row, snapshot, state):
-    """Move the plan to where the CoM is, as far as that is off."""
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1])")
+def carry(row, snapshot, numbers, state):
+    """Move the plan to where the CoM is, but for what the legs can make up for."""
+    away = np.hypot(snapshot[_P_COM] - row[_BODY_P], snapshot[_P_COM + 1] - row[_BODY_P + 1])
+    share = 1.0 - numbers[_NEAR] / max(away, numbers[_NEAR])
     for i in range(2):
-        off = snapshot[_P_COM + i] - row[_BODY_P + i]
+        off = share * (snapshot[_P_COM + i] - row[_BODY_P + i])
         state[_ANCHOR + i] += off
         row[_BODY_P + i] += off
-        faster = snapshot[_V_COM + i] - row[_BODY_V + i]
+        faster = share * (snapshot[_V_COM + i] - row[_BODY_V + i])
         for leg in range(4):
             row[_FOOT_P + 3 * leg + i] += off
             row[_FOOT_V + 3 * leg + i] += faster
@@ -118,4 +121,4 @@ def land(t, contact, events, since, until, unloads, snapshot, numbers, state, ro
         if planned == STANCE and state[_IS_AWAITED + leg] != 0.0:
             judge(leg, row, snapshot, state)
     if not stands:
-        carry(row, snapshot, state)
+        carry(row, snapshot, numbers, state)

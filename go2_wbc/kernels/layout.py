@@ -259,6 +259,7 @@ LANDING = Layout(
     time_out=(),
     ground_share=(),
     foot_radius=(),
+    near=(),
     ramp=(),
     normal_force_min=(),
     normal_force_max=(),

@@ -23,6 +23,7 @@ _BODY_R, _BODY_W, _BODY_DW, _LEGS = (_T[n] for n in ("R_world_base", "w_world", 
 _F_MIN, _F_MAX = _T["normal_force_min"], _T["normal_force_max"]
 _FOOT_P, _FOOT_V, _FOOT_A = (_T[n] for n in ("p_world_feet", "v_world_feet", "a_world_feet"))
 _JOINT_Q, _JOINT_V, _JOINT_A = (_T[n] for n in ("q_joints", "v_joints", "a_joints"))
+_FORCES = _T["f_world_feet"]
 _OFFSET, _PLACE, _ATTITUDE, _OFF_JOINTS = (_S[n] for n in ("offset", "place", "attitude", "joints"))
 _TICKS, _RAISED_TICKS = _S["ticks"], _S["raised_ticks"]
 _SAG, _LEAN, _ANCHOR = _S["sag"], _S["lean"], _S["anchor"]
@@ -170,7 +171,7 @@ def place(plan, anchor, row):
     for begin in (_BODY_P, _BODY_V, _BODY_A, _BODY_W, _BODY_DW):
         x, y = plan[begin], plan[begin + 1]
         row[begin], row[begin + 1] = cosine * x - sine * y, sine * x + cosine * y
-    for begin in (_FOOT_P, _FOOT_V, _FOOT_A):
+    for begin in (_FOOT_P, _FOOT_V, _FOOT_A, _FORCES):
         for leg in range(4):
             k = begin + 3 * leg
             row[k] = cosine * plan[k] - sine * plan[k + 1]

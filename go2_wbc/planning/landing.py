@@ -12,8 +12,9 @@
   ``locomotion``.
 - While a foot stands, the others swing to the plan's places in the world: what one step was off,
   the next one is not. In flight no leg can move the CoM, which goes on as it took off: the plan is
-  carried along with it (x and y), so that the feet come down below the body as planned, and the
-  next jump starts from where this one has ended.
+  carried along with it (x and y) but for the first ``NEAR``, so that the feet come down below the
+  body nearly as planned, and the next jump starts from where this one has ended. Within ``NEAR``
+  they come down in their places, and the legs bring the body back over them.
 """
 
 from __future__ import annotations
@@ -41,6 +42,10 @@ PRESS_DEPTH = 0.06
 """Greatest depth [m] below the ground that it looks for: what a standing leg can still reach."""
 TIME_OUT = 0.2
 """Time [s] after which a foot without contact counts as standing: it reaches the depth in 0.15."""
+
+NEAR = 0.02
+"""Distance [m] by which the CoM may be off its plan when feet come down in their places all the
+same: a tenth of the way to the edge of their support. Far jumps land half as far beside."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,10 +182,12 @@ class ReadableLanding:
                 self._error = max(self._error, float(np.linalg.norm(off[:2] + moved)))
 
     def _carried(self, reference: Reference, snapshot: Snapshot) -> Reference:
-        """``reference`` moved to where the CoM is, the feet as fast as it."""
+        """``reference`` moved to ``NEAR`` of where the CoM is, the feet in step with it."""
         level, body = np.array([1.0, 1.0, 0.0]), reference.body
         off = level * (snapshot.p_world_com - body.p_world)
-        faster = level * (snapshot.v_world_com - body.v_world)
+        share = 1.0 - NEAR / max(float(np.linalg.norm(off)), NEAR)
+        off = share * off
+        faster = share * level * (snapshot.v_world_com - body.v_world)
         self.anchor = Anchor(self.anchor.p_world + off, self.anchor.yaw)
         return replace(
             reference,
@@ -199,6 +206,7 @@ def landing_numbers(footsteps: Footsteps) -> Sequence[float]:
         TIME_OUT,
         GROUND_SHARE,
         FOOT_RADIUS,
+        NEAR,
         footsteps.ramp,
         footsteps.normal_force_min,
         footsteps.normal_force_max,

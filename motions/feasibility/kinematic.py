@@ -88,12 +88,10 @@ def clearance(
     feet = _feet(motion, model)[:, :, 2] - model.foot_radius
     links, count = hulls.heights(motion), len(hulls.links)
     is_calf = np.array([name.endswith("calf") for name in hulls.names])
-    floor = np.concatenate(
-        [
-            np.where(is_calf, limits.calf_clearance, limits.clearance),
-            np.full(len(LEGS), -limits.swing_depth),
-        ]
-    )
+    calves = np.where(motion.is_dynamic, limits.solved_calf_clearance, limits.calf_clearance)
+    floor = np.full((len(motion.times), count + len(LEGS)), limits.clearance)
+    floor[:, :count][:, is_calf] = calves[:, None]
+    floor[:, count:] = -limits.swing_depth
     values = np.hstack([links, feet])
     is_checked = np.ones_like(values, dtype=bool)
     is_checked[:, count:] = ~motion.stance
@@ -161,9 +159,10 @@ def ends(
 ) -> Series:
     """Whether the motion starts and ends at rest in the postures that it names.
 
-    They are above the feet as they stand then, with their heading.
+    They are above the feet as they stand then, with their heading. A foot that is lifted from the
+    first instant on still stands then.
     """
-    home = home_poses(model)
+    home, places = home_poses(model), _feet(motion, model)[0]
     names = tuple(f"{end} {what}" for end in ENDS for what in ("place", "attitude", "speed"))
     bounds = np.array([limits.stance_position, limits.stance_angle, limits.end_speed] * 2)
     values = []
@@ -174,7 +173,8 @@ def ends(
         turn[2] = wrap_angle(float(turn[2]) - feet.yaw)
         off = (motion.q[row, :3] - place, turn, motion.v[row])
         values += [float(np.abs(part).max()) for part in off]
-    if plan.entry is Posture.LIE or not motion.stance[0].all():
+    is_raised = (places[:, 2] - model.foot_radius > limits.reach) & ~motion.stance[0]
+    if plan.entry is Posture.LIE or is_raised.any():
         values[0] = np.inf
     if not motion.stance[-1].all():
         values[3] = np.inf

@@ -32,6 +32,8 @@ class FeasibilityLimits:
         clearance: least height [m] of trunk, hips and thighs: every point of their hulls.
         calf_clearance: the same of the calves, which end 14 mm above the ground where they stand
             upright, and below which the foot is.
+        solved_calf_clearance: the same in solved parts, whose legs bend deeply when they push off
+            and land: with 1 mm none touched.
         swing_depth: how deep [m] the lowest point of a foot in the air may be below the ground.
         drag_height: height [m] of a foot's lowest point below which it is on the ground; planned
             heights are exact, so this only absorbs rounding.
@@ -61,6 +63,7 @@ class FeasibilityLimits:
     self_distance: float = 0.005
     clearance: float = 0.02
     calf_clearance: float = 0.002
+    solved_calf_clearance: float = 0.001
     swing_depth: float = 0.005
     drag_height: float = 0.0005
     drag: float = 0.02

@@ -111,6 +111,13 @@ def test_time_that_runs_backwards_negates_velocities_only(plan: CompiledPlan) ->
     assert (backward.q_joints == forward.q_joints).all()
 
 
+def test_forces_that_were_planned_for_its_tempo_do_not_hold_for_another(
+    plan: CompiledPlan,
+) -> None:
+    pushing = replace(plan.at(2.0), force_weight=0.01)
+    assert retimed(pushing, 0.5, 0.0).force_weight == 0.0
+
+
 def test_a_flight_that_has_begun_is_not_slowed_down_and_ends_on_four_feet() -> None:
     plan = hop_plan(RobotModel(), 0.1, 3)
     for moment in (TAKE_OFF - 0.1, TAKE_OFF + 0.01, LANDING - 0.01):

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import pytest
 
+from benchmarks.exam.outcome import play
 from controller import GO2Controller
+from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline
 from tests.solver import needs_solver
+
+STILL = 0.005
+"""Distance [m] that a foot which stands may slide: half of what counts as a slip."""
 
 
 @needs_solver
@@ -23,3 +28,14 @@ def test_play_tells_how_far_the_plan_is_from_what_was_written() -> None:
         assert measured["plan late [s]"] == pytest.approx(departed.lag)
         assert go2.play(Timeline().body(z=-0.02, over=0.4).home(over=0.4))
         assert not any("written" in name for name in go2.last_outcome.measured)
+
+
+@needs_solver
+def test_feet_stand_still_on_the_floor_that_a_quick_sway_was_solved_for() -> None:
+    """Its forces lie in the cone of that floor; shared evenly they do not, and feet slid 20 mm."""
+    model = RobotModel()
+    line = Timeline(physics="nearest").body(y=0.085, over=0.45).body(y=-0.085, over=0.45)
+    plan = FeasibilityChecker(model).plan(line.home(over=0.4))
+    run = play(plan, model, seed=0)
+    assert run.said, run.reason
+    assert run.slip < STILL

@@ -12,6 +12,7 @@ from benchmarks.solved_plans import shipped_problems
 from go2_wbc.errors import MissingDependency, MotionInfeasible, PlanNotFound, TimelineError
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg
+from motions.compiled_plan import FORCE_WEIGHT
 from motions.dynamics import cache
 from motions.phase_key import PhaseKey
 
@@ -68,6 +69,19 @@ def test_the_kernel_says_what_the_readable_form_says(jumps: CompiledPlan) -> Non
         np.testing.assert_allclose(
             jumps.at(float(t)).row, jumps.readable_at(float(t)).row, atol=_SAME
         )
+
+
+def test_a_solved_part_is_played_with_the_forces_that_it_was_solved_with(
+    jumps: CompiledPlan,
+) -> None:
+    span = jumps.dynamic[0]
+    plan = span.trajectory
+    for step in (0, 7, len(plan.forces) - 1):
+        asked = jumps.at(span.start + float(plan.times[step : step + 2].mean()))
+        np.testing.assert_array_equal(asked.f_world_feet, plan.forces[step])
+        assert asked.force_weight == FORCE_WEIGHT
+    assert jumps.at(span.start - 1e-3).force_weight == 0.0
+    assert jumps.at(span.end + 1e-3).force_weight == 0.0
 
 
 def test_in_flight_a_foot_has_its_load_from_its_first_instant_to_its_last(

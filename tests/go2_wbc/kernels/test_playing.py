@@ -60,8 +60,10 @@ def random_reference(rng: np.random.Generator, near: np.ndarray | None) -> Refer
     point = TrackedPoint.COM if rng.random() < 0.5 else TrackedPoint.BASE
     legs = tuple(LegTask(int(task)) for task in rng.integers(3, size=4))
     loads, feet = rng.uniform(size=(2, 4)), rng.normal(size=(3, 4, 3))
-    joints = rng.normal(size=(3, 12))
-    return Reference(BodyTarget(point, p, v, a, R, w, dw), legs, *loads, *feet, *joints)
+    joints, forces = rng.normal(size=(3, 12)), rng.normal(size=(4, 3))
+    return Reference(
+        BodyTarget(point, p, v, a, R, w, dw), legs, *loads, *feet, *joints, forces, 0.01
+    )
 
 
 @pytest.mark.parametrize("config", [CorrectionConfig(), ODD], ids=["default", "odd"])

@@ -10,6 +10,7 @@ import pytest
 from go2_wbc.legs import Leg
 from go2_wbc.planning.landing import (
     EARLIEST,
+    NEAR,
     PRESS_DEPTH,
     PRESS_SPEED,
     TIME_OUT,
@@ -111,7 +112,8 @@ def test_in_flight_the_plan_goes_where_the_body_goes(kind: Kind) -> None:
     player.shift = np.array([0.03, -0.02, 0.1])
     flying = player.until(TAKE_OFF + 0.1)
     com = MODEL.snapshot(state_of(standing_q() + np.r_[player.shift, np.zeros(16)])).p_world_com
-    np.testing.assert_allclose(flying.body.p_world[:2], com[:2], atol=CORRECTION)
+    left = np.linalg.norm(flying.body.p_world[:2] - com[:2])
+    assert left == pytest.approx(NEAR, abs=CORRECTION), "but for what the legs make up for"
     planned = HOP.at(player.t)
     wanted = planned.p_world_feet - planned.body.p_world
     ours = flying.p_world_feet - flying.body.p_world
@@ -125,6 +127,19 @@ def test_in_flight_the_plan_goes_where_the_body_goes(kind: Kind) -> None:
     kept = (later.p_world_feet - HOP.at(player.t).p_world_feet)[:, :2]
     assert np.ptp(kept, axis=0).max() < 1e-12, "all feet move alike"
     assert np.linalg.norm(shifts) > 0.01, "and stay where they landed"
+
+
+@BOTH
+def test_feet_come_down_in_their_places_if_the_body_is_near_its_own(kind: Kind) -> None:
+    player = Follower(kind, HOP)
+    player.until(TAKE_OFF - 2 * TICK)
+    player.contact[:] = False
+    com = MODEL.snapshot(state_of(standing_q())).p_world_com
+    player.shift = HOP.at(TAKE_OFF).body.p_world - com + [0.5 * NEAR, -0.5 * NEAR, 0.1]
+    flying = player.until(TAKE_OFF + 0.02)
+    planned = HOP.at(player.t)
+    np.testing.assert_allclose(flying.p_world_feet[:, :2], planned.p_world_feet[:, :2], atol=1e-12)
+    np.testing.assert_allclose(flying.v_world_feet[:, :2], planned.v_world_feet[:, :2], atol=1e-12)
 
 
 @BOTH
