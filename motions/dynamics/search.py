@@ -73,6 +73,7 @@ class Search:
         knots: Knots,
         *,
         is_good: Callable[[Found], bool],
+        turns: Callable[[Found], bool],
         budget: float,
         progress: Progress | None,
         start: Start | None = None,
@@ -80,9 +81,11 @@ class Search:
         """Prepare; the budget, processor time [s], runs from here; ``start`` is tried first.
 
         ``is_good`` says whether a solution may be taken although the solver has not converged: it
-        obeys the dynamics, and what more it could gain is only cost.
+        obeys the dynamics, and what more it could gain is only cost. ``turns`` says whether a
+        solution turns as often as it was asked to: the costs cannot tell, so that one that has
+        converged may not.
         """
-        self._is_good = is_good
+        self._is_good, self._turns = is_good, turns
         self._full, self._knots, self._budget = full, knots, budget
         self._start = start
         self._clock = Clock(budget, progress)
@@ -118,14 +121,15 @@ class Search:
     def _climb(self) -> None:
         """Starts, from the one that most often works to the last resort."""
         for xs, us, regularisation in self._starts():
-            if self._solve(self._solver, xs, us, regularisation, STOP):
-                return
+            converges = self._solve(self._solver, xs, us, regularisation, STOP)
             best = self.best()
-            if best is not None and self._is_good(best):
+            if best is None:
+                continue
+            if self._turns(best) if converges else self._is_good(best):
                 return
         raise PlanNotFound(
-            f"no dynamic plan: none of the starts converges ({self._clock.iterations} iterations); "
-            "the phases ask for more than the robot can do"
+            "no dynamic plan: none of the starts converges to a motion that turns as asked "
+            f"({self._clock.iterations} iterations); the phases ask for more than the robot can do"
         )
 
     def _starts(self) -> Iterator[tuple[_Rows, _Rows, float]]:
