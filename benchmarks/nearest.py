@@ -4,8 +4,9 @@ Each seed gives one motion that is refused as it is written (``refused_motions``
 is planned, and played in physics, by torques alone, on a robot and a floor of the seed's. How far
 the trunk was from what was written, at most, is measured and compared with the check's report.
 
-The planner, and how plans are met, were worked on with the motions of seeds 1000 to 1039; none of
-those that are judged here was looked at before.
+The planner, and how plans are met, were worked on with the motions of seeds 1000 to 1039, and those
+of 7300 to 7319 had been seen before the last settings were chosen; none of those that are judged
+here was looked at before.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from motions.dynamic_span import DynamicSpan
 from motions.dynamics.nearest import Written, nearest
 from motions.trajectory import as_written
 
-FIRST_SEED = 7300
+FIRST_SEED = 8600
 """Seed of the first motion that is judged."""
 FOUND = 80.0
 """Percent of the motions for which a plan must be found."""

@@ -258,7 +258,7 @@ class Pilot:
                 f"{plan.name} was cancelled before it began", self._procedures.measurements()
             )
         self._mode = Mode.MOVING
-        behaviour = PlayPlan(plan)
+        behaviour = PlayPlan(plan, self._config.wbc.joint_friction)
         self._procedures.engage(behaviour)
         start, self.playing = self._loop.state.time, behaviour
 

@@ -26,7 +26,6 @@ _AFTERWARDS = 1.0
 _TOGETHER = 0.05
 """Annotations on one limit that are this close in time [s] become one."""
 _LEAST_SAMPLES = 2
-_WRITTEN = "what was written; the plan is the nearest that the robot can do"
 _MOVED, _TURNED = 0.02, np.radians(2.0)
 """A motion that ends farther from its start, [m] and [rad], moves on."""
 
@@ -34,15 +33,12 @@ _MOVED, _TURNED = 0.02, np.radians(2.0)
 def planned(checked: CheckedMotion) -> ReplayContent:
     """The plan with its verdict."""
     plan, shown = checked.plan, checked.recording()
-    content = ReplayContent(shown, is_plan=True, verdict=verdict_of(checked.report))
-    if _is_mended(plan):
-        ghost = _as_written(checked)
-        content = replace(content, ghost=ghost, ghost_name=_WRITTEN, judges_ghost=False)
-    return _shown(plan, content)
+    verdict, written = verdict_of(checked.report), _as_written(checked)
+    return _shown(plan, ReplayContent(shown, is_plan=True, verdict=verdict, written=written))
 
 
 def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> ReplayContent:
-    """A run of the motion with the verdict on its plan, and the plan as the ghost.
+    """A run of the motion with the verdict on its plan, the plan, and what was written instead.
 
     Args:
         checked: of the motion that was played.
@@ -56,8 +52,8 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
     plan = checked.recording()
     labels = (*plan.labels, "afterwards")
     own = replace(own, labels=tuple(labels[row] for row in np.searchsorted(plan.time, own.time)))
-    shown = ReplayContent(own, verdict=verdict_of(checked.report), ghost=plan)
-    return _shown(checked.plan, shown)
+    verdict, written = verdict_of(checked.report), _as_written(checked)
+    return _shown(checked.plan, ReplayContent(own, verdict=verdict, ghost=plan, written=written))
 
 
 def _is_mended(plan: MotionPlan) -> bool:
@@ -66,8 +62,10 @@ def _is_mended(plan: MotionPlan) -> bool:
     return any(isinstance(span.asked, Written) for span in spans)
 
 
-def _as_written(checked: CheckedMotion) -> Recording:
-    """The movement that was written; its forces and torques are not known."""
+def _as_written(checked: CheckedMotion) -> Recording | None:
+    """The movement that was written, if it is not that of the plan; its forces are not known."""
+    if not _is_mended(checked.plan):
+        return None
     shown = checked.recording()
     return replace(
         shown,

@@ -126,9 +126,10 @@ class ReplayContent:
         recording: the movement of the solid robot.
         is_plan: it is a plan; otherwise it was measured.
         verdict: what to say about the motion.
-        ghost: another movement, shown translucent; its clock starts with the first one's.
-        ghost_name: what the ghost is, in words.
-        judges_ghost: the verdict is on the ghost; otherwise on ``recording``.
+        ghost: the plan of what was measured, shown translucent; its clock starts with the
+            recording's, and the verdict is on it.
+        written: what was written, where the plan is only the nearest to it; shown translucent in
+            another colour. Of its forces, torques and margins nothing is shown.
         beats: instants [s] that the motion counts in, drawn as a ruler.
         sliders: parameters that a live page lets one choose.
         sound: an MP3 file that starts with the recording, played in step with it; empty for none.
@@ -139,8 +140,7 @@ class ReplayContent:
     is_plan: bool = False
     verdict: Verdict | None = None
     ghost: Recording | None = None
-    ghost_name: str = "the plan, which was checked"
-    judges_ghost: bool = True
+    written: Recording | None = None
     beats: tuple[float, ...] = ()
     sliders: tuple[Slider, ...] = ()
     sound: bytes = b""
@@ -154,9 +154,9 @@ def checked_content(shown: Recording | ReplayContent) -> ReplayContent:
         ConfigError: for a recording that cannot be drawn.
     """
     content = ReplayContent(shown) if isinstance(shown, Recording) else shown
-    check_recording(content.recording)
-    if content.ghost is not None:
-        check_recording(content.ghost)
+    for recording in (content.recording, content.ghost, content.written):
+        if recording is not None:
+            check_recording(recording)
     return content
 
 

@@ -10,10 +10,12 @@ from jaxtyping import Float
 from controller.behaviours.anchoring import Approach, anchor_of
 from controller.behaviours.base import Behaviour
 from controller.behaviours.safe_return import SafeReturn
+from controller.behaviours.weight import FeltWeight
 from go2_wbc.planning.correction import tracked_position
 from go2_wbc.planning.landing import Landings
 from go2_wbc.planning.playback import Deviation, PlanFollower, Playback
 from go2_wbc.reference import Anchor, MotionPlan, Posture, Reference
+from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
@@ -30,9 +32,11 @@ class PlayPlan(Behaviour):
     _anchor: Anchor
     _follower: PlanFollower
     _approach: Approach
+    _weight: FeltWeight
 
-    def __init__(self, plan: MotionPlan) -> None:
-        """Play ``plan``."""
+    def __init__(self, plan: MotionPlan, friction: JointFriction | None = None) -> None:
+        """Play ``plan``; ``friction`` is that of the joints, by default as configured at first."""
+        self._friction = friction or JointFriction()
         self.label, self.duration = plan.name, plan.duration
         self.plan, self.is_dynamic = plan, plan.has_dynamic_spans
         self._start = self._last = 0.0
@@ -46,6 +50,7 @@ class PlayPlan(Behaviour):
         self._anchor = anchor_of(self.plan, snapshot.p_world_feet)
         self._follower = Playback(self._anchor, self.plan.footsteps)
         self._approach = Approach.of(self.plan, self._anchor, snapshot)
+        self._weight = FeltWeight(self._friction)
 
     def return_safely(self) -> None:
         """Leave the plan: go to its nearest instant on four loaded feet; any thread may call."""
@@ -85,13 +90,14 @@ class PlayPlan(Behaviour):
     def update(self, snapshot: Snapshot) -> Reference:
         """The plan's reference of this instant, in the world."""
         now = snapshot.state.time
-        row, t = self._planned(now)
+        row, t = self._planned(snapshot)
         reference = self._follower.follow(row, snapshot, t, now - self._last)
         self._last = now
         return reference
 
-    def _planned(self, now: float) -> tuple[Float[np.ndarray, " size"], float]:
+    def _planned(self, snapshot: Snapshot) -> tuple[Float[np.ndarray, " size"], float]:
         """The plan's row of this tick, and how far into the plan it is [s]."""
+        now = snapshot.state.time
         if self._must_return and self._return is None:
             self._return = SafeReturn(self.plan, self._last - self._start)
         if self._return is not None:
@@ -100,6 +106,8 @@ class PlayPlan(Behaviour):
         t = now - self._start
         row = self.plan.row_at(t)
         self._approach.add_to(row, t)
+        if self.is_dynamic:
+            self._weight.add_to(row, snapshot, now - self._last)
         return row, t
 
     def is_finished(self, snapshot: Snapshot) -> bool:

@@ -6,6 +6,7 @@ the feet from one place to the next, and the legs' angles follow from both.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,8 @@ from motions.placement import attitudes, configurations, turned, turned_back
 LEAD = 0.2
 """Share of a flight's way by which the trunk is ahead of the feet at take-off, and behind them at
 touchdown, in the first guess."""
+STANDING_TURN = 1e-3
+"""Share of a turn's pace, of that with feet in the air, at which the trunk turns on four feet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,6 +165,10 @@ def _trunk_path(
     known += [goals[-1]] if goals[-1] not in known else []
     keys = [0, *(goal.knot for goal in known)]
     table = np.array([first, *(_over_feet(first, origin, goal.p_feet) for goal in known)])
+    if goals[-1].pose is None:
+        table[-1] = last
+    clock = _turning_clock(times, stance)[keys]
+    table[:, 5] = _headings(table[:, 5], [goal.pose for goal in known], clock)
     for begin, end in flights:
         rows = [keys.index(begin), keys.index(end)]
         lead = LEAD * (table[rows[1]] - table[rows[0]])
@@ -169,9 +176,6 @@ def _trunk_path(
     for row, goal in enumerate(known, start=1):
         if goal.pose is not None:
             table[row] = goal.pose
-    if goals[-1].pose is None:
-        table[-1] = last
-    table[:, 5] = np.unwrap(table[:, 5])
     slopes = PchipInterpolator(times[keys], table).derivative()(times[keys])
     slopes[[0, -1]] = 0.0
     for begin, end in flights:
@@ -184,6 +188,33 @@ def _trunk_path(
         slopes[inside] = (table[rows[1]] - table[rows[0]]) / t[-1]
         slopes[inside, 2] += 0.5 * GRAVITY * (t[-1] - 2.0 * t)
     return CubicHermiteSpline(times[keys], table, slopes)(times)
+
+
+def _turning_clock(
+    times: Float[np.ndarray, " n1"], stance: Bool[np.ndarray, "n 4"]
+) -> Float[np.ndarray, " n1"]:
+    """Time [s] in which the trunk may turn far: that with feet in the air, and a little of all."""
+    pace = np.where(stance.all(axis=1), STANDING_TURN, 1.0)
+    return np.concatenate([[0.0], np.cumsum(pace * np.diff(times))])
+
+
+def _headings(
+    over_feet: Float[np.ndarray, " k"],
+    poses: Sequence[Float[np.ndarray, "6"] | None],
+    clock: Float[np.ndarray, " k"],
+) -> Float[np.ndarray, " k"]:
+    """The asked yaw [rad] as it stands, so that 360 deg is a turn; elsewhere that of the feet.
+
+    Whole turns are added to the latter so that they lead from one that is asked to the next.
+    ``poses`` are those of all rows but the first.
+    """
+    yaw, is_asked = over_feet.copy(), np.array([True, *(pose is not None for pose in poses)])
+    yaw[is_asked] = [over_feet[0], *(pose[5] for pose in poses if pose is not None)]
+    expected = np.interp(clock, clock[is_asked], yaw[is_asked])
+    for row in np.flatnonzero(~is_asked).tolist():
+        off = (yaw[row] - expected[row]) - (yaw[row - 1] - expected[row - 1])
+        yaw[row] -= 2.0 * np.pi * np.round(off / (2.0 * np.pi))
+    return yaw
 
 
 def _over_feet(

@@ -111,8 +111,8 @@ def nearest(
         try:
             task = Task(knots, model, limits, weights, tolerance or Tolerance(), _misses)
             plan = optimum(task, budget=share, progress=progress)
-        except PlanNotFound as error:
-            last = last or error
+        except PlanNotFound as error:  # itself it would hold all that was solved
+            last = last or PlanNotFound(str(error).partition("\n")[0], error.reasons)
         else:
             return replace(plan, lag=_lag(knots, plan))
     raise last or PlanNotFound("no dynamic plan: nothing was tried")

@@ -37,12 +37,34 @@ class _Expired(Exception):
     """The time is up."""
 
 
-class Search:
-    """Solves one program.
+class Clock(crocoddyl.CallbackAbstract):
+    """Counts the iterations of solvers, tells, and stops them when time is up.
+
+    It knows no solver: solvers hold their callbacks where Python's garbage collector does not look,
+    so that a way back would keep both for ever.
 
     Attributes:
-        iterations: done so far, over all starts.
+        iterations: done so far.
     """
+
+    def __init__(self, budget: float, progress: Progress | None) -> None:
+        """Start; the budget is processor time [s]."""
+        super().__init__()
+        self.iterations = 0
+        self._deadline = time.thread_time() + budget
+        self._progress = progress
+
+    def __call__(self, solver: crocoddyl.SolverBoxFDDP) -> None:
+        """Called after every iteration."""
+        self.iterations += 1
+        if self._progress is not None:
+            self._progress(self.iterations, float(solver.cost))
+        if time.thread_time() > self._deadline:
+            raise _Expired
+
+
+class Search:
+    """Solves one program."""
 
     def __init__(
         self,
@@ -51,6 +73,7 @@ class Search:
         knots: Knots,
         *,
         is_good: Callable[[Found], bool],
+        turns: Callable[[Found], bool],
         budget: float,
         progress: Progress | None,
         start: Start | None = None,
@@ -58,20 +81,19 @@ class Search:
         """Prepare; the budget, processor time [s], runs from here; ``start`` is tried first.
 
         ``is_good`` says whether a solution may be taken although the solver has not converged: it
-        obeys the dynamics, and what more it could gain is only cost.
+        obeys the dynamics, and what more it could gain is only cost. ``turns`` says whether a
+        solution turns as often as it was asked to: the costs cannot tell, so that one that has
+        converged may not.
         """
-        self.iterations = 0
-        self._is_good = is_good
+        self._is_good, self._turns = is_good, turns
         self._full, self._knots, self._budget = full, knots, budget
         self._start = start
-        self._deadline = time.thread_time() + budget
-        self._progress = progress
-        self._watch = _watch(self)
+        self._clock = Clock(budget, progress)
         self._soft_solver, self._solver = self._solver_of(soft), self._solver_of(full)
 
     def _solver_of(self, program: Program) -> crocoddyl.SolverBoxFDDP:
         solver = crocoddyl.SolverBoxFDDP(program.problem)
-        solver.setCallbacks([self._watch])
+        solver.setCallbacks([self._clock])
         return solver
 
     def run(self) -> Found:
@@ -86,7 +108,7 @@ class Search:
         except _Expired:
             raise PlanNotFound(
                 f"no dynamic plan within {self._budget:g} s of processor time "
-                f"({self.iterations} iterations); ask for less, or give a larger budget"
+                f"({self._clock.iterations} iterations); ask for less, or give a larger budget"
             ) from None
         return self._found()
 
@@ -96,25 +118,18 @@ class Search:
         is_whole = bool(len(solver.xs)) and solver.isFeasible and np.isfinite(solver.cost)
         return self._found() if is_whole else None
 
-    def step(self, cost: float) -> None:
-        """Count an iteration, tell, and stop when time is up."""
-        self.iterations += 1
-        if self._progress is not None:
-            self._progress(self.iterations, cost)
-        if time.thread_time() > self._deadline:
-            raise _Expired
-
     def _climb(self) -> None:
         """Starts, from the one that most often works to the last resort."""
         for xs, us, regularisation in self._starts():
-            if self._solve(self._solver, xs, us, regularisation, STOP):
-                return
+            converges = self._solve(self._solver, xs, us, regularisation, STOP)
             best = self.best()
-            if best is not None and self._is_good(best):
+            if best is None:
+                continue
+            if self._turns(best) if converges else self._is_good(best):
                 return
         raise PlanNotFound(
-            f"no dynamic plan: none of the starts converges ({self.iterations} iterations); the "
-            "phases ask for more than the robot can do"
+            "no dynamic plan: none of the starts converges to a motion that turns as asked "
+            f"({self._clock.iterations} iterations); the phases ask for more than the robot can do"
         )
 
     def _starts(self) -> Iterator[tuple[_Rows, _Rows, float]]:
@@ -173,13 +188,5 @@ class Search:
                     forces[row, leg] = contacts[FOOT_NAMES[leg]].f.linear
         return Found(
             np.array(solver.xs), np.array(solver.us), forces, np.array(solver.K),
-            self.iterations, float(solver.cost),
+            self._clock.iterations, float(solver.cost),
         )  # fmt: skip
-
-
-def _watch(search: Search) -> crocoddyl.CallbackAbstract:
-    class Watch(crocoddyl.CallbackAbstract):
-        def __call__(self, solver: crocoddyl.SolverBoxFDDP) -> None:
-            search.step(float(solver.cost))
-
-    return Watch()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -14,7 +15,7 @@ from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from motions.dynamics.continuation import Solved, Start, continued
-from motions.dynamics.knots import Found, Knots, feet_at, knots_of
+from motions.dynamics.knots import Found, Knots, feet_at, knots_of, pose_of
 from motions.dynamics.limits import PlanLimits, Weights
 from motions.dynamics.phases import PhaseProblem, Tolerance
 from motions.dynamics.trajectory import DynamicTrajectory, Miss
@@ -23,6 +24,9 @@ from motions.dynamics.verdict import audit
 INSTALL_LINE = "pip install go2-wbc[dynamics]"
 BUDGET = 20.0
 """Processor time [s] that solving may take."""
+ANOTHER_TURN = 1.5 * math.pi
+"""Angle [rad] about an axis of the trunk from which on what is left of a turn is a whole one that
+was lost: attitudes look the same, and the axes tip by much less than the rest."""
 
 
 def solve(
@@ -123,7 +127,9 @@ def optimum(
     full = Program(knots, model, limits, weights)
     search = Search(
         soft, full, knots,
-        is_good=lambda found: not objections(found), budget=budget, progress=progress, start=start,
+        is_good=lambda found: not objections(found),
+        turns=lambda found: task.plan(found).angle_deviation <= math.pi,
+        budget=budget, progress=progress, start=start,
     )  # fmt: skip
     try:
         plan = task.plan(search.run())
@@ -147,17 +153,26 @@ def require_crocoddyl() -> None:
 
 def _misses(knots: Knots, plan: DynamicTrajectory) -> tuple[Miss, ...]:
     misses = []
+    first, turned = pose_of(knots.initial.q), _turned(plan)
     for goal in knots.goals:
         time = float(knots.times[goal.knot])
         if goal.pose is not None:
             R_des = rotation_from_rpy(*goal.pose[3:].tolist())
             place, angle = trunk_miss(plan.q[goal.knot], goal.pose[:3], R_des)
+            left = float(np.abs(goal.pose[3:] - first[3:] - turned[goal.knot]).max())
+            angle = left if left > ANOTHER_TURN else angle
             misses.append(Miss("trunk", goal.label, time, place, angle))
         for leg in LEGS:
             if goal.asked[leg]:
                 off = np.linalg.norm(plan.p_feet[goal.knot, leg] - goal.p_feet[leg])
                 misses.append(Miss(FOOT_NAMES[leg], goal.label, time, float(off), 0.0))
     return tuple(misses)
+
+
+def _turned(plan: DynamicTrajectory) -> Float[np.ndarray, "n1 3"]:
+    """By how much the trunk has turned about its own axes since the start [rad]."""
+    steps = plan.v[1:, 3:6] * np.diff(plan.times)[:, None]
+    return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
 
 
 def trunk_miss(

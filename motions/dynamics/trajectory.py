@@ -44,7 +44,7 @@ class Miss:
         phase: label of the phase at whose end it was asked.
         time: [s] from the start.
         position: distance [m].
-        angle: angle [rad]; 0 of a foot.
+        angle: angle [rad], of the trunk, whole turns that were lost included; 0 of a foot.
     """
 
     subject: str

@@ -163,11 +163,9 @@ class _Audit:
         """A turn by 360 deg looks like none; the integrated yaw and tilt rates tell them apart."""
         plan = self._plan
         R = np.eye(3) if not len(plan.q) else pin.Quaternion(plan.q[0, 3:7]).toRotationMatrix()
-        turned = np.zeros(3)
         worst = 0.0
         for row, dt in enumerate(np.diff(plan.times)):
             step = plan.v[row + 1, 3:6] * dt
-            turned += R @ step
             R = R @ pin.exp3(step)
             measured = pin.Quaternion(plan.q[row + 1, 3:7]).toRotationMatrix()
             worst = max(worst, float(np.linalg.norm(pin.log3(R.T @ measured))))

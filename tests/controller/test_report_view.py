@@ -98,6 +98,7 @@ def test_a_run_is_seen_in_the_frame_and_at_the_time_of_its_motion(
     own = content.recording
     assert not content.is_plan
     assert content.ghost is not None
+    assert content.written is None
     rows = slice(0, len(plan.time))
     np.testing.assert_allclose(own.time[rows], plan.time, atol=_ROUNDING)
     np.testing.assert_allclose(own.q[rows], plan.q, atol=_ROUNDING)
@@ -116,7 +117,7 @@ def test_a_run_without_the_motion_is_refused(
         performed(nod, replace(run, labels=("stand",) * len(run.labels)), checker.model)
 
 
-def _elsewhere(plan: Recording) -> Recording:
+def _elsewhere(plan: Recording, name: str = "nod") -> Recording:
     """The plan done exactly, somewhere else, after standing for 1 s and before another 3 s."""
     before, after = 100, 300
     rows = np.clip(np.arange(-before, len(plan.time) + after), 0, len(plan.time) - 1)
@@ -126,7 +127,7 @@ def _elsewhere(plan: Recording) -> Recording:
     x, y, z, w = q[:, 3:7].T.copy()
     s, c = np.sin(_YAW / 2), np.cos(_YAW / 2)
     q[:, 3:7] = np.column_stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z])
-    labels = ("stand",) * before + ("nod",) * len(plan.time) + ("stand",) * after
+    labels = ("stand",) * before + (name,) * len(plan.time) + ("stand",) * after
     return Recording(
         time=5.0 + np.arange(len(rows)) * 0.01,
         q=q,
@@ -149,14 +150,18 @@ def test_the_page_shows_what_was_written_beside_the_nearest_feasible(
     checked = checker.evaluate(line.home(over=0.3))
     assert checked.report.ok
     content = planned(checked)
-    assert content.ghost is not None
-    assert not content.judges_ghost
-    assert content.ghost_name.startswith("what was written; the plan is the nearest")
-    aside = content.ghost.q[:, 1]
-    turns = [float(aside[np.argmin(np.abs(content.ghost.time - t))]) for t in (0.22, 0.44, 0.66)]
+    assert content.ghost is None
+    assert content.written is not None
+    aside = content.written.q[:, 1]
+    turns = [float(aside[np.argmin(np.abs(content.written.time - t))]) for t in (0.22, 0.44, 0.66)]
     assert turns == pytest.approx([0.06, -0.06, 0.06], abs=2e-3)
     off = np.abs(aside - content.recording.q[:, 1]).max()
     assert 0.005 < off <= 0.05
+    run = performed(checked, _elsewhere(checked.recording(), "sway"), checker.model)
+    assert run.ghost is not None
+    assert run.written is not None
+    np.testing.assert_allclose(run.ghost.q, content.recording.q)
+    np.testing.assert_allclose(run.written.q, content.written.q)
 
 
 def test_the_page_shows_the_beats_and_the_end_of_a_motion_that_moves_on(

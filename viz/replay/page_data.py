@@ -41,20 +41,20 @@ def content_text(content: ReplayContent, title: str, version: str = "") -> str:
         "labels": [[s.start, s.end, s.label] for s in content.recording.spans()],
         "force_scale": max(highest, _LEAST_FORCE_SCALE),
         "beats": list(content.beats),
-        "ghost_name": content.ghost_name,
-        "judges_ghost": content.judges_ghost,
         "end_pose": content.end_pose,
         "has_sound": bool(content.sound),
         "sliders": [asdict(slider) for slider in content.sliders],
         "verdict": None,
         "ghost": None,
+        "written": None,
     }
     if content.sound:
         pack.add("sound", np.frombuffer(content.sound, np.uint8))
     if content.verdict is not None:
         header["verdict"] = _add_verdict(pack, content.verdict)
-    if content.ghost is not None:
-        header["ghost"] = _add_frames(pack, "ghost.", replay_frames(content.ghost, robot))
+    for name, other in (("ghost", content.ghost), ("written", content.written)):
+        if other is not None:
+            header[name] = _add_frames(pack, f"{name}.", replay_frames(other, robot))
     return pack.packed(header)
 
 

@@ -127,7 +127,10 @@ class Tab:
 
     def draw(self) -> None:
         """Draw the 3D view, if anything in it has changed."""
-        self.evaluate(f"isLookedAt = true; {DRAWN}.then(() => {{ isLookedAt = false; }})")
+        self.evaluate(
+            "isLookedAt = true; if (replay.scene.viewer.needs_render) replay.scene.viewer.render();"
+            f" {DRAWN}.then(() => {{ isLookedAt = false; }})"
+        )
 
     def stage(self) -> Float[np.ndarray, "h w 3"]:
         """The 3D view now."""

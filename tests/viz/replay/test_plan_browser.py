@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,6 +19,7 @@ from viz.content import ReplayContent
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
+WRITTEN = "Brown: what was written; the plan is the nearest that the robot can do."
 _BEATS = (0.25, 0.75, 1.25, 2.25)
 _BROKEN, _FINE = 1.7, 2.8
 """Times [s] at which the made-up verdict has a calf over its limit, and nothing broken."""
@@ -205,7 +207,7 @@ def test_the_ghost_follows_the_plan_beside_the_robot(browser: Tab) -> None:
     assert browser.evaluate(shift) == [0, 0]
     browser.evaluate(f"{button}.click()")
     pictures.append(browser.stage())
-    assert browser.evaluate(f"{button}.textContent") == "Ghost: off"
+    assert browser.evaluate(f"{button}.textContent") == "Plan: off"
     browser.evaluate(f"{button}.click()")
     pictures.append(browser.stage())
     beside, overlaid, alone, again = pictures
@@ -224,14 +226,67 @@ def test_the_legend_tells_measured_from_planned(browser: Tab) -> None:
 def test_the_ghost_is_called_what_it_is(browser: Tab) -> None:
     said = "Solid: what was measured. Blue: the plan, which was checked."
     assert browser.text("#who") == said
-    told = "replay.data.header"
-    browser.evaluate(f"{told}.is_plan = true; {told}.ghost_name = 'what was written'")
-    browser.evaluate(f"{told}.judges_ghost = false; replay.use(replay.data)")
-    assert browser.text("#who") == "Solid: the plan. Blue: what was written."
+    browser.evaluate("replay.data.written = replay.data.ghost; replay.data.ghost = null")
+    browser.evaluate("replay.data.header.is_plan = true; replay.use(replay.data)")
+    assert browser.text("#who") == f"Solid: the plan. {WRITTEN}"
     assert browser.evaluate("replay.scene.flags.judged() === replay.scene.flags.parts")
-    browser.evaluate(f"{told}.is_plan = false; {told}.judges_ghost = true")
-    browser.evaluate(f"{told}.ghost_name = 'the plan, which was checked'; replay.use(replay.data)")
+    browser.evaluate("replay.data.ghost = replay.data.written; replay.data.written = null")
+    browser.evaluate("replay.data.header.is_plan = false; replay.use(replay.data)")
     assert browser.text("#who") == said
+
+
+def test_what_was_written_is_a_second_ghost(browser: Tab) -> None:
+    browser.evaluate("replay.scrub(2.0); replay.scene.setView('corner')")
+    button = "document.querySelector('[data-ghost=written]')"
+    is_offered = f"getComputedStyle({button}).display !== 'none'"
+    asides = "replay.scene.ghosts.map((ghost) => ghost.shift[1])"
+    assert not browser.evaluate(is_offered)
+    assert browser.evaluate(asides) == [0.62, 0]
+    without = browser.stage()
+    browser.evaluate("replay.data.written = replay.data.ghost; replay.use(replay.data)")
+    assert browser.evaluate(is_offered)
+    assert browser.text("#who").endswith(f"Blue: the plan, which was checked. {WRITTEN}")
+    assert browser.evaluate(asides) == [0.62, -0.62]
+    both = browser.stage()
+    assert (np.abs(both - without).max(axis=2) > 20).sum() > 5000
+    browser.page.keyboard.press("w")
+    browser.page.keyboard.press("w")
+    assert browser.evaluate(f"{button}.textContent") == "Written: off"
+    assert np.abs(browser.stage() - without).mean() < 0.5
+    browser.page.keyboard.press("w")
+    browser.evaluate("replay.data.written = null; replay.use(replay.data)")
+
+
+def test_frames_are_asked_for_only_while_something_moves(browser: Tab) -> None:
+    browser.evaluate(
+        "(() => { const ask = window.requestAnimationFrame; window.asked = 0;"
+        " window.requestAnimationFrame = (act) => { asked += 1; return ask.call(window, act); };"
+        " })()"
+    )
+    frame = "new Promise((done) => setTimeout(done, 200))"
+    browser.evaluate(f"asked = 0, {frame}")
+    assert browser.evaluate("asked") == 0
+    browser.evaluate(f"replay.play(true), {frame}")
+    assert browser.evaluate("asked") > 1
+    browser.evaluate(f"replay.play(false), {frame}")
+    browser.evaluate(f"asked = 0, {frame}")
+    assert browser.evaluate("asked") == 0
+
+
+def test_on_a_narrow_page_the_buttons_take_two_rows(browser: Tab) -> None:
+    browser.evaluate("replay.data.written = replay.data.ghost; replay.use(replay.data)")
+    browser.page.set_viewport_size({"width": 400, "height": 800})
+    boxes = browser.evaluate(
+        "[...document.querySelectorAll('#toggles button')].map((button) => {"
+        " const box = button.getBoundingClientRect();"
+        " return [box.left, box.right, box.top]; })"
+    )
+    assert len({top for *_, top in boxes}) == 2
+    assert all(0 <= left < right <= 400 for left, right, _ in boxes)
+    for before, after in pairwise(boxes):
+        assert after[0] >= before[1] or after[2] > before[2]
+    browser.page.set_viewport_size({"width": 1280, "height": 720})
+    browser.evaluate("replay.data.written = null; replay.use(replay.data)")
 
 
 def test_an_outline_shows_where_the_motion_is_to_end(browser: Tab) -> None:

@@ -79,6 +79,14 @@ def test_the_ghost_is_stored_beside_the_robot(page: str, content: ReplayContent)
     np.testing.assert_allclose(arrays["ghost.forces"], arrays["forces"] * 0.5, atol=2 * _ROUNDING)
 
 
+def test_what_was_written_is_stored_too(content: ReplayContent, tmp_path: Path) -> None:
+    both = replace(content, written=content.recording)
+    path = viz.export_html(both, tmp_path / "both.html", title="A run")
+    header, arrays = read_data(path.read_text(encoding="utf-8"))
+    assert header["written"] == header["ghost"]
+    np.testing.assert_allclose(arrays["written.q"], arrays["q"], atol=_ROUNDING)
+
+
 def test_nothing_in_it_is_loaded_from_elsewhere(page: str) -> None:
     code = re.sub(r'<script type="text/plain".*?</script>', "", page, flags=re.DOTALL)
     asks = r"https?://|wss?://|\ssrc\s*=|@import|url\(|fetch\(|XMLHttp|EventSource"
@@ -104,9 +112,12 @@ def test_pages_of_the_library_are_small(name: str, tmp_path: Path) -> None:
     assert path.stat().st_size < PAGE_LIMIT / 2
 
 
-def test_a_ghost_that_cannot_be_drawn_is_refused(content: ReplayContent, tmp_path: Path) -> None:
-    assert content.ghost is not None
-    broken = replace(content, ghost=replace(content.ghost, q=content.ghost.q * np.nan))
+@pytest.mark.parametrize("ghost", ["ghost", "written"])
+def test_a_ghost_that_cannot_be_drawn_is_refused(
+    content: ReplayContent, tmp_path: Path, ghost: str
+) -> None:
+    lost = replace(content.recording, q=content.recording.q * np.nan)
+    broken = replace(content, **{ghost: lost})
     with pytest.raises(ConfigError, match="not finite"):
         viz.export_html(broken, tmp_path / "page.html", title="t")
     assert list(tmp_path.iterdir()) == []

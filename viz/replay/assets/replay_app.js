@@ -16,8 +16,6 @@ class Player {
     this.sound.use(data);
     this.describe();
     this.seek(0);
-    this.last = performance.now();
-    requestAnimationFrame((now) => this.tick(now));
   }
 
   // Shows other data at the same time, from the same place.
@@ -37,19 +35,20 @@ class Player {
     const { title, is_plan: isPlan } = data.header;
     document.title = document.querySelector("h1").textContent = title;
     document.getElementById("total").textContent = ` / ${data.duration.toFixed(2)} s`;
-    document.getElementById("app").classList.toggle("has-ghost", data.ghost !== null);
+    const { classList } = document.getElementById("app");
+    for (const name of Object.keys(GHOSTS)) classList.toggle(`has-${name}`, data[name] !== null);
     document.getElementById("force-key").textContent = isPlan ? "planned force" : "measured force";
-    document.querySelector(".ghost-key").hidden = isPlan;
-    const solid = isPlan ? "the plan" : "what was measured";
-    document.getElementById("who").textContent = `Solid: ${solid}. Blue: ${data.header.ghost_name}.`;
+    const who = [`Solid: ${isPlan ? "the plan" : "what was measured"}.`];
+    if (data.ghost) who.push("Blue: the plan, which was checked.");
+    if (data.written) who.push("Brown: what was written; the plan is the nearest that the robot can do.");
+    document.getElementById("who").textContent = who.join(" ");
   }
 
-  cycleGhost() {
-    const { ghost } = this.scene;
-    const places = Object.keys(GHOST_PLACES);
-    ghost.place = places[(places.indexOf(ghost.place) + 1) % places.length];
-    const button = document.querySelector("[data-ghost]");
-    button.textContent = `Ghost: ${ghost.place}`;
+  cycleGhost(name) {
+    const ghost = this.scene.ghosts.find((other) => other.name === name);
+    ghost.place = GHOST_PLACES[(GHOST_PLACES.indexOf(ghost.place) + 1) % GHOST_PLACES.length];
+    const button = document.querySelector(`[data-ghost=${name}]`);
+    button.querySelector("span").textContent = `: ${ghost.place}`;
     button.classList.toggle("on", ghost.place !== "off");
     this.scene.show(this.time);
   }
@@ -62,12 +61,25 @@ class Player {
     }
   }
 
+  get isMoving() {
+    return this.isPlaying || this.scene.shown.orbit;
+  }
+
+  // Frames are asked for only while something moves.
+  wake() {
+    if (this.isAwake || !this.isMoving) return;
+    this.isAwake = true;
+    this.last = performance.now();
+    requestAnimationFrame((now) => this.tick(now));
+  }
+
   tick(now) {
     const passed = Math.min((now - this.last) / 1000, 0.1);
     this.last = now;
     if (this.isPlaying) this.advance(passed);
     if (this.scene.shown.orbit) this.scene.orbit(passed);
-    requestAnimationFrame((later) => this.tick(later));
+    this.isAwake = this.isMoving;
+    if (this.isAwake) requestAnimationFrame((later) => this.tick(later));
   }
 
   advance(passed) {
@@ -113,6 +125,7 @@ class Player {
     this.isPlaying = isPlaying;
     this.sound.play(isPlaying, this.time, this.speed);
     this.button.classList.toggle("playing", isPlaying);
+    this.wake();
   }
 
   setSpeed(speed) {
@@ -128,6 +141,7 @@ class Player {
     shown[name] = !shown[name];
     document.querySelector(`[data-toggle=${name}]`).classList.toggle("on", shown[name]);
     this.scene.show(this.time);
+    this.wake();
   }
 }
 
@@ -144,7 +158,7 @@ function bindControls(player) {
   each("view", (name) => player.scene.setView(name));
   each("speed", (speed) => player.setSpeed(Number(speed)));
   each("step", (frames) => player.step(Number(frames)));
-  each("ghost", () => player.cycleGhost());
+  each("ghost", (name) => player.cycleGhost(name));
   each("sound", () => player.sound.toggle());
   each("open", (name) => player.openTab(name));
   player.button.addEventListener("click", () => {
@@ -152,6 +166,7 @@ function bindControls(player) {
     player.button.blur();
   });
   const views = { 1: "corner", 2: "side", 3: "front", 4: "top" };
+  const ghosts = { g: "ghost", w: "written" };
   const toggles = { c: "follow", o: "orbit", f: "forces", s: "support", p: "paths" };
   window.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -164,7 +179,7 @@ function bindControls(player) {
     else if (key === "end") player.scrub(player.data.duration);
     else if (views[key]) player.scene.setView(views[key]);
     else if (toggles[key]) player.toggle(toggles[key]);
-    else if (key === "g" && player.data.ghost) player.cycleGhost();
+    else if (ghosts[key] && player.data[ghosts[key]]) player.cycleGhost(ghosts[key]);
     else if (key === "m" && player.data.sound) player.sound.toggle();
     else if (key === "n" && player.data.annotations.length) player.jumpToNext();
     else return;

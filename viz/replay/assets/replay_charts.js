@@ -3,7 +3,7 @@
 
 const INK = "#1f2937", MUTED = "#6b7280", LINE = "#e3e8f0", ACCENT = "#2563eb", BAD = "#dc2626";
 const FONT = "Inter, system-ui, -apple-system, 'Segoe UI', Roboto, Arial, sans-serif";
-const WARN = "#f59e0b", GHOST = "#7c93d6";
+const WARN = "#f59e0b", GHOST = "#7c93d6", WRITTEN = "#a8713a";
 const BEAT_ROOM = 7; // px, least distance of two lines of the beats
 const LANE = 9; // px, height of the strip that shows when limits are broken
 const LABEL_COLORS = ["#dbe6ff", "#fde9cf", "#d5f2e3", "#fbdcea", "#e6e0fb", "#d7eff5"];
@@ -174,7 +174,7 @@ class Timeline extends TimeCanvas {
     paint.lineTo(this.xAt(data.end), top + height);
     paint.fill();
     paint.globalAlpha = 1;
-    if (!data.ghost || data.header.is_plan) return; // forces of what was written are not known
+    if (!data.ghost) return;
     paint.strokeStyle = INK;
     paint.lineWidth = 1;
     paint.beginPath();
@@ -226,7 +226,7 @@ class Curve extends TimeCanvas {
 
   use(data) {
     const { style } = this;
-    const runs = this.showsGhost(data) ? [data, data.ghost] : [data];
+    const runs = [data, ...this.others(data).map(([run]) => run)];
     const finite = runs.flatMap((run) => Array.from(run[style.name]))
       .filter(Number.isFinite).map((v) => v * style.scale);
     if (style.limit !== undefined) finite.push(style.limit * style.scale);
@@ -238,9 +238,10 @@ class Curve extends TimeCanvas {
     super.use(data);
   }
 
-  // Of a motion that was written and not planned only the movement is known.
-  showsGhost(data) {
-    return data.ghost && (!data.header.is_plan || this.style.name === "height");
+  // The plan, and what was written, with their colours; of the latter only the movement is known.
+  others(data) {
+    const written = this.style.name === "height" ? data.written : null;
+    return [[data.ghost, GHOST], [written, WRITTEN]].filter(([run]) => run);
   }
 
   yAt(value) {
@@ -257,11 +258,9 @@ class Curve extends TimeCanvas {
       this.horizontal(paint, style.limit * style.scale);
       paint.setLineDash([]);
     }
-    if (this.showsGhost(data)) {
-      paint.setLineDash([5, 3]);
-      this.drawRun(paint, data.ghost, GHOST);
-      paint.setLineDash([]);
-    }
+    paint.setLineDash([5, 3]);
+    this.others(data).forEach(([run, color]) => this.drawRun(paint, run, color));
+    paint.setLineDash([]);
     this.drawRun(paint, data, ACCENT);
   }
 

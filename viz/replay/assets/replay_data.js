@@ -66,7 +66,7 @@ class Run {
   }
 }
 
-// The movement that is shown, the ghost beside it (or null), and what there is to say.
+// The movement that is shown, its plan and what was written (or null), and what there is to say.
 class ReplayData extends Run {
   constructor(buffer, scene) {
     const pack = new Pack(buffer);
@@ -74,7 +74,8 @@ class ReplayData extends Run {
     this.scene = scene;
     this.header = { ...scene.header, ...pack.header };
     this.ghost = pack.header.ghost ? new Run(pack, "ghost.", pack.header.ghost) : null;
-    this.duration = Math.max(this.end, this.ghost ? this.ghost.end : 0);
+    this.written = pack.header.written ? new Run(pack, "written.", pack.header.written) : null;
+    this.duration = Math.max(...[this, this.ghost, this.written].map((run) => (run ? run.end : 0)));
     this.sound = this.header.has_sound ? pack.array("sound") : null; // an MP3 file
     this.annotations = this.header.verdict ? this.header.verdict.annotations : [];
     this.curves = (this.header.verdict ? this.header.verdict.curves : []).map((curve, k) => ({

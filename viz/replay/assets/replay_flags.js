@@ -19,7 +19,7 @@ class Flags {
   // What is judged is the plan: where the ghost shows it, the ghost turns red.
   judged() {
     const { ghost } = this.scene;
-    if (!ghost.isShown || !this.data.header.judges_ghost) return this.parts;
+    if (!ghost.isShown) return this.parts;
     this.ghostParts = this.ghostParts || partsOf(ghost.body.root);
     return this.ghostParts;
   }

@@ -1,8 +1,12 @@
 "use strict";
-// Bodies that can be posed: the robot, and the ghost that shows the plan beside it.
+// Bodies that can be posed: the robot, and the ghosts that show its plan and what was written.
 
-const GHOST_COLOR = 0x6d8ff5, GHOST_OPACITY = 0.38;
-const GHOST_PLACES = { beside: [0, 0.62], overlay: [0, 0], off: [0, 0] }; // m ahead, m left
+const GHOST_OPACITY = 0.38;
+const GHOST_PLACES = ["beside", "overlay", "off"];
+const GHOSTS = { // its colour, and how far to the left [m] it is when it is beside the robot
+  ghost: { color: 0x6d8ff5, aside: 0.62 },
+  written: { color: 0xb8793b, aside: -0.62 },
+};
 
 // A tree of meshes with a base and joints that a configuration moves.
 class Body {
@@ -34,15 +38,13 @@ class Body {
 }
 
 class Ghost {
-  constructor(scene) {
-    this.scene = scene;
-    this.place = "beside";
-    this.run = null;
+  constructor(scene, name) {
+    Object.assign(this, { scene, name, ...GHOSTS[name], place: "beside", run: null });
   }
 
-  // Ground distance [m] between the robot and its ghost.
+  // Ground distance [m] between the robot and its ghost: ahead, to the left.
   get shift() {
-    return this.run ? GHOST_PLACES[this.place] : [0, 0];
+    return this.run && this.place === "beside" ? [0, this.aside] : [0, 0];
   }
 
   get isShown() {
@@ -50,7 +52,7 @@ class Ghost {
   }
 
   use(data) {
-    this.run = data.ghost;
+    this.run = data[this.name];
     if (this.run && !this.body) this.make();
   }
 
@@ -61,7 +63,7 @@ class Ghost {
     const shared = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
     const depth = new THREE.MeshBasicMaterial({ ...shared, colorWrite: false });
     const skin = new THREE.MeshLambertMaterial({
-      ...shared, color: GHOST_COLOR, transparent: true, opacity: GHOST_OPACITY, depthWrite: false,
+      ...shared, color: this.color, transparent: true, opacity: GHOST_OPACITY, depthWrite: false,
     });
     const meshes = [];
     this.body.root.traverse((item) => item.isMesh && meshes.push(item));
@@ -73,7 +75,7 @@ class Ghost {
       over.renderOrder = 0.6;
       mesh.add(over);
     }
-    this.scene.viewer.set_object(["meshcat", "ghost"], this.body.root);
+    this.scene.viewer.set_object(["meshcat", this.name], this.body.root);
   }
 
   show(t) {

@@ -17,6 +17,7 @@ class RobotScene {
     this.pane = pane;
     this.viewer = new MeshCat.Viewer(pane);
     this.viewer.set_3d_pane_size = (w, h) => this.resize(w, h);
+    this.drawOnDemand();
     const { header } = data.scene;
     this.legs = header.legs;
     this.footRadius = header.foot_radius;
@@ -29,7 +30,8 @@ class RobotScene {
     })));
     for (const name of ["forces", "contacts", "com"]) this.makeMarker(this.node(name));
     this.makeSupport();
-    this.ghost = new Ghost(this);
+    this.ghosts = Object.keys(GHOSTS).map((name) => new Ghost(this, name));
+    [this.ghost] = this.ghosts; // the plan, which is judged
     this.steps = new Steps(this);
     this.flags = new Flags(this);
     this.use(data);
@@ -45,8 +47,20 @@ class RobotScene {
     this.data = data;
     this.makePaths();
     this.steps.use(data);
-    this.ghost.use(data);
+    this.ghosts.forEach((ghost) => ghost.use(data));
     this.flags.use(data);
+  }
+
+  // meshcat asks for frames for ever: here one is asked for when something has changed.
+  drawOnDemand() {
+    const { viewer } = this;
+    viewer.animate = () => {};
+    viewer.needs_render = false;
+    viewer.set_dirty = () => {
+      if (!viewer.needs_render) requestAnimationFrame(() => viewer.needs_render && viewer.render());
+      viewer.needs_render = true;
+    };
+    viewer.set_dirty();
   }
 
   // meshcat puts all that Python names below a node of its own.
@@ -150,7 +164,7 @@ class RobotScene {
     this.body.pose(data, t, this.scratch);
     this.poseForces(t);
     this.poseSupport(t);
-    this.ghost.show(t);
+    this.ghosts.forEach((ghost) => ghost.show(t));
     const frame = data.frameAt(t);
     const from = Math.max(0, frame - Math.round(PATH_SECONDS * data.rate));
     this.node("paths").visible = this.shown.paths;
@@ -256,9 +270,11 @@ class RobotScene {
   setView(name) {
     const [azimuth, elevation, distance] = VIEWS[name];
     const [a, e] = [azimuth * Math.PI / 180 + this.heading(), elevation * Math.PI / 180];
-    const [x, y] = this.lastTarget.map((value, k) => value + this.ghost.shift[k] / 2);
     const { camera, controls } = this.viewer;
-    const room = Math.hypot(...this.ghost.shift) / 2;
+    const asides = [0, ...this.ghosts.map((ghost) => ghost.shift[1])];
+    const [right, left] = [Math.min(...asides), Math.max(...asides)];
+    const [x, y] = [this.lastTarget[0], this.lastTarget[1] + (left + right) / 2];
+    const room = (left - right) / 2;
     const reach = (distance + room) * Math.max(1, 1.25 / camera.aspect);
     controls.target.set(x, 0.22, -y);
     camera.position.set(
