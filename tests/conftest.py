@@ -65,6 +65,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.preview",
         "go2_wbc.kernels.rigid_body",
         "go2_wbc.kernels.simulation",
+        "go2_wbc.kernels.standing",
         "go2_wbc.kernels.supervision",
         "go2_wbc.kernels.vectors",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package

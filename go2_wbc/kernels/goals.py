@@ -11,6 +11,7 @@ import numpy as np
 from go2_wbc.kernels.compilation import subroutine
 from go2_wbc.kernels.elimination import JOINTS, STANCE, SWING
 from go2_wbc.kernels.layout import PROGRAM, REFERENCE, SNAPSHOT
+from go2_wbc.kernels.standing import planned_loads
 
 LARGEST_ERROR = 3.0
 """Orientation error [rad] beyond which this logarithm of a rotation is not accurate."""
@@ -129,9 +130,15 @@ def add_leg_goals(snapshot, target, program, base, H, g):
     """Rows of ``SwingFoot``, ``LegPosture`` and ``ForceRegularisation``."""
     q, v = snapshot[:19], snapshot[19:37]
     row = np.empty(13)
+    stance, loads = np.empty(4, dtype=np.int64), np.ones(4)
     feet = 0
     for leg in range(4):
-        feet += target[_LEGS + leg] == STANCE
+        if target[_LEGS + leg] == STANCE:
+            stance[feet] = leg
+            feet += 1
+    if feet > 0:
+        planned_loads(snapshot, target, program[_WEIGHT_OF_ROBOT], stance[:feet], loads[:feet])
+    foot = 0
     for leg in range(4):
         task = target[_LEGS + leg]
         for i in range(3):
@@ -157,4 +164,6 @@ def add_leg_goals(snapshot, target, program, base, H, g):
                 add_unknown_goal(H, g, n, target[_FORCES + n], target[_PRIOR_WEIGHT])
             else:
                 share = program[_WEIGHT_OF_ROBOT] / feet if i == 2 else 0.0
-                add_unknown_goal(H, g, n, share, program[_FORCE_WEIGHT])
+                load = 1.0 if i == 2 else loads[foot]
+                add_unknown_goal(H, g, n, share, program[_FORCE_WEIGHT] / load)
+        foot += task == STANCE

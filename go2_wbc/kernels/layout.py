@@ -276,3 +276,11 @@ FRICTION = Layout(
     no_load_speed=(12,),
 )
 """Of ``robot.joint_friction.JointFriction``, and of the ``MotorModel`` that no torque exceeds."""
+
+LEAST_LOAD, MOST_LOAD = 0.05, 2.0
+"""Bounds of a foot's load, over the mean of the standing feet, by which it is spared (see
+``wbc.loads``): own choice."""
+LEAST_PRESSURE = 0.2
+"""Share of the weight by which moments are divided at least: the zero-moment point stays near."""
+SPREAD = 1e-6
+"""[m^2] by which two feet, between which there is no area, count as spread to all sides."""

@@ -10,6 +10,8 @@ import numpy as np
 
 from go2_wbc.kernels.active_set import SOLVED, solve_qp
 from go2_wbc.kernels.compilation import kernel, subroutine
+from go2_wbc.kernels.layout import LEAST_PRESSURE
+from go2_wbc.kernels.standing import relative_loads
 
 
 @subroutine("void(f8[::1], f8[::1], f8[:,::1], f8, f8[:,::1])")
@@ -37,8 +39,29 @@ def place_leg(leg, q, R, radius, points):
     points[4, 0], points[4, 1], points[4, 2] = 0.0, ch, sh
 
 
-@subroutine("void(f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1])")
-def weigh(A, wrench, shares, scale, numbers, H, g):
+@subroutine("void(f8[:,:,::1], f8[:,::1], f8[::1], i8[::1], f8[::1], f8[::1], f8[::1])")
+def expect(points, R, wrench, loaded, shares, numbers, loads):
+    """Fill the expected loads of the loaded feet, over their mean."""
+    k = len(loads)
+    places, most = np.empty((k, 2)), np.empty(k)
+    F, N, depth = np.zeros(3), np.zeros(3), 0.0
+    for axis in range(3):
+        for m in range(3):
+            F[axis] += R[axis, m] * wrench[m]
+            N[axis] += R[axis, m] * wrench[3 + m]
+    pressure = max(F[2], LEAST_PRESSURE * numbers[1])
+    for foot in range(k):
+        p = points[loaded[foot], 3]
+        for axis in range(2):
+            places[foot, axis] = R[axis, 0] * p[0] + R[axis, 1] * p[1] + R[axis, 2] * p[2]
+        depth -= (R[2, 0] * p[0] + R[2, 1] * p[1] + R[2, 2] * p[2]) / k
+        most[foot] = numbers[2] * shares[foot] * k / pressure
+    x, y = -(N[1] + depth * F[0]) / pressure, (N[0] - depth * F[1]) / pressure
+    relative_loads(places, x, y, most, loads)
+
+
+@subroutine("void(f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1])")
+def weigh(A, wrench, shares, loads, scale, numbers, H, g):
     """Fill the cost x'Hx/2 + g'x of the forces x (3 k,) of k loaded feet."""
     evenness, weight, n, total = numbers[0], numbers[1], len(g), 0.0
     for foot in range(len(shares)):
@@ -48,7 +71,9 @@ def weigh(A, wrench, shares, scale, numbers, H, g):
         for r in range(6):
             g[i] -= scale[r] * A[r, i] * scale[r] * wrench[r]
         for j in range(i + 1):
-            value = evenness if i == j else 0.0
+            value = 0.0
+            if i == j:
+                value = evenness if i % 3 == 2 else evenness / loads[i // 3]
             for r in range(6):
                 value += scale[r] * A[r, i] * scale[r] * A[r, j]
             H[i, j], H[j, i] = value, value
@@ -110,8 +135,8 @@ def gather(joints, R, load_share, legs, radius, points, loaded, shares, A):
     return k
 
 
-@subroutine("void(f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1])")
-def share(A, wrench, shares, pyramid, scale, numbers, x):
+@subroutine("void(f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1])")
+def share(A, wrench, shares, loads, pyramid, scale, numbers, x):
     """Fill the forces of the loaded feet; zeros if there are none."""
     n, m = len(x), len(pyramid) * len(shares)
     H, g, C, lower, upper = (
@@ -121,7 +146,7 @@ def share(A, wrench, shares, pyramid, scale, numbers, x):
         np.empty(m),
         np.empty(m),
     )
-    weigh(A, wrench, shares, scale, numbers, H, g)
+    weigh(A, wrench, shares, loads, scale, numbers, H, g)
     bound(shares, pyramid, numbers[2], C, lower, upper)
     if solve_qp(H, g, np.empty((0, 12)), np.empty(0), C, lower, upper, x, np.empty(m)) != SOLVED:
         for j in range(n):
@@ -151,13 +176,14 @@ def share_loads(
     [m]. ``contact`` comes with zeros, ``tau`` with the joints' rows of ``needed``.
     """
     points, loaded, shares = np.empty((4, 5, 3)), np.empty(4, dtype=np.int64), np.empty(4)
-    left, whole = np.empty(6), np.empty((6, 12))
+    left, whole, loads = np.empty(6), np.empty((6, 12)), np.empty(4)
     for i in range(len(joints)):
         k = gather(joints[i], R[i], load_share[i], legs, numbers[3], points, loaded, shares, whole)
         n = 3 * k
         A, x = whole[:, :n].copy(), np.zeros(n)
         if k > 0:
-            share(A, needed[i], shares[:k], pyramid, scale, numbers, x)
+            expect(points, R[i], needed[i], loaded, shares, numbers, loads[:k])
+            share(A, needed[i], shares[:k], loads[:k], pyramid, scale, numbers, x)
         for foot in range(k):
             leg, f = loaded[foot], x[3 * foot : 3 * foot + 3]
             relieve(points[leg], R[i], f, tau[i, 3 * leg : 3 * leg + 3])
@@ -183,18 +209,20 @@ def least_friction(
     forces that a coefficient allows are among those that a greater one does.
     """
     points, loaded, shares = np.empty((4, 5, 3)), np.empty(4, dtype=np.int64), np.empty(4)
-    left, whole, facets = np.empty(6), np.empty((6, 12)), cone.copy()
+    left, whole, facets, loads = np.empty(6), np.empty((6, 12)), cone.copy(), np.empty(4)
     for i in range(len(joints)):
         low, high = 0.0, highest[i]
         if high == 0.0:
             continue
         k = gather(joints[i], R[i], load_share[i], legs, numbers[3], points, loaded, shares, whole)
         A, x = whole[:, : 3 * k].copy(), np.zeros(3 * k)
+        if k > 0:
+            expect(points, R[i], needed[i], loaded, shares, numbers, loads[:k])
         for _ in range(7 if k > 0 else 0):
             middle = 0.5 * (low + high)
             for facet in range(len(cone) - 1):
                 facets[facet, 2] = middle * cone[facet, 2]
-            share(A, needed[i], shares[:k], facets, scale, numbers, x)
+            share(A, needed[i], shares[:k], loads[:k], facets, scale, numbers, x)
             remain(A, needed[i], x, left)
             missing = 0.0
             for r in range(6):

@@ -10,7 +10,8 @@ gains are not per axis. Where PlaCo's formulation differs from ours it is aligne
   w x (w x (-r n)), which a rolling contact must keep: it is the contact's feed-forward.
 - Costs. ``torque_cost`` (1e-3 by default) is 0, and the regularisation of the QP is 1e-12.
 - Force regularisation. PlaCo regularises around zero. Half of the weight stays there and half is
-  added around 2 f0, since |f|^2 / 2 + |f - 2 f0|^2 / 2 = |f - f0|^2 + const.
+  added around 2 f0, since |f|^2 / 2 + |f - 2 f0|^2 / 2 = |f - f0|^2 + const. Along the ground
+  f0 is 0, and the added half is what is missing of a foot's own weight.
 - Normal force bounds, joint limits and the motors' line. PlaCo knows no bounds on a contact's
   normal force, and one torque limit for both directions: the motors' peak. Its joint limits are
   ours with dt = ``limit_horizon`` and safe acceleration = ``braking`` inside the limits, but
@@ -39,6 +40,7 @@ from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.backends import QpBackend
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import JointLimits, TorqueLimits
+from go2_wbc.wbc.loads import planned_loads
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem
 from go2_wbc.wbc.tasks import Gains, forces_near
 
@@ -215,7 +217,7 @@ class _Mode:
         if not self._solver.solve(False).success:
             raise QpInfeasible(SOLVER, "tasks, friction and torque limits contradict each other")
         qp = self._solver.problem
-        self._add_force_reference(problem.reference)
+        self._add_force_reference(problem)
         self._add_bounds(problem)
         try:
             qp.solve()
@@ -236,13 +238,18 @@ class _Mode:
     def _force_weight(self, reference: Reference) -> float:
         return reference.force_weight or self._config.force_weight
 
-    def _add_force_reference(self, reference: Reference) -> None:
+    def _add_force_reference(self, problem: Problem) -> None:
         if not self._stance:
             return
+        reference, weight = problem.reference, self._model.mass * self._model.gravity
         count = 3 * len(self._stance)
-        near = forces_near(reference, self._model.mass * self._model.gravity)
+        near = forces_near(reference, weight)
+        scale = np.ones((len(self._stance), 3))
+        if not reference.force_weight:
+            loads = planned_loads(problem.snapshot, reference, weight)
+            scale[:, :2] = np.sqrt(2.0 / loads - 1.0)[:, None]
         around = placo.Expression()
-        around.A = np.eye(count, 18 + count, 18)
+        around.A = scale.reshape(-1, 1) * np.eye(count, 18 + count, 18)
         around.b = -2 * near[self._stance].ravel()
         row = self._solver.problem.add_constraint(around == 0.0)
         row.configure("soft", self._force_weight(reference) / 2)

@@ -19,6 +19,7 @@ from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import cross, log_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_between
+from go2_wbc.wbc.loads import planned_loads
 from go2_wbc.wbc.problem import FORCES, SIZE, Rows
 
 GREATEST_GAIN = 1e6
@@ -165,7 +166,9 @@ class ForceRegularisation(Task):
     """Keep the contact forces near those of the reference, so that the optimum is unique.
 
     A reference without forces means an even share of the weight: around zero, a weight of 1e-3
-    already sags the body.
+    already sags the body. Along the ground none is wanted of a foot, the less the less it bears:
+    with weights in inverse proportion to the loads (``loads.planned_loads``), feet that push the
+    trunk aside do so in proportion to them, and all use the same part of their friction.
     """
 
     weight_of_robot: float
@@ -174,12 +177,18 @@ class ForceRegularisation(Task):
     unit: str = "N"
 
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
-        """Three rows per stance foot: its force, against weight / number of stance feet."""
+        """Three rows per stance foot: its force, against weight / number of stance feet.
+
+        Rows along the ground come times the root of the mean load over that of their foot.
+        """
         stance = np.flatnonzero(reference.stance)
-        A = np.zeros((3 * len(stance), SIZE))
+        A, scale = np.zeros((3 * len(stance), SIZE)), np.ones((len(stance), 3))
+        if len(stance) and not reference.force_weight:
+            loads = planned_loads(snapshot, reference, self.weight_of_robot)
+            scale[:, :2] = 1.0 / np.sqrt(loads)[:, None]
         for i, leg in enumerate(stance):
             start = FORCES.start + 3 * leg
-            A[3 * i : 3 * i + 3, start : start + 3] = _EYE
+            A[3 * i : 3 * i + 3, start : start + 3] = np.diag(scale[i])
         b = forces_near(reference, self.weight_of_robot)[stance].ravel()
         return Rows(A, b)
 

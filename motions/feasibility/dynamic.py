@@ -9,7 +9,8 @@ six rows of the base, in which no motor acts, and twelve of the joints:
 M and h are Pinocchio's, with rotor inertia, v and a as in ``Trajectory`` (the base's in its own
 frame, so w too), f the forces of the ground on the rolling contact points in the frame of the
 motion. Of the f that give the trunk its wrench within the friction pyramid, the one that deviates
-least from an even share of the weight is taken; see ``_share``.
+least from an even share of the weight is taken, and along the ground from none, the less the less a
+foot bears, as the whole-body controller does it; see ``_share``.
 """
 
 from __future__ import annotations
@@ -21,13 +22,15 @@ from jaxtyping import Bool, Float, Int
 
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.geometry import support_margins
-from go2_wbc.legs import LEGS
+from go2_wbc.kernels.layout import LEAST_PRESSURE
+from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import friction_pyramid
+from go2_wbc.wbc.loads import relative_loads
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from go2_wbc.world import World
 from motions.feasibility.kinematic import FEET, JOINTS
@@ -267,10 +270,11 @@ def _share(
 ) -> tuple[Float[np.ndarray, "4 3"], Float[np.ndarray, "2"]]:
     """Contact forces (4, 3) [N], and what force [N] and moment [N m] they leave over.
 
-    Minimises |S (A f - w)|^2 + e |f - f_even|^2 over the forces f of the loaded feet, with A the
-    base columns of their Jacobians, transposed, S = diag(1, 1, 1, 1/ARM, 1/ARM, 1/ARM), subject to
+    Minimises |S (A f - w)|^2 + e |D (f - f_even)|^2 over the forces f of the loaded feet, with A
+    the base columns of their Jacobians, transposed, S = diag(1, 1, 1, 1/ARM, 1/ARM, 1/ARM), D^2 = 1
+    for the normal forces and the mean load over the foot's for those along the ground, subject to
     |f_x|, |f_y| <= mu f_z and 0 <= f_z <= f_max s, where s is a foot's share of its load. As a QP,
-    1/2 f' H f + g' f, with H = (S A)' (S A) + e 1 and g = -(S A)' S w - e f_even.
+    1/2 f' H f + g' f, with H = (S A)' (S A) + e D^2 and g = -(S A)' S w - e f_even.
     """
     forces = np.zeros((4, 3))
     legs = [leg for leg in LEGS if load_share[leg] > 0.0]
@@ -280,7 +284,9 @@ def _share(
         shares = load_share[legs]
         even[:, 2] = model.mass * model.gravity * shares / shares.sum()
         weighted = scale_of_wrench()[:, None] * A
-        H = weighted.T @ weighted + EVENNESS * np.eye(3 * len(legs))
+        along = 1.0 / _loads(snapshot, wrench, legs, shares, model)
+        D2 = np.column_stack([along, along, np.ones(len(legs))])
+        H = weighted.T @ weighted + EVENNESS * np.diag(D2.ravel())
         g = -weighted.T @ (scale_of_wrench() * wrench) - EVENNESS * even.ravel()
         C = _PYRAMIDS[len(legs) - 1]
         lower = np.tile([-np.inf] * 4 + [0.0], len(legs))
@@ -293,6 +299,24 @@ def _share(
         forces[legs] = x.reshape(-1, 3)
         wrench = wrench - A @ x
     return forces, np.array([np.linalg.norm(wrench[:3]), np.linalg.norm(wrench[3:])])
+
+
+def _loads(
+    snapshot: Snapshot,
+    wrench: Float[np.ndarray, "6"],
+    legs: list[Leg],
+    shares: Float[np.ndarray, " k"],
+    model: RobotModel,
+) -> Float[np.ndarray, " k"]:
+    """The expected loads of ``legs``, over their mean: see ``wbc.loads.relative_loads``."""
+    R = snapshot.R_world_base
+    force, moment = R @ wrench[:3], R @ wrench[3:]
+    pressure = max(force[2], LEAST_PRESSURE * model.mass * model.gravity)
+    places = snapshot.p_world_feet[legs] - snapshot.state.p_world_base
+    depth = model.foot_radius - places[:, 2].mean()
+    along = [-(moment[1] + depth * force[0]), moment[0] - depth * force[1]]
+    most = NORMAL_FORCE_MAX * shares * len(legs) / pressure
+    return relative_loads(places[:, :2], np.array(along) / pressure, most)
 
 
 _PAIR = 2

@@ -152,8 +152,9 @@ def test_a_body_that_is_asked_to_slide_stays_on_the_friction_pyramid(
 ) -> None:
     snapshot, reference = stand
     demand = pulled(reference, [50.0 * direction[0], 50.0 * direction[1], 0.0])
-    forces = WholeBodyController(model, backend).solve(snapshot, demand).forces
-    slack = CONFIG.friction * forces[:, 2:] - np.abs(forces[:, :2])
+    config = WbcConfig(friction=0.4)
+    forces = WholeBodyController(model, backend, config).solve(snapshot, demand).forces
+    slack = config.friction * forces[:, 2:] - np.abs(forces[:, :2])
     assert (slack > -ACTIVE).all()
     assert (slack < ACTIVE).sum() >= 2
     assert forces.sum(axis=0)[:2] @ direction > 0.4 * model.mass * model.gravity

@@ -1,0 +1,86 @@
+"""The expected load of standing feet, and what it does to the forces along the ground."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from go2_wbc.kernels.layout import LEAST_LOAD, MOST_LOAD
+from go2_wbc.legs import LEGS, Leg
+from go2_wbc.reference import Reference
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.loads import planned_loads, relative_loads
+from tests.engine_helpers import JO, ST, holding_reference, standing_q, state_of
+
+MODEL = RobotModel()
+WEIGHT = MODEL.mass * MODEL.gravity
+FEET = np.array([[0.19, 0.14], [0.19, -0.14], [-0.19, 0.14], [-0.19, -0.14]])
+OPEN = np.full(4, 10.0)
+ROUNDING = 1e-3  # of loads: what ``SPREAD`` takes from the slope; measured 2e-5
+EVEN_USE = 1.4  # most over least use of friction; measured 1.3, and 5.2 where feet push alike
+AHEAD, ASIDE = 0.03, -0.04  # [m] by which the CoM is off the middle of the feet, about
+PUSH = 1.5  # [m/s^2]
+HEIGHT = 0.27  # [m] of the hips over the feet
+
+
+@given(x=st.floats(-0.05, 0.05), y=st.floats(-0.04, 0.04))
+def test_the_loads_act_together_at_the_zero_moment_point(x: float, y: float) -> None:
+    loads = relative_loads(FEET, np.array([x, y]), OPEN)
+    assert loads.sum() == pytest.approx(4.0, abs=ROUNDING)
+    np.testing.assert_allclose(loads @ FEET / 4.0, [x, y], atol=ROUNDING)
+
+
+@pytest.mark.parametrize("leg", LEGS)
+def test_three_feet_share_a_load_as_the_lever_says(leg: Leg) -> None:
+    places = np.delete(FEET, leg, axis=0)
+    wanted = np.array([0.2, 0.3, 0.5])
+    loads = relative_loads(places, wanted @ places, OPEN[:3])
+    np.testing.assert_allclose(loads, 3.0 * wanted, atol=ROUNDING)
+
+
+def test_two_feet_share_a_load_by_where_it_lies_along_their_line() -> None:
+    places = FEET[[0, 3]]
+    aside = np.array([-places[0, 1], places[0, 0]])
+    for off in (0.0, 0.2):
+        loads = relative_loads(places, 0.25 * places[0] + off * aside, OPEN[:2])
+        np.testing.assert_allclose(loads, [1.25, 0.75], atol=ROUNDING)
+
+
+def test_a_load_is_never_far_from_the_mean_nor_above_what_a_foot_may_bear() -> None:
+    loads = relative_loads(FEET, np.array([0.5, 0.0]), np.array([10.0, 0.7, 10.0, 10.0]))
+    np.testing.assert_allclose(loads, [MOST_LOAD, 0.7, LEAST_LOAD, LEAST_LOAD])
+
+
+def leaning(legs: tuple) -> tuple[Snapshot, Reference]:
+    """A stand whose CoM is off the middle of the feet, to be pushed ahead."""
+    q = standing_q()
+    q[7::3] += ASIDE / HEIGHT
+    q[8::3] += AHEAD / HEIGHT
+    snapshot = MODEL.snapshot(state_of(q))
+    reference = replace(holding_reference(snapshot), legs=legs)
+    body = replace(reference.body, a_world=np.array([PUSH, 0.0, 0.0]))
+    return snapshot, replace(reference, body=body)
+
+
+@pytest.mark.parametrize("backend", ["condensed", "full", "placo"])
+@pytest.mark.parametrize("legs", [(ST, ST, ST, ST), (ST, ST, ST, JO)])
+def test_all_feet_use_much_the_same_part_of_their_friction(backend: str, legs: tuple) -> None:
+    snapshot, reference = leaning(legs)
+    stands = np.array([task is ST for task in legs])
+    forces = WholeBodyController(MODEL, backend).solve(snapshot, reference).forces[stands]
+    assert forces[:, 2].max() > 1.5 * forces[:, 2].min()
+    uses = np.linalg.norm(forces[:, :2], axis=1) / forces[:, 2]
+    assert uses.max() < EVEN_USE * uses.min()
+
+
+def test_the_planned_loads_are_those_that_the_controller_gives() -> None:
+    snapshot, reference = leaning((ST, ST, ST, ST))
+    normal = WholeBodyController(MODEL).solve(snapshot, reference).forces[:, 2]
+    loads = planned_loads(snapshot, reference, WEIGHT)
+    np.testing.assert_allclose(loads, normal / normal.mean(), atol=0.1)
