@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
-from motions.compiled_plan import CompiledPlan
+from motions.compiled_plan import LEAST_FEET, CompiledPlan
 from motions.dynamic_span import DynamicSpan, feet_at
 from motions.dynamics.curves import centred
 from motions.dynamics.knots import true_spans
@@ -148,15 +148,15 @@ class _Judge:
     def balance(self) -> Series:
         """Time on two feet or one that were not stood for long enough before: s.
 
-        A robot stands some millimetres off its plan. On four feet it is brought to it; on two that
-        grows like a fall, exp(t / sqrt(0.29 m / g)).
+        A robot stands some millimetres off its plan. On three feet or four it is brought to it; on
+        two that grows like a fall, exp(t / sqrt(0.29 m / g)).
         """
         limits, contacts = self.limits, self.whole.contacts
         feet, events = contacts.modes.sum(axis=1), np.append(contacts.times, np.inf)
         times = self.span.start + self.span.trajectory.times
         since = np.zeros((len(times), 1))
         for start, end in true_spans((feet > 0) & (feet <= BALANCING_FEET)):
-            first = start - 1 if start > 0 and feet[start - 1] == len(LEGS) else start
+            first = max([row for row in range(start) if feet[row] < LEAST_FEET], default=-1) + 1
             if events[start] - events[first] < limits.settling:
                 inside = (times >= events[start]) & (times < events[end])
                 since[inside, 0] = times[inside] - events[start]

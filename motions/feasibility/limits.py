@@ -94,7 +94,8 @@ class FlightLimits:
             the slipperiest ground that dynamic motions are made for.
         slip: distance [m] that a standing foot may move, and be off the ground.
         touchdown: greatest speed [m/s] of a foot that comes down.
-        settling: time [s] on four feet in which the trunk comes to its plan before two are lifted.
+        settling: time [s] on three feet or four in which the trunk comes to its plan, before there
+            are two.
         balance: longest time [s] on two feet without that: 2 mm become 50 mm, what a plan may be
             off.
     """
