@@ -20,7 +20,7 @@ from benchmarks.exam.cases import Case
 from benchmarks.exam.causes import CAUSES, examples, render_causes
 from benchmarks.exam.drawing import TEST
 from benchmarks.exam.outcome import play
-from benchmarks.exam.questions import Question, draw_name, draws, questions
+from benchmarks.exam.questions import Question, draw_name, draws, dynamic_questions, questions
 from benchmarks.exam.stored import (
     BORDERS_FILE,
     borders_version,
@@ -30,7 +30,7 @@ from benchmarks.exam.stored import (
     write_borders,
     write_outcomes,
 )
-from benchmarks.exam.table import render, scores, wrong_ones
+from benchmarks.exam.table import HALVES, noticed, render, scores, wrong_ones
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.session import add_options, measure_all, positive, publish
 from benchmarks.trials import Trial
@@ -39,21 +39,25 @@ from controller.motion_outcome import FELL, LENIENT, STOPS, STRICT, Outcome, out
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
 
-EXAM = "exam"
+EXAM, DYNAMIC = "exam", "dynamic"
 THRESHOLD = 0.95
 """Least precision and recall of refusals and of passes, test half, strict outcome."""
 BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
 """The same of refusals among the motions at the border."""
+LEAST_DYNAMIC = 100
+"""Dynamic motions of the test half that are judged, at least."""
 EXAMPLES = """
 python -m benchmarks feasibility              the exam: ten minutes, 2 cores;
                                               twenty where nothing is stored
 python -m benchmarks feasibility --motions 60
 python -m benchmarks feasibility --rows causes
+python -m benchmarks feasibility --rows dynamic --half test
 python -m benchmarks feasibility --wrong      also what is wrong, train half
 python -m benchmarks feasibility --remake     play all, store the outcomes
 python -m benchmarks feasibility --borders    bisect missing borders, with
                                               --remake all: half an hour
 """
+CAUSES_ROW = "causes"
 REFUSED = Metric("feasibility.refused", "verdict", "refused by the check", "", None)
 OUTCOMES = {
     name: Metric(f"feasibility.{name}", "physics", f"went wrong, {name}", "", None)
@@ -76,8 +80,9 @@ def register(subparsers: Subparsers) -> None:
         examples=EXAMPLES,
     )
     parser.add_argument(
-        "--rows", choices=(EXAM, "causes"), default=EXAM, help="default %(default)s"
+        "--rows", choices=(EXAM, DYNAMIC, CAUSES_ROW), default=EXAM, help="default %(default)s"
     )
+    parser.add_argument("--half", choices=HALVES, help="only the families of this half")
     parser.add_argument("--motions", metavar="N", type=positive, help="only the first N")
     parser.add_argument("--wrong", action="store_true", help="list what is wrong, train half")
     parser.add_argument(
@@ -93,18 +98,20 @@ def run(args: argparse.Namespace) -> int:
     """Bisect borders, or hold the exam and report it."""
     if args.borders:
         return _bisect(args)
-    if args.rows != EXAM:
+    if args.rows == CAUSES_ROW:
         cases = _measured(args, CAUSE_SCENARIO, examples())
         wrong = sum(bool(case.refusal) is not bool(case.outcome.strict) for case in cases)
         publish(args, {"wrong": wrong, "cases": _plain(cases)}, render_causes(cases))
         return ExitCode.OK if not wrong else ExitCode.FAILED
-    chosen = REMADE if args.remake else STORED
+    asked = _QUESTIONS[args.rows]()
+    chosen = (REMADE if args.remake else STORED)[args.rows]
     scenario = replace(chosen, name=f"{chosen.name} {borders_version()}")
     if not args.remake and (why := read_outcomes()[1]):
         print(f"{why}: physics is asked again", file=sys.stderr)
-    cases = _measured(args, scenario, exam())
-    is_ok, verdict = judged(cases, min(args.motions or len(exam()), len(exam())))
-    table = [render(cases), *(wrong_ones(cases) if args.wrong else []), verdict]
+    cases = _measured(args, scenario, asked)
+    judge = judged if args.rows == EXAM else judged_dynamic
+    is_ok, verdict = judge(cases, len(_seeds(args, asked)))
+    table = [render(cases), noticed(cases), *(wrong_ones(cases) if args.wrong else []), verdict]
     values = {"passed": is_ok, "scores": {n: s.as_dict() for n, s in scores(cases).items()}}
     if args.wrong:
         values["wrong"] = wrong_ones(cases)
@@ -116,6 +123,12 @@ def run(args: argparse.Namespace) -> int:
 def exam() -> list[Question]:
     """All motions of the exam, in their order."""
     return questions(read_borders())
+
+
+@cache
+def dynamic() -> list[Question]:
+    """Dynamic motions only, those of the exam and more."""
+    return dynamic_questions(read_borders())
 
 
 @cache
@@ -134,10 +147,10 @@ def ask(trial: Trial, *, of: str, is_played: bool) -> Measurement:
 
     Args:
         trial: its seed is the number of the motion.
-        of: the exam, or the known causes.
+        of: the exam, its dynamic motions and more, or the known causes.
         is_played: whether physics is asked although an outcome is stored.
     """
-    question = (exam() if of == EXAM else examples())[trial.seed]
+    question = _QUESTIONS[of]()[trial.seed]
     checker = _checker()
     plan = question.plan(checker.model)
     report, name = checker.check(plan), f"{question.name} {digest(plan)}"
@@ -152,8 +165,12 @@ def ask(trial: Trial, *, of: str, is_played: bool) -> Measurement:
     return Measurement(values, notes={**texts, PLAN: name})
 
 
-STORED = Scenario(EXAM, METRICS, partial(ask, of=EXAM, is_played=False))
-REMADE = Scenario("exam, played", METRICS, partial(ask, of=EXAM, is_played=True))
+_QUESTIONS = {EXAM: lambda: exam(), DYNAMIC: lambda: dynamic(), CAUSES: examples}
+STORED = {of: Scenario(of, METRICS, partial(ask, of=of, is_played=False)) for of in (EXAM, DYNAMIC)}
+REMADE = {
+    of: Scenario(f"{of}, played", METRICS, partial(ask, of=of, is_played=True))
+    for of in (EXAM, DYNAMIC)
+}
 CAUSE_SCENARIO = Scenario("causes", METRICS, partial(ask, of=CAUSES, is_played=True))
 
 
@@ -161,18 +178,23 @@ def _measured(
     args: argparse.Namespace, scenario: Scenario, asked: Sequence[Question]
 ) -> list[Case]:
     """The cases of the motions asked for; outcomes are stored if that is asked for."""
-    count = min(args.motions or len(asked), len(asked))
-    found = measure_all(args, [(scenario, seed) for seed in range(count)])[scenario.name]
+    found = measure_all(args, [(scenario, seed) for seed in _seeds(args, asked)])[scenario.name]
     lost = {seed: one.reason for seed, one in found.items() if not one.values}
     for seed, reason in sorted(lost.items()):
         print(f"{asked[seed].name}: no result, {reason}", file=sys.stderr)
     answered = {seed: one for seed, one in sorted(found.items()) if one.values}
     cases = {seed: _case(asked[seed], one) for seed, one in answered.items()}
-    if args.remake and asked is exam():
+    if args.remake and args.rows != CAUSES_ROW:
         names = {seed: one.notes[PLAN] for seed, one in answered.items()}
         new = {names[seed]: case.outcome for seed, case in cases.items()}
         write_outcomes({**_known(), **new})
     return list(cases.values())
+
+
+def _seeds(args: argparse.Namespace, asked: Sequence[Question]) -> list[int]:
+    """Numbers of the motions that are asked for."""
+    seeds = [n for n, one in enumerate(asked) if args.half in (None, one.family.half)]
+    return seeds[: args.motions]
 
 
 def _case(question: Question, one: Measurement) -> Case:
@@ -197,6 +219,15 @@ def judged(cases: Sequence[Case], asked: int) -> tuple[bool, str]:
     is_ok &= border.wrong_refused.value >= BORDER_RECALL
     said = f"{len(cases)} motions, {lost} without a result. Test half: all four shares "
     said += f">= {THRESHOLD}, at the border {BORDER_PRECISION} and {BORDER_RECALL}: "
+    return is_ok, said + ("ok." if is_ok else "NO.")
+
+
+def judged_dynamic(cases: Sequence[Case], asked: int) -> tuple[bool, str]:
+    """Whether enough dynamic motions of the test half meet the threshold, in words."""
+    whole, lost = scores(cases)[f"{TEST} {STRICT}"], asked - len(cases)
+    is_ok = whole.least >= THRESHOLD and whole.n >= LEAST_DYNAMIC and not lost
+    said = f"{len(cases)} dynamic motions, {lost} without a result, {whole.n} of the test half: "
+    said += f"all four shares >= {THRESHOLD} on {LEAST_DYNAMIC} or more: "
     return is_ok, said + ("ok." if is_ok else "NO.")
 
 

@@ -10,7 +10,7 @@ from go2_wbc.reference import MotionPlan
 from motions import CompiledPlan
 
 STRICT, STOPS, LENIENT, FELL = "strict", "stops", "lenient", "fell"
-UNPLANNED = "no plan was found"
+UNPLANNED, NOT_DONE = "no plan was found", "not done"
 OFF_TRUNK, OFF_TURN, OFF_PAW, OFF_LANDING = 0.030, math.radians(8.0), 0.030, 0.015
 """How far [m, rad] trunk, raised feet and landed feet may be off what was written, strictly."""
 SOLVED_OFF, SOLVED_LANDING = 0.050, 0.040
@@ -85,7 +85,7 @@ def shares_of(run: MotionMeasurement, plan: MotionPlan) -> dict[str, tuple[float
 
 
 def _strictly(run: MotionMeasurement, plan: MotionPlan) -> tuple[str, ...]:
-    ends = _true({"fell": run.fall is not None, "not done": not run.said})
+    ends = _true({"fell": run.fall is not None, NOT_DONE: not run.said})
     return (*ends, *(words for share, words in shares_of(run, plan).values() if share > 1.0))
 
 

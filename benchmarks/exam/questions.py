@@ -18,6 +18,10 @@ EASY_SHARE, BORDER_SHARE, IMPOSSIBLE_SHARE = (0.3, 0.7), (0.10, 0.25), (1.6, 2.5
 
 FRESH = 100
 """Number of the first draw that is not bisected."""
+FRESH_DYNAMIC = 110
+"""The same of what is asked besides of solved motions."""
+EACH = 4
+"""Motions that are asked besides of each dynamic family."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +102,40 @@ def questions(borders: Mapping[str, float | None]) -> list[Question]:
     return list({question.name: question for question in found}.values())
 
 
+def dynamic_questions(borders: Mapping[str, float | None]) -> list[Question]:
+    """The exam's dynamic motions, and ``EACH`` more of each family, with free numbers of their own.
+
+    Where physics does not change its mind there are twice as many draws, and none at a border.
+
+    Args:
+        borders: see ``questions``.
+    """
+    more: list[Question] = []
+    for family in FAMILIES.values():
+        if not family.is_dynamic:
+            continue
+        flip, number, own = borders[draw_name(family, 0)], FRESH_DYNAMIC, list[Question]()
+        while len(own) < EACH:
+            rng = Draw(f"more strata of {family.name}", number)
+            sides = () if flip is None else (-1.0, 1.0)
+            asked = [
+                ((flip or 2.0 * family.low) * rng.between(*EASY_SHARE), EASY),
+                ((flip or family.high) * rng.between(*IMPOSSIBLE_SHARE), IMPOSSIBLE),
+                *(((flip or 1.0) * (1.0 + k * rng.between(*BORDER_SHARE)), BORDER) for k in sides),
+            ]
+            own += [_clipped(family, number, *amplitude) for amplitude in asked]
+            number += 1
+        more += own
+    found = [*(one for one in questions(borders) if one.family.is_dynamic), *more]
+    return list({question.name: question for question in found}.values())
+
+
+def _clipped(family: Family, number: int, amplitude: float, stratum: str) -> Question:
+    """A motion whose amplitude lies between the family's bounds."""
+    s = round(min(max(amplitude, family.low), family.high), 4)
+    return Question(family, number, s, stratum)
+
+
 def _around(family: Family, number: int, flip: float | None) -> Iterator[Question]:
     """The motions that belong to one border."""
     rng = Draw(f"strata of {family.name}", number)
@@ -111,8 +149,7 @@ def _around(family: Family, number: int, flip: float | None) -> Iterator[Questio
         asked.append((draw, (flip or 2.0 * family.low) * easy, EASY))
         asked.append((draw, (flip or family.high) * beyond, IMPOSSIBLE))
     for draw, amplitude, stratum in asked:
-        s = round(min(max(amplitude, family.low), family.high), 4)
-        yield Question(family, draw, s, stratum)
+        yield _clipped(family, draw, amplitude, stratum)
 
 
 def draw_name(family: Family, number: int) -> str:

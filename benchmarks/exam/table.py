@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from benchmarks.exam.cases import Case, Score, chosen
 from benchmarks.exam.drawing import TEST, TRAIN
 from benchmarks.exam.questions import STRATA
-from controller.motion_outcome import FELL, LENIENT, STOPS, STRICT
+from controller.motion_outcome import FELL, LENIENT, NOT_DONE, STOPS, STRICT
 
 _ROW = "{name:<17}{n:>4}{done:>5}" + "".join(f"{{shares[{k}]:>13}}" for k in range(4))
 _HEADS = ("refused", "wrong:", "passed", "done:")
@@ -55,6 +55,13 @@ def _causes(cases: Sequence[Case]) -> list[str]:
     kinds = Counter(re.sub(r"[\d.]+ ", "", why) for c in cases for why in c.outcome.by(STRICT))
     counts = ", ".join(f"{kind} {n}" for kind, n in kinds.most_common())
     return textwrap.wrap(f"What went wrong, strictly: {counts or 'nothing'}.", 80)
+
+
+def noticed(cases: Sequence[Case]) -> str:
+    """How many of the motions that were played and went wrong ``play`` says so of."""
+    wrong = [case.outcome.strict for case in cases if case.outcome.strict and case.has_plan]
+    told = sum(NOT_DONE in reasons for reasons in wrong)
+    return f"Of {len(wrong)} motions that were played and went wrong, `play` says so of {told}."
 
 
 def wrong_ones(cases: Sequence[Case]) -> list[str]:

@@ -15,15 +15,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pinocchio as pin
 from jaxtyping import Bool, Float
-from scipy.interpolate import PPoly
 
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
-from motions.compiled_plan import CompiledPlan
+from motions.compiled_plan import LEAST_FEET, CompiledPlan
 from motions.dynamic_span import DynamicSpan, feet_at
 from motions.dynamics.curves import centred
+from motions.dynamics.knots import true_spans
 from motions.dynamics.phases import PhaseProblem
+from motions.dynamics.trajectory import BALANCING_FEET
 from motions.dynamics.verdict import defects
 from motions.feasibility.dynamic import PRESSED, Forces
 from motions.feasibility.kinematic import FEET, JOINTS
@@ -52,12 +53,12 @@ def with_spans(forces: Forces, path: Trajectory, plan: CompiledPlan, model: Robo
 
 def flight(plan: CompiledPlan, model: RobotModel, limits: FlightLimits) -> list[Series]:
     """All checks of the dynamic spans of ``plan``; causes before what follows from them."""
-    judges = [_Judge(span, plan.curves, model, limits) for span in plan.dynamic]
+    judges = [_Judge(span, plan, model, limits) for span in plan.dynamic]
     if not judges:
         return []
     kinds: Sequence[Callable[[_Judge], Series]] = (
         _Judge.steps, _Judge.equations, _Judge.curves, _Judge.contact_force, _Judge.cone,
-        _Judge.standing, _Judge.touchdown, _Judge.place, _Judge.turn,
+        _Judge.standing, _Judge.balance, _Judge.touchdown, _Judge.place, _Judge.turn,
     )  # fmt: skip
     return [_joined([kind(judge) for judge in judges]) for kind in kinds]
 
@@ -71,10 +72,10 @@ def _joined(parts: Sequence[Series]) -> Series:
 
 @dataclass(frozen=True, slots=True)
 class _Judge:
-    """Judges one span."""
+    """Judges one span of a plan."""
 
     span: DynamicSpan
-    played: PPoly
+    whole: CompiledPlan
     model: RobotModel
     limits: FlightLimits
 
@@ -98,7 +99,7 @@ class _Judge:
         """How far the curves that are played are from the span's states: m, rad."""
         plan, model = self.span.trajectory, self.model
         q = centred(plan, model)
-        values = self.played(np.minimum(self.span.start + plan.times, self.played.x[-1]))
+        values = self.whole.curves(np.minimum(self.span.start + plan.times, self.whole.duration))
         com = np.array([model.center_of_mass(row) for row in q])
         R = [pin.Quaternion(row[3:7]).toRotationMatrix() for row in q]
         turns = [
@@ -143,6 +144,23 @@ class _Judge:
                     height = abs(places[row, leg, 2] - self.model.foot_radius)
                     off[row, leg] = max(float(np.linalg.norm(places[row, leg] - place)), height)
         return self._at_knots("standing feet", "m", FEET, off, self.limits.slip)
+
+    def balance(self) -> Series:
+        """Time on two feet or one that were not stood for long enough before: s.
+
+        A robot stands some millimetres off its plan. On three feet or four it is brought to it; on
+        two that grows like a fall, exp(t / sqrt(0.29 m / g)).
+        """
+        limits, contacts = self.limits, self.whole.contacts
+        feet, events = contacts.modes.sum(axis=1), np.append(contacts.times, np.inf)
+        times = self.span.start + self.span.trajectory.times
+        since = np.zeros((len(times), 1))
+        for start, end in true_spans((feet > 0) & (feet <= BALANCING_FEET)):
+            first = max([row for row in range(start) if feet[row] < LEAST_FEET], default=-1) + 1
+            if events[start] - events[first] < limits.settling:
+                inside = (times >= events[start]) & (times < events[end])
+                since[inside, 0] = times[inside] - events[start]
+        return self._at_knots("balance on few feet", "s", ("trunk",), since, limits.balance)
 
     def touchdown(self) -> Series:
         """Speed of the feet when they come down: m/s."""

@@ -94,6 +94,10 @@ class FlightLimits:
             the slipperiest ground that dynamic motions are made for.
         slip: distance [m] that a standing foot may move, and be off the ground.
         touchdown: greatest speed [m/s] of a foot that comes down.
+        settling: time [s] on three feet or four in which the trunk comes to its plan, before there
+            are two.
+        balance: longest time [s] on two feet without that: 2 mm become 50 mm, what a plan may be
+            off.
     """
 
     step: float = 1e-3
@@ -103,6 +107,8 @@ class FlightLimits:
     friction: float = 0.55
     slip: float = 0.02
     touchdown: float = 1.0
+    settling: float = 0.3
+    balance: float = 0.55
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a limit that is not positive."""

@@ -14,7 +14,16 @@ from benchmarks.exam.borders import BORDER, PLAYS
 from benchmarks.exam.cases import Case
 from benchmarks.exam.drawing import TEST, TRAIN
 from benchmarks.exam.questions import draw_name, draws
-from benchmarks.feasibility import EXAM, OUTCOMES, PLAN, REFUSED, ask, exam, judged
+from benchmarks.feasibility import (
+    EXAM,
+    OUTCOMES,
+    PLAN,
+    REFUSED,
+    ask,
+    exam,
+    judged,
+    judged_dynamic,
+)
 from benchmarks.runner import run_trial
 from benchmarks.scenario import Measurement
 from benchmarks.trials import Trial
@@ -53,6 +62,14 @@ def test_a_motion_without_a_result_is_not_ok() -> None:
     assert "1 without a result" in said
 
 
+def test_enough_dynamic_motions_must_be_foretold() -> None:
+    right = [*(50 * [case(True, True)]), *(50 * [case(False, False)])]
+    assert judged_dynamic(right, 100)[0]
+    assert not judged_dynamic(right, 101)[0], "one is lost"
+    assert not judged_dynamic(right[:99], 99)[0], "too few"
+    assert not judged_dynamic([*right, *(4 * [case(True, False)])], 104)[0]
+
+
 def fake(trial: Trial) -> Measurement:
     failed = float(trial.seed % 2)
     values = {REFUSED.name: failed, **{metric.name: failed for metric in OUTCOMES.values()}}
@@ -66,7 +83,8 @@ def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
     tmp_path: Path,
     results_folder: Path,
 ) -> None:
-    monkeypatch.setattr(feasibility, "STORED", replace(feasibility.STORED, measure=fake))
+    fakes = {of: replace(one, measure=fake) for of, one in feasibility.STORED.items()}
+    monkeypatch.setattr(feasibility, "STORED", fakes)
     file = tmp_path / "scores.json"
     arguments = ["feasibility", "--motions", str(COUNT), "--jobs", "1", "--json"]
     assert main([*arguments, "--out", str(file)]) == ExitCode.OK
@@ -85,11 +103,23 @@ def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
     assert f"{COUNT} finished trials are taken" in again.err
 
 
+def test_dynamic_motions_of_one_half_are_asked_by_themselves(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
+) -> None:
+    fakes = {of: replace(one, measure=fake) for of, one in feasibility.STORED.items()}
+    monkeypatch.setattr(feasibility, "STORED", fakes)
+    arguments = ["feasibility", "--rows", "dynamic", "--half", "test", "--jobs", "1", "--json"]
+    main([*arguments, "--motions", str(COUNT)])
+    found = json.loads(capsys.readouterr().out)["scores"]
+    assert (found["test dynamic"]["n"], found["train strict"]["n"]) == (COUNT, 0)
+
+
 def test_what_is_remade_is_stored_beside_what_was_stored(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
 ) -> None:
     kept: dict[str, Outcome] = {}
-    monkeypatch.setattr(feasibility, "REMADE", replace(feasibility.REMADE, measure=fake))
+    fakes = {of: replace(one, measure=fake) for of, one in feasibility.REMADE.items()}
+    monkeypatch.setattr(feasibility, "REMADE", fakes)
     monkeypatch.setattr(feasibility, "write_outcomes", kept.update)
     monkeypatch.setattr(feasibility, "_known", lambda: {"old": FINE, "1": FINE})
     main(["feasibility", "--motions", "2", "--jobs", "1", "--remake"])
@@ -147,5 +177,5 @@ def test_a_robot_that_does_not_get_ready_is_a_lost_run_and_not_a_bug(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(GO2Controller, "stand", lambda _go2: False)
-    measured = run_trial(feasibility.REMADE.measure, 0)
+    measured = run_trial(feasibility.REMADE[EXAM].measure, 0)
     assert (measured.values, measured.reason) == ({}, "lying, nothing asked yet")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from benchmarks.exam.cases import Case, Score, Share
 from benchmarks.exam.drawing import TEST, TRAIN
-from benchmarks.exam.table import render, scores, wrong_ones
-from controller.motion_outcome import FELL, LENIENT, STRICT, UNPLANNED, Outcome
+from benchmarks.exam.table import noticed, render, scores, wrong_ones
+from controller.motion_outcome import FELL, LENIENT, NOT_DONE, STRICT, UNPLANNED, Outcome
 
 
 def case(refused: bool, failed: bool, *, half: str = TEST, why: str = "slip 12 mm") -> Case:
@@ -63,6 +65,14 @@ def test_motions_without_a_plan_are_counted_apart() -> None:
     ]
     found = scores(cases)
     assert (found["test dynamic"].n, found["test solved"].n) == (2, 1)
+
+
+def test_it_is_told_how_often_play_noticed_what_went_wrong() -> None:
+    told = replace(case(False, True), outcome=Outcome((NOT_DONE, "fell"), (), (), ()))
+    unplanned = replace(case(True, True), outcome=Outcome((UNPLANNED,), (), (), ()))
+    said = noticed([told, case(True, True), case(False, False), unplanned])
+    assert said.startswith("Of 2 motions that were played and went wrong")
+    assert said.endswith("says so of 1.")
 
 
 def test_of_the_test_half_no_motion_is_named() -> None:

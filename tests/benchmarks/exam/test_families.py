@@ -19,6 +19,7 @@ from benchmarks.exam.questions import (
     Question,
     draw_name,
     draws,
+    dynamic_questions,
     questions,
 )
 from go2_wbc.robot.model import RobotModel
@@ -86,6 +87,18 @@ def test_strata_lie_around_the_amplitude_at_which_physics_changes_its_mind() -> 
         else:
             assert question.stratum == IMPOSSIBLE
             assert question.amplitude >= min(1.6, question.family.high)
+
+
+def test_dynamic_motions_are_asked_by_themselves_and_of_each_family_alike() -> None:
+    borders = all_borders() | {"spin 0": None}
+    asked, own = dynamic_questions(borders), questions(borders)
+    assert all(question.family.is_dynamic for question in asked)
+    assert {q.name for q in own if q.family.is_dynamic} <= {q.name for q in asked}
+    assert len({question.name for question in asked}) == len(asked)
+    assert sum(question.family.half == TEST for question in asked) >= LEAST_DYNAMIC
+    more = [q.stratum for q in asked if q.family.name == "pounce_farther" and q.draw >= 110]
+    assert sorted(more) == [BORDER, BORDER, EASY, IMPOSSIBLE]
+    assert not [q for q in asked if q.family.name == "spin" and q.stratum == BORDER]
 
 
 def test_a_draw_without_a_border_gives_no_motion_there() -> None:

@@ -130,7 +130,7 @@ def test_what_is_no_motion_to_be_near_to_is_a_failure_in_words(
     checker: FeasibilityChecker,
 ) -> None:
     line = Timeline(balance=False, physics="nearest").foot("FL", z=0.04, over=0.2)
-    failure = checker.check(line.home(over=0.2)).failures[0]
+    failure = checker.check(line.hold(0.4)).failures[0]
     assert failure.check == "nearest motion"
     assert "must start and end on four feet" in failure.note
 
