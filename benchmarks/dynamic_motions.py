@@ -191,7 +191,10 @@ def play(plant: MujocoPlant, plan: CompiledPlan, model: RobotModel) -> Played:
         robot.truth.clear()
         objection = "" if robot.go2.play(plan, check=False) else robot.go2.last_outcome.reason
         recorded = robot.truth.recording()
-        robot.wait(AFTERWARDS)
+        try:
+            robot.wait(AFTERWARDS)
+        except TrialFailed as failed:
+            raise TrialFailed(objection or str(failed)) from None
         after = _feet_frame(robot, model)
     moved = yaw_rotation(before.yaw).T @ (after.p_world - before.p_world)
     return Played(recorded, moved, wrap_angle(after.yaw - before.yaw), objection)

@@ -1,4 +1,4 @@
-"""Climbing: a kind of jump asked for ever more, until the planner finds none.
+"""Climbing: a kind of jump asked for ever more, until it is not planned or not done.
 
 Every plan is the start of the search for the next (continuation), and the time in the air is
 searched. Between the last two sizes it is bisected. No random number takes part.
@@ -88,7 +88,7 @@ class Attempt:
     Attributes:
         size: in the kind's unit.
         flight: time in the air [s].
-        reason: why there is no plan; empty if there is one.
+        reason: why there is no plan, or why it is not done; empty if it is.
     """
 
     size: float
@@ -97,7 +97,7 @@ class Attempt:
 
     def __str__(self) -> str:
         """For progress."""
-        return f"{self.size:.3g}, {self.flight:.2f} s in the air: {self.reason or 'planned'}"
+        return f"{self.size:.3g}, {self.flight:.2f} s in the air: {self.reason or 'done'}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,7 +105,7 @@ class Climb:
     """How far the sizes of a kind were climbed.
 
     Attributes:
-        size: the greatest [m, rad] for which there is a plan.
+        size: the greatest [m, rad] that is done.
         jump: that jump.
         attempts: all, in their order.
     """
@@ -130,17 +130,26 @@ def objection(plan: CompiledPlan, model: RobotModel) -> str:
 class Climber:
     """Climbs the sizes of one kind; plans are kept where ``compile_timeline`` looks for them.
 
-    A plan counts if the check lets it pass. One that it does not is still a start for the next.
+    A plan counts if the check lets it pass and it is done when it is played. One of which that is
+    not so is still a start for the next.
     """
 
     def __init__(
-        self, kind: Kind, model: RobotModel, budget: float, tell: Callable[[str], None]
+        self,
+        kind: Kind,
+        model: RobotModel,
+        budget: float,
+        *,
+        play: Callable[[CompiledPlan], str],
+        tell: Callable[[str], None],
     ) -> None:
         """Ask for jumps of ``kind``, each for ``budget`` seconds of processor time.
 
-        ``tell`` is called with every attempt in words.
+        ``play`` plays a plan and says what is in the way of its being done, or nothing; ``tell`` is
+        called with every attempt in words.
         """
-        self._kind, self._model, self._budget, self._tell = kind, model, budget, tell
+        self._kind, self._model, self._budget = kind, model, budget
+        self._play, self._tell = play, tell
         self._attempts: list[Attempt] = []
         self._last: Solved | None = None
         self._longer = 0.0
@@ -149,7 +158,7 @@ class Climber:
         """The greatest size.
 
         Raises:
-            PlanNotFound: if there is no plan for the first one.
+            PlanNotFound: if the first one is not planned or not done.
         """
         found, jump, least = self._kind.sizes[0], None, math.inf
         for size in self._kind.sizes:
@@ -168,18 +177,18 @@ class Climber:
         return Climb(found, jump, tuple(self._attempts))
 
     def _find(self, size: float) -> Jump | None:
-        """A jump of this size for which there is a plan, over the times in the air."""
+        """A jump of this size that is done, over the times in the air."""
         asked, longer = self._kind.ask(size), self._longer
         for steps in FLIGHT_STEPS:
             self._longer = longer + steps * KNOT_PERIOD
             halves = max(round(0.5 * (asked.flight + self._longer) / KNOT_PERIOD), 1)
             jump = asked._replace(flight=2.0 * KNOT_PERIOD * halves)
-            if self._is_planned(size, jump):
+            if self._is_done(size, jump):
                 return jump
         self._longer = longer
         return None
 
-    def _is_planned(self, size: float, jump: Jump) -> bool:
+    def _is_done(self, size: float, jump: Jump) -> bool:
         phases = moves.jump(jump.x, 0.0, jump.yaw, jump.height, flight=jump.flight)
         problem, reason = PhaseProblem(phases), ""
         try:
@@ -189,7 +198,8 @@ class Climber:
         else:
             keep(problem, self._model, plan)
             self._last = Solved(problem, plan)
-            reason = objection(compiled(jump, self._model), self._model)
+            ready = compiled(jump, self._model)
+            reason = objection(ready, self._model) or self._play(ready)
         attempt = Attempt(self._kind.scale * size, jump.flight, reason)
         self._attempts.append(attempt)
         self._tell(f"{self._kind.title}, {attempt}")

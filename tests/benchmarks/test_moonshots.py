@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks import jump_climb, moonshots
+from benchmarks.dynamic_motions import Played
 from benchmarks.jump_climb import BISECTIONS, KINDS, Climber, Jump, Kind
 from benchmarks.jump_physics import best_take_off
-from benchmarks.trials import Trial
+from benchmarks.trials import Trial, TrialFailed
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.kernels.compilation import CACHE_VARIABLE
 from go2_wbc.robot.model import RobotModel
+from motions import CompiledPlan, Timeline, compile_timeline
 from motions.dynamics import PhaseProblem, Solved
 from motions.dynamics.limits import PlanLimits
+from tests.go2_wbc.plant.helpers import empty_recording
 from tests.solver import needs_solver
 
 MODEL = RobotModel()
@@ -57,8 +62,14 @@ def planner(monkeypatch: pytest.MonkeyPatch) -> Planner:
     return planner
 
 
-def climb(kind: Kind, told: list[str]) -> jump_climb.Climb:
-    return Climber(kind, MODEL, 1.0, told.append).climb()
+def done(plan: object) -> str:
+    return ""
+
+
+def climb(
+    kind: Kind, told: list[str], play: Callable[[CompiledPlan], str] = done
+) -> jump_climb.Climb:
+    return Climber(kind, MODEL, 1.0, play=play, tell=told.append).climb()
 
 
 def test_a_climb_ends_within_a_bisected_step_of_what_is_planned(planner: Planner) -> None:
@@ -83,6 +94,36 @@ def test_a_plan_that_the_check_refuses_does_not_count(planner: Planner) -> None:
     assert 0.2 <= found.size <= planner.highest
     assert "the check: torque at speed" in [attempt.reason for attempt in found.attempts]
     assert "plan of 0.25 m" in planner.starts, "it is a start all the same"
+
+
+def test_a_plan_that_is_not_done_does_not_count(planner: Planner) -> None:
+    def play(plan: CompiledPlan) -> str:
+        assert isinstance(plan, Jump)  # as the planner of these tests compiles it
+        return "played: fell" if plan.height > 0.22 else ""
+
+    found = climb(KINDS["high"], [], play)
+    assert 0.2 <= found.size <= 0.22
+    assert "played: fell" in [attempt.reason for attempt in found.attempts]
+    assert "plan of 0.25 m" in planner.starts, "it is a start all the same"
+
+
+def test_a_robot_that_does_not_do_it_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    seeds: list[int] = []
+
+    def play(plant: int, plan: object, model: RobotModel) -> Played:
+        seeds.append(plant)
+        if len(seeds) == 5:
+            raise TrialFailed("fell at t=1.00 s")
+        return Played(empty_recording(2, np.zeros((2, 4, 3))), np.zeros(3), 0.0, "")
+
+    monkeypatch.setattr(moonshots, "plant_of", lambda trial: trial.seed)
+    monkeypatch.setattr(moonshots, "play", play)
+    plan = compile_timeline(Timeline().body(z=-0.01, over=0.3), MODEL)
+    assert moonshots.not_done(plan) == ""
+    assert seeds == list(moonshots.TRIED)
+    assert moonshots.not_done(plan) == "played: fell at t=1.00 s"
+    judged = range(moonshots.OFFSET, moonshots.OFFSET + 20)
+    assert not set(judged) & set(seeds)
 
 
 def test_the_time_in_the_air_is_searched(planner: Planner) -> None:

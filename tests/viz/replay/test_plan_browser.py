@@ -246,7 +246,7 @@ def test_what_was_written_is_a_second_ghost(browser: Tab) -> None:
     browser.evaluate("replay.data.written = replay.data.ghost; replay.use(replay.data)")
     assert browser.evaluate(is_offered)
     assert browser.text("#who").endswith(f"Blue: the plan, which was checked. {WRITTEN}")
-    assert browser.evaluate(asides) == [0.62, -0.62]
+    assert browser.evaluate(asides) == [0.62, 1.24]
     both = browser.stage()
     assert (np.abs(both - without).max(axis=2) > 20).sum() > 5000
     browser.page.keyboard.press("w")

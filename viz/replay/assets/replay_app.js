@@ -36,7 +36,7 @@ class Player {
     document.title = document.querySelector("h1").textContent = title;
     document.getElementById("total").textContent = ` / ${data.duration.toFixed(2)} s`;
     const { classList } = document.getElementById("app");
-    for (const name of Object.keys(GHOSTS)) classList.toggle(`has-${name}`, data[name] !== null);
+    for (const name of Object.keys(GHOST_COLORS)) classList.toggle(`has-${name}`, data[name] !== null);
     document.getElementById("force-key").textContent = isPlan ? "planned force" : "measured force";
     const who = [`Solid: ${isPlan ? "the plan" : "what was measured"}.`];
     if (data.ghost) who.push("Blue: the plan, which was checked.");

@@ -3,10 +3,8 @@
 
 const GHOST_OPACITY = 0.38;
 const GHOST_PLACES = ["beside", "overlay", "off"];
-const GHOSTS = { // its colour, and how far to the left [m] it is when it is beside the robot
-  ghost: { color: 0x6d8ff5, aside: 0.62 },
-  written: { color: 0xb8793b, aside: -0.62 },
-};
+const GHOST_ASIDE = 0.62; // m to the left of the robot; the second ghost is twice as far
+const GHOST_COLORS = { ghost: 0x6d8ff5, written: 0xb8793b };
 
 // A tree of meshes with a base and joints that a configuration moves.
 class Body {
@@ -39,12 +37,13 @@ class Body {
 
 class Ghost {
   constructor(scene, name) {
-    Object.assign(this, { scene, name, ...GHOSTS[name], place: "beside", run: null });
+    Object.assign(this, { scene, name, place: "beside", run: null });
   }
 
   // Ground distance [m] between the robot and its ghost: ahead, to the left.
   get shift() {
-    return this.run && this.place === "beside" ? [0, this.aside] : [0, 0];
+    if (!this.run || this.place !== "beside") return [0, 0];
+    return [0, GHOST_ASIDE * (1 + this.scene.ghosts.filter((other) => other.run).indexOf(this))];
   }
 
   get isShown() {
@@ -63,7 +62,7 @@ class Ghost {
     const shared = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 };
     const depth = new THREE.MeshBasicMaterial({ ...shared, colorWrite: false });
     const skin = new THREE.MeshLambertMaterial({
-      ...shared, color: this.color, transparent: true, opacity: GHOST_OPACITY, depthWrite: false,
+      ...shared, color: GHOST_COLORS[this.name], transparent: true, opacity: GHOST_OPACITY, depthWrite: false,
     });
     const meshes = [];
     this.body.root.traverse((item) => item.isMesh && meshes.push(item));

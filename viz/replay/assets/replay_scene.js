@@ -30,7 +30,7 @@ class RobotScene {
     })));
     for (const name of ["forces", "contacts", "com"]) this.makeMarker(this.node(name));
     this.makeSupport();
-    this.ghosts = Object.keys(GHOSTS).map((name) => new Ghost(this, name));
+    this.ghosts = Object.keys(GHOST_COLORS).map((name) => new Ghost(this, name));
     [this.ghost] = this.ghosts; // the plan, which is judged
     this.steps = new Steps(this);
     this.flags = new Flags(this);
@@ -271,10 +271,8 @@ class RobotScene {
     const [azimuth, elevation, distance] = VIEWS[name];
     const [a, e] = [azimuth * Math.PI / 180 + this.heading(), elevation * Math.PI / 180];
     const { camera, controls } = this.viewer;
-    const asides = [0, ...this.ghosts.map((ghost) => ghost.shift[1])];
-    const [right, left] = [Math.min(...asides), Math.max(...asides)];
-    const [x, y] = [this.lastTarget[0], this.lastTarget[1] + (left + right) / 2];
-    const room = (left - right) / 2;
+    const room = Math.max(...this.ghosts.map((ghost) => ghost.shift[1])) / 2;
+    const [x, y] = [this.lastTarget[0], this.lastTarget[1] + room];
     const reach = (distance + room) * Math.max(1, 1.25 / camera.aspect);
     controls.target.set(x, 0.22, -y);
     camera.position.set(
