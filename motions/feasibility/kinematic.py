@@ -87,13 +87,9 @@ def clearance(
     """Heights of the lowest points of the links, and of the feet in the air, over the ground."""
     feet = _feet(motion, model)[:, :, 2] - model.foot_radius
     links, count = hulls.heights(motion), len(hulls.links)
-    is_calf = np.array([name.endswith("calf") for name in hulls.names])
-    floor = np.concatenate(
-        [
-            np.where(is_calf, limits.calf_clearance, limits.clearance),
-            np.full(len(LEGS), -limits.swing_depth),
-        ]
-    )
+    lower = {"thigh": limits.thigh_clearance, "calf": limits.calf_clearance}
+    least = [lower.get(name.rpartition(" ")[2], limits.clearance) for name in hulls.names]
+    floor = np.array([*least, *(-limits.swing_depth for _ in LEGS)])
     values = np.hstack([links, feet])
     is_checked = np.ones_like(values, dtype=bool)
     is_checked[:, count:] = ~motion.stance
