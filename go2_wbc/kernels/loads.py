@@ -234,12 +234,41 @@ def least_friction(
         friction[i] = high
 
 
-@kernel("void(f8[:,:,::1], b1[:,::1], f8, f8, f8, f8[:,::1])", nogil=True)
-def slide(forces, counts, friction, mass, dt, ways):
+@kernel(
+    "void(f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8, f8[:,:,::1])",
+    nogil=True,
+)
+def accelerate(joints, R, a, legs, radius, feet):
+    """Fill J a along the ground, of the contact point of every foot, with a of base and joints."""
+    points, J_a = np.empty((5, 3)), np.empty(3)
+    for i in range(len(joints)):
+        for leg in range(4):
+            place_leg(legs[leg], joints[i, 3 * leg : 3 * leg + 3], R[i], radius, points)
+            p = points[3]
+            for k in range(3):
+                m, n = (k + 1) % 3, (k + 2) % 3
+                J_a[k] = a[i, k] + a[i, 3 + m] * p[n] - a[i, 3 + n] * p[m]
+            for joint in range(3):
+                rate = a[i, 6 + 3 * leg + joint]
+                u, v, w = 1.0, 0.0, 0.0
+                if joint > 0:
+                    u, v, w = points[4, 0], points[4, 1], points[4, 2]
+                a0, a1 = p[0] - points[joint, 0], p[1] - points[joint, 1]
+                a2 = p[2] - points[joint, 2]
+                J_a[0] += rate * (v * a2 - w * a1)
+                J_a[1] += rate * (w * a0 - u * a2)
+                J_a[2] += rate * (u * a1 - v * a0)
+            for axis in range(2):
+                row = R[i, axis]
+                feet[i, leg, axis] = row[0] * J_a[0] + row[1] * J_a[1] + row[2] * J_a[2]
+
+
+@kernel("void(f8[:,:,::1], f8[:,:,::1], b1[:,::1], f8, f8, f8, f8[:,::1])", nogil=True)
+def slide(forces, creep, counts, friction, mass, dt, ways):
     """Fill how far every foot has slid since it began to count.
 
     A sliding block (Newmark 1965): what a force along the ground exceeds friction by accelerates
-    the foot, which friction then stops.
+    the foot, which friction then stops. ``creep`` is its speed besides.
     """
     for leg in range(4):
         vx, vy, x, y = 0.0, 0.0, 0.0, 0.0
@@ -260,7 +289,7 @@ def slide(forces, counts, friction, mass, dt, ways):
             if force <= holds and nx * vx + ny * vy <= 0.0:
                 nx, ny = 0.0, 0.0
             vx, vy = nx, ny
-            x, y = x + dt * vx, y + dt * vy
+            x, y = x + dt * (vx + creep[i, leg, 0]), y + dt * (vy + creep[i, leg, 1])
             ways[i, leg] = np.hypot(x, y)
 
 

@@ -147,7 +147,7 @@ class FeasibilityChecker:
         forces = dynamic.resisted(forces, path, self.world.worst)
         lag = dynamic.lagging(path, forces, heavy, limits)
         com, zero_moment_point = dynamic.support(carried, forces, limits)
-        slip = friction.slip(path, forces, limits, floor)
+        slip = friction.slip(path, forces, heavy, limits, floor)
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
         wrench, load = dynamic.contacts(path, forces, limits)
         grip = friction.friction(path, forces, heavy, limits, floor)

@@ -87,11 +87,12 @@ def clearance(
     """Heights of the lowest points of the links, and of the feet in the air, over the ground."""
     feet = _feet(motion, model)[:, :, 2] - model.foot_radius
     links, count = hulls.heights(motion), len(hulls.links)
-    is_calf = np.array([name.endswith("calf") for name in hulls.names])
-    calves = np.where(motion.is_dynamic, limits.solved_calf_clearance, limits.calf_clearance)
-    floor = np.full((len(motion.times), count + len(LEGS)), limits.clearance)
-    floor[:, :count][:, is_calf] = calves[:, None]
-    floor[:, count:] = -limits.swing_depth
+    lower = {"thigh": limits.thigh_clearance, "calf": limits.calf_clearance}
+    parts = [name.rpartition(" ")[2] for name in hulls.names]
+    least = [lower.get(part, limits.clearance) for part in parts]
+    floor = np.tile([*least, *(-limits.swing_depth for _ in LEGS)], (len(motion.times), 1))
+    calves = np.flatnonzero([part == "calf" for part in parts])
+    floor[np.ix_(motion.is_dynamic, calves)] = limits.solved_calf_clearance
     values = np.hstack([links, feet])
     is_checked = np.ones_like(values, dtype=bool)
     is_checked[:, count:] = ~motion.stance

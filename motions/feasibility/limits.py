@@ -29,7 +29,8 @@ class FeasibilityLimits:
             give. In MuJoCo it was off by up to twice as much.
         stop: how far [m] a foot, or the trunk over it, may be off for a joint at its stop.
         self_distance: least distance [m] between links that must not touch.
-        clearance: least height [m] of trunk, hips and thighs: every point of their hulls.
+        clearance: least height [m] of trunk and hips: every point of their hulls.
+        thigh_clearance: the same of the thighs, which come near to the ground where it sits.
         calf_clearance: the same of the calves, which end 14 mm above the ground where they stand
             upright, and below which the foot is.
         solved_calf_clearance: the same in solved parts, whose legs bend deeply when they push off
@@ -62,6 +63,7 @@ class FeasibilityLimits:
     stop: float = 0.022
     self_distance: float = 0.005
     clearance: float = 0.02
+    thigh_clearance: float = 0.008
     calf_clearance: float = 0.002
     solved_calf_clearance: float = 0.001
     swing_depth: float = 0.005

@@ -19,6 +19,8 @@ from motions.mending import Mend
 Progress = Callable[[int, float], None]
 SUMS = ("slip",)
 """Checks whose values add up: what was too much stays so, but is wrong only while it grows."""
+GROWTH = 5e-5
+"""By how much [m] at least from one sample to the next: less is the creep of any movement."""
 
 
 def mending(
@@ -43,5 +45,5 @@ def _broken(series: Series) -> Float[np.ndarray, " k"]:
     is_below = series.margins < 0.0
     if series.check in SUMS:
         before = np.vstack([np.full((1, series.margins.shape[1]), np.inf), series.margins[:-1]])
-        is_below &= ~(series.margins >= before)
+        is_below &= ~(series.margins >= before - GROWTH)
     return series.times[is_below.any(axis=1)]
