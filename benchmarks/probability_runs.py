@@ -13,9 +13,9 @@ import numpy as np
 
 from benchmarks.exam.questions import IMPOSSIBLE, Question, questions
 from benchmarks.exam.stored import read_borders
-from benchmarks.trials import TrialFailed, TrialRobot
 from controller.motion_measurement import measure_motion
 from controller.motion_outcome import outcome_of
+from controller.sweeps.trials import TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.plant.mujoco.worlds import plant_in_world
 from go2_wbc.reference import MotionPlan, Posture
