@@ -17,9 +17,9 @@ from jaxtyping import Float
 from benchmarks.pushes import PUSH_TIME
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
-from benchmarks.trials import Trial, TrialRobot
 from controller.cli.common import Subparsers, add_parser
 from controller.modes import Mode
+from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.planning.locomotion import GREATEST_HEIGHT, LEAST_HEIGHT, LocomotionConfig
 from go2_wbc.plant import MujocoPlant

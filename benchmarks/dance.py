@@ -17,9 +17,9 @@ import numpy as np
 
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
-from benchmarks.trials import Trial, TrialRobot
 from controller.cli.common import Subparsers, add_parser
 from controller.motion_measurement import during_motion
+from controller.sweeps.trials import Trial, TrialRobot
 from motions import FeasibilityChecker
 from motions.music import Beats, Song, beats, click_track, danced, feasible_dance, made_song
 

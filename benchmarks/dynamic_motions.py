@@ -18,9 +18,9 @@ from jaxtyping import Bool, Float
 
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
-from benchmarks.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
 from controller.cli.common import Subparsers, add_parser
 from controller.motion_measurement import FULL
+from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording

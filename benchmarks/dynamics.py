@@ -17,8 +17,8 @@ from pathlib import Path
 
 from benchmarks.scenario import Measurement, Metric, Scenario, chosen_scenarios
 from benchmarks.session import add_options, positive, run_and_report, tasks_of
-from benchmarks.trials import Trial
 from controller.cli.common import Subparsers, add_parser
+from controller.sweeps.trials import Trial
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics import (

@@ -33,9 +33,9 @@ from benchmarks.exam.stored import (
 from benchmarks.exam.table import HALVES, noticed, render, scores, wrong_ones
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.session import add_options, measure_all, positive, publish
-from benchmarks.trials import Trial
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_outcome import FELL, LENIENT, STOPS, STRICT, Outcome, outcome_of
+from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
 

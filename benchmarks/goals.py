@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.trials import Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.state import RobotState
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.trials import Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.geometry import moving_support_margins
 from go2_wbc.legs import LEGS, SIDES, Leg
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording, true_runs

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cache
 
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.trials import Trial, TrialRobot
 from controller.motion_measurement import measure_motion
+from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion, motion_names

@@ -24,9 +24,9 @@ import numpy as np
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
 from benchmarks.steps import plant_of
-from benchmarks.trials import Trial, TrialRobot
 from controller.cli.common import Subparsers, add_parser
 from controller.motion_measurement import FULL
+from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.locomotion import LocomotionConfig

@@ -9,10 +9,10 @@ from jaxtyping import Float
 
 from benchmarks.agreement import model_agreement
 from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.trials import Trial, TrialFailed
 from controller.assembly import build_pilot
 from controller.pilot import Pilot
 from controller.procedures import Aborted
+from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.config import Config
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import VelocityCommand

@@ -22,9 +22,9 @@ from benchmarks.report import WIDTH, render, summarise
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario, chosen_scenarios
 from benchmarks.seeded import QUICK_SEEDS, SEEDS, add_seeded_options
 from benchmarks.session import measure_all, publish, run_and_report, tasks_of
-from benchmarks.trials import Trial, TrialFailed
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.cli.progress import ProgressLine
+from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan
 

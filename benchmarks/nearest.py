@@ -23,9 +23,9 @@ from benchmarks.dynamic_motions import AFTERWARDS, plant_of
 from benchmarks.refused_motions import refused_motion
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
-from benchmarks.trials import Trial, TrialFailed, TrialRobot
 from controller.cli.common import Subparsers, add_parser
 from controller.motion_measurement import FULL, during_motion
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import MotionInfeasible
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.reference import Anchor

@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.pushes import PUSH_TIME, directions_of, force_of, measure_impulses, push_metrics
 from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.trials import Trial, TrialFailed, TrialRobot
 from controller.modes import Mode
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.robot.model import RobotModel
 from motions.postures import STAND_HEIGHT
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from benchmarks.exam.questions import IMPOSSIBLE, Question, questions
 from benchmarks.exam.stored import read_borders
-from benchmarks.trials import TrialFailed, TrialRobot
 from controller.motion_measurement import measure_motion
 from controller.motion_outcome import outcome_of
+from controller.sweeps.trials import TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.plant.mujoco.worlds import plant_in_world
 from go2_wbc.reference import MotionPlan, Posture
@@ -32,15 +32,16 @@ PLACE = ((-0.08, 0.08), (-0.04, 0.04), (0.0, 0.10))
 MASS_UNCERTAINTY, JOINT_FRICTION_UNCERTAINTY = 0.05, 0.5
 """What the check is not told."""
 _STREAM = 12
-_NOT_READY = "not ready"
+NOT_READY = "not ready"
+"""What went wrong with a robot that did not get as far as the motion."""
 
 
 def trial(seed: int) -> dict[str, object]:
     """The row of a seed: motion, verdict, margins (JSON) and outcome by the strict definition."""
     question, plan = _asked(seed // WORLDS)
     world = world_of(seed)
-    report = FeasibilityChecker(_model(), world=world).check(plan)
-    harm = _played(plan, world, seed)
+    report = FeasibilityChecker(model(), world=world).check(plan)
+    harm = played(plan, world, seed)
     return {
         "motion": question.name,
         "family": question.family.name,
@@ -70,28 +71,29 @@ def world_of(seed: int) -> World:
     )
 
 
-def _played(plan: MotionPlan, world: World, seed: int) -> tuple[str, ...]:
-    """What went wrong in a sample of ``world``."""
+def played(plan: MotionPlan, world: World, seed: int) -> tuple[str, ...]:
+    """What went wrong, strictly, in a sample of ``world``; nothing if it was done."""
     with TrialRobot(plant_in_world(world, seed=seed)) as robot:
         try:
             robot.require(robot.go2.stand())
             if plan.entry is Posture.SIT:
                 robot.require(robot.go2.sit())
         except (TrialFailed, Go2WbcError):
-            return (_NOT_READY,)
-        measured = measure_motion(robot.go2, robot.truth, plan, _model())
+            return (NOT_READY,)
+        measured = measure_motion(robot.go2, robot.truth, plan, model())
     return outcome_of(measured, plan).strict
 
 
 @lru_cache(maxsize=1)
-def _model() -> RobotModel:
+def model() -> RobotModel:
+    """The robot, read once in each process."""
     return RobotModel()
 
 
 @lru_cache(maxsize=2)
 def _asked(number: int) -> tuple[Question, MotionPlan]:
     question = exam()[number]
-    return question, question.plan(_model())
+    return question, question.plan(model())
 
 
 @lru_cache(maxsize=1)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from benchmarks.scenario import Measurement, Scenario
-from benchmarks.trials import Trial, TrialFailed
 from controller.sweeps.local import LocalEngine
+from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import Go2WbcError
 
 Results = dict[str, dict[int, Measurement]]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 from go2_wbc.errors import CommandError, unknown_name
 
 

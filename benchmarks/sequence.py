@@ -12,8 +12,8 @@ from benchmarks.goals import way_between
 from benchmarks.high_fives import highest_window
 from benchmarks.postures import standing_failure
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.trials import Trial, TrialFailed, TrialRobot
 from controller.demo.run import DemoProgress, run_demo
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.rotations import wrap_angle
 from go2_wbc.robot.state import RobotState

@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.postures import standing_failure
 from benchmarks.pushes import DIRECTIONS
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.trials import Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import SIDES
 
 RAISED = 0.5

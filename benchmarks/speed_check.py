@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.scenario import Measurement, Metric
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.scenario import Measurement, Metric
-from benchmarks.trials import Trial, TrialFailed
 from controller.assembly import build_pilot
 from controller.procedures import Aborted
+from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
 

@@ -7,8 +7,8 @@ from contextlib import closing
 
 from benchmarks.scenario import Measurement, Metric
 from benchmarks.speed_bare import BareWork, share_late
-from benchmarks.trials import Trial, TrialFailed
 from controller.go2_controller import GO2Controller
+from controller.sweeps.trials import Trial, TrialFailed
 
 DURATION = 60.0
 """Time [s] of the trot."""

@@ -11,9 +11,9 @@ import numpy as np
 
 from benchmarks.scenario import Direction, Measurement, Metric
 from benchmarks.speed_placo import BarePlaco
-from benchmarks.trials import Trial, TrialFailed
 from controller.assembly import build_pilot
 from controller.procedures import Aborted
+from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.reference import Reference

@@ -12,7 +12,7 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.scenario import Measurement, Metric
-from benchmarks.trials import Trial, TrialFailed
+from controller.sweeps.trials import Trial, TrialFailed
 
 PROCESSES = 5
 """Fresh processes of a trial; the median counts."""

@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks.scenario import Direction, Measurement, Metric
 from benchmarks.speed_bare import BareWork, timed
 from benchmarks.speed_solves import recorded_ticks, slowness
-from benchmarks.trials import Trial, TrialFailed
 from controller.go2_controller import GO2Controller
+from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.plant import MujocoPlant
 
 PERIOD = 2000.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.pushes import PUSH_TIME, force_of, measure_impulses, push_metrics
 from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.trials import Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording

@@ -112,6 +112,8 @@ def verdict_of(report: FeasibilityReport) -> Verdict:
         text=text,
         annotations=_grouped([_annotation(finding, report.series) for finding in findings]),
         curves=tuple(_curve(item) for item in judged),
+        chance=report.probability,
+        world=str(report.world),
     )
 
 

@@ -5,6 +5,7 @@ Plain values: whoever checks motions translates its report into a ``Verdict``.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,6 +77,48 @@ class Annotation:
 
 
 @dataclass(frozen=True, slots=True)
+class CertifiedRun:
+    """One randomised run.
+
+    Attributes:
+        seed: that it can be repeated with.
+        conditions: what the seed has drawn, in words.
+        is_done: whether the movement was done.
+        text: what went wrong, or came nearest to it.
+    """
+
+    seed: int
+    conditions: str
+    is_done: bool
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class CertifiedRate:
+    """How often a movement was done in randomised runs.
+
+    Attributes:
+        n: runs.
+        done: runs in which it was done.
+        interval: of the true rate, 0 to 1.
+        confidence: of the interval, 0 to 1.
+        world: in which it holds, in words.
+        worst: the worst runs, the worst first.
+        versions: what else it holds for, by name.
+        outdated: why it does not hold for what is shown; empty if it does.
+    """
+
+    n: int
+    done: int
+    interval: tuple[float, float]
+    confidence: float
+    world: str
+    worst: tuple[CertifiedRun, ...]
+    versions: Mapping[str, str]
+    outdated: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Verdict:
     """What a check says of a movement.
 
@@ -84,12 +127,18 @@ class Verdict:
         text: the verdict in a few words.
         annotations: the broken limits, then the tight ones.
         curves: the margin of every limit.
+        chance: that the movement is done, 0 to 1; None if nothing is said of it.
+        world: in which all this holds, in words.
+        certified: how often it was done in randomised runs.
     """
 
     ok: bool
     text: str
     annotations: tuple[Annotation, ...]
     curves: tuple[MarginCurve, ...]
+    chance: float | None = None
+    world: str = ""
+    certified: CertifiedRate | None = None
 
     def ranked(self) -> tuple[MarginCurve, ...]:
         """The curves: broken ones first, then the tight ones, then the others as they come."""

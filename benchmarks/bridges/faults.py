@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from benchmarks.scenario import Measurement, Metric
-from benchmarks.trials import TrialFailed
+from controller.sweeps.trials import TrialFailed
 from go2_wbc.errors import Go2WbcError
 
 TILT_LIMIT: Final = 30.0

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.bridges.ros2_processes import Probe, joined, quiet_client, serving
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 from go2_wbc.errors import BridgeError, MissingDependency
 
 NAMESPACE: Final = "bench"

@@ -26,7 +26,7 @@ from benchmarks.bridges.ros2_processes import (
     serving,
 )
 from benchmarks.scenario import Measurement, Scenario
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 
 if TYPE_CHECKING:
     from controller.bridges.ros2 import GO2ControllerNode

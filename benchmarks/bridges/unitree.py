@@ -14,11 +14,11 @@ from benchmarks.bridges.faults import require
 from benchmarks.bridges.processes import wait_until
 from benchmarks.bridges.unitree_processes import MOVE, SPEED, Scene, driver, good_commands, scene
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.trials import Trial
 from controller.bridges.unitree import layout
 from controller.bridges.unitree.codec import decode_message, encode_message
 from controller.bridges.unitree.low_level import intact_message, low_cmd_message
 from controller.bridges.unitree.sport_api import Api
+from controller.sweeps.trials import Trial
 from go2_wbc.robot.state import JointCommand
 
 MOVE_TIME, MOVE_PERIOD = 3.0, 0.05

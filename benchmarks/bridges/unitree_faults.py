@@ -12,11 +12,11 @@ from benchmarks.bridges.faults import Fault, fault, metrics_of, require, run_all
 from benchmarks.bridges.processes import PROGRAM, Process, wait_until
 from benchmarks.bridges.unitree_processes import LIMIT, MOVE, Scene, driver, flood, scene, simulator
 from benchmarks.scenario import Measurement, Scenario
-from benchmarks.trials import Trial
 from controller.bridges.unitree.codec import encode_message
 from controller.bridges.unitree.low_level import low_cmd_message
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
 from controller.cli.common import ExitCode
+from controller.sweeps.trials import Trial
 from go2_wbc.robot.state import JointCommand
 
 BAD_MOVES: Final = ('{"x": NaN, "y": 0, "z": 0}', "rubbish", "[1]", '{"x": "fast"}')

@@ -7,8 +7,8 @@ import math
 from benchmarks.exam.outcome import play
 from benchmarks.exam.questions import Question, draws
 from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.trials import Trial
 from controller.motion_outcome import outcome_of
+from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 
 NEAR, NEAR_SOLVED = 1.06, 1.13

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from benchmarks.trials import TrialRobot
 from controller.motion_measurement import MotionMeasurement, measure_motion
+from controller.sweeps.trials import TrialRobot
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.model import RobotModel

@@ -20,7 +20,7 @@ from go2_wbc.reference import MotionPlan
 
 FOLDER = Path(__file__).parent
 BORDERS_FILE, OUTCOMES_FILE = FOLDER / "borders.json", FOLDER / "outcomes.json"
-DECIDES = ("go2_wbc", "controller", "benchmarks/trials.py", "benchmarks/exam/outcome.py")
+DECIDES = ("go2_wbc", "controller", "benchmarks/exam/outcome.py")
 """Code that decides what physics makes of a plan. What makes plans is not among it: each outcome is
 kept under a digest of its plan."""
 INSTANTS = 80

@@ -14,6 +14,7 @@ go2-wbc preview my_motion.py              again after every save
 go2-wbc preview wave --set side=left --port 8080 --no-open
 go2-wbc preview high_five --html high_five.html
 go2-wbc preview dance --video dance.webp --plot margins.svg
+go2-wbc preview bow --certificate out/sweeps/bow.sqlite
 """
 DEFAULT_PORT = 7000
 
@@ -32,6 +33,12 @@ def register(subparsers: Subparsers) -> None:
         examples=EXAMPLES,
     )
     add_motion(parser)
+    parser.add_argument(
+        "--certificate",
+        metavar="FILE",
+        type=Path,
+        help="of `go2-wbc certify`: show it, and check in its world",
+    )
     files = parser.add_argument_group("files, instead of the live page")
     files.add_argument(
         "--html", metavar="FILE", type=Path, help="one offline page; ends in .html or .htm"

@@ -7,12 +7,16 @@ import sys
 import time
 import webbrowser
 from dataclasses import replace
+from pathlib import Path
 
 import viz
 from controller.cli.common import ExitCode, print_json, print_json_line, shown_path
 from controller.cli.motion_args import MotionSource, print_verdict, the_motion
 from controller.cli.progress import ProgressLine
 from controller.report_view import planned, slider
+from controller.sweeps.certificate_view import with_certificate
+from controller.sweeps.certify import read_certificate
+from controller.sweeps.motion_study import world_of
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.files import checked_output
 from go2_wbc.plant.mujoco.viewer import display_problem
@@ -26,6 +30,28 @@ VIDEO_RATE = 12.5
 """Pictures per second: 80 ms each, which GIF can store."""
 
 
+class _Show:
+    """Checks motions, and makes of them what is shown: with a certificate, if one is given.
+
+    Attributes:
+        checker: for the world of the certificate, or the usual one.
+    """
+
+    def __init__(self, certificate: Path | None, line: ProgressLine) -> None:
+        """Read the certificate; raises as ``read_certificate``."""
+        self._certificate = None if certificate is None else read_certificate(certificate)
+        held = self._certificate
+        world = None if held is None else world_of(held.about["world"])
+        self.checker = FeasibilityChecker(progress=line.solving, world=world)
+
+    def content(self, checked: CheckedMotion) -> ReplayContent:
+        """The plan with its verdict and the certificate."""
+        content = planned(checked)
+        if self._certificate is None:
+            return content
+        return with_certificate(content, self._certificate, checked.plan)
+
+
 def write_files(args: argparse.Namespace) -> int:
     """Check the motion and write what was asked for."""
     wanted = {
@@ -37,8 +63,9 @@ def write_files(args: argparse.Namespace) -> int:
     motion = the_motion(args.motion, args.values)
     with ProgressLine(is_quiet=args.json) as line:
         line.update(0.0, f"checking {motion.name}")
-        checked = FeasibilityChecker(progress=line.solving).evaluate(motion)
-        report, content, title = checked.report, planned(checked), checked.plan.name
+        show = _Show(args.certificate, line)
+        checked = show.checker.evaluate(motion)
+        report, content, title = checked.report, show.content(checked), checked.plan.name
         if page := files.get("html"):
             line.update(0.0, f"writing {page.name}")
             viz.export_html(content, page, title=title)
@@ -65,9 +92,9 @@ def write_files(args: argparse.Namespace) -> int:
 def serve(args: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C; the exit code is that of what was saved last."""
     source, line = MotionSource(args.motion, args.values), ProgressLine(is_quiet=args.json)
-    checker = FeasibilityChecker(progress=line.solving)
-    checked = _evaluated(source, checker, line)
-    content = _content(source, checked)
+    show = _Show(args.certificate, line)
+    checked = _evaluated(source, show.checker, line)
+    content = _content(source, show, checked)
     with PreviewServer(content, source.name, args.port, source.choose) as server:
         ok = checked.report.ok
         try:
@@ -82,7 +109,7 @@ def serve(args: argparse.Namespace) -> int:
             while True:
                 time.sleep(POLL_PERIOD)
                 if source.has_changed():
-                    ok = _show_again(source, checker, server, line, as_json=args.json)
+                    ok = _show_again(source, show, server, line, as_json=args.json)
         except KeyboardInterrupt:
             return ExitCode.OK if ok else ExitCode.FAILED
 
@@ -98,7 +125,7 @@ def _evaluated(
 
 def _show_again(
     source: MotionSource,
-    checker: FeasibilityChecker,
+    show: _Show,
     server: PreviewServer,
     line: ProgressLine,
     *,
@@ -106,8 +133,8 @@ def _show_again(
 ) -> bool:
     """Check and show what the file says now; whether the robot can do it."""
     try:
-        checked = _evaluated(source, checker, line)
-        server.publish(_content(source, checked))
+        checked = _evaluated(source, show.checker, line)
+        server.publish(_content(source, show, checked))
     except (Go2WbcError, OSError) as error:
         server.publish_error(str(error))
         if as_json:
@@ -119,9 +146,9 @@ def _show_again(
     return checked.report.ok
 
 
-def _content(source: MotionSource, checked: CheckedMotion) -> ReplayContent:
+def _content(source: MotionSource, show: _Show, checked: CheckedMotion) -> ReplayContent:
     sliders = tuple(slider(*item) for item in source.parameters.items())
-    return replace(planned(checked), sliders=sliders)
+    return replace(show.content(checked), sliders=sliders)
 
 
 def _tell(report: FeasibilityReport, *, as_json: bool) -> None:

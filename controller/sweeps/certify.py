@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from controller.sweeps.rows import SEED, Row
-from controller.sweeps.run import Progress, sweep
+from controller.sweeps.run import Progress, SweepResult, read_sweep, sweep
 from controller.sweeps.summary import CONFIDENCE, rate_interval
 from controller.sweeps.targets import motion_target
 from go2_wbc.errors import CommandError
@@ -62,6 +62,8 @@ class Certificate:
 
     def table(self) -> str:
         """Rate, interval, the worst runs and what it holds for, at most 80 columns wide."""
+        from controller.sweeps.motion_study import world_of  # imports the robot
+
         low, high = (100.0 * bound for bound in self.interval)
         lines = [
             f"{self.motion:.50}: done in {self.done} of {self.n} runs, {100.0 * self.rate:.1f} %",
@@ -72,9 +74,10 @@ class Certificate:
         ]
         for row in self.worst:
             world = f"{row['friction']:>8.2f} {row['mass_scale']:>6.2f}"
-            lines.append(f"{row[SEED]:>6}  {world}  {_told(row):.54}")
+            lines.append(f"{row[SEED]:>6}  {world}  {told(row):.54}")
         lines.append("-" * 80)
-        lines += [f"{name}: {value}"[:80] for name, value in self.about.items()]
+        about = {**self.about, "world": str(world_of(self.about["world"]))}
+        lines += [f"{name}: {value}"[:80] for name, value in about.items()]
         return "\n".join(lines)
 
     def as_dict(self) -> dict[str, Any]:
@@ -137,6 +140,25 @@ def certify(
         is_enough=None if width is None else _narrow(width),
         on_progress=on_progress,
     )
+    return _certificate(result)
+
+
+def read_certificate(path: Path | str) -> Certificate:
+    """The certificate of all rows that the file of ``certify``, or a motion's sweep, holds.
+
+    Raises:
+        ConfigError: if there is no such file, or it is something else.
+        CommandError: if its rows are not those of a motion, or there are none.
+    """
+    result = read_sweep(path)
+    if result.about.get("kind") != "motion":
+        raise CommandError(f"{path} is a sweep of {result.name}: only motions are certified")
+    if not result.rows:
+        raise CommandError(f"{path} has no finished run yet: `go2-wbc certify` makes them")
+    return _certificate(result)
+
+
+def _certificate(result: SweepResult) -> Certificate:
     rows = result.rows
     done = sum(bool(row["done"]) for row in rows)
     return Certificate(
@@ -166,7 +188,7 @@ def _goodness(row: Row) -> tuple[bool, bool, float]:
     return bool(row["done"]), not row["fall"], -share if math.isfinite(share) else 0.0
 
 
-def _told(row: Row) -> str:
+def told(row: Row) -> str:
     """What went wrong in a run, or what came nearest to it."""
     if not row["done"]:
         return str(row["harm"])

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks import behaviour, session
 from benchmarks.scenario import Scenario
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 
 Only = Callable[[Scenario], None]
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 from go2_wbc.errors import PlantError
 
 SPEED = Metric("fake.speed", "fake item", "speed", "m/s", 1.0, Direction.AT_LEAST)

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.answers import SCENARIOS, calf_distance, watch
 from benchmarks.scenario import Measurement
-from benchmarks.trials import Trial, TrialRobot
+from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.controller import WholeBodyController

@@ -16,9 +16,9 @@ from benchmarks.__main__ import COMMANDS, main
 from benchmarks.behaviour import SCENARIOS
 from benchmarks.report import WIDTH
 from benchmarks.scenario import Measurement, chosen_scenarios
-from benchmarks.trials import Trial
 from controller.cli.common import ExitCode
 from controller.cli.main import Command
+from controller.sweeps.trials import Trial
 from go2_wbc.errors import CommandError
 from tests.benchmarks.conftest import Only
 from tests.benchmarks.support import fake, fall_on_seed_1, have_a_bug, measure_badly, measure_well

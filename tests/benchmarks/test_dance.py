@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import dance
 from benchmarks.dance import SCENARIOS, TEMPI, measure, song_of
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 from motions.music import Beats, Song
 
 SECONDS = 7.0

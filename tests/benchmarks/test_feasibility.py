@@ -26,10 +26,10 @@ from benchmarks.feasibility import (
 )
 from benchmarks.runner import run_trial
 from benchmarks.scenario import Measurement
-from benchmarks.trials import Trial
 from controller.cli.common import ExitCode
 from controller.go2_controller import GO2Controller
 from controller.motion_outcome import STRICT, Outcome
+from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 
 FINE, BAD = Outcome((), (), (), ()), Outcome(("fell",), ("fell",), ("fell",), ("fell",))

@@ -10,7 +10,10 @@ import pytest
 from benchmarks.high_fives import highest_window, largest_slip, longest_run
 from benchmarks.pushes import IMPULSE_STEP, largest_impulse
 from benchmarks.sequence import CRITERIA, StepCheck
-from benchmarks.trials import (
+from controller.demo.report import StepResult
+from controller.demo.run import DemoProgress
+from controller.demo.steps import DEMO_STEPS
+from controller.sweeps.trials import (
     FRICTION_RANGE,
     MASS_RANGE,
     NOMINAL_FRICTION,
@@ -19,9 +22,6 @@ from benchmarks.trials import (
     TrialFailed,
     TrialRobot,
 )
-from controller.demo.report import StepResult
-from controller.demo.run import DemoProgress
-from controller.demo.steps import DEMO_STEPS
 from go2_wbc.legs import LEGS, Leg
 from tests.go2_wbc.plant.helpers import empty_recording
 

@@ -12,7 +12,7 @@ from benchmarks import jump_climb, moonshots
 from benchmarks.dynamic_motions import Played
 from benchmarks.jump_climb import BISECTIONS, KINDS, Climber, Jump, Kind
 from benchmarks.jump_physics import best_take_off
-from benchmarks.trials import Trial, TrialFailed
+from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.kernels.compilation import CACHE_VARIABLE
 from go2_wbc.robot.model import RobotModel

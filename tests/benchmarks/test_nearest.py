@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks import nearest
 from benchmarks.nearest import METRICS, measure, off_written
 from benchmarks.refused_motions import KINDS, refused_motion
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation

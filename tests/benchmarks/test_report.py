@@ -10,7 +10,7 @@ import pytest
 from benchmarks.behaviour import SCENARIOS
 from benchmarks.report import WIDTH, render, summarise, summarise_metric, threshold_text
 from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 from tests.benchmarks.support import ERROR, NOTE, SPEED, fake, measure_well, measured
 
 NEEDED = {

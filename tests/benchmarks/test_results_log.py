@@ -12,8 +12,8 @@ from benchmarks import results_log
 from benchmarks.__main__ import main
 from benchmarks.results_log import ResultsLog, settings_header
 from benchmarks.scenario import Measurement
-from benchmarks.trials import Trial
 from controller.cli.common import ExitCode
+from controller.sweeps.trials import Trial
 from go2_wbc.errors import ConfigError
 from tests.benchmarks.conftest import Only
 from tests.benchmarks.support import fake, measure_well

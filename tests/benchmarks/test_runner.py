@@ -8,7 +8,7 @@ from benchmarks.report import summarise
 from benchmarks.runner import Results, run_tasks
 from benchmarks.scenario import Measurement, Scenario
 from benchmarks.session import tasks_of
-from benchmarks.trials import Trial, TrialFailed
+from controller.sweeps.trials import Trial, TrialFailed
 from tests.benchmarks.support import (
     SPEED,
     break_the_plant,

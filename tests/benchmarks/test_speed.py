@@ -8,7 +8,7 @@ import pytest
 from benchmarks import speed_parts, speed_realtime, speed_solves, speed_startup, speed_ticks
 from benchmarks.scenario import Measurement, Metric
 from benchmarks.speed_placo import BarePlaco
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from benchmarks import speed_check
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 
 
 def test_checking_and_compiling_are_timed_for_every_motion(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.steps import FRICTION_RANGE, MASS_RANGE, onwards, plant_of, walk_with_paws
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 from go2_wbc.reference import Anchor
 from motions.keys import LegKey, StepKey
 

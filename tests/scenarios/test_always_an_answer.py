@@ -8,7 +8,7 @@ from __future__ import annotations
 import pytest
 
 from benchmarks.answers import SCENARIOS
-from benchmarks.trials import Trial
+from controller.sweeps.trials import Trial
 
 SAMPLES = [("boxes", 19), ("pushes", 12), ("stops", 13)]
 """Scenario and seed; in all of these the hard QP has no solution in some ticks."""

@@ -26,6 +26,7 @@ _SCRIPTS = (
     "replay_steps.js",
     "replay_flags.js",
     "replay_charts.js",
+    "replay_trust.js",
     "replay_verdict.js",
     "replay_sound.js",
     "replay_app.js",

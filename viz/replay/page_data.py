@@ -79,4 +79,13 @@ def _add_verdict(pack: Pack, verdict: Verdict) -> dict[str, object]:
         words = {"name": curve.name, "unit": curve.unit, "subjects": curve.subjects}
         curves.append({**words, "tight": float(curve.tight)})
     annotations = [asdict(annotation) for annotation in verdict.annotations]
-    return {"ok": verdict.ok, "text": verdict.text, "annotations": annotations, "curves": curves}
+    certified = verdict.certified
+    return {
+        "ok": verdict.ok,
+        "text": verdict.text,
+        "annotations": annotations,
+        "curves": curves,
+        "chance": verdict.chance,
+        "world": verdict.world,
+        "certified": None if certified is None else asdict(certified),
+    }

@@ -12,9 +12,9 @@ from benchmarks.exam.borders import BORDER, NEAR, measure_border
 from benchmarks.exam.families import FAMILIES
 from benchmarks.exam.outcome import play
 from benchmarks.exam.questions import Question, draws
-from benchmarks.trials import Trial
 from controller.motion_measurement import MotionMeasurement
 from controller.motion_outcome import UNPLANNED, Outcome, outcome_of
+from controller.sweeps.trials import Trial
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.bridges.faults import TILT_LIMIT, Fault
 from benchmarks.bridges.ros2_faults import FAULTS, tilt_during
-from benchmarks.trials import TrialFailed
+from controller.sweeps.trials import TrialFailed
 from tests.controller.bridges.ros2_graph import needs_ros2
 
 

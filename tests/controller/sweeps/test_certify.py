@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,12 +15,17 @@ import pytest
 from controller import Certificate, certify, sweep
 from controller.cli.common import ExitCode
 from controller.cli.main import main
+from controller.report_view import planned
+from controller.sweeps.certificate_view import certified_rate, with_certificate
+from controller.sweeps.certify import read_certificate
 from controller.sweeps.motion_study import world_of
 from controller.sweeps.rows import Row
 from go2_wbc import World
 from go2_wbc.errors import CommandError, ConfigError
-from motions import Timeline, deg
+from go2_wbc.world import DOUBTFUL
+from motions import FeasibilityChecker, Timeline, deg
 from tests.controller.sweeps import swept
+from tests.viz.page_reader import read_data
 
 ROOT = Path(__file__).resolve().parents[3]
 BOW = Timeline(name="bow").body(pitch=deg(8), over=0.4).home(over=0.4)
@@ -110,6 +116,51 @@ def test_a_sweep_ends_with_the_fewest_first_rows_that_are_enough(tmp_path: Path)
         assert [row["seed"] for row in found.rows] == list(range(7))  # 0, 3 and 6 are ok
     again = sweep(swept.trial, 40, out=tmp_path / "3.sqlite", is_enough=is_enough)
     assert len(again.rows) == 7
+
+
+def test_a_page_shows_the_certificate_and_whether_it_holds(bows: Certificate) -> None:
+    assert read_certificate(bows.path) == bows
+    checked = FeasibilityChecker(world=DOUBTFUL).evaluate(BOW)
+    shown = with_certificate(planned(checked), bows, checked.plan).verdict
+    assert shown is not None
+    assert shown.certified is not None
+    assert shown.chance == checked.report.probability
+    found = shown.certified
+    assert (found.n, found.done, found.interval) == (4, 4, bows.interval)
+    assert found.world == str(DOUBTFUL)
+    assert [run.seed for run in found.worst] == [row["seed"] for row in bows.worst]
+    assert found.versions["plan"] == bows.about["plan"]
+    assert not found.outdated
+    other = FeasibilityChecker().evaluate(BOW.scale(0.5)).plan
+    assert "another plan than" in certified_rate(bows, other).outdated
+    old = replace(bows, about={**bows.about, "code": "0"})
+    assert "another code than" in certified_rate(old, checked.plan).outdated
+
+
+def test_what_holds_no_runs_of_a_motion_is_no_certificate(tmp_path: Path) -> None:
+    swept_file = sweep(swept.trial, 2, workers=1, out=tmp_path / "rows.sqlite").path
+    with pytest.raises(CommandError, match="only motions are certified"):
+        read_certificate(swept_file)
+    with pytest.raises(ConfigError, match="there is no file"):
+        read_certificate(tmp_path / "none.sqlite")
+
+
+def test_certify_and_preview_write_pages_with_the_certificate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(MOTIONS, encoding="utf-8")
+    word, rows = f"{tmp_path / 'mine.py'}:leap", str(tmp_path / "rows.sqlite")
+    page, other = tmp_path / "leap.html", tmp_path / "preview.html"
+    assert main(["certify", word, "--n", "1", "--out", rows, "--html", str(page)]) == ExitCode.OK
+    assert "leap.html" in capsys.readouterr().out
+    assert main(["preview", word, "--certificate", rows, "--html", str(other)]) == ExitCode.FAILED
+    for file in (page, other):
+        header, _ = read_data(file.read_text(encoding="utf-8"))
+        assert header["verdict"]["certified"]["n"] == 1
+        assert header["verdict"]["certified"]["outdated"] == ""
+        assert header["verdict"]["world"] == str(DOUBTFUL)
+    words = ["certify", word, "--n", "1", "--out", rows, "--html", str(tmp_path / "page.txt")]
+    assert main(words) == ExitCode.USAGE
 
 
 @pytest.mark.parametrize("width", [0.0, 1.5, -0.1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -14,7 +15,7 @@ import viz
 from go2_wbc.recording import Recording
 from tests.viz.replay.browsing import DRAWN, Tab
 from tests.viz.verdicts import made_up_verdict
-from viz.content import ReplayContent
+from viz.content import CertifiedRate, CertifiedRun, ReplayContent
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -23,13 +24,27 @@ WRITTEN = "Brown: what was written; the plan is the nearest that the robot can d
 _BEATS = (0.25, 0.75, 1.25, 2.25)
 _BROKEN, _FINE = 1.7, 2.8
 """Times [s] at which the made-up verdict has a calf over its limit, and nothing broken."""
+_SURENESS = {
+    "chance": 0.876,
+    "world": "friction 0.4",
+    "certified": CertifiedRate(
+        n=200,
+        done=143,
+        interval=(0.648, 0.776),
+        confidence=0.95,
+        world="friction 0.4, payload 2 kg",
+        worst=(CertifiedRun(17, "friction 0.41, mass 0.97", False, "<b>FL slid 23 mm"),),
+        versions={"version": "0.1.0", "plan": "ad86f5d05086"},
+        outdated="Of another plan than this: certify it again.",
+    ),
+}
 
 
 @pytest.fixture(scope="module")
 def browser(
     recording: Recording, chromium_browser: Browser, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Tab]:
-    verdict = made_up_verdict(recording.duration)
+    verdict = replace(made_up_verdict(recording.duration), **_SURENESS)
     lower = recording.q.copy()
     lower[:, 2] += 0.03
     content = ReplayContent(
@@ -135,6 +150,42 @@ def test_a_finding_in_the_list_jumps_to_its_time_and_shows_its_margin(browser: T
     assert browser.evaluate("document.querySelectorAll('.annotation')[1].classList.contains('now')")
     browser.evaluate(f"replay.scrub({_FINE})")
     assert browser.text("#chosen output") == "FR calf: 0.5 rad left"
+
+
+def test_chance_and_certificate_stand_where_the_margins_are(browser: Tab) -> None:
+    assert browser.text("#verdict #chance p") == "Chance that it is done so: 88 %"
+    assert browser.text("#chance .calm") == "friction 0.4"
+    assert browser.text("#certificate summary b") == "Certificate: done in 143 of 200 runs"
+    assert browser.text("#certificate summary span") == "71.5 %, 95 % interval: 64.8 % to 77.6 %"
+    assert "certify it again" in browser.text("#certificate .warning")
+    browser.page.locator("#certificate summary").click()
+    cells = "[...document.querySelectorAll('#certificate {}')].map((cell) => cell.textContent)"
+    run = ["17", "friction 0.41, mass 0.97", "<b>FL slid 23 mm"]
+    assert browser.evaluate(cells.format(".failed td")) == run
+    held = ["friction 0.4, payload 2 kg", "0.1.0", "ad86f5d05086"]
+    assert browser.evaluate(cells.format("dd")) == held
+    strip = "getComputedStyle(document.querySelector('#certificate .{}')).{}"
+    width = browser.evaluate("document.querySelector('#certificate .rate-bar').clientWidth")
+    for name, side, share in (("interval", "left", 0.648), ("interval", "width", 0.128)):
+        shown = float(browser.evaluate(strip.format(name, side)).removesuffix("px"))
+        assert shown == pytest.approx(share * width, abs=1.0)
+    browser.page.locator("#certificate summary").click()
+
+
+def test_what_is_not_known_is_not_shown(browser: Tab) -> None:
+    verdict = "replay.data.header.verdict"
+    kept = browser.evaluate(f"({{chance: {verdict}.chance, certified: {verdict}.certified}})")
+    browser.evaluate(f"{verdict}.certified = null; replay.use(replay.data)")
+    hidden = "document.getElementById('{}').hidden"
+    assert [browser.evaluate(hidden.format(name)) for name in ("trust", "certificate")] == [
+        False,
+        True,
+    ]
+    browser.evaluate(f"{verdict}.chance = null; replay.use(replay.data)")
+    assert browser.evaluate(hidden.format("trust"))
+    back = f"Object.assign({verdict}, {json.dumps(kept)}); replay.use(replay.data)"
+    browser.evaluate(back)
+    assert not browser.evaluate(hidden.format("trust"))
 
 
 def test_the_key_n_goes_from_finding_to_finding(browser: Tab) -> None:

@@ -26,6 +26,7 @@ class VerdictPanel {
     badge.textContent = verdict ? verdict.text : "";
     badge.className = verdict ? `badge ${verdict.ok ? "good" : "bad"}` : "badge";
     if (!verdict) return;
+    showTrust(verdict);
     this.list.replaceChildren(...data.annotations.map((annotation) => this.annotationRow(annotation)));
     if (!data.annotations.length) this.list.append(plainText("li", "No limit is broken, no margin is tight.", "calm"));
     this.sparks = data.curves.map((curve) => new MarginRow(data, curve, () => this.choose(curve.name), this.onJump));

@@ -15,8 +15,8 @@ from benchmarks.bridges.processes import wait_until
 from benchmarks.bridges.unitree import measure_drive
 from benchmarks.bridges.unitree_faults import DAMPED, garbage
 from benchmarks.bridges.unitree_processes import own_domain, scene, simulator
-from benchmarks.trials import Trial
 from controller.bridges.unitree.guards import GuardConfig
+from controller.sweeps.trials import Trial
 from go2_wbc.errors import CommandError, PlantTimeout
 from go2_wbc.plant.base import Plant
 from tests.controller.bridges.unitree.support import needs_dds

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.bridges.faults import TILT_LIMIT, Fault, run_all
 from benchmarks.bridges.unitree_faults import FAULTS, tilt_during
-from benchmarks.trials import TrialFailed
+from controller.sweeps.trials import TrialFailed
 from tests.controller.bridges.unitree.support import needs_dds
 
 
