@@ -115,7 +115,7 @@ def watch(name: str, robot: TrialRobot, course: Iterator[float]) -> Measurement:
             go2.wait(min(LOOK, end - robot.plant.time))
         if not is_up(robot):
             break
-    was_damped = go2.mode is Mode.DAMPED and robot.plant.read().tilt < UPRIGHT
+    was_damped = go2.mode is Mode.DAMPED and robot.plant.truth().tilt < UPRIGHT
     ticks = round((robot.plant.time - start) / robot.plant.control_period)
     shares = {"grave": counts.grave_ticks, "relaxed": counts.relaxed_ticks}
     go2.wait(0.0 if is_up(robot) else AFTERMATH)

@@ -237,7 +237,7 @@ def _beat_error(recorded: TruthRecording) -> float:
 
 
 def _feet_frame(robot: TrialRobot, model: RobotModel) -> Anchor:
-    return Anchor.of_feet(model.snapshot(robot.plant.read()).p_world_feet, model.foot_radius)
+    return Anchor.of_feet(model.snapshot(robot.plant.truth()).p_world_feet, model.foot_radius)
 
 
 def metrics_of(name: str, title: str, done: float) -> list[Metric]:

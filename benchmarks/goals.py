@@ -33,14 +33,14 @@ def measure(trial: Trial) -> Measurement:
     with TrialRobot(trial) as robot:
         try:
             robot.require(robot.go2.stand())
-            start = robot.plant.read()
+            start = robot.plant.truth()
             robot.require(robot.go2.move_forward(DISTANCE))
-            there = robot.plant.read()
+            there = robot.plant.truth()
             x, y, turned = way_between(start, there)
             values["goal.miss"] = 1000.0 * math.hypot(x - DISTANCE, y)
             values["goal.heading"] = math.degrees(abs(turned))
             robot.require(robot.go2.turn_left(ANGLE))
-            x, y, turned = way_between(there, robot.plant.read())
+            x, y, turned = way_between(there, robot.plant.truth())
             values["goal.turn"] = math.degrees(abs(wrap_angle(turned - ANGLE)))
             values["goal.drift"] = 1000.0 * math.hypot(x, y)
         except TrialFailed as failed:

@@ -1,9 +1,10 @@
 """``python -m benchmarks locomotion``: how fast, and how exactly, the robot walks in every gait.
 
 The forces are planned ahead by the MPC. A run takes ``WINDOW`` seconds, from ``START_TIME`` after
-the command on: ground truth as the state, motors with their torque-speed line, friction 0.6 to 1.0
-and masses within 10 %, of which the controller is not told. Gaits and weights were chosen on seeds
-0 to 9; those judged begin at ``FIRST_SEED``.
+the command on: motors with their torque-speed line, friction 0.6 to 1.0 and masses within 10 %, of
+which the controller is not told. The state is the true one, or estimated from IMU, encoders and
+feet (the group ``sensors``; ``benchmarks.sensed`` has more of it). Gaits and weights were chosen on
+seeds 0 to 9; those judged begin at ``FIRST_SEED``.
 
 - velocity: of MuJoCo's CoM in the heading frame, every tick;
 - mean velocity error: |mean - command| / |command|, in the direction of the command;
@@ -21,6 +22,7 @@ from functools import partial
 
 import numpy as np
 
+from benchmarks import sensed
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
 from benchmarks.steps import plant_of
@@ -47,6 +49,7 @@ CONFIG = Config(
 EXAMPLES = """
 python -m benchmarks locomotion            everything; an hour on two cores
 python -m benchmarks locomotion --quick    three seeds
+python -m benchmarks locomotion --rows sensors
 python -m benchmarks locomotion --rows ahead-2.5 gaits --json
 python -m benchmarks locomotion --list     the metrics and their thresholds
 """
@@ -60,25 +63,28 @@ class Run:
         name: of the scenario.
         gait: its name.
         command: what is followed.
-        mean: greatest mean error [%].
+        mean: greatest mean error [%]; None if it only informs.
         mae: greatest mean absolute error [m/s]; None if it only informs.
         saturated: greatest share of saturated ticks [%]; None if it only informs.
         group: of the scenario.
+        sensors: of the plant.
     """
 
     name: str
     gait: str
     command: VelocityCommand
-    mean: float
+    mean: float | None
     mae: float | None = None
     saturated: float | None = None
     group: str = "trot"
+    sensors: str = "ideal"
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
         """The rows of the report."""
         c = self.command
-        item = f"{self.gait} ({c.linear_x:g}, {c.linear_y:g}) m/s, {c.angular_z:g} rad/s, 20 s"
+        on = "" if self.sensors == "ideal" else "sensors: "
+        item = f"{on}{self.gait} ({c.linear_x:g}, {c.linear_y:g}) m/s, {c.angular_z:g} rad/s, 20 s"
         turning = [Metric(f"{self.name}.turn", item, "mean turning error", "%", self.mean)]
         moving = [
             Metric(f"{self.name}.mean", item, "mean velocity error", "%", self.mean),
@@ -99,7 +105,7 @@ def speed_of(command: VelocityCommand) -> float:
 
 def measure_run(trial: Trial, run: Run) -> Measurement:
     """Follow the command; see the module's docstring for what is measured."""
-    command, plant = run.command, plant_of(trial, FIRST_SEED, MASS_RANGE)
+    command, plant = run.command, plant_of(trial, FIRST_SEED, MASS_RANGE, run.sensors)
     with TrialRobot(plant, CONFIG) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk(run.gait))
@@ -146,8 +152,17 @@ RUNS = (
     Run("pace", "pace", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
     Run("pronk", "pronk", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
 )
-SCENARIOS = tuple(
-    Scenario(run.name, run.metrics, partial(measure_run, run=run), group=run.group) for run in RUNS
+SENSED = tuple(
+    Run(f"sensed-{speed:g}", "trot", VelocityCommand(speed), mean, group="sensors", sensors="imu")
+    for speed, mean in ((0.5, 2.0), (1.0, 2.0), (1.5, 2.0), (2.0, 2.0), (2.5, 3.0), (3.0, None))
+)
+"""The same on its own sensors; at 3 m/s all that is asked for is not to fall."""
+SCENARIOS = (
+    *(
+        Scenario(run.name, run.metrics, partial(measure_run, run=run), group=run.group)
+        for run in (*RUNS, *SENSED)
+    ),
+    *sensed.SCENARIOS,
 )
 """In the order of the report."""
 

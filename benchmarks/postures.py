@@ -37,7 +37,7 @@ def standing_failure(robot: TrialRobot) -> str | None:
 
     Standing is: CoM within 20 mm of its height, tilt below 6 deg, every foot loaded.
     """
-    state, height = robot.plant.read(), float(robot.truth.p_world_com[2])
+    state, height = robot.plant.truth(), float(robot.truth.p_world_com[2])
     if abs(height - STAND_HEIGHT) > HEIGHT_TOLERANCE:
         return f"CoM at {height:.3f} m instead of {STAND_HEIGHT:.2f} m"
     if state.tilt > TILT_TOLERANCE:
@@ -62,7 +62,7 @@ def measure_stand(trial: Trial) -> Measurement:
             "stand.time": robot.plant.time - start,
             "stand.torque": float(recorded.torque_shares(RobotModel()).max()),
             "stand.height": 1000.0 * abs(float(recorded.p_world_com[-1, 2]) - STAND_HEIGHT),
-            "stand.tilt": math.degrees(robot.plant.read().tilt),
+            "stand.tilt": math.degrees(robot.plant.truth().tilt),
         }
         failure = standing_failure(robot)
     return Measurement(values, {} if failure is None else {"stand.height": failure})

@@ -78,13 +78,13 @@ class StepCheck:
     def __init__(self, robot: TrialRobot) -> None:
         """Check ``robot``'s demo."""
         self._robot = robot
-        self._before = robot.plant.read()
+        self._before = robot.plant.truth()
         self.untrue: list[str] = []
 
     def __call__(self, progress: DemoProgress) -> None:
         """Take note of a step's begin, or check its end."""
         if progress.result is None:
-            self._before = self._robot.plant.read()
+            self._before = self._robot.plant.truth()
             self._robot.truth.clear()
         elif progress.result.ok:
             name = progress.result.name
@@ -99,7 +99,7 @@ def _stand(robot: TrialRobot, _before: RobotState) -> str | None:
 
 
 def _sit(robot: TrialRobot, _before: RobotState) -> str | None:
-    state = robot.plant.read()
+    state = robot.plant.truth()
     pitch, rear = float(state.rpy[1]), float(state.q[2] + REAR_END * state.R_world_base[2, 0])
     if pitch > SIT_PITCH:
         return f"pitch {math.degrees(pitch):.0f} deg"
@@ -107,7 +107,7 @@ def _sit(robot: TrialRobot, _before: RobotState) -> str | None:
 
 
 def _forward(robot: TrialRobot, before: RobotState) -> str | None:
-    ahead, left, _ = way_between(before, robot.plant.read())
+    ahead, left, _ = way_between(before, robot.plant.truth())
     if not FORWARD_WAY[0] <= ahead <= FORWARD_WAY[1] or abs(left) > FORWARD_ASIDE:
         return f"went {ahead:.3f} m ahead and {left:.3f} m aside"
     return None
@@ -120,7 +120,7 @@ def _stop(robot: TrialRobot, _before: RobotState) -> str | None:
 
 def _turn(robot: TrialRobot, before: RobotState) -> str | None:
     asked, tolerance = TURN
-    *_, turned = way_between(before, robot.plant.read())
+    *_, turned = way_between(before, robot.plant.truth())
     if abs(wrap_angle(turned - asked)) > tolerance:
         return f"turned {math.degrees(turned):.1f} deg"
     return None

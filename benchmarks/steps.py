@@ -63,6 +63,7 @@ def plant_of(
     trial: Trial,
     first_seed: int = FIRST_SEED,
     mass_range: tuple[float, float] = MASS_RANGE,
+    sensors: str = "ideal",
 ) -> MujocoPlant:
     """A simulated robot under the conditions of the trial."""
     rng = np.random.default_rng(first_seed + trial.seed)
@@ -70,6 +71,7 @@ def plant_of(
     return MujocoPlant(
         friction=float(friction),
         mass_scale=float(mass),
+        sensors=sensors,
         seed=first_seed + trial.seed,
         initial_yaw=float(yaw),
         initial_joint_noise=JOINT_NOISE,
@@ -122,7 +124,7 @@ def play(robot: TrialRobot, plan: CompiledPlan) -> Played:
 def feet_frame(robot: TrialRobot) -> Anchor:
     """The frame of the feet as they stand, in truth."""
     model = RobotModel()
-    return Anchor.of_feet(model.snapshot(robot.plant.read()).p_world_feet, model.foot_radius)
+    return Anchor.of_feet(model.snapshot(robot.plant.truth()).p_world_feet, model.foot_radius)
 
 
 def onwards(anchor: Anchor, pose: tuple[float, float, float]) -> Anchor:

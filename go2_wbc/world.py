@@ -10,7 +10,7 @@ import numpy as np
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.validation import require_between
 
-SENSORS = ("ideal", "noisy")
+SENSORS = ("ideal", "noisy", "imu")
 PAYLOAD_HALF_SIZE = (0.10, 0.06, 0.04)
 """Of the payload [m]: a solid box of about a battery's or computer's size."""
 
@@ -34,7 +34,8 @@ class World:
         joint_friction_uncertainty: share by which it may be more or less, 0 to 1.
         delay: time [s] after which a command acts, 0 to 0.05; a round trip of the robot's bus takes
             0.002. Only in simulation: the check has no equation for it.
-        sensors: "ideal", or "noisy" for ``plant.sensors.SensorNoise``. Only in simulation.
+        sensors: "ideal", "noisy" for ``plant.sensors.SensorNoise``, or "imu" for the state
+            estimated from IMU, encoders and feet. Only in simulation.
     """
 
     friction: float = 0.5

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from go2_wbc.errors import PlantError
+from go2_wbc.world import SENSORS
 
 EXAMPLES = """
 go2-wbc unitree-sim                      domain 1 on the loopback interface
@@ -36,7 +37,7 @@ def register(subparsers: Subparsers) -> None:
     parser.add_argument("--mjcf", metavar="FILE", type=Path, help="your own Go2 model or scene")
     parser.add_argument("--friction", metavar="MU", type=float, help="of the feet, default 0.8")
     parser.add_argument("--payload", metavar="KG", type=float, default=0.0, help="extra mass")
-    parser.add_argument("--sensors", choices=("ideal", "noisy"), default="ideal")
+    parser.add_argument("--sensors", choices=SENSORS, default="ideal")
     parser.add_argument("--seed", metavar="N", type=int, default=0, help="of the noise")
     parser.add_argument(
         "--lockstep",

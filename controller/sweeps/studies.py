@@ -119,7 +119,7 @@ class PushStudy:
         else:
             robot.require(robot.go2.stand())
         robot.wait(START_TIME + phase * period)
-        start, heading = robot.truth.p_world_com, float(robot.plant.read().rpy[2])
+        start, heading = robot.truth.p_world_com, float(robot.plant.truth().rpy[2])
         force = self.impulse / PUSH_TIME * np.array([math.cos(angle), math.sin(angle), 0.0])
         robot.push(force, PUSH_TIME)
         robot.wait(RECOVERY_TIME)

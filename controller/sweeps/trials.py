@@ -115,5 +115,5 @@ class TrialRobot:
 
     def push(self, f_heading: Float[np.ndarray, "3"], duration: float, where: str = "base") -> None:
         """Push with a force [N] that points ahead, left, up of the robot, beginning now."""
-        yaw = float(self.plant.read().rpy[2])
+        yaw = float(self.plant.truth().rpy[2])
         self.plant.push(yaw_rotation(yaw) @ f_heading, duration, where)

@@ -6,6 +6,7 @@ from importlib import import_module
 
 KERNELS = (
     "condensed",
+    "estimation",
     "kinematics",
     "loads",
     "locomotion",

@@ -24,7 +24,7 @@ EXACT = 1e-9
         ({"payload_place": (0.0, 0.0, 0.9)}, "World.payload_place must be between -0.5 and 0.5"),
         ({"mass_uncertainty": 0.6}, "World.mass_uncertainty must be between 0 and 0.5"),
         ({"delay": 1.0}, "World.delay must be between 0 and 0.05"),
-        ({"sensors": "lidar"}, "unknown World.sensors 'lidar'; valid: ideal, noisy"),
+        ({"sensors": "lidar"}, "unknown World.sensors 'lidar'; valid: ideal, imu, noisy"),
     ],
 )
 def test_a_world_out_of_range_is_refused(setting: dict, says: str) -> None:

@@ -119,7 +119,6 @@ def sensor_reading(message: Shaped[np.ndarray, "1"]) -> SensorReading:
     imu = message["imu_state"][0]
     return SensorReading(
         time=0.001 * float(message["tick"][0]),
-        quaternion=imu["quaternion"].astype(float)[[1, 2, 3, 0]],
         gyro=imu["gyroscope"].astype(float),
         accelerometer=imu["accelerometer"].astype(float),
         q_joints=motors["q"].astype(float),

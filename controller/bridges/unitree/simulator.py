@@ -44,7 +44,7 @@ class SimulatorSettings:
         mjcf: a user's own Go2 model or scene.
         friction: of the feet; None is the model's.
         payload: extra mass [kg].
-        sensors: "ideal" or "noisy".
+        sensors: "ideal", "noisy" or "imu", as of ``MujocoPlant``.
         seed: of the noise.
         config: TOML with other numbers.
         lockstep: under low-level control let time pass only command by command.

@@ -151,7 +151,7 @@ class GroundTruth(Plant):
 
     def write(self, command: JointCommand) -> None:
         """Apply ``command`` for one control period, and record what came of it."""
-        state = self._plant.read()
+        state = self._plant.truth()
         self._plant.write(command)
         self._record(command.asked(state.joint_positions, state.joint_velocities))
         if self.on_tick is not None:
@@ -169,7 +169,7 @@ class GroundTruth(Plant):
 
     def fall(self) -> str | None:
         """Why the robot counts as fallen at this moment, or None."""
-        state = self._plant.read()
+        state = self._plant.truth()
         if not np.isfinite(state.q).all() or state.tilt > FALLEN_TILT:
             return f"fell by t={state.time:.2f} s: tilt {math.degrees(state.tilt):.0f} deg"
         if self._plant.base_contact_force > TOUCH:
@@ -194,7 +194,7 @@ class GroundTruth(Plant):
         plant = self._plant
         forces = plant.base_contact_force, plant.limb_contact_force
         feet = plant.p_world_feet
-        self._instants.append(_Instant(plant.read(), tau_asked, feet, forces, plant.contacts()))
+        self._instants.append(_Instant(plant.truth(), tau_asked, feet, forces, plant.contacts()))
         self.cpu_time += time.thread_time() - began
 
 

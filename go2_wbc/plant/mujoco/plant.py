@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import logging
-import math
-from collections import deque
 from functools import partial
 from pathlib import Path
 
@@ -16,6 +14,7 @@ from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, u
 from go2_wbc.lazy import without_collecting
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
+from go2_wbc.plant.mujoco.commands import DelayedCommands
 from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
 from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
@@ -23,7 +22,7 @@ from go2_wbc.plant.mujoco.pushes import Pushes
 from go2_wbc.plant.mujoco.saved import SavedPhysics
 from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
-from go2_wbc.plant.sensors import ImuSample, SensorNoise
+from go2_wbc.plant.sensors import ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.state import JointCommand, RobotState
@@ -53,9 +52,11 @@ class MujocoPlant(Plant):
         payload_place: of its middle in the base frame [m].
         mass_scale: factor on every mass and inertia of the robot, payload excepted.
         terrain: boxes to strew on the floor; only without ``mjcf``.
-        sensors: ``"ideal"``, or ``"noisy"`` for white noise on everything measured.
-        noise: its standard deviations.
-        seed: of the noise and of ``initial_joint_noise``.
+        sensors: ``"ideal"``, ``"noisy"`` for white noise on everything measured, or ``"imu"``: all
+            that ``read`` gives is estimated from IMU, encoders and feet, in a world of its own.
+        noise: standard deviations of ``"noisy"``.
+        errors: of the sensors of ``"imu"``.
+        seed: of both and of ``initial_joint_noise``.
         initial_yaw: heading at the start [rad].
         initial_joint_noise: standard deviation [rad] of the joint angles from which it settles.
         joint_dynamics: friction, damping, armature; ``None`` is ``JointDynamics()``, or what
@@ -84,6 +85,7 @@ class MujocoPlant(Plant):
         terrain: Boxes | None = None,
         sensors: str = "ideal",
         noise: SensorNoise | None = None,
+        errors: SensorErrors | None = None,
         seed: int = 0,
         initial_yaw: float = 0.0,
         initial_joint_noise: float = 0.0,
@@ -122,8 +124,7 @@ class MujocoPlant(Plant):
         self._period, self._substeps = control_period, round(control_period / timestep)
         self._closed = False
         self._ticks = 0
-        self._waiting: deque[Float[np.ndarray, "5 12"]] = deque()
-        self._delay = round(delay / control_period)
+        self._commands = DelayedCommands(round(delay / control_period))
         self._pushes = Pushes(self._model, self._data, self._layout)
         # Views into MuJoCo's memory, made once because making them is slow.
         data, layout = self._data, self._layout
@@ -133,9 +134,12 @@ class MujocoPlant(Plant):
         self._bind_kernels()
         settle(self._model, data, layout, setup, start_rng)
         # One period in the lying state, so that the first read has forces and torques.
-        self._command = np.zeros((5, 12))  # until a delayed one arrives
+        self._senses: Proprioception | None = None
         self.write(JointCommand.damping(LYING_DAMPING))
         self._ticks, self._data.time = 0, 0.0
+        if sensors == "imu":
+            self._senses = Proprioception(errors or SensorErrors(), control_period, self._rng)
+            self._sense()
 
     @property
     def control_period(self) -> float:
@@ -179,10 +183,23 @@ class MujocoPlant(Plant):
         """The state now; reading again before the next ``write`` gives the same values."""
         self._check_open()
         if self._state is None:
-            state = self._measure()
-            noise = self._noise
+            state, noise = self.truth(), self._noise
             self._state = state if noise is None else noise.corrupt_state(state, self._rng)
         return self._state
+
+    def truth(self) -> RobotState:
+        """The true state now, for tests and judges; ``read`` gives the same with ideal sensors."""
+        q, v = np.empty(19), np.empty(18)
+        self._read_joints(q, v)
+        forces = self._forces[: len(LEGS)].copy()
+        return RobotState(
+            time=self.time,
+            q=q,
+            v=v,
+            tau=self._tau.copy(),
+            foot_forces=forces,
+            feet_in_contact=forces > FOOT_CONTACT_THRESHOLD,
+        )
 
     def write(self, command: JointCommand) -> None:
         """Applies ``command`` for one control period, with the motor law at every physics step.
@@ -194,11 +211,11 @@ class MujocoPlant(Plant):
             ClosedError: after ``close()``.
         """
         self._check_open()
-        self._accept(command)
+        accepted = self._commands.next(command)
         model, data = self._model, self._data
         total = np.zeros(12)
         for remaining in range(self._substeps, 0, -1):
-            self._drive(self._command, *self._motors, total)
+            self._drive(accepted, *self._motors, total)
             self._pushes.apply()
             mujoco.mj_step2(model, data)
             if remaining == 1:
@@ -206,18 +223,14 @@ class MujocoPlant(Plant):
             mujoco.mj_step1(model, data)
         self._tau = total / self._substeps
         self._ticks += 1
-        self._state, self._imu = None, None
         self._check_physics()
+        self._sense()
 
     def imu(self) -> ImuSample:
         """The inertial measurement unit's reading; its accelerometer lags by one physics step."""
         self._check_open()
         if self._imu is None:
-            sensor = self._data.sensor
-            quaternion = sensor(ORIENTATION).data[[1, 2, 3, 0]]
-            gyro, accelerometer = sensor(GYRO).data.copy(), sensor(ACCELEROMETER).data.copy()
-            sample = ImuSample(quaternion, gyro, accelerometer)
-            noise = self._noise
+            sample, noise = self._true_imu(), self._noise
             self._imu = sample if noise is None else noise.corrupt_imu(sample, self._rng)
         return self._imu
 
@@ -259,7 +272,9 @@ class MujocoPlant(Plant):
         data.qacc_warmstart[:] = 0.0
         mujoco.mj_step1(self._model, data)
         self._forces = np.zeros(ROBOT_BINS)
-        self._state, self._imu = None, None
+        if self._senses is not None:
+            self._senses.restart()
+        self._sense()
 
     @property
     def p_world_feet(self) -> Float[np.ndarray, "4 3"]:
@@ -301,12 +316,13 @@ class MujocoPlant(Plant):
             integration=integration,
             ticks=self._ticks,
             pushes=self._pushes.active,
-            waiting=tuple(self._waiting),
+            waiting=self._commands.waiting,
             tau=self._tau,
             forces=self._forces,
             noise_state=self._rng.bit_generator.state,
             state=self._state,
             imu=self._imu,
+            senses=None if self._senses is None else self._senses.save(),
         )
 
     def restore(self, saved: SavedPhysics) -> None:
@@ -318,10 +334,12 @@ class MujocoPlant(Plant):
         self._warnings[:] = 0
         self._ticks = saved.ticks
         self._pushes.active = saved.pushes
-        self._waiting = deque(saved.waiting)
+        self._commands.waiting = saved.waiting
         self._tau, self._forces = saved.tau, saved.forces
         self._rng.bit_generator.state = dict(saved.noise_state)
         self._state, self._imu = saved.state, saved.imu
+        if self._senses is not None and saved.senses is not None:
+            self._senses.restore(saved.senses)
 
     def close(self) -> None:
         """Ends the plant; every later call but ``close`` raises ``ClosedError``."""
@@ -331,20 +349,16 @@ class MujocoPlant(Plant):
         if self._closed:
             raise ClosedError("the MuJoCo plant is closed")
 
-    def _accept(self, command: JointCommand) -> None:
-        """Copies ``command`` if it is good."""
-        rows = (command.tau, command.q_des, command.v_des, command.kp, command.kd)
-        for name, row in zip(_FIELDS, rows, strict=True):
-            if row.shape != (12,):
-                raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
-        accepted = np.array(rows, dtype=float)
-        if not math.isfinite(np.vdot(accepted, accepted)):  # cheap, but huge numbers overflow
-            for name, row in zip(_FIELDS, rows, strict=True):
-                if not np.isfinite(row).all():
-                    raise CommandError(f"command.{name} is not finite: {row}")
-        self._waiting.append(accepted)
-        if len(self._waiting) > self._delay:
-            self._command = self._waiting.popleft()
+    def _sense(self) -> None:
+        """Lets the robot's own sensors read, if it lives on them."""
+        self._state, self._imu = None, None
+        if self._senses is not None:
+            self._state, self._imu = self._senses.sense(self.truth(), self._true_imu())
+
+    def _true_imu(self) -> ImuSample:
+        sensor = self._data.sensor
+        quaternion = sensor(ORIENTATION).data[[1, 2, 3, 0]]
+        return ImuSample(quaternion, sensor(GYRO).data.copy(), sensor(ACCELEROMETER).data.copy())
 
     def _bind_kernels(self) -> None:
         """Binds the kernels of a tick and the arrays of MuJoCo's that they read and fill."""
@@ -373,26 +387,9 @@ class MujocoPlant(Plant):
         self._bin_forces(*rows, codes, self._is_elliptic, forces)
         return forces
 
-    def _measure(self) -> RobotState:
-        """The true state in Pinocchio's conventions."""
-        q, v = np.empty(19), np.empty(18)
-        self._read_joints(q, v)
-        forces = self._forces[: len(LEGS)].copy()
-        return RobotState(
-            time=self.time,
-            q=q,
-            v=v,
-            tau=self._tau.copy(),
-            foot_forces=forces,
-            feet_in_contact=forces > FOOT_CONTACT_THRESHOLD,
-        )
-
     def _check_physics(self) -> None:
         """Raises ``PlantError`` if MuJoCo warned about anything."""
         counts = self._warnings
         if np.count_nonzero(counts):
             raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(counts)]
             raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
-
-
-_FIELDS = ("tau", "q_des", "v_des", "kp", "kd")

@@ -27,3 +27,4 @@ class SavedPhysics:
     noise_state: Mapping[str, Any]
     state: RobotState | None
     imu: ImuSample | None
+    senses: Mapping[str, Any] | None

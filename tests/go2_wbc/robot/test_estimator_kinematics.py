@@ -20,10 +20,12 @@ from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from go2_wbc.robot.state import RobotState
 from tests.engine_helpers import state_of
 
-TICK, COUNT = 0.002, 500  # s; of readings
+TICK, COUNT = 0.002, 700  # s; of readings
+STANDING = 0.4  # s
 NUDGE = 1e-4  # s; of differences
-# m/s and m. The filter takes the acceleration as constant over a tick,.
-SPEED_ERROR, PLACE_ERROR = 1e-3, 5e-5
+# m/s and m. The filter takes the acceleration as constant over a tick.
+SPEED_ERROR, PLACE_ERROR = 3e-3, 2e-3
+TURNING_ERROR, TILT_ERROR = 2e-3, 2e-3  # rad/s, rad
 IN_THE_AIR = Leg.FL
 CONTACT_FORCE = EstimatorConfig().contact_force
 
@@ -37,8 +39,8 @@ class Motion:
 
 
 def pose(t: float) -> tuple[np.ndarray, np.ndarray]:
-    """Place [m] and rotation of a trunk that starts at rest."""
-    phase = np.array([0.7, 1.0, 1.3]) * 2.0 * np.pi * t
+    """Place [m] and rotation of a trunk that is at rest first, by which gravity is known."""
+    phase = np.array([0.7, 1.0, 1.3]) * 2.0 * np.pi * max(t - STANDING, 0.0)
     place = np.array([0.03, -0.02, 0.015]) * (1.0 - np.cos(phase)) + [0.0, 0.0, 0.27]
     rpy = np.array([0.10, 0.08, 0.15]) * (1.0 - np.cos(phase[::-1]))
     return place, rotation_from_rpy(*rpy)
@@ -93,7 +95,6 @@ def motion(model: RobotModel) -> Motion:
         readings.append(
             SensorReading(
                 time=t,
-                quaternion=state.q[3:7],
                 gyro=state.v[3:6],
                 accelerometer=imu_acceleration(t, p_base_imu),
                 q_joints=joints,
@@ -110,22 +111,23 @@ def motion(model: RobotModel) -> Motion:
 def test_place_and_speed_of_an_exactly_known_motion_are_found(
     motion: Motion, model: RobotModel
 ) -> None:
-    estimator = StateEstimator(model)
+    estimator = StateEstimator(model, EstimatorConfig(compliance=1e-9))
     found = [estimator.update(reading) for reading in motion.readings]
     off_v = np.array([a.v - b.v for a, b in zip(found, motion.states, strict=True)])
     off_q = np.array([a.q - b.q for a, b in zip(found, motion.states, strict=True)])
     assert np.abs(off_v[50:, :3]).max() < SPEED_ERROR
     assert np.abs(off_q[:, :3]).max() < PLACE_ERROR
-    assert np.abs(off_v[:, 3:]).max() < 1e-12
-    assert np.abs(off_q[:, 3:]).max() < 1e-12
+    assert np.abs(off_v[:, 3:6]).max() < TURNING_ERROR
+    assert np.abs(off_q[:, 3:7]).max() < TILT_ERROR
+    assert np.abs(off_v[:, 6:]).max() < 1e-12
+    assert np.abs(off_q[:, 7:]).max() < 1e-12
 
 
 def test_what_needs_no_estimate_is_passed_on(motion: Motion, model: RobotModel) -> None:
     reading = motion.readings[7]
     forces = np.array([0.0, CONTACT_FORCE, CONTACT_FORCE + 0.01, 40.0])
-    scaled = replace(reading, quaternion=1.01 * reading.quaternion, foot_forces=forces)
+    scaled = replace(reading, foot_forces=forces)
     state = StateEstimator(model).update(scaled)
-    assert state.q[3:7] == pytest.approx(reading.quaternion, abs=1e-12)
     assert state.time == reading.time
     assert state.tau.tolist() == reading.tau.tolist()
     assert state.foot_forces.tolist() == forces.tolist()

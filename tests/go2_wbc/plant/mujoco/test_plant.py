@@ -96,7 +96,7 @@ def test_initial_joint_noise_moves_the_joints_by_the_seed() -> None:
         ({"mass_scale": np.nan}, "mass_scale"),
         ({"initial_yaw": np.inf}, "initial_yaw"),
         ({"initial_joint_noise": -0.1}, "initial_joint_noise"),
-        ({"sensors": "perfect"}, "ideal, noisy"),
+        ({"sensors": "perfect"}, "ideal, imu, noisy"),
         ({"motor": "perfect"}, "ideal, torque-speed"),
     ],
 )
@@ -272,7 +272,7 @@ def history(plant: MujocoPlant, ticks: int = 200) -> list[RobotState]:
     return states
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "noisy"])
+@pytest.mark.parametrize("sensors", ["ideal", "noisy", "imu"])
 def test_the_same_seed_gives_the_same_history_bit_by_bit(sensors: str) -> None:
     first, second = (MujocoPlant(sensors=sensors, seed=4) for _ in range(2))
     assert all(map(same, history(first), history(second)))
@@ -283,7 +283,7 @@ def test_another_seed_gives_other_noise() -> None:
     assert not np.array_equal(first, second)
 
 
-@pytest.mark.parametrize("sensors", ["ideal", "noisy"])
+@pytest.mark.parametrize("sensors", ["ideal", "noisy", "imu"])
 def test_a_restored_plant_goes_on_as_it_did_even_in_the_middle_of_a_push(sensors: str) -> None:
     plant = MujocoPlant(sensors=sensors)
     plant.push(np.array([0.0, 100.0, 0.0]), 0.3)

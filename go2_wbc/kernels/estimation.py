@@ -1,0 +1,339 @@
+"""One step of the state estimator; ``robot.estimator`` describes the filter.
+
+An estimate is a row of ``STATE`` numbers: position and velocity of the IMU in the world, the
+quaternion x y z w, the biases of gyro and accelerometer, the feet's centres. Its error is a row of
+``ERROR`` numbers, the same with a rotation vector along the world's axes in place of the
+quaternion: R_true = exp(theta) R. Measurements are taken in one number after the other, which for
+independent ones is the same as all at once (Bierman, *Factorization Methods for Discrete Sequential
+Estimation*, 1977, ch. II), and needs no matrix inverse.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from go2_wbc.kernels.compilation import kernel, subroutine
+from go2_wbc.kernels.vectors import rotation_of
+
+STATE, ERROR, MEMORY, READING = 28, 27, 20, 35
+"""Lengths: of an estimate, of its error, of what is kept from tick to tick (the time [s] at rest,
+the ages [s] of the feet's contacts, the gyro, the joints' smoothed speeds), and of a reading (dt,
+gyro, accelerometer, angles, speeds, forces)."""
+_QUATERNION, _GYRO_BIAS, _FORCE_BIAS, _FEET = 6, 10, 13, 16
+_THETA, _E_GYRO_BIAS, _E_FORCE_BIAS, _E_FEET = 6, 9, 12, 15
+LEAST_TRUST = 1e-3
+"""Trust in a foot in the air: its place drifts a thousand times as fast as a standing one's."""
+_SMOOTHING = 0.05
+"""Time constant [s] in which the joints' speeds are smoothed, to tell slow motion from noise."""
+_HEIGHT_GATE = 9.0
+"""Square of the deviations by which a foot's height may be off that of flat ground; else it stands
+on something else, and its height says nothing."""
+
+
+@subroutine("void(f8[::1], f8, f8, f8, b1)")
+def turn(x, a, b, c, in_world):
+    """Turn the quaternion of an estimate by a vector along the world's axes or its own."""
+    angle = np.sqrt(a * a + b * b + c * c)
+    factor = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
+    e0, e1, e2, e3 = factor * a, factor * b, factor * c, np.cos(0.5 * angle)
+    q0, q1, q2, q3 = x[6], x[7], x[8], x[9]
+    sign = 1.0 if in_world else -1.0  # e q or q e: the vectors' cross product changes its sign
+    x[6] = e3 * q0 + q3 * e0 + sign * (e1 * q2 - e2 * q1)
+    x[7] = e3 * q1 + q3 * e1 + sign * (e2 * q0 - e0 * q2)
+    x[8] = e3 * q2 + q3 * e2 + sign * (e0 * q1 - e1 * q0)
+    x[9] = e3 * q3 - e0 * q0 - e1 * q1 - e2 * q2
+    length = np.sqrt(x[6] * x[6] + x[7] * x[7] + x[8] * x[8] + x[9] * x[9])
+    for i in range(6, 10):
+        x[i] /= length
+
+
+@subroutine("void(f8[:,::1], f8, f8, f8, f8[::1], i8)")
+def put_turned(R, a, b, c, row, start):
+    """Put R (a, b, c) into its place in a row."""
+    for i in range(3):
+        row[start + i] = R[i, 0] * a + R[i, 1] * b + R[i, 2] * c
+
+
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, f8[:,::1], f8[::1])")
+def see_foot(leg, q, u, p_imu, w, radius, R, foot):
+    """Fill what a leg measures, along the world's axes.
+
+    Place of the foot's centre from the IMU (3), the velocity of the IMU if the foot rolls on the
+    ground (3), and that of the foot's centre then (3). ``leg`` is ``LegGeometry.row``, q and u are
+    the angles and speeds of its joints, w the angular velocity of the base.
+    """
+    c1, s1, c2, s2 = np.cos(q[0]), np.sin(q[0]), np.cos(q[1]), np.sin(q[1])
+    c3, s3, bend = np.cos(q[1] + q[2]), np.sin(q[1] + q[2]), u[1] + u[2]
+    width, thigh, calf = leg[3], leg[4], leg[5]
+    down = thigh * c2 + calf * c3
+    longer = -thigh * s2 * u[1] - calf * s3 * bend
+    x = leg[0] - thigh * s2 - calf * s3 - p_imu[0]
+    y = leg[1] + width * c1 + down * s1 - p_imu[1]
+    z = leg[2] + width * s1 - down * c1 - p_imu[2]
+    dx = -thigh * c2 * u[1] - calf * c3 * bend + w[1] * z - w[2] * y
+    dy = longer * s1 + (down * c1 - width * s1) * u[0] + w[2] * x - w[0] * z
+    dz = (width * c1 + down * s1) * u[0] - longer * c1 + w[0] * y - w[1] * x
+    put_turned(R, x, y, z, foot, 0)
+    put_turned(R, -dx, -dy, -dz, foot, 3)
+    put_turned(R, w[0] + u[0], w[1] + c1 * bend, w[2] + s1 * bend, foot, 6)
+    foot[6], foot[7], foot[8] = radius * foot[7], -radius * foot[6], 0.0  # w x (0, 0, r)
+    foot[3] += foot[6]
+    foot[4] += foot[7]
+
+
+@subroutine("void(f8[:,::1], f8, f8[:,::1], f8[::1], f8[::1])")
+def mix(P, dt, R, force, row):
+    """One side of F P F': adds to the rows of P what the errors of the state bring about.
+
+    d theta = -R d bias dt; dv = (theta x f - R d bias) dt with f the force in the world.
+    """
+    for j in range(ERROR):
+        t0, t1, t2 = P[_THETA, j], P[_THETA + 1, j], P[_THETA + 2, j]
+        row[0] = t1 * force[2] - t2 * force[1]
+        row[1] = t2 * force[0] - t0 * force[2]
+        row[2] = t0 * force[1] - t1 * force[0]
+        for i in range(3):
+            turning = 0.0
+            for k in range(3):
+                row[i] -= R[i, k] * P[_E_FORCE_BIAS + k, j]
+                turning += R[i, k] * P[_E_GYRO_BIAS + k, j]
+            P[i, j] += dt * P[3 + i, j] + 0.5 * dt * dt * row[i]
+            P[3 + i, j] += dt * row[i]
+            P[_THETA + i, j] -= dt * turning
+
+
+@subroutine("void(f8[::1], f8[:,::1], f8, f8[::1], f8[::1], f8, f8[:,::1], f8[::1])")
+def predict(x, P, dt, w, reading, gravity, R, noise):
+    """Move the estimate on by ``dt``: turned by w, driven by the accelerometer.
+
+    ``noise``: variances that the step adds to each number of the error. R is work space.
+    """
+    force, row = np.empty(3), np.empty(3)
+    turn(x, 0.5 * dt * w[0], 0.5 * dt * w[1], 0.5 * dt * w[2], False)
+    rotation_of(x[6], x[7], x[8], x[9], R)
+    a, b, c = (
+        reading[4] - x[_FORCE_BIAS],
+        reading[5] - x[_FORCE_BIAS + 1],
+        reading[6] - x[_FORCE_BIAS + 2],
+    )
+    put_turned(R, a, b, c, force, 0)
+    for i in range(3):
+        acceleration = force[i] - (gravity if i == 2 else 0.0)
+        x[i] += dt * x[3 + i] + 0.5 * dt * dt * acceleration
+        x[3 + i] += dt * acceleration
+    turn(x, 0.5 * dt * w[0], 0.5 * dt * w[1], 0.5 * dt * w[2], False)
+    mix(P, dt, R, force, row)
+    for i in range(ERROR):
+        for j in range(i):
+            P[i, j], P[j, i] = P[j, i], P[i, j]
+    mix(P, dt, R, force, row)
+    for i in range(ERROR):
+        P[i, i] += noise[i]
+
+
+@subroutine("void(f8[:,::1], f8[::1], f8[::1], i8[::1], f8[::1], i8, f8, f8)")
+def take_in(P, dx, column, places, shares, count, innovation, variance):
+    """Take in a number that is a sum of ``count`` numbers of the error, at ``places``.
+
+    ``innovation``: what was measured beyond the prediction. dx is the error as found so far,
+    ``column`` work space.
+    """
+    expected, spread = 0.0, variance
+    for i in range(ERROR):
+        column[i] = 0.0
+    for n in range(count):
+        row, share = P[places[n]], shares[n]
+        expected += share * dx[places[n]]
+        for i in range(ERROR):
+            column[i] += share * row[i]
+    for n in range(count):
+        spread += shares[n] * column[places[n]]
+    gain = (innovation - expected) / spread
+    for i in range(ERROR):
+        dx[i] += gain * column[i]
+        scaled = column[i] / spread
+        for j in range(ERROR):
+            P[i, j] -= scaled * column[j]
+
+
+@subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], i8, f8, f8[::1])")
+def take_in_leg(x, P, dx, column, foot, leg, place, velocity):
+    """Take in what a leg measures, with these variances; velocities with 0 are left out."""
+    places, shares = np.empty(4, np.int64), np.empty(4)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        # R s = f - p - theta x R s; the k-th number of the product has those at i and j
+        places[0], places[1], places[2], places[3] = (
+            _E_FEET + 3 * leg + k,
+            k,
+            _THETA + i,
+            _THETA + j,
+        )
+        shares[0], shares[1], shares[2], shares[3] = 1.0, -1.0, -foot[j], foot[i]
+        off = foot[k] - x[_FEET + 3 * leg + k] + x[k]
+        take_in(P, dx, column, places, shares, 4, off, place)
+        if velocity[k] > 0.0:
+            places[1], shares[1] = 3 + k, 1.0
+            shares[2], shares[3] = -foot[3 + j], foot[3 + i]
+            off = foot[3 + k] - x[3 + k]
+            take_in(P, dx, column, places[1:], shares[1:], 3, off, velocity[k])
+
+
+@subroutine("void(f8[:,::1], f8[::1], f8[::1], i8, f8, f8)")
+def take_in_one(P, dx, column, place, innovation, variance):
+    """Take in a measurement of one number of the error."""
+    places, shares = np.full(1, place), np.ones(1)
+    take_in(P, dx, column, places, shares, 1, innovation, variance)
+
+
+@subroutine("f8(f8[::1], f8[:,::1], f8[::1], f8[::1], f8)")
+def slip_factor(x, P, foot, variances, gate):
+    """Factor on the variances of a foot that stands: above 1 if it moves as no standing one would.
+
+    With chi^2 the square of the velocity's innovation over its variance, and the gate its greatest
+    usual root: max(1, chi^2 / gate^2), so that an outlier counts by its size no longer (Huber,
+    *Robust Statistics*, 1981).
+    """
+    chi = 0.0
+    for k in range(3):
+        off = foot[3 + k] - x[3 + k]
+        chi += off * off / (P[3 + k, 3 + k] + variances[k])
+    return max(1.0, chi / (gate * gate))
+
+
+@subroutine("b1(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
+def is_at_rest(x, memory, reading, gravity, numbers):
+    """Whether joints, gyro and accelerometer have read rest for long enough."""
+    speed, turning, force = 0.0, 0.0, 0.0
+    share = min(reading[0] / _SMOOTHING, 1.0)
+    for n in range(12):
+        memory[8 + n] += share * (reading[19 + n] - memory[8 + n])
+        speed += memory[8 + n] ** 2 / 12.0
+    for k in range(3):
+        turning += (reading[1 + k] - x[_GYRO_BIAS + k]) ** 2
+        force += (reading[4 + k] - x[_FORCE_BIAS + k]) ** 2
+    is_still = (
+        speed < numbers[STILL_JOINTS] ** 2
+        and turning < numbers[STILL_TURNING] ** 2
+        and abs(np.sqrt(force) - gravity) < numbers[STILL_FORCE]
+    )
+    memory[0] = memory[0] + reading[0] if is_still else 0.0
+    return memory[0] >= numbers[STILL_TIME]
+
+
+@subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def take_in_rest(x, P, dx, column, reading, numbers):
+    """Take in that nothing moves: no velocity, and a gyro that reads its bias."""
+    for k in range(3):
+        take_in_one(P, dx, column, 3 + k, -x[3 + k], numbers[STILL_VELOCITY] ** 2)
+        off = reading[1 + k] - x[_GYRO_BIAS + k]
+        take_in_one(P, dx, column, _E_GYRO_BIAS + k, off, numbers[STILL_GYRO] ** 2)
+
+
+@subroutine("void(f8[::1], f8[::1])")
+def correct(x, dx):
+    """Put the error that was found into the estimate."""
+    for i in range(6):
+        x[i] += dx[i]
+    turn(x, dx[_THETA], dx[_THETA + 1], dx[_THETA + 2], True)
+    for i in range(_E_GYRO_BIAS, ERROR):
+        x[i + 1] += dx[i]
+
+
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1])")
+def report(x, reading, w, p_imu, R, q, v):
+    """Fill q (19,) and v (18,) of a ``RobotState`` from the motion of the IMU."""
+    rotation_of(x[6], x[7], x[8], x[9], R)
+    turning = (
+        w[1] * p_imu[2] - w[2] * p_imu[1],
+        w[2] * p_imu[0] - w[0] * p_imu[2],
+        w[0] * p_imu[1] - w[1] * p_imu[0],
+    )
+    for i in range(3):
+        q[i], v[i], v[3 + i] = x[i], -turning[i], w[i]
+        for k in range(3):
+            q[i] -= R[i, k] * p_imu[k]
+            v[i] += R[k, i] * x[3 + k]
+    q[3:7] = x[6:10]
+    q[7:], v[6:] = reading[7:19], reading[19:31]
+
+
+ACCELERATION, FOOT_DRIFT, PLACE, VELOCITY, HEIGHT, CONTACT, TRUSTED, REST = range(8)
+GYRO, GYRO_WALK, FORCE_WALK, GATE, STILL_TIME, STILL_JOINTS, STILL_TURNING = range(8, 15)
+STILL_FORCE, STILL_VELOCITY, STILL_DRIFT, RADIUS, GRAVITY = range(15, 20)
+TOUCHDOWN_SLIP, TOUCHDOWN_TIME, VERTICAL, COMPLIANCE, STILL_GYRO = range(20, 25)
+"""What ``numbers`` holds: those of ``EstimatorConfig``, foot radius [m] and gravity [m/s^2]."""
+
+
+@subroutine("void(f8, f8[::1], f8[::1])")
+def add_noise(dt, numbers, noise):
+    """Fill the variances that a step adds to all but the feet."""
+    for k in range(3):
+        noise[k] = (0.5 * numbers[ACCELERATION] * dt * dt) ** 2
+        noise[3 + k] = (numbers[ACCELERATION] * dt) ** 2
+        noise[6 + k] = (numbers[GYRO] * dt) ** 2
+        noise[9 + k] = numbers[GYRO_WALK] ** 2 * dt
+        noise[12 + k] = numbers[FORCE_WALK] ** 2 * dt
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
+    """Take in a reading, ``reading[0]`` seconds after the last one, and fill the robot's state."""
+    dt, radius, gravity = reading[0], numbers[RADIUS], numbers[GRAVITY]
+    w, mean, R, noise = np.empty(3), np.empty(3), np.empty((3, 3)), np.zeros(ERROR)
+    feet, velocities, heights = np.empty((4, 9)), np.zeros((4, 3)), np.empty(4)
+    dx, column = np.zeros(ERROR), np.empty(ERROR)
+    for k in range(3):
+        w[k] = reading[1 + k] - x[_GYRO_BIAS + k]
+        mean[k] = 0.5 * (reading[1 + k] + memory[5 + k]) - x[_GYRO_BIAS + k]
+        memory[5 + k] = reading[1 + k]
+    add_noise(dt, numbers, noise)
+    rests = is_at_rest(x, memory, reading, gravity, numbers)
+    predict(x, P, dt, mean, reading, gravity, R, noise)
+    rotation_of(x[6], x[7], x[8], x[9], R)
+    is_carried = False
+    for leg in range(4):
+        foot = feet[leg]
+        angles = slice(7 + 3 * leg, 10 + 3 * leg)
+        speeds = slice(19 + 3 * leg, 22 + 3 * leg)
+        force = reading[31 + leg]
+        pressed = radius - 0.5 * numbers[COMPLIANCE] * force
+        see_foot(legs[leg], reading[angles], reading[speeds], p_imu, w, pressed, R, foot)
+        age = memory[1 + leg] if force > numbers[CONTACT] else -dt
+        slip = numbers[TOUCHDOWN_SLIP] * np.exp(-max(age, 0.0) / numbers[TOUCHDOWN_TIME])
+        share = (force - numbers[CONTACT]) / (numbers[TRUSTED] - numbers[CONTACT])
+        trust = min(max(share, LEAST_TRUST), 1.0)
+        memory[1 + leg] = age + dt
+        level, factor = numbers[FOOT_DRIFT] / trust + slip, 1.0
+        if trust > LEAST_TRUST:
+            is_carried = True
+            velocities[leg, :2] = (numbers[VELOCITY] / trust) ** 2 + slip * slip
+            velocities[leg, 2] = velocities[leg, 0] + numbers[VERTICAL] ** 2
+            factor = slip_factor(x, P, foot, velocities[leg], numbers[GATE])
+            velocities[leg] *= factor
+        for k in range(3):
+            drift = level if k < 2 else level + numbers[VERTICAL]
+            if rests:
+                drift = numbers[STILL_DRIFT]
+            P[_E_FEET + 3 * leg + k, _E_FEET + 3 * leg + k] += factor * (drift * dt) ** 2
+            x[_FEET + 3 * leg + k] += dt * foot[6 + k]
+        z = 2 + 3 * leg
+        heights[leg] = radius - numbers[COMPLIANCE] * force - x[_FEET + z]
+        spread = P[_E_FEET + z, _E_FEET + z] + numbers[HEIGHT] ** 2
+        settled = 3.0 * numbers[TOUCHDOWN_TIME]
+        if not age < settled <= age + dt or heights[leg] ** 2 > _HEIGHT_GATE * spread:
+            heights[leg] = np.inf
+    for leg in range(4):
+        take_in_leg(x, P, dx, column, feet[leg], leg, numbers[PLACE] ** 2, velocities[leg])
+        if heights[leg] != np.inf:
+            off = heights[leg]
+            take_in_one(P, dx, column, _E_FEET + 2 + 3 * leg, off, numbers[HEIGHT] ** 2)
+    if rests:
+        take_in_rest(x, P, dx, column, reading, numbers)
+    elif not is_carried:
+        for k in range(3):
+            take_in_one(P, dx, column, 3 + k, -x[3 + k], numbers[REST] ** 2)
+    correct(x, dx)
+    for k in range(3):
+        w[k] = reading[1 + k] - x[_GYRO_BIAS + k]
+    report(x, reading, w, p_imu, R, q, v)

@@ -1,0 +1,196 @@
+"""The estimator's kernel against the same filter in numpy: all numbers at once, by an inverse.
+
+Its Jacobians are finite differences of the functions that they are of, and its feet and their
+velocities come from Pinocchio; nothing is shared with the kernel but the equations of
+``robot.estimator`` (Kalman, J. Basic Eng. 82, 1960; Sola, *Quaternion kinematics for the
+error-state Kalman filter*, 2017, sec. 7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from go2_wbc.legs import FOOT_NAMES
+from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
+from go2_wbc.robot.model import RobotModel
+from tests.engine_helpers import STAND_JOINTS
+
+STEP, COUNT = 0.002, 40  # s; of readings
+NUDGE = 1e-6
+EXACT = 2e-5  # m, m/s, rad; what is left is the differences' rounding, and dR / db half a step
+P_BASE_IMU = np.array([-0.02557, 0.0, 0.04232])  # m; the URDF's imu_joint
+CONFIG = EstimatorConfig()
+FORCES = {
+    "some feet half loaded": np.array([40.0, 15.0, 12.0, 0.0]),
+    "all feet in the air": np.zeros(4),
+    "all feet on the ground": np.array([40.0, 35.0, 60.0, 90.0]),
+}
+
+
+def readings(forces: np.ndarray) -> list[SensorReading]:
+    """A robot that turns and kicks, with much noise; its feet come down one after the other."""
+    rng = np.random.default_rng(5)
+    return [
+        SensorReading(
+            time=STEP * tick,
+            gyro=np.array([0.4, -0.3, 0.5]) + 0.1 * rng.standard_normal(3),
+            accelerometer=np.array([0.5, -0.3, 9.6]) + rng.standard_normal(3),
+            q_joints=STAND_JOINTS + 0.01 * rng.standard_normal(12),
+            v_joints=rng.standard_normal(12),
+            tau=np.zeros(12),
+            foot_forces=forces * (tick > 3 * np.arange(4)),
+        )
+        for tick in range(COUNT)
+    ]
+
+
+class Twin:
+    """The filter, written for reading: x is p, v, R, gyro bias, force bias, feet."""
+
+    def __init__(self, model: RobotModel, first: SensorReading) -> None:
+        self.model, self.pin, self.data = model, model.pin_model, model.pin_model.createData()
+        up = first.accelerometer
+        roll, pitch = np.arctan2(up[1], up[2]), np.arctan2(-up[0], np.hypot(up[1], up[2]))
+        R = pin.rpy.rpyToMatrix(roll, pitch, 0.0)
+        feet = self.legs(first, np.zeros(3), R)[0]
+        p = R @ P_BASE_IMU
+        p[2] = model.foot_radius - feet[:, 2].min()
+        self.x = [p, np.zeros(3), R, np.zeros(3), np.zeros(3), (p + feet).ravel()]
+        tilt = [CONFIG.tilt, CONFIG.tilt, 1e-4]
+        biases = [CONFIG.gyro_bias] * 3 + [CONFIG.accelerometer_bias] * 3
+        self.P = np.diag([0.001] * 3 + [0.1] * 3 + tilt + biases + [0.01] * 12) ** 2
+        self.age, self.gyro = np.zeros(4), first.gyro
+        self.step(first, 0.0)
+
+    @staticmethod
+    def plus(x: list[np.ndarray], error: np.ndarray) -> list[np.ndarray]:
+        """The state that is off by ``error`` (27,)."""
+        parts = np.split(error, [3, 6, 9, 12, 15])
+        return [
+            pin.exp3(part) @ number if place == 2 else number + part
+            for place, (number, part) in enumerate(zip(x, parts, strict=True))
+        ]
+
+    @staticmethod
+    def minus(a: list[np.ndarray], b: list[np.ndarray]) -> np.ndarray:
+        """The error (27,) by which ``a`` is off ``b``."""
+        pairs = enumerate(zip(a, b, strict=True))
+        return np.concatenate([pin.log3(i @ j.T) if n == 2 else i - j for n, (i, j) in pairs])
+
+    @staticmethod
+    def jacobian(function: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Of a function of the error, at no error."""
+        return np.column_stack(
+            [(function(e) - function(-e)) / (2 * NUDGE) for e in NUDGE * np.eye(27)]
+        )
+
+    def legs(
+        self, reading: SensorReading, w: np.ndarray, R: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Places of the feet, velocities of the IMU by each, those of rolling feet: world."""
+        q = np.concatenate([np.zeros(6), [1.0], reading.q_joints])
+        v = np.concatenate([np.zeros(3), w, reading.v_joints])
+        pin.forwardKinematics(self.pin, self.data, q, v)
+        place, velocity, rolling = np.empty((4, 3)), np.empty((4, 3)), np.zeros((4, 3))
+        for leg, name in enumerate(FOOT_NAMES):
+            frame = self.pin.getFrameId(name)
+            place[leg] = pin.updateFramePlacement(self.pin, self.data, frame).translation
+            u = pin.getFrameVelocity(self.pin, self.data, frame, pin.LOCAL_WORLD_ALIGNED)
+            calf = R @ u.angular
+            radius = self.model.foot_radius - 0.5 * CONFIG.compliance * reading.foot_forces[leg]
+            rolling[leg] = np.cross(calf, [0.0, 0.0, radius])
+            velocity[leg] = rolling[leg] - R @ (u.linear - np.cross(w, P_BASE_IMU))
+        return (place - P_BASE_IMU) @ R.T, velocity, rolling
+
+    def step(self, reading: SensorReading, dt: float) -> None:
+        """Take in a reading."""
+        c, gyro, noise = CONFIG, 0.5 * (reading.gyro + self.gyro), np.zeros(27)
+        self.gyro, before = reading.gyro, self.x
+        w = reading.gyro - before[3]
+
+        def moved(error: np.ndarray) -> list[np.ndarray]:
+            p, v, R, b, d, f = self.plus(before, error)
+            halfway = R @ pin.exp3(0.5 * dt * (gyro - b))
+            a = halfway @ (reading.accelerometer - d) - [0.0, 0.0, self.model.gravity]
+            return [
+                *(p + dt * v + 0.5 * dt**2 * a, v + dt * a),
+                *(R @ pin.exp3(dt * (gyro - b)), b, d, f),
+            ]
+
+        x = moved(np.zeros(27))
+        F = self.jacobian(lambda e: self.minus(moved(e), x))
+        noise[:3], noise[3:6] = 0.5 * c.acceleration * dt**2, c.acceleration * dt
+        noise[6:9], noise[9:12] = c.gyro * dt, c.gyro_bias_walk * dt**0.5
+        noise[12:15] = c.accelerometer_bias_walk * dt**0.5
+        P = F @ self.P @ F.T + np.diag(noise**2)
+        place, velocity, rolling = self.legs(reading, w, x[2])
+        trust = np.clip((reading.foot_forces - c.contact_force) / 20.0, 1e-3, 1.0)
+        self.age = np.where(reading.foot_forces > c.contact_force, self.age, -dt)
+        slip = c.touchdown_slip * np.exp(-np.maximum(self.age, 0.0) / c.touchdown_time)
+        x[5] = x[5] + dt * rolling.ravel()
+        seen = x[2]
+        told: list[tuple[Callable[[list[np.ndarray]], np.ndarray], np.ndarray]] = []
+        for leg in range(4):
+            level = (c.velocity / trust[leg]) ** 2 + slip[leg] ** 2
+            variance = np.array([level, level, level + c.vertical**2])
+            own = slice(3 * leg, 3 * leg + 3)
+            chi = ((velocity[leg] - x[1]) ** 2 / (np.diag(P)[3:6] + variance)).sum()
+            stands = trust[leg] > 1e-3
+            factor = max(1.0, chi / c.slip**2) if stands else 1.0
+            drift = c.foot_drift / trust[leg] + slip[leg] + np.array([0.0, 0.0, c.vertical])
+            P[15:, 15:][own, own] += np.diag(factor * (drift * dt) ** 2)
+            s, m = place[leg], velocity[leg]
+            told.append(
+                (
+                    lambda y, s=s, own=own: y[2] @ seen.T @ s - y[5][own] + y[0],
+                    np.full(3, c.place**2),
+                )
+            )
+            if stands:
+                told.append((lambda y, m=m: y[2] @ seen.T @ m - y[1], factor * variance))
+            if self.age[leg] < 3 * c.touchdown_time <= self.age[leg] + dt:
+                z, height = slice(own.stop - 1, own.stop), np.full(1, c.height**2)
+                ground = self.model.foot_radius - c.compliance * reading.foot_forces[leg]
+                if (x[5][z] - ground) ** 2 < 9.0 * (P[15 + z.start, 15 + z.start] + height):
+                    told.append((lambda y, z=z, ground=ground: y[5][z] - ground, height))
+        if not (trust > 1e-3).any():
+            told.append((lambda y: y[1], np.full(3, c.rest**2)))
+        self.age = self.age + dt
+        self._correct(x, P, told)
+
+    def _correct(
+        self,
+        x: list[np.ndarray],
+        P: np.ndarray,
+        told: list[tuple[Callable[[list[np.ndarray]], np.ndarray], np.ndarray]],
+    ) -> None:
+        """Take in numbers that should be 0, with their variances."""
+
+        def off(error: np.ndarray) -> np.ndarray:
+            return np.concatenate([number(self.plus(x, error)) for number, _ in told])
+
+        H, V = self.jacobian(off), np.diag(np.concatenate([variance for _, variance in told]))
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + V)
+        self.x, self.P = self.plus(x, -K @ off(np.zeros(27))), P - K @ H @ P
+
+
+@pytest.mark.parametrize("case", FORCES)
+def test_the_estimate_is_that_of_the_documented_filter(case: str) -> None:
+    model = RobotModel()
+    given = readings(FORCES[case])
+    estimator, twin = StateEstimator(model), Twin(model, given[0])
+    states = [estimator.update(reading) for reading in given]
+    for reading in given[1:]:
+        twin.step(reading, STEP)
+    p, v, R, b, *_ = twin.x
+    w = given[-1].gyro - b
+    found = states[-1]
+    assert found.R_world_base == pytest.approx(R, abs=EXACT)
+    assert found.q[:3] == pytest.approx(p - R @ P_BASE_IMU, abs=EXACT)
+    assert found.v[:3] == pytest.approx(R.T @ v - np.cross(w, P_BASE_IMU), abs=EXACT)
+    assert found.v[3:6] == pytest.approx(w, abs=EXACT)
+    assert np.abs(v).max() > 1e2 * EXACT
