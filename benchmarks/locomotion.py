@@ -10,6 +10,8 @@ and masses within 10 %, of which the controller is not told. Gaits and weights w
 - mean absolute error: mean of |velocity - command|, oscillation within the stride included;
 - turning: from the heading (unwrapped) at both ends of the window;
 - saturated ticks: share of ticks in which some motor gives all it has at its speed.
+
+The rows of the group ``unknown`` are those of ``benchmarks.unknown_world``.
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
 from benchmarks.steps import plant_of
 from benchmarks.trials import Trial, TrialRobot
+from benchmarks.unknown_world import SCENARIOS as UNKNOWN
 from controller.cli.common import Subparsers, add_parser
 from controller.motion_measurement import FULL
 from go2_wbc.config import Config
@@ -146,8 +149,12 @@ RUNS = (
     Run("pace", "pace", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
     Run("pronk", "pronk", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
 )
-SCENARIOS = tuple(
-    Scenario(run.name, run.metrics, partial(measure_run, run=run), group=run.group) for run in RUNS
+SCENARIOS = (
+    *(
+        Scenario(run.name, run.metrics, partial(measure_run, run=run), group=run.group)
+        for run in RUNS
+    ),
+    *UNKNOWN,
 )
 """In the order of the report."""
 
