@@ -19,6 +19,7 @@ from jaxtyping import Float
 
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
+from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs, Terrain
@@ -109,11 +110,13 @@ class Unknown:
         )
 
 
-def measure(trial: Trial, unknown: Unknown, first_seed: int = FIRST_SEED) -> Measurement:
+def measure(
+    trial: Trial, unknown: Unknown, first_seed: int = FIRST_SEED, config: Config | None = None
+) -> Measurement:
     """Stand up, walk, come to rest, stand; see the module's docstring."""
     values = {f"{unknown.name}.done": 0.0}
     try:
-        with TrialRobot(unknown.plant(first_seed + trial.seed)) as robot:
+        with TrialRobot(unknown.plant(first_seed + trial.seed), config) as robot:
             robot.require(robot.go2.stand())
             if unknown.speed:
                 _walk(robot, unknown, values)

@@ -50,9 +50,11 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.active_set",  # compiled: a kernel cannot be wrapped
         "go2_wbc.kernels.bounds",
         "go2_wbc.kernels.condensed",
+        "go2_wbc.kernels.contact",
         "go2_wbc.kernels.elimination",
         "go2_wbc.kernels.friction",
         "go2_wbc.kernels.goals",
+        "go2_wbc.kernels.ground",
         "go2_wbc.kernels.inputs",
         "go2_wbc.kernels.kinematics",
         "go2_wbc.kernels.landing",
@@ -65,6 +67,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.preview",
         "go2_wbc.kernels.rigid_body",
         "go2_wbc.kernels.simulation",
+        "go2_wbc.kernels.slip",
         "go2_wbc.kernels.supervision",
         "go2_wbc.kernels.vectors",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
