@@ -11,6 +11,8 @@ seeds 0 to 9; those judged begin at ``FIRST_SEED``.
 - mean absolute error: mean of |velocity - command|, oscillation within the stride included;
 - turning: from the heading (unwrapped) at both ends of the window;
 - saturated ticks: share of ticks in which some motor gives all it has at its speed.
+
+The rows of the group ``unknown`` are those of ``benchmarks.unknown_world``.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from benchmarks import sensed
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
 from benchmarks.steps import plant_of
+from benchmarks.unknown_world import SCENARIOS as UNKNOWN
 from controller.cli.common import Subparsers, add_parser
 from controller.motion_measurement import FULL
 from controller.sweeps.trials import Trial, TrialRobot
@@ -163,6 +166,7 @@ SCENARIOS = (
         for run in (*RUNS, *SENSED)
     ),
     *sensed.SCENARIOS,
+    *UNKNOWN,
 )
 """In the order of the report."""
 

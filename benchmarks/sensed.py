@@ -15,7 +15,7 @@ from jaxtyping import Float
 
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.steps import plant_of
-from benchmarks.trials import Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.rotations import yaw_rotation
 

@@ -60,8 +60,14 @@ def base_height(snapshot: Snapshot) -> float:
 
 
 def com_height(snapshot: Snapshot) -> float:
-    """Height [m] of the centre of mass above the ground."""
-    return float(snapshot.p_world_com[2]) - ground_height(snapshot)
+    """Height [m] of the centre of mass above the plane through the feet, straight below it.
+
+    On a slope or with feet on steps the lowest foot says little.
+    """
+    feet = snapshot.p_world_feet - snapshot.p_world_com
+    plane = np.column_stack([np.ones(4), feet[:, :2]])
+    below = np.linalg.lstsq(plane, feet[:, 2], rcond=None)[0]
+    return FOOT_RADIUS - float(below[0])
 
 
 def is_still(snapshot: Snapshot) -> bool:

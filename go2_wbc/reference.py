@@ -98,6 +98,8 @@ class Reference:
         f_world_feet: forces [N] near which those of the stance feet are kept.
         force_weight: by which they are, 1e-6 to 100; 0 for an even share of the robot's weight,
             with the controller's own weight.
+        friction: greatest coefficient that the stance feet may count on; 0 for the controller's
+            own, which is never exceeded.
         stance: feet in stance, from ``legs``.
     """
 
@@ -113,6 +115,7 @@ class Reference:
     a_joints: Float[np.ndarray, "12"]
     f_world_feet: Float[np.ndarray, "4 3"] = field(default_factory=partial(np.zeros, (4, 3)))
     force_weight: float = 0.0
+    friction: float = 0.0
     stance: Bool[np.ndarray, "4"] = field(init=False)
     _row: Float[np.ndarray, " size"] | None = field(init=False, repr=False, default=None)
 
@@ -150,7 +153,7 @@ class Reference:
             return view("legs") == LegTask.STANCE
         if name == "legs":
             return tuple(_LEG_TASKS[int(task)] for task in view("legs").tolist())
-        if name == "force_weight":
+        if name in ("force_weight", "friction"):
             return float(view(name))
         return view(name)
 
@@ -187,17 +190,20 @@ class Reference:
                 self.a_joints,
                 self.f_world_feet,
                 self.force_weight,
+                self.friction,
             ]
             try:
                 row = REFERENCE.pack(values)
             except ValueError as error:
                 raise CommandError(f"reference: {error}") from error
-            weight = float(row[-1])
+            weight = float(REFERENCE.view(row, "force_weight"))
             if np.isfinite(weight) and weight != 0.0 and not LEAST_WEIGHT <= weight <= MOST_WEIGHT:
                 raise CommandError(
                     f"reference: force_weight must be 0 or {LEAST_WEIGHT:g} to {MOST_WEIGHT:g}, "
                     f"got {weight:g}"
                 )
+            if self.friction < 0.0:
+                raise CommandError(f"reference: friction must be 0 or more, got {self.friction:g}")
             _set(self, "_row", row)
         return row
 

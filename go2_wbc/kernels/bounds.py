@@ -20,6 +20,7 @@ MOST_ROWS = 44
 _S, _T, _P = SNAPSHOT.start, REFERENCE.start, PROGRAM.start
 _M, _H, _J_CONTACTS = _S["mass_matrix"], _S["bias"], _S["J_contacts"]
 _LEGS, _F_MIN, _F_MAX = (_T[n] for n in ("legs", "normal_force_min", "normal_force_max"))
+_LESS = _T["friction"]
 _FRICTION, _PEAK, _KNEE = _P["friction"], _P["peak_torque"], _P["knee_speed"]
 _NO_LOAD, _Q_LOWER, _Q_UPPER = _P["no_load_speed"], _P["q_lower"], _P["q_upper"]
 _SPEED, _BRAKING, _HORIZON = _P["speed"], _P["braking"], _P["horizon"]
@@ -33,6 +34,13 @@ def is_within(value, lower, upper):
         and lower - value <= VIOLATION * (1.0 + abs(lower))
         and value - upper <= VIOLATION * (1.0 + abs(upper))
     )
+
+
+@subroutine("f8(f8[::1], f8[::1])")
+def friction_for(target, program):
+    """What the feet may count on: ``FrictionPyramid``."""
+    own, less = program[_FRICTION], target[_LESS]
+    return min(own, less) if less > 0.0 else own
 
 
 @subroutine("Tuple((f8, f8))(f8[::1], i8, f8)")
@@ -64,7 +72,7 @@ def acceleration_range(program, n, q, speed):
 @subroutine("b1(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
 def are_met(snapshot, target, program, z, tau):
     """Whether a decision and its torques keep every bound; not if a number is not finite."""
-    mu = program[_FRICTION]
+    mu = friction_for(target, program)
     for leg in range(4):
         if target[_LEGS + leg] != STANCE:
             continue
@@ -87,7 +95,7 @@ def are_met(snapshot, target, program, z, tau):
 @subroutine("i8(f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1])")
 def bound_forces(target, program, C, lower, upper):
     """Rows of ``FrictionPyramid``; returns how many."""
-    mu = program[_FRICTION]
+    mu = friction_for(target, program)
     count = 0
     for leg in range(4):
         if target[_LEGS + leg] != STANCE:

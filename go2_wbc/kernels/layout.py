@@ -116,6 +116,7 @@ REFERENCE = Layout(
     a_joints=(12,),
     f_world_feet=(4, 3),
     force_weight=(),
+    friction=(),
 )
 """Of ``reference.Reference`` and its ``BodyTarget``."""
 
@@ -166,6 +167,15 @@ PLANNER = Layout(
     liftoff=(4, 3),
     was_stance=(4,),
     is_awaited=(4,),
+    friction=(),
+    loaded=(4,),
+    sliding=(4,),
+    is_early=(4,),
+    since=(4,),
+    slope=(2,),
+    p_seen=(2,),
+    p_met=(4, 3),
+    roughness=(),
 )
 """State of the locomotion planner from tick to tick."""
 
@@ -200,6 +210,12 @@ LOCOMOTION = Layout(
     gravity=(),
     foot_radius=(),
     p_base_feet_nominal=(4, 3),
+    slip=(8,),
+    contact=(2,),
+    ground=(6,),
+    least_determinant=(),
+    most_slope=(),
+    mid_swing=(),
 )
 """Numbers of the locomotion planner: gait, configuration, robot."""
 

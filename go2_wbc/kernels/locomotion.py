@@ -10,7 +10,18 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.kernels.compilation import kernel, subroutine
+from go2_wbc.kernels.contact import follow_contact, loaded_time
+from go2_wbc.kernels.ground import (
+    apex_raise,
+    carry_ground,
+    ground_at,
+    learn_ground,
+    note_stumble,
+    tilt,
+)
 from go2_wbc.kernels.layout import LOCOMOTION, PLANNER, REFERENCE, SNAPSHOT
+from go2_wbc.kernels.slip import observe_slip
+from go2_wbc.kernels.vectors import cross
 
 TIE = 1e-9
 """As ``contacts.TIE`` and ``swing.TIE``."""
@@ -20,7 +31,7 @@ _N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLANNER.start, LOCOMOTION.star
 _Q, _P_COM, _V_COM, _P_FEET = (_N[n] for n in ("q", "p_world_com", "v_world_com", "p_world_feet"))
 _YAW, _POSITION, _VELOCITY = (_S[n] for n in ("yaw", "position", "velocity"))
 _STEPPING, _PHASE_TIME, _TIME = (_S[n] for n in ("is_stepping", "phase_time", "time"))
-_GROUND, _HEIGHT_OFFSET = _S["ground"], _S["height_offset"]
+_GROUND, _SLOPE, _HEIGHT_OFFSET = (_S[n] for n in ("ground", "slope", "height_offset"))
 _LIFTOFF, _WAS_STANCE, _AWAITED = (_S[n] for n in ("liftoff", "was_stance", "is_awaited"))
 _PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
 _GAIT, _REST, _STRIDE, _RATES = (_C[n] for n in ("period", "rest_period", "stride", "adaptation"))
@@ -30,7 +41,7 @@ _LEASH, _YAW_LEASH, _REACH = (_C[n] for n in ("position_leash", "yaw_leash", "fo
 _F_MIN, _F_MAX, _RAMP = (_C[n] for n in ("normal_force_min", "normal_force_max", "load_ramp"))
 _SETTLE_SPEED, _SETTLED = _C["settle_speed"], _C["settled_command"]
 _CAPTURE, _SQUARE = _C["capture_margin"], _C["square_tolerance"]
-_APEX, _DEPTH, _GROUND_SHARE = (_C[n] for n in ("apex", "touchdown_depth", "ground_share"))
+_APEX, _DEPTH, _MID_SWING = (_C[n] for n in ("apex", "touchdown_depth", "mid_swing"))
 _RATE, _WINDOW, _LIMIT = (
     _C[n] for n in ("correction_rate", "correction_window", "correction_limit")
 )
@@ -39,7 +50,7 @@ _IS_COM, _BODY_P, _BODY_V = (_T[n] for n in ("is_com", "p_world", "v_world"))
 _BODY_R, _BODY_W = _T["R_world_base"], _T["w_world"]
 _LEGS, _T_F_MIN, _T_F_MAX = (_T[n] for n in ("legs", "normal_force_min", "normal_force_max"))
 _FOOT_P, _FOOT_V, _FOOT_A = (_T[n] for n in ("p_world_feet", "v_world_feet", "a_world_feet"))
-_JOINT_Q = _T["q_joints"]
+_JOINT_Q, _T_FRICTION, _FRICTION = _T["q_joints"], _T["friction"], _S["friction"]
 
 
 @subroutine("f8(f8[::1])")
@@ -190,16 +201,17 @@ def integrate(snapshot, s, c, dt, command):
     if distance > c[_LEASH]:
         s[_POSITION] = snapshot[_P_COM] + x * c[_LEASH] / distance
         s[_POSITION + 1] = snapshot[_P_COM + 1] + y * c[_LEASH] / distance
+    carry_ground(snapshot, s)
     sag = s[_GROUND] + c[_HEIGHT] - snapshot[_P_COM + 2]
     counted = min(max(sag, -c[_WINDOW]), c[_WINDOW])
     offset = s[_HEIGHT_OFFSET] + c[_RATE] * dt * counted
     s[_HEIGHT_OFFSET] = min(max(offset, -c[_LIMIT]), c[_LIMIT])
 
 
-@subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], b1[::1])")
-def note_liftoffs(snapshot, contact, s, c, stance):
-    """Remember where feet leave the ground; low-pass its height where they meet it."""
-    landed, height = 0, 0.0
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], b1[::1], f8[::1])")
+def note_liftoffs(snapshot, contact, s, c, stance, progress):
+    """Remember where feet leave the ground; learn of it where they meet it."""
+    met, stumbles = np.zeros(4, dtype=np.bool_), False
     for leg in range(4):
         was_stance = s[_WAS_STANCE + leg] != 0.0
         if was_stance and not stance[leg]:
@@ -207,15 +219,17 @@ def note_liftoffs(snapshot, contact, s, c, stance):
                 s[_LIFTOFF + 3 * leg + i] = snapshot[_P_FEET + 3 * leg + i]
         if not stance[leg]:
             s[_AWAITED + leg] = 0.0
+            is_middle = abs(progress[leg] - 0.5) <= c[_MID_SWING] + TIE
+            stumbles |= is_middle and contact[leg] != 0.0
         elif not was_stance:
             s[_AWAITED + leg] = 1.0
         if s[_AWAITED + leg] != 0.0 and contact[leg] != 0.0:
-            landed += 1
-            height += snapshot[_P_FEET + 3 * leg + 2]
+            met[leg] = True
             s[_AWAITED + leg] = 0.0
         s[_WAS_STANCE + leg] = 1.0 if stance[leg] else 0.0
-    if landed:
-        s[_GROUND] += c[_GROUND_SHARE] * (height / landed - c[_RADIUS] - s[_GROUND])
+    learn_ground(snapshot, s, c, met)
+    if stumbles:
+        note_stumble(s, c)
 
 
 @subroutine("Tuple((f8, f8, f8))(f8)")
@@ -236,7 +250,7 @@ def swing(leg, s, c, progress, goal, target):
         target[_FOOT_P + k + i] = start[i] + x * delta
         target[_FOOT_V + k + i] = dx / duration * delta
         target[_FOOT_A + k + i] = ddx / duration**2 * delta
-    apex = max(start[2], goal[2]) + c[_APEX]
+    apex = max(start[2], goal[2]) + c[_APEX] + apex_raise(s, c)
     is_rising = progress < 0.5 - TIE
     begin = start[2] if is_rising else apex
     delta = (apex if is_rising else goal[2] - c[_DEPTH]) - begin
@@ -261,22 +275,52 @@ def foothold(leg, snapshot, s, c, nominal, remaining, goal):
     share = min(1.0, c[_REACH] / max(np.hypot(x, y), TINY))
     goal[0] = nominal[leg, 0] + x * share + v_x * remaining
     goal[1] = nominal[leg, 1] + y * share + v_y * remaining
-    goal[2] = s[_GROUND] + c[_RADIUS]
+    goal[2] = ground_at(s, goal[0], goal[1]) + c[_RADIUS]
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1])")
 def fill_body(s, c, target):
-    """The trunk's reference: integrated pose, commanded velocity, level."""
+    """The trunk's reference: integrated pose, commanded velocity, along the ground."""
     cosine, sine = np.cos(s[_YAW]), np.sin(s[_YAW])
     target[_IS_COM] = 1.0
     target[_BODY_P], target[_BODY_P + 1] = s[_POSITION], s[_POSITION + 1]
-    target[_BODY_P + 2] = s[_GROUND] + c[_HEIGHT] + s[_HEIGHT_OFFSET]
-    target[_BODY_V] = cosine * s[_VELOCITY] - sine * s[_VELOCITY + 1]
-    target[_BODY_V + 1] = sine * s[_VELOCITY] + cosine * s[_VELOCITY + 1]
-    target[_BODY_R], target[_BODY_R + 1] = cosine, -sine
-    target[_BODY_R + 3], target[_BODY_R + 4] = sine, cosine
-    target[_BODY_R + 8] = 1.0
+    target[_BODY_P + 2] = ground_at(s, s[_POSITION], s[_POSITION + 1])
+    target[_BODY_P + 2] += c[_HEIGHT] + s[_HEIGHT_OFFSET]
+    v_x = cosine * s[_VELOCITY] - sine * s[_VELOCITY + 1]
+    v_y = sine * s[_VELOCITY] + cosine * s[_VELOCITY + 1]
+    target[_BODY_V], target[_BODY_V + 1] = v_x, v_y
+    target[_BODY_V + 2] = s[_SLOPE] * v_x + s[_SLOPE + 1] * v_y
+    a, b = tilt(s, c)
+    rise = a * cosine + b * sine
+    length, steep = np.sqrt(1.0 + rise * rise), np.sqrt(1.0 + a * a + b * b)
+    x = cosine / length, sine / length, rise / length
+    z = -a / steep, -b / steep, 1.0 / steep
+    y = cross(z, x)
+    for i in range(3):
+        target[_BODY_R + 3 * i] = x[i]
+        target[_BODY_R + 3 * i + 1] = y[i]
+        target[_BODY_R + 3 * i + 2] = z[i]
     target[_BODY_W + 2] = s[_VELOCITY + 2]
+
+
+@subroutine("void(f8[::1], f8[::1], f8[::1], b1[::1], b1[::1], f8[::1], f8[::1], f8[::1])")
+def fill_feet(snapshot, s, c, stance, stands, elapsed, remaining, target):
+    """What each leg does, its load, and the way of a foot in the air."""
+    nominal, goal = np.empty((4, 2)), np.empty(3)
+    nominal_feet(snapshot, c, nominal)
+    for leg in range(4):
+        target[_LEGS + leg] = 0.0 if stands[leg] else 1.0
+        for i in range(3):
+            target[_FOOT_P + 3 * leg + i] = snapshot[_P_FEET + 3 * leg + i]
+        share = 0.0
+        if stands[leg]:
+            loaded = loaded_time(s, leg, stance[leg], elapsed[leg], remaining[leg])
+            share = min(loaded / max(c[_RAMP], TIE), 1.0)
+        else:
+            foothold(leg, snapshot, s, c, nominal, remaining[leg], goal)
+            progress = elapsed[leg] / (elapsed[leg] + remaining[leg])
+            swing(leg, s, c, progress, goal, target)
+        target[_T_F_MIN + leg], target[_T_F_MAX + leg] = c[_F_MIN] * share, c[_F_MAX] * share
 
 
 @kernel("void(f8[::1], f8, f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
@@ -298,22 +342,17 @@ def plan(snapshot, time, contact, s, c, command, target):
             stance[leg], elapsed[leg], remaining[leg] = foot_phase(
                 s[_PHASE_TIME], s[_OFFSETS + leg], s[_PERIOD], s[_DUTY]
             )
-    note_liftoffs(snapshot, contact, s, c, stance)
-    target[:] = 0.0
-    fill_body(s, c, target)
-    nominal, goal = np.empty((4, 2)), np.empty(3)
-    nominal_feet(snapshot, c, nominal)
+    stands, progress = np.ones(4, dtype=np.bool_), np.zeros(4)
     for leg in range(4):
-        target[_LEGS + leg] = 0.0 if stance[leg] else 1.0
-        for i in range(3):
-            target[_FOOT_P + 3 * leg + i] = snapshot[_P_FEET + 3 * leg + i]
-        share = 0.0
-        if stance[leg]:
-            share = min(min(elapsed[leg], remaining[leg]) / max(c[_RAMP], TIE), 1.0)
-        else:
-            foothold(leg, snapshot, s, c, nominal, remaining[leg], goal)
-            progress = elapsed[leg] / (elapsed[leg] + remaining[leg])
-            swing(leg, s, c, progress, goal, target)
-        target[_T_F_MIN + leg], target[_T_F_MAX + leg] = c[_F_MIN] * share, c[_F_MAX] * share
+        if not stance[leg]:
+            progress[leg] = elapsed[leg] / (elapsed[leg] + remaining[leg])
+        touches, share = contact[leg] != 0.0, progress[leg]
+        stands[leg] = follow_contact(snapshot, s, c, leg, touches, stance[leg], share, dt)
+    observe_slip(snapshot, contact, s, c, stands, dt)
+    note_liftoffs(snapshot, contact, s, c, stance, progress)
+    target[:] = 0.0
+    target[_T_FRICTION] = s[_FRICTION]
+    fill_body(s, c, target)
+    fill_feet(snapshot, s, c, stance, stands, elapsed, remaining, target)
     for n in range(12):
         target[_JOINT_Q + n] = snapshot[_Q + 7 + n]

@@ -12,6 +12,7 @@ import numpy as np
 from go2_wbc.kernels.active_set import SOLVED
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.elimination import STANCE, solve_linear
+from go2_wbc.kernels.ground import ground_at, tilt
 from go2_wbc.kernels.layout import (
     FORCES,
     LOCOMOTION,
@@ -29,9 +30,9 @@ _N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLANNER.start, LOCOMOTION.star
 _Q, _V, _R, _M = (_N[n] for n in ("q", "v", "R_world_base", "mass_matrix"))
 _P_COM, _V_COM, _P_FEET = (_N[n] for n in ("p_world_com", "v_world_com", "p_world_feet"))
 _YAW, _POSITION, _VELOCITY = (_S[n] for n in ("yaw", "position", "velocity"))
-_PHASE_TIME, _GROUND, _HEIGHT_OFFSET = (_S[n] for n in ("phase_time", "ground", "height_offset"))
+_PHASE_TIME, _HEIGHT_OFFSET = _S["phase_time"], _S["height_offset"]
 _PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
-_STEPPING = _S["is_stepping"]
+_STEPPING, _SLOPE = _S["is_stepping"], _S["slope"]
 _ACCELERATION, _HEIGHT, _RADIUS = (_C[n] for n in ("acceleration", "height", "foot_radius"))
 _NOMINAL = _C["p_base_feet_nominal"]
 _STEP, _MASS, _GRAVITY = (MPC.start[n] for n in ("step", "mass", "gravity"))
@@ -90,6 +91,9 @@ def fill_goals(s, c, command, step, goals):
     """Pose and rate wanted at the end of each node: the command ramped and integrated."""
     velocity = s[_VELOCITY : _VELOCITY + 3].copy()
     yaw, x, y = s[_YAW], s[_POSITION], s[_POSITION + 1]
+    a, b = tilt(s, c)
+    steep = np.hypot(a, b)
+    share = np.arctan(steep) / steep if steep > 0.0 else 1.0
     goals[:] = 0.0
     for k in range(MPC_NODES):
         for i in range(3):
@@ -103,7 +107,9 @@ def fill_goals(s, c, command, step, goals):
         y += goals[k, 10] * step
         goals[k, 2], goals[k, 8] = yaw - s[_YAW], velocity[2]
         goals[k, 3], goals[k, 4] = x, y
-        goals[k, 5] = s[_GROUND] + c[_HEIGHT] + s[_HEIGHT_OFFSET]
+        goals[k, 0], goals[k, 1] = share * b, -share * a
+        goals[k, 5] = ground_at(s, x, y) + c[_HEIGHT] + s[_HEIGHT_OFFSET]
+        goals[k, 11] = s[_SLOPE] * goals[k, 9] + s[_SLOPE + 1] * goals[k, 10]
 
 
 @subroutine("void(f8[::1], f8, f8[:,::1], f8[:,::1])")
@@ -148,7 +154,6 @@ def fill_arms(snapshot, s, c, step, goals, landings, arms):
         for leg in range(4):
             wait = landings[k, leg] * period
             arm = arms[k, leg]
-            arm[2] = s[_GROUND] - com[2]
             if landings[k, leg] == 0.0:
                 foot = vector(snapshot, _P_FEET + 3 * leg)
                 arm[0] = foot[0] - com[0] - way_x
@@ -157,6 +162,7 @@ def fill_arms(snapshot, s, c, step, goals, landings, arms):
             elif landings[k, leg] < 1.0 - duty + TIE:
                 arm[0] = footholds[leg, 0] - com[0] - way_x
                 arm[1] = footholds[leg, 1] - com[1] - way_y
+                arm[2] = ground_at(s, footholds[leg, 0], footholds[leg, 1]) - com[2]
             else:
                 yaw = s[_YAW] + rate * wait
                 cosine, sine = np.cos(yaw), np.sin(yaw)
@@ -165,6 +171,7 @@ def fill_arms(snapshot, s, c, step, goals, landings, arms):
                 early = duty * period / 2 + wait - (k + 0.5) * step
                 arm[0] = base[0] - com[0] + hip_x + (goals[k, 9] - rate * hip_y) * early
                 arm[1] = base[1] - com[1] + hip_y + (goals[k, 10] + rate * hip_x) * early
+                arm[2] = ground_at(s, com[0] + arm[0], com[1] + arm[1]) - com[2]
 
 
 @subroutine("b1(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1])")

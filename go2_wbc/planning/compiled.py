@@ -7,16 +7,18 @@ from dataclasses import astuple
 import numpy as np
 
 from go2_wbc.contacts import DUTY_RATE, OFFSET_RATE, PERIOD_RATE, Gait
-from go2_wbc.kernels.layout import FORCES, LOCOMOTION, PLANNER, REFERENCE
+from go2_wbc.kernels.layout import FORCES, LOCOMOTION, MPC, PLANNER, REFERENCE
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.correction import CorrectionConfig
 from go2_wbc.planning.gait_clock import resting_gait
-from go2_wbc.planning.locomotion import (
+from go2_wbc.planning.ground import (
     GROUND_SHARE,
-    SETTLED_COMMAND,
-    GaitPlanner,
-    LocomotionConfig,
+    LEAST_DETERMINANT,
+    MOST_SLOPE,
+    GroundPlane,
 )
+from go2_wbc.planning.locomotion import MID_SWING, GaitPlanner, LocomotionConfig
+from go2_wbc.planning.trunk import SETTLED_COMMAND
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -40,7 +42,8 @@ class CompiledPlanner(GaitPlanner):
 
             self._steer = steer
         self._mpc, self._forces = config.mpc.numbers(model.mass, model.gravity), _nothing_planned()
-        self._foot_radius = model.foot_radius
+        self._foot_radius, self._most_friction = model.foot_radius, config.slip.most
+        self._mpc_friction, self._ground = config.mpc.friction, config.ground
         self._numbers = _numbers(model, gait, config)
         self._state = np.zeros(PLANNER.size)
         self._command = np.zeros(3)
@@ -49,6 +52,7 @@ class CompiledPlanner(GaitPlanner):
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state, standing."""
         feet, self._forces = snapshot.p_world_feet, _nothing_planned()
+        ground = GroundPlane(snapshot, self._foot_radius, self._ground)
         self._state = PLANNER.pack(
             [
                 snapshot.state.yaw,
@@ -57,12 +61,21 @@ class CompiledPlanner(GaitPlanner):
                 0.0,
                 0.0,
                 snapshot.state.time,
-                float(np.mean(feet[:, 2])) - self._foot_radius,
+                ground.height,
                 0.0,
                 *LOCOMOTION.views(self._numbers)[3:6],
                 feet,
                 np.ones(4),
                 np.zeros(4),
+                self._most_friction,
+                np.zeros(4),
+                np.zeros(4),
+                np.zeros(4),
+                np.full(4, np.inf),
+                ground.slope,
+                snapshot.p_world_com[:2],
+                feet,
+                0.0,
             ]
         )
 
@@ -94,6 +107,7 @@ class CompiledPlanner(GaitPlanner):
         self._plan(snapshot.row, state.time, self._contact, own, numbers, wanted, row)
         if self._steer is not None:
             forces = self._forces
+            self._mpc[MPC.start["friction"]] = min(self._mpc_friction, own[_STATE["friction"]])
             self._steer(snapshot.row, state.time, own, numbers, self._mpc, wanted, forces, row)
         return Reference.of_row(row)
 
@@ -137,5 +151,11 @@ def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndar
             model.gravity,
             model.foot_radius,
             model.p_base_feet_nominal,
+            astuple(config.slip),
+            astuple(config.contact),
+            astuple(config.ground),
+            LEAST_DETERMINANT,
+            MOST_SLOPE,
+            MID_SWING,
         ]
     )

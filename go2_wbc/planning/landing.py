@@ -28,7 +28,7 @@ from jaxtyping import Float
 
 from go2_wbc.contacts import TIE, ContactPhase
 from go2_wbc.legs import LEGS
-from go2_wbc.planning.locomotion import GROUND_SHARE
+from go2_wbc.planning.ground import GROUND_SHARE
 from go2_wbc.reference import Anchor, Footsteps, LegTask, Reference
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot

@@ -20,32 +20,33 @@ frame (z up, x along the reference's yaw).
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
-from go2_wbc.contacts import ContactPhase, Gait, standing
+from go2_wbc.contacts import TIE, ContactPhase, Gait, standing
 from go2_wbc.errors import ConfigError
 from go2_wbc.legs import LEGS
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.correction import SteadyStateCorrection
+from go2_wbc.planning.contact import ContactConfig, FootContacts
 from go2_wbc.planning.gait_clock import GaitClock
+from go2_wbc.planning.ground import GroundConfig, GroundPlane
 from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.planning.preview import Course, ForcePlanner
+from go2_wbc.planning.slip import SlipConfig, SlipObserver
 from go2_wbc.planning.swing import SwingConfig, swing_foot
-from go2_wbc.reference import BodyTarget, LegTask, Reference, TrackedPoint
+from go2_wbc.planning.trunk import TrunkLimits, TrunkPath
+from go2_wbc.reference import LegTask, Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_not_negative, require_positive
 
-SETTLED_COMMAND = 1e-3
-"""Ramped velocity command [m/s, rad/s] below which it counts as arrived at zero."""
 LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34
 """CoM heights [m] between which the legs can step."""
-GROUND_SHARE = 0.3
-"""Share of a landing foot's height that goes into the estimate of the ground's height."""
+MID_SWING = 0.2
+"""Share of a swing before and after its middle in which a foot that has contact stumbles."""
 _TINY = 1e-9
 """Length [m] that stands in for zero where one divides by it."""
 
@@ -72,6 +73,9 @@ class LocomotionConfig:
         square_tolerance: distance [m] of a foot from below its hip at which the robot stands
             squarely enough to stop stepping.
         swing: shape of the swing.
+        slip: estimate of the friction.
+        contact: when measured contacts count.
+        ground: estimate of its slope and roughness.
         mpc: planning of the forces ahead.
     """
 
@@ -89,12 +93,16 @@ class LocomotionConfig:
     capture_margin: float = 0.09
     square_tolerance: float = 0.02
     swing: SwingConfig = field(default_factory=SwingConfig)
+    slip: SlipConfig = field(default_factory=SlipConfig)
+    contact: ContactConfig = field(default_factory=ContactConfig)
+    ground: GroundConfig = field(default_factory=GroundConfig)
     mpc: MpcConfig = field(default_factory=MpcConfig)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a number that is out of range."""
         zero_is_valid = {"velocity_feedback", "normal_force_min"}
-        positive = {f.name for f in fields(self)} - zero_is_valid - {"swing", "mpc"}
+        parts = {"swing", "slip", "contact", "ground", "mpc"}
+        positive = {f.name for f in fields(self)} - zero_is_valid - parts
         require_positive(self, *sorted(positive))
         require_not_negative(self, *sorted(zero_is_valid))
         if not LEAST_HEIGHT <= self.height <= GREATEST_HEIGHT:
@@ -107,6 +115,12 @@ class LocomotionConfig:
                 f"normal_force_min must be below normal_force_max, got {self.normal_force_min} "
                 f"and {self.normal_force_max} N"
             )
+
+    @property
+    def trunk_limits(self) -> TrunkLimits:
+        """How fast the trunk's reference changes, and how far it may run ahead."""
+        rate = np.array([self.linear_acceleration] * 2 + [self.angular_acceleration])
+        return TrunkLimits(rate, self.position_leash, self.yaw_leash)
 
     def plans_forces(self, gait: Gait) -> bool:
         """Whether ``gait`` is walked with the forces planned ahead."""
@@ -146,6 +160,11 @@ class GaitPlanner(ABC):
 class LocomotionPlanner(GaitPlanner):
     """The planner in its readable form, to which ``compiled.CompiledPlanner`` is held."""
 
+    _trunk: TrunkPath
+    _slip: SlipObserver
+    _contacts: FootContacts
+    _ground: GroundPlane
+
     def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
         """Prepare a planner; ``start`` sets it on its way."""
         self._model = model
@@ -155,24 +174,22 @@ class LocomotionPlanner(GaitPlanner):
         self._ramp = config.ramp(gait)
         self._forces = ForcePlanner(model, config.mpc) if plans_forces else None
         self._is_stepping = False
-        self._yaw = 0.0
+        self._has_started = False
 
     def start(self, snapshot: Snapshot) -> None:
         """Begin from the measured state, standing."""
-        self._yaw = snapshot.state.yaw
-        self._position = snapshot.p_world_com[:2].copy()
-        self._velocity = np.zeros(3)
-        self._is_stepping = False
+        self._trunk = TrunkPath(snapshot, self._config.trunk_limits)
+        self._slip = SlipObserver(self._config.slip)
+        self._contacts = FootContacts(self._config.contact)
+        self._has_started, self._is_stepping = True, False
         self._clock.restart()
         if self._forces is not None:
             self._forces.start()
         self._last_time = snapshot.state.time
-        self._ground = float(np.mean(snapshot.p_world_feet[:, 2])) - self._model.foot_radius
+        self._ground = GroundPlane(snapshot, self._model.foot_radius, self._config.ground)
         self._liftoff = snapshot.p_world_feet.copy()
         self._was_stance = np.ones(4, dtype=bool)
         self._is_awaited = np.zeros(4, dtype=bool)
-        self._correction = SteadyStateCorrection()
-        self._height_offset = 0.0
 
     @property
     def is_stepping(self) -> bool:
@@ -182,7 +199,7 @@ class LocomotionPlanner(GaitPlanner):
     @property
     def heading(self) -> float:
         """Yaw [rad] of the reference; 0 before ``start``."""
-        return self._yaw
+        return self._trunk.yaw if self._has_started else 0.0
 
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""
@@ -195,16 +212,20 @@ class LocomotionPlanner(GaitPlanner):
         dt = snapshot.state.time - self._last_time
         self._last_time = snapshot.state.time
         self._advance_phase(snapshot, command, dt)
-        self._integrate(snapshot, command, dt)
-        self._correct_height(snapshot, dt)
+        self._trunk.integrate(snapshot, command, dt)
+        self._ground.carry(snapshot)
+        self._trunk.correct_height(snapshot, self._ground.height + self._config.height, dt)
         phase = self._phase(command, dt)
-        self._note_liftoffs(snapshot, phase.stance)
+        self._contacts.update(snapshot, phase, self._ground.above(snapshot.p_world_feet), dt)
+        stance = self._contacts.stance
+        self._slip.update(snapshot, stance, dt)
+        self._note_liftoffs(snapshot, phase)
         p, v, a = self._feet(snapshot, phase)
-        legs = tuple(LegTask.STANCE if s else LegTask.SWING for s in phase.stance)
+        legs = tuple(LegTask.STANCE if s else LegTask.SWING for s in stance)
         q = snapshot.state.joint_positions
-        load = phase.load_share(self._ramp)
+        load = self._contacts.load_share(phase, self._ramp)
         reference = Reference(
-            body=self._body(),
+            body=self._trunk.target(self._ground, self._config.height),
             legs=legs,
             normal_force_min=self._config.normal_force_min * load,
             normal_force_max=self._config.normal_force_max * load,
@@ -214,6 +235,7 @@ class LocomotionPlanner(GaitPlanner):
             q_joints=q,
             v_joints=np.zeros(12),
             a_joints=np.zeros(12),
+            friction=self._slip.friction,
         )
         if self._forces is None or not self._is_stepping:
             return reference
@@ -222,9 +244,9 @@ class LocomotionPlanner(GaitPlanner):
     def _phase(self, command: VelocityCommand, dt: float) -> ContactPhase:
         if not self._is_stepping:
             return standing().at(0.0)
-        x, y, turn = self._velocity
+        x, y, turn = self._trunk.velocity
         arm = np.hypot(*self._model.p_base_feet_nominal[0, :2])
-        is_resting = command.is_zero and self._is_settled()
+        is_resting = command.is_zero and self._trunk.is_settled
         self._clock.adapt(dt, float(np.hypot(x, y) + arm * abs(turn)), is_resting=is_resting)
         return self._clock.now()
 
@@ -234,15 +256,14 @@ class LocomotionPlanner(GaitPlanner):
         return Course(
             gait=self._clock.gait,
             time=self._clock.time,
-            yaw=self._yaw,
-            position=np.array(
-                [*self._position, self._ground + config.height + self._height_offset]
-            ),
-            velocity=self._velocity,
+            yaw=self._trunk.yaw,
+            position=self._trunk.target(self._ground, config.height).p_world,
+            velocity=self._trunk.velocity,
             command=np.array([command.linear_x, command.linear_y, command.angular_z]),
-            acceleration=np.array([config.linear_acceleration] * 2 + [config.angular_acceleration]),
+            acceleration=config.trunk_limits.rate,
             footholds=self._footholds(snapshot, remaining),
             ground=self._ground,
+            friction=self._slip.friction,
         )
 
     def _advance_phase(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> None:
@@ -262,16 +283,13 @@ class LocomotionPlanner(GaitPlanner):
 
     def _may_stop(self, snapshot: Snapshot) -> bool:
         slow = np.linalg.norm(snapshot.v_world_com[:2]) < self._config.settle_speed
-        return bool(slow and self._is_settled() and self._is_square(snapshot))
+        return bool(slow and self._trunk.is_settled and self._is_square(snapshot))
 
     def _is_square(self, snapshot: Snapshot) -> bool:
         """Whether the feet form the nominal rectangle; their mean may be off: the body moves."""
         offsets = snapshot.p_world_feet[:, :2] - self._nominal_feet(snapshot)
         offsets -= offsets.mean(axis=0)
         return bool(np.linalg.norm(offsets, axis=1).max() < self._config.square_tolerance)
-
-    def _is_settled(self) -> bool:
-        return bool(np.abs(self._velocity).max() < SETTLED_COMMAND)
 
     def _must_step(self, snapshot: Snapshot) -> bool:
         """Whether the capture point ``p + v / sqrt(g / h)`` is too far from the feet's middle."""
@@ -280,54 +298,17 @@ class LocomotionPlanner(GaitPlanner):
         middle = snapshot.p_world_feet[:, :2].mean(axis=0)
         return bool(np.linalg.norm(capture - middle) > self._config.capture_margin)
 
-    def _integrate(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> None:
-        """Ramp the velocity towards ``command``, integrate it to the pose, and apply the leash.
-
-        The velocity is in the heading frame; the heading is integrated first and turns it.
-        """
-        config = self._config
-        wanted = np.array([command.linear_x, command.linear_y, command.angular_z])
-        rate = np.array([config.linear_acceleration] * 2 + [config.angular_acceleration])
-        self._velocity += np.clip(wanted - self._velocity, -rate * dt, rate * dt)
-        self._yaw += self._velocity[2] * dt
-        lead = wrap_angle(self._yaw - snapshot.state.yaw)
-        self._yaw += np.clip(lead, -config.yaw_leash, config.yaw_leash) - lead
-        self._position = self._position + self._world_velocity()[:2] * dt
-        offset = self._position - snapshot.p_world_com[:2]
-        distance = float(np.linalg.norm(offset))
-        if distance > config.position_leash:
-            self._position = snapshot.p_world_com[:2] + offset * (config.position_leash / distance)
-
-    def _correct_height(self, snapshot: Snapshot, dt: float) -> None:
-        """Integrate the CoM's height error: a payload makes the robot sag for good."""
-        sag = self._ground + self._config.height - snapshot.p_world_com[2]
-        error = np.array([0.0, 0.0, sag, 0.0, 0.0, 0.0])
-        self._height_offset = float(self._correction.update(error, dt)[2])
-
-    def _world_velocity(self) -> Float[np.ndarray, "3"]:
-        return yaw_rotation(self._yaw) @ np.array([self._velocity[0], self._velocity[1], 0.0])
-
-    def _body(self) -> BodyTarget:
-        height = self._ground + self._config.height + self._height_offset
-        return BodyTarget(
-            point=TrackedPoint.COM,
-            p_world=np.array([*self._position, height]),
-            v_world=self._world_velocity(),
-            a_world=np.zeros(3),
-            R_world_base=yaw_rotation(self._yaw),
-            w_world=np.array([0.0, 0.0, self._velocity[2]]),
-            dw_world=np.zeros(3),
-        )
-
-    def _note_liftoffs(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"]) -> None:
-        """Remember where feet leave the ground; low-pass its height where they meet it."""
+    def _note_liftoffs(self, snapshot: Snapshot, phase: ContactPhase) -> None:
+        """Remember where feet leave the ground; learn of it where they meet it."""
+        stance, contact = phase.stance, snapshot.state.feet_in_contact
         lifted = self._was_stance & ~stance
         self._liftoff[lifted] = snapshot.p_world_feet[lifted]
         self._is_awaited = (self._is_awaited | ~self._was_stance) & stance
-        landed = self._is_awaited & snapshot.state.feet_in_contact
+        landed = self._is_awaited & contact
         if landed.any():
-            height = float(np.mean(snapshot.p_world_feet[landed, 2])) - self._model.foot_radius
-            self._ground += GROUND_SHARE * (height - self._ground)
+            self._ground.learn(snapshot.p_world_feet, landed)
+        if (contact & ~stance & (np.abs(phase.progress - 0.5) <= MID_SWING + TIE)).any():
+            self._ground.stumble()
         self._is_awaited &= ~landed
         self._was_stance = stance.copy()
 
@@ -348,10 +329,10 @@ class LocomotionPlanner(GaitPlanner):
         """
         config = self._config
         v = snapshot.v_world_com[:2]
-        v_ref = self._world_velocity()[:2]
+        v_ref = self._trunk.world_velocity[:2]
         hips = self._nominal_feet(snapshot)
         arms = hips - snapshot.state.p_world_base[:2]
-        spin = self._velocity[2] * np.column_stack([-arms[:, 1], arms[:, 0]])
+        spin = self._trunk.velocity[2] * np.column_stack([-arms[:, 1], arms[:, 0]])
         velocity = v + spin
         travel = velocity * self._clock.gait.stance_time / 2 + config.velocity_feedback * (
             v - v_ref
@@ -365,21 +346,22 @@ class LocomotionPlanner(GaitPlanner):
         self, snapshot: Snapshot, phase: ContactPhase
     ) -> tuple[Float[np.ndarray, "4 3"], Float[np.ndarray, "4 3"], Float[np.ndarray, "4 3"]]:
         p, v, a = snapshot.p_world_feet.copy(), np.zeros((4, 3)), np.zeros((4, 3))
-        swinging = ~phase.stance
-        if not swinging.any():
+        if self._contacts.stance.all():
             return p, v, a
-        remaining = np.where(swinging, phase.remaining, 0.0)
+        remaining = np.where(phase.stance, 0.0, phase.remaining)
         goals = self._footholds(snapshot, remaining)
         progress = phase.progress
-        touchdown_height = self._ground + self._model.foot_radius
+        shape = self._config.swing
+        shape = replace(shape, apex=shape.apex + self._ground.apex_raise)
         for leg in LEGS:
-            if swinging[leg]:
-                goal = np.array([*goals[leg], touchdown_height])
+            if not self._contacts.stance[leg]:
+                height = self._ground.at(goals[leg]) + self._model.foot_radius
+                goal = np.array([*goals[leg], height])
                 p[leg], v[leg], a[leg] = swing_foot(
                     self._liftoff[leg],
                     goal,
                     float(progress[leg]),
                     self._clock.gait.swing_time,
-                    self._config.swing,
+                    shape,
                 )
         return p, v, a

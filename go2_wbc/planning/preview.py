@@ -17,7 +17,8 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.contacts import TIE, Gait
-from go2_wbc.kernels.layout import MPC_NODES
+from go2_wbc.kernels.layout import MPC, MPC_NODES
+from go2_wbc.planning.ground import GroundPlane, tilt_vector
 from go2_wbc.planning.mpc import Horizon, MpcConfig
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
@@ -38,7 +39,8 @@ class Course:
         command: what it is ramped to.
         acceleration: how fast, per second.
         footholds: where the feet in the air come down [m].
-        ground: height of the ground [m].
+        ground: what is known of the ground.
+        friction: greatest coefficient that the feet may count on.
     """
 
     gait: Gait
@@ -49,7 +51,8 @@ class Course:
     command: Float[np.ndarray, "3"]
     acceleration: Float[np.ndarray, "3"]
     footholds: Float[np.ndarray, "4 2"]
-    ground: float
+    ground: GroundPlane
+    friction: float
 
 
 class ForcePlanner:
@@ -94,6 +97,8 @@ class ForcePlanner:
         """Solve for the forces of the first node, while its feet stand; False without solution."""
         horizon = look_ahead(snapshot, course, self._config.step, self._model)
         forces = np.empty((MPC_NODES, 4, 3))
+        friction = min(self._config.friction, course.friction)
+        self._numbers[MPC.start["friction"]] = friction
         parts = horizon.state, horizon.goals, horizon.share, horizon.arms, horizon.inertia
         outcome = self._solve(self._numbers, *parts, forces)
         share = np.maximum(horizon.share[0], self._config.least_share)
@@ -128,12 +133,15 @@ def _goals(course: Course, step: float) -> Float[np.ndarray, "nodes 12"]:
     """Pose and rate wanted at the end of each node: the command ramped and integrated."""
     goals = np.zeros((MPC_NODES, 12))
     velocity, yaw, position = course.velocity.copy(), course.yaw, course.position.copy()
+    slope, turn = course.ground.slope, tilt_vector(course.ground.tilt)
     most = course.acceleration * step
     for goal in goals:
         velocity = velocity + np.clip(course.command - velocity, -most, most)
         yaw += velocity[2] * step
         along = yaw_rotation(yaw) @ [velocity[0], velocity[1], 0.0]
+        along[2] = slope @ along[:2]
         position = position + along * step
+        goal[:2] = turn
         goal[2], goal[8] = yaw - course.yaw, velocity[2]
         goal[3:6], goal[9:] = position, along
     return goals
@@ -186,16 +194,17 @@ def _arms(
         before, middle = goals[k, 3:5], (k + 0.5) * step
         for leg in range(4):
             arm = arms[k, leg]
-            arm[2] = course.ground - com[2]
             wait = landings[k, leg] * gait.period
             if landings[k, leg] == 0.0:
                 foot = snapshot.p_world_feet[leg] - com
                 arm[:2], arm[2] = foot[:2] - way, foot[2] - model.foot_radius
             elif landings[k, leg] < 1.0 - gait.duty + TIE:
                 arm[:2] = course.footholds[leg] - com[:2] - way
+                arm[2] = course.ground.at(course.footholds[leg]) - com[2]
             else:
                 yaw, rate = course.yaw + goals[k, 8] * wait, goals[k, 8]
                 hip = (yaw_rotation(yaw) @ model.p_base_feet_nominal[leg])[:2]
                 speed = goals[k, 9:11] + rate * np.array([-hip[1], hip[0]])
                 arm[:2] = base[:2] + hip + speed * (gait.stance_time / 2 + wait - middle)
+                arm[2] = course.ground.at(com[:2] + arm[:2]) - com[2]
     return arms

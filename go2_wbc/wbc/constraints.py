@@ -90,11 +90,16 @@ class FrictionPyramid(Inequality):
 
     Attributes:
         friction: mu of the square pyramid, per axis; on the diagonal it allows 1.4 times as much.
+            A reference may ask for less.
     """
 
     friction: float
     name: str = "contact forces"
     unit: str = "N"
+
+    def friction_for(self, reference: Reference) -> float:
+        """What the feet may count on."""
+        return min(self.friction, reference.friction or self.friction)
 
     def bounds(self, snapshot: Snapshot, reference: Reference) -> Bounds:
         """Five rows per stance foot."""
@@ -103,7 +108,7 @@ class FrictionPyramid(Inequality):
         C = np.zeros((5 * count, SIZE))
         lower = np.full(5 * count, -np.inf)
         upper = np.zeros(5 * count)
-        pattern = friction_pyramid(self.friction)
+        pattern = friction_pyramid(self.friction_for(reference))
         for i, leg in enumerate(stance):
             start = FORCES.start + 3 * leg
             C[5 * i : 5 * i + 5, start : start + 3] = pattern

@@ -39,7 +39,7 @@ from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.backends import QpBackend
 from go2_wbc.wbc.config import WbcConfig
-from go2_wbc.wbc.constraints import JointLimits, TorqueLimits
+from go2_wbc.wbc.constraints import FrictionPyramid, JointLimits, TorqueLimits
 from go2_wbc.wbc.loads import planned_loads
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem
 from go2_wbc.wbc.tasks import Gains, forces_near
@@ -92,6 +92,7 @@ class _Mode:
         point: TrackedPoint,
     ) -> None:
         self._robot, self._model, self._config = robot, model, config
+        self._friction = FrictionPyramid(config.friction)
         self._point = point
         self._stance = [leg for leg in LEGS if legs[leg] is LegTask.STANCE]
         self._solver = placo.DynamicsSolver(robot)
@@ -122,7 +123,6 @@ class _Mode:
         task = self._solver.add_position_task(f"{leg.name}_contact", np.zeros(3))
         task.configure(f"{leg.name} contact", "hard", 1.0)
         contact = self._solver.add_unilateral_point_contact(task)
-        contact.mu = self._config.friction
         contact.weight_tangentials = 0.0
         self._pressing.append(contact)
         return task
@@ -139,6 +139,8 @@ class _Mode:
 
     def update(self, state: RobotState, reference: Reference) -> None:
         """Bring the robot to ``state`` and set every desired acceleration."""
+        for contact in self._pressing:
+            contact.mu = self._friction.friction_for(reference)
         self._robot.state.q = state.q
         self._robot.state.qd = state.v
         self._robot.update_kinematics()

@@ -132,6 +132,11 @@ def test_a_weight_of_planned_forces_that_costs_accuracy_is_refused(weight: float
         _ = replace(REFERENCE, force_weight=weight).row
 
 
+def test_a_friction_below_zero_is_refused() -> None:
+    with pytest.raises(CommandError, match=r"friction must be 0 or more, got -0\.1"):
+        _ = replace(REFERENCE, friction=-0.1).row
+
+
 def test_the_row_of_a_reference_holds_its_planned_forces() -> None:
     again = Reference.of_row(REFERENCE.row)
     assert again.force_weight == REFERENCE.force_weight

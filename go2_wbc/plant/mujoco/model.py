@@ -16,7 +16,7 @@ import numpy as np
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.mujoco.visuals import add_visuals
-from go2_wbc.plant.terrain import Boxes
+from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.description import BASE_LINK, RobotDescription
 from go2_wbc.validation import require_not_negative
 from go2_wbc.world import PAYLOAD_HALF_SIZE
@@ -81,7 +81,7 @@ def build_spec(
     joint_dynamics: JointDynamics,
     *,
     friction: float,
-    terrain: Boxes | None = None,
+    terrain: Terrain | None = None,
     visuals: bool = False,
 ) -> mujoco.MjSpec:
     """The robot of ``description`` on a floor, with torque motors and an IMU.
@@ -90,7 +90,7 @@ def build_spec(
         description: which files.
         joint_dynamics: friction, damping and armature of the joints.
         friction: sliding friction coefficient of every pair of surfaces.
-        terrain: boxes on the floor.
+        terrain: the ground, where it is not a level floor.
         visuals: also convert the .dae visual meshes, which takes about 2 s; physics ignores them.
 
     Raises:
@@ -105,10 +105,10 @@ def build_spec(
     add_motors(spec, JOINT_NAMES, description)
     add_imu(spec, BASE_LINK)
     add_floor(spec)
-    if terrain is not None:
-        _add_boxes(spec, terrain)
     for geom in spec.geoms:
         geom.friction = [friction, _TORSIONAL, _ROLLING]
+    if terrain is not None:
+        _add_terrain(spec, terrain, friction)
     if visuals:
         add_visuals(spec, description)
     spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
@@ -211,17 +211,27 @@ def add_floor(spec: mujoco.MjSpec) -> None:
     spec.worldbody.add_light(pos=[0, 0, 5], dir=[0, 0, -1], castshadow=False)
 
 
-def _add_boxes(spec: mujoco.MjSpec, terrain: Boxes) -> None:
-    half = 0.5 * terrain.size
-    for index, (x, y, yaw, height) in enumerate(terrain.layout()):
+def _add_terrain(spec: mujoco.MjSpec, terrain: Terrain, friction: float) -> None:
+    spec.geom(FLOOR).quat = _quaternion(0.0, terrain.floor_pitch)
+    for index, block in enumerate(terrain.blocks()):
+        mu = friction if block.friction is None else block.friction
         spec.worldbody.add_geom(
             name=f"box{index}",
             type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=[x, y, 0.5 * height],
-            quat=[np.cos(0.5 * yaw), 0.0, 0.0, np.sin(0.5 * yaw)],
-            size=[half, half, 0.5 * height],
+            pos=list(block.centre),
+            quat=_quaternion(block.yaw, block.pitch),
+            size=list(block.half_size),
             rgba=[0.55, 0.45, 0.35, 1.0],
+            friction=[mu, _TORSIONAL, _ROLLING],
+            # The one of the higher priority says what the friction is; else the greater number.
+            priority=int(block.friction is not None),
         )
+
+
+def _quaternion(yaw: float, pitch: float) -> list[float]:
+    """MuJoCo's, w x y z, of Rz(yaw) Ry(pitch)."""
+    a, b, c, d = np.cos(0.5 * yaw), np.sin(0.5 * yaw), np.cos(0.5 * pitch), np.sin(0.5 * pitch)
+    return [float(a * c), float(-b * d), float(a * d), float(b * c)]
 
 
 def add_payload(

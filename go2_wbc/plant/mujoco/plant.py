@@ -23,7 +23,7 @@ from go2_wbc.plant.mujoco.saved import SavedPhysics
 from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
 from go2_wbc.plant.sensors import ImuSample, Proprioception, SensorErrors, SensorNoise
-from go2_wbc.plant.terrain import Boxes
+from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.state import JointCommand, RobotState
 from go2_wbc.world import SENSORS
@@ -51,7 +51,8 @@ class MujocoPlant(Plant):
         payload: extra mass [kg], a solid box.
         payload_place: of its middle in the base frame [m].
         mass_scale: factor on every mass and inertia of the robot, payload excepted.
-        terrain: boxes to strew on the floor; only without ``mjcf``.
+        terrain: the ground (``plant.terrain``), where it is not a level floor; only without
+            ``mjcf``.
         sensors: ``"ideal"``, ``"noisy"`` for white noise on everything measured, or ``"imu"``: all
             that ``read`` gives is estimated from IMU, encoders and feet, in a world of its own.
         noise: standard deviations of ``"noisy"``.
@@ -82,7 +83,7 @@ class MujocoPlant(Plant):
         payload: float = 0.0,
         payload_place: tuple[float, float, float] = (0.0, 0.0, 0.0),
         mass_scale: float = 1.0,
-        terrain: Boxes | None = None,
+        terrain: Terrain | None = None,
         sensors: str = "ideal",
         noise: SensorNoise | None = None,
         errors: SensorErrors | None = None,

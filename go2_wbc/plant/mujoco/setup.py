@@ -13,7 +13,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.layout import MujocoLayout, find_layout, foot_geoms
 from go2_wbc.plant.mujoco.model import JointDynamics, add_payload, build_spec, finish
 from go2_wbc.plant.mujoco.user_model import load_user_model
-from go2_wbc.plant.terrain import Boxes
+from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.description import BASE_LINK, find_description
 from go2_wbc.robot.motor import MotorModel, require_motor
 from go2_wbc.validation import require_finite, require_not_negative, require_positive
@@ -34,7 +34,7 @@ class PlantSetup:
     payload: float
     payload_place: tuple[float, float, float]
     mass_scale: float
-    terrain: Boxes | None
+    terrain: Terrain | None
     initial_yaw: float
     initial_joint_noise: float
     joint_dynamics: JointDynamics | None
@@ -48,8 +48,10 @@ class PlantSetup:
             path = getattr(self, name)
             if path is not None and not isinstance(path, Path | str):
                 raise ConfigError(f"{name} must be a path, got {path!r}")
-        if self.terrain is not None and not isinstance(self.terrain, Boxes):
-            raise ConfigError(f"terrain must be Boxes(...) or None, got {self.terrain!r}")
+        if self.terrain is not None and not isinstance(self.terrain, Terrain):
+            raise ConfigError(
+                f"terrain must be a Terrain, as Boxes(...), or None, got {self.terrain!r}"
+            )
         require_positive(self, "timestep", "control_period", "mass_scale")
         if self.friction is not None:
             require_positive(self, "friction")

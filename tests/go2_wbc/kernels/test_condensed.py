@@ -101,6 +101,28 @@ def test_planned_forces_are_kept_near_as_in_the_full_problem() -> None:
     assert moved > 50
 
 
+def test_less_friction_that_a_reference_asks_for_is_kept_and_more_is_not_believed() -> None:
+    model = RobotModel()
+    compiled = WholeBodyController(model)
+    readable = WholeBodyController(model, "full", WbcConfig(solver="daqp"))
+    bound = 0
+    for snapshot, plain in cases(model, 52, seed=29):
+        free, slippery = (replace(plain, friction=mu) for mu in (0.9, 0.2))
+        ours, without = (compiled.solve_compiled(snapshot, r) for r in (slippery, plain))
+        theirs = solve_or_none(readable, snapshot, slippery)
+        assert (ours is None) == (theirs is None)
+        if ours is None or theirs is None or without is None:
+            continue
+        np.testing.assert_allclose(ours.tau, theirs.tau, atol=AGREEMENT, rtol=0)
+        believed = compiled.solve_compiled(snapshot, free)
+        assert believed is not None
+        np.testing.assert_array_equal(believed.tau, without.tau)
+        sideways = np.abs(ours.forces[:, :2]).max(axis=1)
+        assert (sideways <= 0.2 * ours.forces[:, 2] + 1e-4).all()
+        bound += bool(np.abs(ours.tau - without.tau).max() > 1e-2)
+    assert bound > 20
+
+
 @pytest.mark.parametrize("share", [1.0, 0.4])
 def test_torques_of_fast_joints_keep_to_the_motors_line(share: float) -> None:
     model, config = RobotModel(), WbcConfig(torque_share=share)

@@ -11,8 +11,11 @@ from go2_wbc.contacts import GAITS, ContactPhase, Gait
 from go2_wbc.kernels.locomotion import foot_phase
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.compiled import CompiledPlanner
+from go2_wbc.planning.contact import ContactConfig
+from go2_wbc.planning.ground import GroundConfig
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.mpc import MpcConfig
+from go2_wbc.planning.slip import SlipConfig
 from go2_wbc.planning.swing import SwingConfig
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -37,6 +40,9 @@ ODD_CONFIG = LocomotionConfig(
     capture_margin=0.07,
     square_tolerance=0.05,
     swing=SwingConfig(apex=0.083, touchdown_depth=0.011),
+    slip=SlipConfig(0.12, 0.007, 0.015, 1.9, 0.18, 0.22, 0.14, 0.55),
+    contact=ContactConfig(0.62, 0.013),
+    ground=GroundConfig(0.41, 0.59, 0.018, 0.052, 0.73, 0.057),
 )
 """No two numbers alike, so that one in another's place is seen."""
 ODD_MPC = MpcConfig(step=0.028, interval=0.012, force_max=180.0, prior_weight=4e-3, load_ramp=0.02)
@@ -54,6 +60,8 @@ def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.nda
         q[3:] = standing_q()[3:]
     pace = 0.02 if tick % 1400 >= 700 else 1.0
     contact = rng.random(4) < 0.1  # so that feet are met early, late and never
+    if tick % 900 >= 450:  # and some long enough to slide
+        contact = np.random.default_rng(tick // 40).random(4) < 0.6
     return model.snapshot(
         replace(state, time=tick * TICK, q=q, v=pace * state.v, feet_in_contact=contact)
     )
@@ -77,7 +85,7 @@ def test_references_are_those_of_the_readable_planner(gait: Gait, config: Locomo
     readable.start(start)
     compiled.start(start)
     command, at = ZERO_COMMAND, start.p_world_com[:2]
-    starts = 0
+    starts, frictions, early = 0, set[float](), 0
     for tick in range(1, 5001):
         if tick % 200 == 0:
             command = VelocityCommand(*rng.normal(size=3)) if rng.random() < 0.6 else ZERO_COMMAND
@@ -90,10 +98,14 @@ def test_references_are_those_of_the_readable_planner(gait: Gait, config: Locomo
         assert compiled.is_stepping == readable.is_stepping
         assert compiled.heading == pytest.approx(readable.heading, abs=ROUNDING)
         starts += readable.is_stepping and not was_stepping
+        frictions.add(theirs.friction)
+        early += int((readable._contacts.stance & ~readable._was_stance).sum())
         at = theirs.body.p_world[:2]
         if tick % 900 == 0:
             assert compiled.square_up(snapshot) == readable.square_up(snapshot)
     assert starts >= 3, "the comparison must go through standing and stepping"
+    assert len(frictions) > 10, "and through slips"
+    assert early > 0, "and through feet that find a step"
 
 
 @pytest.mark.parametrize(

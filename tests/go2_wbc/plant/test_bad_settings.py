@@ -19,7 +19,7 @@ WRONG = """
 from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.sensors import SensorNoise
-from go2_wbc.plant.terrain import Boxes
+from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs
 from go2_wbc.wbc.config import WbcConfig
 
 refused = {
@@ -33,6 +33,10 @@ refused = {
     "urdf": lambda: MujocoPlant(urdf=b"go2.urdf"),
     "height": lambda: Boxes(height=-0.1),
     "size": lambda: Boxes(size=0.0),
+    "count": lambda: Stairs(count=0),
+    "angle": lambda: Slope(1.2),
+    "start": lambda: Ramp(0.2, start=-1.0),
+    "length": lambda: Patch(length=float("inf")),
     "position": lambda: SensorNoise(position=-1.0),
     "WbcConfig.friction": lambda: WbcConfig(friction="a"),
     "WbcConfig.force_weight": lambda: WbcConfig(force_weight=1e-9),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -22,7 +23,7 @@ from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import FOOT_RADIUS, PAYLOAD_BODY, JointDynamics
-from go2_wbc.plant.terrain import Boxes
+from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs, Terrain
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.state import JointCommand
 from tests.go2_wbc.plant.helpers import STAND
@@ -167,6 +168,58 @@ def test_boxes_are_on_the_floor_and_leave_the_start_clear() -> None:
     plant = MujocoPlant(terrain=terrain)
     assert plant.model.ngeom == MujocoPlant().model.ngeom + len(rows)
     assert plant.read().tilt == pytest.approx(MujocoPlant().read().tilt, abs=0.01)
+
+
+def ground_at(plant: MujocoPlant, x: float, y: float = 0.0) -> float:
+    """Height [m] of whatever a ray from above meets first."""
+    geom, top = np.zeros(1, dtype=np.int32), np.array([x, y, 20.0])
+    down = np.array([0.0, 0.0, -1.0])
+    return 20.0 - mujoco.mj_ray(plant.model, plant.data, top, down, None, True, -1, geom)
+
+
+STEEP = 0.25
+
+
+@pytest.mark.parametrize(
+    ("terrain", "heights"),
+    [
+        (Stairs(0.08, 3, 0.3, 0.9), {0.85: 0.0, 0.95: 0.08, 1.25: 0.16, 1.55: 0.24, 9.0: 0.24}),
+        (Slope(STEEP), {1.0: math.tan(STEEP), -1.0: -math.tan(STEEP)}),
+        (
+            Ramp(STEEP, 1.0, 0.8),
+            {
+                0.75: 0.0,
+                0.801: 0.001 * math.tan(STEEP),
+                1.3: 0.5 * math.tan(STEEP),
+                2.3: math.tan(STEEP),
+                3.3: 0.5 * math.tan(STEEP),
+                3.85: 0.0,
+            },
+        ),
+        (Patch(0.15, 0.5, 1.0), {0.99: 0.0, 1.01: 0.002, 1.49: 0.002, 1.51: 0.0}),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_the_ground_is_as_high_as_the_terrain_says(
+    terrain: Terrain, heights: dict[float, float]
+) -> None:
+    plant = MujocoPlant(terrain=terrain)
+    for x, height in heights.items():
+        assert ground_at(plant, x) == pytest.approx(height, abs=1e-9), x
+        assert ground_at(plant, x, 2.0) == pytest.approx(height, abs=1e-9), x
+
+
+@pytest.mark.parametrize("own", [0.1, 1.3], ids=["slipperier", "rougher"])
+def test_a_foot_on_a_patch_has_the_friction_of_the_patch(own: float) -> None:
+    terrain = Patch(friction=own, length=2.0, start=0.01)
+    plant = MujocoPlant(friction=0.7, terrain=terrain)
+    data = plant.data
+    frictions = {
+        bool(data.contact[i].pos[0] > terrain.start): data.contact[i].friction[0]
+        for i in range(data.ncon)
+        if any(plant.model.geom(n).name.endswith("foot") for n in data.contact[i].geom)
+    }
+    assert frictions == {True: pytest.approx(own), False: pytest.approx(0.7)}
 
 
 def test_the_visual_meshes_change_nothing_in_the_physics() -> None:

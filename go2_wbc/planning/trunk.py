@@ -1,0 +1,102 @@
+"""The trunk's way: the command ramped, integrated to a pose and kept near the robot.
+
+The velocity is in the heading frame (z up, x along the reference's yaw); the heading is integrated
+first and turns it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.correction import SteadyStateCorrection
+from go2_wbc.planning.ground import GroundPlane, tilted_rotation
+from go2_wbc.reference import BodyTarget, TrackedPoint
+from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from go2_wbc.robot.snapshot import Snapshot
+
+SETTLED_COMMAND = 1e-3
+"""Ramped velocity command [m/s, rad/s] below which it counts as arrived at zero."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrunkLimits:
+    """How fast the reference changes, and how far it may run ahead of the robot.
+
+    Attributes:
+        rate: greatest change of the velocity: ahead, left [m/s^2], turning [rad/s^2].
+        position_leash: [m].
+        yaw_leash: [rad].
+    """
+
+    rate: Float[np.ndarray, "3"]
+    position_leash: float
+    yaw_leash: float
+
+
+class TrunkPath:
+    """Where the trunk shall be.
+
+    Attributes:
+        yaw: heading [rad].
+        position: of the CoM, on the level [m].
+        velocity: ramped command in the heading frame [m/s], [rad/s].
+        height_offset: what is added to the wanted height against a load [m].
+    """
+
+    def __init__(self, snapshot: Snapshot, limits: TrunkLimits) -> None:
+        """Begin where the robot is, at rest."""
+        self._limits = limits
+        self.yaw = snapshot.state.yaw
+        self.position = snapshot.p_world_com[:2].copy()
+        self.velocity = np.zeros(3)
+        self.height_offset = 0.0
+        self._correction = SteadyStateCorrection()
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether the ramped command has arrived at zero."""
+        return bool(np.abs(self.velocity).max() < SETTLED_COMMAND)
+
+    @property
+    def world_velocity(self) -> Float[np.ndarray, "3"]:
+        """Wanted velocity of the CoM [m/s]."""
+        return yaw_rotation(self.yaw) @ np.array([self.velocity[0], self.velocity[1], 0.0])
+
+    def integrate(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> None:
+        """Ramp the velocity towards ``command``, integrate it to the pose, and apply the leash."""
+        limits = self._limits
+        wanted = np.array([command.linear_x, command.linear_y, command.angular_z])
+        most = limits.rate * dt
+        self.velocity += np.clip(wanted - self.velocity, -most, most)
+        self.yaw += self.velocity[2] * dt
+        lead = wrap_angle(self.yaw - snapshot.state.yaw)
+        self.yaw += np.clip(lead, -limits.yaw_leash, limits.yaw_leash) - lead
+        self.position = self.position + self.world_velocity[:2] * dt
+        offset = self.position - snapshot.p_world_com[:2]
+        distance = float(np.linalg.norm(offset))
+        if distance > limits.position_leash:
+            self.position = snapshot.p_world_com[:2] + offset * (limits.position_leash / distance)
+
+    def correct_height(self, snapshot: Snapshot, height: float, dt: float) -> None:
+        """Integrate the error from ``height`` [m]: a payload makes the robot sag for good."""
+        error = np.array([0.0, 0.0, height - snapshot.p_world_com[2], 0.0, 0.0, 0.0])
+        self.height_offset = float(self._correction.update(error, dt)[2])
+
+    def target(self, ground: GroundPlane, height: float) -> BodyTarget:
+        """The trunk's reference: along the ground, its CoM at ``height`` [m] plus the offset."""
+        v_world = self.world_velocity
+        v_world[2] = ground.slope @ v_world[:2]
+        top = ground.at(self.position) + height + self.height_offset
+        return BodyTarget(
+            point=TrackedPoint.COM,
+            p_world=np.array([*self.position, top]),
+            v_world=v_world,
+            a_world=np.zeros(3),
+            R_world_base=tilted_rotation(self.yaw, ground.tilt),
+            w_world=np.array([0.0, 0.0, self.velocity[2]]),
+            dw_world=np.zeros(3),
+        )

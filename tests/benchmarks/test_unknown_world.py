@@ -1,0 +1,50 @@
+"""The benchmark of what the robot is not told of: what a run counts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from benchmarks import unknown_world
+from benchmarks.scenario import Measurement
+from benchmarks.unknown_world import WORLDS, Unknown, measure
+from controller.sweeps.trials import Trial
+from go2_wbc.plant.terrain import Boxes, Stairs
+
+QUICK = Unknown("any", "level ground", time=0.6)
+
+
+def measured(world: Unknown) -> Measurement:
+    """Of one trial of the seeds for tuning."""
+    return measure(Trial(0), world, first_seed=0)
+
+
+def test_a_run_is_done_by_a_robot_that_walks_and_stands_again() -> None:
+    done = measured(QUICK)
+    assert done.values["any.done"] == 1.0
+    assert set(done.values) == {metric.name for metric in QUICK.metrics}
+
+
+def test_a_robot_before_a_wall_has_not_done_it() -> None:
+    wall = replace(QUICK, terrain=Stairs(height=0.4, count=1, start=0.5), time=1.5)
+    failed = measured(wall)
+    assert failed.values["any.done"] == 0.0
+    assert failed.reason is not None
+
+
+def test_a_payload_is_judged_by_the_height_and_tilt_of_the_trunk() -> None:
+    aside = replace(QUICK, payload=1.0, payload_place=(0.0, 0.1, 0.1))
+    done = measured(aside)
+    assert set(done.values) == {metric.name for metric in aside.metrics}
+    assert done.values["any.tilt"] > 0.05
+
+
+def test_every_trial_has_a_plant_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    monkeypatch.setattr(unknown_world, "MujocoPlant", lambda **settings: seen.append(settings))
+    boxes = next(world for world in WORLDS if isinstance(world.terrain, Boxes))
+    for seed in (1, 2):
+        boxes.plant(seed)
+    first, second = seen
+    assert all(first[name] != second[name] for name in ("friction", "mass_scale", "terrain"))

@@ -1,0 +1,101 @@
+"""The ground below a walking robot: its plane, and how rough it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from go2_wbc.planning.ground import (
+    MOST_SLOPE,
+    GroundConfig,
+    GroundPlane,
+    tilt_vector,
+    tilted_rotation,
+)
+from go2_wbc.robot.rotations import log_rotation, yaw_rotation
+from go2_wbc.robot.snapshot import Snapshot
+from tests import engine_helpers as helpers
+
+MODEL = helpers.symmetric_model()
+CONFIG = GroundConfig()
+SLOPE = np.array([0.2, -0.1])
+EXACT = 1e-12
+
+
+def on_plane(slope: np.ndarray, height: float = 0.4) -> Snapshot:
+    """A robot whose feet stand on a plane that is ``height`` high below its CoM."""
+    snapshot = MODEL.snapshot(helpers.state_of(helpers.standing_q()))
+    feet, com = snapshot.p_world_feet.copy(), snapshot.p_world_com
+    feet[:, 2] = height + (feet[:, :2] - com[:2]) @ slope + MODEL.foot_radius
+    return replace(snapshot, p_world_feet=feet)
+
+
+def plane(snapshot: Snapshot) -> GroundPlane:
+    return GroundPlane(snapshot, MODEL.foot_radius, CONFIG)
+
+
+def test_the_plane_at_first_is_that_through_the_feet() -> None:
+    snapshot = on_plane(SLOPE)
+    ground = plane(snapshot)
+    np.testing.assert_allclose(ground.slope, SLOPE, atol=EXACT)
+    assert ground.height == pytest.approx(0.4, abs=EXACT)
+    np.testing.assert_allclose(ground.above(snapshot.p_world_feet), 0.0, atol=EXACT)
+
+
+def test_feet_in_a_line_or_on_a_wall_tell_no_slope_that_no_foot_could_hold_on() -> None:
+    snapshot = on_plane(SLOPE)
+    line = snapshot.p_world_feet.copy()
+    line[:, 1] = 0.0
+    np.testing.assert_array_equal(plane(replace(snapshot, p_world_feet=line)).slope, 0.0)
+    np.testing.assert_allclose(plane(on_plane(10 * SLOPE)).slope, [MOST_SLOPE, -MOST_SLOPE])
+
+
+def test_it_is_carried_along_with_the_robot() -> None:
+    snapshot = on_plane(SLOPE)
+    ground = plane(snapshot)
+    moved = replace(snapshot, p_world_com=snapshot.p_world_com + [0.5, 0.2, 0.0])
+    ground.carry(moved)
+    assert ground.height == pytest.approx(0.4 + SLOPE @ [0.5, 0.2], abs=EXACT)
+
+
+def test_feet_that_land_on_another_plane_turn_it_there() -> None:
+    ground, new = plane(on_plane(np.zeros(2))), on_plane(SLOPE, 0.43)
+    pairs = np.array([True, False, False, True])
+    for n in range(40):
+        ground.learn(new.p_world_feet, pairs if n % 2 else ~pairs)
+    np.testing.assert_allclose(ground.slope, SLOPE, atol=1e-3)
+    assert ground.height == pytest.approx(0.43, abs=1e-3)
+    assert ground.roughness < 1e-2
+
+
+def test_a_step_raises_the_swing_for_a_while_and_smooth_ground_does_not() -> None:
+    snapshot = on_plane(np.zeros(2))
+    ground, front_left = plane(snapshot), np.array([True, False, False, False])
+    ground.learn(snapshot.p_world_feet, front_left)
+    assert ground.apex_raise == 0.0
+    ground.learn(snapshot.p_world_feet + [0.0, 0.0, 0.05], front_left)
+    assert ground.apex_raise == pytest.approx(0.05 - CONFIG.smooth)
+    ground.stumble()
+    assert ground.apex_raise == pytest.approx(CONFIG.stumble - CONFIG.smooth)
+    for _ in range(20):
+        ground.learn(snapshot.p_world_feet, np.ones(4, dtype=bool))
+    assert ground.apex_raise == 0.0
+
+
+def test_a_trunk_on_a_slope_keeps_its_heading_and_has_its_normal_up() -> None:
+    R = tilted_rotation(0.7, SLOPE)
+    np.testing.assert_allclose(R.T @ R, np.eye(3), atol=EXACT)
+    np.testing.assert_allclose(R[:, 2], np.array([-0.2, 0.1, 1.0]) / np.sqrt(1.05), atol=EXACT)
+    assert np.arctan2(R[1, 0], R[0, 0]) == pytest.approx(0.7, abs=EXACT)
+    np.testing.assert_allclose(tilted_rotation(0.7, np.zeros(2)), yaw_rotation(0.7), atol=EXACT)
+
+
+def test_the_turn_to_a_slope_is_that_of_its_rotation() -> None:
+    turn = tilt_vector(np.array([0.0, 0.3]))
+    np.testing.assert_allclose(turn, [np.arctan(0.3), 0.0], atol=EXACT)
+    R = tilted_rotation(0.0, np.array([0.3, 0.0]))
+    np.testing.assert_allclose(
+        [*tilt_vector(np.array([0.3, 0.0])), 0.0], log_rotation(R), atol=EXACT
+    )

@@ -1,0 +1,65 @@
+"""Friction from feet that slide: when it falls, how far, and that it comes back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from go2_wbc.errors import ConfigError
+from go2_wbc.planning.slip import SlipConfig, SlipObserver
+from go2_wbc.robot.snapshot import Snapshot
+from tests import engine_helpers as helpers
+
+MODEL = helpers.symmetric_model()
+CONFIG = SlipConfig()
+TICK = 0.002
+STANCE = np.ones(4, dtype=bool)
+
+
+def sliding(speed: float, rise: float = 0.0, *, touches: bool = True) -> Snapshot:
+    """The front left foot slides sideways."""
+    snapshot = MODEL.snapshot(helpers.state_of(helpers.standing_q()))
+    v = np.zeros((4, 3))
+    v[0] = [0.0, speed, rise]
+    state = replace(snapshot.state, feet_in_contact=np.full(4, touches))
+    return replace(snapshot, state=state, v_world_contacts=v)
+
+
+def after(snapshot: Snapshot, seconds: float) -> SlipObserver:
+    observer = SlipObserver(CONFIG)
+    for _ in range(round(seconds / TICK)):
+        observer.update(snapshot, STANCE, TICK)
+    return observer
+
+
+def test_a_foot_that_slides_lowers_the_friction_to_the_least() -> None:
+    assert after(sliding(0.3), 0.1).friction < 0.2
+    assert CONFIG.least <= after(sliding(0.3), 1.0).friction < CONFIG.least + 1e-3
+
+
+@pytest.mark.parametrize(
+    "snapshot",
+    [sliding(0.9 * CONFIG.speed), sliding(0.3, touches=False), sliding(0.3, 0.3)],
+    ids=["slow", "in the air", "off an edge"],
+)
+def test_a_foot_that_does_not_slide_on_the_ground_leaves_it(snapshot: Snapshot) -> None:
+    assert after(snapshot, 0.2).friction == CONFIG.most
+
+
+def test_a_foot_may_slide_just_after_touchdown() -> None:
+    assert after(sliding(0.3), CONFIG.mask).friction == CONFIG.most
+
+
+def test_the_friction_comes_back_slowly() -> None:
+    observer = after(sliding(0.3), 0.2)
+    low = observer.friction
+    for _ in range(500):
+        observer.update(sliding(0.0), STANCE, TICK)
+    assert observer.friction == pytest.approx(low + CONFIG.recovery, abs=1e-6)
+
+
+def test_bounds_that_cross_are_refused() -> None:
+    with pytest.raises(ConfigError, match=r"least.*0\.5 and 0\.4"):
+        SlipConfig(least=0.5, most=0.4)
