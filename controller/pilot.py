@@ -147,14 +147,13 @@ class Pilot:
     # --- walking --------------------------------------------------------------------------
 
     def walk(self, gait: str | Gait) -> Measurements:
-        """Enter walking mode, ready for commands; one that walks with this gait just goes on."""
+        """Enter walking mode, ready for commands; one that walks already goes on, with this gait."""
         wanted = find_gait(gait)
         if self.mode is not Mode.WALKING:
             self._ensure_standing()
             self._start_walking(wanted)
         elif wanted != self._walking.gait:
-            self.rest()
-            self._start_walking(wanted)
+            self._change_gait(wanted)
         self.wait(READY_TIME)
         self._mode = Mode.WALKING
         return self._procedures.measurements()
@@ -223,6 +222,14 @@ class Pilot:
         self._procedures.engage(walking)
         self._walking = walking
         self._envelope = self._config.envelope.scaled(walking.gait.envelope_share)
+
+    def _change_gait(self, gait: Gait) -> None:
+        """Walk on with ``gait``, slowing down into its envelope before."""
+        walking, self._envelope = self._walking, self._config.envelope.scaled(gait.envelope_share)
+        walking.command = self._envelope.clip(walking.command)
+        self._procedures.until(lambda: walking.follows_command, STOP_LIMIT, "slow down")
+        with self._runner.lock():  # the planner may be at work in another thread
+            walking.change_gait(gait)
 
     def _finish_steps(self, what: str) -> None:
         walking, loop = self._walking, self._loop

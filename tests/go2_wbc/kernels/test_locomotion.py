@@ -91,8 +91,13 @@ def test_references_are_those_of_the_readable_planner(gait: Gait, config: Locomo
         assert compiled.heading == pytest.approx(readable.heading, abs=ROUNDING)
         starts += readable.is_stepping and not was_stepping
         at = theirs.body.p_world[:2]
+        np.testing.assert_allclose(compiled.velocity, readable.velocity, atol=ROUNDING, rtol=0)
         if tick % 900 == 0:
             assert compiled.square_up(snapshot) == readable.square_up(snapshot)
+        if tick % 1100 == 0:
+            other = (gait, GAITS["walk"], GALLOP)[tick // 1100 % 3]
+            readable.change_gait(other)
+            compiled.change_gait(other)
     assert starts >= 3, "the comparison must go through standing and stepping"
 
 

@@ -12,9 +12,9 @@ import pytest
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.compiled import CompiledPlanner
+from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.locomotion import (
     GROUND_SHARE,
-    GaitPlanner,
     LocomotionConfig,
     LocomotionPlanner,
 )
