@@ -130,6 +130,9 @@ class GO2Controller:
     def walk(self, gait: str | Gait = "trot") -> bool:
         """Enter walking mode; the robot stands ready until ``move``. Stands up first if needed.
 
+        One that walks already passes over into the gait while it walks on, with a command that is
+        clipped into the gait's envelope.
+
         Args:
             gait: name of a gait, or a gait of your own.
 

@@ -8,13 +8,12 @@ procedures into calls.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from statistics import fmean
-
-import numpy as np
-from jaxtyping import Float
 
 import motions
 from controller.behaviours.plans import ChangePosture, PlayPlan
+from controller.behaviours.standing import Standing
 from controller.behaviours.walking import Walking
 from controller.checks import (
     LYING_HEIGHT,
@@ -30,12 +29,19 @@ from controller.checks import (
 )
 from controller.modes import Mode
 from controller.navigation import Goal
-from controller.procedures import Aborted, Measurements, ProcedureRunner, Touches, listed
+from controller.procedures import (
+    Aborted,
+    Measurements,
+    ProcedureRunner,
+    Touches,
+    listed,
+    refuse_dynamic_on_hardware,
+)
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait, find_gait
-from go2_wbc.errors import DynamicMotionRefused, ModeError, StanceMismatch
+from go2_wbc.errors import ModeError, StanceMismatch
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.reference import MotionPlan, Posture
@@ -43,6 +49,8 @@ from motions.postures import lie_down, rise, sit_down
 
 READY_TIME = 0.2
 """Time [s] that a robot is given to stand ready in walking mode."""
+HOLD_TIME = 0.4
+"""Time [s] in which a robot that stands takes the exact posture."""
 STOP_LIMIT = 4.0
 """Time [s] in which a walking robot must come to rest after ``stop``."""
 PAW_TOLERANCE = 0.03
@@ -75,9 +83,10 @@ class Pilot:
     def mode(self) -> Mode:
         """What the robot is doing, faults of the loop included."""
         fault = self._loop.fault
-        if fault is None:
-            return self._mode
-        return Mode.FALLEN if fault.is_fall else Mode.DAMPED
+        if fault is not None:
+            return Mode.FALLEN if fault.is_fall else Mode.DAMPED
+        is_stepping = self._mode is Mode.STANDING and self._procedures.is_stepping
+        return Mode.MOVING if is_stepping else self._mode
 
     @property
     def command(self) -> VelocityCommand:
@@ -86,7 +95,8 @@ class Pilot:
 
     def begin(self) -> None:
         """Begin a procedure: the mode is from now on what the last fault, if any, has made it."""
-        self._mode = self.mode
+        if self._loop.fault is not None:
+            self._mode = self.mode
         self._must_return = False
         self._runner.begin()
 
@@ -94,6 +104,7 @@ class Pilot:
 
     def stand(self) -> Measurements:
         """Stand, from any mode but fallen."""
+        self._procedures.stop_stepping()
         mode = self.mode
         if mode is Mode.WALKING:
             self.rest()
@@ -101,23 +112,24 @@ class Pilot:
             self._mode = Mode.MOVING
             tuck(self._procedures)
         entry = {Mode.SITTING: Posture.SIT, Mode.LYING: Posture.LIE}.get(mode, Posture.STAND)
-        duration = 0.4 if mode in (Mode.STANDING, Mode.WALKING) else 1.2
-        self._take_posture(lambda pose: rise(pose, entry, duration))
+        duration = HOLD_TIME if mode in (Mode.STANDING, Mode.WALKING) else 1.2
+        self._take_posture(self._make_standing(entry, duration))
         return self._settle(Posture.STAND, "stand")
 
     def sit(self) -> Measurements:
         """Sit like a dog, from any mode but fallen."""
         if self.mode is not Mode.SITTING:
             self._ensure_standing()
-            self._take_posture(sit_down)
+            self._take_posture(ChangePosture(sit_down))
         return self._settle(Posture.SIT, "sit")
 
     def lie_down(self) -> Measurements:
         """Lie down and go limp."""
+        self._procedures.stop_stepping()
         if self.mode not in (Mode.LYING, Mode.DAMPED) and not self._is_on_the_ground:
             if self.mode is not Mode.MOVING:  # a stand that failed need not succeed to lie down
                 self._ensure_standing()
-            self._take_posture(lie_down)
+            self._take_posture(ChangePosture(lie_down))
         lie_limp(self._procedures)
         return self._settle(Posture.LIE, "lie down")
 
@@ -130,9 +142,13 @@ class Pilot:
         self._mode = Mode.LYING
         return self.stand()
 
-    def _take_posture(self, make_plan: Callable[[Float[np.ndarray, "6"]], MotionPlan]) -> None:
+    def _take_posture(self, change: ChangePosture) -> None:
         self._mode = Mode.MOVING
-        self._procedures.run(ChangePosture(make_plan), 5.0)
+        self._procedures.run(change, 5.0)
+
+    def _make_standing(self, entry: Posture, duration: float) -> Standing:
+        make_plan = partial(rise, entry=entry, duration=duration)
+        return Standing(make_plan, self._model, self._config.locomotion)
 
     def _settle(self, posture: Posture, what: str) -> Measurements:
         mode, check = _RESTING[posture]
@@ -147,14 +163,13 @@ class Pilot:
     # --- walking --------------------------------------------------------------------------
 
     def walk(self, gait: str | Gait) -> Measurements:
-        """Enter walking mode, ready for commands; one that walks with this gait just goes on."""
+        """Enter walking mode, ready for commands; one that walks goes on, with this gait."""
         wanted = find_gait(gait)
         if self.mode is not Mode.WALKING:
             self._ensure_standing()
             self._start_walking(wanted)
         elif wanted != self._walking.gait:
-            self.rest()
-            self._start_walking(wanted)
+            self._change_gait(wanted)
         self.wait(READY_TIME)
         self._mode = Mode.WALKING
         return self._procedures.measurements()
@@ -224,6 +239,14 @@ class Pilot:
         self._walking = walking
         self._envelope = self._config.envelope.scaled(walking.gait.envelope_share)
 
+    def _change_gait(self, gait: Gait) -> None:
+        """Walk on with ``gait``, slowing down into its envelope before."""
+        walking, self._envelope = self._walking, self._config.envelope.scaled(gait.envelope_share)
+        walking.command = self._envelope.clip(walking.command)
+        self._procedures.until(lambda: walking.follows_command, STOP_LIMIT, "slow down")
+        with self._runner.lock():  # the planner may be at work in another thread
+            walking.change_gait(gait)
+
     def _finish_steps(self, what: str) -> None:
         walking, loop = self._walking, self._loop
         self._procedures.until(lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, what)
@@ -245,13 +268,8 @@ class Pilot:
             StanceMismatch: if the plan starts from another stance.
         """
         plant = self._loop.plant
-        if plan.is_dynamic and plant.is_hardware and not allow_dynamic:
-            raise DynamicMotionRefused(
-                f"motion {plan.name!r} is dynamic: fewer than three feet carry the robot in parts "
-                f"of it, so it cannot be stopped there, and {type(plant).__name__} may move a "
-                "robot. No dynamic motion of this project was tried on one. To play it all the "
-                "same: play(..., allow_dynamic=True)"
-            )
+        if not allow_dynamic:
+            refuse_dynamic_on_hardware(plan, plant)
         self._meet_entry(plan)
         if self._must_return:
             raise Aborted(
@@ -275,6 +293,8 @@ class Pilot:
             if self._must_return:
                 raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
             at_rest = self._settle(plan.exit, plan.name)
+            if plan.exit is Posture.STAND:
+                self._procedures.engage(self._make_standing(Posture.STAND, HOLD_TIME))
         finally:
             self.playing = None
         touches.require_few(plan)
@@ -300,6 +320,7 @@ class Pilot:
             playing.return_safely()
 
     def _meet_entry(self, plan: MotionPlan) -> None:
+        self._procedures.stop_stepping()
         mode, (entry, _) = self.mode, _RESTING[plan.entry]
         if mode is not entry and (mode, entry) != (Mode.WALKING, Mode.STANDING):
             raise StanceMismatch(

@@ -6,15 +6,19 @@ from collections.abc import Callable, Mapping
 from typing import NoReturn
 
 from controller.behaviours.base import Behaviour
-from controller.checks import posture_measurements
+from controller.behaviours.standing import Standing
+from controller.checks import is_standing, posture_measurements
 from controller.loop import Fault
 from controller.runner import Runner
+from go2_wbc.errors import DynamicMotionRefused
 from go2_wbc.plant import Plant
 from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.snapshot import Snapshot
 
 SETTLE_LIMIT = 3.0
 """Time [s] in which a posture must come to rest after its motion."""
+STEPS_LIMIT = 4.0
+"""Time [s] in which steps for balance must come to rest."""
 CALM_TIME = 0.1
 """Time [s] for which a posture must hold without a break."""
 ROUNDING = 1e-9
@@ -89,6 +93,18 @@ class ProcedureRunner:
             raise self._aborted(fault.reason)
         raise self._aborted(f"{what} not done within {limit:.1f} s: {listed(self.measurements())}")
 
+    @property
+    def is_stepping(self) -> bool:
+        """Whether a standing robot steps for balance now."""
+        behaviour = self.loop.behaviour
+        return isinstance(behaviour, Standing) and behaviour.is_stepping
+
+    def stop_stepping(self) -> None:
+        """Wait until a robot that steps for balance stands again."""
+        if self.is_stepping:
+            self.until(lambda: not self.is_stepping, STEPS_LIMIT, "stand again")
+            self.settle("stand again", is_standing)
+
     def let_pass(self, seconds: float) -> None:
         """Let time pass, whatever happens in it."""
         end = self.loop.state.time + seconds - ROUNDING
@@ -128,6 +144,17 @@ class Touches:
             raise Aborted(
                 f"{plan.name} touched the ground with trunk or legs for {self._time:.2f} s"
             )
+
+
+def refuse_dynamic_on_hardware(plan: MotionPlan, plant: Plant) -> None:
+    """Raise ``DynamicMotionRefused`` for a dynamic plan on a plant that may be a robot."""
+    if plan.is_dynamic and plant.is_hardware:
+        raise DynamicMotionRefused(
+            f"motion {plan.name!r} is dynamic: fewer than three feet carry the robot in parts "
+            f"of it, so it cannot be stopped there, and {type(plant).__name__} may move a "
+            "robot. No dynamic motion of this project was tried on one. To play it all the "
+            "same: play(..., allow_dynamic=True)"
+        )
 
 
 def listed(measured: Measurements) -> str:

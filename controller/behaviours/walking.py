@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from controller.behaviours.base import Behaviour
 from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.compiled import CompiledPlanner
-from go2_wbc.planning.locomotion import GaitPlanner, LocomotionConfig
+from go2_wbc.planning.gait_planner import GaitPlanner
+from go2_wbc.planning.locomotion import SETTLED_COMMAND, LocomotionConfig
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -34,6 +37,17 @@ class Walking(Behaviour):
     def square_up(self, snapshot: Snapshot) -> bool:
         """Step in place unless the feet are below the hips; returns whether they are."""
         return self._planner.square_up(snapshot)
+
+    def change_gait(self, gait: Gait) -> None:
+        """Walk on with another gait, within whose envelope the robot must walk already."""
+        self._planner.change_gait(gait)
+        self.gait = gait
+
+    @property
+    def follows_command(self) -> bool:
+        """Whether the planner has ramped the command; the robot itself may yet catch up."""
+        command = self.command.linear_x, self.command.linear_y, self.command.angular_z
+        return bool(np.allclose(self._planner.velocity, command, atol=SETTLED_COMMAND))
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the robot has come to rest."""

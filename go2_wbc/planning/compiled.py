@@ -5,19 +5,21 @@ from __future__ import annotations
 from dataclasses import astuple
 
 import numpy as np
+from jaxtyping import Float
 
 from go2_wbc.contacts import DUTY_RATE, OFFSET_RATE, PERIOD_RATE, Gait
 from go2_wbc.kernels.layout import FORCES, LOCOMOTION, MPC, PLANNER, REFERENCE
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.correction import CorrectionConfig
 from go2_wbc.planning.gait_clock import resting_gait
+from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.ground import (
     GROUND_SHARE,
     LEAST_DETERMINANT,
     MOST_SLOPE,
     GroundPlane,
 )
-from go2_wbc.planning.locomotion import MID_SWING, GaitPlanner, LocomotionConfig
+from go2_wbc.planning.locomotion import MID_SWING, LocomotionConfig
 from go2_wbc.planning.trunk import SETTLED_COMMAND
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
@@ -35,16 +37,14 @@ class CompiledPlanner(GaitPlanner):
     def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
         """Prepare a planner; ``start`` sets it on its way."""
         from go2_wbc.kernels.locomotion import is_square, plan
+        from go2_wbc.kernels.preview import steer
 
-        self._plan, self._is_square, self._steer = plan, is_square, None
-        if config.plans_forces(gait):
-            from go2_wbc.kernels.preview import steer
-
-            self._steer = steer
-        self._mpc, self._forces = config.mpc.numbers(model.mass, model.gravity), _nothing_planned()
+        self._plan, self._is_square, self._steer = plan, is_square, steer
+        self._model, self._config = model, config
+        self._mpc = config.mpc.numbers(model.mass, model.gravity)
         self._foot_radius, self._most_friction = model.foot_radius, config.slip.most
         self._mpc_friction, self._ground = config.mpc.friction, config.ground
-        self._numbers = _numbers(model, gait, config)
+        self.change_gait(gait)
         self._state = np.zeros(PLANNER.size)
         self._command = np.zeros(3)
         self._contact = np.zeros(4)
@@ -79,6 +79,16 @@ class CompiledPlanner(GaitPlanner):
             ]
         )
 
+    def change_gait(self, gait: Gait) -> None:
+        """Walk on with ``gait``; see ``GaitPlanner``."""
+        self._plans_forces, self._forces = self._config.plans_forces(gait), _nothing_planned()
+        self._numbers = _numbers(self._model, gait, self._config)
+
+    @property
+    def velocity(self) -> Float[np.ndarray, "3"]:
+        """Ramped command; see ``GaitPlanner``."""
+        return PLANNER.view(self._state, "velocity").copy()
+
     @property
     def is_stepping(self) -> bool:
         """Whether the gait is running; not before ``start``."""
@@ -105,7 +115,7 @@ class CompiledPlanner(GaitPlanner):
         self._contact[:] = state.feet_in_contact
         own, numbers = self._state, self._numbers
         self._plan(snapshot.row, state.time, self._contact, own, numbers, wanted, row)
-        if self._steer is not None:
+        if self._plans_forces:
             forces = self._forces
             self._mpc[MPC.start["friction"]] = min(self._mpc_friction, own[_STATE["friction"]])
             self._steer(snapshot.row, state.time, own, numbers, self._mpc, wanted, forces, row)

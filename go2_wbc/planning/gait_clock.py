@@ -36,8 +36,12 @@ class GaitClock:
 
     def __init__(self, gait: Gait, stride: Stride | None) -> None:
         """Args: gait: wanted; stride: how it follows the speed, or None."""
-        self._wanted, self._rest, self._stride = gait, resting_gait(gait), stride
+        self.change(gait, stride)
         self.restart()
+
+    def change(self, gait: Gait, stride: Stride | None) -> None:
+        """Move towards another gait from now on."""
+        self._wanted, self._rest, self._stride = gait, resting_gait(gait), stride
 
     def restart(self) -> None:
         """Begin the first stride."""

@@ -19,7 +19,6 @@ frame (z up, x along the reference's yaw).
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -31,6 +30,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.contact import ContactConfig, FootContacts
 from go2_wbc.planning.gait_clock import GaitClock
+from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.ground import GroundConfig, GroundPlane
 from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.planning.preview import Course, ForcePlanner
@@ -131,32 +131,6 @@ class LocomotionConfig:
         return self.mpc.load_ramp if self.plans_forces(gait) else self.load_ramp
 
 
-class GaitPlanner(ABC):
-    """Turns a velocity command into references, one tick after the other."""
-
-    @abstractmethod
-    def start(self, snapshot: Snapshot) -> None:
-        """Begin from the measured state, standing."""
-
-    @property
-    @abstractmethod
-    def is_stepping(self) -> bool:
-        """Whether the gait is running; not before ``start``."""
-
-    @property
-    @abstractmethod
-    def heading(self) -> float:
-        """Yaw [rad] of the reference; 0 before ``start``."""
-
-    @abstractmethod
-    def square_up(self, snapshot: Snapshot) -> bool:
-        """Start stepping unless every foot is below its hip; returns whether they all are."""
-
-    @abstractmethod
-    def update(self, snapshot: Snapshot, command: VelocityCommand) -> Reference:
-        """The reference of this tick for the wanted ``command`` (already inside the envelope)."""
-
-
 class LocomotionPlanner(GaitPlanner):
     """The planner in its readable form, to which ``compiled.CompiledPlanner`` is held."""
 
@@ -169,10 +143,8 @@ class LocomotionPlanner(GaitPlanner):
         """Prepare a planner; ``start`` sets it on its way."""
         self._model = model
         self._config = config
-        plans_forces = config.plans_forces(gait)
-        self._clock = GaitClock(gait, gait.stride if plans_forces else None)
-        self._ramp = config.ramp(gait)
-        self._forces = ForcePlanner(model, config.mpc) if plans_forces else None
+        self._clock = GaitClock(gait, None)
+        self.change_gait(gait)
         self._is_stepping = False
         self._has_started = False
 
@@ -190,6 +162,19 @@ class LocomotionPlanner(GaitPlanner):
         self._liftoff = snapshot.p_world_feet.copy()
         self._was_stance = np.ones(4, dtype=bool)
         self._is_awaited = np.zeros(4, dtype=bool)
+
+    def change_gait(self, gait: Gait) -> None:
+        """Walk on with ``gait``; see ``GaitPlanner``."""
+        config = self._config
+        plans_forces = config.plans_forces(gait)
+        self._clock.change(gait, gait.stride if plans_forces else None)
+        self._ramp = config.ramp(gait)
+        self._forces = ForcePlanner(self._model, config.mpc) if plans_forces else None
+
+    @property
+    def velocity(self) -> Float[np.ndarray, "3"]:
+        """Ramped command; see ``GaitPlanner``."""
+        return self._trunk.velocity.copy() if self._has_started else np.zeros(3)
 
     @property
     def is_stepping(self) -> bool:

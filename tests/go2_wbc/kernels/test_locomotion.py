@@ -101,8 +101,13 @@ def test_references_are_those_of_the_readable_planner(gait: Gait, config: Locomo
         frictions.add(theirs.friction)
         early += int((readable._contacts.stance & ~readable._was_stance).sum())
         at = theirs.body.p_world[:2]
+        np.testing.assert_allclose(compiled.velocity, readable.velocity, atol=ROUNDING, rtol=0)
         if tick % 900 == 0:
             assert compiled.square_up(snapshot) == readable.square_up(snapshot)
+        if tick % 1100 == 0:
+            other = (gait, GAITS["walk"], GALLOP)[tick // 1100 % 3]
+            readable.change_gait(other)
+            compiled.change_gait(other)
     assert starts >= 3, "the comparison must go through standing and stepping"
     assert len(frictions) > 10, "and through slips"
     assert early > 0, "and through feet that find a step"

@@ -12,8 +12,9 @@ import pytest
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.compiled import CompiledPlanner
+from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.ground import GROUND_SHARE
-from go2_wbc.planning.locomotion import GaitPlanner, LocomotionConfig, LocomotionPlanner
+from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot

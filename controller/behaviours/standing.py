@@ -1,0 +1,122 @@
+"""Standing: the feet stay where they are as long as that holds the robot, and step if it does not.
+
+The capture point (Pratt et al., Capture Point, Humanoids 2006), ``p + v / sqrt(g / h)``, is where
+an inverted pendulum of height ``h`` would have to put its foot to come to rest above it. Within the
+support polygon the feet need not move; outside the robot falls unless they do. The steps are those
+of the walking planner without a command. Once it has come to rest the robot stands where it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import hypot
+
+import numpy as np
+from jaxtyping import Float
+
+from controller.behaviours.plans import ChangePosture
+from controller.behaviours.walking import Walking
+from go2_wbc.contacts import GAITS, Gait
+from go2_wbc.geometry import support_margin
+from go2_wbc.legs import Leg
+from go2_wbc.planning.locomotion import LEAST_HEIGHT, LocomotionConfig
+from go2_wbc.reference import MotionPlan, Reference
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+
+LEAST_MARGIN = 0.03
+"""Distance [m] of the capture point inside the edge of the support polygon below which the robot
+steps: of 32 pushes of 36 to 45 N s 4 made it fall, at the edge itself 10, beyond it 11."""
+WELL_INSIDE = 0.06
+"""Distance [m] of the capture point from the feet's middle within which it is not looked closer."""
+AT_ONCE = 1e-6
+"""Capture margin [m] of the planner: once it is asked to step it does."""
+MIRRORED_OFFSETS = (0.0, 0.5, 0.5, 0.0)
+"""Of the trot that begins with FL and RR on the ground."""
+
+
+class Standing(ChangePosture):
+    """Go to the standing posture, hold it, and step for balance where that cannot be held."""
+
+    def __init__(
+        self,
+        make_plan: Callable[[Float[np.ndarray, "6"]], MotionPlan],
+        model: RobotModel,
+        config: LocomotionConfig,
+    ) -> None:
+        """Stand.
+
+        Args:
+            make_plan: as for ``ChangePosture``.
+            model: of the robot that steps.
+            config: how it steps; the forces are always planned ahead.
+        """
+        super().__init__(make_plan)
+        mpc = replace(config.mpc, enabled=True)
+        self._model, self._config = model, replace(config, capture_margin=AT_ONCE, mpc=mpc)
+        self._steps: Walking | None = None
+
+    @property
+    def is_stepping(self) -> bool:
+        """Whether it steps for balance now."""
+        return self._steps is not None
+
+    @property
+    def sag_and_lean(self) -> tuple[float, float] | None:  # type: ignore[override]
+        """From the plan; while it steps, from what is tracked."""
+        return None if self.is_stepping else super().sag_and_lean
+
+    def update(self, snapshot: Snapshot) -> Reference:
+        """The posture's reference, or that of the steps."""
+        if self._steps is not None and self._steps.is_finished(snapshot):
+            self._steps = None
+            self.start(snapshot)
+        if self._steps is None and not self.may_lie:
+            offset = self._capture_offset(snapshot)
+            if must_step(snapshot, offset):
+                self._steps = Walking(self._model, trot_against(snapshot, offset), self._config)
+                self._steps.start(snapshot)
+        return super().update(snapshot) if self._steps is None else self._steps.update(snapshot)
+
+    def is_finished(self, snapshot: Snapshot) -> bool:
+        """Whether the posture is reached, with no step left to do."""
+        return not self.is_stepping and super().is_finished(snapshot)
+
+    def _capture_offset(self, snapshot: Snapshot) -> tuple[float, float]:
+        """Place [m] of the capture point in the world, from the feet's middle."""
+        time = (self._config.height / self._model.gravity) ** 0.5
+        feet = snapshot.p_world_feet[:, :2]
+        capture = snapshot.p_world_com[:2] + time * snapshot.v_world_com[:2]
+        x, y = (capture - feet.sum(axis=0) / len(feet)).tolist()
+        return x, y
+
+
+def must_step(snapshot: Snapshot, offset: tuple[float, float]) -> bool:
+    """Whether a robot that is up cannot come to rest above its feet.
+
+    Args:
+        snapshot: of this tick.
+        offset: place [m] of the capture point in the world, from the feet's middle.
+    """
+    if hypot(*offset) < WELL_INSIDE:
+        return False
+    feet = snapshot.p_world_feet
+    if snapshot.p_world_com[2] - feet[:, 2].min() < LEAST_HEIGHT:
+        return False
+    return support_margin(feet[:, :2] - feet[:, :2].mean(axis=0), np.array(offset)) < LEAST_MARGIN
+
+
+def trot_against(snapshot: Snapshot, offset: tuple[float, float]) -> Gait:
+    """The trot that begins on the two feet whose line lies along the way the robot falls.
+
+    They can press against it from the first step on. Begun on the other two, the robot fell after
+    three pushes out of four along their diagonal.
+    """
+    feet, trot = snapshot.p_world_feet[:, :2], GAITS["trot"]
+    mirrored, usual = (
+        abs(float(way @ offset)) / float(np.linalg.norm(way))
+        for way in (feet[Leg.FL] - feet[Leg.RR], feet[Leg.FR] - feet[Leg.RL])
+    )
+    offsets = trot.offsets if usual >= mirrored else MIRRORED_OFFSETS
+    return replace(trot, name="balance", offsets=offsets, stride=None)

@@ -1,0 +1,113 @@
+"""A standing robot that its feet in place cannot hold steps, and stands again where it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from controller import GO2Controller, Mode
+from controller.behaviours.standing import Standing, must_step, trot_against
+from controller.checks import is_standing
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.model import RobotModel
+from tests.controller.plants import PERIOD
+from tests.engine_helpers import standing_q, state_of
+
+# s, and N s: at 16 N s aside, or 20 ahead, feet in place are at their end.
+PUSH_TIME = 0.1
+HARD, HARD_ASIDE = 30.0, 22.0
+SOFT = 6.0
+# s; in which it stands again.
+LIMIT = 3.0
+SNAPSHOT = RobotModel().snapshot(state_of(standing_q()))
+
+
+def pushed(impulse: float, angle: float) -> GO2Controller:
+    """A robot that stands and has just been pushed."""
+    plant = MujocoPlant(control_period=PERIOD)
+    go2 = GO2Controller(plant=plant)
+    assert go2.stand()
+    force = impulse / PUSH_TIME * np.array([np.cos(angle), np.sin(angle), 0.0])
+    plant.push(force, PUSH_TIME)
+    go2.wait(0.15)
+    return go2
+
+
+@pytest.mark.parametrize(
+    ("impulse", "angle"), [(HARD, 0.0), (HARD, np.pi / 4), (HARD_ASIDE, -np.pi / 2)]
+)
+def test_a_push_that_feet_in_place_cannot_hold_starts_steps(impulse: float, angle: float) -> None:
+    # It fell.
+    with pushed(impulse, angle) as go2:
+        assert go2.mode is Mode.MOVING
+        for _ in range(round(LIMIT / 0.1)):
+            go2.wait(0.1)
+            if go2.mode is Mode.STANDING:
+                break
+        go2.wait(0.5)
+        assert go2.mode is Mode.STANDING
+        assert is_standing(go2._runner.loop.snapshot)
+        assert np.linalg.norm(go2.state.q[:2]) > 0.1, "it was pushed away and stands there"
+
+
+def test_a_push_that_feet_in_place_hold_starts_no_step() -> None:
+    with pushed(SOFT, np.pi / 2) as go2:
+        assert go2.mode is Mode.STANDING
+        feet = go2._runner.loop.snapshot.p_world_feet
+        go2.wait(1.0)
+        assert np.abs(go2._runner.loop.snapshot.p_world_feet - feet).max() < 0.01
+
+
+@pytest.mark.parametrize("what", ["stand", "sit", "lie_down", "high_five", "bow"])
+def test_what_is_asked_for_while_it_steps_waits_until_it_stands(what: str) -> None:
+    # Begun at once it ended in a fall.
+    with pushed(HARD, 0.0) as go2:
+        assert go2.mode is Mode.MOVING
+        if what == "bow":
+            assert go2.play("bow"), go2.last_outcome.reason
+        else:
+            assert getattr(go2, what)(), go2.last_outcome.reason
+
+
+def test_it_also_steps_after_a_motion() -> None:
+    plant = MujocoPlant(control_period=PERIOD)
+    with GO2Controller(plant=plant) as go2:
+        assert go2.stand()
+        assert go2.play("bow")
+        plant.push(np.array([HARD / PUSH_TIME, 0.0, 0.0]), PUSH_TIME)
+        go2.wait(LIMIT)
+        assert go2.mode is Mode.STANDING
+
+
+@pytest.mark.parametrize(
+    ("offset", "steps"),
+    [((0.0, 0.0), False), ((0.1, 0.0), False), ((0.3, 0.0), True), ((0.0, -0.13), True)],
+)
+def test_it_steps_where_the_capture_point_is_near_the_edge_of_the_feet(
+    offset: tuple[float, float], *, steps: bool
+) -> None:
+    assert must_step(SNAPSHOT, offset) is steps
+
+
+def test_it_begins_on_the_feet_along_whose_line_it_falls() -> None:
+    left_ahead, right_ahead = (
+        trot_against(SNAPSHOT, (0.2, 0.1)),
+        trot_against(SNAPSHOT, (0.2, -0.1)),
+    )
+    assert left_ahead.schedule().at(0.0).stance.tolist() == [True, False, False, True]
+    assert right_ahead.schedule().at(0.0).stance.tolist() == [False, True, True, False]
+
+
+def test_a_robot_on_its_way_up_does_not_step() -> None:
+    plant = MujocoPlant(control_period=PERIOD)
+    with GO2Controller(plant=plant) as go2:
+        stepping: list[bool] = []
+
+        def note() -> None:
+            behaviour = go2._runner.loop.behaviour
+            stepping.append(isinstance(behaviour, Standing) and behaviour.is_stepping)
+
+        go2._runner._after_tick = note
+        assert go2.stand()
+        assert stepping
+        assert not any(stepping)
