@@ -9,7 +9,8 @@ from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.compiled import CompiledPlanner
 from go2_wbc.planning.gait_planner import GaitPlanner
-from go2_wbc.planning.locomotion import SETTLED_COMMAND, LocomotionConfig
+from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.trunk import SETTLED_COMMAND
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot

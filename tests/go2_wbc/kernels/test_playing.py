@@ -62,7 +62,13 @@ def random_reference(rng: np.random.Generator, near: np.ndarray | None) -> Refer
     loads, feet = rng.uniform(size=(2, 4)), rng.normal(size=(3, 4, 3))
     joints, forces = rng.normal(size=(3, 12)), rng.normal(size=(4, 3))
     return Reference(
-        BodyTarget(point, p, v, a, R, w, dw), legs, *loads, *feet, *joints, forces, 0.01
+        BodyTarget(point, p, v, a, R, w, dw),
+        legs,
+        *loads,
+        *feet,
+        *joints,
+        f_world_feet=forces,
+        force_weight=0.01,
     )
 
 
