@@ -141,7 +141,8 @@ def torque(
 
     Only a driving motor, tau v > 0, meets the line of torque and speed; rounding moves none.
     """
-    asked, most = np.abs(forces.tau), limits.torque_share * model.torque_limits
+    share = np.where(motion.is_dynamic, limits.solved_torque_share, limits.torque_share)
+    asked, most = np.abs(forces.tau), share[:, None] * model.torque_limits
     v = motion.v[:, 6:] if forces.v_motors is None else forces.v_motors
     lower, upper = model.motor.limits(v)
     at_speed = np.where(forces.tau < 0.0, -lower, upper)

@@ -15,6 +15,9 @@ class FeasibilityLimits:
         reach: distance [m] by which a foot's place may be out of the leg's reach: what rounding of
             the trunk's place makes of one at the end of the reach.
         torque_share: share of the torque limit that a plan may use; 15 % are for feedback.
+        solved_torque_share: the same in solved parts. They are solved for 0.85, so this is what one
+            reaches that would need more: the robot was on its feet after these, but slid and
+            turned.
         slip: greatest distance [m] that a standing foot may slide.
         foot_load: least normal force [N] of a foot that stands: 2 % of the weight; leans with 4 N
             were done.
@@ -51,6 +54,7 @@ class FeasibilityLimits:
 
     reach: float = 0.002
     torque_share: float = 0.85
+    solved_torque_share: float = 0.845
     slip: float = 0.01
     foot_load: float = 3.0
     support: float = 0.006

@@ -20,6 +20,8 @@ from motions import (
 )
 from motions.dynamics.phases import Tolerance
 from motions.dynamics.trajectory import DynamicTrajectory
+from motions.feasibility.dynamic import torque
+from motions.feasibility.limits import FeasibilityLimits
 from tests.solver import needs_solver
 
 Mutation = Callable[[DynamicTrajectory, np.random.Generator], DynamicTrajectory]
@@ -176,6 +178,19 @@ def test_a_plan_beyond_its_tolerance_is_refused_with_how_far_and_when(
     worst = report.margins["off by"]
     assert worst.unit == "mm"
     assert worst.value == pytest.approx(1e3 * span.trajectory.position_deviation, rel=1e-3)
+
+
+def test_a_solved_part_at_the_torque_that_it_may_use_would_need_more(
+    checker: FeasibilityChecker, jump: CheckedMotion
+) -> None:
+    """A solver never exceeds its bound: a plan that was cut by it is told by reaching it."""
+    tau = np.zeros(jump.forces.tau.shape)
+    row = int(np.flatnonzero(jump.path.is_dynamic)[5])
+    written = int(np.flatnonzero(~jump.path.is_dynamic)[0])
+    tau[[row, written], 1] = 0.85 * checker.model.torque_limits[1] - 1e-6
+    forces = replace(jump.forces, tau=tau)
+    peak, _ = torque(jump.path, forces, checker.model, FeasibilityLimits())
+    assert np.argwhere(peak.margins < 0.0).tolist() == [[row, 1]]
 
 
 def test_neither_support_nor_zero_moment_point_is_asked_for_in_flight(jump: CheckedMotion) -> None:
