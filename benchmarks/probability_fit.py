@@ -28,6 +28,8 @@ MOST = 20.0
 """Value of asinh beyond which more of it, or an infinite margin, tells nothing."""
 REST_SPREAD = 5.0
 """Standard deviation of the log odds of the rest."""
+USUAL_LEAK, LEAK_SPREAD = -3.0, 1.5
+"""Log odds of the leak before anything is seen, and their standard deviation."""
 BINS = 10
 RESAMPLES = 1000
 _LEAST = 1e-9
@@ -52,20 +54,23 @@ def fit(samples: Sequence[Sample]) -> ProbabilityModel:
     """The model of greatest posterior density (MAP), by L-BFGS.
 
     Log likelihood of outcomes y in {0, 1} with P of the model, plus normal priors on each centre,
-    on the logarithm of each width, and on the rest; over asinh(margin / unit), of no unit.
+    on the logarithm of each width, on the rest and on the log odds of the leak; over
+    asinh(margin / unit), of no unit.
     """
     names, units = _fitted(samples)
     x = np.clip(np.arcsinh(_table(samples, names) / units), -MOST, MOST)
     done = np.array([sample.is_done for sample in samples])
-    start = np.concatenate([np.zeros(len(names)), np.full(len(names), np.log(USUAL_WIDTH)), [3.0]])
-    bounds = [FARTHEST] * len(names) + [np.log(WIDTHS)] * len(names) + [FARTHEST]
+    start = np.concatenate(
+        [np.zeros(len(names)), np.full(len(names), np.log(USUAL_WIDTH)), [3.0], [USUAL_LEAK]]
+    )
+    bounds = [FARTHEST] * len(names) + [np.log(WIDTHS)] * len(names) + [FARTHEST] * 2
     found = minimize(_loss, start, args=(x, done), jac=True, method="L-BFGS-B", bounds=bounds)
-    centres, widths, rest = _split(found.x, len(names))
+    centres, widths, rest, leak = _split(found.x, len(names))
     rises = {
         name: Rise(float(unit), float(centre), float(width))
         for name, centre, width, unit in zip(names, centres, widths, units, strict=True)
     }
-    return ProbabilityModel(rises, float(rest))
+    return ProbabilityModel(rises, rest, float(expit(leak)))
 
 
 def _fitted(samples: Sequence[Sample]) -> tuple[list[str], Float[np.ndarray, " k"]]:
@@ -94,8 +99,10 @@ def _table(samples: Sequence[Sample], names: Sequence[str]) -> Float[np.ndarray,
 
 def _split(
     parameters: Float[np.ndarray, " p"], k: int
-) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], float]:
-    return parameters[:k], np.exp(parameters[k : 2 * k]), float(parameters[2 * k])
+) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"], float, float]:
+    """Centres, widths, log odds of the rest and of the leak."""
+    rest, leak = parameters[2 * k :].tolist()
+    return parameters[:k], np.exp(parameters[k : 2 * k]), rest, leak
 
 
 def _loss(
@@ -103,34 +110,40 @@ def _loss(
 ) -> tuple[float, Float[np.ndarray, " p"]]:
     """The negative log posterior and its gradient.
 
-    With z = (x - c) / w and L = log P = log s(b) + sum log s(z):
-    d log s(z) / dz = s(-z), and for a run that failed d log(1 - P) / dL = -P / (1 - P).
+    With z = (x - c) / w, Q = prod s(z), R = e + (1 - e) Q and L = log P = log s(b) + log R:
+    d log s(z) / dz = s(-z), d log R / d log Q = (1 - e) Q / R, and for a run that failed
+    d log(1 - P) / dL = -P / (1 - P).
     """
     k = x.shape[1]
-    centres, widths, rest = _split(parameters, k)
+    centres, widths, rest, leak = _split(parameters, k)
     is_seen = np.isfinite(x)
     z = np.where(is_seen, (np.nan_to_num(x) - centres) / widths, 0.0)
-    log_p = log_expit(rest) + np.where(is_seen, log_expit(z), 0.0).sum(axis=1)
-    log_p = np.minimum(log_p, -_LEAST)
+    log_q = np.where(is_seen, log_expit(z), 0.0).sum(axis=1) + log_expit(-leak)
+    log_r = np.logaddexp(log_expit(leak), log_q)
+    log_p = np.minimum(log_expit(rest) + log_r, -_LEAST)
     p = np.exp(log_p)
-    log_q = np.log1p(-p)
-    likelihood = np.where(done, log_p, log_q).sum()
+    likelihood = np.where(done, log_p, np.log1p(-p)).sum()
     pull = np.where(done, 1.0, -p / (1.0 - p))  # d likelihood / d log p
-    slope = pull[:, None] * np.where(is_seen, expit(-z), 0.0)
+    share = np.exp(log_q - log_r)  # of the product in R; the leak has the rest
+    slope = (pull * share)[:, None] * np.where(is_seen, expit(-z), 0.0)
     d_centre = -(slope / widths).sum(axis=0)
     d_width = -(slope * z).sum(axis=0)  # of the logarithm of the width
     d_rest = float((pull * expit(-rest)).sum())
+    d_leak = float((pull * ((1.0 - share) * expit(-leak) - share * expit(leak))).sum())
     away = (parameters[k : 2 * k] - np.log(USUAL_WIDTH)) / WIDTH_SPREAD
+    leak_away = (leak - USUAL_LEAK) / LEAK_SPREAD
     prior = (
         0.5 * float(((centres / CENTRE_SPREAD) ** 2).sum())
         + 0.5 * float((away**2).sum())
         + 0.5 * (rest / REST_SPREAD) ** 2
+        + 0.5 * leak_away**2
     )
     gradient = np.concatenate(
         [
             -d_centre + centres / CENTRE_SPREAD**2,
             -d_width + away / WIDTH_SPREAD,
             [-d_rest + rest / REST_SPREAD**2],
+            [-d_leak + leak_away / LEAK_SPREAD],
         ]
     )
     return prior - float(likelihood), gradient

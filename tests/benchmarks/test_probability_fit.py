@@ -10,7 +10,9 @@ import pytest
 from benchmarks.probability_fit import Sample, _loss, calibration, fit
 from motions.feasibility.probability import ProbabilityModel, Rise
 
-TRUTH = ProbabilityModel({"slip": Rise(0.03, 0.5, 0.3), "torque": Rise(3.0, -0.4, 0.2)}, rest=3.0)
+TRUTH = ProbabilityModel(
+    {"slip": Rise(0.03, 0.5, 0.3), "torque": Rise(3.0, -0.4, 0.2)}, rest=3.0, leak=0.05
+)
 
 
 def _samples(seed: int, n: int) -> list[Sample]:
@@ -30,10 +32,10 @@ def test_the_gradient_of_the_loss_is_that_of_finite_differences() -> None:
     rng = np.random.default_rng(1)
     x, done = rng.normal(size=(50, 3)), rng.random(50) < 0.5
     x[rng.random((50, 3)) < 0.2] = np.nan
-    parameters, step = rng.normal(size=7), 1e-6
+    parameters, step = rng.normal(size=8), 1e-6
     _, gradient = _loss(parameters, x, done)
     for i in range(len(parameters)):
-        moved = [parameters + sign * step * np.eye(7)[i] for sign in (1.0, -1.0)]
+        moved = [parameters + sign * step * np.eye(8)[i] for sign in (1.0, -1.0)]
         up, down = (_loss(at, x, done)[0] for at in moved)
         assert gradient[i] == pytest.approx((up - down) / (2 * step), rel=1e-5, abs=1e-6)
 
@@ -45,6 +47,7 @@ def test_the_fit_finds_what_made_the_data_and_is_calibrated_on_others() -> None:
         assert found.unit * math.sinh(found.centre) == pytest.approx(even, abs=0.3 * rise.unit)
         for margin in np.linspace(-2.0, 3.0, 11) * rise.unit:
             assert found.chance(margin) == pytest.approx(rise.chance(margin), abs=0.1)
+    assert model.leak == pytest.approx(TRUTH.leak, abs=0.02)
     others = _samples(3, 2000)
     chances = np.array([model.probability(sample.margins) for sample in others])
     done = np.array([sample.is_done for sample in others])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -36,5 +37,16 @@ def test_a_check_that_no_fit_has_seen_is_a_yes_or_no() -> None:
     assert MODEL.chances({"a": 1e-9, "b": 0.0, "c": -1e-9}) == {"a": 1.0, "b": 1.0, "c": 0.0}
 
 
+def test_the_leak_is_what_is_left_where_a_margin_says_no_but_not_to_what_no_fit_has_seen() -> None:
+    leaky = replace(MODEL, leak=0.1)
+    rest = 1 / (1 + math.exp(-3))
+    assert leaky.probability({"slip": -math.inf}) == pytest.approx(0.1 * rest)
+    even = {"torque": 2.0 * math.sinh(-1.0)}
+    assert leaky.probability(even) == pytest.approx((0.1 + 0.9 * 0.5) * rest)
+    assert leaky.probability({"slip": math.inf}) == pytest.approx(rest)
+    assert leaky.probability({"numbers": -1.0}) == 0.0
+
+
 def test_a_model_comes_back_from_its_values() -> None:
-    assert ProbabilityModel.of(MODEL.as_dict()) == MODEL
+    for model in (MODEL, replace(MODEL, leak=0.1)):
+        assert ProbabilityModel.of(model.as_dict()) == model
