@@ -1,0 +1,313 @@
+"""``python -m benchmarks balance``: pushes, drops, changes of gait, and whether a fall is noticed.
+
+Ground truth as the state, motors with their torque-speed line, friction 0.6 to 1.0 (drops: 0.4 to
+1.0), masses within 10 %, of which the controller is not told; forces planned ahead by the MPC.
+Numbers were chosen on seeds 0 to 9; those judged begin at ``FIRST_SEED``.
+
+- standing: a push of 0.1 s in each of eight directions, 36 N s aside, 45 ahead and back, on an
+  ellipse in between; survived is who stands again within 3 s;
+- trotting: a push of 0.1 s at 16 phases of the stride, at 0.5 m/s; survived as in ``behaviour``;
+- recover: limp, any attitude, any joint angles, up to 0.5 m above the ground;
+- gaits: ten changes to a random gait, or stops, with a random velocity in its envelope;
+- disturbed: random calls and velocities, and pushes of up to 90 N s at random moments. A fall is
+  the trunk on the ground for 0.05 s, or a tilt of 60 deg, in truth; the delay is to the mode. An
+  error that a call must not raise ends the benchmark.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from functools import partial
+
+import numpy as np
+
+from benchmarks.locomotion import CONFIG, FIRST_SEED, MASS_RANGE
+from benchmarks.pushes import PUSH_TIME
+from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.seeded import add_seeded_options, run_seeded
+from benchmarks.steps import plant_of
+from benchmarks.trials import Trial, TrialFailed, TrialRobot
+from controller.checks import is_standing
+from controller.cli.common import Subparsers, add_parser
+from controller.modes import Mode
+from go2_wbc.contacts import GAITS
+from go2_wbc.errors import ModeError
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH
+from go2_wbc.robot.model import RobotModel
+
+ASIDE, AHEAD = 36.0, 45.0
+"""Impulses [N s] on the standing robot."""
+DIRECTIONS, PHASES = 8, 16
+STANDING_LIMIT = 3.0
+"""Time [s] after a push in which the robot must stand again."""
+LOOK = 0.05
+"""Time [s] between two looks at the robot."""
+CALM = 0.2
+"""Time [s] for which it must stand."""
+TROT_PUSHES = {"lateral": (math.pi / 2, 26.0), "forward": (0.0, 50.0), "backward": (math.pi, 42.0)}
+"""Direction [rad] and impulse [N s]."""
+TROT_SPEED, SPEED_TOLERANCE, TROT_TIME = 0.5, 0.15, 2.0
+"""m/s, m/s, and the time [s] after a push within which it trots again."""
+DROP_FRICTION = (0.4, 1.0)
+DROP_HEIGHT = (0.1, 0.5)
+"""Height [m] of the lowest point of the robot over the floor."""
+DROP_TIME = 1.0
+"""Time [s] for which the limp robot falls before ``recover()``."""
+CHANGES = 10
+CALLS = 6
+CALLED = ("stand", "sit", "lie_down", "high_five", "walk", "bow", "turn")
+RISEN = 0.2
+"""Height [m] of the base over the lowest foot from which on a trunk has left the ground."""
+HARDEST = 90.0
+"""Greatest impulse [N s] of a disturbance."""
+STUMBLE = 0.05
+"""Time [s] for which a trunk may touch the ground without having fallen."""
+EXAMPLES = """
+python -m benchmarks balance              everything
+python -m benchmarks balance --quick      three seeds
+python -m benchmarks balance --rows recover --seeds 200
+python -m benchmarks balance --list       the metrics and their thresholds
+"""
+
+
+def heading_force(angle: float, impulse: float) -> np.ndarray:
+    """Force (3,) [N] that gives ``impulse`` [N s] at ``angle`` [rad] from ahead to the left."""
+    return impulse / PUSH_TIME * np.array([math.cos(angle), math.sin(angle), 0.0])
+
+
+def impulse_at(angle: float) -> float:
+    """Impulse [N s] of the standing robot's push in this direction."""
+    return 1.0 / math.hypot(math.cos(angle) / AHEAD, math.sin(angle) / ASIDE)
+
+
+def measure_standing(trial: Trial, direction: int) -> Measurement:
+    """Push the standing robot in one direction."""
+    angle, name = 2.0 * math.pi * direction / DIRECTIONS, f"stand.{45 * direction}"
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+        robot.require(robot.go2.stand())
+        start, since = robot.plant.time, math.inf
+        try:
+            robot.push(heading_force(angle, impulse_at(angle)), PUSH_TIME)
+            while robot.plant.time - start < STANDING_LIMIT:
+                robot.wait(LOOK)
+                stands = is_standing(RobotModel().snapshot(robot.plant.read()))
+                since = min(since, robot.plant.time) if stands else math.inf
+        except TrialFailed as failed:
+            return Measurement({name: 0.0}, notes={name: str(failed)})
+    return Measurement({name: float(since <= start + STANDING_LIMIT - CALM)})
+
+
+def measure_trotting(trial: Trial, name: str) -> Measurement:
+    """Push the trotting robot at every phase; the share of phases that it survives."""
+    angle, impulse = TROT_PUSHES[name]
+    survived, period = 0, GAITS["trot"].period
+    for phase in range(PHASES):
+        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+            robot.require(robot.go2.stand())
+            robot.require(robot.go2.walk())
+            robot.go2.move(TROT_SPEED)
+            side = 1.0 if phase % 2 or name != "lateral" else -1.0
+            try:
+                robot.wait(TROT_TIME + phase * period / PHASES)
+                robot.push(heading_force(side * angle, impulse), PUSH_TIME)
+                robot.wait(TROT_TIME)
+            except TrialFailed:
+                continue
+            strides = robot.truth.recording(since=robot.plant.time - 2.0 * period)
+            speed = float(strides.com_velocity[:, 0].mean())
+            survived += abs(speed - TROT_SPEED) < SPEED_TOLERANCE
+    return Measurement({f"trot.{name}": survived / PHASES})
+
+
+def dropped(seed: int) -> MujocoPlant:
+    """A robot in the air, in any attitude, with any joint angles."""
+    rng, model = np.random.default_rng(seed), RobotModel()
+    friction, mass = float(rng.uniform(*DROP_FRICTION)), float(rng.uniform(*MASS_RANGE))
+    plant = MujocoPlant(friction=friction, mass_scale=mass, seed=seed)
+    q = np.concatenate(
+        [[0.0, 0.0, 1.0], rng.normal(size=4), rng.uniform(model.q_lower, model.q_upper)]
+    )
+    plant.place(q)
+    lowest = plant.data.geom_xpos[plant.model.geom_bodyid > 0, 2].min()
+    q[2] += rng.uniform(*DROP_HEIGHT) - lowest
+    plant.place(q)
+    return plant
+
+
+def measure_recovery(trial: Trial) -> Measurement:
+    """Drop the limp robot and let it get up."""
+    with TrialRobot(dropped(FIRST_SEED + trial.seed), CONFIG) as robot:
+        robot.go2.wait(DROP_TIME)
+        said = robot.go2.recover()
+        is_up = said and robot.truth.fall() is None
+        stands = is_up and is_standing(RobotModel().snapshot(robot.plant.read()))
+        notes = {} if stands else {"recover": robot.go2.last_outcome.reason}
+    return Measurement({"recover": float(stands)}, notes=notes)
+
+
+def measure_gaits(trial: Trial) -> Measurement:
+    """Change the gait, or stop, again and again."""
+    rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+        robot.require(robot.go2.stand())
+        robot.require(robot.go2.walk())
+        try:
+            for _ in range(CHANGES):
+                _change(robot, rng)
+                done += 1
+        except TrialFailed as failed:
+            return Measurement({"gaits": done / CHANGES}, notes={"gaits": str(failed)})
+    return Measurement({"gaits": 1.0})
+
+
+def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
+    """A stop, or another gait at a velocity in its envelope; then some time."""
+    if rng.random() < 0.2:
+        robot.go2.stop()
+    else:
+        gait = GAITS[str(rng.choice(list(GAITS)))]
+        robot.require(robot.go2.walk(gait))
+        x, y, turn = rng.uniform(-1.0, 1.0, 3) * gait.envelope_share * [1.2, 0.5, 1.5]
+        robot.go2.move(x, turn, linear_y=y)
+    robot.wait(float(rng.uniform(0.3, 1.5)))
+
+
+def measure_disturbed(trial: Trial) -> Measurement:
+    """Call at random, push at random, until the robot has fallen or all calls are made."""
+    rng = np.random.default_rng(FIRST_SEED + trial.seed)
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+        watch = Watch(robot, rng)
+        robot.truth.on_tick = watch.look
+        for _ in range(CALLS):
+            if robot.go2.mode in (Mode.FALLEN, Mode.DAMPED):
+                break
+            what = str(rng.choice(CALLED))
+            watch.may_lie = what == "lie_down"
+            _call(robot, what, rng)
+        robot.go2.wait(1.0)
+        delay = watch.delay
+    notes = {"disturbed.fell": str(watch.fell)}
+    return Measurement({"disturbed.delay": delay}, notes=notes)
+
+
+def _call(robot: TrialRobot, what: str, rng: np.random.Generator) -> None:
+    """One call that may end in a fall, and time after it."""
+    go2 = robot.go2
+    try:
+        if what == "walk":
+            go2.walk(str(rng.choice(list(GAITS))))
+            go2.move(*rng.uniform((-1.0, -1.5), (1.5, 1.5)).tolist())
+        elif what == "bow":
+            go2.stand()
+            go2.play("bow")
+        elif what == "turn":
+            go2.turn_left(float(rng.uniform(-1.5, 1.5)))
+        else:
+            getattr(go2, what)()
+        go2.wait(float(rng.uniform(0.2, 1.5)))
+    except ModeError:  # it fell in between, and says so
+        return
+
+
+class Watch:
+    """Pushes at random moments, and compares what the mode says with the truth, every tick.
+
+    Attributes:
+        fell: when [s] the robot fell in truth, infinite if it did not.
+        may_lie: whether it was told to lie down.
+    """
+
+    def __init__(self, robot: TrialRobot, rng: np.random.Generator) -> None:
+        self._robot, self._rng = robot, rng
+        self._next = float(rng.uniform(1.0, 6.0))
+        self._touches_since = self.fell = self._noticed = math.inf
+        self.may_lie = self._has_risen = False
+
+    @property
+    def delay(self) -> float:
+        """From the fall to the mode that says so [s]; 0 if it did not fall, or said so before."""
+        return max(self._noticed - self.fell, 0.0) if math.isfinite(self.fell) else 0.0
+
+    def look(self) -> None:
+        """Once a tick."""
+        plant, mode = self._robot.plant, self._robot.go2.mode
+        now = plant.time
+        if now >= self._next:
+            angle, impulse = self._rng.uniform((0.0, 0.0), (2.0 * math.pi, HARDEST)).tolist()
+            plant.push(heading_force(angle, impulse), PUSH_TIME)
+            self._next = now + float(self._rng.uniform(1.0, 6.0))
+        if mode in (Mode.FALLEN, Mode.DAMPED):
+            self._noticed = min(self._noticed, now)
+        height = float(plant.read().q[2] - plant.p_world_feet[:, 2].min())
+        self._has_risen = mode.is_upright and (self._has_risen or height > RISEN)
+        must_be_up = self._has_risen and not self.may_lie
+        is_down = must_be_up and plant.base_contact_force > TOUCH
+        self._touches_since = min(self._touches_since, now) if is_down else math.inf
+        if plant.read().tilt > FALLEN_TILT:
+            self.fell = min(self.fell, now)
+        if now - self._touches_since > STUMBLE:
+            self.fell = min(self.fell, self._touches_since)
+
+
+def _share(name: str, item: str, quantity: str, least: float) -> Metric:
+    return Metric(name, item, quantity, "", least, Direction.AT_LEAST)
+
+
+_TROT = "trot 0.5 m/s, push 0.1 s, 16 phases"
+SCENARIOS = (
+    *(
+        Scenario(
+            f"stand-{45 * k}",
+            (
+                _share(
+                    f"stand.{45 * k}",
+                    "standing, push 0.1 s, 36 N s aside, 45 ahead",
+                    f"survived at {45 * k} deg",
+                    1.0,
+                ),
+            ),
+            partial(measure_standing, direction=k),
+            group="standing",
+        )
+        for k in range(DIRECTIONS)
+    ),
+    *(
+        Scenario(
+            f"trot-{name}",
+            (_share(f"trot.{name}", _TROT, f"{name} {impulse:g} N s survived", 1.0),),
+            partial(measure_trotting, name=name),
+            group="trotting",
+        )
+        for name, (_, impulse) in TROT_PUSHES.items()
+    ),
+    Scenario("recover", (_share("recover", "drops", "stand again", 0.98),), measure_recovery, 10),
+    Scenario(
+        "gaits", (_share("gaits", "ten changes of gait and stops", "done", 1.0),), measure_gaits
+    ),
+    Scenario(
+        "disturbed",
+        (Metric("disturbed.delay", "random calls and pushes", "delay of notice", "s", 0.2),),
+        measure_disturbed,
+        50,
+    ),
+)
+"""In the order of the report."""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``balance``."""
+    parser = add_parser(
+        subparsers,
+        "balance",
+        "Pushes, drops, changes of gait, and whether a fall is noticed.\n"
+        "Exit code 0 if every threshold is met, 1 if one is not.",
+        examples=EXAMPLES,
+    )
+    add_seeded_options(parser, "; times 10 for drops, 50 for disturbed runs")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run what was asked for; see ``run_seeded``."""
+    return run_seeded(args, SCENARIOS)

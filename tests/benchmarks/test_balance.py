@@ -1,0 +1,65 @@
+"""A sample of every row of ``balance``, and that what judges a fall sees one."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from benchmarks import balance
+from benchmarks.balance import SCENARIOS, dropped, heading_force, impulse_at
+from benchmarks.pushes import PUSH_TIME
+from benchmarks.trials import Trial, TrialRobot
+from go2_wbc.config import Config
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.safety import FallDetector, SafetyConfig
+
+
+def measured(name: str, seed: int) -> dict[str, float]:
+    scenario = next(s for s in SCENARIOS if s.name == name)
+    return dict(scenario.measure(Trial(seed)).values)
+
+
+def test_every_metric_has_a_name_of_its_own() -> None:
+    names = [metric.name for scenario in SCENARIOS for metric in scenario.metrics]
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize(
+    ("angle", "impulse"), [(0.0, 45.0), (math.pi, 45.0), (math.pi / 2, 36.0), (-math.pi / 2, 36.0)]
+)
+def test_a_push_has_the_impulse_of_its_direction(angle: float, impulse: float) -> None:
+    assert impulse_at(angle) == pytest.approx(impulse)
+    force = heading_force(angle, impulse)
+    assert np.linalg.norm(force) * PUSH_TIME == pytest.approx(impulse)
+    assert math.atan2(force[1], force[0]) == pytest.approx(angle)
+
+
+def test_a_drop_begins_above_the_floor() -> None:
+    plant = dropped(7)
+    lowest = plant.data.geom_xpos[plant.model.geom_bodyid > 0, 2].min()
+    assert 0.1 <= lowest <= 0.5
+    assert plant.base_contact_force == 0.0
+    plant.close()
+
+
+def test_a_dropped_robot_stands_again() -> None:
+    assert measured("recover", 1) == {"recover": 1.0}
+
+
+def test_a_disturbed_robot_says_in_time_that_it_has_fallen() -> None:
+    assert measured("disturbed", 0)["disturbed.delay"] <= 0.2
+
+
+def test_a_fall_that_nobody_notices_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(FallDetector, "reason", lambda *_, **__: None)
+    patient = Config(safety=SafetyConfig(qp_patience=10_000))
+    with TrialRobot(MujocoPlant(control_period=0.004), patient) as robot:
+        watch = balance.Watch(robot, np.random.default_rng(0))
+        robot.require(robot.go2.stand())
+        robot.truth.on_tick = watch.look
+        robot.plant.push(heading_force(math.pi / 2, 90.0), PUSH_TIME)
+        robot.go2.wait(2.0)
+        assert math.isfinite(watch.fell)
+        assert watch.delay == math.inf
