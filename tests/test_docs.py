@@ -246,7 +246,10 @@ def test_the_limits_in_the_table_are_those_of_the_checker() -> None:
         "lag": f"<= {1000 * limits.lag:g} mm, {limits.lag_angle:g} rad",
         "friction": f"<= {World().friction:g}",
         "self-collision": f">= {1000 * limits.self_distance:g} mm",
-        "clearance": f">= {1000 * limits.clearance:g} mm; feet >= -{1000 * limits.swing_depth:g}",
+        "clearance": f">= {1000 * limits.clearance:g} mm; "
+        f"feet >= -{1000 * limits.swing_depth:g} mm; "
+        f"thighs >= {1000 * limits.thigh_clearance:g} mm; "
+        f"calves >= {1000 * limits.calf_clearance:g} mm",
         "dragging": f"<= {1000 * limits.drag:g} mm",
         "landing place": f"<= {1000 * limits.landing:g} mm",
         "landing speed": f"<= {limits.landing_speed:g} m/s",

@@ -45,6 +45,18 @@ def _skims(_draw: Draw, s: float) -> Timeline:
     return line.down("FR", over=0.6).home(over=0.8)
 
 
+def _slides(_draw: Draw, s: float) -> Timeline:
+    line = Timeline().foot("RR", x=s, z=0.006, over=0.6)
+    return line.down("RR", over=0.5).home(over=0.8)
+
+
+def _rocks(_draw: Draw, s: float) -> Timeline:
+    line = Timeline()
+    for _ in range(4):
+        line = line.body(roll=0.37, over=s).body(roll=-0.37, over=s)
+    return line.home(over=0.5)
+
+
 def _stamps(_draw: Draw, s: float) -> Timeline:
     line = Timeline()
     for _ in range(3):
@@ -72,6 +84,8 @@ _EXAMPLES = {
     _twists: (0.20, 0.25, 0.30),
     _sways: (0.30, 0.40),
     _skims: (0.004, 0.010, 0.030),
+    _slides: (0.02, 0.04),
+    _rocks: (0.13, 0.20),
     _stamps: (0.15, 0.20, 0.25),
     _taps: (0.15, 0.20, 0.30),
     _lifts_in_turn: (0.05, 0.10, 0.15),
