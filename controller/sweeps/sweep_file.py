@@ -88,7 +88,7 @@ class SweepFile:
         if about is not None and (other := _differences(found, about)):
             raise ConfigError(
                 f"{self.path} holds rows that depend on something else ({'; '.join(other)}): "
-                "choose another file, or begin anew"
+                "choose another file, or begin anew with `--fresh` (`fresh=True`)"
             )
         return found
 

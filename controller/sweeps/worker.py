@@ -16,11 +16,13 @@ import threading
 import traceback
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from pathlib import Path
 from queue import SimpleQueue
 from typing import IO, Any
 
 from controller.sweeps.engine import Failure
 
+_HERE = Path(__file__).parent
 _LENGTH = struct.Struct("<Q")
 
 
@@ -51,9 +53,19 @@ def answer(order: bytes, item: bytes) -> bytes:
         return pickle.dumps((_ordered(order)(pickle.loads(item)), None))
     except (Exception, SystemExit) as error:
         text = traceback.format_exception_only(error)[-1].strip()
-        return pickle.dumps((None, Failure(text, traceback.format_exc())))
+        return pickle.dumps((None, Failure(text, _told(error))))
     finally:
         _tidy_up()
+
+
+def _told(error: BaseException) -> str:
+    """The traceback from where it leaves this package: its user looks for what is in their file."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        if Path(trace.tb_frame.f_code.co_filename).parent != _HERE:
+            break
+        trace = trace.tb_next
+    return "".join(traceback.format_exception(type(error), error, trace))
 
 
 def _tidy_up() -> None:

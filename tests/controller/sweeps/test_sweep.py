@@ -118,6 +118,7 @@ def test_a_function_that_raises_is_told_with_its_seed_and_traceback(out: Path) -
     text = str(caught.value)
     assert "seed 5: ValueError: five is too much; 5 finished rows are kept in" in text
     assert "in raise_on_5" in text
+    assert not any(own in text for own in ("worker.py", "targets.py"))
     assert known(read_sweep(out).rows) == known(expected(5))
 
 
