@@ -200,8 +200,8 @@ def _call(robot: TrialRobot, what: str, rng: np.random.Generator) -> None:
             go2.walk(str(rng.choice(list(GAITS))))
             go2.move(*rng.uniform((-1.0, -1.5), (1.5, 1.5)).tolist())
         elif what == "bow":
-            go2.stand()
-            go2.play("bow")
+            if go2.stand():
+                go2.play("bow")
         elif what == "turn":
             go2.turn_left(float(rng.uniform(-1.5, 1.5)))
         else:

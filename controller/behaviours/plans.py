@@ -24,6 +24,9 @@ LOW = 0.15
 """Height [m] of the trunk over the ground below which a posture may begin on the belly."""
 RISEN = 0.22
 """Height [m] of the tracked point over the ground from which on the robot has left its belly."""
+SUNK_BACK = 0.04
+"""Depth [m] below the highest that it has risen to, from which on a rising robot is falling: one
+that is too weak, or carries too much, stops where it is."""
 
 
 class PlayPlan(Behaviour):
@@ -136,11 +139,14 @@ class ChangePosture(PlayPlan):
         pose = np.array([*position, roll, pitch, wrap_angle(float(yaw) - anchor.yaw)])
         self.plan = self._make_plan(pose)
         self.duration = self.plan.duration
+        self._highest = float(pose[2])
         self.may_lie = bool(pose[2] < LOW) or self.plan.exit is Posture.LIE
 
     def update(self, snapshot: Snapshot) -> Reference:
-        """The plan's reference; once the robot has risen, its belly must stay off the ground."""
+        """The plan's reference; once the robot has risen, or sinks back, it must not lie."""
         height = float(tracked_position(snapshot, self._point)[2] - self._anchor.p_world[2])
-        if height > RISEN and self.plan.exit is not Posture.LIE:
+        self._highest = max(self._highest, height)
+        has_sunk_back = self._highest - height > SUNK_BACK
+        if (height > RISEN or has_sunk_back) and self.plan.exit is not Posture.LIE:
             self.may_lie = False
         return super().update(snapshot)

@@ -38,8 +38,6 @@ class SafetyConfig:
             balancing robot counts as collapsed; on its belly it is 0.063.
         touch_limit: time [s] for which the trunk of a balancing robot may touch the ground; of the
             robots that withstood a push in simulation none touched it.
-        rise_limit: depth [m] of a trunk that may begin on the ground below where it shall be, from
-            which on it must not touch it any more; it leaves it at 0.03 with a payload of 8 kg.
         sink_limit: depth [m] of the trunk below where it shall be, beyond which it has sunk; in
             simulation 0.01 at most in every motion, 0.07 with a payload of 8 kg.
         sink_limit_time: time [s] for which it may; after pushes that a trot withstood 0.16 at most.
@@ -54,7 +52,6 @@ class SafetyConfig:
     tilt_limit: float = 1.05
     height_limit: float = 0.075
     touch_limit: float = 0.1
-    rise_limit: float = 0.06
     sink_limit: float = 0.12
     sink_limit_time: float = 0.3
     lean_limit: float = 0.52
@@ -92,8 +89,7 @@ class FallDetector:
         """
         state, config = snapshot.state, self._config
         height, clearance = self._heights(snapshot.row, TRUNK_UNDERSIDE, FOOT_RADIUS)
-        shall_be_up = not may_lie or sag > config.rise_limit
-        is_touching = shall_be_up and clearance < TOUCH
+        is_touching = not may_lie and clearance < TOUCH
         has_sunk = not may_lie and sag > config.sink_limit
         leans = lean > config.lean_limit
         what = None

@@ -111,20 +111,9 @@ def test_touches_that_end_in_between_are_stumbles(falls: FallDetector, model: Ro
 def test_where_the_belly_may_be_down_it_may_lie_for_ever(
     falls: FallDetector, model: RobotModel
 ) -> None:
-    sag = 0.9 * SafetyConfig().rise_limit
     for time in np.arange(0.0, 2.0, 0.1).tolist():
-        assert falls.reason(on_the_belly(model, time), sag, 0.0, may_lie=True) is None
-    assert falls.reason(on_the_belly(model, 2.0), sag, 0.0, may_lie=False) is None
-
-
-def test_a_belly_that_should_have_risen_must_not_stay_on_the_ground(
-    falls: FallDetector, model: RobotModel
-) -> None:
-    limit, sag, first = SafetyConfig().touch_limit, 1.1 * SafetyConfig().rise_limit, None
-    for time in np.arange(1.0, 1.5, TICK).tolist():
-        reason = falls.reason(on_the_belly(model, time), sag, 0.0, may_lie=True)
-        first = time if reason and first is None else first
-    assert first == pytest.approx(1.0 + limit, abs=1.5 * TICK)
+        assert falls.reason(on_the_belly(model, time), 0.5, 0.0, may_lie=True) is None
+    assert falls.reason(on_the_belly(model, 2.0), 0.5, 0.0, may_lie=False) is None
 
 
 def test_a_trunk_far_below_where_it_should_be_is_a_fall_after_the_limit(
