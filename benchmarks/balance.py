@@ -27,10 +27,10 @@ from benchmarks.pushes import PUSH_TIME
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
 from benchmarks.steps import plant_of
-from benchmarks.trials import Trial, TrialFailed, TrialRobot
 from controller.checks import is_standing
 from controller.cli.common import Subparsers, add_parser
 from controller.modes import Mode
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import ModeError
 from go2_wbc.plant import MujocoPlant

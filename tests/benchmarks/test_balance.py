@@ -10,7 +10,7 @@ import pytest
 from benchmarks import balance
 from benchmarks.balance import SCENARIOS, dropped, heading_force, impulse_at
 from benchmarks.pushes import PUSH_TIME
-from benchmarks.trials import Trial, TrialRobot
+from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.safety import FallDetector, SafetyConfig
