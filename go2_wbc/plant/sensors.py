@@ -100,11 +100,12 @@ class SensorNoise:
 class SensorErrors:
     """How the sensors of ``sensors="imu"`` err: all that the controller is given then.
 
-    Biases are drawn once per plant. The Go2 publishes no data sheet of its IMU; the values are
-    of the order of a consumer MEMS unit's (such as Bosch's BMI088: gyro about 0.014 deg/s and
-    accelerometer about 0.2 mg per root hertz, offsets about 1 deg/s and 20 mg), at 500 Hz, the noise three times that for the vibration of the legs, the accelerometer's offset a
-    quarter after calibration. The encoders' resolution is that of the protocol of Unitree's
-    GO-M8010-6 motor (angle 2 pi / 32768, speed 2 pi / 256 rad/s of the rotor, gear 6.33).
+    Biases are drawn once per plant. The Go2 publishes no data sheet of its IMU; the values are of
+    the order of a consumer MEMS unit's (such as Bosch's BMI088: gyro about 0.014 deg/s and
+    accelerometer about 0.2 mg per root hertz, offsets about 1 deg/s and 20 mg), at 500 Hz, the
+    noise three times that for the vibration of the legs, the accelerometer's offset a quarter after
+    calibration. The encoders' resolution is that of the protocol of Unitree's GO-M8010-6 motor
+    (angle 2 pi / 32768, speed 2 pi / 256 rad/s of the rotor, gear 6.33).
 
     Attributes:
         gyro: white noise per sample [rad/s].
