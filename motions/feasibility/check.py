@@ -143,7 +143,8 @@ class FeasibilityChecker:
         if isinstance(plan, CompiledPlan):
             problems = plan.problems
             forces = flight.with_spans(forces, path, plan, model)
-            in_flight = flight.flight(plan, model, FlightLimits(friction=FLIGHT_SHARE * floor))
+            spans = FlightLimits(friction=FLIGHT_SHARE * floor)
+            in_flight = flight.flight(plan, model, heavy.mass, spans)
         forces = dynamic.resisted(forces, path, self.world.worst)
         lag = dynamic.lagging(path, forces, heavy, limits)
         com, zero_moment_point = dynamic.support(carried, forces, limits)

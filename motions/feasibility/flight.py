@@ -51,14 +51,23 @@ def with_spans(forces: Forces, path: Trajectory, plan: CompiledPlan, model: Robo
     return replace(forces, contact=contact, tau=tau, missing=missing, v_motors=v)
 
 
-def flight(plan: CompiledPlan, model: RobotModel, limits: FlightLimits) -> list[Series]:
-    """All checks of the dynamic spans of ``plan``; causes before what follows from them."""
-    judges = [_Judge(span, plan, model, limits) for span in plan.dynamic]
+def flight(
+    plan: CompiledPlan, model: RobotModel, mass: float, limits: FlightLimits
+) -> list[Series]:
+    """All checks of the dynamic spans of ``plan``; causes before what follows from them.
+
+    Args:
+        plan: what was solved for ``model``.
+        model: the robot without load.
+        mass: of the robot that plays it [kg].
+        limits: what is allowed.
+    """
+    judges = [_Judge(span, plan, model, mass, limits) for span in plan.dynamic]
     if not judges:
         return []
     kinds: Sequence[Callable[[_Judge], Series]] = (
-        _Judge.steps, _Judge.equations, _Judge.curves, _Judge.contact_force, _Judge.cone,
-        _Judge.standing, _Judge.balance, _Judge.touchdown, _Judge.place, _Judge.turn,
+        _Judge.load, _Judge.steps, _Judge.equations, _Judge.curves, _Judge.contact_force,
+        _Judge.cone, _Judge.standing, _Judge.balance, _Judge.touchdown, _Judge.place, _Judge.turn,
     )  # fmt: skip
     return [_joined([kind(judge) for judge in judges]) for kind in kinds]
 
@@ -77,7 +86,13 @@ class _Judge:
     span: DynamicSpan
     whole: CompiledPlan
     model: RobotModel
+    mass: float
     limits: FlightLimits
+
+    def load(self) -> Series:
+        """Share by which the mass differs from that it was solved for: push-off does not know."""
+        off = np.full((len(self.span.trajectory.times), 1), abs(self.mass / self.model.mass - 1.0))
+        return self._at_knots("mass in solved parts", "", ("trunk",), off, self.limits.unlike)
 
     def steps(self) -> Series:
         """Each state must follow from the one before by its speed: m, rad."""
