@@ -92,7 +92,7 @@ class _Judge:
     def load(self) -> Series:
         """Share by which the mass differs from that it was solved for: push-off does not know."""
         off = np.full((len(self.span.trajectory.times), 1), abs(self.mass / self.model.mass - 1.0))
-        return self._at_knots("mass in solved parts", "", ("trunk",), off, self.limits.unlike)
+        return self._at_knots("mass solved for", "", ("trunk",), off, self.limits.unlike)
 
     def steps(self) -> Series:
         """Each state must follow from the one before by its speed: m, rad."""
@@ -175,7 +175,7 @@ class _Judge:
             if events[start] - events[first] < limits.settling:
                 inside = (times >= events[start]) & (times < events[end])
                 since[inside, 0] = times[inside] - events[start]
-        return self._at_knots("balance on few feet", "s", ("trunk",), since, limits.balance)
+        return self._at_knots("few feet", "s", ("trunk",), since, limits.balance)
 
     def touchdown(self) -> Series:
         """Speed of the feet when they come down: m/s."""
