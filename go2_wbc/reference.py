@@ -202,7 +202,7 @@ class Reference:
                     f"reference: force_weight must be 0 or {LEAST_WEIGHT:g} to {MOST_WEIGHT:g}, "
                     f"got {weight:g}"
                 )
-            if self.friction < 0.0:
+            if np.isfinite(self.friction) and self.friction < 0.0:
                 raise CommandError(f"reference: friction must be 0 or more, got {self.friction:g}")
             _set(self, "_row", row)
         return row

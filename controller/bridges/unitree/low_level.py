@@ -10,6 +10,7 @@ import logging
 import time
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final, final
 
 import numpy as np
@@ -126,6 +127,13 @@ def sensor_reading(message: Shaped[np.ndarray, "1"]) -> SensorReading:
         tau=motors["tau_est"].astype(float),
         foot_forces=message["foot_force"][0].astype(float)[FEET_SWAPPED],
     )
+
+
+def with_own_attitude(state: RobotState, message: Shaped[np.ndarray, "1"]) -> RobotState:
+    """``state`` with the attitude that the robot itself estimates: a second opinion of its tilt."""
+    q = state.q.copy()
+    q[3:7] = message["imu_state"][0]["quaternion"].astype(float)[[1, 2, 3, 0]]
+    return replace(state, q=q)
 
 
 @final

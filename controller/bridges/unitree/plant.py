@@ -23,6 +23,7 @@ from controller.bridges.unitree.low_level import (
     intact_message,
     low_cmd_message,
     sensor_reading,
+    with_own_attitude,
 )
 from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Code, SwitcherApi
 from controller.pacing import SWITCH_INTERVAL
@@ -191,7 +192,7 @@ class UnitreePlant(Plant):
     def _require_sound(self) -> None:
         if self._failure is not None:
             raise PlantError(f"damped: {self._failure}; lay the robot down and make a new plant")
-        fault = self._guards.fault(self._state)
+        fault = self._guards.fault(self._state) or self._guards.fault(self._own_view)
         if fault is not None:
             raise self._stop(PlantError(fault))
 
@@ -310,6 +311,7 @@ class UnitreePlant(Plant):
             if tick > self._tick:
                 self._tick, self._heard = tick, time.monotonic()
                 self._state = self._estimator.update(sensor_reading(message))
+                self._own_view = with_own_attitude(self._state, message)
         return self._tick > known
 
     # --- taking over ----------------------------------------------------------------------
@@ -319,10 +321,11 @@ class UnitreePlant(Plant):
         state = self._state
         _, p_feet = self._model.forward_kinematics(state.q)
         height = float(state.q[2] - p_feet[:, 2].min()) + self._model.foot_radius
-        if not (height < self._config.lying_height and state.tilt < self._config.lying_tilt):
+        tilt = max(state.tilt, self._own_view.tilt)
+        if not (height < self._config.lying_height and tilt < self._config.lying_tilt):
             raise PlantError(
                 f"the robot must lie on its belly at the start; its base is {height:.2f} m above "
-                f"its feet, tilted by {np.degrees(state.tilt):.0f} deg"
+                f"its feet, tilted by {np.degrees(tilt):.0f} deg"
             )
 
     def _release_sport(self, bus: Bus, interface: str) -> None:
