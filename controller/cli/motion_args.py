@@ -24,6 +24,11 @@ def add_motion(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
     """Add the argument for one motion, or any number, and the option for parameters."""
     number = "*" if many else None
     parser.add_argument("motion", metavar="MOTION", nargs=number, help=MOTION_HELP)
+    add_values(parser)
+
+
+def add_values(parser: argparse.ArgumentParser) -> None:
+    """Add the option for parameters of a motion."""
     parser.add_argument(
         "--set",
         metavar="NAME=VALUE",

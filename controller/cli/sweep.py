@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json, shown_path
-from controller.cli.motion_args import the_motion
+from controller.cli.motion_args import add_values, the_motion
 from controller.cli.progress import ProgressLine
 
 if TYPE_CHECKING:
@@ -46,14 +46,7 @@ def register(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--keep-going", action="store_true", help="a seed that fails does not end the sweep"
     )
-    parser.add_argument(
-        "--set",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        dest="values",
-        help="a parameter of the motion; see `go2-wbc list`",
-    )
+    add_values(parser)
     parser.add_argument(
         "--export", metavar="FILE", nargs="+", type=Path, default=[], help=".csv or .parquet"
     )
