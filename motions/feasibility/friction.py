@@ -49,7 +49,7 @@ FOOT_MASS = 1.4
 (seeds that judge nothing) are told best. A leg weighs 2.2 kg."""
 CREEP = 160.0
 """Rate b [1/s] at which a contact of MuJoCo stops a foot: 105 by its numbers (2 / 0.95 / 0.02 s);
-with this the creep of 17 motions of the train half is told best, as trunks lag their plan."""
+more, as trunks lag their plan. Own choice, seen on 17 motions of the train half."""
 SETTLED = 0.1
 """Time [s] after a touchdown, and before a lift-off, in which a foot without load may skid."""
 TIGHT_SLIP = 0.003
