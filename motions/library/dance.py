@@ -17,7 +17,7 @@ from motions.timeline import Timeline
 def dance() -> Timeline:
     """Dance for half a minute: wiggle, twist, tap, hula, wave, and bow to the audience."""
     return wiggle().then(
-        twist(tempo=70.0),
+        twist(tempo=60.0),
         tap_dance(tempo=80.0, bars=1),
         hula(rounds=1),
         push_ups(times=2),
