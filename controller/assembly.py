@@ -16,6 +16,7 @@ from go2_wbc.lazy import without_collecting
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.wbc.controller import WholeBodyController
 
 RECORDED_TIME = 240.0
@@ -80,7 +81,10 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
     wbc = WholeBodyController(model, config.backend, config.wbc)
     dynamic_wbc = WholeBodyController(model, config.backend, config.wbc.for_dynamics)
     telemetry = Telemetry(model, max(1, round(settings.recorded_time / plant.control_period)))
-    loop = ControlLoop(plant, model, wbc, telemetry, config.safety, dynamic_wbc)
+    payloads = None
+    if config.payload.enabled and config.backend != "placo":  # whose robot is PlaCo's own
+        payloads = PayloadEstimator(model, config.wbc.joint_friction, config.payload)
+    loop = ControlLoop(plant, model, wbc, telemetry, config.safety, dynamic_wbc, payloads)
     with ExitStack() as opened:
         viewer = None
         if settings.viewer:

@@ -21,6 +21,8 @@ from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
 from go2_wbc.plant.base import Plant
 from go2_wbc.reference import JointReference, Reference
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.payload import NO_PAYLOAD, Payload
+from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.robot.safety import FallDetector, SafetyConfig
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import JointCommand, RobotState
@@ -67,6 +69,7 @@ class ControlLoop:
         telemetry: Telemetry,
         safety: SafetyConfig,
         dynamic_wbc: WholeBodyController | None = None,
+        payloads: PayloadEstimator | None = None,
     ) -> None:
         """Start damped.
 
@@ -77,6 +80,7 @@ class ControlLoop:
             telemetry: what records.
             safety: when to give up.
             dynamic_wbc: what follows those of dynamic behaviours; ``wbc`` unless given.
+            payloads: what feels what the robot carries; nobody does unless given.
 
         Raises:
             PlantError: if the plant does not answer, or its state is not finite.
@@ -94,11 +98,12 @@ class ControlLoop:
         if not self._is_plausible(self.state):
             raise PlantError(f"the first state of the plant is not finite: q={self.state.q}")
         self.snapshot: Snapshot = model.snapshot(self.state)
+        self._payloads = payloads
         self._last_command = JointCommand.damping(DAMPING)
         self._unanswered = 0
         self._qp_failures_in_a_row = 0
-        self.behaviour: Behaviour
-        self.engage(Damped("lying"))
+        self.behaviour: Behaviour = Damped("lying")
+        self.engage(self.behaviour)
 
     def engage(self, behaviour: Behaviour, *, observe: bool = True) -> None:
         """Start ``behaviour`` from the present state and clear the fault.
@@ -112,6 +117,7 @@ class ControlLoop:
         """
         if observe:
             self._observe()
+        self.snapshot = self.model.snapshot(self.state, self._payload_of(behaviour))
         self.fault = None
         self._qp_failures_in_a_row = 0
         self._falls.begin()
@@ -141,6 +147,7 @@ class ControlLoop:
         try:
             self._observe()
             self._guard()
+            self._feel()
             target = self.behaviour.update(self.snapshot)
             self._sag, self._lean = self._sag_and_lean(target)
             command = self._command(target)
@@ -160,12 +167,24 @@ class ControlLoop:
         if is_finite and state.time > self.state.time:
             self._unanswered = 0
             self.state = state
-            self.snapshot = self.model.snapshot(state)
+            self.snapshot = self.model.snapshot(state, self._payload_of(self.behaviour))
             return
         silence = self._unanswered * self.plant.control_period
         if silence > self._safety.stale_limit:
             lack = "new" if is_finite else "finite"
             raise PlantTimeout(f"no {lack} state from the plant for {1000 * silence:.0f} ms")
+
+    def _payload_of(self, behaviour: Behaviour) -> Payload:
+        """What ``behaviour`` is to know of what the robot carries."""
+        return self.telemetry.payload if behaviour.knows_payload else NO_PAYLOAD
+
+    def _feel(self) -> None:
+        if self._payloads is None:
+            return
+        if self.behaviour.knows_payload:
+            self.telemetry.payload = self._payloads.update(self.snapshot)
+        else:
+            self._payloads.pause()
 
     def _guard(self) -> None:
         fault = self.fault

@@ -14,6 +14,7 @@ from go2_wbc.kernels.layout import Layout
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import LEAST_SHARE
+from go2_wbc.robot.payload import NO_PAYLOAD
 from go2_wbc.robot.snapshot import Snapshot
 
 BLOCK = 4096
@@ -33,6 +34,7 @@ class Telemetry:
         qp_failures: ticks in which the QP had no solution, over the whole run.
         relaxed_ticks: ticks in which constraints of the QP had to give way.
         grave_ticks: those of them in which they gave way by more than ``wbc.relaxation.LIMITS``.
+        payload: what the robot is believed to carry beside its own parts.
         missed_deadlines: ticks that were not done when the next was due, at the wall clock's pace.
     """
 
@@ -50,6 +52,7 @@ class Telemetry:
         least = LEAST_SHARE * motor.peak
         self._motor = np.array([motor.peak, motor.knee_speed, motor.no_load_speed, least])
         self._v_before: Float[np.ndarray, "12"] | None = None
+        self.payload = NO_PAYLOAD
         self.qp_failures = self.relaxed_ticks = self.grave_ticks = self.missed_deadlines = 0
 
     def record(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"], label: str) -> None:

@@ -24,6 +24,7 @@ from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.planning.command import VelocityEnvelope
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.robot.motor import TORQUE_SPEED, require_motor
+from go2_wbc.robot.payload_estimation import PayloadConfig
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.validation import is_finite_number
 from go2_wbc.wbc.config import WbcConfig
@@ -40,6 +41,7 @@ class Config:
         locomotion: locomotion planner.
         envelope: velocity commands that are followed.
         safety: when to give up.
+        payload: estimate of what the robot carries.
         backend: whole-body back end: condensed, full or placo.
         motor: what the motors are taken for: "torque-speed", or "ideal" for the peak torque at
             every speed.
@@ -49,6 +51,7 @@ class Config:
     locomotion: LocomotionConfig = field(default_factory=LocomotionConfig)
     envelope: VelocityEnvelope = field(default_factory=VelocityEnvelope)
     safety: SafetyConfig = field(default_factory=SafetyConfig)
+    payload: PayloadConfig = field(default_factory=PayloadConfig)
     backend: str = "condensed"
     motor: str = TORQUE_SPEED
 

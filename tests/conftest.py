@@ -64,6 +64,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.locomotion",
         "go2_wbc.kernels.motor",
         "go2_wbc.kernels.mpc",
+        "go2_wbc.kernels.payload",
         "go2_wbc.kernels.playing",
         "go2_wbc.kernels.preview",
         "go2_wbc.kernels.rigid_body",

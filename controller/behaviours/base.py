@@ -17,6 +17,7 @@ class Behaviour(ABC):
         needs_balance: whether a large tilt means that the robot has fallen.
         may_lie: whether the belly may be on the ground.
         is_dynamic: whether it flies, or stands on few feet.
+        knows_payload: whether the robot is taken to carry what was felt, and goes on feeling it.
         sag_and_lean: depth [m] of the trunk below where it shall be and angle [rad] from how it
             shall be, if what is tracked says something else; None if it says so itself.
     """
@@ -26,6 +27,7 @@ class Behaviour(ABC):
     needs_balance: bool = True
     may_lie: bool = False
     is_dynamic: bool = False
+    knows_payload: bool = False
 
     @property
     def sag_and_lean(self) -> tuple[float, float] | None:

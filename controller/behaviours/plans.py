@@ -123,6 +123,8 @@ class PlayPlan(Behaviour):
 class ChangePosture(PlayPlan):
     """Play a plan that starts from the measured pose of the body."""
 
+    knows_payload = True
+
     def __init__(self, make_plan: Callable[[Float[np.ndarray, "6"]], MotionPlan]) -> None:
         """Args: make_plan: from the pose (6,) of its point in the feet's frame to the plan."""
         super().__init__(make_plan(np.zeros(6)))  # until ``start`` has measured

@@ -20,6 +20,7 @@ class Walking(Behaviour):
     """Walk with ``gait`` and follow ``command``; stand ready while it is zero."""
 
     label = "walk"
+    knows_payload = True
 
     def __init__(self, model: RobotModel, gait: Gait, config: LocomotionConfig) -> None:
         """Walk with ``gait``."""

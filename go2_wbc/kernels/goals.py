@@ -31,6 +31,8 @@ _POSITION, _ORIENTATION, _SWING, _POSTURE = (
     _P[n] for n in ("position_kp", "orientation_kp", "swing_kp", "posture_kp")
 )
 _FORCE_WEIGHT, _WEIGHT_OF_ROBOT = _P["force_weight"], _P["weight_of_robot"]
+_CARRIED = _S["payload"] + 1
+"""Weight of the payload [N]."""
 _FORCES, _PRIOR_WEIGHT = _T["f_world_feet"], _T["force_weight"]
 
 
@@ -100,7 +102,7 @@ def add_body_goals(snapshot, target, program, base, H, g):
                 if target[_LEGS + leg] == STANCE:
                     row[3 * leg + i] = 1.0 / mass
             if i == 2:
-                row[12] = -program[_WEIGHT_OF_ROBOT] / mass
+                row[12] = -(program[_WEIGHT_OF_ROBOT] + snapshot[_CARRIED]) / mass
         else:
             position = q[i]
             velocity = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
@@ -138,7 +140,7 @@ def add_leg_goals(snapshot, target, program, base, H, g):
             feet += 1
     if feet > 0:
         planned_loads(snapshot, target, program[_WEIGHT_OF_ROBOT], stance[:feet], loads[:feet])
-    foot = 0
+    foot, weight = 0, program[_WEIGHT_OF_ROBOT] + snapshot[_CARRIED]
     for leg in range(4):
         task = target[_LEGS + leg]
         for i in range(3):
@@ -163,7 +165,7 @@ def add_leg_goals(snapshot, target, program, base, H, g):
             elif target[_PRIOR_WEIGHT] > 0.0:
                 add_unknown_goal(H, g, n, target[_FORCES + n], target[_PRIOR_WEIGHT])
             else:
-                share = program[_WEIGHT_OF_ROBOT] / feet if i == 2 else 0.0
+                share = weight / feet if i == 2 else 0.0
                 load = 1.0 if i == 2 else loads[foot]
                 add_unknown_goal(H, g, n, share, program[_FORCE_WEIGHT] / load)
         foot += task == STANCE

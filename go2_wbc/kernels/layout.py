@@ -83,6 +83,8 @@ SNAPSHOT = Layout(
     J_contacts=(4, 3, 18),
     drift_contacts=(4, 3),
     v_world_contacts=(4, 3),
+    payload=(2,),
+    com_shift=(3,),
 )
 """Of ``robot.snapshot.Snapshot``, the state's q and v first."""
 
@@ -94,8 +96,23 @@ ROBOT = Layout(
     p_joints=(12, 3),
     p_calf_feet=(4, 3),
     armature=(12,),
+    payload=(4,),
 )
-"""Numbers of the robot for its snapshot: of each link mass, first moment and inertia."""
+"""Numbers of the robot for its snapshot: of each link mass, first moment and inertia. The trunk and
+the robot's mass have the payload in them, whose own mass and place come last."""
+
+FEELING = Layout(
+    gravity=(),
+    memory=(),
+    least_height=(),
+    most_rise=(),
+    most_speed=(),
+)
+"""Numbers by which a payload is felt: of ``robot.payload_estimation.PayloadConfig``."""
+
+FELT = Layout(force=(3,), moment=(3,), gravity=(3,))
+"""What a payload takes of the standing feet, in the mean: force, and moment about the base's
+origin, and what a unit of mass weighs, all in the base frame."""
 
 REFERENCE = Layout(
     is_com=(),

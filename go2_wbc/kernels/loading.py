@@ -12,6 +12,7 @@ KERNELS = (
     "locomotion",
     "motor",
     "mpc",
+    "payload",
     "playing",
     "preview",
     "rigid_body",

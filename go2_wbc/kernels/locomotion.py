@@ -29,6 +29,7 @@ TINY = 1e-9
 
 _N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLANNER.start, LOCOMOTION.start
 _Q, _P_COM, _V_COM, _P_FEET = (_N[n] for n in ("q", "p_world_com", "v_world_com", "p_world_feet"))
+_SHIFT = _N["com_shift"]
 _YAW, _POSITION, _VELOCITY = (_S[n] for n in ("yaw", "position", "velocity"))
 _STEPPING, _PHASE_TIME, _TIME = (_S[n] for n in ("is_stepping", "phase_time", "time"))
 _GROUND, _SLOPE, _HEIGHT_OFFSET = (_S[n] for n in ("ground", "slope", "height_offset"))
@@ -74,14 +75,14 @@ def foot_phase(t, offset, period, duty):
 
 @subroutine("void(f8[::1], f8[::1], f8[:,::1])")
 def nominal_feet(snapshot, c, feet):
-    """Points below the hips of a level trunk with the measured heading."""
+    """Points below the hips of a level trunk with the measured heading, moved by ``com_shift``."""
     q = snapshot[_Q : _Q + 19]
     yaw = yaw_of(q)
     cosine, sine = np.cos(yaw), np.sin(yaw)
     for leg in range(4):
         x, y = c[_NOMINAL + 3 * leg], c[_NOMINAL + 3 * leg + 1]
-        feet[leg, 0] = q[0] + cosine * x - sine * y
-        feet[leg, 1] = q[1] + sine * x + cosine * y
+        feet[leg, 0] = q[0] + cosine * x - sine * y + snapshot[_SHIFT]
+        feet[leg, 1] = q[1] + sine * x + cosine * y + snapshot[_SHIFT + 1]
 
 
 @kernel("b1(f8[::1], f8[::1])")

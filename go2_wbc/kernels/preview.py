@@ -24,11 +24,12 @@ from go2_wbc.kernels.layout import (
 )
 from go2_wbc.kernels.locomotion import TIE, foothold, nominal_feet
 from go2_wbc.kernels.mpc import solve_mpc
-from go2_wbc.kernels.vectors import cross, vector
+from go2_wbc.kernels.vectors import cross, plus, vector
 
 _N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLANNER.start, LOCOMOTION.start
 _Q, _V, _R, _M = (_N[n] for n in ("q", "v", "R_world_base", "mass_matrix"))
 _P_COM, _V_COM, _P_FEET = (_N[n] for n in ("p_world_com", "v_world_com", "p_world_feet"))
+_SHIFT, _CARRIED = _N["com_shift"], _N["payload"]
 _YAW, _POSITION, _VELOCITY = (_S[n] for n in ("yaw", "position", "velocity"))
 _PHASE_TIME, _HEIGHT_OFFSET = _S["phase_time"], _S["height_offset"]
 _PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
@@ -138,7 +139,8 @@ def fill_contacts(s, step, share, landings):
 def fill_arms(snapshot, s, c, step, goals, landings, arms):
     """From the CoM in the middle of each node to the contact points."""
     period, duty = s[_PERIOD], s[_DUTY]
-    com, base = vector(snapshot, _P_COM), vector(snapshot, _Q)
+    com = vector(snapshot, _P_COM)
+    base = plus(vector(snapshot, _Q), vector(snapshot, _SHIFT))
     nominal, goal, footholds = np.empty((4, 2)), np.empty(3), np.empty((4, 2))
     nominal_feet(snapshot, c, nominal)
     for leg in range(4):
@@ -190,7 +192,9 @@ def plan_forces(snapshot, s, c, m, command, inertia, f):
     fill_goals(s, c, command, m[_STEP], goals)
     fill_contacts(s, m[_STEP], share, landings)
     fill_arms(snapshot, s, c, m[_STEP], goals, landings, arms)
-    outcome = solve_mpc(m, state, goals, share, arms, inertia, forces)
+    numbers = m.copy()
+    numbers[_MASS] += snapshot[_CARRIED]
+    outcome = solve_mpc(numbers, state, goals, share, arms, inertia, forces)
     for leg in range(4):
         for i in range(3):
             f[_PLANNED + 3 * leg + i] = forces[0, leg, i] / max(share[0, leg], m[_LEAST_SHARE])
@@ -208,7 +212,7 @@ def steer(snapshot, time, s, c, m, command, f, target):
         if not plan_forces(snapshot, s, c, m, command, inertia, f):
             return
         f[_NEXT] = time + m[_INTERVAL]
-    system = np.zeros((3, 4))
+    system, mass = np.zeros((3, 4)), m[_MASS] + snapshot[_CARRIED]
     system[:, :3] = inertia
     a = np.zeros(3)
     for leg in range(4):
@@ -223,7 +227,7 @@ def steer(snapshot, time, s, c, m, command, f, target):
         moment = cross(arm, force)
         for i in range(3):
             target[_T_FORCES + 3 * leg + i] = force[i]
-            a[i] += force[i] / m[_MASS]
+            a[i] += force[i] / mass
             system[i, 3] += moment[i]
     solve_linear(system, 3)
     for i in range(3):

@@ -45,6 +45,8 @@ _MASS, _GRAVITY, _RADIUS, _ARMATURE = (
     ROBOT.start[n] for n in ("mass", "gravity", "foot_radius", "armature")
 )
 _LINKS, _JOINTS, _FEET = (ROBOT.start[n] for n in ("links", "p_joints", "p_calf_feet"))
+_PAYLOAD, _SHIFT = (SNAPSHOT.start[n] for n in ("payload", "com_shift"))
+_CARRIED = ROBOT.start["payload"]
 
 _I6 = "UniTuple(f8, 6)"
 _BODY = f"Tuple((f8, {V3}, {_I6}))"
@@ -341,6 +343,22 @@ def fill_base(robot, row, base, whole, force, moment):
         row[_V_COM + i] = velocity
 
 
+@subroutine(f"void(f8[::1], f8[::1], {AXES}, {V3})")
+def fill_payload(robot, row, base, moment):
+    """Fill what is carried, and by how much it moves the CoM.
+
+    ``moment`` is the first moment of the robot with the payload.
+    """
+    carried, mass = robot[_CARRIED], robot[_MASS]
+    row[_PAYLOAD], row[_PAYLOAD + 1] = carried, carried * robot[_GRAVITY]
+    if carried == 0.0:
+        return
+    own = plus_scaled(moment, -carried, vector(robot, _CARRIED + 1))
+    factor = -mass / (mass - carried)
+    shift = along(base, plus_scaled(moment, factor, own))
+    put(row, _SHIFT, (shift[0] / mass, shift[1] / mass, shift[2] / mass))
+
+
 _MEASURED = "Array(f8, 1, 'A', readonly=True)"
 
 
@@ -368,3 +386,4 @@ def fill_snapshot(q, v, robot, row):
         force, moment = plus(force, f), plus(moment, m)
         fill_foot(robot, row, n, base, leg)
     fill_base(robot, row, base, whole, force, moment)
+    fill_payload(robot, row, base, whole[1])

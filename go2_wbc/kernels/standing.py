@@ -17,6 +17,8 @@ from go2_wbc.kernels.layout import (
 _R, _M, _COM, _FEET = (
     SNAPSHOT.start[n] for n in ("R_world_base", "mass_matrix", "p_world_com", "p_world_feet")
 )
+_CARRIED = SNAPSHOT.start["payload"] + 1
+"""Weight of the payload [N]."""
 _A, _DW, _MOST = (REFERENCE.start[n] for n in ("a_world", "dw_world", "normal_force_max"))
 
 
@@ -47,6 +49,7 @@ def planned_loads(snapshot, target, weight_of_robot, stance, loads):
     R = snapshot[_R : _R + 9].reshape(3, 3)
     places, most, turn = np.empty((k, 2)), np.empty(k), np.zeros(3)
     mass, height = snapshot[_M], snapshot[_COM + 2]
+    weight_of_robot += snapshot[_CARRIED]
     pressure = weight_of_robot + mass * target[_A + 2]
     pressure = max(pressure, LEAST_PRESSURE * weight_of_robot)
     for foot in range(k):

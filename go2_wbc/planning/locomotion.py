@@ -8,7 +8,8 @@ frame (z up, x along the reference's yaw).
   speeds the trunk up nor slows it down; ``k (v - v_ref)`` more takes out the velocity error.
 - Body: the command is integrated to a pose. A body that only followed a velocity would keep a
   steady error of place and heading. The pose is held within reach (a leash) of the measured one,
-  so that a robot that is held does not store up a way to jump afterwards.
+  so that a robot that is held does not store up a way to jump afterwards. It is the CoM's, with
+  the snapshot's payload, and the footholds are moved as that moves the CoM.
 - Ground: its height is learnt from the feet that should stand, each where its contact is first
   measured. A foot that comes down late has no contact yet when it should; taken for landed, it
   would raise the ground, and with it the trunk, step by step.
@@ -298,10 +299,13 @@ class LocomotionPlanner(GaitPlanner):
         self._was_stance = stance.copy()
 
     def _nominal_feet(self, snapshot: Snapshot) -> Float[np.ndarray, "4 2"]:
-        """Points [m] on the ground below the hips of a level trunk with the measured heading."""
+        """Points [m] on the ground below the hips of a level trunk with the measured heading.
+
+        A payload moves them as it does the CoM, which so stays above the feet's middle.
+        """
         R = yaw_rotation(snapshot.state.yaw)
         feet = self._model.p_base_feet_nominal @ R.T
-        return snapshot.state.p_world_base[:2] + feet[:, :2]
+        return snapshot.state.p_world_base[:2] + feet[:, :2] + snapshot.com_shift[:2]
 
     def _footholds(
         self, snapshot: Snapshot, remaining: Float[np.ndarray, "4"]

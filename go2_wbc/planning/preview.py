@@ -84,7 +84,8 @@ class ForcePlanner:
         forces = np.where(reference.stance[:, None], self._forces, 0.0)
         contacts = snapshot.p_world_feet - [0.0, 0.0, model.foot_radius]
         moment = np.cross(contacts - snapshot.p_world_com, forces).sum(axis=0)
-        a = forces.sum(axis=0) / model.mass - [0.0, 0.0, model.gravity]
+        mass = model.mass + snapshot.payload[0]
+        a = forces.sum(axis=0) / mass - [0.0, 0.0, model.gravity]
         dw = np.linalg.solve(inertia_about_com(snapshot), moment)
         return replace(
             reference,
@@ -99,6 +100,7 @@ class ForcePlanner:
         forces = np.empty((MPC_NODES, 4, 3))
         friction = min(self._config.friction, course.friction)
         self._numbers[MPC.start["friction"]] = friction
+        self._numbers[MPC.start["mass"]] = self._model.mass + snapshot.payload[0]
         parts = horizon.state, horizon.goals, horizon.share, horizon.arms, horizon.inertia
         outcome = self._solve(self._numbers, *parts, forces)
         share = np.maximum(horizon.share[0], self._config.least_share)
@@ -187,7 +189,7 @@ def _arms(
     """
     arms = np.empty((MPC_NODES, 4, 3))
     com, gait = snapshot.p_world_com, course.gait
-    base = snapshot.state.p_world_base - com
+    base = snapshot.state.p_world_base - com + snapshot.com_shift
     before = course.position[:2]
     for k in range(MPC_NODES):
         way = (before + goals[k, 3:5]) / 2 - course.position[:2]

@@ -22,6 +22,7 @@ from go2_wbc.kernels.layout import ROBOT, SNAPSHOT
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
+from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.world import PAYLOAD_HALF_SIZE, World
@@ -87,6 +88,7 @@ class RobotModel:
         self._data = self.pin_model.createData()
         self._foot_frames = [self.pin_model.getFrameId(name) for name in FOOT_NAMES]
         self._zero_acceleration = np.zeros(18)
+        self._carried: tuple[Payload, Float[np.ndarray, " size"]] = NO_PAYLOAD, np.zeros(0)
         self._read_constants()
 
     def _read_constants(self) -> None:
@@ -106,15 +108,21 @@ class RobotModel:
         self.p_base_feet_nominal = self.p_base_hips.copy()
         self.p_base_feet_nominal[:, 1] += self.hip_width * np.array([leg.side for leg in LEGS])
 
-    def snapshot(self, state: RobotState) -> Snapshot:
+    def snapshot(self, state: RobotState, payload: Payload = NO_PAYLOAD) -> Snapshot:
         """Every dynamic quantity of ``state``, computed once.
 
         By a kernel if the robot's legs turn about x, y and y, as a Go2's do, else by Pinocchio's
         functions. The kernel takes the robot as it is at the first call.
+
+        Args:
+            state: measured.
+            payload: what the trunk carries beside what the model has.
         """
         numbers = self._numbers
         if numbers is None:
-            return self.readable_snapshot(state)
+            return self.readable_snapshot(state, payload)
+        if payload.mass:
+            numbers = self._loaded(numbers, payload)
         row = np.empty(SNAPSHOT.size)
         self._fill_snapshot(state.q, state.v, numbers, row)
         return Snapshot.of_row(state, row)
@@ -147,12 +155,29 @@ class RobotModel:
                 [place.translation for place in places[1:]],
                 [foot.placement.translation for foot in feet],
                 model.armature[6:],
+                np.zeros(4),
             ]
         )
 
-    def readable_snapshot(self, state: RobotState) -> Snapshot:
+    def _loaded(
+        self, own: Float[np.ndarray, " size"], payload: Payload
+    ) -> Float[np.ndarray, " size"]:
+        """The robot's ``own`` numbers with ``payload``; kept until it changes."""
+        carried, numbers = self._carried
+        if carried != payload:
+            numbers = own.copy()
+            numbers[ROBOT.start["mass"]] += payload.mass
+            ROBOT.view(numbers, "links")[0] += _about_joint(payload.inertia)
+            ROBOT.view(numbers, "payload")[:] = payload.mass, *payload.place
+            self._carried = payload, numbers
+        return numbers
+
+    def readable_snapshot(self, state: RobotState, payload: Payload = NO_PAYLOAD) -> Snapshot:
         """The same as ``snapshot``, by Pinocchio's own functions: what the kernel is held to."""
         model, data = self.pin_model, self._data
+        if payload.mass:
+            model = model.copy()
+            model.inertias[1] = model.inertias[1] + payload.inertia
         q, v = state.q, state.v
         M = pin.crba(model, data, q, pin.Convention.WORLD)  # a copy, both triangles filled
         h = np.array(pin.nonLinearEffects(model, data, q, v))
@@ -164,7 +189,7 @@ class RobotModel:
             p_feet[leg] = pin.updateFramePlacement(model, data, frame).translation
             J_feet[leg] = pin.getFrameJacobian(model, data, frame, _ALIGNED)
             drift_feet[leg] = pin.getFrameClassicalAcceleration(model, data, frame, _ALIGNED).vector
-        return Snapshot.build(state, M, h, p_feet, J_feet, drift_feet, self._constants)
+        return Snapshot.build(state, M, h, p_feet, J_feet, drift_feet, self._constants, payload)
 
     @property
     def _constants(self) -> tuple[float, float, float]:

@@ -10,6 +10,7 @@ to the material point.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,7 @@ from jaxtyping import Float
 
 from go2_wbc.errors import CommandError
 from go2_wbc.kernels.layout import SNAPSHOT
+from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.state import RobotState
 
 _set = object.__setattr__  # of a frozen value that is being made
@@ -37,6 +39,9 @@ class Snapshot:
         J_feet, drift_feet: Jacobians and drifts of the foot centres (world).
         J_contacts, drift_contacts: the same for the rolling contact points.
         v_world_contacts: velocity of the material contact points [m/s].
+        payload: mass [kg] and weight [N] of what the trunk is taken to carry; it is in all the
+            dynamics above.
+        com_shift: by which it moves the CoM [m] in the world.
     """
 
     state: RobotState
@@ -54,6 +59,8 @@ class Snapshot:
     J_contacts: Float[np.ndarray, "4 3 18"]
     drift_contacts: Float[np.ndarray, "4 3"]
     v_world_contacts: Float[np.ndarray, "4 3"]
+    payload: Float[np.ndarray, "2"] = field(default_factory=partial(np.zeros, 2))
+    com_shift: Float[np.ndarray, "3"] = field(default_factory=partial(np.zeros, 3))
     _row: Float[np.ndarray, " size"] | None = field(init=False, repr=False, default=None)
 
     @staticmethod
@@ -103,18 +110,22 @@ class Snapshot:
         J_feet: Float[np.ndarray, "4 6 18"],
         drift_feet: Float[np.ndarray, "4 6"],
         constants: tuple[float, float, float],
+        payload: Payload = NO_PAYLOAD,
     ) -> Snapshot:
         """Derive the CoM and contact terms from what Pinocchio computed.
 
-        ``constants`` are mass [kg], gravity [m/s^2] and foot radius [m].
+        ``constants`` are mass [kg], gravity [m/s^2] and foot radius [m]; ``payload`` is in M and h,
+        but not in this mass.
         """
-        mass, gravity, radius = constants
+        bare, gravity, radius = constants
+        mass = bare + payload.mass
         R = state.R_world_base
         J_com = R @ M[:3] / mass
         drift_com = R @ h[:3] / mass
         drift_com[2] -= gravity
         com_cross = M[:3, 3:6] / -mass
         p_base_com = np.array([com_cross[2, 1], com_cross[0, 2], com_cross[1, 0]])
+        p_base_own = (mass * p_base_com - payload.mass * np.array(payload.place)) / bare
         J_linear, J_angular = J_feet[:, :3], J_feet[:, 3:]
         J_contacts = J_linear.copy()
         J_contacts[:, 0] -= radius * J_angular[:, 1]
@@ -138,4 +149,6 @@ class Snapshot:
             J_contacts=J_contacts,
             drift_contacts=drift_contacts,
             v_world_contacts=J_contacts @ state.v,
+            payload=payload.mass * np.array([1.0, gravity]),
+            com_shift=R @ (p_base_com - p_base_own) if payload.mass else np.zeros(3),
         )

@@ -42,6 +42,7 @@ def planned_loads(
     feet, M, body = snapshot.p_world_feet[stance], snapshot.mass_matrix, reference.body
     R, com = snapshot.R_world_base, snapshot.p_world_com
     mass = M[0, 0]
+    weight_of_robot += snapshot.payload[1]
     moment = R @ M[3:6, 3:6] @ R.T @ body.dw_world
     pressure = max(weight_of_robot + mass * body.a_world[2], LEAST_PRESSURE * weight_of_robot)
     push = mass * (com[2] - feet[:, 2].mean()) * body.a_world

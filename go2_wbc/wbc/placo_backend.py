@@ -245,7 +245,7 @@ class _Mode:
             return
         reference, weight = problem.reference, self._model.mass * self._model.gravity
         count = 3 * len(self._stance)
-        near = forces_near(reference, weight)
+        near = forces_near(reference, weight + float(problem.snapshot.payload[1]))
         scale = np.ones((len(self._stance), 3))
         if not reference.force_weight:
             loads = planned_loads(problem.snapshot, reference, weight)

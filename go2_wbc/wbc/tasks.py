@@ -189,7 +189,8 @@ class ForceRegularisation(Task):
         for i, leg in enumerate(stance):
             start = FORCES.start + 3 * leg
             A[3 * i : 3 * i + 3, start : start + 3] = np.diag(scale[i])
-        b = forces_near(reference, self.weight_of_robot)[stance].ravel()
+        weight = self.weight_of_robot + float(snapshot.payload[1])
+        b = forces_near(reference, weight)[stance].ravel()
         return Rows(A, b)
 
     def weight_at(self, reference: Reference) -> float:

@@ -11,6 +11,7 @@ from go2_wbc.errors import QpInfeasible
 from go2_wbc.legs import Leg
 from go2_wbc.reference import LegTask, Reference
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.backends import SINGULAR_DETERMINANT
@@ -30,6 +31,7 @@ from tests.engine_helpers import (
 )
 
 AGREEMENT = 1e-6  # [N m] between two solvers; measured 2.3e-8
+PULL = 1.0  # [N] of the forces' regularisation on a robot at rest; measured 0.5, 0.06 N m
 COUNT = 1040  # 80 of every contact mode
 FAST_COUNT = 208  # 16 of every contact mode
 SATURATING = WbcConfig(speed_share=0.15, torque_share=0.4)  # bounds bind in most states
@@ -99,6 +101,35 @@ def test_planned_forces_are_kept_near_as_in_the_full_problem() -> None:
         np.testing.assert_allclose(ours.tau, theirs.tau, atol=AGREEMENT, rtol=0)
         moved += bool(np.abs(ours.forces - without.forces).max() > 1.0)
     assert moved > 50
+
+
+def test_a_payload_is_carried_as_in_the_full_problem() -> None:
+    model = RobotModel()
+    compiled = WholeBodyController(model)
+    readable = WholeBodyController(model, "full", WbcConfig(solver="daqp"))
+    solved = 0
+    for bare, reference in cases(model, 104, seed=29):
+        snapshot = model.snapshot(bare.state, Payload(4.0, (0.05, 0.08, 0.1)))
+        ours = compiled.solve_compiled(snapshot, reference)
+        theirs = solve_or_none(readable, snapshot, reference)
+        assert (ours is None) == (theirs is None)
+        if ours is None or theirs is None:
+            continue
+        np.testing.assert_allclose(ours.tau, theirs.tau, atol=AGREEMENT, rtol=0)
+        solved += 1
+    assert solved > 50
+
+
+@pytest.mark.parametrize("backend", ["condensed", "full"])
+def test_a_robot_that_stands_with_a_payload_bears_both_weights(backend: str) -> None:
+    model, carried = RobotModel(), Payload(4.0, (0.05, 0.08, 0.0))
+    snapshot = model.snapshot(state_of(standing_q()), carried)
+    solution = WholeBodyController(model, backend).solve(snapshot, holding_reference(snapshot))
+    weight = (model.mass + carried.mass) * model.gravity
+    assert solution.forces.sum(axis=0) == pytest.approx([0.0, 0.0, weight], abs=PULL)
+    contacts = snapshot.p_world_feet - snapshot.p_world_com
+    moment = np.cross(contacts, solution.forces).sum(axis=0)
+    assert moment == pytest.approx(np.zeros(3), abs=0.1 * PULL)
 
 
 def test_less_friction_that_a_reference_asks_for_is_kept_and_more_is_not_believed() -> None:

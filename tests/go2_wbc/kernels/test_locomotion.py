@@ -18,6 +18,7 @@ from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.planning.slip import SlipConfig
 from go2_wbc.planning.swing import SwingConfig
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.snapshot import Snapshot
 from tests.engine_helpers import random_state, standing_q, state_of
 
@@ -52,7 +53,10 @@ GALLOP = Gait("gallop", 0.36, 0.40, (0.0, 0.15, 0.5, 0.65), needs_mpc=True)
 
 
 def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.ndarray) -> Snapshot:
-    """A measured state near ``at``: calm for a while, then wild, now and then upright at rest."""
+    """A measured state near ``at``: calm for a while, then wild, now and then upright at rest.
+
+    Now and then the robot carries something, and knows it.
+    """
     state = random_state(rng, tilt=0.3 if tick % 1000 >= 500 else 0.02)
     q = state.q.copy()
     q[:3] = [*(at + rng.normal(scale=0.02, size=2)), 0.3 + 0.02 * rng.normal()]
@@ -63,7 +67,8 @@ def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.nda
     if tick % 900 >= 450:  # and some long enough to slide
         contact = np.random.default_rng(tick // 40).random(4) < 0.6
     return model.snapshot(
-        replace(state, time=tick * TICK, q=q, v=pace * state.v, feet_in_contact=contact)
+        replace(state, time=tick * TICK, q=q, v=pace * state.v, feet_in_contact=contact),
+        Payload(5.0, (0.06, -0.08, 0.03)) if tick % 600 >= 400 else NO_PAYLOAD,
     )
 
 

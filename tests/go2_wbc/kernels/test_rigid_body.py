@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from go2_wbc.kernels.layout import SNAPSHOT
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from tests.engine_helpers import random_state, state_of
@@ -25,6 +26,12 @@ PAYLOAD = """<link name="payload"><inertial><origin xyz="0.1 -0.05 0.12" rpy="0.
 <mass value="4.0"/><inertia ixx="0.05" ixy="0.01" ixz="0.005" iyy="0.07" iyz="0.002" izz="0.03"/>
 </inertial></link><joint name="payload_joint" type="fixed"><parent link="{link}"/>
 <child link="payload"/><origin xyz="0.02 0.03 0.04" rpy="0.5 0.4 0.3"/></joint></robot>"""
+
+
+POINT_MASS = """<link name="payload"><inertial><origin xyz="0 0 0" rpy="0 0 0"/>
+<mass value="4.0"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>
+</inertial></link><joint name="payload_joint" type="fixed"><parent link="base"/>
+<child link="payload"/><origin xyz="0.1 -0.05 0.12" rpy="0 0 0"/></joint></robot>"""
 
 
 def difference(a: Snapshot, b: Snapshot) -> float:
@@ -66,6 +73,40 @@ def test_it_is_for_a_robot_that_carries_something(tmp_path: Path, link: str) -> 
     for _ in range(100):
         state = fast_state(rng)
         assert difference(model.snapshot(state), model.readable_snapshot(state)) < FAST_ROUNDING
+
+
+def test_it_is_for_a_payload_that_comes_and_goes() -> None:
+    model, rng = RobotModel(), np.random.default_rng(9)
+    for mass in (3.0, 0.0, 7.5, 7.5):
+        payload = Payload(mass, tuple(rng.uniform(-0.2, 0.2, size=3).tolist()))
+        for _ in range(20):
+            state = fast_state(rng)
+            ours, theirs = model.snapshot(state, payload), model.readable_snapshot(state, payload)
+            assert difference(ours, theirs) < FAST_ROUNDING
+
+
+def test_a_payload_is_a_part_of_the_trunk(tmp_path: Path) -> None:
+    """The same as a point mass in the robot's description, and it says where the CoM was."""
+    path, place = tmp_path / "robot.urdf", (0.1, -0.05, 0.12)
+    urdf = find_description().urdf_path.read_text(encoding="utf-8")
+    path.write_text(urdf.replace("</robot>", POINT_MASS), encoding="utf-8")
+    heavy, model = RobotModel(find_description(path)), RobotModel()
+    state = fast_state(np.random.default_rng(10))
+    carrying, bare = model.snapshot(state, Payload(4.0, place)), model.snapshot(state)
+    same = heavy.snapshot(state)
+    for name in set(NAMES) - {"payload", "com_shift"}:
+        assert getattr(carrying, name) == pytest.approx(getattr(same, name), abs=1e-6), name
+    moved = carrying.p_world_com - bare.p_world_com
+    np.testing.assert_allclose(carrying.com_shift, moved, atol=1e-12)
+    assert np.linalg.norm(carrying.com_shift) > 0.02
+    assert carrying.payload == pytest.approx([4.0, 4.0 * model.gravity])
+
+
+def test_a_robot_that_carries_nothing_is_the_same_to_the_bit() -> None:
+    model, state = RobotModel(), fast_state(np.random.default_rng(11))
+    bare = model.snapshot(state).row.copy()
+    model.snapshot(state, Payload(3.0, (0.1, 0.0, 0.0)))
+    np.testing.assert_array_equal(model.snapshot(state, NO_PAYLOAD).row, bare)
 
 
 def test_a_robot_with_other_joints_gets_pinocchios_snapshot() -> None:

@@ -1,0 +1,185 @@
+"""What a robot carries is felt as it is; what it does not carry is not believed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from jaxtyping import Float
+
+from go2_wbc.errors import ConfigError
+from go2_wbc.robot.joint_friction import JointFriction
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.payload import NO_PAYLOAD, Payload
+from go2_wbc.robot.payload_estimation import PayloadConfig, PayloadEstimator, felt_now
+from go2_wbc.robot.state import RobotState
+from tests.engine_helpers import random_state, standing_q, state_of
+
+TICK = 0.002
+MODEL = RobotModel()
+Z = PayloadConfig().middle[2]
+ALL = np.ones(4, dtype=bool)
+AT_ONCE = PayloadConfig(memory=TICK, most_rise=1e3, most_speed=1e3, least_height=0.01)
+ASIDE = Payload(4.0, (0.03, 0.08, Z))
+
+
+def standing(
+    carried: Payload, time: float = 0.0, contact: np.ndarray = ALL, share: float = 1.0
+) -> RobotState:
+    """At rest on all feet with torques that hold ``share`` of robot and payload."""
+    state = replace(state_of(standing_q(), time=time), feet_in_contact=contact)
+    snapshot = MODEL.snapshot(state, carried)
+    J = np.concatenate(list(snapshot.J_contacts))
+    forces = np.linalg.pinv(J[:, :6].T) @ snapshot.bias[:6]
+    return replace(state, tau=share * (snapshot.bias - J.T @ forces)[6:])
+
+
+def after(
+    estimator: PayloadEstimator, carried: Payload, seconds: float, start: float = 0.0, **how: object
+) -> Payload:
+    """What is believed after standing so for a while."""
+    payload = NO_PAYLOAD if start == 0.0 else estimator.update(MODEL.snapshot(standing(carried)))
+    for tick in range(round(seconds / TICK)):
+        state = standing(carried, start + tick * TICK, **how)  # type: ignore[arg-type]
+        payload = estimator.update(MODEL.snapshot(state, payload))
+    return payload
+
+
+def make(config: PayloadConfig | None = None) -> PayloadEstimator:
+    return PayloadEstimator(MODEL, JointFriction.none(), config)
+
+
+def test_a_payload_beside_the_middle_is_found_with_its_place() -> None:
+    found = after(make(), ASIDE, 5.0)
+    assert found.mass == pytest.approx(4.0, abs=0.01)
+    assert found.place == pytest.approx(ASIDE.place, abs=1e-3)
+
+
+def test_the_belief_grows_slowly() -> None:
+    estimator = make()
+    assert after(estimator, ASIDE, 0.1) is NO_PAYLOAD
+    assert 0.0 < after(make(), ASIDE, 1.0).mass < 3.0
+
+
+def test_what_the_robot_no_longer_carries_is_forgotten_for_good() -> None:
+    estimator = make()
+    payload = after(estimator, ASIDE, 5.0)
+    for tick in range(3000):
+        state = standing(NO_PAYLOAD, 5.0 + tick * TICK)
+        payload = estimator.update(MODEL.snapshot(state, payload))
+    assert payload is NO_PAYLOAD
+
+
+@pytest.mark.parametrize(
+    "little", [Payload(1.6, (0.0, 0.0, Z)), Payload(3.5, (0.02, 0.0, Z)), Payload(0.9, (0, 0.1, Z))]
+)
+def test_a_little_is_not_believed(little: Payload) -> None:
+    assert after(make(), little, 4.0) is NO_PAYLOAD
+
+
+def test_one_that_is_in_the_middle_is_believed_from_a_greater_mass_on() -> None:
+    found = after(make(), Payload(6.0, (0.0, 0.0, Z)), 5.0)
+    assert found.mass == pytest.approx(6.0, abs=0.02)
+
+
+def test_the_belief_is_bounded() -> None:
+    config = PayloadConfig()
+    found = after(make(), Payload(11.0, (0.3, -0.25, Z)), 6.0)
+    assert found.mass == pytest.approx(config.most_mass, abs=0.02)
+    assert found.place[:2] == pytest.approx([config.reach[0], -config.reach[1]], abs=1e-3)
+
+
+def test_a_foot_that_measures_no_contact_makes_no_payload() -> None:
+    one_broken = np.array([True, True, False, True])
+    assert after(make(), NO_PAYLOAD, 4.0, contact=one_broken) is NO_PAYLOAD
+
+
+def test_nothing_is_felt_without_any_contact() -> None:
+    assert after(make(), ASIDE, 4.0, contact=~ALL) is NO_PAYLOAD
+
+
+def test_nothing_is_felt_on_the_belly_in_a_rise_and_at_speed() -> None:
+    lying = replace(PayloadConfig(), least_height=0.35)
+    assert after(make(lying), ASIDE, 4.0) is NO_PAYLOAD
+    for velocity in ([0.0, 0.0, 0.2], [1.6, 0.0, 0.0]):
+        estimator, payload = make(), NO_PAYLOAD
+        for tick in range(2000):
+            state = standing(ASIDE, tick * TICK)
+            v = np.concatenate([velocity, np.zeros(15)])
+            payload = estimator.update(MODEL.snapshot(replace(state, v=v), payload))
+        assert payload is NO_PAYLOAD
+
+
+def test_a_tick_after_a_pause_is_not_compared_with_one_before() -> None:
+    estimator = make(AT_ONCE)
+    still = standing(NO_PAYLOAD)
+    estimator.update(MODEL.snapshot(still))
+    estimator.pause()
+    moved = replace(standing(NO_PAYLOAD, 9.0), v=np.ones(18))
+    estimator.update(MODEL.snapshot(moved))
+    assert estimator.felt == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+
+
+def test_the_kernel_feels_what_the_readable_form_does() -> None:
+    rng = np.random.default_rng(4)
+    friction = JointFriction.by_part((0.3, 0.2, 0.5), (0.1, 0.2, 0.3))
+    for _ in range(300):
+        before, state = random_state(rng, 0.3), random_state(rng, 0.3)
+        contact = rng.random(4) < 0.7
+        contact[rng.integers(4)] = True
+        state = replace(state, time=TICK, tau=rng.normal(size=12), feet_in_contact=contact)
+        payload = Payload(float(rng.uniform(0.1, 6.0)), (0.1, -0.05, 0.02))
+        snapshot = MODEL.snapshot(state, payload)
+        estimator = PayloadEstimator(MODEL, friction, AT_ONCE)
+        estimator._place = np.array(payload.place)
+        estimator.update(MODEL.snapshot(before))
+        estimator.update(snapshot)
+        tau = state.tau - friction.torque(state.joint_velocities, np.zeros(12))
+        a = (state.v - before.v) / TICK
+        theirs = felt_now(snapshot, tau, a, payload, MODEL.gravity)
+        np.testing.assert_allclose(estimator._means, theirs, rtol=1e-8, atol=1e-6)
+
+
+def pushed(
+    rng: np.random.Generator, carried: Payload
+) -> tuple[RobotState, Float[np.ndarray, "18"]]:
+    """A moving robot whose trunk does not turn, and the acceleration that its torques make."""
+    state = random_state(rng, 0.2)
+    v = state.v.copy()
+    v[3:6] = 0.0
+    snapshot = MODEL.snapshot(replace(state, v=v), carried)
+    a = rng.normal(scale=5.0, size=18)
+    a[3:6] = 0.0
+    needed = snapshot.mass_matrix @ a + snapshot.bias
+    J = np.concatenate(list(snapshot.J_contacts))
+    forces = np.linalg.lstsq(J[:, :6].T, needed[:6], rcond=None)[0]
+    return replace(state, v=v, tau=(needed - J.T @ forces)[6:], feet_in_contact=ALL), a
+
+
+def test_what_is_felt_of_a_moving_robot_is_the_payloads_weight_and_inertia() -> None:
+    """With the law of motion of the loaded robot, and the dynamics of the one without a load."""
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        state, a = pushed(rng, ASIDE)
+        felt = felt_now(MODEL.snapshot(state), state.tau, a, NO_PAYLOAD, MODEL.gravity)
+        force = ASIDE.mass * (a[:3] + MODEL.gravity * state.R_world_base[2])
+        assert felt[:3] == pytest.approx(force, abs=1e-8)
+        assert felt[3:6] == pytest.approx(np.cross(ASIDE.place, force), abs=1e-8)
+
+
+def test_what_is_known_already_counts_as_felt() -> None:
+    """One that knows its payload feels the same as one that does not."""
+    rng = np.random.default_rng(6)
+    for _ in range(100):
+        state, a = pushed(rng, ASIDE)
+        without = felt_now(MODEL.snapshot(state), state.tau, a, NO_PAYLOAD, MODEL.gravity)
+        knowing = felt_now(MODEL.snapshot(state, ASIDE), state.tau, a, ASIDE, MODEL.gravity)
+        assert knowing == pytest.approx(without, abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ["memory", "response", "least_mass", "most_mass", "reach"])
+def test_numbers_that_make_no_sense_are_refused(name: str) -> None:
+    bad = (0.1, -0.1) if name == "reach" else -1.0
+    with pytest.raises(ConfigError, match=rf"PayloadConfig.{name} must be positive"):
+        PayloadConfig(**{name: bad})  # type: ignore[arg-type]
