@@ -8,7 +8,8 @@ from types import UnionType
 from typing import TypeVar
 
 from go2_wbc.config import Config, load_config
-from go2_wbc.errors import ConfigError, Go2WbcError
+from go2_wbc.errors import CommandError, ConfigError, Go2WbcError
+from go2_wbc.planning.command import finite_number
 from go2_wbc.plant.base import Plant
 
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
@@ -44,6 +45,20 @@ def pace(realtime: bool, plant: Plant | None) -> bool:
             "GO2Controller(plant=..., realtime=True)"
         )
     return realtime
+
+
+def duration(name: str, value: float) -> float:
+    """``value`` [s]; raise CommandError if it is no finite number, or negative."""
+    seconds = finite_number(name, value)
+    if seconds < 0:
+        raise CommandError(f"{name} must not be negative, got {seconds}")
+    return seconds
+
+
+def within(name: str, seconds: float, least: float, most: float) -> None:
+    """Raise CommandError unless ``seconds`` lies between ``least`` and ``most``."""
+    if not least <= seconds <= most:
+        raise CommandError(f"{name} must be {least:g} to {most:g} s, got {seconds}")
 
 
 def namespace(value: str) -> str:

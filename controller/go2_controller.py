@@ -14,13 +14,14 @@ from controller import arguments
 from controller.assembly import PilotSettings, build_pilot
 from controller.modes import Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
-from controller.procedures import Aborted, Measurements
+from controller.procedures import Aborted, Measurements, interruption
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError
 from go2_wbc.legs import front_leg
 from go2_wbc.planning.command import VelocityCommand, finite_number
+from go2_wbc.planning.pose import BodyPose
 from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
@@ -142,21 +143,35 @@ class GO2Controller:
         gait = arguments.checked("gait", gait, Gait | str, "a Gait or its name", CommandError)
         return self._call("walk", lambda: self._pilot.walk(gait))
 
-    def move(self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0) -> None:
-        """Walk with this velocity until the next command; takes no time by itself.
+    def move(
+        self,
+        linear_x: float = 0.0,
+        angular_z: float = 0.0,
+        *,
+        linear_y: float = 0.0,
+        height: float = 0.0,
+        roll: float = 0.0,
+        pitch: float = 0.0,
+        yaw: float = 0.0,
+    ) -> None:
+        """Walk like this until the next command; takes no time by itself.
 
         Args:
             linear_x: forward speed [m/s], negative is backward.
             angular_z: turning rate [rad/s], positive is left.
             linear_y: sideways speed [m/s], positive is left.
+            height: of the trunk, from the usual one [m], negative is lower.
+            roll: of the trunk [rad], positive lowers the right side.
+            pitch: of the trunk [rad], positive lowers the front.
+            yaw: of the trunk [rad], positive looks left of the heading, which stays.
 
         Raises:
-            CommandError: if a value is not a finite number.
+            CommandError: if a value is not a finite number, or the pose is beyond its envelope.
             ModeError: outside walking mode, or while another thread turns or moves forward.
         """
         self._check_open()
         wanted = VelocityCommand(linear_x, linear_y, angular_z)
-        followed = self._pilot.set_command(wanted)
+        followed = self._pilot.set_command(wanted, BodyPose(height, roll, pitch, yaw))
         if followed != wanted:
             _log.warning("velocity command clipped from %s to %s", wanted, followed)
 
@@ -214,8 +229,7 @@ class GO2Controller:
 
         leg = front_leg(arguments.checked("side", side, str, "a string", CommandError))
         hold = finite_number("hold", hold)
-        if not 0.5 <= hold <= 30.0:
-            raise CommandError(f"hold must be 0.5 to 30 s, got {hold}")
+        arguments.within("hold", hold, 0.5, 30.0)
         if plan is None:
             timeline = motions.load_motion("high_five", side=side, hold=hold, height=HEIGHT)
             with self._planning:
@@ -275,9 +289,7 @@ class GO2Controller:
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
         self._check_open()
-        seconds = finite_number("seconds", seconds)
-        if seconds < 0:
-            raise CommandError(f"seconds must not be negative, got {seconds}")
+        seconds = arguments.duration("seconds", seconds)
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
 
     # --- looking --------------------------------------------------------------------------
@@ -296,6 +308,11 @@ class GO2Controller:
     def command(self) -> VelocityCommand:
         """The velocity command that is being followed, after clipping."""
         return self._pilot.command
+
+    @property
+    def body_pose(self) -> BodyPose:
+        """The pose of the trunk that is being followed while the robot walks."""
+        return self._pilot.body_pose
 
     @property
     def last_outcome(self) -> Outcome:
@@ -365,7 +382,7 @@ class GO2Controller:
             reason = str(error)
             raise
         except BaseException as error:
-            reason = _interruption(name, error)
+            reason = interruption(name, error)
             self._pilot.collapse(reason)
             reason = f"{reason}, damped"
             raise
@@ -381,9 +398,3 @@ class GO2Controller:
     def _check_open(self) -> None:
         if self._closed:
             raise ClosedError("this GO2Controller is closed")
-
-
-def _interruption(name: str, error: BaseException) -> str:
-    if isinstance(error, KeyboardInterrupt):
-        return f"interrupted during {name}()"
-    return f"{type(error).__name__} during {name}(): {error}"

@@ -14,7 +14,6 @@ from statistics import fmean
 import motions
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
-from controller.behaviours.walking import Walking
 from controller.checks import (
     LYING_HEIGHT,
     arrival_measurements,
@@ -39,11 +38,13 @@ from controller.procedures import (
 )
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
+from controller.walker import Walker
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait, find_gait
 from go2_wbc.errors import ModeError, StanceMismatch
 from go2_wbc.legs import Leg
-from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.reference import MotionPlan, Posture
 from motions.postures import lie_down, rise, sit_down
 
@@ -51,8 +52,6 @@ READY_TIME = 0.2
 """Time [s] that a robot is given to stand ready in walking mode."""
 HOLD_TIME = 0.4
 """Time [s] in which a robot that stands takes the exact posture."""
-STOP_LIMIT = 4.0
-"""Time [s] in which a walking robot must come to rest after ``stop``."""
 PAW_TOLERANCE = 0.03
 """Distance [m] that the paw, on the average of the hold, may be below its planned height."""
 
@@ -72,8 +71,7 @@ class Pilot:
         self._model = runner.loop.model
         self._config = config
         self._procedures = ProcedureRunner(runner)
-        self._walking = self._make_walking("trot")
-        self._envelope: VelocityEnvelope = self._config.envelope
+        self._walker = Walker(runner, config)
         self._goal: Goal | None = None
         self.playing: PlayPlan | None = None
         self._must_return = False
@@ -91,7 +89,12 @@ class Pilot:
     @property
     def command(self) -> VelocityCommand:
         """The velocity command that is being followed."""
-        return self._walking.command if self.mode is Mode.WALKING else ZERO_COMMAND
+        return self._walker.command if self.mode is Mode.WALKING else ZERO_COMMAND
+
+    @property
+    def body_pose(self) -> BodyPose:
+        """The pose of the trunk that is being followed while the robot walks."""
+        return self._walker.walking.pose if self.mode is Mode.WALKING else LEVEL
 
     def begin(self) -> None:
         """Begin a procedure: the mode is from now on what the last fault, if any, has made it."""
@@ -167,31 +170,37 @@ class Pilot:
         wanted = find_gait(gait)
         if self.mode is not Mode.WALKING:
             self._ensure_standing()
-            self._start_walking(wanted)
-        elif wanted != self._walking.gait:
-            self._change_gait(wanted)
+            self._walker.start(wanted)
+        elif wanted != self._walker.walking.gait:
+            self._walker.change_gait(wanted)
         self.wait(READY_TIME)
         self._mode = Mode.WALKING
         return self._procedures.measurements()
 
-    def set_command(self, command: VelocityCommand) -> VelocityCommand:
+    def set_command(
+        self, command: VelocityCommand, pose: BodyPose | None = None
+    ) -> VelocityCommand:
         """Follow ``command``, clipped to the envelope; returns what is followed.
 
+        Args:
+            command: wanted.
+            pose: wanted of the trunk; None keeps the one that is followed.
+
         Raises:
+            CommandError: if the pose is beyond its envelope.
             ModeError: outside walking mode, or during a goal.
         """
         if self._goal is not None:
             raise ModeError(f"move() during a goal ({self._goal.name}): end it by stop()")
         if self.mode is not Mode.WALKING:
             raise ModeError(f"move() needs walking mode, not {self.mode.value}: call walk() first")
-        self._walking.command = self._envelope.clip(command)
-        return self._walking.command
+        return self._walker.follow(command, pose)
 
     def rest(self) -> Measurements:
-        """Zero the command and let the walking robot come to rest."""
+        """Zero the command, level the trunk and let the walking robot come to rest."""
         if self.mode is Mode.WALKING:
-            self._walking.command = ZERO_COMMAND
-            self._finish_steps("come to rest")
+            self._walker.halt()
+            self._walker.finish("come to rest")
         return self._procedures.measurements()
 
     def run_goal(self, goal: Goal) -> Measurements:
@@ -205,7 +214,7 @@ class Pilot:
             def is_over() -> bool:
                 if self._goal is None:
                     return True
-                self._walking.command = self._envelope.clip(goal.command(loop.state))
+                self._walker.follow(goal.command(loop.state))
                 return goal.is_done(loop.state)
 
             goal.begin(loop.state)
@@ -227,29 +236,8 @@ class Pilot:
         The goal's own call then brings the robot to rest.
         """
         had_goal, self._goal = self._goal is not None, None
-        self._walking.command = ZERO_COMMAND
+        self._walker.halt()
         return had_goal
-
-    def _make_walking(self, gait: str | Gait) -> Walking:
-        return Walking(self._model, find_gait(gait), self._config.locomotion)
-
-    def _start_walking(self, gait: str | Gait) -> None:
-        walking = self._make_walking(gait)
-        self._procedures.engage(walking)
-        self._walking = walking
-        self._envelope = self._config.envelope.scaled(walking.gait.envelope_share)
-
-    def _change_gait(self, gait: Gait) -> None:
-        """Walk on with ``gait``, slowing down into its envelope before."""
-        walking, self._envelope = self._walking, self._config.envelope.scaled(gait.envelope_share)
-        walking.command = self._envelope.clip(walking.command)
-        self._procedures.until(lambda: walking.follows_command, STOP_LIMIT, "slow down")
-        with self._runner.lock():  # the planner may be at work in another thread
-            walking.change_gait(gait)
-
-    def _finish_steps(self, what: str) -> None:
-        walking, loop = self._walking, self._loop
-        self._procedures.until(lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, what)
 
     # --- motions --------------------------------------------------------------------------
 
@@ -360,12 +348,9 @@ class Pilot:
     def square_up(self) -> None:
         """Stand with the feet below the hips, stepping in place if need be."""
         self._ensure_standing()
-        self._start_walking("trot")
-        with self._runner.lock():  # the planner may be at work in another thread
-            is_square = self._walking.square_up(self._loop.snapshot)
-        if not is_square:
+        if not self._walker.square_up():
             self._mode = Mode.WALKING
-            self._finish_steps("square the feet")
+            self._walker.finish("square the feet")
             self._mode = Mode.STANDING
         self.stand()
 

@@ -157,6 +157,13 @@ def refuse_dynamic_on_hardware(plan: MotionPlan, plant: Plant) -> None:
         )
 
 
+def interruption(name: str, error: BaseException) -> str:
+    """Why the call ``name`` ended by ``error``, in plain words."""
+    if isinstance(error, KeyboardInterrupt):
+        return f"interrupted during {name}()"
+    return f"{type(error).__name__} during {name}(): {error}"
+
+
 def listed(measured: Measurements) -> str:
     """``measured`` in one line."""
     return ", ".join(f"{name} {value:.3g}" for name, value in measured.items())

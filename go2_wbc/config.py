@@ -23,6 +23,7 @@ from typing import Any, TypeVar
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.planning.command import VelocityEnvelope
 from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.pose import PoseEnvelope
 from go2_wbc.robot.motor import TORQUE_SPEED, require_motor
 from go2_wbc.robot.payload_estimation import PayloadConfig
 from go2_wbc.robot.safety import SafetyConfig
@@ -40,6 +41,7 @@ class Config:
         wbc: whole-body controller.
         locomotion: locomotion planner.
         envelope: velocity commands that are followed.
+        pose: poses of the trunk that are taken while walking.
         safety: when to give up.
         payload: estimate of what the robot carries.
         backend: whole-body back end: condensed, full or placo.
@@ -50,6 +52,7 @@ class Config:
     wbc: WbcConfig = field(default_factory=WbcConfig)
     locomotion: LocomotionConfig = field(default_factory=LocomotionConfig)
     envelope: VelocityEnvelope = field(default_factory=VelocityEnvelope)
+    pose: PoseEnvelope = field(default_factory=PoseEnvelope)
     safety: SafetyConfig = field(default_factory=SafetyConfig)
     payload: PayloadConfig = field(default_factory=PayloadConfig)
     backend: str = "condensed"

@@ -10,6 +10,7 @@ from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.compiled import CompiledPlanner
 from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.planning.trunk import SETTLED_COMMAND
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
@@ -17,7 +18,7 @@ from go2_wbc.robot.snapshot import Snapshot
 
 
 class Walking(Behaviour):
-    """Walk with ``gait`` and follow ``command``; stand ready while it is zero."""
+    """Walk with ``gait`` and follow ``command`` and ``pose``; stand ready without command."""
 
     label = "walk"
     knows_payload = True
@@ -26,6 +27,7 @@ class Walking(Behaviour):
         """Walk with ``gait``."""
         self.gait = gait
         self.command: VelocityCommand = ZERO_COMMAND
+        self.pose: BodyPose = LEVEL
         self._planner: GaitPlanner = CompiledPlanner(model, gait, config)
 
     def start(self, snapshot: Snapshot) -> None:
@@ -34,7 +36,7 @@ class Walking(Behaviour):
 
     def update(self, snapshot: Snapshot) -> Reference:
         """The planner's reference."""
-        return self._planner.update(snapshot, self.command)
+        return self._planner.update(snapshot, self.command, self.pose)
 
     def square_up(self, snapshot: Snapshot) -> bool:
         """Step in place unless the feet are below the hips; returns whether they are."""

@@ -193,6 +193,8 @@ PLANNER = Layout(
     p_seen=(2,),
     p_met=(4, 3),
     roughness=(),
+    pose=(4,),
+    pose_rate=(4,),
 )
 """State of the locomotion planner from tick to tick."""
 
@@ -233,8 +235,12 @@ LOCOMOTION = Layout(
     least_determinant=(),
     most_slope=(),
     mid_swing=(),
+    pose_path=(3,),
 )
 """Numbers of the locomotion planner: gait, configuration, robot."""
+
+COMMAND = Layout(velocity=(3,), pose=(4,))
+"""What the locomotion planner is asked for: ahead, left, turning; height, roll, pitch, yaw."""
 
 MPC_NODES = 12
 """Nodes of the MPC's horizon."""

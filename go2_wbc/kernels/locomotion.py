@@ -20,6 +20,7 @@ from go2_wbc.kernels.ground import (
     tilt,
 )
 from go2_wbc.kernels.layout import LOCOMOTION, PLANNER, REFERENCE, SNAPSHOT
+from go2_wbc.kernels.pose import advance_pose, lean_rotation, pose_turn
 from go2_wbc.kernels.slip import observe_slip
 from go2_wbc.kernels.vectors import cross
 
@@ -33,6 +34,7 @@ _SHIFT = _N["com_shift"]
 _YAW, _POSITION, _VELOCITY = (_S[n] for n in ("yaw", "position", "velocity"))
 _STEPPING, _PHASE_TIME, _TIME = (_S[n] for n in ("is_stepping", "phase_time", "time"))
 _GROUND, _SLOPE, _HEIGHT_OFFSET = (_S[n] for n in ("ground", "slope", "height_offset"))
+_POSE, _POSE_RATE = _S["pose"], _S["pose_rate"]
 _LIFTOFF, _WAS_STANCE, _AWAITED = (_S[n] for n in ("liftoff", "was_stance", "is_awaited"))
 _PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
 _GAIT, _REST, _STRIDE, _RATES = (_C[n] for n in ("period", "rest_period", "stride", "adaptation"))
@@ -73,11 +75,11 @@ def foot_phase(t, offset, period, duty):
     return False, max(elapsed - stance_time, 0.0), period - elapsed
 
 
-@subroutine("void(f8[::1], f8[::1], f8[:,::1])")
-def nominal_feet(snapshot, c, feet):
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8[:,::1])")
+def nominal_feet(snapshot, s, c, feet):
     """Points below the hips of a level trunk with the measured heading, moved by ``com_shift``."""
     q = snapshot[_Q : _Q + 19]
-    yaw = yaw_of(q)
+    yaw = yaw_of(q) - s[_POSE + 3]
     cosine, sine = np.cos(yaw), np.sin(yaw)
     for leg in range(4):
         x, y = c[_NOMINAL + 3 * leg], c[_NOMINAL + 3 * leg + 1]
@@ -85,11 +87,11 @@ def nominal_feet(snapshot, c, feet):
         feet[leg, 1] = q[1] + sine * x + cosine * y + snapshot[_SHIFT + 1]
 
 
-@kernel("b1(f8[::1], f8[::1])")
-def is_square(snapshot, c):
+@kernel("b1(f8[::1], f8[::1], f8[::1])")
+def is_square(snapshot, s, c):
     """Whether the feet form the nominal rectangle, wherever its middle is."""
     offsets, mean = np.empty((4, 2)), np.zeros(2)
-    nominal_feet(snapshot, c, offsets)
+    nominal_feet(snapshot, s, c, offsets)
     for leg in range(4):
         for i in range(2):
             offsets[leg, i] = snapshot[_P_FEET + 3 * leg + i] - offsets[leg, i]
@@ -137,7 +139,7 @@ def is_settled(s, c):
 def may_stop(snapshot, s, c):
     """Whether the robot is slow, no longer commanded, and stands squarely."""
     slow = np.hypot(snapshot[_V_COM], snapshot[_V_COM + 1]) < c[_SETTLE_SPEED]
-    return is_settled(s, c) and slow and is_square(snapshot, c)
+    return is_settled(s, c) and slow and is_square(snapshot, s, c)
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
@@ -186,12 +188,13 @@ def adapt_gait(s, c, dt, command):
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
 def integrate(snapshot, s, c, dt, command):
-    """Ramp the velocity, integrate it to the pose, apply the leash, correct the height."""
+    """Ramp velocity and pose, integrate to the place, apply the leash, correct the height."""
+    advance_pose(s[_POSE : _POSE + 4], s[_POSE_RATE : _POSE_RATE + 4], c, command, dt)
     for i in range(3):
         most = c[_ACCELERATION + i] * dt
         s[_VELOCITY + i] += min(max(command[i] - s[_VELOCITY + i], -most), most)
     s[_YAW] += s[_VELOCITY + 2] * dt
-    difference = s[_YAW] - yaw_of(snapshot[_Q : _Q + 19])
+    difference = s[_YAW] + s[_POSE + 3] - yaw_of(snapshot[_Q : _Q + 19])
     lead = np.arctan2(np.sin(difference), np.cos(difference))
     s[_YAW] += min(max(lead, -c[_YAW_LEASH]), c[_YAW_LEASH]) - lead
     cosine, sine = np.cos(s[_YAW]), np.sin(s[_YAW])
@@ -203,7 +206,7 @@ def integrate(snapshot, s, c, dt, command):
         s[_POSITION] = snapshot[_P_COM] + x * c[_LEASH] / distance
         s[_POSITION + 1] = snapshot[_P_COM + 1] + y * c[_LEASH] / distance
     carry_ground(snapshot, s)
-    sag = s[_GROUND] + c[_HEIGHT] - snapshot[_P_COM + 2]
+    sag = s[_GROUND] + c[_HEIGHT] + s[_POSE] - snapshot[_P_COM + 2]
     counted = min(max(sag, -c[_WINDOW]), c[_WINDOW])
     offset = s[_HEIGHT_OFFSET] + c[_RATE] * dt * counted
     s[_HEIGHT_OFFSET] = min(max(offset, -c[_LIMIT]), c[_LIMIT])
@@ -286,11 +289,11 @@ def fill_body(s, c, target):
     target[_IS_COM] = 1.0
     target[_BODY_P], target[_BODY_P + 1] = s[_POSITION], s[_POSITION + 1]
     target[_BODY_P + 2] = ground_at(s, s[_POSITION], s[_POSITION + 1])
-    target[_BODY_P + 2] += c[_HEIGHT] + s[_HEIGHT_OFFSET]
+    target[_BODY_P + 2] += c[_HEIGHT] + s[_HEIGHT_OFFSET] + s[_POSE]
     v_x = cosine * s[_VELOCITY] - sine * s[_VELOCITY + 1]
     v_y = sine * s[_VELOCITY] + cosine * s[_VELOCITY + 1]
     target[_BODY_V], target[_BODY_V + 1] = v_x, v_y
-    target[_BODY_V + 2] = s[_SLOPE] * v_x + s[_SLOPE + 1] * v_y
+    target[_BODY_V + 2] = s[_SLOPE] * v_x + s[_SLOPE + 1] * v_y + s[_POSE_RATE]
     a, b = tilt(s, c)
     rise = a * cosine + b * sine
     length, steep = np.sqrt(1.0 + rise * rise), np.sqrt(1.0 + a * a + b * b)
@@ -301,14 +304,18 @@ def fill_body(s, c, target):
         target[_BODY_R + 3 * i] = x[i]
         target[_BODY_R + 3 * i + 1] = y[i]
         target[_BODY_R + 3 * i + 2] = z[i]
-    target[_BODY_W + 2] = s[_VELOCITY + 2]
+    pose, turn = s[_POSE : _POSE + 4], np.empty(3)
+    lean_rotation(pose, target[_BODY_R : _BODY_R + 9].reshape(3, 3))
+    w = target[_BODY_W : _BODY_W + 3]
+    pose_turn(s[_YAW], pose, s[_POSE_RATE : _POSE_RATE + 4], turn, w)
+    w[2] += s[_VELOCITY + 2]
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], b1[::1], b1[::1], f8[::1], f8[::1], f8[::1])")
 def fill_feet(snapshot, s, c, stance, stands, elapsed, remaining, target):
     """What each leg does, its load, and the way of a foot in the air."""
     nominal, goal = np.empty((4, 2)), np.empty(3)
-    nominal_feet(snapshot, c, nominal)
+    nominal_feet(snapshot, s, c, nominal)
     for leg in range(4):
         target[_LEGS + leg] = 0.0 if stands[leg] else 1.0
         for i in range(3):

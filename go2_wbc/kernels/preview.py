@@ -24,6 +24,7 @@ from go2_wbc.kernels.layout import (
 )
 from go2_wbc.kernels.locomotion import TIE, foothold, nominal_feet
 from go2_wbc.kernels.mpc import solve_mpc
+from go2_wbc.kernels.pose import advance_pose, pose_turn
 from go2_wbc.kernels.vectors import cross, plus, vector
 
 _N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLANNER.start, LOCOMOTION.start
@@ -34,6 +35,7 @@ _YAW, _POSITION, _VELOCITY = (_S[n] for n in ("yaw", "position", "velocity"))
 _PHASE_TIME, _HEIGHT_OFFSET = _S["phase_time"], _S["height_offset"]
 _PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
 _STEPPING, _SLOPE = _S["is_stepping"], _S["slope"]
+_POSE, _POSE_RATE = _S["pose"], _S["pose_rate"]
 _ACCELERATION, _HEIGHT, _RADIUS = (_C[n] for n in ("acceleration", "height", "foot_radius"))
 _NOMINAL = _C["p_base_feet_nominal"]
 _STEP, _MASS, _GRAVITY = (MPC.start[n] for n in ("step", "mass", "gravity"))
@@ -113,6 +115,22 @@ def fill_goals(s, c, command, step, goals):
         goals[k, 11] = s[_SLOPE] * goals[k, 9] + s[_SLOPE + 1] * goals[k, 10]
 
 
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[:,::1])")
+def lean_goals(s, c, command, step, goals):
+    """Add to the goals of a level trunk the pose on its way."""
+    pose, rate = s[_POSE : _POSE + 4].copy(), s[_POSE_RATE : _POSE_RATE + 4].copy()
+    turn, w = np.empty(3), np.empty(3)
+    for k in range(MPC_NODES):
+        advance_pose(pose, rate, c, command, step)
+        pose_turn(s[_YAW] + goals[k, 2], pose, rate, turn, w)
+        goals[k, 2] += pose[3] - s[_POSE + 3]
+        goals[k, 5] += pose[0]
+        goals[k, 11] += rate[0]
+        for i in range(3):
+            goals[k, i] += turn[i]
+            goals[k, 6 + i] += w[i]
+
+
 @subroutine("void(f8[::1], f8, f8[:,::1], f8[:,::1])")
 def fill_contacts(s, step, share, landings):
     """Share of each node that each foot stands, and in how many strides it will have landed."""
@@ -142,7 +160,7 @@ def fill_arms(snapshot, s, c, step, goals, landings, arms):
     com = vector(snapshot, _P_COM)
     base = plus(vector(snapshot, _Q), vector(snapshot, _SHIFT))
     nominal, goal, footholds = np.empty((4, 2)), np.empty(3), np.empty((4, 2))
-    nominal_feet(snapshot, c, nominal)
+    nominal_feet(snapshot, s, c, nominal)
     for leg in range(4):
         remaining = max(landings[0, leg], 0.0) * period
         foothold(leg, snapshot, s, c, nominal, remaining, goal)
@@ -180,7 +198,7 @@ def fill_arms(snapshot, s, c, step, goals, landings, arms):
 def plan_forces(snapshot, s, c, m, command, inertia, f):
     """Solve for the forces of the first node, while its feet stand; False without solution."""
     state, turn = np.empty(12), np.empty(3)
-    turn_from(snapshot, s[_YAW], turn)
+    turn_from(snapshot, s[_YAW] + s[_POSE + 3], turn)
     for i in range(3):
         state[i], state[3 + i] = turn[i], snapshot[_P_COM + i]
         state[6 + i], state[9 + i] = 0.0, snapshot[_V_COM + i]
@@ -194,6 +212,7 @@ def plan_forces(snapshot, s, c, m, command, inertia, f):
     fill_arms(snapshot, s, c, m[_STEP], goals, landings, arms)
     numbers = m.copy()
     numbers[_MASS] += snapshot[_CARRIED]
+    lean_goals(s, c, command, m[_STEP], goals)
     outcome = solve_mpc(numbers, state, goals, share, arms, inertia, forces)
     for leg in range(4):
         for i in range(3):

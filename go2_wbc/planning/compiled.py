@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.contacts import DUTY_RATE, OFFSET_RATE, PERIOD_RATE, Gait
-from go2_wbc.kernels.layout import FORCES, LOCOMOTION, MPC, PLANNER, REFERENCE
+from go2_wbc.kernels.layout import COMMAND, FORCES, LOCOMOTION, MPC, PLANNER, REFERENCE
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.correction import CorrectionConfig
 from go2_wbc.planning.gait_clock import resting_gait
@@ -20,6 +20,7 @@ from go2_wbc.planning.ground import (
     GroundPlane,
 )
 from go2_wbc.planning.locomotion import MID_SWING, LocomotionConfig
+from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.planning.trunk import SETTLED_COMMAND
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
@@ -46,7 +47,7 @@ class CompiledPlanner(GaitPlanner):
         self._mpc_friction, self._ground = config.mpc.friction, config.ground
         self.change_gait(gait)
         self._state = np.zeros(PLANNER.size)
-        self._command = np.zeros(3)
+        self._command = np.zeros(COMMAND.size)
         self._contact = np.zeros(4)
 
     def start(self, snapshot: Snapshot) -> None:
@@ -76,6 +77,8 @@ class CompiledPlanner(GaitPlanner):
                 snapshot.p_world_com[:2],
                 feet,
                 0.0,
+                np.zeros(4),
+                np.zeros(4),
             ]
         )
 
@@ -101,16 +104,19 @@ class CompiledPlanner(GaitPlanner):
 
     def square_up(self, snapshot: Snapshot) -> bool:
         """Start stepping unless every foot is below its hip; returns whether they all are."""
-        stands = bool(self._is_square(snapshot.row, self._numbers))
+        stands = bool(self._is_square(snapshot.row, self._state, self._numbers))
         self._state[_STATE["is_stepping"]] = not stands
         self._state[_STATE["phase_time"]] = 0.0
         self._state[_FORM] = self._numbers[_RESTING]
         return stands
 
-    def update(self, snapshot: Snapshot, command: VelocityCommand) -> Reference:
-        """The reference of this tick for the wanted ``command`` (already inside the envelope)."""
+    def update(
+        self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose = LEVEL
+    ) -> Reference:
+        """The reference of this tick; see ``GaitPlanner``."""
         wanted, row = self._command, np.empty(REFERENCE.size)
         wanted[0], wanted[1], wanted[2] = command.linear_x, command.linear_y, command.angular_z
+        wanted[3], wanted[4], wanted[5], wanted[6] = pose.height, pose.roll, pose.pitch, pose.yaw
         state = snapshot.state
         self._contact[:] = state.feet_in_contact
         own, numbers = self._state, self._numbers
@@ -167,5 +173,6 @@ def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndar
             LEAST_DETERMINANT,
             MOST_SLOPE,
             MID_SWING,
+            astuple(config.pose),
         ]
     )

@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.reference import Reference
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -47,5 +48,13 @@ class GaitPlanner(ABC):
         """Start stepping unless every foot is below its hip; returns whether they all are."""
 
     @abstractmethod
-    def update(self, snapshot: Snapshot, command: VelocityCommand) -> Reference:
-        """The reference of this tick for the wanted ``command`` (already inside the envelope)."""
+    def update(
+        self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose = LEVEL
+    ) -> Reference:
+        """The reference of this tick.
+
+        Args:
+            snapshot: of this tick.
+            command: wanted velocity, already inside the envelope.
+            pose: wanted pose of the trunk, already inside its envelope.
+        """

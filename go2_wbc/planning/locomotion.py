@@ -27,6 +27,7 @@ from jaxtyping import Float
 
 from go2_wbc.contacts import TIE, ContactPhase, Gait, standing
 from go2_wbc.errors import ConfigError
+from go2_wbc.kernels.layout import MPC_NODES
 from go2_wbc.legs import LEGS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.contact import ContactConfig, FootContacts
@@ -34,6 +35,7 @@ from go2_wbc.planning.gait_clock import GaitClock
 from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.ground import GroundConfig, GroundPlane
 from go2_wbc.planning.mpc import MpcConfig
+from go2_wbc.planning.pose import LEVEL, BodyPose, PoseConfig
 from go2_wbc.planning.preview import Course, ForcePlanner
 from go2_wbc.planning.slip import SlipConfig, SlipObserver
 from go2_wbc.planning.swing import SwingConfig, swing_foot
@@ -78,6 +80,7 @@ class LocomotionConfig:
         contact: when measured contacts count.
         ground: estimate of its slope and roughness.
         mpc: planning of the forces ahead.
+        pose: how a new pose of the trunk is approached.
     """
 
     height: float = 0.29
@@ -98,11 +101,12 @@ class LocomotionConfig:
     contact: ContactConfig = field(default_factory=ContactConfig)
     ground: GroundConfig = field(default_factory=GroundConfig)
     mpc: MpcConfig = field(default_factory=MpcConfig)
+    pose: PoseConfig = field(default_factory=PoseConfig)
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a number that is out of range."""
         zero_is_valid = {"velocity_feedback", "normal_force_min"}
-        parts = {"swing", "slip", "contact", "ground", "mpc"}
+        parts = {"swing", "slip", "contact", "ground", "mpc", "pose"}
         positive = {f.name for f in fields(self)} - zero_is_valid - parts
         require_positive(self, *sorted(positive))
         require_not_negative(self, *sorted(zero_is_valid))
@@ -121,7 +125,7 @@ class LocomotionConfig:
     def trunk_limits(self) -> TrunkLimits:
         """How fast the trunk's reference changes, and how far it may run ahead."""
         rate = np.array([self.linear_acceleration] * 2 + [self.angular_acceleration])
-        return TrunkLimits(rate, self.position_leash, self.yaw_leash)
+        return TrunkLimits(rate, self.position_leash, self.yaw_leash, self.pose)
 
     def plans_forces(self, gait: Gait) -> bool:
         """Whether ``gait`` is walked with the forces planned ahead."""
@@ -193,12 +197,14 @@ class LocomotionPlanner(GaitPlanner):
         self._clock.restart()
         return not self._is_stepping
 
-    def update(self, snapshot: Snapshot, command: VelocityCommand) -> Reference:
-        """The reference of this tick for the wanted ``command`` (already inside the envelope)."""
+    def update(
+        self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose = LEVEL
+    ) -> Reference:
+        """The reference of this tick; see ``GaitPlanner``."""
         dt = snapshot.state.time - self._last_time
         self._last_time = snapshot.state.time
         self._advance_phase(snapshot, command, dt)
-        self._trunk.integrate(snapshot, command, dt)
+        self._trunk.integrate(snapshot, command, pose, dt)
         self._ground.carry(snapshot)
         self._trunk.correct_height(snapshot, self._ground.height + self._config.height, dt)
         phase = self._phase(command, dt)
@@ -225,7 +231,8 @@ class LocomotionPlanner(GaitPlanner):
         )
         if self._forces is None or not self._is_stepping:
             return reference
-        return self._forces.update(snapshot, self._course(snapshot, command, phase), reference)
+        course = self._course(snapshot, command, pose, phase)
+        return self._forces.update(snapshot, course, reference)
 
     def _phase(self, command: VelocityCommand, dt: float) -> ContactPhase:
         if not self._is_stepping:
@@ -236,16 +243,20 @@ class LocomotionPlanner(GaitPlanner):
         self._clock.adapt(dt, float(np.hypot(x, y) + arm * abs(turn)), is_resting=is_resting)
         return self._clock.now()
 
-    def _course(self, snapshot: Snapshot, command: VelocityCommand, phase: ContactPhase) -> Course:
+    def _course(
+        self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose, phase: ContactPhase
+    ) -> Course:
         config = self._config
         remaining = np.where(phase.stance, 0.0, phase.remaining)
         return Course(
             gait=self._clock.gait,
             time=self._clock.time,
             yaw=self._trunk.yaw,
-            position=self._trunk.target(self._ground, config.height).p_world,
+            position=self._trunk.place(self._ground, config.height),
             velocity=self._trunk.velocity,
             command=np.array([command.linear_x, command.linear_y, command.angular_z]),
+            lean=self._trunk.pose.pose,
+            leaning=self._trunk.pose.ahead(pose, config.mpc.step, MPC_NODES),
             acceleration=config.trunk_limits.rate,
             footholds=self._footholds(snapshot, remaining),
             ground=self._ground,
@@ -303,7 +314,7 @@ class LocomotionPlanner(GaitPlanner):
 
         A payload moves them as it does the CoM, which so stays above the feet's middle.
         """
-        R = yaw_rotation(snapshot.state.yaw)
+        R = yaw_rotation(snapshot.state.yaw - self._trunk.pose.pose[3])
         feet = self._model.p_base_feet_nominal @ R.T
         return snapshot.state.p_world_base[:2] + feet[:, :2] + snapshot.com_shift[:2]
 

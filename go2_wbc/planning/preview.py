@@ -20,6 +20,7 @@ from go2_wbc.contacts import TIE, Gait
 from go2_wbc.kernels.layout import MPC, MPC_NODES
 from go2_wbc.planning.ground import GroundPlane, tilt_vector
 from go2_wbc.planning.mpc import Horizon, MpcConfig
+from go2_wbc.planning.pose import pose_turn
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, yaw_rotation
@@ -37,6 +38,8 @@ class Course:
         position: of the reference's CoM [m].
         velocity: ramped command in the heading frame [m/s], [rad/s].
         command: what it is ramped to.
+        lean: pose of the trunk, from that of one that walks level: height, roll, pitch, yaw.
+        leaning: that pose and its rate at the end of each node.
         acceleration: how fast, per second.
         footholds: where the feet in the air come down [m].
         ground: what is known of the ground.
@@ -49,6 +52,8 @@ class Course:
     position: Float[np.ndarray, "3"]
     velocity: Float[np.ndarray, "3"]
     command: Float[np.ndarray, "3"]
+    lean: Float[np.ndarray, "4"]
+    leaning: Float[np.ndarray, "nodes 2 4"]
     acceleration: Float[np.ndarray, "3"]
     footholds: Float[np.ndarray, "4 2"]
     ground: GroundPlane
@@ -118,15 +123,16 @@ def inertia_about_com(snapshot: Snapshot) -> Float[np.ndarray, "3 3"]:
 
 def look_ahead(snapshot: Snapshot, course: Course, step: float, model: RobotModel) -> Horizon:
     """What the MPC looks at, in nodes of ``step`` [s]."""
-    turn = log_rotation(snapshot.R_world_base @ yaw_rotation(course.yaw).T)
+    turn = log_rotation(snapshot.R_world_base @ yaw_rotation(course.yaw + course.lean[3]).T)
     w = snapshot.R_world_base @ snapshot.state.v[3:6]
     goals = _goals(course, step)
     share, landings = _contacts(course, step)
+    arms = _arms(snapshot, course, step, model, goals, landings)
     return Horizon(
         state=np.concatenate([turn, snapshot.p_world_com, w, snapshot.v_world_com]),
-        goals=goals,
+        goals=_leaned(course, goals),
         share=share,
-        arms=_arms(snapshot, course, step, model, goals, landings),
+        arms=arms,
         inertia=inertia_about_com(snapshot),
     )
 
@@ -147,6 +153,19 @@ def _goals(course: Course, step: float) -> Float[np.ndarray, "nodes 12"]:
         goal[2], goal[8] = yaw - course.yaw, velocity[2]
         goal[3:6], goal[9:] = position, along
     return goals
+
+
+def _leaned(course: Course, goals: Float[np.ndarray, "nodes 12"]) -> Float[np.ndarray, "nodes 12"]:
+    """The goals of a level trunk with the pose on its way added."""
+    leaned = goals.copy()
+    for goal, (pose, rate) in zip(leaned, course.leaning, strict=True):
+        turn, w = pose_turn(course.yaw + float(goal[2]), pose, rate)
+        goal[2] += pose[3] - course.lean[3]
+        goal[:3] += turn
+        goal[6:9] += w
+        goal[5] += pose[0]
+        goal[11] += rate[0]
+    return leaned
 
 
 def _contacts(

@@ -14,6 +14,7 @@ from jaxtyping import Float
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.correction import SteadyStateCorrection
 from go2_wbc.planning.ground import GroundPlane, tilted_rotation
+from go2_wbc.planning.pose import BodyPose, PoseConfig, PosePath, pose_turn
 from go2_wbc.reference import BodyTarget, TrackedPoint
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
@@ -30,11 +31,13 @@ class TrunkLimits:
         rate: greatest change of the velocity: ahead, left [m/s^2], turning [rad/s^2].
         position_leash: [m].
         yaw_leash: [rad].
+        pose: how a new pose is approached.
     """
 
     rate: Float[np.ndarray, "3"]
     position_leash: float
     yaw_leash: float
+    pose: PoseConfig
 
 
 class TrunkPath:
@@ -45,6 +48,7 @@ class TrunkPath:
         position: of the CoM, on the level [m].
         velocity: ramped command in the heading frame [m/s], [rad/s].
         height_offset: what is added to the wanted height against a load [m].
+        pose: on top of walking level.
     """
 
     def __init__(self, snapshot: Snapshot, limits: TrunkLimits) -> None:
@@ -54,6 +58,7 @@ class TrunkPath:
         self.position = snapshot.p_world_com[:2].copy()
         self.velocity = np.zeros(3)
         self.height_offset = 0.0
+        self.pose = PosePath(limits.pose)
         self._correction = SteadyStateCorrection()
 
     @property
@@ -66,14 +71,17 @@ class TrunkPath:
         """Wanted velocity of the CoM [m/s]."""
         return yaw_rotation(self.yaw) @ np.array([self.velocity[0], self.velocity[1], 0.0])
 
-    def integrate(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> None:
-        """Ramp the velocity towards ``command``, integrate it to the pose, and apply the leash."""
+    def integrate(
+        self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose, dt: float
+    ) -> None:
+        """Ramp towards ``command`` and ``pose``, integrate to the place, and apply the leash."""
         limits = self._limits
+        self.pose.advance(pose, dt)
         wanted = np.array([command.linear_x, command.linear_y, command.angular_z])
         most = limits.rate * dt
         self.velocity += np.clip(wanted - self.velocity, -most, most)
         self.yaw += self.velocity[2] * dt
-        lead = wrap_angle(self.yaw - snapshot.state.yaw)
+        lead = wrap_angle(self.yaw + self.pose.pose[3] - snapshot.state.yaw)
         self.yaw += np.clip(lead, -limits.yaw_leash, limits.yaw_leash) - lead
         self.position = self.position + self.world_velocity[:2] * dt
         offset = self.position - snapshot.p_world_com[:2]
@@ -82,21 +90,28 @@ class TrunkPath:
             self.position = snapshot.p_world_com[:2] + offset * (limits.position_leash / distance)
 
     def correct_height(self, snapshot: Snapshot, height: float, dt: float) -> None:
-        """Integrate the error from ``height`` [m]: a payload makes the robot sag for good."""
-        error = np.array([0.0, 0.0, height - snapshot.p_world_com[2], 0.0, 0.0, 0.0])
+        """Integrate the error from ``height`` [m], the pose's added: a payload makes it sag."""
+        sag = height + self.pose.pose[0] - snapshot.p_world_com[2]
+        error = np.array([0.0, 0.0, sag, 0.0, 0.0, 0.0])
         self.height_offset = float(self._correction.update(error, dt)[2])
 
-    def target(self, ground: GroundPlane, height: float) -> BodyTarget:
-        """The trunk's reference: along the ground, its CoM at ``height`` [m] plus the offset."""
-        v_world = self.world_velocity
-        v_world[2] = ground.slope @ v_world[:2]
+    def place(self, ground: GroundPlane, height: float) -> Float[np.ndarray, "3"]:
+        """Where the CoM of a level trunk shall be [m]: ``height`` above ground, plus the offset."""
         top = ground.at(self.position) + height + self.height_offset
+        return np.array([*self.position, top])
+
+    def target(self, ground: GroundPlane, height: float) -> BodyTarget:
+        """The trunk's reference: along the ground, its CoM at ``height`` [m], with the pose."""
+        v_world = self.world_velocity
+        (raised, *_), (rising, *_) = self.pose.pose, self.pose.rate
+        v_world[2] = ground.slope @ v_world[:2] + rising
+        _, w_world = pose_turn(self.yaw, self.pose.pose, self.pose.rate)
         return BodyTarget(
             point=TrackedPoint.COM,
-            p_world=np.array([*self.position, top]),
+            p_world=self.place(ground, height) + [0.0, 0.0, raised],
             v_world=v_world,
             a_world=np.zeros(3),
-            R_world_base=tilted_rotation(self.yaw, ground.tilt),
-            w_world=np.array([0.0, 0.0, self.velocity[2]]),
+            R_world_base=tilted_rotation(self.yaw, ground.tilt) @ self.pose.rotation,
+            w_world=w_world + [0.0, 0.0, self.velocity[2]],
             dw_world=np.zeros(3),
         )

@@ -2,7 +2,7 @@
 
 Unitree has renumbered its procedures more than once. These are those of robots from V1.1.6 on, from
 ``unitree_sdk2py/go2/sport/sport_api.py`` of unitree_sdk2_python, which keeps some of before beside
-them: 1018, 1026, 1033.
+them: 1018, 1026, 1033. ``BodyHeight`` (1013) is of the clients before those.
 """
 
 from __future__ import annotations
@@ -43,6 +43,7 @@ class Api(IntEnum):
     MOVE = 1008
     SIT = 1009
     RISE_SIT = 1010
+    BODY_HEIGHT = 1013
     SPEED_LEVEL = 1015
     HELLO = 1016
     STRETCH = 1017
@@ -121,6 +122,8 @@ class SportStatus:
 
 MOVE_LEAST, MOVE_GREATEST = (-2.5, -1.0, -4.0), (3.8, 1.0, 4.0)
 """Of ``Move``: forward, left [m/s], turning left [rad/s]."""
+HEIGHT_LEAST, HEIGHT_GREATEST = -0.18, 0.03
+"""Of ``BodyHeight``: from the usual height [m]."""
 EULER_LIMITS: Final = (0.75, 0.75, 0.6)
 """Of ``Euler``: roll, pitch, yaw [rad], either way."""
 SPEED_LEVELS: Final[Mapping[int, float]] = {-1: 0.4, 0: 0.7, 1: 1.0}
@@ -166,6 +169,14 @@ def level(parameter: str) -> int:
     value = _fields(parameter).get("data")
     if type(value) is not int or value not in SPEED_LEVELS:
         raise CommandError(f"data must be one of {sorted(SPEED_LEVELS)}, got {value!r}")
+    return value
+
+
+def height(parameter: str) -> float:
+    """``data`` of a parameter as a height; CommandError if it is none, or out of range."""
+    (value,) = _numbers(_fields(parameter), ("data",))
+    if not HEIGHT_LEAST <= value <= HEIGHT_GREATEST:
+        raise CommandError(f"data must be {HEIGHT_LEAST} to {HEIGHT_GREATEST} m, got {value}")
     return value
 
 

@@ -16,8 +16,9 @@ from controller.modes import Mode
 from controller.procedures import ProcedureRunner
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS
-from go2_wbc.errors import Go2WbcError
+from go2_wbc.errors import CommandError, Go2WbcError
 from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.plant.base import Plant
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
@@ -50,6 +51,8 @@ MOTIONS: Final[Mapping[int, str]] = {
 """The motion of the library that stands for each of Unitree's, if the library has it."""
 WALKS: Final[Mapping[int, str]] = {Api.STATIC_WALK: "walk", Api.TROT_RUN: "trot"}
 """The gait that stands for each of Unitree's, if there is one of that name."""
+WALKING: Final = frozenset({Api.MOVE, *WALKS})
+"""What enters walking mode, or stays in it."""
 STANDING_UP: Final = frozenset({Api.STAND_UP, Api.BALANCE_STAND, Api.RECOVERY_STAND})
 POSE: Final = (0.12, -0.15, 0.2)
 """Roll, pitch, yaw [rad] of ``Pose``."""
@@ -70,6 +73,7 @@ class SportRobot:
         is_leaning: whether it holds an attitude, after ``Euler`` or ``Pose``.
         unsupported: procedures for which the library has no motion, or for which there is no gait.
         pilot: runs the procedures.
+        pose: of the trunk while it walks; ``Euler`` and ``BodyHeight`` change it.
     """
 
     def __init__(self, plant: Plant, config: Config) -> None:
@@ -86,6 +90,7 @@ class SportRobot:
         self._procedures = ProcedureRunner(self._runner)
         self.is_locked = False
         self.is_leaning = False
+        self.pose = LEVEL
         self._actions: Mapping[int, Callable[[], object]] = {
             Api.BALANCE_STAND: self.pilot.stand,
             Api.STAND_UP: self.pilot.stand,
@@ -116,7 +121,9 @@ class SportRobot:
     def _walk(self, gait: str) -> object:
         """Enter walking mode; ``Move`` walks like this from now on."""
         self._gait = gait
-        return self.pilot.walk(gait)
+        walked = self.pilot.walk(gait)
+        self.pilot.set_command(self.pilot.command, self.pose)
+        return walked
 
     def begin(self) -> None:
         """Begin an action: what makes the robot limp ends it; PlantError without a control loop."""
@@ -124,6 +131,8 @@ class SportRobot:
 
     def perform(self, api: int) -> None:
         """Do an action that has begun; ``Aborted`` says why it was not done."""
+        if api not in WALKING:
+            self.pose = BodyPose(self.pose.height)
         if api not in STANDING_UP:
             if self.is_leaning:
                 self.pilot.stand()
@@ -133,6 +142,7 @@ class SportRobot:
 
     def lean_to(self, rpy: tuple[float, float, float]) -> None:
         """Turn the trunk to roll, pitch, yaw [rad] over the feet and hold it, or ``Aborted``."""
+        self._procedures.stop_stepping()
         if self.mode is Mode.WALKING:
             self.pilot.square_up()
         target = np.array(rpy)
@@ -146,6 +156,15 @@ class SportRobot:
 
         self._procedures.settle("lean", is_there)
 
+    def can_hold(self, pose: BodyPose) -> bool:
+        """Whether it can hold ``pose`` while it walks."""
+        try:
+            self._config.pose.require(pose)
+        except CommandError as error:
+            _log.warning("not while walking: %s", error)
+            return False
+        return True
+
     def can_lean_to(self, rpy: tuple[float, float, float]) -> bool:
         """Whether the feasibility check finds nothing against this attitude."""
         roll, pitch, yaw = rpy
@@ -158,14 +177,19 @@ class SportRobot:
         return report.ok
 
     def steer(self, command: VelocityCommand, share: float) -> None:
-        """Follow ``command``, within ``share`` of the walking envelope; only in walking mode."""
+        """Follow ``command``, within ``share`` of the walking envelope, in the pose that was asked.
+
+        Only in walking mode.
+        """
         x, y, turn = command.linear_x, command.linear_y, command.angular_z
         inside = self._config.envelope.clip(VelocityCommand(x / share, y / share, turn / share))
         x, y, turn = inside.linear_x, inside.linear_y, inside.angular_z
-        self.pilot.set_command(VelocityCommand(share * x, share * y, share * turn))
+        followed = VelocityCommand(share * x, share * y, share * turn)
+        self.pilot.set_command(followed, self.pose)
 
     def damp(self) -> None:
         """Go limp at once; ends the action that runs."""
+        self.pose = LEVEL
         self.is_locked = self.is_leaning = False
         self.pilot.collapse("limp, as asked by Damp")
 

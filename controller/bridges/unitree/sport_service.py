@@ -11,6 +11,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Final, final
 
 import numpy as np
@@ -25,6 +26,7 @@ from controller.modes import Mode
 from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.pose import BodyPose
 
 _log = logging.getLogger(__name__)
 
@@ -40,6 +42,7 @@ _AT_ONCE: Final = frozenset(
         Api.STOP_MOVE,
         Api.MOVE,
         Api.TRAJECTORY_FOLLOW,
+        Api.BODY_HEIGHT,
         Api.SPEED_LEVEL,
         Api.GET_SPEED_LEVEL,
         Api.AUTO_RECOVERY_SET,
@@ -94,13 +97,13 @@ class SportService:
         elif self._is_released():
             reply(Code.NOT_READY, "")
         elif api in _AT_ONCE:
-            reply(Code.OK, self._do_at_once(api, request.parameter))
+            reply(*self._do_at_once(api, request.parameter))
         else:
             self._path = None  # what is asked now takes its place
             self._submit(api, self._procedure(api, request.parameter), reply)
 
-    def _do_at_once(self, api: Api, parameter: str) -> str:
-        """Do what needs no action of its own; what the response says besides."""
+    def _do_at_once(self, api: Api, parameter: str) -> tuple[int, str]:
+        """Do what needs no action of its own; the response's code, and what it says besides."""
         if api is Api.STOP_MOVE:
             self._halt()
             self._follow()
@@ -109,15 +112,26 @@ class SportService:
         elif api is Api.TRAJECTORY_FOLLOW:
             self._path = SportPath(np.array(sport_api.path_points(parameter)))
             self._follow()
+        elif api is Api.BODY_HEIGHT:
+            return self._raise_to(sport_api.height(parameter)), ""
         elif api is Api.SPEED_LEVEL:
             self._level = sport_api.level(parameter)
         elif api is Api.AUTO_RECOVERY_SET:
             self._recovers = sport_api.flag(parameter)
         elif api is Api.AUTO_RECOVERY_GET:
-            return sport_api.answer(self._recovers)
+            return Code.OK, sport_api.answer(self._recovers)
         else:  # GET_SPEED_LEVEL
-            return sport_api.answer(self._level)
-        return ""
+            return Code.OK, sport_api.answer(self._level)
+        return Code.OK, ""
+
+    def _raise_to(self, height: float) -> Code:
+        """Walk at that height [m] from the usual one, from now on; 4206 if it cannot."""
+        pose = replace(self._robot.pose, height=height)
+        if not self._robot.can_hold(pose):
+            return Code.POSE_REFUSED
+        self._robot.pose = pose
+        self._follow()
+        return Code.OK
 
     def _halt(self) -> None:
         self._wanted, self._path = ZERO_COMMAND, None
@@ -158,6 +172,11 @@ class SportService:
         return is_rising
 
     def _lean(self, rpy: tuple[float, float, float]) -> None:
+        """Take an attitude: on the way, if the robot walks and can hold it then, else standing."""
+        pose = BodyPose(self._robot.pose.height, *rpy)
+        if self._robot.mode is Mode.WALKING and self._robot.can_hold(pose):
+            self._robot.pose = pose
+            return
         is_beyond = (np.abs(rpy) > sport_api.EULER_LIMITS).any()
         if is_beyond or not self._robot.can_lean_to(rpy):
             raise _PoseRefused("the robot cannot take this attitude")

@@ -15,6 +15,7 @@ from go2_wbc.planning.contact import ContactConfig
 from go2_wbc.planning.ground import GroundConfig
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.mpc import MpcConfig
+from go2_wbc.planning.pose import LEVEL, BodyPose, PoseConfig
 from go2_wbc.planning.slip import SlipConfig
 from go2_wbc.planning.swing import SwingConfig
 from go2_wbc.robot.model import RobotModel
@@ -44,6 +45,7 @@ ODD_CONFIG = LocomotionConfig(
     slip=SlipConfig(0.12, 0.007, 0.015, 1.9, 0.18, 0.22, 0.14, 0.55),
     contact=ContactConfig(0.62, 0.013),
     ground=GroundConfig(0.41, 0.59, 0.018, 0.052, 0.73, 0.057),
+    pose=PoseConfig(0.13, 0.47, 4.1),
 )
 """No two numbers alike, so that one in another's place is seen."""
 ODD_MPC = MpcConfig(step=0.028, interval=0.012, force_max=180.0, prior_weight=4e-3, load_ramp=0.02)
@@ -83,20 +85,24 @@ def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.nda
     ids=["trot", "odd", "trot by MPC", "gallop"],
 )
 def test_references_are_those_of_the_readable_planner(gait: Gait, config: LocomotionConfig) -> None:
-    model, rng = RobotModel(), np.random.default_rng(8)
+    model, rng, of_poses = RobotModel(), np.random.default_rng(8), np.random.default_rng(9)
     readable = LocomotionPlanner(model, gait, config)
     compiled = CompiledPlanner(model, gait, config)
     start = model.snapshot(state_of(standing_q()))
     readable.start(start)
     compiled.start(start)
-    command, at = ZERO_COMMAND, start.p_world_com[:2]
+    command, pose, at = ZERO_COMMAND, LEVEL, start.p_world_com[:2]
     starts, frictions, early = 0, set[float](), 0
     for tick in range(1, 5001):
         if tick % 200 == 0:
             command = VelocityCommand(*rng.normal(size=3)) if rng.random() < 0.6 else ZERO_COMMAND
+        if tick % 300 == 0:
+            leans = tick % 900 == 0  # level for long enough that the robot may come to rest
+            pose = BodyPose(*of_poses.uniform(-0.3, 0.3, 4)) if leans else LEVEL
         snapshot = stumbling(model, rng, tick, at)
         was_stepping = readable.is_stepping
-        theirs, ours = readable.update(snapshot, command), compiled.update(snapshot, command)
+        theirs = readable.update(snapshot, command, pose)
+        ours = compiled.update(snapshot, command, pose)
         rounding = OF_FORCES if theirs.force_weight else ROUNDING
         np.testing.assert_allclose(ours.row, theirs.row, atol=rounding, rtol=0)
         assert ours.legs == theirs.legs

@@ -22,6 +22,7 @@ from controller.navigation import APPROACH
 from controller.procedures import Aborted
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import ClosedError, CommandError, MissingDependency, PlantError
+from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion, motion_names
@@ -37,6 +38,7 @@ class Stage:
         self.robot: Any = create_autospec(SportRobot, instance=True)
         self.robot.state, self.robot.mode = lying_state(0.0), Mode.STANDING
         self.robot.is_locked = self.robot.is_leaning = False
+        self.robot.pose = LEVEL
         self.robot.unsupported = frozenset({Api.FRONT_JUMP})
         self.robot.damp.side_effect = lambda: self.is_limp.set()
         self.is_limp, self.is_released = threading.Event(), False
@@ -346,3 +348,37 @@ def test_a_path_is_followed_until_it_ends_or_something_else_is_asked(stage: Stag
 def test_a_path_that_is_none_is_refused(stage: Stage, path: str) -> None:
     with pytest.raises(CommandError):
         stage.ask(Api.TRAJECTORY_FOLLOW, path)
+
+
+# --- the pose while walking -----------------------------------------------------------------------
+
+
+def test_a_walking_robot_takes_an_attitude_on_its_way(stage: Stage) -> None:
+    # It stopped, stood and leaned.
+    stage.robot.mode, stage.robot.can_hold.return_value = Mode.WALKING, True
+    assert stage.code(Api.BODY_HEIGHT, '{"data": -0.03}') == Code.OK
+    assert stage.code(Api.EULER, LEAN) == Code.OK
+    assert stage.robot.pose == BodyPose(-0.03, 0.1, 0.1, 0.0)
+    stage.robot.lean_to.assert_not_called()
+    stage.robot.perform.assert_not_called()
+
+
+def test_an_attitude_that_is_not_held_on_the_way_is_taken_standing(stage: Stage) -> None:
+    stage.robot.mode, stage.robot.can_hold.return_value = Mode.WALKING, False
+    assert stage.code(Api.EULER, LEAN) == Code.OK
+    stage.robot.lean_to.assert_called_once_with((0.1, 0.1, 0.0))
+    assert stage.robot.pose == LEVEL
+
+
+@pytest.mark.parametrize(
+    ("parameter", "code"),
+    [('{"data": 0.05}', Code.BAD_PARAMETER), ('{"data": -0.15}', Code.POSE_REFUSED)],
+)
+def test_a_height_beyond_a_range_is_refused(stage: Stage, parameter: str, code: Code) -> None:
+    stage.robot.can_hold.return_value = False
+    if code is Code.BAD_PARAMETER:
+        with pytest.raises(CommandError, match=r"-0\.18 to 0\.03 m, got 0\.05"):
+            stage.ask(Api.BODY_HEIGHT, parameter)
+    else:
+        assert stage.code(Api.BODY_HEIGHT, parameter) == code
+    assert stage.robot.pose == LEVEL

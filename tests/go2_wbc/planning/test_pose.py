@@ -1,0 +1,147 @@
+"""The trunk's pose while walking: what is refused, how it is approached, and what it adds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from go2_wbc.contacts import GAITS
+from go2_wbc.errors import CommandError, ConfigError
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.compiled import CompiledPlanner
+from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.pose import (
+    LEVEL,
+    BodyPose,
+    PoseConfig,
+    PoseEnvelope,
+    PosePath,
+    pose_turn,
+)
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
+from tests.engine_helpers import standing_q, state_of
+
+TICK = 0.002
+EXACT = 1e-12
+ARRIVED = 2e-3  # of what is left a second after the greatest rate ends: exp(-5) of 0.07 rad
+DERIVED = 1e-6  # of central differences over 1e-5 s
+angles = st.floats(-0.6, 0.6)
+poses = st.builds(BodyPose, st.floats(-0.1, 0.1), angles, angles, angles)
+
+
+@pytest.mark.parametrize("name", ["height", "roll", "pitch", "yaw"])
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_pose_that_is_not_finite_is_refused_by_name(name: str, value: float) -> None:
+    with pytest.raises(CommandError, match=f"{name} must be finite"):
+        BodyPose(**{name: value})
+
+
+def test_a_pose_beyond_the_envelope_is_refused_with_every_bound_that_it_breaks() -> None:
+    envelope = PoseEnvelope(lowest=-0.05, highest=0.01, roll=0.1, pitch=0.2, yaw=0.3)
+    envelope.require(BodyPose(-0.05, 0.1, -0.2, 0.3))
+    with pytest.raises(CommandError) as refusal:
+        envelope.require(BodyPose(-0.06, 0.0, 0.21, -0.3))
+    text = str(refusal.value)
+    assert "height must be -0.05 to 0.01 m, got -0.06" in text
+    assert "pitch must be -0.2 to 0.2 rad, got 0.21" in text
+    assert "roll" not in text
+    assert "yaw" not in text
+
+
+@pytest.mark.parametrize(
+    ("bounds", "told"),
+    [
+        ({"lowest": 0.01}, "lowest must be 0 or below, got 0.01"),
+        ({"lowest": -math.inf}, "lowest must be 0 or below, got -inf"),
+        ({"roll": -0.1}, "PoseEnvelope.roll"),
+    ],
+)
+def test_an_envelope_without_the_level_pose_is_refused(bounds: dict[str, float], told: str) -> None:
+    with pytest.raises(ConfigError, match=told):
+        PoseEnvelope(**bounds)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_pose_is_approached_without_a_jump_and_not_overshot(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    first, last = (BodyPose(*rng.uniform(-1.0, 1.0, 4) * [0.1, 0.6, 0.6, 0.6]) for _ in range(2))
+    config = PoseConfig()
+    most = np.array([config.height_rate] + [config.turning_rate] * 3)
+    path = PosePath(config)
+    for target in (first, last):
+        start = path.pose
+        low, high = np.minimum(start, target.row), np.maximum(start, target.row)
+        for _ in range(round(5.0 / TICK)):
+            before = path.rate
+            path.advance(target, TICK)
+            assert (np.abs(path.rate) <= most + EXACT).all()
+            assert (np.abs(path.rate - before) <= config.sharpness * most * TICK + EXACT).all()
+            assert (path.pose >= low - EXACT).all()
+            assert (path.pose <= high + EXACT).all()
+        np.testing.assert_allclose(path.pose, target.row, atol=ARRIVED)
+
+
+def test_what_comes_is_what_will_be() -> None:
+    path, target = PosePath(PoseConfig()), BodyPose(-0.05, 0.1, -0.1, 0.2)
+    ahead = path.ahead(target, TICK, 40)
+    for pose, rate in ahead:
+        path.advance(target, TICK)
+        np.testing.assert_array_equal(path.pose, pose)
+        np.testing.assert_array_equal(path.rate, rate)
+
+
+@given(st.floats(-3.0, 3.0), poses)
+def test_the_turn_of_a_pose_is_that_from_a_level_trunk_with_its_yaw(
+    yaw: float, pose: BodyPose
+) -> None:
+    level = yaw_rotation(yaw + pose.yaw)
+    R = yaw_rotation(yaw) @ rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
+    turn, _ = pose_turn(yaw, pose.row, np.zeros(4))
+    np.testing.assert_allclose(turn, log_rotation(R @ level.T), atol=1e-9)
+
+
+@given(st.floats(-3.0, 3.0), poses, poses)
+def test_the_angular_velocity_of_a_pose_is_the_derivative_of_its_rotation(
+    yaw: float, pose: BodyPose, rate: BodyPose
+) -> None:
+    step = 1e-5
+
+    def rotation(t: float) -> np.ndarray:
+        _, roll, pitch, aside = pose.row + t * rate.row
+        return yaw_rotation(yaw) @ rotation_from_rpy(roll, pitch, aside)
+
+    _, w = pose_turn(yaw, pose.row, rate.row)
+    derived = log_rotation(rotation(step) @ rotation(-step).T) / (2 * step)
+    np.testing.assert_allclose(w, derived, atol=DERIVED)
+
+
+def test_the_reference_of_a_walking_robot_arrives_at_the_pose_and_the_feet_stay() -> None:
+    model, asked = RobotModel(), BodyPose(-0.04, 0.1, 0.12, 0.2)
+    planners = [CompiledPlanner(model, GAITS["trot"], LocomotionConfig()) for _ in range(2)]
+    start = model.snapshot(state_of(standing_q()))
+    for planner in planners:
+        planner.start(start)
+    command = VelocityCommand(0.0, 0.0, 1e-9)
+    for tick in range(1, 1501):
+        snapshot = model.snapshot(state_of(standing_q(), time=tick * TICK))
+        level, leaning = (
+            planner.update(snapshot, command, pose)
+            for planner, pose in zip(planners, (LEVEL, asked), strict=True)
+        )
+    turned = level.body.R_world_base.T @ leaning.body.R_world_base
+    np.testing.assert_allclose(turned, rotation_from_rpy(0.1, 0.12, 0.2), atol=ARRIVED)
+    assert planners[1].heading == pytest.approx(planners[0].heading, abs=1e-6)
+
+
+def test_without_a_pose_the_trunk_is_level() -> None:
+    model = RobotModel()
+    planner = CompiledPlanner(model, GAITS["trot"], LocomotionConfig())
+    start = model.snapshot(state_of(standing_q()))
+    planner.start(start)
+    reference = planner.update(model.snapshot(state_of(standing_q(), time=TICK)), ZERO_COMMAND)
+    np.testing.assert_allclose(reference.body.R_world_base, np.eye(3), atol=EXACT)
