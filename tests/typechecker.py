@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from functools import partial, wraps
+from types import FunctionType
 from typing import Any
 
+import jaxtyping
 from beartype import BeartypeConf, beartype
-from jaxtyping import config
+from jaxtyping import _decorator
 
 CHECKED_CALLS = 10
 """Of each place: a tick of the control loop has 400, and a check takes 25 us."""
@@ -41,21 +44,39 @@ def checked(function: Callable[..., Any]) -> Callable[..., Any]:
     return check
 
 
-class Ration(type(config)):
-    """Tells jaxtyping, before each call that it would check, whether to go without."""
+def ration() -> None:
+    """Leave most of the repetitions in long loops unchecked, in what is imported from now on."""
+    jaxtyping.jaxtyped = _decorator.jaxtyped = _rationed(_decorator.jaxtyped)
 
-    @property
-    def jaxtyping_disable(self) -> bool:
-        """Whether this call goes unchecked; asked once a call, by the wrapper of the function."""
-        caller = sys._getframe(2)
+
+def _rationed(jaxtyped: Callable[..., Any]) -> Callable[..., Any]:
+    """``jaxtyped`` with functions whose calls are counted before anything else is done."""
+
+    def decorator(decorated: Any = None, *, typechecker: Callable[..., Any]) -> Any:
+        if decorated is None:
+            return partial(decorator, typechecker=typechecker)
+        if getattr(decorated, "__globals__", None) is globals():  # inherited, and counted already
+            return decorated
+        made = jaxtyped(decorated, typechecker=typechecker)
+        return _counted(decorated, made) if isinstance(decorated, FunctionType) else made
+
+    return decorator
+
+
+def _counted(plain: Callable[..., Any], strict: Callable[..., Any]) -> Callable[..., Any]:
+    """``strict`` for the calls that are to be checked, ``plain`` for the others."""
+
+    @wraps(plain)
+    def counted(*args: object, **kwargs: object) -> object:
+        __tracebackhide__ = True
+        caller = sys._getframe(1)
         place = id(caller.f_code) * _LONGEST_CODE + caller.f_lasti
         calls = _calls[place] = _calls.get(place, 0) + 1
-        return calls > CHECKED_CALLS and calls % STRIDE != 0
+        if calls > CHECKED_CALLS and calls % STRIDE:
+            return plain(*args, **kwargs)
+        return strict(*args, **kwargs)
 
-
-def ration() -> None:
-    """Leave most of the repetitions in long loops unchecked, from now on."""
-    config.__class__ = Ration
+    return counted
 
 
 def renew() -> None:
