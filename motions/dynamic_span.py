@@ -79,7 +79,11 @@ class DynamicSpan:
             a=a,
             tau=plan.tau[rows],
             forces=plan.forces[rows],
-            v_motors=0.5 * (plan.v[rows, 6:] + plan.v[rows + 1, 6:]),
+            v_motors=np.where(
+                plan.tau[rows] < 0.0,
+                np.minimum(plan.v[rows, 6:], plan.v[rows + 1, 6:]),
+                np.maximum(plan.v[rows, 6:], plan.v[rows + 1, 6:]),
+            ),
         )
 
 
@@ -92,9 +96,8 @@ class SpanSamples:
         a: (k, 18) accelerations.
         tau: (k, 12) torques [N m].
         forces: (k, 4, 3) of the ground on the feet [N].
-        v_motors: (k, 12) joint speeds [rad/s] at which the torques are given: the mean from knot to
-            knot, since a step by semi-implicit Euler gives the torque of the middle between the
-            speeds (as leapfrog does).
+        v_motors: (k, 12) joint speeds [rad/s] at which the motors must give the torques: of those
+            at both ends of the step, through which a torque holds, the one at which they give less.
     """
 
     q: Float[np.ndarray, "k 19"]

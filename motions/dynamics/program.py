@@ -4,7 +4,7 @@ Full rigid-body dynamics with point contacts at the feet's centres, integrated b
 Euler from knot to knot. A foot that touches down has its speed taken within one knot by the
 contact's damping (50 /s at knots of 20 ms), so no impulse model is needed; the cost of its speed
 there makes it small. Torques are bounded as such, everything else by quadratic barriers, except for
-the motors' line, which depends on speed: ``bound`` takes the speeds of the last solution.
+the motors' line, which depends on speed: ``allowed`` takes the speeds of the last solution.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ class Program:
     Attributes:
         problem: crocoddyl's.
         motor: what the motors give, at the share that plans may use.
+        motor_at_end: the same at the speeds at the end of a step.
         tau_hold: (12,) torques [N m] that hold the robot standing: first controls everywhere.
     """
 
@@ -46,6 +47,7 @@ class Program:
         """Build every knot's dynamics and costs."""
         self._knots, self._model, self._limits, self._weights = knots, model, limits, weights
         self.motor = model.motor.scaled(limits.torque_share)
+        self.motor_at_end = model.motor.scaled(limits.end_share)
         self._state = crocoddyl.StateMultibody(model.pin_model)
         self._actuation = crocoddyl.ActuationModelFloatingBase(self._state)
         self._feet = [model.pin_model.getFrameId(name) for name in FOOT_NAMES]
@@ -57,20 +59,31 @@ class Program:
         terminal = self._terminal(goals[len(steps)])
         x0 = np.concatenate([knots.initial.q, knots.initial.v])
         self.problem = crocoddyl.ShootingProblem(x0, self._models, terminal)
-        still = np.zeros((len(steps), 12))
-        self.bound(still, still)
+        self.bound(*self.allowed(np.zeros((len(steps) + 1, 12))))
 
-    def bound(
-        self, slowest: Float[np.ndarray, "n 12"], fastest: Float[np.ndarray, "n 12"]
+    def allowed(
+        self, rates: Float[np.ndarray, "n1 12"]
     ) -> tuple[Float[np.ndarray, "n 12"], Float[np.ndarray, "n 12"]]:
-        """Bound the torques by what the motors give at joint speeds between two [rad/s], by knots.
+        """Least and greatest torque [N m] of every step at joint speeds ``rates`` [rad/s] of knots.
 
-        Returns them: lower and upper.
+        A torque holds through its step, while the speed goes from that of its knot to the next.
         """
-        lower, upper = self.motor.limits(slowest)[0], self.motor.limits(fastest)[1]
+        before, after = rates[:-1], rates[1:]
+        ranges = [self.motor.limits(v) for v in (before, 0.5 * (before + after))]
+        ranges.append(self.motor_at_end.limits(after))
+        lower, upper = zip(*ranges, strict=True)
+        return np.max(lower, axis=0), np.min(upper, axis=0)
+
+    def used(self, tau: Float[np.ndarray, "n 12"], rates: Float[np.ndarray, "n1 12"]) -> float:
+        """The greatest share of what is allowed that torques ``tau`` [N m] of the steps use."""
+        before, after = rates[:-1], rates[1:]
+        shares = [self.motor.share(tau, v).max() for v in (before, 0.5 * (before + after))]
+        return float(max(*shares, self.motor_at_end.share(tau, after).max()))
+
+    def bound(self, lower: Float[np.ndarray, "n 12"], upper: Float[np.ndarray, "n 12"]) -> None:
+        """Bound the torques [N m] of every step."""
         for row, model in enumerate(self._models):
             model.u_lb, model.u_ub = lower[row], upper[row]
-        return lower, upper
 
     def _running(
         self, knot: int, dt: float, goal: Goal | None

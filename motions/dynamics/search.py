@@ -24,9 +24,10 @@ SOFT_STOP, STOP = 1e-2, 1e-3
 """Expected improvement of the cost below which a softened and a full program are done."""
 LINE_ROUNDS = 4
 """Rounds in which torque bounds and speeds are made to agree."""
-AGREED = 1.1
-"""Torque over what the plan may use at the speed of its knot with which it is done: 0.94 of what
-the motors give with ``PlanLimits.torque_share`` at 0.85. Exact agreement takes many rounds."""
+AGREED = 1.05
+"""Torque over what the plan may use at its speeds with which it is done: 0.89 of what the motors
+give in the middle of a step, all of it at its end (``PlanLimits``). Exact agreement takes many
+rounds."""
 _JOINT_RATES = slice(19 + 6, None)
 
 Progress = Callable[[int, float], None]
@@ -148,21 +149,18 @@ class Search:
             yield list(soft.xs), list(soft.us), regularisation
 
     def _agree(self) -> None:
-        """Bound the torques by the greatest speeds of the solutions until they agree.
-
-        The speeds of a step are that of its knot and that of its middle, by which it is judged.
-        """
+        """Bound the torques by the greatest speeds of the solutions until they agree."""
         program = self._full
-        slowest = fastest = np.zeros((len(self._knots.stance), 12))
+        lower, upper = program.allowed(np.zeros((len(self._knots.times), 12)))
         for _ in range(LINE_ROUNDS):
             x, us = np.array(self._solver.xs), np.array(self._solver.us)
             rates = x[:, _JOINT_RATES]
-            v = np.stack([rates[:-1], 0.5 * (rates[:-1] + rates[1:])])
-            if max(program.motor.share(us, step).max() for step in v) <= AGREED:
+            if program.used(us, rates) <= AGREED:
                 return
-            slowest = np.minimum(slowest, v.min(axis=0))
-            fastest = np.maximum(fastest, v.max(axis=0))
-            us = np.clip(us, *program.bound(slowest, fastest))
+            least, most = program.allowed(rates)
+            lower, upper = np.maximum(lower, least), np.minimum(upper, most)
+            program.bound(lower, upper)
+            us = np.clip(us, lower, upper)
             self._solve(self._solver, list(x), list(us), REGULARISATIONS[0], STOP)
 
     def _solve(

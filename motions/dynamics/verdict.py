@@ -97,8 +97,8 @@ class _Audit:
 
     def readings(self) -> tuple[Reading, ...]:
         plan, model, bounds = self._plan, self._model, self._bounds
-        v = plan.v[:-1, 6:]
-        tau_share = model.motor.share(plan.tau, v)
+        ends = plan.v[:-1, 6:], plan.v[1:, 6:]  # a torque holds through its step
+        tau_share = np.max([model.motor.share(plan.tau, v) for v in ends], axis=0)
         speed = np.abs(plan.v[:, 6:]) / model.speed_limits
         joints = plan.q[:, 7:]
         beyond = np.maximum(model.q_lower - joints, joints - model.q_upper)
