@@ -7,13 +7,14 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from controller.go2_controller import GO2Controller
+from controller.placed_plan import PlacedPlan
 from controller.written_motion import off_written
+from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.ground_truth import TOUCH, GroundTruth, TruthRecording, true_runs
-from go2_wbc.reference import Anchor, LegTask, MotionPlan, TrackedPoint
+from go2_wbc.reference import Anchor, LegTask, MotionPlan
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 
 TRACKING_STRIDE = 5
 """Every fifth tick is compared with the plan."""
@@ -138,7 +139,8 @@ def during_motion(go2: GO2Controller, truth: GroundTruth, name: str) -> TruthRec
 def _slip(recorded: TruthRecording, plan: MotionPlan, dt: float) -> float:
     """Largest distance [m] slid in a stance phase, less its edges inside of the motion."""
     start, n = float(recorded.time[0]), len(recorded.time)
-    stance = np.array([plan.at(float(t) - start).stance for t in recorded.time])
+    stance = np.array([plan.row_at(t)[_LEGS] for t in (recorded.time - start).tolist()])
+    stance = stance == LegTask.STANCE
     margin, worst = round(SETTLED_CONTACT / dt), 0.0
     for leg in LEGS:
         for phase in true_runs(stance[:, leg]):
@@ -154,16 +156,15 @@ def _off_plan(
 ) -> tuple[float, float, float]:
     """Largest deviations from the plan: CoM [m], attitude [rad], raised feet [m]."""
     anchor = Anchor.of_feet(recorded.p_world_feet[0].copy(), model.foot_radius)
-    start, worst = float(recorded.time[0]), np.zeros(3)
-    legs = [LegGeometry.of(model, leg) for leg in LEGS]
-    for row in range(0, len(recorded.time), TRACKING_STRIDE):
-        reference = plan.at(float(recorded.time[row]) - start).placed(anchor)
-        body, q = reference.body, recorded.q[row]
-        point = recorded.p_world_com[row] if body.point is TrackedPoint.COM else q[:3]
-        turn = body.R_world_base @ rotation_from_rpy(*recorded.rpy[row].tolist()).T
-        joints = np.vstack([q[7:], reference.q_joints])
-        raised = [leg for leg in LEGS if reference.legs[leg] is LegTask.JOINTS]
-        feet = [np.subtract(*foot_places(legs[leg], joints[:, leg.joints])) for leg in raised]
-        off = np.linalg.norm([point - body.p_world, log_rotation(turn), *feet], axis=1)
-        worst = np.maximum(worst, [off[0], off[1], off[2:].max(initial=0.0)])
-    return float(worst[0]), float(worst[1]), float(worst[2])
+    truth = recorded.part(slice(None, None, TRACKING_STRIDE))
+    asked = PlacedPlan.of(plan, truth.time - recorded.time[0], anchor)
+    raised, feet = asked.does(LegTask.JOINTS), 0.0
+    for leg in LEGS:
+        rows, geometry = raised[:, leg], LegGeometry.of(model, leg)
+        real, planned = truth.q[rows, 7:][:, leg.joints], asked.q_joints[rows][:, leg.joints]
+        off = foot_places(geometry, real) - foot_places(geometry, planned)
+        feet = max(feet, float(np.linalg.norm(off, axis=1).max(initial=0.0)))
+    return float(asked.trunk_off(truth).max()), float(asked.turned_off(truth).max()), feet
+
+
+_LEGS = REFERENCE.slice("legs")

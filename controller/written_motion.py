@@ -8,11 +8,12 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Bool, Float
 
+from controller.placed_plan import PlacedPlan
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording, true_runs
-from go2_wbc.reference import Anchor, MotionPlan, TrackedPoint
+from go2_wbc.reference import Anchor, LegTask, MotionPlan
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
+from go2_wbc.robot.rotations import yaw_rotation
 from motions.compiled_plan import CompiledPlan
 from motions.dynamic_span import DynamicSpan
 from motions.dynamics.phases import PhaseProblem
@@ -69,24 +70,17 @@ def _off_curves(
     recorded: TruthRecording, plan: MotionPlan, anchor: Anchor, solved: Bool[np.ndarray, " n"]
 ) -> OffWritten:
     """Trunk and feet against the plan's curves, where no part is solved."""
-    rows = [row for row in range(0, len(recorded.time), STRIDE) if not solved[row]]
-    start, stance = float(recorded.time[0]), np.ones((len(rows), 4), dtype=bool)
-    trunk, turned, feet = np.zeros(len(rows)), np.zeros(len(rows)), np.zeros((len(rows), 4))
-    for k, row in enumerate(rows):
-        reference = plan.at(float(recorded.time[row]) - start).placed(anchor)
-        body = reference.body
-        is_com = body.point is TrackedPoint.COM
-        point = recorded.p_world_com[row] if is_com else recorded.q[row, :3]
-        turn = body.R_world_base @ rotation_from_rpy(*recorded.rpy[row].tolist()).T
-        trunk[k] = np.linalg.norm(point - body.p_world)
-        turned[k] = np.linalg.norm(log_rotation(turn))
-        feet[k] = np.linalg.norm(recorded.p_world_feet[row] - reference.p_world_feet, axis=1)
-        stance[k] = reference.stance
+    rows = np.flatnonzero(~solved[::STRIDE]) * STRIDE
+    truth = recorded.part(rows)
+    asked = PlacedPlan.of(plan, truth.time - recorded.time[0], anchor)
+    trunk, turned = asked.trunk_off(truth), asked.turned_off(truth)
+    stance = asked.does(LegTask.STANCE)
+    feet = np.linalg.norm(truth.p_world_feet - asked.p_world_feet, axis=2)
     return OffWritten(
         float(trunk.max(initial=0.0)),
         float(turned.max(initial=0.0)),
         float(feet[~stance].max(initial=0.0)),
-        _landed_off(recorded.time[rows], stance, feet),
+        _landed_off(truth.time, stance, feet),
     )
 
 

@@ -52,7 +52,7 @@ def ration() -> None:
 def _rationed(jaxtyped: Callable[..., Any]) -> Callable[..., Any]:
     """``jaxtyped`` with functions whose calls are counted before anything else is done."""
 
-    def decorator(decorated: Any = None, *, typechecker: Callable[..., Any]) -> Any:
+    def decorator(decorated: object = None, *, typechecker: Callable[..., Any]) -> object:
         if decorated is None:
             return partial(decorator, typechecker=typechecker)
         if getattr(decorated, "__globals__", None) is globals():  # inherited, and counted already

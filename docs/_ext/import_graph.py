@@ -31,12 +31,12 @@ Graph = dict[str, set[str]]
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """A source file: its dotted name, whether it is a package's own, its lines, its tree."""
+    """A source file: its dotted name, whether it is a package's own, its lines, its imports."""
 
     name: str
     is_package: bool
     lines: int
-    tree: ast.Module
+    imports: tuple[ast.Import | ast.ImportFrom, ...]
 
 
 @cache
@@ -48,7 +48,9 @@ def read_modules(root: Path = ROOT) -> Mapping[str, Module]:
         is_package = parts[-1] == "__init__"
         name = ".".join(parts[:-1] if is_package else parts)
         text = file.read_text(encoding="utf-8")
-        found[name] = Module(name, is_package, len(text.splitlines()), ast.parse(text))
+        nodes_of_file = ast.walk(ast.parse(text))
+        imports = [n for n in nodes_of_file if isinstance(n, ast.Import | ast.ImportFrom)]
+        found[name] = Module(name, is_package, len(text.splitlines()), tuple(imports))
     return found
 
 
@@ -75,7 +77,7 @@ def _exports(package: Module) -> dict[str, str]:
     """The module that each name comes from which a package passes on."""
     return {
         alias.name: node.module
-        for node in ast.walk(package.tree)
+        for node in package.imports
         if isinstance(node, ast.ImportFrom) and node.module
         for alias in node.names
     }
@@ -84,10 +86,10 @@ def _exports(package: Module) -> dict[str, str]:
 def _imports(
     module: Module, modules: Mapping[str, Module], homes: Mapping[str, Mapping[str, str]]
 ) -> Iterator[str]:
-    for node in ast.walk(module.tree):
+    for node in module.imports:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in modules)
-        elif isinstance(node, ast.ImportFrom) and node.module and node.module in modules:
+        elif node.module and node.module in modules:
             for alias in node.names:
                 full = f"{node.module}.{alias.name}"
                 own = homes.get(node.module, {}).get(alias.name, node.module)

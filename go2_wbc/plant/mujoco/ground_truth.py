@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, final
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.contacts import Contacts, foot_contacts, touches_itself
@@ -61,7 +61,7 @@ class TruthRecording:
     limb_force: Float[np.ndarray, " n"]
     touches_itself: Bool[np.ndarray, " n"]
 
-    def part(self, rows: slice) -> TruthRecording:
+    def part(self, rows: slice | Int[np.ndarray, " m"]) -> TruthRecording:
         """Some of the ticks."""
         return TruthRecording(*(getattr(self, name)[rows] for name in TruthRecording.__slots__))
 

@@ -104,15 +104,15 @@ def test_references_are_those_of_the_readable_planner(gait: Gait, config: Locomo
         theirs = readable.update(snapshot, command, pose)
         ours = compiled.update(snapshot, command, pose)
         rounding = OF_FORCES if theirs.force_weight else ROUNDING
-        np.testing.assert_allclose(ours.row, theirs.row, atol=rounding, rtol=0)
+        assert np.abs(ours.row - theirs.row).max() <= rounding, (tick, ours, theirs)
         assert ours.legs == theirs.legs
         assert compiled.is_stepping == readable.is_stepping
-        assert compiled.heading == pytest.approx(readable.heading, abs=ROUNDING)
+        assert abs(compiled.heading - readable.heading) <= ROUNDING
         starts += readable.is_stepping and not was_stepping
         frictions.add(theirs.friction)
         early += int((readable._contacts.stance & ~readable._was_stance).sum())
         at = theirs.body.p_world[:2]
-        np.testing.assert_allclose(compiled.velocity, readable.velocity, atol=ROUNDING, rtol=0)
+        assert np.abs(np.subtract(compiled.velocity, readable.velocity)).max() <= ROUNDING
         if tick % 900 == 0:
             assert compiled.square_up(snapshot) == readable.square_up(snapshot)
         if tick % 1100 == 0:
