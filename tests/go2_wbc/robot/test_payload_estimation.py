@@ -20,7 +20,7 @@ TICK = 0.002
 MODEL = RobotModel()
 Z = PayloadConfig().middle[2]
 ALL = np.ones(4, dtype=bool)
-AT_ONCE = PayloadConfig(memory=TICK, most_rise=1e3, most_speed=1e3, least_height=0.01)
+AT_ONCE = PayloadConfig(memory=TICK, most_rise=1e3, most_speed=(1e3, 1e3), least_height=0.01)
 ASIDE = Payload(4.0, (0.03, 0.08, Z))
 
 
@@ -102,7 +102,7 @@ def test_nothing_is_felt_without_any_contact() -> None:
 def test_nothing_is_felt_on_the_belly_in_a_rise_and_at_speed() -> None:
     lying = replace(PayloadConfig(), least_height=0.35)
     assert after(make(lying), ASIDE, 4.0) is NO_PAYLOAD
-    for velocity in ([0.0, 0.0, 0.2], [1.6, 0.0, 0.0]):
+    for velocity in ([0.0, 0.0, 0.2], [1.6, 0.0, 0.0], [0.0, 0.5, 0.0]):
         estimator, payload = make(), NO_PAYLOAD
         for tick in range(2000):
             state = standing(ASIDE, tick * TICK)
