@@ -57,9 +57,20 @@ def test_a_payload_beside_the_middle_is_found_with_its_place() -> None:
 
 
 def test_the_belief_grows_slowly() -> None:
-    estimator = make()
-    assert after(estimator, ASIDE, 0.1) is NO_PAYLOAD
-    assert 0.0 < after(make(), ASIDE, 1.0).mass < 3.0
+    assert after(make(), ASIDE, 1.2).mass < 3.0
+    assert after(make(), ASIDE, 2.5).mass > 3.0
+
+
+def test_what_does_not_last_is_not_believed() -> None:
+    estimator, config = make(), PayloadConfig()
+    most = np.zeros(3)
+    for tick in range(1000):
+        blow = Payload(10.0, (0.0, 0.1, Z)) if tick * TICK < 0.15 else NO_PAYLOAD
+        state = standing(blow, tick * TICK)
+        assert estimator.update(MODEL.snapshot(state)) is NO_PAYLOAD
+        most = np.maximum(most, estimator.felt)
+    assert most[0] > config.least_mass
+    assert most[2] > config.least_moment[1]
 
 
 def test_what_the_robot_no_longer_carries_is_forgotten_for_good() -> None:
