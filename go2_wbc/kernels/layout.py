@@ -106,7 +106,7 @@ FEELING = Layout(
     memory=(),
     least_height=(),
     most_rise=(),
-    most_speed=(),
+    most_speed=(2,),
 )
 """Numbers by which a payload is felt: of ``robot.payload_estimation.PayloadConfig``."""
 

@@ -30,9 +30,10 @@ def can_feel(snapshot, contact, c):
     for leg in range(4):
         lowest = min(lowest, snapshot[_P_FEET + 3 * leg + 2])
         touches |= contact[leg] != 0.0
-    x, y, z = vector(snapshot, _V_COM)
-    is_up = snapshot[_Q + 2] - lowest >= c[_LOW]
-    return touches and is_up and abs(z) <= c[_RISE] and np.hypot(x, y) <= c[_SPEED]
+    if not touches or snapshot[_Q + 2] - lowest < c[_LOW]:
+        return False
+    is_slow = abs(snapshot[_V]) <= c[_SPEED] and abs(snapshot[_V + 1]) <= c[_SPEED + 1]
+    return is_slow and abs(snapshot[_V_COM + 2]) <= c[_RISE]
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1])")
