@@ -10,11 +10,13 @@ import threading
 from pathlib import Path
 
 from controller.cli.common import ExitCode, Subparsers, add_parser
+from go2_wbc.world import SENSORS
 
 EXAMPLES = """
 go2-wbc ros2 --realtime                      at the pace of the wall clock
 go2-wbc ros2                                 as fast as it can, with /clock
 go2-wbc ros2 --realtime --namespace robot2   a second robot
+go2-wbc ros2 --realtime --sensors imu        odometry as a robot has it
 """
 
 
@@ -32,6 +34,9 @@ def register(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--realtime", action="store_true", help="at the pace of the wall clock")
     parser.add_argument("--viewer", action="store_true", help="open MuJoCo's window")
+    parser.add_argument(
+        "--sensors", choices=SENSORS, default="ideal", help="what its state comes from"
+    )
     parser.add_argument("--config", metavar="FILE", type=Path, help="TOML with other numbers")
 
 
@@ -43,6 +48,6 @@ def run(args: argparse.Namespace) -> int:
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
-    settings = ServerSettings(args.namespace, args.realtime, args.viewer, args.config)
+    settings = ServerSettings(args.namespace, args.realtime, args.viewer, args.config, args.sensors)
     serve(settings, stop, lambda text: print(text, file=sys.stderr, flush=True))
     return ExitCode.OK

@@ -13,8 +13,12 @@ from jaxtyping import Float
 
 from go2_wbc.robot.estimator import SensorReading, StateEstimator
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import OdometryCovariance, RobotState
 from go2_wbc.validation import require_not_negative
+
+EXACT = 1e-4
+"""Standard deviation [m, rad, m/s, rad/s] that stands for the truth's 0, which many filters take
+for unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +88,12 @@ class SensorNoise:
             accelerometer=sample.accelerometer + self.accelerometer * rng.standard_normal(3),
         )
 
+    @property
+    def covariance(self) -> OdometryCovariance:
+        """How sure a state with this noise is of the base: ``EXACT`` at the least."""
+        parts = self.position, self.orientation, self.linear_velocity, self.gyro
+        return OdometryCovariance.of_deviations(*(max(part, EXACT) for part in parts))
+
     def _turn(
         self, quaternion: Float[np.ndarray, "4"], rng: np.random.Generator
     ) -> Float[np.ndarray, "4"]:
@@ -94,6 +104,10 @@ class SensorNoise:
         turned[:3] = vector + scalar * half + np.cross(vector, half)
         turned[3] = scalar - vector @ half
         return turned / np.linalg.norm(turned)
+
+
+NONE = SensorNoise(*[0.0] * 8)
+"""The truth."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,6 +179,11 @@ class Proprioception:
         reading = replace(self._waiting.popleft() if late else self._waiting[0], time=true.time)
         state = self._estimator.update(reading)
         return state, ImuSample(state.q[3:7], reading.gyro, reading.accelerometer)
+
+    @property
+    def covariance(self) -> OdometryCovariance:
+        """How sure the estimate of the base is."""
+        return self._estimator.covariance()
 
     def _read(self, true: RobotState, imu: ImuSample) -> SensorReading:
         errors, noise = self._errors, self._rng.standard_normal(22)

@@ -37,7 +37,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.robot.description import BASE_LINK
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_table
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import OdometryCovariance, RobotState
 from go2_wbc.validation import require_positive
 
 IMU_FRAME = "imu"
@@ -211,6 +211,26 @@ class StateEstimator:
             foot_forces=reading.foot_forces,
             feet_in_contact=reading.foot_forces > self._config.contact_force,
         )
+
+    def covariance(self) -> OdometryCovariance:
+        """How sure the last state is of the base, from the covariance of the filter's errors.
+
+        With the IMU at r in the base frame, and the error of the orientation theta in the world:
+        dp_base = dp - theta x R r, dv_base = R' (dv - theta x v) - dw x r, and dw is the bias's
+        error and the gyro's noise.
+        """
+        R, r = pin.Quaternion(self._x[6:10]).toRotationMatrix(), pin.skew(self._p_base_imu)
+        one = np.eye(3)
+        of_pose, of_twist = np.zeros((6, len(self._P))), np.zeros((6, len(self._P)))
+        of_pose[:3, :3], of_pose[:3, 6:9], of_pose[3:, 6:9] = (
+            one,
+            pin.skew(R @ self._p_base_imu),
+            one,
+        )
+        of_twist[:3, 3:6], of_twist[:3, 6:9] = R.T, R.T @ pin.skew(self._x[3:6])
+        of_twist[:, 9:12] = of_gyro = -np.vstack([r, one])
+        twist = of_twist @ self._P @ of_twist.T + self._config.gyro**2 * of_gyro @ of_gyro.T
+        return OdometryCovariance(of_pose @ self._P @ of_pose.T, twist)
 
     def save(self) -> Mapping[str, Any]:
         """All that the next estimates depend on, besides the readings."""

@@ -41,6 +41,12 @@ def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Float[np.ndarr
     return pin.Quaternion(rotation_from_rpy(roll, pitch, yaw)).coeffs()
 
 
+def rpy_from_quaternion(quaternion: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3"]:
+    """Roll, pitch, yaw [rad] of a quaternion x y z w that is not 0; its length does not count."""
+    unit = quaternion / np.linalg.norm(quaternion)
+    return rpy_from_rotation(pin.Quaternion(unit).toRotationMatrix())
+
+
 def yaw_rotation(yaw: float) -> Float[np.ndarray, "3 3"]:
     """R = Rz(yaw), angle in rad."""
     c, s = math.cos(yaw), math.sin(yaw)

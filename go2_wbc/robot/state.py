@@ -80,6 +80,27 @@ class RobotState:
 
 
 @dataclass(frozen=True, slots=True)
+class OdometryCovariance:
+    """How sure a state is of the base: of its errors, as ``nav_msgs/Odometry`` has them.
+
+    Attributes:
+        pose: of position [m] and turn about fixed axes [rad], in the world.
+        twist: of linear [m/s] and angular [rad/s] velocity, in the base frame.
+    """
+
+    pose: Float[np.ndarray, "6 6"]
+    twist: Float[np.ndarray, "6 6"]
+
+    @classmethod
+    def of_deviations(
+        cls, position: float, turn: float, linear: float, angular: float
+    ) -> OdometryCovariance:
+        """Of independent errors with these standard deviations."""
+        pose, twist = np.repeat([position, turn], 3), np.repeat([linear, angular], 3)
+        return cls(np.diag(pose**2), np.diag(twist**2))
+
+
+@dataclass(frozen=True, slots=True)
 class JointCommand:
     """What the motors are told: tau + kp (q_des - q) + kd (v_des - v), clipped to the limits.
 

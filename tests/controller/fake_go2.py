@@ -64,7 +64,17 @@ class FakeGo2(GO2Controller):
     def walk(self, gait: str | Gait = "trot") -> bool:
         return self._do("walk", Mode.WALKING, STAND)
 
-    def move(self, linear_x: float = 0.0, angular_z: float = 0.0, *, linear_y: float = 0.0) -> None:
+    def move(
+        self,
+        linear_x: float = 0.0,
+        angular_z: float = 0.0,
+        *,
+        linear_y: float = 0.0,
+        height: float = 0.0,
+        roll: float = 0.0,
+        pitch: float = 0.0,
+        yaw: float = 0.0,
+    ) -> None:
         self.calls.append("move")
         if self._the_mode is not Mode.WALKING:
             raise ModeError(f"move() needs walking mode, not {self._the_mode.value}")

@@ -74,6 +74,7 @@ SignalHandlerOptions = needed("rclpy.signals").SignalHandlerOptions
 Future = needed("rclpy.task").Future
 
 Time = needed("builtin_interfaces.msg").Time
+Pose = needed("geometry_msgs.msg").Pose
 Twist = needed("geometry_msgs.msg").Twist
 TransformStamped = needed("geometry_msgs.msg").TransformStamped
 Odometry = needed("nav_msgs.msg").Odometry

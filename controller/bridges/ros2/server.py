@@ -24,7 +24,13 @@ from controller import arguments
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.actions import MotionActions
 from controller.bridges.ros2.behaviors import COMMANDS, order
-from controller.bridges.ros2.names import BEHAVIOR_SERVICE, CMD_VEL, SERVER_NODE, STATISTICS_SERVICE
+from controller.bridges.ros2.names import (
+    BEHAVIOR_SERVICE,
+    BODY_POSE,
+    CMD_VEL,
+    SERVER_NODE,
+    STATISTICS_SERVICE,
+)
 from controller.bridges.ros2.namespace_lock import GraphWatch, lock_namespace
 from controller.bridges.ros2.polling import PolledService, PolledSubscription
 from controller.bridges.ros2.states import StatePublisher
@@ -54,12 +60,14 @@ class ServerSettings:
         realtime: at the pace of the wall clock; otherwise as fast as the CPU allows, with /clock.
         viewer: open MuJoCo's window.
         config: numbers of the engine, or a TOML file.
+        sensors: of the simulated robot, as of ``MujocoPlant``.
     """
 
     namespace: str = "robot1"
     realtime: bool = False
     viewer: bool = False
     config: Config | Path | None = None
+    sensors: str = "ideal"
 
 
 def serve(
@@ -99,7 +107,9 @@ def serve(
         stack.callback(graph_node.destroy_node)
         watch = GraphWatch(graph_node, namespace)
         watch.check()
-        simulator = MujocoPlant(visuals=settings.viewer, motor=config.motor)
+        simulator = MujocoPlant(
+            visuals=settings.viewer, motor=config.motor, sensors=settings.sensors
+        )
         stack.callback(simulator.close)
         go2 = stack.enter_context(
             GO2Controller(
@@ -110,7 +120,14 @@ def serve(
                 after_tick=lambda: node.serve(stop),
             )
         )
-        node = RobotNode(context, go2, simulator, config, realtime=settings.realtime)
+        node = RobotNode(
+            context,
+            go2,
+            simulator,
+            config,
+            realtime=settings.realtime,
+            sensors=settings.sensors,
+        )
         stack.callback(node.close)
         on_ready(node.offer)
         node.run(stop, watch)
@@ -128,6 +145,7 @@ class RobotNode:
         config: Config,
         *,
         realtime: bool,
+        sensors: str,
     ) -> None:
         """Offer ``go2``, which drives ``simulator``, in ``context``."""
         self._go2, namespace = go2, go2.namespace
@@ -135,7 +153,8 @@ class RobotNode:
             SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
         self._jobs = JobServer(go2)
-        self._velocity = VelocityInput(go2, config.envelope)
+        self._velocity = VelocityInput(go2, config.envelope, config.pose)
+        self._poses = PolledSubscription(node, ros.Pose, BODY_POSE, self._take_pose)
         self._twists = PolledSubscription(node, ros.Twist, CMD_VEL, self._take_twist)
         self._commands = (
             PolledService(node, ros.RobotBehaviorCommand, BEHAVIOR_SERVICE, self._take_command)
@@ -143,7 +162,7 @@ class RobotNode:
             else None
         )
         self._triggers = cycle(self._offer_triggers())
-        self._states = StatePublisher(node, simulator, realtime=realtime)
+        self._states = StatePublisher(node, simulator, realtime=realtime, sensors=sensors)
         self._actions = (
             MotionActions(context, namespace, self._jobs) if ros.PlayMotion is not None else None
         )
@@ -195,6 +214,7 @@ class RobotNode:
         next(self._triggers).poll()
         self._poll_commands()
         self._twists.poll()
+        self._poses.poll()
         self._velocity.expire()
         self._states.publish_due()
 
@@ -216,6 +236,10 @@ class RobotNode:
     def _take_twist(self, twist: Any) -> None:
         linear, is_busy = twist.linear, self._jobs.job is not None
         self._velocity.accept(linear.x, linear.y, twist.angular.z, is_busy=is_busy)
+
+    def _take_pose(self, pose: Any) -> None:
+        at = pose.orientation
+        self._velocity.accept_pose(pose.position.z, (at.x, at.y, at.z, at.w))
 
     def _take_command(self, request: Any, reply: Reply) -> None:
         self._order(request.command, reply)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,17 +15,22 @@ from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.names import ODOM, QUEUE, STATE_RATE, TRANSFORM_RATE
 from go2_wbc.legs import JOINT_NAMES, Leg
 from go2_wbc.plant.mujoco.plant import MujocoPlant
+from go2_wbc.plant.sensors import SensorErrors, SensorNoise
+from go2_wbc.robot.estimator import EstimatorConfig
 from go2_wbc.robot.state import RobotState
 
 _log = logging.getLogger(__name__)
 
 FEET_ORDER = (Leg.FR, Leg.FL, Leg.RR, Leg.RL)
 """The order of the feet in ``RobotFootContact``."""
-GYRO_VARIANCE = 1e-6
-ACCELERATION_VARIANCE = 1e-4
-ORIENTATION_VARIANCE = 1e-6
-"""Variances of the simulated IMU [(rad/s)^2, (m/s^2)^2, rad^2]: its sensors are ideal; not 0, since
-many filters take 0 for unknown."""
+_NOISE, _ERRORS, _FILTER = SensorNoise(), SensorErrors(), EstimatorConfig()
+IMU_DEVIATIONS: Mapping[str, tuple[float, float, float]] = {
+    "ideal": (1e-3, 1e-3, 1e-2),
+    "noisy": (_NOISE.orientation, _NOISE.gyro, _NOISE.accelerometer),
+    "imu": (_FILTER.tilt, _ERRORS.gyro, _ERRORS.accelerometer),
+}
+"""Of the simulated IMU's orientation [rad], gyro [rad/s] and accelerometer [m/s^2], by its sensors;
+not 0 with ideal ones, since many filters take 0 for unknown."""
 
 
 Fill = Callable[[Any, RobotState, Any], None]
@@ -50,8 +55,17 @@ class StatePublisher:
         counts: messages published so far, by topic.
     """
 
-    def __init__(self, node: Any, simulator: MujocoPlant, *, realtime: bool) -> None:
-        """Publish on ``node``; ``realtime``: stamp with the wall clock, and publish no /clock."""
+    def __init__(
+        self, node: Any, simulator: MujocoPlant, *, realtime: bool, sensors: str = "ideal"
+    ) -> None:
+        """Publish on ``node``.
+
+        Args:
+            node: of the robot.
+            simulator: whose state is published.
+            realtime: stamp with the wall clock, and publish no /clock.
+            sensors: of the simulator, which say the variances of its IMU.
+        """
         self._node, self._simulator, self._realtime = node, simulator, realtime
         self.counts: dict[str, int] = {}
         self._streams: list[_Stream] = []
@@ -62,9 +76,9 @@ class StatePublisher:
         self._add(
             ODOM,
             ros.Odometry(header=ros.Header(frame_id=odom), child_frame_id=base),
-            _fill_odometry,
+            self._fill_odometry,
         )
-        self._add("imu", _imu(f"{namespace}/imu"), self._fill_imu)
+        self._add("imu", _imu(f"{namespace}/imu", sensors), self._fill_imu)
         if ros.RobotFootContact is not None:
             self._add("foot_contact", ros.RobotFootContact(), _fill_contacts)
         if ros.TFMessage is not None:
@@ -101,12 +115,24 @@ class StatePublisher:
         _set_vector(message.angular_velocity, sample.gyro.tolist())
         _set_vector(message.linear_acceleration, sample.accelerometer.tolist())
 
+    def _fill_odometry(self, message: Any, state: RobotState, stamp: Any) -> None:
+        message.header.stamp = stamp
+        pose, twist = message.pose.pose, message.twist.twist
+        _set_vector(pose.position, state.q[:3].tolist())
+        _set_quaternion(pose.orientation, state.q[3:7].tolist())
+        _set_vector(twist.linear, state.v[:3].tolist())
+        _set_vector(twist.angular, state.v[3:6].tolist())
+        covariance = self._simulator.odometry_covariance
+        message.pose.covariance[:] = covariance.pose.ravel()
+        message.twist.covariance[:] = covariance.twist.ravel()
 
-def _imu(frame: str) -> Any:
+
+def _imu(frame: str, sensors: str) -> Any:
     message = ros.Imu(header=ros.Header(frame_id=frame))
-    message.orientation_covariance[[0, 4, 8]] = ORIENTATION_VARIANCE
-    message.angular_velocity_covariance[[0, 4, 8]] = GYRO_VARIANCE
-    message.linear_acceleration_covariance[[0, 4, 8]] = ACCELERATION_VARIANCE
+    turn, gyro, acceleration = IMU_DEVIATIONS[sensors]
+    message.orientation_covariance[[0, 4, 8]] = turn**2
+    message.angular_velocity_covariance[[0, 4, 8]] = gyro**2
+    message.linear_acceleration_covariance[[0, 4, 8]] = acceleration**2
     return message
 
 
@@ -115,15 +141,6 @@ def _fill_joints(message: Any, state: RobotState, stamp: Any) -> None:
     message.position = array("d", state.joint_positions.tobytes())
     message.velocity = array("d", state.joint_velocities.tobytes())
     message.effort = array("d", state.tau.tobytes())
-
-
-def _fill_odometry(message: Any, state: RobotState, stamp: Any) -> None:
-    message.header.stamp = stamp
-    pose, twist = message.pose.pose, message.twist.twist
-    _set_vector(pose.position, state.q[:3].tolist())
-    _set_quaternion(pose.orientation, state.q[3:7].tolist())
-    _set_vector(twist.linear, state.v[:3].tolist())
-    _set_vector(twist.angular, state.v[3:6].tolist())
 
 
 def _fill_contacts(message: Any, state: RobotState, _stamp: Any) -> None:

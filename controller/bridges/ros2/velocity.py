@@ -5,11 +5,21 @@ from __future__ import annotations
 import logging
 import math
 
+import numpy as np
+
 from controller.bridges.ros2.names import CMD_VEL_SILENCE
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from controller.pacing import LogThrottle
-from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
+from go2_wbc.errors import CommandError
+from go2_wbc.planning.command import (
+    ZERO_COMMAND,
+    VelocityCommand,
+    VelocityEnvelope,
+    finite_number,
+)
+from go2_wbc.planning.pose import LEVEL, BodyPose, PoseEnvelope
+from go2_wbc.robot.rotations import rpy_from_quaternion
 
 _log = logging.getLogger(__name__)
 
@@ -21,13 +31,19 @@ class VelocityInput:
         counts: how many commands came, and what became of them.
     """
 
-    def __init__(self, go2: GO2Controller, envelope: VelocityEnvelope) -> None:
-        """Drive ``go2`` within ``envelope``."""
-        self._go2, self._envelope = go2, envelope
+    def __init__(
+        self,
+        go2: GO2Controller,
+        envelope: VelocityEnvelope,
+        poses: PoseEnvelope | None = None,
+    ) -> None:
+        """Drive ``go2`` within the envelopes of velocities and of poses."""
+        self._go2, self._envelope, self._poses = go2, envelope, poses or PoseEnvelope()
+        self._pose = LEVEL
         self._throttle = LogThrottle(_log)
         self._last: float | None = None
         self.counts = dict.fromkeys(
-            ("received", "followed", "not_finite", "out_of_mode", "silences"), 0
+            ("received", "followed", "not_finite", "out_of_mode", "silences", "poses_refused"), 0
         )
 
     def accept(self, x: float, y: float, turn: float, *, is_busy: bool) -> None:
@@ -54,9 +70,40 @@ class VelocityInput:
         command = self._envelope.clip(wanted)
         if command != wanted:
             self._throttle.warn("clip", f"cmd_vel clipped from {wanted} to {command}")
-        self._go2.move(command.linear_x, command.angular_z, linear_y=command.linear_y)
+        self._move(command)
         self.counts["followed"] += 1
         self._last = self._go2.state.time
+
+    def accept_pose(self, height: float, quaternion: tuple[float, float, float, float]) -> None:
+        """Take a pose of the trunk while the robot walks; it lasts until the next one.
+
+        Args:
+            height: from the usual one [m].
+            quaternion: of the trunk from that of one that walks level, x y z w; all 0 is level.
+        """
+        try:
+            rpy = _attitude(quaternion)
+            pose = BodyPose(height, *rpy)
+            self._poses.require(pose)
+        except CommandError as error:
+            self.counts["poses_refused"] += 1
+            self._throttle.warn("pose", f"body_pose ignored: {error}")
+            return
+        self._pose = pose
+        if self._go2.mode is Mode.WALKING and self._go2.body_pose != pose:
+            self._move(self._go2.command)
+
+    def _move(self, command: VelocityCommand) -> None:
+        pose = self._pose
+        self._go2.move(
+            command.linear_x,
+            command.angular_z,
+            linear_y=command.linear_y,
+            height=pose.height,
+            roll=pose.roll,
+            pitch=pose.pitch,
+            yaw=pose.yaw,
+        )
 
     def expire(self) -> None:
         """Stop a robot whose last command is older than ``CMD_VEL_SILENCE``."""
@@ -68,5 +115,13 @@ class VelocityInput:
         self._last = None
         was_walking = self._go2.mode is Mode.WALKING and not self._go2.command.is_zero
         if was_walking:
-            self._go2.move()
+            self._move(ZERO_COMMAND)
         return was_walking
+
+
+def _attitude(quaternion: tuple[float, float, float, float]) -> list[float]:
+    """Roll, pitch and yaw [rad] of x y z w; CommandError unless they are finite numbers."""
+    x, y, z, w = (finite_number("orientation", part) for part in quaternion)
+    if not any((x, y, z, w)):  # what a message has in which nobody has set it
+        return [0.0, 0.0, 0.0]
+    return rpy_from_quaternion(np.array([x, y, z, w])).tolist()

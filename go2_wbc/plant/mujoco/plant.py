@@ -22,10 +22,10 @@ from go2_wbc.plant.mujoco.pushes import Pushes
 from go2_wbc.plant.mujoco.saved import SavedPhysics
 from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
-from go2_wbc.plant.sensors import ImuSample, Proprioception, SensorErrors, SensorNoise
+from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
-from go2_wbc.robot.state import JointCommand, RobotState
+from go2_wbc.robot.state import JointCommand, OdometryCovariance, RobotState
 from go2_wbc.world import SENSORS
 
 _logger = logging.getLogger(__name__)
@@ -38,9 +38,8 @@ class MujocoPlant(Plant):
     """A Go2 in MuJoCo, driven by torques only; lies on the ground, folded and damped, at time 0.
 
     The motor law is evaluated at every physics step, and cut to what the motors give at the joints'
-    speeds then. Contact forces and torques that ``read``
-    reports acted over the last physics step and the last control period, respectively; positions
-    and velocities are those of this instant.
+    speeds then. Contact forces and torques that ``read`` reports acted over the last physics step
+    and the last control period, respectively; positions and velocities are those of this instant.
 
     Args:
         mjcf: a user's own Go2 MJCF or scene; ``None`` builds the model from the URDF.
@@ -187,6 +186,11 @@ class MujocoPlant(Plant):
             state, noise = self.truth(), self._noise
             self._state = state if noise is None else noise.corrupt_state(state, self._rng)
         return self._state
+
+    @property
+    def odometry_covariance(self) -> OdometryCovariance:
+        """How sure what ``read`` says of the base is."""
+        return (self._senses or self._noise or NONE).covariance
 
     def truth(self) -> RobotState:
         """The true state now, for tests and judges; ``read`` gives the same with ideal sensors."""
@@ -370,10 +374,9 @@ class MujocoPlant(Plant):
         numbers = np.array([motors.peak, motors.knee_speed, motors.no_load_speed])
         places = np.array([layout.joint_q, layout.joint_v, layout.motors], dtype=np.int64)
         self._drive, self._motors = motor.drive, (numbers, places, data.qpos, data.qvel, data.ctrl)
+        state = (data.qpos, data.qvel, self._R_world_base)
         base = (layout.base_q.start, layout.base_v.start)
-        self._read_joints = partial(
-            simulation.measure, data.qpos, data.qvel, self._R_world_base, *base, places
-        )
+        self._read_joints = partial(simulation.measure, *state, *base, places)
         self._bin_forces = simulation.ground_forces
         self._is_elliptic = bool(self._model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC)
 

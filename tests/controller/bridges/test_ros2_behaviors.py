@@ -21,6 +21,8 @@ from controller.modes import Mode
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError, ModeError
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
+from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.robot.rotations import quaternion_from_rpy
 from motions.assembly import compile_timeline
 from motions.authoring import parse_values
 from motions.feasibility.report import FeasibilityReport
@@ -216,3 +218,42 @@ def test_velocities_that_cannot_be_followed_are_counted_and_warned_of_once(
     assert (counts["not_finite"], counts["out_of_mode"]) == (6, 6)
     warnings = [record.message for record in caplog.records if "cmd_vel" in record.message]
     assert len(warnings) == 3
+
+
+LEVEL_QUATERNION = (0.0, 0.0, 0.0, 1.0)
+
+
+def test_a_pose_lasts_beyond_the_velocities() -> None:
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        velocity = VelocityInput(go2, VelocityEnvelope())
+        velocity.accept_pose(-0.03, tuple(quaternion_from_rpy(0.1, -0.05, 0.15).tolist()))
+        assert go2.walk()
+        velocity.accept(0.3, 0.0, 0.0, is_busy=False)
+        pose = go2.body_pose
+        assert pose.row == pytest.approx([-0.03, 0.1, -0.05, 0.15])
+        velocity.end()
+        assert go2.command.is_zero
+        assert go2.body_pose == pose
+        velocity.accept_pose(0.0, LEVEL_QUATERNION)
+        assert go2.body_pose == LEVEL
+
+
+@pytest.mark.parametrize(
+    ("height", "quaternion"),
+    [
+        (math.nan, LEVEL_QUATERNION),
+        (-0.5, LEVEL_QUATERNION),
+        (0.0, (math.inf, 0.0, 0.0, 1.0)),
+        (0.0, (1.0, 0.0, 0.0, 1.0)),  # a quarter turn
+    ],
+)
+def test_a_pose_that_cannot_be_taken_is_counted_and_changes_nothing(
+    height: float, quaternion: tuple[float, float, float, float]
+) -> None:
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        velocity = VelocityInput(go2, VelocityEnvelope())
+        assert go2.walk()
+        velocity.accept_pose(0.01, (0.0, 0.0, 0.0, 0.0))  # nobody has set the orientation
+        velocity.accept_pose(height, quaternion)
+        assert go2.body_pose == BodyPose(0.01)
+        assert velocity.counts["poses_refused"] == 1

@@ -10,10 +10,12 @@ from collections.abc import Iterator
 from contextlib import closing
 from typing import Any
 
+import numpy as np
 import pytest
 
 from benchmarks.bridges.processes import Process, wait_until
 from benchmarks.bridges.ros2_processes import ANSWER, DISCOVERY, Place, Probe, serving, without
+from go2_wbc.plant.sensors import EXACT
 from tests.controller.bridges.ros2_graph import needs_ros2
 
 pytestmark = needs_ros2
@@ -182,6 +184,31 @@ def test_the_messages_say_what_a_standing_robot_measures(server: Process, probe:
         "robot1/base_link",
     )
     assert transform.transform.translation.z == pytest.approx(probe.height(), abs=0.01)
+
+
+def test_odometry_says_how_sure_it_is_and_a_pose_is_taken_while_walking(
+    server: Process, probe: Probe
+) -> None:
+    from geometry_msgs.msg import Pose
+    from nav_msgs.msg import Odometry
+
+    odometry = listen(probe, {"odom": (Odometry, "/robot1/odom")})["odom"]
+    for covariance in (odometry.pose.covariance, odometry.twist.covariance):
+        assert covariance == pytest.approx(EXACT**2 * np.eye(6).ravel())
+    asked = Pose()
+    asked.position.z = -0.04
+    asked.orientation.x, asked.orientation.w = math.sin(0.05), math.cos(0.05)
+    publisher = probe.node.create_publisher(Pose, "/robot1/body_pose", 10)
+    assert wait_until(lambda: publisher.get_subscription_count() > 0, DISCOVERY)
+    assert probe.call("walk").success
+    before = probe.height()
+    publisher.publish(asked)
+    probe.drive(2.0, 0.2)
+    assert probe.height() - before == pytest.approx(-0.04, abs=0.01)
+    assert probe.state().rpy[0] == pytest.approx(0.1, abs=0.03)
+    asked.position.z, asked.orientation.x, asked.orientation.w = 0.0, 0.0, 1.0
+    publisher.publish(asked)
+    probe.let_pass(1.0)
 
 
 def listen(probe: Probe, topics: dict[str, tuple[Any, str]]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from go2_wbc.planning.pose import (
     PosePath,
     pose_turn,
 )
+from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
 from tests.engine_helpers import standing_q, state_of
@@ -127,12 +128,15 @@ def test_the_reference_of_a_walking_robot_arrives_at_the_pose_and_the_feet_stay(
     for planner in planners:
         planner.start(start)
     command = VelocityCommand(0.0, 0.0, 1e-9)
-    for tick in range(1, 1501):
+
+    def references(tick: int) -> list[Reference]:
         snapshot = model.snapshot(state_of(standing_q(), time=tick * TICK))
-        level, leaning = (
-            planner.update(snapshot, command, pose)
-            for planner, pose in zip(planners, (LEVEL, asked), strict=True)
-        )
+        asks = zip(planners, (LEVEL, asked), strict=True)
+        return [planner.update(snapshot, command, pose) for planner, pose in asks]
+
+    for tick in range(1, 1500):
+        references(tick)
+    level, leaning = references(1500)
     turned = level.body.R_world_base.T @ leaning.body.R_world_base
     np.testing.assert_allclose(turned, rotation_from_rpy(0.1, 0.12, 0.2), atol=ARRIVED)
     assert planners[1].heading == pytest.approx(planners[0].heading, abs=1e-6)
