@@ -331,11 +331,11 @@ def fill_feet(snapshot, s, c, stance, stands, elapsed, remaining, target):
         target[_T_F_MIN + leg], target[_T_F_MAX + leg] = c[_F_MIN] * share, c[_F_MAX] * share
 
 
-@kernel("void(f8[::1], f8, f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
-def plan(snapshot, time, contact, s, c, command, target):
+@kernel("void(f8[::1], f8, f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def plan(snapshot, time, contact, tau, s, c, command, target):
     """Bring the state to ``time`` and fill the reference of this tick.
 
-    ``contact`` is not 0 for the feet in measured contact.
+    ``contact`` is not 0 for the feet in measured contact, ``tau`` the measured torques.
     """
     dt = time - s[_TIME]
     s[_TIME] = time
@@ -356,7 +356,7 @@ def plan(snapshot, time, contact, s, c, command, target):
             progress[leg] = elapsed[leg] / (elapsed[leg] + remaining[leg])
         touches, share = contact[leg] != 0.0, progress[leg]
         stands[leg] = follow_contact(snapshot, s, c, leg, touches, stance[leg], share, dt)
-    observe_slip(snapshot, contact, s, c, stands, dt)
+    observe_slip(snapshot, contact, tau, s, c, stands, dt)
     note_liftoffs(snapshot, contact, s, c, stance, progress)
     target[:] = 0.0
     target[_T_FRICTION] = s[_FRICTION]

@@ -28,6 +28,12 @@ def cross(a, b):
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
+@subroutine(f"f8({V3}, {V3})")
+def dot(a, b):
+    """a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
 @subroutine(f"{V3}(f8, f8, {V3})")
 def about_x(c, s, a):
     """A vector turned about x by the angle of this cosine and sine."""

@@ -120,7 +120,7 @@ class CompiledPlanner(GaitPlanner):
         state = snapshot.state
         self._contact[:] = state.feet_in_contact
         own, numbers = self._state, self._numbers
-        self._plan(snapshot.row, state.time, self._contact, own, numbers, wanted, row)
+        self._plan(snapshot.row, state.time, self._contact, state.tau, own, numbers, wanted, row)
         if self._plans_forces:
             forces = self._forces
             self._mpc[MPC.start["friction"]] = min(self._mpc_friction, own[_STATE["friction"]])

@@ -42,7 +42,7 @@ ODD_CONFIG = LocomotionConfig(
     capture_margin=0.07,
     square_tolerance=0.05,
     swing=SwingConfig(apex=0.083, touchdown_depth=0.011),
-    slip=SlipConfig(0.12, 0.007, 0.015, 1.9, 0.18, 0.22, 0.14, 0.55),
+    slip=SlipConfig(0.12, 0.007, 0.015, 1.9, 0.18, 0.22, 0.14, 0.55, 0.34),
     contact=ContactConfig(0.62, 0.013),
     ground=GroundConfig(0.41, 0.59, 0.018, 0.052, 0.73, 0.057),
     pose=PoseConfig(0.13, 0.47, 4.1),
@@ -69,7 +69,14 @@ def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.nda
     if tick % 900 >= 450:  # and some long enough to slide
         contact = np.random.default_rng(tick // 40).random(4) < 0.6
     return model.snapshot(
-        replace(state, time=tick * TICK, q=q, v=pace * state.v, feet_in_contact=contact),
+        replace(
+            state,
+            time=tick * TICK,
+            q=q,
+            v=pace * state.v,
+            tau=rng.normal(scale=10.0, size=12),
+            feet_in_contact=contact,
+        ),
         Payload(5.0, (0.06, -0.08, 0.03)) if tick % 600 >= 400 else NO_PAYLOAD,
     )
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.errors import ConfigError
-from go2_wbc.planning.slip import SlipConfig, SlipObserver
+from go2_wbc.planning.slip import SlipConfig, SlipObserver, exerted_ratios
 from go2_wbc.robot.snapshot import Snapshot
 from tests import engine_helpers as helpers
 
@@ -16,14 +16,20 @@ MODEL = helpers.symmetric_model()
 CONFIG = SlipConfig()
 TICK = 0.002
 STANCE = np.ones(4, dtype=bool)
+PRESSURE = 40.0  # N on each foot
+ROUNDING = 1e-9
 
 
-def sliding(speed: float, rise: float = 0.0, *, touches: bool = True) -> Snapshot:
-    """The front left foot slides sideways."""
+def sliding(
+    speed: float, rise: float = 0.0, ratio: float = 0.0, *, touches: bool = True
+) -> Snapshot:
+    """The front left foot slides sideways; all push with ``ratio`` times what presses on them."""
     snapshot = MODEL.snapshot(helpers.state_of(helpers.standing_q()))
     v = np.zeros((4, 3))
     v[0] = [0.0, speed, rise]
-    state = replace(snapshot.state, feet_in_contact=np.full(4, touches))
+    force = np.tile([0.6 * ratio * PRESSURE, -0.8 * ratio * PRESSURE, PRESSURE], (4, 1))
+    tau = snapshot.bias - np.einsum("lij,li->j", snapshot.J_contacts, force)
+    state = replace(snapshot.state, tau=tau[6:], feet_in_contact=np.full(4, touches))
     return replace(snapshot, state=state, v_world_contacts=v)
 
 
@@ -37,6 +43,36 @@ def after(snapshot: Snapshot, seconds: float) -> SlipObserver:
 def test_a_foot_that_slides_lowers_the_friction_to_the_least() -> None:
     assert after(sliding(0.3), 0.1).friction < 0.2
     assert CONFIG.least <= after(sliding(0.3), 1.0).friction < CONFIG.least + 1e-3
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.3, 1.4])
+def test_the_ratio_is_that_of_the_forces_that_the_torques_make(ratio: float) -> None:
+    np.testing.assert_allclose(exerted_ratios(sliding(0.0, ratio=ratio)), ratio, atol=ROUNDING)
+
+
+def test_the_friction_falls_to_what_the_foot_shows_and_no_further() -> None:
+    shown = 0.4 / (1.0 + 0.2 / CONFIG.half_speed)
+    assert after(sliding(0.2, ratio=0.4), 1.0).friction == pytest.approx(shown, abs=1e-6)
+
+
+def test_a_foot_that_slides_under_a_great_force_leaves_it() -> None:
+    """The trot fell at pushes, for want of the force that its overloaded feet still gave."""
+    assert after(sliding(0.15, ratio=0.9), 0.2).friction == CONFIG.most
+
+
+def test_the_foot_that_shows_least_counts() -> None:
+    snapshot = sliding(0.2, ratio=0.4)
+    v = np.tile(snapshot.v_world_contacts[0], (4, 1))
+    tau = snapshot.state.tau.copy()
+    tau[:3] = sliding(0.2, ratio=0.1).state.tau[:3]
+    both = replace(snapshot, state=replace(snapshot.state, tau=tau), v_world_contacts=v)
+    assert after(both, 1.0).friction == pytest.approx(CONFIG.least, abs=1e-6)
+
+
+def test_a_foot_that_does_not_press_on_the_ground_leaves_it() -> None:
+    snapshot = sliding(0.3, ratio=0.2)
+    lifts = replace(snapshot.state, tau=2 * snapshot.bias[6:] - snapshot.state.tau)
+    assert after(replace(snapshot, state=lifts), 0.2).friction == CONFIG.most
 
 
 @pytest.mark.parametrize(
