@@ -149,7 +149,8 @@ def test_a_pyramid_in_the_cone_allows_most_along_the_planned_force(
     f = np.array([np.cos(direction), np.sin(direction)])
     most = (-sides[:, 2]).min() / (sides[:, :2] @ f).max()
     assert MU / np.sqrt(2.0) - EXACT <= most <= MU + EXACT
-    along = np.array([np.cos(heading := np.arctan2(*planned[::-1])), np.sin(heading)])
+    heading = np.arctan2(planned[1], planned[0])
+    along = np.array([np.cos(heading), np.sin(heading)])
     assert (-sides[:, 2]).min() / (sides[:, :2] @ along).max() == pytest.approx(MU)
 
 
