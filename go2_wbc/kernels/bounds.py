@@ -20,7 +20,8 @@ MOST_ROWS = 44
 _S, _T, _P = SNAPSHOT.start, REFERENCE.start, PROGRAM.start
 _M, _H, _J_CONTACTS = _S["mass_matrix"], _S["bias"], _S["J_contacts"]
 _LEGS, _F_MIN, _F_MAX = (_T[n] for n in ("legs", "normal_force_min", "normal_force_max"))
-_LESS = _T["friction"]
+_LESS, _PLANNED, _PRIOR = (_T[n] for n in ("friction", "f_world_feet", "force_weight"))
+_KEEPS_CONE = _P["keeps_cone"]
 _FRICTION, _PEAK, _KNEE = _P["friction"], _P["peak_torque"], _P["knee_speed"]
 _NO_LOAD, _Q_LOWER, _Q_UPPER = _P["no_load_speed"], _P["q_lower"], _P["q_upper"]
 _SPEED, _BRAKING, _HORIZON = _P["speed"], _P["braking"], _P["horizon"]
@@ -41,6 +42,16 @@ def friction_for(target, program):
     """What the feet may count on: ``FrictionPyramid``."""
     own, less = program[_FRICTION], target[_LESS]
     return min(own, less) if less > 0.0 else own
+
+
+@subroutine("Tuple((f8, f8, f8))(f8[::1], f8[::1], i8, f8)")
+def pyramid_of(target, program, leg, mu):
+    """Friction and cosine and sine of the turn of a foot's pyramid: ``pyramid_in_cone``."""
+    if program[_KEEPS_CONE] == 0.0 or target[_PRIOR] == 0.0:
+        return mu, 1.0, 0.0
+    x, y = target[_PLANNED + 3 * leg], target[_PLANNED + 3 * leg + 1]
+    turn = np.arctan2(y, x) - np.pi / 4
+    return mu / np.sqrt(2.0), np.cos(turn), np.sin(turn)
 
 
 @subroutine("Tuple((f8, f8))(f8[::1], i8, f8)")
@@ -79,7 +90,9 @@ def are_met(snapshot, target, program, z, tau):
         f = z[18 + 3 * leg : 21 + 3 * leg]
         if not is_within(f[2], target[_F_MIN + leg], target[_F_MAX + leg]):
             return False
-        if not (abs(f[0]) - mu * f[2] <= VIOLATION and abs(f[1]) - mu * f[2] <= VIOLATION):
+        share, c, s = pyramid_of(target, program, leg, mu)
+        first, second = abs(c * f[0] + s * f[1]), abs(c * f[1] - s * f[0])
+        if not (first - share * f[2] <= VIOLATION and second - share * f[2] <= VIOLATION):
             return False
     for n in range(12):
         q, speed = snapshot[7 + n], snapshot[25 + n]
@@ -100,13 +113,16 @@ def bound_forces(target, program, C, lower, upper):
     for leg in range(4):
         if target[_LEGS + leg] != STANCE:
             continue
+        share, c, s = pyramid_of(target, program, leg, mu)
         for n in range(5):
             row = count + n
             C[row] = 0.0
             lower[row], upper[row] = -np.inf, 0.0
-            C[row, 3 * leg + 2] = -mu
+            C[row, 3 * leg + 2] = -share
             if n < 4:
-                C[row, 3 * leg + n // 2] = 1.0 - 2.0 * (n % 2)
+                side = 1.0 - 2.0 * (n % 2)
+                C[row, 3 * leg] = side * (c if n < 2 else -s)
+                C[row, 3 * leg + 1] = side * (s if n < 2 else c)
         C[count + 4, 3 * leg + 2] = 1.0
         lower[count + 4], upper[count + 4] = target[_F_MIN + leg], target[_F_MAX + leg]
         count += 5

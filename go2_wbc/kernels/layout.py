@@ -154,6 +154,7 @@ PROGRAM = Layout(
     weight_of_robot=(),
     stance_damping=(),
     friction=(),
+    keeps_cone=(),
     peak_torque=(12,),
     knee_speed=(12,),
     no_load_speed=(12,),

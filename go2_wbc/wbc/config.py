@@ -35,9 +35,9 @@ class DynamicWbcConfig:
             robot lands twice as far off, and motors give all they have for 2 to 6 times as long.
         limit_horizon: time [s] in which a joint-limit bound must be met. In 0.02 s the knees may
             not speed up as fast as a jump needs, which costs a quarter of its height.
-        friction: mu of the friction pyramid: 5 % less than the floor of 0.5 that such plans are
-            solved for, since feedback comes on top of their forces. With 0.6, feet that land slid
-            up to 30 mm on that floor.
+        friction: mu of the cone of planned forces, and of the pyramid of others: 5 % less than the
+            floor of 0.5 that such plans are solved for, since feedback comes on top of their
+            forces. With 0.6, feet that land slid up to 30 mm on that floor.
     """
 
     position_weight: float = 150.0
@@ -71,6 +71,9 @@ class WbcConfig:
             1e3; the first two may be 0, but a leg in the air needs a goal.
         force_weight: of the force regularisation, 1e-6 to 100, or accuracy is lost.
         friction: mu of the friction pyramid.
+        keeps_cone: whether a foot with a planned force keeps within the cone of ``friction``, where
+            the pyramid allows 1.4 times as much on its diagonal. Plans with flights do: feet with
+            little load after a landing slid 15 mm.
         torque_share: share of the motors' torque that may be used, at every speed.
         speed_share: share of the URDF's joint speed limit that may be used.
         stance_damping: [1/s] on the velocity of stance contact points.
@@ -92,6 +95,7 @@ class WbcConfig:
     posture_weight: float = 1.0
     force_weight: float = 1e-4
     friction: float = 0.6
+    keeps_cone: bool = False
     torque_share: float = 1.0
     speed_share: float = 1.0
     stance_damping: float = 20.0
@@ -122,4 +126,5 @@ class WbcConfig:
             swing_weight=special.swing_weight,
             limit_horizon=special.limit_horizon,
             friction=min(special.friction, self.friction),
+            keeps_cone=True,
         )

@@ -7,6 +7,7 @@ limits at the measured speeds, and joint position and speed limits as bounds on 
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
@@ -91,9 +92,12 @@ class FrictionPyramid(Inequality):
     Attributes:
         friction: mu of the square pyramid, per axis; on the diagonal it allows 1.4 times as much.
             A reference may ask for less.
+        keeps_cone: whether the pyramid of a foot with a planned force lies inside of the cone of
+            ``friction`` instead, an edge of it along that force.
     """
 
     friction: float
+    keeps_cone: bool = False
     name: str = "contact forces"
     unit: str = "N"
 
@@ -108,9 +112,11 @@ class FrictionPyramid(Inequality):
         C = np.zeros((5 * count, SIZE))
         lower = np.full(5 * count, -np.inf)
         upper = np.zeros(5 * count)
-        pattern = friction_pyramid(self.friction_for(reference))
+        mu = self.friction_for(reference)
+        is_inside = self.keeps_cone and reference.force_weight > 0.0
         for i, leg in enumerate(stance):
-            start = FORCES.start + 3 * leg
+            start, f_planned = FORCES.start + 3 * leg, reference.f_world_feet[leg]
+            pattern = pyramid_in_cone(mu, f_planned) if is_inside else friction_pyramid(mu)
             C[5 * i : 5 * i + 5, start : start + 3] = pattern
             lower[5 * i + 4] = reference.normal_force_min[leg]
             upper[5 * i + 4] = reference.normal_force_max[leg]
@@ -198,6 +204,16 @@ def torque_map(
     A[:, :18] = snapshot.mass_matrix[6:]
     A[:, FORCES] = -snapshot.J_contacts[:, :, 6:].reshape(12, 12).T
     return A, snapshot.bias[6:]
+
+
+def pyramid_in_cone(mu: float, f: Float[np.ndarray, "3"]) -> Float[np.ndarray, "5 3"]:
+    """The square pyramid inside of the cone of ``mu`` with an edge along ``f`` on the ground.
+
+    Rows as of ``friction_pyramid``. Of all inscribed ones it allows most in the direction of ``f``.
+    """
+    rows, turn = friction_pyramid(mu / math.sqrt(2.0)), math.atan2(f[1], f[0]) - math.pi / 4.0
+    rows[:4, :2] @= np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+    return rows
 
 
 def friction_pyramid(mu: float) -> Float[np.ndarray, "5 3"]:

@@ -197,7 +197,7 @@ def _inequalities(model: RobotModel, config: WbcConfig) -> tuple[Inequality, ...
     if (model.q_upper - model.q_lower <= 2 * config.joint_margin).any():
         raise ConfigError(f"WbcConfig.joint_margin leaves no range: {config.joint_margin} rad")
     return (
-        FrictionPyramid(config.friction),
+        FrictionPyramid(config.friction, keeps_cone=config.keeps_cone),
         TorqueLimits(model.motor.scaled(config.torque_share)),
         JointLimits(
             model.q_lower + config.joint_margin,

@@ -59,6 +59,7 @@ class Program:
         position, orientation = _first(BodyPosition, tasks), _first(BodyOrientation, tasks)
         swing, posture = _first(SwingFoot, tasks), _first(LegPosture, tasks)
         force, still = _first(ForceRegularisation, tasks), _first(StanceFeetStill, constraints)
+        pyramid = _first(FrictionPyramid, constraints)
         torque, joints = _first(TorqueLimits, constraints), _first(JointLimits, constraints)
         gains = [
             part
@@ -71,7 +72,8 @@ class Program:
                 force.weight,
                 force.weight_of_robot,
                 still.damping,
-                _first(FrictionPyramid, constraints).friction,
+                pyramid.friction,
+                float(pyramid.keeps_cone),
                 torque.motor.peak,
                 torque.motor.knee_speed,
                 torque.motor.no_load_speed,

@@ -132,6 +132,28 @@ def test_a_robot_that_stands_with_a_payload_bears_both_weights(backend: str) -> 
     assert moment == pytest.approx(np.zeros(3), abs=0.1 * PULL)
 
 
+def test_planned_forces_keep_within_the_cone_as_in_the_full_problem() -> None:
+    """On a pyramid's diagonal feet with little load slid 15 mm after a landing."""
+    model, rng = RobotModel(), np.random.default_rng(31)
+    config = WbcConfig(friction=0.2, keeps_cone=True)
+    compiled = WholeBodyController(model, config=config)
+    readable = WholeBodyController(model, "full", replace(config, solver="daqp"))
+    square = WholeBodyController(model, config=replace(config, keeps_cone=False))
+    beyond = 0
+    for snapshot, plain in cases(model, 104, seed=30):
+        reference = with_planned_forces(plain, rng)
+        ours, wider = (one.solve_compiled(snapshot, reference) for one in (compiled, square))
+        theirs = solve_or_none(readable, snapshot, reference)
+        assert (ours is None) == (theirs is None)
+        if ours is None or theirs is None or wider is None:
+            continue
+        np.testing.assert_allclose(ours.tau, theirs.tau, atol=AGREEMENT, rtol=0)
+        excess = [np.hypot(*f.T[:2]) - 0.2 * f[:, 2] for f in (ours.forces, wider.forces)]
+        assert excess[0].max() < 1e-4
+        beyond += bool(excess[1].max() > 1.0)
+    assert beyond > 20
+
+
 def test_less_friction_that_a_reference_asks_for_is_kept_and_more_is_not_believed() -> None:
     model = RobotModel()
     compiled = WholeBodyController(model)

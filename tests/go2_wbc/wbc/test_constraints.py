@@ -17,6 +17,7 @@ from go2_wbc.wbc.constraints import (
     JointLimits,
     StanceFeetStill,
     TorqueLimits,
+    pyramid_in_cone,
     torque_map,
 )
 from tests.engine_helpers import (
@@ -138,6 +139,31 @@ def test_a_force_meets_the_bounds_exactly_if_it_lies_in_the_pyramid(
     sideways = MU * z - np.maximum(np.abs(x), np.abs(y))
     expected = np.minimum(sideways, np.minimum(z - least, greatest - z))
     np.testing.assert_allclose(slack, expected[reference.stance], atol=EXACT)
+
+
+@given(st.tuples(newtons, newtons), st.floats(-np.pi, np.pi))
+def test_a_pyramid_in_the_cone_allows_most_along_the_planned_force(
+    planned: tuple[float, float], direction: float
+) -> None:
+    sides = pyramid_in_cone(MU, np.array([*planned, 100.0]))[:4]
+    f = np.array([np.cos(direction), np.sin(direction)])
+    most = (-sides[:, 2]).min() / (sides[:, :2] @ f).max()
+    assert MU / np.sqrt(2.0) - EXACT <= most <= MU + EXACT
+    heading = np.arctan2(planned[1], planned[0])
+    along = np.array([np.cos(heading), np.sin(heading)])
+    assert (-sides[:, 2]).min() / (sides[:, :2] @ along).max() == pytest.approx(MU)
+
+
+def test_only_planned_forces_are_kept_in_the_cone() -> None:
+    f = np.tile([30.0, 20.0, 50.0], (4, 1))
+    plain = holding_reference(SNAPSHOT, FOUR_FEET)
+    planned = replace(plain, f_world_feet=f, force_weight=0.01)
+    square, cone = FrictionPyramid(MU), FrictionPyramid(MU, keeps_cone=True)
+    same = square.bounds(SNAPSHOT, planned).C
+    np.testing.assert_array_equal(cone.bounds(SNAPSHOT, plain).C, same)
+    other = cone.bounds(SNAPSHOT, planned).C
+    np.testing.assert_array_equal(other[:4, 18:21], pyramid_in_cone(MU, f[0])[:4])
+    assert np.abs(other - same).max() > 0.1
 
 
 # --- joint limits ---------------------------------------------------------------------------------
