@@ -57,7 +57,7 @@ def test_one_half_of_a_nested_table_may_be_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("speed = 1", r"unknown key 'speed'; valid: backend, envelope, locomotion, motor, safety"),
+        ("speed = 1", r"unknown key 'speed'; valid: backend, envelope, locomotion, motor, payload"),
         ("[wbc]\nsolvr = 'daqp'", r"mine\.toml: wbc: unknown key 'solvr'; valid: .*solver"),
         ("[wbc.swing_foot]\nki = [1, 1, 1]", r"wbc: swing_foot: unknown key 'ki'; valid: kd, kp"),
         ("wbc = 3", r"wbc must be a table, got 3"),
