@@ -36,7 +36,7 @@ from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.validation import require_between, require_positive, require_share
 
-PERIOD = 0.01
+PERIOD = 0.02
 """Time [s] from one change of the belief to the next: much less than its response takes."""
 NOTHING = 0.02
 """Mass [kg] at which a belief that fades has ended."""
