@@ -33,6 +33,8 @@ from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import ModeError
+from go2_wbc.planning.command import VelocityEnvelope
+from go2_wbc.planning.envelopes import envelope_of
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH
 from go2_wbc.robot.model import RobotModel
@@ -55,6 +57,8 @@ DROP_HEIGHT = (0.1, 0.5)
 """Height [m] of the lowest point of the robot over the floor."""
 DROP_TIME = 1.0
 """Time [s] for which the limp robot falls before ``recover()``."""
+GENTLE = VelocityEnvelope(forward=1.2, backward=1.2, lateral=0.5, turning=1.5)
+"""Of the trot's changes; those of the other gaits are in proportion."""
 CHANGES = 10
 CALLS = 6
 CALLED = ("stand", "sit", "lie_down", "high_five", "walk", "bow", "turn")
@@ -169,7 +173,9 @@ def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
     else:
         gait = GAITS[str(rng.choice(list(GAITS)))]
         robot.require(robot.go2.walk(gait))
-        x, y, turn = rng.uniform(-1.0, 1.0, 3) * gait.envelope_share * [1.2, 0.5, 1.5]
+        most = envelope_of(gait, GENTLE)
+        bounds = most.forward, most.lateral, most.turning
+        x, y, turn = rng.uniform(-1.0, 1.0, 3) * bounds
         robot.go2.move(x, turn, linear_y=y)
     robot.wait(float(rng.uniform(0.3, 1.5)))
 

@@ -131,11 +131,10 @@ class GO2Controller:
     def walk(self, gait: str | Gait = "trot") -> bool:
         """Enter walking mode; the robot stands ready until ``move``. Stands up first if needed.
 
-        One that walks already passes over into the gait while it walks on, with a command that is
-        clipped into the gait's envelope.
+        One that walks already passes over into the gait, its command clipped into the envelope.
 
         Args:
-            gait: name of a gait, or a gait of your own.
+            gait: name of a gait, "auto" for one by the speed, or a gait of your own.
 
         Raises:
             CommandError: for an unknown gait; lists the valid ones.
@@ -171,9 +170,10 @@ class GO2Controller:
         """
         self._check_open()
         wanted = VelocityCommand(linear_x, linear_y, angular_z)
-        followed = self._pilot.set_command(wanted, BodyPose(height, roll, pitch, yaw))
+        pose, limits = BodyPose(height, roll, pitch, yaw), self._pilot.limits
+        followed = self._pilot.set_command(wanted, pose)
         if followed != wanted:
-            _log.warning("velocity command clipped from %s to %s", wanted, followed)
+            _log.warning("velocity command clipped from %s to %s: %s", wanted, followed, limits)
 
     def stop(self) -> None:
         """Zero velocity: the robot comes to rest in walking mode.

@@ -40,7 +40,7 @@ from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
 from controller.walker import Walker
 from go2_wbc.config import Config
-from go2_wbc.contacts import Gait, find_gait
+from go2_wbc.contacts import Gait
 from go2_wbc.errors import ModeError, StanceMismatch
 from go2_wbc.legs import Leg
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
@@ -90,6 +90,11 @@ class Pilot:
     def command(self) -> VelocityCommand:
         """The velocity command that is being followed."""
         return self._walker.command if self.mode is Mode.WALKING else ZERO_COMMAND
+
+    @property
+    def limits(self) -> str:
+        """The envelope to which velocity commands are clipped, in plain words."""
+        return self._walker.limits
 
     @property
     def body_pose(self) -> BodyPose:
@@ -167,12 +172,12 @@ class Pilot:
 
     def walk(self, gait: str | Gait) -> Measurements:
         """Enter walking mode, ready for commands; one that walks goes on, with this gait."""
-        wanted = find_gait(gait)
+        self._walker.require(gait)
         if self.mode is not Mode.WALKING:
             self._ensure_standing()
-            self._walker.start(wanted)
-        elif wanted != self._walker.walking.gait:
-            self._walker.change_gait(wanted)
+            self._walker.start(gait)
+        else:
+            self._walker.take(gait)
         self.wait(READY_TIME)
         self._mode = Mode.WALKING
         return self._procedures.measurements()

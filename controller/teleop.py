@@ -10,8 +10,10 @@ from collections.abc import Callable, Mapping
 from queue import SimpleQueue
 from typing import final
 
+from controller.gamepad import PadReading
 from controller.go2_controller import GO2Controller
 from controller.jobs import Answer, Job, JobServer
+from controller.modes import Mode
 from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import ClosedError, Go2WbcError
 from go2_wbc.planning.command import VelocityCommand
@@ -20,6 +22,8 @@ SPEED_STEP = 0.1
 """Change of speed [m/s] by one key."""
 TURN_STEP = 0.2
 """Change of the turning rate [rad/s] by one key."""
+WIDTH = 79
+"""Columns of the state line at most."""
 JOIN_TIME = 5.0
 """Time [s] that a running call gets to end when the robot is let go."""
 
@@ -62,6 +66,7 @@ class Teleop:
         self._jobs.start("teleop")
         self._doing = ""
         self._news: SimpleQueue[str] = SimpleQueue()
+        self._sticks_rest = True
 
     @property
     def is_busy(self) -> bool:
@@ -84,15 +89,35 @@ class Teleop:
             self._news.put(str(error))
         return key != QUIT
 
+    def follow(self, reading: PadReading) -> bool:
+        """Do what a gamepad says; False if it means to end."""
+        goes_on = all([self.press(key) for key in reading.keys])
+        wanted = reading.command
+        if self.is_busy or self._go2.mode is not Mode.WALKING:
+            self._sticks_rest = True
+        elif not (wanted.is_zero and self._sticks_rest):
+            self._sticks_rest = wanted.is_zero
+            self._go2.move(wanted.linear_x, wanted.angular_z, linear_y=wanted.linear_y)
+        return goes_on
+
     def status(self) -> str:
-        """One line of at most 80 columns: what it does, what is asked and what is measured."""
-        state, command = self._go2.state, self._go2.command
-        doing = f"{self._doing} ..." if self.is_busy else self._go2.mode.name.lower()
+        """One line of at most 80 columns: what it does, what is asked, measured, and a fault."""
+        go2 = self._go2
+        state, command, mode = go2.state, go2.command, go2.mode
+        doing = f"{self._doing} ..." if self.is_busy else mode.name.lower()
+        if mode in (Mode.FALLEN, Mode.DAMPED) and not self.is_busy:
+            return f"{doing:<13} {self._fault()}"[:WIDTH]
         asked = (
             f"{command.linear_x:+.1f} {command.linear_y:+.1f} m/s {command.angular_z:+.1f} rad/s"
         )
         measured = f"ahead {state.v[0]:+.2f} m/s, {state.q[2]:.2f} m high"
-        return f"{doing:<13} asked {asked}; {measured}"
+        return f"{doing:<13} asked {asked}; {measured}"[:WIDTH]
+
+    def _fault(self) -> str:
+        """Why the robot is limp, and what brings it back."""
+        outcome = self._go2.last_outcome
+        reason = "limp" if outcome.ok else outcome.reason
+        return f"r recovers, 1 stands: {reason}"
 
     def news(self) -> list[str]:
         """What has been said since the last call."""

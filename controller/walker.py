@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from controller.behaviours.walking import Walking
 from controller.procedures import ProcedureRunner
 from controller.runner import Runner
 from go2_wbc.config import Config
-from go2_wbc.contacts import Gait, find_gait
+from go2_wbc.contacts import GAITS, Gait, find_gait
+from go2_wbc.errors import CommandError, unknown_name
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
+from go2_wbc.planning.envelopes import envelope_of
+from go2_wbc.planning.gait_choice import AUTO, DWELL, LADDER, GaitChoice
 from go2_wbc.planning.pose import LEVEL, BodyPose
 
 STOP_LIMIT = 4.0
 """Time [s] in which a walking robot must come to rest after ``stop``."""
+CHANGE_SHARE = 0.65
+"""Share of both envelopes in which one gait passes over into another: at their edge it fell."""
 
 
 class Walker:
@@ -32,24 +39,68 @@ class Walker:
         return Walking(self._runner.loop.model, gait, self._config.locomotion)
 
     @property
+    def limits(self) -> str:
+        """The envelope of the gait, in plain words."""
+        name = self.walking.gait.name if self.walking.choice is None else AUTO
+        return f"the envelope of gait {name!r} is {self._envelope}"
+
+    @property
     def command(self) -> VelocityCommand:
         """The velocity that is followed."""
         return self.walking.command
 
-    def start(self, gait: Gait) -> None:
+    def require(self, gait: str | Gait) -> None:
+        """Raise CommandError for a gait that there is not."""
+        if gait != AUTO and not isinstance(gait, Gait) and gait not in GAITS:
+            raise CommandError(unknown_name("gait", gait, [*GAITS, AUTO]))
+
+    def start(self, gait: str | Gait) -> None:
         """Stand ready to walk with ``gait``."""
-        walking = self._make(gait)
+        choice = self._choice(gait)
+        walking = self._make(find_gait(LADDER[0] if gait == AUTO else gait))
+        walking.choice = choice
         self._procedures.engage(walking)
         self.walking = walking
-        self._envelope = self._config.envelope.scaled(gait.envelope_share)
+        self._envelope = self._envelope_of(walking)
 
-    def change_gait(self, gait: Gait) -> None:
+    def take(self, gait: str | Gait) -> None:
         """Walk on with ``gait``, slowing down into its envelope before."""
-        walking, self._envelope = self.walking, self._config.envelope.scaled(gait.envelope_share)
-        walking.command = self._envelope.clip(walking.command)
+        walking, choice = self.walking, self._choice(gait)
+        if choice is not None:
+            with self._runner.lock():  # the planner may be at work in another thread
+                walking.choice = walking.choice or choice
+            self._envelope = self._envelope_of(walking)
+        elif walking.choice is not None or find_gait(gait) != walking.gait:
+            self._change(find_gait(gait))
+
+    def _change(self, gait: Gait) -> None:
+        """Slow down into the middle of both envelopes, pass over, and go on as before."""
+        walking, before = self.walking, self._envelope
+        self._envelope = envelope_of(gait, self._config.envelope)
+        asked = self._envelope.clip(walking.command)
+        slowed = before.scaled(CHANGE_SHARE).clip(self._envelope.scaled(CHANGE_SHARE).clip(asked))
+        walking.command = slowed
         self._procedures.until(lambda: walking.follows_command, STOP_LIMIT, "slow down")
-        with self._runner.lock():  # the planner may be at work in another thread
+        with self._runner.lock():
+            walking.choice = None
             walking.change_gait(gait)
+        if slowed != asked:
+            self._procedures.until(self._has_passed(DWELL), STOP_LIMIT, "pass over")
+            if walking.command is slowed:  # nobody has asked for another one
+                walking.command = asked
+
+    def _has_passed(self, seconds: float) -> Callable[[], bool]:
+        loop, start = self._runner.loop, self._runner.loop.state.time
+        return lambda: loop.state.time - start >= seconds
+
+    def _choice(self, gait: str | Gait) -> GaitChoice | None:
+        return GaitChoice(self._config.envelope) if gait == AUTO else None
+
+    def _envelope_of(self, walking: Walking) -> VelocityEnvelope:
+        choice = walking.choice
+        if choice is not None:
+            return choice.envelope
+        return envelope_of(walking.gait, self._config.envelope)
 
     def follow(self, command: VelocityCommand, pose: BodyPose | None = None) -> VelocityCommand:
         """Follow ``command``, clipped to the envelope of the gait; returns what is followed.
@@ -78,6 +129,6 @@ class Walker:
 
     def square_up(self) -> bool:
         """Start to put the feet below the hips; returns whether they are."""
-        self.start(find_gait("trot"))
+        self.start("trot")
         with self._runner.lock():  # the planner may be at work in another thread
             return self.walking.square_up(self._runner.loop.snapshot)

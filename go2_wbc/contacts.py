@@ -162,7 +162,8 @@ class Gait:
         stride: how period and duty follow the speed, where the forces are planned ahead by the
             MPC; None if they are fixed.
         needs_mpc: whether it can be walked only with the forces planned ahead.
-        envelope_share: share of the trot's velocity envelope in which it is walked, (0, 1].
+        envelope_share: share of the trot's velocity envelope in which a gait of one's own is
+            walked, (0, 1]; those with a name have a measured one (``planning.envelopes``).
     """
 
     name: str
@@ -217,9 +218,9 @@ GAITS: dict[str, Gait] = {
     for gait in (
         Gait("trot", 0.36, 0.5, (0.5, 0.0, 0.0, 0.5), Stride()),
         Gait("flying_trot", 0.30, 0.35, (0.5, 0.0, 0.0, 0.5), needs_mpc=True),
-        Gait("walk", 0.60, 0.70, (0.0, 0.5, 0.75, 0.25), needs_mpc=True, envelope_share=0.33),
-        Gait("pace", 0.24, 0.45, (0.0, 0.5, 0.0, 0.5), needs_mpc=True, envelope_share=0.53),
-        Gait("pronk", 0.36, 0.50, (0.0, 0.0, 0.0, 0.0), needs_mpc=True, envelope_share=0.53),
+        Gait("walk", 0.60, 0.70, (0.0, 0.5, 0.75, 0.25), needs_mpc=True),
+        Gait("pace", 0.24, 0.45, (0.0, 0.5, 0.0, 0.5), needs_mpc=True),
+        Gait("pronk", 0.36, 0.50, (0.0, 0.0, 0.0, 0.0), needs_mpc=True),
     )
 }
 """The gaits by name. The trot is the one in which the robot starts to walk and comes to rest."""

@@ -8,6 +8,7 @@ from controller.behaviours.base import Behaviour
 from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.compiled import CompiledPlanner
+from go2_wbc.planning.gait_choice import GaitChoice
 from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.planning.pose import LEVEL, BodyPose
@@ -18,7 +19,10 @@ from go2_wbc.robot.snapshot import Snapshot
 
 
 class Walking(Behaviour):
-    """Walk with ``gait`` and follow ``command`` and ``pose``; stand ready without command."""
+    """Walk with ``gait`` and follow ``command`` and ``pose``; stand ready without command.
+
+    With a ``choice`` the gait is chosen by the speed.
+    """
 
     label = "walk"
     knows_payload = True
@@ -28,6 +32,7 @@ class Walking(Behaviour):
         self.gait = gait
         self.command: VelocityCommand = ZERO_COMMAND
         self.pose: BodyPose = LEVEL
+        self.choice: GaitChoice | None = None
         self._planner: GaitPlanner = CompiledPlanner(model, gait, config)
 
     def start(self, snapshot: Snapshot) -> None:
@@ -36,7 +41,13 @@ class Walking(Behaviour):
 
     def update(self, snapshot: Snapshot) -> Reference:
         """The planner's reference."""
-        return self._planner.update(snapshot, self.command, self.pose)
+        command = self.command
+        if self.choice is not None:
+            velocity = self._planner.velocity
+            gait, command = self.choice.update(snapshot.state.time, velocity, command)
+            if gait != self.gait:
+                self.change_gait(gait)
+        return self._planner.update(snapshot, command, self.pose)
 
     def square_up(self, snapshot: Snapshot) -> bool:
         """Step in place unless the feet are below the hips; returns whether they are."""

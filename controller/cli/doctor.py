@@ -75,6 +75,7 @@ BUILT = ("quadropted-msgs", "tf2-msgs")
 BUILD_LINE = "ros2/build_interfaces.sh {python} dist && {pip} dist/*.whl"
 EXTRAS: Mapping[str, tuple[str, str, str]] = {
     "music": ("librosa", ">=0.11,<0.12", "the beats of a song: dance"),
+    "gamepad": ("pygame-ce", ">=2.5,<3", "a gamepad for teleop"),
     "unitree": ("cyclonedds", "==11.0.1", "Unitree's protocol: unitree-sim, unitree-drive"),
 }
 """What an optional extra brings: a package, its version, and what it is for."""

@@ -1,4 +1,4 @@
-"""``go2-wbc teleop``: drive the simulated robot with the keyboard."""
+"""``go2-wbc teleop``: drive the simulated robot with the keyboard or a gamepad."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from controller.cli.common import ExitCode, Subparsers, add_parser
 from go2_wbc.errors import CommandError
 
 if TYPE_CHECKING:
+    from controller.gamepad import Gamepad
     from controller.teleop import Teleop
 
 EXAMPLES = """
@@ -32,10 +33,11 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "teleop",
-        "Drive the robot in MuJoCo with the keyboard, at the pace of the wall clock.",
+        "Drive the robot in MuJoCo with keyboard or gamepad, at the wall clock's pace.",
         examples=EXAMPLES,
     )
     parser.add_argument("--viewer", action="store_true", help="also open MuJoCo's window")
+    parser.add_argument("--keyboard", action="store_true", help="look for no gamepad")
     parser.add_argument("--mjcf", metavar="FILE", type=Path, help="your own Go2 model or scene")
     parser.add_argument("--config", metavar="FILE", type=Path, help="TOML with other numbers")
 
@@ -45,11 +47,13 @@ def run(args: argparse.Namespace) -> int:
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise CommandError("teleop reads keys from a terminal; standard input or output is none")
     from controller.arguments import config
+    from controller.gamepad import LEGEND, find_gamepad
     from controller.go2_controller import GO2Controller
     from controller.teleop import Teleop, keys_help
     from go2_wbc.plant import MujocoPlant
 
-    print(keys_help())
+    pad, said = (None, "keys only") if args.keyboard else find_gamepad()
+    print(keys_help(), said, *([] if pad is None else [LEGEND]), sep="\n")
     numbers = config(args.config)
     with (
         closing(MujocoPlant(args.mjcf, motor=numbers.motor)) as plant,
@@ -58,16 +62,18 @@ def run(args: argparse.Namespace) -> int:
         teleop = Teleop(go2)
         try:
             with _single_keys():
-                _drive(teleop)
+                _drive(teleop, pad)
         except KeyboardInterrupt:
             pass
         finally:
             print()
             teleop.close()
+            if pad is not None:
+                pad.close()
     return ExitCode.OK
 
 
-def _drive(teleop: Teleop) -> None:
+def _drive(teleop: Teleop, pad: Gamepad | None) -> None:
     goes_on = True
     while goes_on:
         width = shutil.get_terminal_size().columns - 1
@@ -76,6 +82,14 @@ def _drive(teleop: Teleop) -> None:
         sys.stdout.flush()
         for key in _pressed():
             goes_on = goes_on and teleop.press(key)
+        if pad is not None:
+            reading = pad.read()
+            if reading is None:
+                teleop.press(" ")
+                print(f"{_CLEAR_LINE}the gamepad is gone: the robot stops; go on with keys")
+                pad = None
+            else:
+                goes_on = teleop.follow(reading) and goes_on
 
 
 def _pressed() -> str:

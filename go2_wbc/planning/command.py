@@ -78,8 +78,22 @@ class VelocityEnvelope:
         parts = (command.linear_x, command.linear_y, command.angular_z)
         scale = max(1.0, *map(abs, parts))  # so that no quotient overflows
         x, y, turn = (part / scale for part in parts)
-        forward = self.forward if x >= 0.0 else self.backward
-        load = math.hypot(x / forward, y / self.lateral, turn / self.turning)
+        load = self._load(x, y, turn)
         if load * scale <= 1.0 + ROUNDING:
             return command
         return VelocityCommand(x / load, y / load, turn / load)
+
+    def load(self, command: VelocityCommand) -> float:
+        """Share of the envelope that ``command`` uses: 1 on its surface."""
+        return self._load(command.linear_x, command.linear_y, command.angular_z)
+
+    def _load(self, x: float, y: float, turn: float) -> float:
+        forward = self.forward if x >= 0.0 else self.backward
+        return math.hypot(x / forward, y / self.lateral, turn / self.turning)
+
+    def __str__(self) -> str:
+        """The bounds with their units."""
+        return (
+            f"{self.forward:.2f} m/s ahead, {self.backward:.2f} back, {self.lateral:.2f} aside, "
+            f"{self.turning:.2f} rad/s"
+        )

@@ -7,6 +7,8 @@ import pytest
 
 from controller import GO2Controller
 from go2_wbc.contacts import GAITS
+from go2_wbc.planning.command import VelocityEnvelope
+from go2_wbc.planning.envelopes import envelope_of
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 
@@ -28,7 +30,7 @@ def test_a_gait_walks_at_the_edge_of_its_envelope_and_comes_to_rest(name: str) -
         assert go2.walk(name)
         go2.move(FAST)
         wanted = go2.command.linear_x
-        assert wanted == pytest.approx(1.5 * GAITS[name].envelope_share)
+        assert wanted == pytest.approx(envelope_of(GAITS[name], VelocityEnvelope()).forward)
         go2.wait(2.0)
         truth.clear()
         go2.wait(2.0)
@@ -57,11 +59,38 @@ def test_gaits_pass_over_into_one_another_while_the_robot_walks() -> None:
             truth.clear()
             assert go2.walk(name)
             go2.wait(1.0)
-            envelope = 1.5 * GAITS[name].envelope_share
-            assert go2.command.linear_x <= envelope * (1.0 + 1e-9)
+            most = envelope_of(GAITS[name], VelocityEnvelope()).forward
+            assert go2.command.linear_x <= most * (1.0 + 1e-9)
             assert truth.recording().com_velocity[:, 0].min() > 0.15
         assert go2.command.linear_x > 0.0
         go2.stop()
+        assert go2.stand()
+        assert truth.fall() is None
+    truth.close()
+
+
+@pytest.mark.slow
+def test_auto_goes_from_walk_to_flying_trot_and_back_to_rest() -> None:
+    truth = GroundTruth(MujocoPlant(friction=FRICTION, seed=44))
+    with GO2Controller(plant=truth) as go2:
+        assert go2.stand()
+        assert go2.walk("auto")
+        walking = go2._pilot._walker.walking
+        for speed, name in ((0.3, "walk"), (0.9, "trot"), (2.0, "flying_trot")):
+            go2.move(speed)
+            go2.wait(3.0)
+            assert walking.gait.name == name
+            truth.clear()
+            go2.wait(1.5)
+            mean = float(truth.recording().com_velocity[:, 0].mean())
+            assert mean == pytest.approx(speed, rel=SLOW)
+        assert go2.walk("trot")
+        assert walking.choice is None
+        assert go2.command.linear_x <= VelocityEnvelope().forward * (1.0 + 1e-9)
+        assert go2.walk("auto")
+        go2.stop()
+        go2.wait(1.0)
+        assert walking.gait.name == "walk"
         assert go2.stand()
         assert truth.fall() is None
     truth.close()

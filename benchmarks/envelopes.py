@@ -1,0 +1,171 @@
+"""``python -m benchmarks envelopes``: how fast each gait follows, ahead, back, aside and turning.
+
+A speed is held if under every seed the robot does not fall, follows within ``ERROR`` on the mean of
+the window, keeps every joint's speed limit, and has some motor at its limit (of the torque-speed
+line) in ``SATURATED`` of the ticks at most. The greatest is bisected between 0 and ``MOST``, with
+the planner's default numbers: the trot by the QP alone, gaits that need it by the MPC.
+``--store`` writes what ``go2_wbc.planning.envelopes`` reads: the seeds are those of tuning, not
+those that ``benchmarks.locomotion`` judges by.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.session import positive, publish
+from benchmarks.steps import plant_of
+from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.progress import ProgressLine
+from controller.cli.sweep import tell
+from controller.motion_measurement import FULL
+from controller.sweeps.rows import Row
+from controller.sweeps.run import sweep
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
+from go2_wbc.config import Config
+from go2_wbc.contacts import GAITS
+from go2_wbc.files import write_atomically
+from go2_wbc.planning.command import VelocityEnvelope
+from go2_wbc.planning.envelopes import FILE
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from go2_wbc.robot.model import RobotModel
+
+FIRST_SEED = 5200
+"""Of those that measure an envelope; nothing is judged by them."""
+SEEDS = 4
+MASS_RANGE = (0.9, 1.1)
+ERROR, SATURATED = 0.05, 0.05
+"""Share of the command, and of the ticks."""
+LEAST_ERROR = 0.02
+"""m/s, rad/s; an error below it is none, however slow the command."""
+LEAD, WINDOW = 1.0, 2.0
+"""Time [s] after the ramp that is left out, and that is measured."""
+MOST = {"forward": 4.0, "backward": 3.0, "lateral": 2.0, "turning": 7.0}
+"""m/s, rad/s"""
+STEPS = 6
+"""Halvings: a bound is exact to a 64th of ``MOST``."""
+ITEMS = tuple(product(GAITS, MOST))
+CONFIG = Config(envelope=VelocityEnvelope(forward=1e3, backward=1e3, lateral=1e3, turning=1e3))
+ROWS = Path("out/benchmarks/envelopes.sqlite")
+EXAMPLES = """
+python -m benchmarks envelopes           measure and print; ten minutes
+python -m benchmarks envelopes --store   also store them in the package
+"""
+
+
+def register(subparsers: Subparsers) -> None:
+    """Add the options of ``envelopes``."""
+    parser = add_parser(
+        subparsers,
+        "envelopes",
+        "The greatest speed of each gait, ahead, back, aside and turning, inside the\n"
+        "limits of torque and joint speed and without a fall, by bisection.",
+        examples=EXAMPLES,
+    )
+    parser.add_argument("--store", action="store_true", help="store them in the package")
+    parser.add_argument("--rows", metavar="FILE", type=Path, default=ROWS, help="keep rows here")
+    parser.add_argument("--jobs", metavar="N", type=positive, default=1, help="default 1")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
+    parser.add_argument("--out", metavar="FILE", type=Path, help="also write the JSON here")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Measure what is not kept yet, and store it if asked."""
+    args.rows.parent.mkdir(parents=True, exist_ok=True)
+    with ProgressLine() as line:
+        result = sweep(
+            trial,
+            len(ITEMS),
+            workers=args.jobs,
+            out=args.rows,
+            keep_going=True,
+            on_progress=lambda progress: tell(line, progress),
+        )
+    bounds = collected(result.rows)
+    is_whole = not result.failures and all(len(b) == len(MOST) for b in bounds.values())
+    if args.store and is_whole:
+        store(bounds)
+    publish(args, {"passed": is_whole, "envelopes": bounds}, render(bounds))
+    return ExitCode.OK if is_whole else ExitCode.FAILED
+
+
+def trial(seed: int) -> Row:
+    """The bound of the gait and direction that the seed stands for."""
+    gait, axis = ITEMS[seed]
+    low, high = 0.0, MOST[axis]
+    for _ in range(STEPS):
+        middle = (low + high) / 2
+        if all(holds(gait, axis, middle, n) for n in range(SEEDS)):
+            low = middle
+        else:
+            high = middle
+    return {"gait": gait, "axis": axis, "bound": low}
+
+
+def holds(gait: str, axis: str, speed: float, seed: int) -> bool:
+    """Whether a robot under the conditions of ``seed`` follows that speed; see the module."""
+    x, y, turn = _components(axis, speed)
+    rate = CONFIG.locomotion.angular_acceleration if turn else CONFIG.locomotion.linear_acceleration
+    try:
+        with TrialRobot(plant_of(Trial(seed), FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+            robot.require(robot.go2.stand())
+            robot.require(robot.go2.walk(gait))
+            robot.go2.move(x, turn, linear_y=y)
+            robot.wait(speed / rate + LEAD)
+            robot.truth.clear()
+            robot.wait(WINDOW)
+            return is_held(robot.truth.recording(), axis, speed)
+    except TrialFailed:
+        return False
+
+
+def _components(axis: str, speed: float) -> tuple[float, float, float]:
+    ways = {
+        "forward": (speed, 0.0, 0.0),
+        "backward": (-speed, 0.0, 0.0),
+        "lateral": (0.0, speed, 0.0),
+        "turning": (0.0, 0.0, speed),
+    }
+    return ways[axis]
+
+
+def is_held(window: TruthRecording, axis: str, speed: float) -> bool:
+    """Whether a recording shows that the speed was followed inside the limits."""
+    model = RobotModel()
+    ahead, left, _ = window.com_velocity.mean(axis=0).tolist()
+    turned, took = float(np.ptp(window.rpy[[0, -1], 2])), float(np.ptp(window.time))
+    reached = {"forward": ahead, "backward": -ahead, "lateral": left, "turning": turned / took}[
+        axis
+    ]
+    saturated = float((window.torque_shares(model) >= FULL).mean())
+    is_inside = saturated <= SATURATED and window.peak_speed_share(model) <= 1.0
+    return is_inside and abs(reached - speed) <= max(ERROR * speed, LEAST_ERROR)
+
+
+def collected(rows: Sequence[Row]) -> dict[str, dict[str, float]]:
+    """The bounds by gait and direction."""
+    bounds: dict[str, dict[str, float]] = {gait: {} for gait in GAITS}
+    for row in rows:
+        bounds[str(row["gait"])][str(row["axis"])] = round(float(row["bound"]), 4)
+    return bounds
+
+
+def store(bounds: dict[str, dict[str, float]], file: Path = FILE) -> None:
+    """Write the bounds where the package looks for them."""
+    about = {"measured_by": "python -m benchmarks envelopes --store", "seeds": SEEDS}
+    text = json.dumps({"about": about, "gaits": bounds}, indent=1)
+    write_atomically(file, (text + "\n").encode())
+
+
+def render(bounds: dict[str, dict[str, float]]) -> str:
+    """The table, at most 80 columns wide."""
+    lines = [f"{'gait':<14}" + "".join(f"{axis:>16}" for axis in MOST), "-" * 78]
+    for gait, values in bounds.items():
+        cells = (f"{values[axis]:>16.2f}" if axis in values else f"{'?':>16}" for axis in MOST)
+        lines.append(f"{gait:<14}" + "".join(cells))
+    return "\n".join([*lines, "m/s; turning in rad/s"])
