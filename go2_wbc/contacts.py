@@ -163,6 +163,8 @@ class Gait:
             MPC; None if they are fixed.
         needs_mpc: whether it can be walked only with the forces planned ahead.
         envelope_share: share of the trot's velocity envelope in which it is walked, (0, 1].
+        starts_at_once: whether the first stride is already this gait's, and not the trot's: for a
+            robot that does not stand still.
     """
 
     name: str
@@ -172,6 +174,7 @@ class Gait:
     stride: Stride | None = None
     needs_mpc: bool = False
     envelope_share: float = 1.0
+    starts_at_once: bool = False
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a period, duty, offset or share that is out of range."""
