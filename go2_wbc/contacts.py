@@ -164,6 +164,8 @@ class Gait:
         needs_mpc: whether it can be walked only with the forces planned ahead.
         envelope_share: share of the trot's velocity envelope in which a gait of one's own is
             walked, (0, 1]; those with a name have a measured one (``planning.envelopes``).
+        starts_at_once: whether the first stride is already this gait's, and not the trot's: for a
+            robot that does not stand still.
     """
 
     name: str
@@ -173,6 +175,7 @@ class Gait:
     stride: Stride | None = None
     needs_mpc: bool = False
     envelope_share: float = 1.0
+    starts_at_once: bool = False
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a period, duty, offset or share that is out of range."""

@@ -23,7 +23,8 @@ from go2_wbc.contacts import (
 
 def resting_gait(gait: Gait) -> Gait:
     """The gait in which a robot that walks with ``gait`` starts and comes to rest."""
-    return gait if gait.lands_on_four and not gait.needs_mpc else GAITS["trot"]
+    is_own = gait.starts_at_once or (gait.lands_on_four and not gait.needs_mpc)
+    return gait if is_own else GAITS["trot"]
 
 
 class GaitClock:

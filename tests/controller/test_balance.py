@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 
 from controller import GO2Controller, Mode
-from controller.behaviours.standing import Standing, must_step, trot_against
+from controller.behaviours.standing import (
+    KEPT_SPEED,
+    SLOW,
+    Standing,
+    going_on,
+    must_step,
+    trot_against,
+)
 from controller.checks import is_standing
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
@@ -16,6 +23,8 @@ from tests.engine_helpers import standing_q, state_of
 # s, and N s: at 16 N s aside, or 20 ahead, feet in place are at their end.
 PUSH_TIME = 0.1
 HARD, HARD_ASIDE = 30.0, 22.0
+# N s; 3 m/s ahead, 2.4 m/s aside. It fell with the strides of a slow trot.
+HARDEST, HARDEST_ASIDE = 45.0, 36.0
 SOFT = 6.0
 # s; in which it stands again.
 LIMIT = 3.0
@@ -34,7 +43,14 @@ def pushed(impulse: float, angle: float) -> GO2Controller:
 
 
 @pytest.mark.parametrize(
-    ("impulse", "angle"), [(HARD, 0.0), (HARD, np.pi / 4), (HARD_ASIDE, -np.pi / 2)]
+    ("impulse", "angle"),
+    [
+        (HARD, 0.0),
+        (HARD, np.pi / 4),
+        (HARD_ASIDE, -np.pi / 2),
+        (HARDEST, np.pi),
+        (HARDEST_ASIDE, -np.pi / 2),
+    ],
 )
 def test_a_push_that_feet_in_place_cannot_hold_starts_steps(impulse: float, angle: float) -> None:
     # It fell.
@@ -96,6 +112,19 @@ def test_it_begins_on_the_feet_along_whose_line_it_falls() -> None:
     )
     assert left_ahead.schedule().at(0.0).stance.tolist() == [True, False, False, True]
     assert right_ahead.schedule().at(0.0).stance.tolist() == [False, True, True, False]
+
+
+def test_it_walks_on_at_a_little_less_than_its_speed_until_it_is_slow() -> None:
+    yaw = 0.7
+    q, v = standing_q(), np.zeros(18)
+    q[3:7] = 0.0, 0.0, np.sin(yaw / 2), np.cos(yaw / 2)
+    v[:2] = 2.0, -1.0
+    command = going_on(RobotModel().snapshot(state_of(q, v)))
+    assert command.linear_x == pytest.approx(2.0 * KEPT_SPEED)
+    assert command.linear_y == pytest.approx(-1.0 * KEPT_SPEED)
+    assert command.angular_z == 0.0
+    v[:2] = 0.9 * SLOW, 0.0
+    assert going_on(RobotModel().snapshot(state_of(q, v))).is_zero
 
 
 def test_a_robot_on_its_way_up_does_not_step() -> None:

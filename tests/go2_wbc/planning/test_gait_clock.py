@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +23,13 @@ def test_a_gait_is_reached_from_the_one_at_rest_and_left_again(gait: Gait) -> No
     for wanted, is_resting in ((gait, False), (resting_gait(gait), True)):
         run(clock, is_resting=is_resting)
         assert clock.gait == wanted
+
+
+def test_a_gait_that_starts_at_once_is_not_preceded_by_the_trot() -> None:
+    flying = Gait("flying", 0.3, 0.4, (0.0, 0.5, 0.5, 0.0))
+    assert GaitClock(flying, None).gait == GAITS["trot"]
+    at_once = replace(flying, starts_at_once=True)
+    assert GaitClock(at_once, None).gait == at_once
 
 
 @pytest.mark.parametrize("gait", GAITS.values(), ids=lambda gait: gait.name)
