@@ -34,7 +34,7 @@ from tests.go2_wbc.plant.contract import PlantContract
 
 # A share of the motors' torque with which the legs cannot carry the trunk.
 FEEBLE = 0.05
-# kg; twice the robot's own mass.
+# kg; two and a half times the robot's own mass.
 HEAVY = 40.0
 # N for 0.2 s at the trunk: 60 N s, three times what a standing robot withstands.
 SHOVE = np.array([0.0, 300.0, 0.0])
