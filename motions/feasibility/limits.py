@@ -44,8 +44,7 @@ class FeasibilityLimits:
         drag: longest way [m] of a foot that counts as raised along the ground: twice the 9 mm that
             generated waves need, whose paw comes down at a slant.
         landing: distance [m] by which a foot may land beside its place.
-        landing_speed: greatest speed [m/s] of a foot at touchdown; taps and stamps of the train half
-            that came down with 1.1 and 1.4 were done.
+        landing_speed: greatest speed [m/s] of a foot at touchdown: taps with 1.4 were done.
         joint_jump: greatest change [rad/s] of a joint's speed between samples of 10 ms.
         body_jump, turn_jump: the same of the trunk's speed [m/s, rad/s]: a plan that jumps. What is
             merely quick shows in forces, torques and slips.

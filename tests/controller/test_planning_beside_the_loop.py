@@ -12,6 +12,7 @@ import pytest
 from controller import GO2Controller
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from motions import FeasibilityChecker
@@ -47,8 +48,8 @@ def snapshots(monkeypatch: pytest.MonkeyPatch) -> list[Snapshot]:
     taken: list[Snapshot] = []
     take = RobotModel.snapshot
 
-    def noted(model: RobotModel, state: RobotState) -> Snapshot:
-        snapshot = take(model, state)
+    def noted(model: RobotModel, state: RobotState, *carried: Payload) -> Snapshot:
+        snapshot = take(model, state, *carried)
         if threading.current_thread().name == "go2-loop":
             taken.append(snapshot)
         return snapshot
