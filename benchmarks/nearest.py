@@ -63,6 +63,8 @@ METRICS = (
     Metric("nearest.speed", ITEM, "peak joint speed / limit", "", 1.0),
     Metric("nearest.saturated", ITEM, "saturated ticks", "%", 2.0),
 )
+OF_FOUND = tuple(metric.name for metric in METRICS[1:])
+"""What is asked only of a motion for which a plan was found."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +92,7 @@ def measure(trial: Trial) -> Measurement:
     try:
         checked.report.raise_if_infeasible()
     except MotionInfeasible as error:
-        return Measurement({"nearest.found": 0.0}, reason=str(error))
+        return Measurement({"nearest.found": 0.0}, not_asked=dict.fromkeys(OF_FOUND, str(error)))
     values = {"nearest.found": 100.0, "nearest.cpu": planning_time(checked, model)}
     reported = {name: reported_worst(checked.report, name) for name in ("off by", "turned off by")}
     values["nearest.reported"], values["nearest.angle"] = reported.values()

@@ -95,7 +95,8 @@ def summarise(scenarios: Sequence[Scenario], results: Results) -> Report:
 
 def summarise_metric(metric: Metric, trials: Mapping[int, Measurement]) -> MetricResult:
     """One metric over the trials of its scenario, given by seed."""
-    name, ordered = metric.name, dict(sorted(trials.items()))
+    name = metric.name
+    ordered = {s: trial for s, trial in sorted(trials.items()) if name not in trial.not_asked}
     found = {s: trial.values[name] for s, trial in ordered.items() if name in trial.values}
     failures = {s: why for s, trial in ordered.items() if (why := trial.failure(name)) is not None}
     failures |= {s: f"{v} was measured" for s, v in found.items() if math.isnan(v)}
@@ -104,7 +105,7 @@ def summarise_metric(metric: Metric, trials: Mapping[int, Measurement]) -> Metri
     worst = metric.direction.worst(values) if values else None
     return MetricResult(
         metric=metric,
-        n=len(trials),
+        n=len(ordered),
         mean=fmean(values.values()) if values else None,
         worst=None if missing or worst is None else values[worst],
         worst_seed=missing[0] if missing else worst,

@@ -56,12 +56,14 @@ class Measurement:
         failures: by metric, why the robot did not do it although there may be a value.
         reason: why metrics without a value have none; empty if all have one.
         notes: what else is worth keeping, by name; is on disk only.
+        not_asked: by metric, why this trial says nothing of it, neither good nor bad.
     """
 
     values: Mapping[str, float]
     failures: Mapping[str, str] = field(default_factory=dict)
     reason: str = ""
     notes: Mapping[str, str] = field(default_factory=dict)
+    not_asked: Mapping[str, str] = field(default_factory=dict)
 
     def failure(self, metric: str) -> str | None:
         """Why this trial counts as failed for ``metric``, or None."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -86,3 +87,13 @@ def test_a_run_that_is_not_as_reported_is_a_failure_whatever_the_mean(
     far = nearest.Played(place=0.05, angle=0.0, torque=0.5, speed=0.5, saturated=0.0)
     monkeypatch.setattr(nearest, "play", lambda *_: far)
     assert "mm" in measure(Trial(0)).failures["nearest.as_reported"]
+
+
+def test_only_what_was_found_is_to_be_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    refused = Timeline().body(z=-0.2, over=0.05).home(over=0.05)
+    monkeypatch.setattr(nearest, "refused_motion", lambda *_: SimpleNamespace(nearest=refused))
+    measured = measure(Trial(0))
+    assert measured.values == {"nearest.found": 0.0}
+    asked = [metric.name for metric in METRICS if metric.name not in measured.not_asked]
+    assert asked == ["nearest.found"]
+    assert measured.failure("nearest.found") is None
