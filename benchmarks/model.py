@@ -34,9 +34,11 @@ TORQUE_LIMIT = 1e-5
 """N m"""
 ORACLE_PERIOD = 10
 """Ticks between those that the other back ends solve as well."""
-DRIVERS = ("condensed", "placo")
+PLACO = "placo"
+"""It has a robot of its own, which carries nothing."""
+DRIVERS = ("condensed", PLACO)
 """Back ends that drive a whole run each, every solution audited."""
-BACKENDS = ("condensed", "full", "placo")
+BACKENDS = ("condensed", "full", PLACO)
 """Back ends that are compared with the driving one."""
 
 _SOLUTION_ITEM = "whole-body solutions"
@@ -75,7 +77,7 @@ class AuditedController(WholeBodyController):
         """Solve with ``backend``; keep what is larger than in ``worst`` there."""
         super().__init__(model, backend)
         others = [name for name in BACKENDS if name != backend]
-        self._others = [WholeBodyController(model, name) for name in others]
+        self._others = {name: WholeBodyController(model, name) for name in others}
         self._ticks = 0
         self._worst = worst
 
@@ -86,7 +88,9 @@ class AuditedController(WholeBodyController):
         solution = super().solve(snapshot, reference, relax=relax)
         self._audit(snapshot, solution)
         if self._ticks % ORACLE_PERIOD == 0:
-            for controller in self._others:
+            for name, controller in self._others.items():
+                if PLACO in (name, solution.backend) and snapshot.payload.any():
+                    continue
                 other = controller.solve(snapshot, reference)
                 self._audit(snapshot, other)
                 self._note("wbc.torque", float(np.abs(solution.tau - other.tau).max()))
@@ -101,12 +105,34 @@ class AuditedController(WholeBodyController):
 
 
 def motion_error(model: RobotModel, snapshot: Snapshot, solution: WbcSolution) -> float:
-    """Largest entry [N, N m] of M qdd + h - S' tau - J' f, by recursive Newton-Euler."""
+    """Largest entry [N, N m] of M qdd + h - S' tau - J' f, by recursive Newton-Euler.
+
+    A payload that the snapshot carries is a point mass of the base.
+    """
     generalised: Float[np.ndarray, "18"] = np.concatenate([np.zeros(6), solution.tau])
     for J, force in zip(snapshot.J_contacts, solution.forces, strict=True):
         generalised += J.T @ force
     state = snapshot.state
-    return float(np.abs(model.inverse_dynamics(state.q, state.v, solution.qdd) - generalised).max())
+    needed = model.inverse_dynamics(state.q, state.v, solution.qdd)
+    if snapshot.payload.any() and solution.backend != PLACO:
+        needed[:6] += payload_wrench(model, snapshot, solution.qdd)
+    return float(np.abs(needed - generalised).max())
+
+
+def payload_wrench(
+    model: RobotModel, snapshot: Snapshot, qdd: Float[np.ndarray, "18"]
+) -> Float[np.ndarray, "6"]:
+    """Force and moment [N, N m], base frame, that a snapshot's payload takes: m (a_p + g), p x.
+
+    The CoM is ``com_shift`` = m / (M + m) (p - c) from that of the robot alone, c.
+    """
+    (m, _), state = snapshot.payload, snapshot.state
+    R = snapshot.R_world_base
+    p_world = snapshot.p_world_com + snapshot.com_shift * model.mass / m
+    p, v, w = R.T @ (p_world - state.q[:3]), state.v[:3], state.v[3:6]
+    a = qdd[:3] + np.cross(w, v) + np.cross(qdd[3:6], p) + np.cross(w, np.cross(w, p))
+    force = m * (a + R.T @ np.array([0.0, 0.0, model.gravity]))
+    return np.concatenate([force, np.cross(p, force)])
 
 
 def measure_solutions(trial: Trial) -> Measurement:
