@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.session import positive, publish
+from benchmarks.session import make_folder_of, positive, publish
 from benchmarks.steps import plant_of
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.cli.progress import ProgressLine
@@ -76,7 +76,7 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure what is not kept yet, and store it if asked."""
-    args.rows.parent.mkdir(parents=True, exist_ok=True)
+    make_folder_of(args.rows)
     with ProgressLine() as line:
         result = sweep(
             trial,

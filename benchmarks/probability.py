@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.exam.drawing import TEST, TRAIN
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit
 from benchmarks.probability_runs import WORLDS, exam, trial
-from benchmarks.session import publish
+from benchmarks.session import make_folder_of, publish
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.cli.progress import ProgressLine
 from controller.cli.sweep import tell
@@ -57,7 +57,7 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run what is not kept, fit if asked, and judge the test half."""
-    args.rows.parent.mkdir(parents=True, exist_ok=True)
+    make_folder_of(args.rows)
     with ProgressLine() as line:
         result = sweep(
             trial,

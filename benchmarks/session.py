@@ -16,6 +16,7 @@ from benchmarks.runner import Results, Task, run_tasks
 from benchmarks.scenario import Scenario
 from controller.cli.common import ExitCode, print_json
 from controller.cli.progress import ProgressLine
+from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
 LOG_FOLDER = Path("out/benchmarks")
@@ -50,6 +51,18 @@ def positive(text: str) -> int:
 def _output(name: str) -> Path:
     """The type of ``--out``: writable before the run already, so that no result can be lost."""
     return checked_output(name, [".json"])
+
+
+def make_folder_of(rows: Path) -> None:
+    """Make the folder of a file of rows.
+
+    Raises:
+        ConfigError: if it cannot be made.
+    """
+    try:
+        rows.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"cannot make the folder of {rows}: {error.strerror}") from error
 
 
 def tasks_of(scenarios: Sequence[Scenario], seeds: int) -> list[Task]:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.probability_runs import NOT_READY
-from benchmarks.session import positive, publish
+from benchmarks.session import make_folder_of, positive, publish
 from benchmarks.trust_runs import passed_play
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.cli.progress import ProgressLine
@@ -20,7 +20,6 @@ from controller.cli.sweep import tell
 from controller.sweeps.rows import Row
 from controller.sweeps.run import sweep
 from controller.sweeps.summary import rate_interval
-from go2_wbc.errors import ConfigError
 
 PLAYS = 2000
 MOST_ASKED = 20
@@ -53,10 +52,7 @@ def register(subparsers: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Play what is not kept yet, count the falls."""
-    try:
-        args.rows.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ConfigError(f"cannot make the folder of {args.rows}: {error.strerror}") from error
+    make_folder_of(args.rows)
     with ProgressLine() as line:
         result = sweep(
             passed_play,

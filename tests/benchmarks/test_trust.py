@@ -77,10 +77,11 @@ def test_every_fourth_motion_is_of_the_library() -> None:
     assert LIBRARY not in others
 
 
+@pytest.mark.parametrize("name", ["trust", "envelopes", "probability"])
 def test_a_folder_that_cannot_be_made_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("", encoding="utf-8")
-    words = ["trust", "--plays", "1", "--rows", str(tmp_path / "file" / "in" / "rows.sqlite")]
+    words = [name, "--rows", str(tmp_path / "file" / "in" / "rows.sqlite")]
     assert main(words) == ExitCode.USAGE
     assert "cannot make the folder" in capsys.readouterr().err
