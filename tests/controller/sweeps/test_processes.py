@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+import socket
+import subprocess
 import sys
 import threading
 from collections.abc import Callable
@@ -106,6 +108,24 @@ def test_the_process_that_forks_may_die(tmp_path: Path) -> None:
     os.kill(int(first["parent"]), signal.SIGKILL)
     again = row_of_sweep(swept.process, tmp_path / "rows.sqlite")
     assert again["parent"] != first["parent"]
+
+
+@pytest.mark.parametrize("is_left", [False, True])
+def test_the_process_that_forks_ends_with_nothing_to_do_or_without_its_parent(
+    *, is_left: bool
+) -> None:
+    mine, control = socket.socketpair()
+    patience = 600.0 if is_left else 0.01
+    code = (
+        "from controller.sweeps import fork_server; "
+        f"fork_server.PATIENCE = {patience}; fork_server.serve({control.fileno()})"
+    )
+    with mine, control:
+        server = subprocess.Popen([sys.executable, "-c", code], pass_fds=[control.fileno()])
+        control.close()
+        if is_left:
+            mine.close()
+        assert server.wait(HANG_GUARD) == 0
 
 
 def test_a_worker_ends_if_the_process_that_has_forked_it_is_dead() -> None:
