@@ -210,11 +210,13 @@ class Runner:
             self.loop.abandon(Fault(reason, is_fall=fault is not None and fault.is_fall))
 
     def _keep_pace(self) -> None:
+        are_frozen = gc.get_freeze_count() > 0  # a program's own objects, which stay so
         gc.freeze()  # else a collection looks through all that was imported, for tens of ms
         try:
             self._tick_at_pace()
         finally:
-            gc.unfreeze()
+            if not are_frozen:
+                gc.unfreeze()
 
     def _tick_at_pace(self) -> None:
         pacer = Pacer(self.loop.plant.control_period, GREATEST_LAG, LEAST_PAUSE)

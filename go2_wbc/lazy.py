@@ -7,6 +7,7 @@ Pinocchio and MuJoCo for a command line that only prints its help.
 from __future__ import annotations
 
 import gc
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -19,13 +20,13 @@ def lazy_exports(package: str, homes: Mapping[str, Sequence[str]]) -> Callable[[
         package: its dotted name.
         homes: the public names by the module that defines them, relative to ``package``.
     """
-    home_of = {name: home for home, names in homes.items() for name in names}
+    home_of = {name: f"{package}.{home}" for home, names in homes.items() for name in names}
 
     def load(name: str) -> object:
         if name not in home_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         with without_collecting():
-            module = import_module(f"{package}.{home_of[name]}")
+            module = import_module(home_of[name])
         return getattr(module, name)
 
     return load
@@ -36,16 +37,19 @@ def without_collecting() -> Iterator[None]:
     """Does not look for garbage while something is imported.
 
     Imports leave next to none, and looking through all that they make takes a tenth of their time.
-    What they made counts as old afterwards, so that it is not looked through then.
+    What they made counts as old afterwards, so that it is not looked through then. That costs
+    nothing if there was nothing left to import.
     """
     if not gc.isenabled():
         yield
         return
+    known = len(sys.modules)
     gc.disable()
     try:
         yield
     finally:
-        if not gc.get_freeze_count():  # a program's own frozen objects stay so
+        # A program's own frozen objects stay so; to count them takes tens of ms.
+        if len(sys.modules) != known and not gc.get_freeze_count():
             gc.freeze()
             gc.unfreeze()  # into the oldest generation
         gc.enable()

@@ -1,26 +1,24 @@
-"""Workers on this machine: each a Python of its own, started anew, with one thread for its BLAS."""
+"""Workers on this machine: each a process of its own, with one thread for its BLAS."""
 
 from __future__ import annotations
 
 import os
 import pickle
-import signal
-import subprocess
 import sys
 import threading
 from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from functools import partial
 from queue import SimpleQueue
-from typing import IO, Any, final
+from typing import Any, final
 
-from controller.sweeps.engine import ONE_THREAD, Ended, Engine, Failure, Item
-from controller.sweeps.worker import order_of, read_message, write_message
+from controller.sweeps.engine import Ended, Engine, Failure, Item
+from controller.sweeps.processes import start_process
+from controller.sweeps.worker import modules_of, order_of, read_message, write_message
 
 ATTEMPTS = 2
 """How often an item is tried whose worker dies: the first time it may have been anything."""
-_START = "import sys; sys.path[:] = {}; from controller.sweeps.worker import main; main()"
-"""What a worker runs: it finds the same modules as its parent."""
 
 
 def processors() -> int:
@@ -44,7 +42,9 @@ class LocalEngine(Engine):
 
     def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[Ended[Item]]:
         """What came of each item; see ``Engine.run``."""
-        pool = _Pool(order_of(function), [pickle.dumps(item) for item in items], self._workers)
+        pickled = [pickle.dumps(item) for item in items]
+        modules = modules_of(pickle.dumps(function), *pickled[:1])
+        pool = _Pool(partial(_Worker, modules, order_of(function)), pickled, self._workers)
         try:
             while not pool.is_done:
                 for number, value, failure in pool.wait():
@@ -56,8 +56,10 @@ class LocalEngine(Engine):
 class _Pool:
     """Some workers, and which of them does which item."""
 
-    def __init__(self, order: bytes, items: Sequence[bytes], size: int) -> None:
-        self._order, self._items, self._size = order, items, size
+    def __init__(
+        self, start: Callable[[_Answers], _Worker], items: Sequence[bytes], size: int
+    ) -> None:
+        self._start, self._items, self._size = start, items, size
         self._waiting, self._deaths = deque(range(len(items))), Counter[int]()
         self._busy: dict[_Worker, int] = {}
         self._answers: _Answers = SimpleQueue()
@@ -69,7 +71,7 @@ class _Pool:
     def wait(self) -> Iterator[tuple[int, Any, Failure | None]]:
         """Until a worker says something: the item that has ended by it, if one has."""
         while self._waiting and len(self._busy) < self._size:
-            self._give(_Worker(self._order, self._answers))
+            self._give(self._start(self._answers))
         worker, message = self._answers.get()
         number = self._busy.pop(worker, None)
         if number is None:  # a worker has ended that had nothing left to do
@@ -82,7 +84,7 @@ class _Pool:
         if self._deaths[number] < ATTEMPTS:
             self._waiting.appendleft(number)
             return
-        text = f"its process died {ATTEMPTS} times: {_cause(message)}"
+        text = f"its process died {ATTEMPTS} times: {message}"
         yield number, None, Failure(text, has_died=True)
 
     def close(self) -> None:
@@ -100,46 +102,29 @@ class _Pool:
 class _Worker:
     """A worker process, and the thread that listens to it."""
 
-    def __init__(self, order: bytes, answers: _Answers) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _START.format(sys.path)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env={**os.environ, **ONE_THREAD},
-            process_group=0,  # out of reach of Ctrl-C
-        )
+    def __init__(self, modules: Sequence[str], order: bytes, answers: _Answers) -> None:
+        self._process = start_process(modules)
         self.give(order)
-        threading.Thread(target=self._listen, args=(answers,), name="worker", daemon=True).start()
+        self._listener = threading.Thread(
+            target=self._listen, args=(answers,), name="worker", daemon=True
+        )
+        self._listener.start()
 
     def give(self, message: bytes) -> None:
         """Send the order, or an item; if the worker has died, the listener tells."""
         with suppress(OSError, ValueError):  # a pipe that is broken, or closed
-            write_message(_pipe(self._process.stdin), message)
+            write_message(self._process.stdin, message)
 
     def end(self) -> None:
         """End it at once."""
         self._process.kill()
-        self._process.wait()
+        self._listener.join()
 
     def _listen(self, answers: _Answers) -> None:
-        with suppress(OSError), self._process:
-            while (message := read_message(_pipe(self._process.stdout))) is not None:
-                answers.put((self, message))
-        answers.put((self, self._process.returncode))
+        while (message := read_message(self._process.stdout)) is not None:
+            answers.put((self, message))
+        answers.put((self, self._process.close()))
 
 
-def _pipe(stream: IO[bytes] | None) -> IO[bytes]:
-    if stream is None:
-        raise ValueError("a worker was started without pipes")
-    return stream
-
-
-_Answers = SimpleQueue[tuple[_Worker, bytes | int]]
-"""What workers say, or with which code they ended."""
-
-
-def _cause(code: int) -> str:
-    """What an exit code of ``subprocess`` says."""
-    with suppress(ValueError):
-        return f"killed by {signal.Signals(-code).name}"
-    return f"exit code {code}"
+_Answers = SimpleQueue[tuple[_Worker, bytes | str]]
+"""What workers say, or how they ended."""

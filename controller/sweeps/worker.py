@@ -7,23 +7,29 @@ standard error. When the parent ends, however it came, so does the worker, at on
 from __future__ import annotations
 
 import gc
+import io
 import logging
 import os
 import pickle
+import signal
 import struct
 import sys
 import threading
 import traceback
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from contextlib import suppress
+from functools import cache, lru_cache
 from pathlib import Path
 from queue import SimpleQueue
 from typing import IO, Any
 
 from controller.sweeps.engine import Failure
+from controller.sweeps.identity import SOURCES
 
 _HERE = Path(__file__).parent
 _LENGTH = struct.Struct("<Q")
+_OURS = (*SOURCES, "benchmarks")
+"""Packages that stay what they are while a process runs: those of users may be edited."""
 
 
 def write_message(stream: IO[bytes], content: bytes) -> None:
@@ -45,6 +51,33 @@ def read_message(stream: IO[bytes]) -> bytes | None:
 def order_of(function: Callable[[Any], Any]) -> bytes:
     """The message that tells a worker what to call, and where to look for it."""
     return pickle.dumps((sys.path, pickle.dumps(function)))
+
+
+def modules_of(*pickled: bytes) -> tuple[str, ...]:
+    """Modules of this project in which a worker will look for what these pickles name."""
+    found = dict[str, None]()
+    for content in pickled:
+        _Reader(content, found).load()
+    return tuple(name for name in found if name.partition(".")[0] in _OURS)
+
+
+class _Reader(pickle.Unpickler):
+    """Notes the modules that a pickle names."""
+
+    def __init__(self, content: bytes, found: dict[str, None]) -> None:
+        super().__init__(io.BytesIO(content))
+        self._found = found
+
+    def find_class(self, module_name: str, global_name: str) -> Any:  # noqa: ANN401 - anything
+        self._found[module_name] = None
+        return super().find_class(module_name, global_name)
+
+
+def cause_of(code: int) -> str:
+    """What an exit code of ``subprocess`` says."""
+    with suppress(ValueError):
+        return f"killed by {signal.Signals(-code).name}"
+    return f"exit code {code}"
 
 
 def answer(order: bytes, item: bytes) -> bytes:
@@ -69,13 +102,15 @@ def _told(error: BaseException) -> str:
 
 
 def _tidy_up() -> None:
-    """Free what the item has left: robots hold tens of megabytes of records, in cycles.
-
-    What the first one has imported and kept is not looked through again: that takes long.
-    """
+    """Free what the item has left: robots hold tens of megabytes of records, in cycles."""
     gc.collect()
-    if not gc.get_freeze_count():
-        gc.freeze()
+    _keep_the_rest()
+
+
+@cache
+def _keep_the_rest() -> None:
+    """What the first item has imported and kept is not looked through again: that takes long."""
+    gc.freeze()
 
 
 @lru_cache(maxsize=1)

@@ -14,7 +14,7 @@ from motions.feasibility import dynamic, flight, friction, kinematic
 from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion, timeline_of
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.departure import departure_measurements, departures
-from motions.feasibility.hulls import LinkHulls
+from motions.feasibility.hulls import hulls_of
 from motions.feasibility.limits import FeasibilityLimits, FlightLimits
 from motions.feasibility.load import loaded, with_load
 from motions.feasibility.nearest import Progress, mending
@@ -58,7 +58,7 @@ class FeasibilityChecker:
         self._limits = limits or FeasibilityLimits()
         self._loaded = loaded(self.model, self.world.worst)
         self._collision = SelfCollision(self.model)
-        self._hulls = LinkHulls(self.model, self._collision.geometry)
+        self._hulls = hulls_of(self.model.description)
 
     def plan(self, motion: Playable, *, check: bool = True) -> MotionPlan:
         """The plan of ``motion``, compiled and checked no more often than needed.

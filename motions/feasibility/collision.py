@@ -23,6 +23,7 @@ nearest, and is left out. The least distance and its pair are those of looking a
 from __future__ import annotations
 
 import warnings
+from functools import lru_cache
 
 import coal
 import numpy as np
@@ -52,10 +53,10 @@ class SelfCollision:
     """
 
     def __init__(self, model: RobotModel) -> None:
-        """Load the meshes: a tenth of a second."""
+        """Take the convex bodies of ``model``; see ``geometry_of``."""
         self._model = model.pin_model
         self._data = self._model.createData()
-        self.geometry = _load(model.pin_model, model.description)
+        self.geometry = geometry_of(model.description)
         self._results = self.geometry.createData()
         objects = self.geometry.geometryObjects
         pairs = self.geometry.collisionPairs
@@ -132,7 +133,23 @@ def _lever_arms(model: pin.Model, body: pin.GeometryObject) -> Float[np.ndarray,
     return arms
 
 
-def _load(model: pin.Model, description: RobotDescription) -> pin.GeometryModel:
+def geometry_of(description: RobotDescription) -> pin.GeometryModel:
+    """The convex bodies of a robot, which all that ask for them share: never change them.
+
+    The first time takes a tenth of a second, and again if the URDF or the SRDF has been written.
+    """
+    return _geometry(description, written(description))
+
+
+def written(description: RobotDescription) -> tuple[int, ...]:
+    """When URDF and SRDF were written last [ns]."""
+    files = (description.urdf_path, description.srdf_path)
+    return tuple(file.stat().st_mtime_ns for file in files if file is not None)
+
+
+@lru_cache(maxsize=4)
+def _geometry(description: RobotDescription, _written: tuple[int, ...]) -> pin.GeometryModel:
+    model = RobotModel(description).pin_model
     folders = [str(folder) for folder in description.package_dirs]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # pin talks about its own argument names

@@ -9,6 +9,7 @@ height of the link's joint and c_k the corners (the hull's support function, Eri
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import final
 
 import numpy as np
@@ -17,7 +18,9 @@ from jaxtyping import Float
 from scipy.spatial import ConvexHull
 
 from go2_wbc.legs import LEGS, Leg
+from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
+from motions.feasibility.collision import geometry_of, written
 from motions.placement import attitudes
 from motions.trajectory import Trajectory
 
@@ -124,3 +127,13 @@ def _name(joint: int) -> str:
         return "trunk"
     leg, part = divmod(joint - TRUNK_JOINT - 1, len(PARTS))
     return f"{LEGS[leg].name} {PARTS[part]}"
+
+
+def hulls_of(description: RobotDescription) -> LinkHulls:
+    """The hulls of a robot's links; the first time takes 20 ms, see ``geometry_of``."""
+    return _hulls(description, written(description))
+
+
+@lru_cache(maxsize=4)
+def _hulls(description: RobotDescription, _written: tuple[int, ...]) -> LinkHulls:
+    return LinkHulls(RobotModel(description), geometry_of(description))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import gc
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
+from go2_wbc import legs
 from go2_wbc.lazy import lazy_exports, without_collecting
 
 MODULE = """
@@ -50,15 +53,31 @@ def test_an_unknown_name_is_refused() -> None:
         lazy_exports("go2_wbc", {"legs": ("Leg",)})("Other")
 
 
-def test_what_an_import_made_is_old_and_a_programs_frozen_objects_stay_frozen() -> None:
+@pytest.fixture
+def _nothing_frozen() -> Iterator[None]:
+    """As in a program that has frozen nothing."""
+    gc.unfreeze()
+    yield
+    gc.freeze()
+
+
+@pytest.mark.usefixtures("_nothing_frozen")
+def test_what_an_import_made_is_old_and_a_programs_frozen_objects_stay_frozen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     with without_collecting():
         made = [[] for _ in range(5000)]
+        monkeypatch.setitem(sys.modules, "go2_wbc.first", ModuleType("first"))
     assert gc.get_count()[0] < len(made)
     assert not gc.get_freeze_count()
     gc.freeze()
-    try:
-        with without_collecting():
-            pass
-        assert gc.get_freeze_count()
-    finally:
-        gc.unfreeze()
+    with without_collecting():
+        monkeypatch.setitem(sys.modules, "go2_wbc.second", ModuleType("second"))
+    assert gc.get_freeze_count()
+
+
+def test_frozen_objects_are_not_counted_where_nothing_is_imported(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(gc, "get_freeze_count", lambda: pytest.fail("takes tens of ms"))
+    assert lazy_exports("go2_wbc", {"legs": ("Leg",)})("Leg") is legs.Leg

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import signal
 import sys
 import threading
@@ -72,6 +73,20 @@ def process(seed: int) -> dict[str, object]:
     return {"pid": os.getpid(), "parent": os.getppid()}
 
 
+def surroundings(seed: int) -> dict[str, object]:
+    """What a worker has from its parent, and the threads of the process that has forked it."""
+    status = Path(f"/proc/{os.getppid()}/status").read_text()
+    return {
+        "folder": str(Path.cwd()),
+        "variable": os.environ.get("GO2_WBC_TEST_VARIABLE", ""),
+        "place": sys.path[-1],
+        "robot": "pinocchio" in sys.modules,
+        "kernels": "go2_wbc.kernels.mpc" in sys.modules,
+        "threads": int(status.partition("Threads:")[2].split()[0]),
+        "number": float(np.random.random()),  # noqa: NPY002 - nobody has seeded it
+    }
+
+
 def slow(seed: int) -> dict[str, object]:
     """Long enough that a test can kill its parent in the middle."""
     end = time.process_time() + 0.01
@@ -82,6 +97,13 @@ def slow(seed: int) -> dict[str, object]:
 
 def wait_for_ever(seed: int) -> dict[str, object]:
     threading.Event().wait()
+    return {}
+
+
+def stuck(seed: int) -> dict[str, object]:
+    """Tells its number in the file named by the variable, then lets no other thread run."""
+    Path(os.environ["GO2_WBC_TEST_FILE"]).write_text(str(os.getpid()))
+    re.match("(a+)+$", "a" * 60 + "b")
     return {}
 
 

@@ -201,11 +201,11 @@ def test_workers_end_with_a_parent_that_was_killed(out: Path) -> None:
         f"sweep(swept.wait_for_ever, 4, workers=2, out={str(out)!r})"
     )
     process = running([sys.executable, "-c", code])
-    wait_until(lambda: len(children(process.pid)) == 2)
-    workers = children(process.pid)
+    wait_until(lambda: len(descendants(process.pid)) == 3)  # two workers and what forks them
+    started = descendants(process.pid)
     os.kill(process.pid, signal.SIGKILL)
     process.wait(HANG_GUARD)
-    wait_until(lambda: not any(is_running(pid) for pid in workers))
+    wait_until(lambda: not any(is_running(pid) for pid in started))
 
 
 def has_rows(out: Path, least: int) -> bool:
@@ -216,8 +216,10 @@ def rows_in(out: Path) -> int:
     return len(read_sweep(out).rows) if out.is_file() and out.stat().st_size else 0
 
 
-def children(pid: int) -> list[int]:
-    return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+def descendants(pid: int) -> list[int]:
+    """The processes that a running one has started, and those that they have."""
+    own = [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    return own + [later for child in own for later in descendants(child)]
 
 
 def is_running(pid: int) -> bool:

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
 from motions.feasibility import collision
 from motions.feasibility.collision import SLACK, STRIDE, SelfCollision
+from motions.feasibility.hulls import hulls_of
 from motions.trajectory import trajectory_of
 from tests.engine_helpers import standing_q
 
@@ -95,3 +99,19 @@ def test_few_pairs_are_looked_at_along_a_motion(
         looked.clear()
         bodies.nearest_along(q)
         assert looked["pairs"] < 10 * len(q) + len(bodies.names)  # of 145
+
+
+def test_bodies_are_loaded_once_and_again_if_the_file_has_changed(tmp_path: Path) -> None:
+    installed = find_description()
+    assert collision.geometry_of(installed) is collision.geometry_of(find_description())
+    urdf = tmp_path / "go2.urdf"
+    urdf.write_bytes(installed.urdf_path.read_bytes())
+    own = find_description(urdf)
+    first = collision.geometry_of(own)
+    assert first is not collision.geometry_of(installed)
+    assert collision.geometry_of(own) is first
+    hulls = hulls_of(own)
+    os.utime(urdf, ns=(0, 0))
+    assert collision.geometry_of(own) is not first
+    assert hulls_of(own) is not hulls
+    assert hulls_of(own) is hulls_of(own)
