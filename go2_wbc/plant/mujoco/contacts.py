@@ -56,7 +56,7 @@ class Contacts:
         """The present ones."""
         contacts = data.contact
         return Contacts(
-            _pair_codes(data, layout),
+            layout.geom_codes[contacts.geom].sum(axis=1),
             contacts.dist.copy(),
             contacts.pos.copy(),
             contacts.frame[:, :3].copy(),
@@ -100,8 +100,3 @@ def _gathered(
     when = np.repeat(np.arange(len(instants)), [len(contacts.codes) for contacts in instants])
     codes = np.concatenate([contacts.codes for contacts in instants])
     return when, codes, np.concatenate([contacts.distances for contacts in instants])
-
-
-def _pair_codes(data: mujoco.MjData, layout: MujocoLayout) -> Int[np.ndarray, " n"]:
-    """Sum of both geoms' codes: ``FOREIGN`` plus a bin if exactly one belongs to the robot."""
-    return layout.geom_codes[data.contact.geom].sum(axis=1)

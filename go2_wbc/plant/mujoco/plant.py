@@ -194,17 +194,13 @@ class MujocoPlant(Plant):
 
     def truth(self) -> RobotState:
         """The true state now, for tests and judges; ``read`` gives the same with ideal sensors."""
-        q, v = np.empty(19), np.empty(18)
-        self._read_joints(q, v)
-        forces = self._forces[: len(LEGS)].copy()
-        return RobotState(
-            time=self.time,
-            q=q,
-            v=v,
-            tau=self._tau.copy(),
-            foot_forces=forces,
-            feet_in_contact=forces > FOOT_CONTACT_THRESHOLD,
-        )
+        if self._truth is None:
+            q, v = np.empty(19), np.empty(18)
+            self._read_joints(q, v)
+            forces = self._forces[: len(LEGS)].copy()
+            touching = forces > FOOT_CONTACT_THRESHOLD
+            self._truth = RobotState(self.time, q, v, self._tau.copy(), forces, touching)
+        return self._truth
 
     def write(self, command: JointCommand) -> None:
         """Applies ``command`` for one control period, with the motor law at every physics step.
@@ -342,7 +338,7 @@ class MujocoPlant(Plant):
         self._commands.waiting = saved.waiting
         self._tau, self._forces = saved.tau, saved.forces
         self._rng.bit_generator.state = dict(saved.noise_state)
-        self._state, self._imu = saved.state, saved.imu
+        self._truth, self._state, self._imu = None, saved.state, saved.imu
         if self._senses is not None and saved.senses is not None:
             self._senses.restore(saved.senses)
 
@@ -356,7 +352,7 @@ class MujocoPlant(Plant):
 
     def _sense(self) -> None:
         """Lets the robot's own sensors read, if it lives on them."""
-        self._state, self._imu = None, None
+        self._truth, self._state, self._imu = None, None, None
         if self._senses is not None:
             self._state, self._imu = self._senses.sense(self.truth(), self._true_imu())
 
