@@ -8,6 +8,8 @@ SHELL := bash
 
 # A shell that has sourced another robot stack would put its own Pinocchio before ours.
 unexport PYTHONPATH
+# Tests start many processes: without its bytecode each would compile the project again.
+unexport PYTHONDONTWRITEBYTECODE
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
 PYTHON ?=

@@ -18,6 +18,7 @@ from motions.authoring import Choice
 from motions.dynamics.cache import SHIPPED, problem_key, ship
 from motions.dynamics.limits import PlanLimits
 from motions.dynamics.phases import PhaseProblem
+from motions.phase_key import PhaseKey
 
 EXAMPLES = """
 python -m benchmarks solve
@@ -55,6 +56,8 @@ def shipped_problems(model: RobotModel) -> dict[str, PhaseProblem]:
     """The problems of all motions of the library, by their keys."""
     found = {}
     for line in _timelines():
+        if not line.in_order(PhaseKey):  # nothing in it is solved
+            continue
         for span in compile_timeline(line, model).dynamic:
             if isinstance(span.asked, PhaseProblem):
                 found[problem_key(span.asked, model, PlanLimits())] = span.asked

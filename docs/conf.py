@@ -26,6 +26,7 @@ extensions = [
     "import_graph",
     "mathml",
     "plain_docstrings",
+    "quick_references",
     "reference_pages",
 ]
 exclude_patterns = ["_build", "**/.ipynb_checkpoints"]
@@ -45,6 +46,7 @@ autodoc_mock_imports = ["rclpy", "cyclonedds"]
 autodoc_member_order = "bysource"
 autodoc_preserve_defaults = True
 autodoc_typehints_format = "short"
+autodoc_use_type_comments = False  # there are none: looking for them is a thirtieth of a build
 autoclass_content = "both"  # the class, then what its __init__ takes
 napoleon_numpy_docstring = False
 napoleon_custom_sections = [("Attributes", "params_style")]  # a list of fields without links

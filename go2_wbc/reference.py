@@ -47,6 +47,7 @@ class LegTask(IntEnum):
 
 
 _LEG_TASKS = tuple(LegTask)
+_STANCE = int(LegTask.STANCE)  # a number: looking an enumeration's members up takes longer
 _BODY_PARTS = ("p_world", "v_world", "a_world", "R_world_base", "w_world", "dw_world")
 
 
@@ -55,6 +56,9 @@ class TrackedPoint(Enum):
 
     COM = "com"
     BASE = "base"
+
+
+_COM, _BASE = TrackedPoint
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,10 +151,10 @@ class Reference:
     def _unpacked(self, name: str) -> object:
         view = partial(REFERENCE.view, self.row)
         if name == "body":
-            point = TrackedPoint.COM if view("is_com") else TrackedPoint.BASE
+            point = _COM if view("is_com") else _BASE
             return BodyTarget(point, *(view(part) for part in _BODY_PARTS))
         if name == "stance":
-            return view("legs") == LegTask.STANCE
+            return view("legs") == _STANCE
         if name == "legs":
             return tuple(_LEG_TASKS[int(task)] for task in view("legs").tolist())
         if name in ("force_weight", "friction"):

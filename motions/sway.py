@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.interpolate import BSpline, CubicSpline
 from scipy.sparse import block_diag, csr_matrix, diags, eye, hstack, vstack
 from scipy.sparse.linalg import spsolve
@@ -85,17 +85,28 @@ class Stepping:
         return p - self.lever[:, None] * path(self.times, 2) + self.bias
 
 
-def sway(stepping: Stepping) -> Float[np.ndarray, "n 2"]:
-    """What to add to the place of the CoM [m]; nothing, at rest, at both ends."""
-    values, curvature, jerk = _spline(stepping)
-    if not values.nnz:
-        return np.zeros((len(stepping.times), 2))
-    G, h = _limits(stepping, values, csr_matrix(values - diags(stepping.lever) @ curvature))
-    period = float(np.mean(np.diff(stepping.times)))
-    own = period * (values.T @ values) + SMOOTHING**6 * (jerk.T @ jerk)
-    H = csr_matrix(block_diag([own, own]))
-    x = _least(H, G, h, STIFFNESS * period).reshape(2, -1)
-    return np.column_stack([values @ x[0], values @ x[1]])
+class SwayProblem:
+    """What to add to the place of the CoM in a stretch; its ``bias`` may change."""
+
+    def __init__(self, stepping: Stepping) -> None:
+        """Set it up for ``stepping``, with any bias."""
+        values, curvature, jerk = _spline(stepping)
+        self._values, self._period = values, float(np.mean(np.diff(stepping.times)))
+        if not values.nnz:
+            return
+        zmp = csr_matrix(values - diags(stepping.lever) @ curvature)
+        self._limits = _Limits.of(stepping, values, zmp)
+        own = self._period * (values.T @ values) + SMOOTHING**6 * (jerk.T @ jerk)
+        self._H = csr_matrix(block_diag([own, own]))
+
+    def solve(self, stepping: Stepping) -> Float[np.ndarray, "n 2"]:
+        """The way [m] in the same stretch with its bias; nothing, at rest, at both ends."""
+        if not self._values.nnz:
+            return np.zeros((len(stepping.times), 2))
+        limits = self._limits
+        x = _least(self._H, limits.G, limits.bounds_of(stepping), STIFFNESS * self._period)
+        ways = x.reshape(2, -1)
+        return np.column_stack([self._values @ ways[0], self._values @ ways[1]])
 
 
 def _least(
@@ -151,24 +162,49 @@ def _spline(stepping: Stepping) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
     return first, second, third
 
 
-def _limits(
-    stepping: Stepping, values: csr_matrix, zmp: csr_matrix
-) -> tuple[csr_matrix, Float[np.ndarray, " k"]]:
-    """G, h: the sway x keeps zero-moment point and CoM inside where G x <= h."""
-    normals, bounds = _edges(stepping)
-    many = np.flatnonzero(stepping.stance.sum(axis=1) > 2)
-    parts, ends = [], []
-    for table, rows, points in (
-        (zmp, np.arange(len(bounds)), stepping.zmp()),
-        (values, many, stepping.p_com[:, :2]),
-    ):
-        for edge in range(normals.shape[1]):
-            n, part = normals[rows, edge], table[rows]
-            parts.append(hstack([diags(n[:, 0]) @ part, diags(n[:, 1]) @ part]))
-            ends.append(bounds[rows, edge] - (n * points[rows]).sum(axis=1))
-    h = np.concatenate(ends)
-    is_edge = np.isfinite(h)
-    return csr_matrix(vstack(parts))[is_edge], h[is_edge]
+@dataclass(frozen=True, slots=True)
+class _Limits:
+    """The sway x keeps zero-moment point and CoM inside where G x <= h.
+
+    Attributes:
+        G: one row for an edge at an instant; first those of the zero-moment point.
+        rows: instant of each row.
+        normals: of the edges.
+        bounds: n p <= b where the point p keeps its margin.
+        of_com: number of rows of the zero-moment point, the first that is of the CoM.
+    """
+
+    G: csr_matrix
+    rows: Int[np.ndarray, " k"]
+    normals: Float[np.ndarray, "k 2"]
+    bounds: Float[np.ndarray, " k"]
+    of_com: int
+
+    @staticmethod
+    def of(stepping: Stepping, values: csr_matrix, zmp: csr_matrix) -> _Limits:
+        """Of every edge at every instant; the CoM's where more than two feet stand."""
+        normals, bounds = _edges(stepping)
+        edges, rows = np.nonzero(np.isfinite(bounds).T)  # edge after edge
+        own = np.flatnonzero((stepping.stance.sum(axis=1) > 2)[rows])
+        place = np.concatenate([np.arange(len(rows)), own])
+        n = normals[rows, edges]
+        parts = [
+            hstack([diags(n[kept, 0]) @ part, diags(n[kept, 1]) @ part])
+            for kept, part in ((slice(None), zmp[rows]), (own, values[rows[own]]))
+        ]
+        return _Limits(
+            G=csr_matrix(vstack(parts)),
+            rows=rows[place],
+            normals=n[place],
+            bounds=bounds[rows, edges][place],
+            of_com=len(rows),
+        )
+
+    def bounds_of(self, stepping: Stepping) -> Float[np.ndarray, " k"]:
+        """h: how far each point may go beyond where it is without a sway [m]."""
+        first, rest = self.rows[: self.of_com], self.rows[self.of_com :]
+        points = np.concatenate([stepping.zmp()[first], stepping.p_com[rest, :2]])
+        return self.bounds - (self.normals * points).sum(axis=1)
 
 
 def _edges(

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from motions.placement import Wanted, attitudes, centres_of_mass, configurations, place
-from motions.sway import Stepping, sway
+from motions.sway import Stepping, SwayProblem
 from motions.tracks import LegTracks, Poses, Times
 from motions.trajectory import rates, zero_moment_points
 
@@ -60,8 +60,9 @@ def swayed(
         p_feet=p_feet,
     )
     placed = place(wanted, CENTRING_STEPS, model)
+    problem = SwayProblem(stepping)
     for _ in range(PASSES):
-        way = sway(stepping)
+        way = problem.solve(stepping)
         wanted = replace(wanted, p=com + np.pad(way, ((0, 0), (0, 1))))
         placed = place(wanted, CENTRING_STEPS, model)
         true = _zmp(span.times, np.hstack([placed.p_base, rpy]), placed.q_joints, model)

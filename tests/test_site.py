@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
@@ -145,6 +147,34 @@ def test_a_docstring_keeps_its_bars_and_its_indented_blocks() -> None:
         "    x: any.",
         "",
     ]
+
+
+def test_a_name_is_found_as_sphinx_finds_it() -> None:
+    from sphinx.domains.python import ObjectEntry, PythonDomain
+
+    kinds = {"a.Leg": "class", "a.b.Leg": "class", "a.Leg.hip": "method", "b.hip": "function"}
+    objects = {name: ObjectEntry("page", name, kind, False) for name, kind in kinds.items()}
+    theirs = domain_of(PythonDomain, objects)
+    ours = domain_of(extension("quick_references").QuickPythonDomain, objects)
+    found = 0
+    for name in ("Leg", "a.Leg", "Leg.hip", "hip()", "eg", "float", ""):
+        for where in (("", ""), ("a", ""), ("a", "Leg"), ("a.b", "")):
+            for role, mode in (("class", 0), ("class", 1), ("meth", 1), ("func", 1), (None, 0)):
+                usual = theirs.find_obj(None, *where, name, role, mode)
+                assert ours.find_obj(None, *where, name, role, mode) == usual
+                found += len(usual)
+    assert found > 10
+    ours.data["objects"]["c.Foot"] = ObjectEntry("page", "c.Foot", "class", False)
+    assert ours.find_obj(None, "", "", "Foot", "class", 1)[0][0] == "c.Foot"
+
+
+def domain_of(kind: type, objects: Mapping[str, object]) -> Any:  # noqa: ANN401
+    """A domain outside of a build, which knows ``objects``."""
+    domain: Any = object.__new__(kind)
+    domain.data = {"objects": dict(objects)}
+    roles = {"class": ["class"], "meth": ["method"], "func": ["function"]}
+    domain.objtypes_for_role = roles.get
+    return domain
 
 
 def test_every_public_module_has_its_place_in_the_reference() -> None:

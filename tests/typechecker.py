@@ -20,11 +20,10 @@ from jaxtyping import _decorator
 
 CHECKED_CALLS = 10
 """Of each place: a tick of the control loop has 400, and a check takes 25 us."""
-STRIDE = 61
-"""Prime, so that the calls of a loop come up in turn, whatever their number."""
+STRIDE = 251
+"""Prime, so that the calls of a loop come up in turn, whatever their number. A control loop makes
+its calls as often in half a second; at every 61st the checks took a quarter of a tick."""
 _check = beartype(conf=BeartypeConf(is_pep484_tower=True))
-_LONGEST_CODE = 1 << 20
-"""Bytes; the longest function has a fraction of it."""
 _calls: dict[int, int] = {}
 """By place: how many calls it has made since the last ``renew``."""
 
@@ -57,24 +56,32 @@ def _rationed(jaxtyped: Callable[..., Any]) -> Callable[..., Any]:
             return partial(decorator, typechecker=typechecker)
         if getattr(decorated, "__globals__", None) is globals():  # inherited, and counted already
             return decorated
-        made = jaxtyped(decorated, typechecker=typechecker)
-        return _counted(decorated, made) if isinstance(decorated, FunctionType) else made
+        make = partial(jaxtyped, decorated, typechecker=typechecker)
+        return _counted(decorated, make) if isinstance(decorated, FunctionType) else make()
 
     return decorator
 
 
-def _counted(plain: Callable[..., Any], strict: Callable[..., Any]) -> Callable[..., Any]:
-    """``strict`` for the calls that are to be checked, ``plain`` for the others."""
+def _counted(
+    plain: Callable[..., Any], make: Callable[[], Callable[..., Any]]
+) -> Callable[..., Any]:
+    """What ``make`` makes for the calls that are to be checked, ``plain`` for the others.
+
+    It is made at the first call: reading the annotations of all functions takes a second.
+    """
+    strict: list[Callable[..., Any]] = []
 
     @wraps(plain)
     def counted(*args: object, **kwargs: object) -> object:
         __tracebackhide__ = True
         caller = sys._getframe(1)
-        place = id(caller.f_code) * _LONGEST_CODE + caller.f_lasti
+        place = id(caller.f_code) + caller.f_lasti  # an address within the code: no other has it
         calls = _calls[place] = _calls.get(place, 0) + 1
         if calls > CHECKED_CALLS and calls % STRIDE:
             return plain(*args, **kwargs)
-        return strict(*args, **kwargs)
+        if not strict:
+            strict.append(make())
+        return strict[0](*args, **kwargs)
 
     return counted
 

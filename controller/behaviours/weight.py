@@ -53,7 +53,8 @@ class FeltWeight:
         ones: so much force does the plan take.
         """
         a_world = REFERENCE.view(row, "a_world")
-        self._is_over |= bool((REFERENCE.view(row, "legs") != LegTask.STANCE).any())
+        if not self._is_over:
+            self._is_over = bool((REFERENCE.view(row, "legs") != LegTask.STANCE).any())
         if not self._is_over:
             mass = float(snapshot.mass_matrix[0, 0])
             self._felt += dt * vertical_force(snapshot, self._friction) / mass

@@ -11,7 +11,7 @@ in a second at most, which is as fast as it must fall at the end, so that nothin
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Float
@@ -46,7 +46,7 @@ class BodyPose:
     @property
     def row(self) -> Float[np.ndarray, "4"]:
         """Height [m], roll, pitch, yaw [rad]."""
-        return np.array(astuple(self))
+        return np.array([self.height, self.roll, self.pitch, self.yaw])
 
 
 LEVEL = BodyPose()
@@ -132,9 +132,9 @@ class PosePath:
 
     def ahead(self, target: BodyPose, step: float, count: int) -> Float[np.ndarray, "count 2 4"]:
         """Pose and rate at the ends of the next ``count`` steps [s]."""
-        path, pose, rate = np.empty((count, 2, 4)), self.pose, self.rate
+        path, pose, rate, wanted = np.empty((count, 2, 4)), self.pose, self.rate, target.row
         for node in path:
-            pose, rate = self._after(pose, rate, target.row, step)
+            pose, rate = self._after(pose, rate, wanted, step)
             node[:] = pose, rate
         return path
 

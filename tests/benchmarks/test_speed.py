@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -18,10 +20,17 @@ KNEE_DIFFERENCE = 0.2
 weighs torques, and so prefers other forces between the feet."""
 
 
+record = speed_solves.recorded_ticks
+recorded_ticks = cache(record)
+"""One run of few rounds for all tests: nothing changes a tick that is recorded."""
+
+
 @pytest.fixture(autouse=True)
 def few_rounds(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed_solves, "ROUNDS", 3)
     monkeypatch.setattr(speed_solves, "WARM_UP", 1)
+    for module in (speed_solves, speed_ticks):
+        monkeypatch.setattr(module, "recorded_ticks", recorded_ticks)
 
 
 def assert_complete(measured: Measurement, metrics: tuple[Metric, ...]) -> None:
@@ -36,7 +45,7 @@ def test_both_solve_the_same_ticks_in_every_contact_mode() -> None:
 
 def test_placo_is_asked_for_the_same_torques(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed_solves, "ROUNDS", 700)
-    standing = speed_solves.recorded_ticks(Trial(0))[4][-1]
+    standing = record(Trial(0))[4][-1]
     model, config = RobotModel(), WbcConfig()
     tau = BarePlaco(model, config).tick(standing.state, standing.reference)
     ours = WholeBodyController(model).solve(standing.snapshot, standing.reference)
@@ -44,7 +53,7 @@ def test_placo_is_asked_for_the_same_torques(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_reference_is_packed_again_for_every_measurement_if_it_came_unpacked() -> None:
-    ticks = speed_solves.recorded_ticks(Trial(0))
+    ticks = recorded_ticks(Trial(0))
     for tick in (tick for kept in ticks.values() for tick in kept):
         assert (tick.asked()._row is not None) == tick.is_packed
 

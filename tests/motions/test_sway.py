@@ -11,7 +11,7 @@ from go2_wbc.geometry import support_margins
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from motions.footing import standing_feet
-from motions.sway import INSIDE, OFF_LINE, Stepping, sway
+from motions.sway import INSIDE, OFF_LINE, Stepping, SwayProblem
 
 NOMINAL = standing_feet(RobotModel())
 TIMES = np.linspace(0.0, 3.0, 301)
@@ -32,6 +32,17 @@ def stepping(raised: dict[Leg, tuple[float, float]]) -> Stepping:
         gravity=9.81,
         bias=np.zeros((len(TIMES), 2)),
     )
+
+
+def sway(asked: Stepping) -> np.ndarray:
+    return SwayProblem(asked).solve(asked)
+
+
+def test_a_problem_is_solved_with_another_bias_as_if_it_were_made_with_it() -> None:
+    asked = stepping({Leg.FL: (1.0, 1.3), Leg.RR: (1.5, 1.9)})
+    biased = replace(asked, bias=np.full((len(TIMES), 2), 0.01))
+    assert np.array_equal(SwayProblem(asked).solve(biased), sway(biased))
+    assert not np.array_equal(sway(asked), sway(biased))
 
 
 def test_nothing_moves_where_nothing_must() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import importlib
 import multiprocessing
 import os
@@ -85,6 +86,7 @@ class Sandbox:
 
 def _run_pytest(home: Path, told: Path, command: list[str], limit: int) -> None:
     """In a fork: forget what was imported of the real tree, and test the copy."""
+    gc.freeze()  # what the process before the fork has made stays
     os.setsid()
     resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
     sys.stdout = sys.stderr = stream = told.open("w")

@@ -60,4 +60,11 @@ def test_every_mutant_is_python_and_none_is_drawn_twice() -> None:
     assert len({mutant.name for mutant in drawn}) == 300
     for mutant in drawn:
         source = (ROOT / mutant.path).read_bytes()
-        assert ast.dump(ast.parse(mutant.applied(source))) != ast.dump(ast.parse(source))
+        line = source.count(b"\n", 0, mutant.start) + 1
+        assert statement_at(line, mutant.applied(source)) != statement_at(line, source)
+
+
+def statement_at(line: int, source: bytes) -> str:
+    """The function or class that the line belongs to, as it is parsed."""
+    body = ast.parse(source).body
+    return next(ast.dump(node) for node in body if line <= (node.end_lineno or node.lineno))

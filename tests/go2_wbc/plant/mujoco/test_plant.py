@@ -296,6 +296,19 @@ def test_a_restored_plant_goes_on_as_it_did_even_in_the_middle_of_a_push(sensors
     assert all(map(same, first, history(plant)))
 
 
+def test_the_truth_is_that_of_this_moment_after_all_that_changes_it() -> None:
+    plant = MujocoPlant(sensors="noisy")
+    saved, lying = plant.save(), plant.truth()
+    plant.write(DAMPED)
+    fallen = plant.truth()
+    assert fallen.time > lying.time
+    assert np.array_equal(fallen.q[:3], plant.data.qpos[:3])
+    plant.place(np.concatenate([[1.0, -2.0, 3.0], lying.q[3:]]))
+    assert plant.truth().q[2] == 3.0
+    plant.restore(saved)
+    assert same(plant.truth(), lying)
+
+
 # --- noise --------------------------------------------------------------------------------------
 
 
