@@ -16,12 +16,17 @@ from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline
 from motions.dynamics import PhaseProblem, Solved, moves, solve
 from motions.dynamics.cache import keep
+from motions.dynamics.limits import PlanLimits
 from motions.dynamics.phases import GRAVITY, KNOT_PERIOD
 
 BISECTIONS = 2
 """Between the greatest size that is found and the least that is not."""
 FLIGHT_STEPS = (0, 2, -2)
 """Knots by which the time in the air is changed, in this order, where there is no plan."""
+LIMITS = PlanLimits(torque_share=0.84, knee_height=0.12)
+"""What the greatest jumps keep, more strictly than others: with knees 0.09 m high at least, calves
+touch the ground in landing; at 0.85 of the torque, the check allows 0.845. Chosen on a jump of 0.7
+m and the seeds of the trials by which a climb decides."""
 DRAWN_UP = 0.10
 """Height [m] that the feet gain by drawing up the legs, for which the trunk need not rise."""
 
@@ -192,7 +197,7 @@ class Climber:
         phases = moves.jump(jump.x, 0.0, jump.yaw, jump.height, flight=jump.flight)
         problem, reason = PhaseProblem(phases), ""
         try:
-            plan = solve(problem, self._model, budget=self._budget, start=self._last)
+            plan = solve(problem, self._model, budget=self._budget, limits=LIMITS, start=self._last)
         except PlanNotFound as error:
             reason = "; ".join([str(error).split("\n")[0], *error.reasons])
         else:

@@ -276,6 +276,22 @@ class Footsteps:
     normal_force_max: float
 
 
+@dataclass(frozen=True, slots=True)
+class PlanFeedback:
+    """How a solved plan brings the robot back to its state, at one instant.
+
+    Attributes:
+        q: (19,) planned configuration, in the motion's frame.
+        v: (18,) planned velocity.
+        gains: feedback of the state's error (as Pinocchio's ``difference`` of planned and measured
+            q, then of v) into torques: tau - gains @ error [N m].
+    """
+
+    q: Float[np.ndarray, "19"]
+    v: Float[np.ndarray, "18"]
+    gains: Float[np.ndarray, "12 36"]
+
+
 class MotionPlan(ABC):
     """A motion, ready to be played: a reference for every instant, in the motion's own frame.
 
@@ -311,6 +327,11 @@ class MotionPlan(ABC):
     def has_dynamic_spans(self) -> bool:
         """Whether some of it is solved by the whole robot's dynamics."""
         return False
+
+    def feedback_at(self, t: float) -> PlanFeedback | None:
+        """The feedback ``t`` seconds after the start; None where it was not solved for two feet."""
+        del t
+        return None
 
     @property
     def footsteps(self) -> Footsteps | None:

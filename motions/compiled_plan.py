@@ -19,6 +19,7 @@ from go2_wbc.reference import (
     Footsteps,
     LegTask,
     MotionPlan,
+    PlanFeedback,
     Posture,
     Reference,
     TrackedPoint,
@@ -138,6 +139,13 @@ class CompiledPlan(MotionPlan):
         if forces is not None:
             row[_FORCES], row[_FORCE_WEIGHT] = forces.ravel(), FORCE_WEIGHT
         return row
+
+    def feedback_at(self, t: float) -> PlanFeedback | None:
+        """Of the span at ``t``, on two feet or one; see ``MotionPlan.feedback_at``."""
+        for span in self.dynamic:
+            if span.start <= t < span.end:
+                return span.feedback_at(t)
+        return None
 
     def readable_at(self, t: float) -> Reference:
         """The same as ``at``, step by step: what the kernel is held to."""

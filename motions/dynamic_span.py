@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 
 from go2_wbc.errors import MotionError
 from go2_wbc.legs import FOOT_NAMES
-from go2_wbc.reference import Anchor
+from go2_wbc.reference import Anchor, PlanFeedback
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
 from motions.dynamics.curves import ATTITUDE, sampled
 from motions.dynamics.nearest import Written
 from motions.dynamics.phases import PhaseProblem, Tolerance
-from motions.dynamics.trajectory import DynamicTrajectory
+from motions.dynamics.trajectory import BALANCING_FEET, DynamicTrajectory
 
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -85,6 +85,24 @@ class DynamicSpan:
                 np.maximum(plan.v[rows, 6:], plan.v[rows + 1, 6:]),
             ),
         )
+
+    def feedback_at(self, t: float) -> PlanFeedback | None:
+        """The feedback at ``t`` [s] of the plan, if two feet or one stand then.
+
+        The planned state is that of the curves that are played, for which see ``centred``.
+        """
+        plan = self.trajectory
+        row = int(np.searchsorted(plan.times, t - self.start, side="right")) - 1
+        row = min(max(row, 0), len(plan.tau) - 1)
+        if not 1 <= plan.stance[row].sum() <= BALANCING_FEET:
+            return None
+        step = float(plan.times[row + 1] - plan.times[row])
+        share = (t - self.start - float(plan.times[row])) / step
+        v = (1.0 - share) * plan.v[row] + share * plan.v[row + 1]
+        way = step * (share * plan.v[row + 1] - 0.5 * v)
+        base = pin.XYZQUATToSE3(plan.q[row, :7]) * pin.exp6(way[:6])
+        q = np.concatenate([pin.SE3ToXYZQUAT(base), plan.q[row, 7:] + way[6:]])
+        return PlanFeedback(q, v, plan.gains[row])
 
 
 @dataclass(frozen=True, slots=True)

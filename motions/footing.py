@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float
 
@@ -15,6 +17,8 @@ from motions.language.written import SAME, Written
 
 Times = Float[np.ndarray, " n"]
 
+SQUARE = 1e-3
+"""Distance [m] from its place below the hip within which a foot is in it."""
 _ROUND = 64.0
 """1 / (u^3 (1 - u)^3) at u = 1/2: makes the height of a swing 1 in its middle."""
 
@@ -106,6 +110,46 @@ class Footing:
         frame = Anchor.of_feet(p_feet, 0.0)
         x, y, _ = frame.p_world.tolist()
         return x, y, frame.yaw
+
+    def steps_back(self, end: float) -> dict[StepKey, StepKey]:
+        """For every step the one back, of the motion that is this one backwards.
+
+        Args:
+            end: when the motion ends [s].
+
+        Raises:
+            TimelineError: if the feet do not end below their hips, where every motion starts.
+        """
+        last, frame = self.end, Anchor.of_feet(self.end, 0.0)
+        off = last - frame.p_world - self._nominal @ yaw_rotation(frame.yaw).T
+        if (far := np.abs(off[:, :2]).max(axis=1)).max() > SQUARE:
+            leg = Leg(int(np.argmax(far)))
+            raise TimelineError(
+                f"reverse(): foot {leg.name} ends {1e3 * far[leg]:.0f} mm from its place below the "
+                "hip, where no motion starts: end on walk() or turn()"
+            )
+        places = [(key, goal) for steps in self._steps.values() for key, goal in steps]
+        origins = {key: self._before(key) for key, _ in places}
+        found = dict[StepKey, StepKey]()
+        for key, goal in places:
+            p_feet = last.copy()
+            for other, _ in sorted(places, key=lambda place: -place[0].end):
+                if other.end > key.end + SAME:
+                    p_feet[other.leg] = origins[other]
+            R = yaw_rotation(Anchor.of_feet(p_feet, 0.0).yaw)
+            x, y, _ = ((origins[key] - goal) @ R).tolist()
+            start = end - key.end
+            found[key] = replace(
+                key, start=start, end=end - key.start, place=(x, y, 0.0), since=start,
+                is_square=False,
+            )  # fmt: skip
+        return found
+
+    def _before(self, key: StepKey) -> Float[np.ndarray, "3"]:
+        """Where the foot of a step stood before it [m]."""
+        places = [self.start[key.leg], *(goal for _, goal in self._steps[key.leg])]
+        keys = [other for other, _ in self._steps[key.leg]]
+        return places[keys.index(key)]
 
     def _goal(self, key: StepKey) -> Float[np.ndarray, "3"]:
         p_feet = self._feet_at(key.since)

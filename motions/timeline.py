@@ -26,6 +26,7 @@ from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.footing import Footing, standing_feet
+from motions.keys import StepKey
 from motions.language.clock import SAME
 from motions.language.flight import Flight
 from motions.language.shapes import Shapes
@@ -52,6 +53,19 @@ class Timeline(Shapes, Steps, Flight, Transforms):
             heading = yaw_rotation(Anchor.of_feet(feet, 0.0).yaw)
             feet, start = feet + block.shift @ heading.T, block.end
         return Footing(self._between(start, math.inf), nominal, feet).end_pose
+
+    def reverse(self) -> Timeline:
+        """The same motion backwards; it must end at home, with its feet below their hips.
+
+        A foot that steps goes back to where it came from.
+
+        Raises:
+            TimelineError: if it does not, or holds a call that has no way back.
+        """
+        steps = (
+            Footing(self, _nominal_feet()).steps_back(self.end) if self.in_order(StepKey) else {}
+        )
+        return self._reversed(steps)
 
     def _between(self, start: float, end: float) -> Timeline:
         """What is written from ``start`` to ``end`` [s]."""

@@ -12,6 +12,7 @@ from controller.behaviours.base import Behaviour
 from controller.behaviours.safe_return import SafeReturn
 from controller.behaviours.weight import FeltWeight
 from go2_wbc.planning.correction import tracked_position
+from go2_wbc.planning.feedback import fed_back
 from go2_wbc.planning.landing import Landings
 from go2_wbc.planning.playback import Deviation, PlanFollower, Playback
 from go2_wbc.reference import Anchor, MotionPlan, Posture, Reference
@@ -96,7 +97,12 @@ class PlayPlan(Behaviour):
         row, t = self._planned(snapshot)
         reference = self._follower.follow(row, snapshot, t, now - self._last)
         self._last = now
-        return reference
+        if not self.is_dynamic or self._return is not None:
+            return reference
+        feedback = self.plan.feedback_at(t)
+        if feedback is None:
+            return reference
+        return fed_back(reference, feedback, self._follower.anchor, snapshot)
 
     def _planned(self, snapshot: Snapshot) -> tuple[Float[np.ndarray, " size"], float]:
         """The plan's row of this tick, and how far into the plan it is [s]."""

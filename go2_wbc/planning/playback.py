@@ -57,6 +57,11 @@ class PlanFollower(ABC):
 
     @property
     @abstractmethod
+    def anchor(self) -> Anchor:
+        """Where the plan is now: landings move it."""
+
+    @property
+    @abstractmethod
     def landings(self) -> Landings:
         """What came of the landings of feet that step."""
 
@@ -108,6 +113,12 @@ class Playback(PlanFollower):
         return Reference.of_row(row)
 
     @property
+    def anchor(self) -> Anchor:
+        """See ``PlanFollower.anchor``."""
+        x, y, z, yaw = PLAYBACK.view(self._state, "anchor").tolist()
+        return Anchor(np.array([x, y, z]), yaw)
+
+    @property
     def landings(self) -> Landings:
         """See ``PlanFollower.landings``."""
         return Landings(int(self._state[_MISSED]), float(self._state[_ERROR]))
@@ -155,6 +166,11 @@ class ReadablePlayback(PlanFollower):
         counts = dt if reference.stance.any() else 0.0  # nothing can be corrected in flight
         body = self._correction.corrected(reference.body, snapshot, counts)
         return replace(reference, body=body)
+
+    @property
+    def anchor(self) -> Anchor:
+        """See ``PlanFollower.anchor``."""
+        return self._anchor if self._landing is None else self._landing.anchor
 
     @property
     def landings(self) -> Landings:

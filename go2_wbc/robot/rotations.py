@@ -41,6 +41,13 @@ def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Float[np.ndarr
     return pin.Quaternion(rotation_from_rpy(roll, pitch, yaw)).coeffs()
 
 
+def rotation_from_quaternion(quaternion: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"]:
+    """Rotation matrix of a unit quaternion x y z w."""
+    x, y, z, w = quaternion.tolist()
+    R: Float[np.ndarray, "3 3"] = pin.Quaternion(w, x, y, z).toRotationMatrix()
+    return R
+
+
 def rpy_from_quaternion(quaternion: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3"]:
     """Roll, pitch, yaw [rad] of a quaternion x y z w that is not 0; its length does not count."""
     unit = quaternion / np.linalg.norm(quaternion)

@@ -128,7 +128,9 @@ class _Audit:
         return Reading(name, float(values[row, column]), limit, unit, subjects[column], time)
 
     def _depth(self) -> Float[np.ndarray, "n1 4"]:
-        stands = np.vstack([self._plan.stance, self._plan.stance[-1:]])
+        """Of the feet in the air; one that stands in a step does so until the step's end."""
+        stance = self._plan.stance
+        stands = np.vstack([stance, stance[-1:]]) | np.vstack([stance[:1], stance])
         depth = self._model.foot_radius - self._plan.p_feet[:, :, 2]
         return np.where(stands, 0.0, depth)
 

@@ -84,7 +84,11 @@ def joint_speed(motion: Trajectory, model: RobotModel) -> Series:
 def clearance(
     motion: Trajectory, model: RobotModel, hulls: LinkHulls, limits: FeasibilityLimits
 ) -> Series:
-    """Heights of the lowest points of the links, and of the feet in the air, over the ground."""
+    """Heights of the lowest points of the links, and of the feet in the air, over the ground.
+
+    In solved parts a foot that lifts off stands until then: where it sinks in the last step of a
+    push-off, by half the square of the step times its J' v, that is the planner's integration.
+    """
     feet = _feet(motion, model)[:, :, 2] - model.foot_radius
     links, count = hulls.heights(motion), len(hulls.links)
     lower = {"thigh": limits.thigh_clearance, "calf": limits.calf_clearance}
@@ -95,7 +99,8 @@ def clearance(
     floor[np.ix_(motion.is_dynamic, calves)] = limits.solved_calf_clearance
     values = np.hstack([links, feet])
     is_checked = np.ones_like(values, dtype=bool)
-    is_checked[:, count:] = ~motion.stance
+    stood = np.vstack([motion.stance[:1], motion.stance[:-1]]) & motion.is_dynamic[:, None]
+    is_checked[:, count:] = ~(motion.stance | stood)
     subjects = (*hulls.names, *(f"{leg.name} foot" for leg in LEGS))
     what = ("clearance", "m", subjects, motion.times, values)
     return Series.against(*what, floor, is_floor=True, where=is_checked)

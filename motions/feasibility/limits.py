@@ -102,8 +102,8 @@ class FlightLimits:
         touchdown: greatest speed [m/s] of a foot that comes down.
         settling: time [s] on three feet or four in which the trunk comes to its plan, before there
             are two.
-        balance: longest time [s] on two feet without that: 2 mm become 50 mm, what a plan may be
-            off.
+        balance: longest time [s] on two feet without that: of pairs lifted at once, 0.86 s were
+            done, 40 mm off, and 0.96 s were not.
         unlike: greatest share by which the mass may differ from that it was solved for: with 2 kg,
             0.13, a rear is still done, with 4 kg it falls.
     """
@@ -116,7 +116,7 @@ class FlightLimits:
     slip: float = 0.02
     touchdown: float = 1.0
     settling: float = 0.3
-    balance: float = 0.55
+    balance: float = 0.7
     unlike: float = 0.15
 
     def __post_init__(self) -> None:

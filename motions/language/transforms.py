@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -19,6 +19,7 @@ from motions.keys import (
     LegTarget,
     Mark,
     PostureKey,
+    StepKey,
 )
 from motions.language.arrangement import Arrangement
 from motions.language.clock import SAME, BeatClock
@@ -102,17 +103,18 @@ class Transforms(Arrangement):
                 keys.append(BodyKey(move.start, move.end, Ease.MINIMUM_JERK, "z", goal))
         return replace(self, keys=tuple(keys))
 
-    def reverse(self: _Line) -> _Line:
-        """The same motion backwards; it must end at home.
+    def _reversed(self: _Line, steps: Mapping[StepKey, StepKey]) -> _Line:
+        """The same motion backwards; ``steps`` are those back, for every step.
 
         Raises:
-            TimelineError: if it does not, or holds a call that has no way back.
+            TimelineError: if it does not end at home, or holds a call that has no way back.
         """
         self._require_home("reverse()")
         end, last = self.end, dict[str, Any]()
         keys = list[Key]()
         for key in sorted(self.keys, key=lambda key: key.start):
-            keys.append(_backwards(key, last, self, end))
+            is_step = isinstance(key, StepKey)
+            keys.append(steps[key] if is_step else _backwards(key, last, self, end))
         counted = tuple(end - beat for beat in reversed(self.beats))
         line = replace(self, keys=tuple(keys), entry=self.exit, exit=self.entry)
         return replace(line, cursor=end, floor=0.0, counted=counted, counted_from=end)

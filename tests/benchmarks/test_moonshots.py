@@ -35,8 +35,15 @@ class Planner:
         self.kept: list[object] = []
 
     def solve(
-        self, problem: PhaseProblem, model: RobotModel, *, budget: float, start: Solved | None
+        self,
+        problem: PhaseProblem,
+        model: RobotModel,
+        *,
+        budget: float,
+        limits: PlanLimits,
+        start: Solved | None,
     ) -> str:
+        assert limits.knee_height > PlanLimits().knee_height
         self.starts.append(start)
         rise = problem.phases[2]
         height = max(place[2] for place in rise.feet.values())

@@ -11,7 +11,9 @@ import pytest
 from go2_wbc.errors import TimelineError
 from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import yaw_rotation
 from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg, load_motion
+from motions.footing import Footing, standing_feet
 from motions.keys import JointKey
 from motions.trajectory import trajectory_of
 
@@ -166,6 +168,29 @@ def test_backwards_twice_is_the_motion_itself() -> None:
         assert written(twice) == written(line)
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        Timeline().walk(0.2, turn=0.5, gait="trot"),
+        Timeline().walk(0.1, 0.05).foot("FR", z=0.1, over=0.7).home(over=0.7).turn(0.4),
+        Timeline().step("FL", 0.05, 0.02, yaw=0.1, over=0.5).walk(0.1, gait="trot"),
+    ],
+)
+def test_backwards_every_foot_steps_to_where_it_came_from(line: Timeline) -> None:
+    there, back = Footing(line, standing_feet(MODEL)), Footing(line.reverse(), standing_feet(MODEL))
+    times = np.linspace(0.0, line.end, 200)
+    x, y, yaw = line.end_pose
+    R, p_end = yaw_rotation(yaw), np.array([x, y, 0.0])
+    seen = p_end + back.places(times) @ R.T
+    assert seen == pytest.approx(there.places(line.end - times), abs=1e-9)
+    frames = back.frames(times)
+    assert (p_end[:2] + frames[:, :2] @ R[:2, :2].T) == pytest.approx(
+        there.frames(line.end - times)[:, :2], abs=1e-9
+    )
+    assert line.reverse().reverse().end_pose == pytest.approx(line.end_pose, abs=1e-9)
+    assert FeasibilityChecker(MODEL).check(line.reverse()).ok
+
+
 def test_a_loop_is_as_many_whole_rounds_as_fit() -> None:
     assert NOD.loop(until=5.0).end == pytest.approx(3 * 1.5)
     assert NOD.loop(until=3.0).end == pytest.approx(3.0)
@@ -198,6 +223,8 @@ def test_a_loop_is_as_many_whole_rounds_as_fit() -> None:
         (lambda: NOD.jump(height=0.1).shift_height(0.01), "dynamic block"),
         (lambda: NOD.scale(math.inf), "above 0"),
         (lambda: NOD.body(x=0.01, over=1.0).reverse(), "end at home"),
+        (lambda: Timeline().step("FL", 0.05, over=0.5).home(over=1.0).reverse(), "FL ends 38 mm"),
+        (lambda: Timeline().walk(0.1).jump(height=0.1).reverse(), "the whole robot.* no way back"),
         (lambda: NOD.loop(until=1.0), "less than the motion takes"),
         (lambda: Timeline().body(x=0.01, over=1.0, ease="hold").home(over=1.0).reverse(), "hold"),
     ],

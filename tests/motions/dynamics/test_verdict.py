@@ -61,6 +61,17 @@ def test_a_foot_under_the_ground_or_sliding_is_found(
     assert broken(jump, model) == {"depth under ground", "slip"}
 
 
+def test_a_foot_may_sink_in_the_step_in_which_it_pushes_off(
+    jump: DynamicTrajectory, model: RobotModel
+) -> None:
+    """Up to there it stands: the way that is left of the last step's curvature is no flight's."""
+    lifts = int(np.flatnonzero(~jump.stance.any(axis=1))[0])
+    jump.p_feet[lifts, Leg.FR, 2] = model.foot_radius - 0.009
+    assert broken(jump, model) == set()
+    jump.p_feet[lifts + 1, Leg.FR, 2] = model.foot_radius - 0.009
+    assert broken(jump, model) == {"depth under ground"}
+
+
 def test_a_joint_beyond_its_range_is_found(jump: DynamicTrajectory, model: RobotModel) -> None:
     jump.q[5, 9] = model.q_upper[2] + 0.01
     assert "angle beyond its limit" in broken(jump, model)
