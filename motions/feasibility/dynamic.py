@@ -11,6 +11,10 @@ frame, so w too), f the forces of the ground on the rolling contact points in th
 motion. Of the f that give the trunk its wrench within the friction pyramid, the one that deviates
 least from an even share of the weight is taken, and along the ground from none, the less the less a
 foot bears, as the whole-body controller does it; see ``_share``.
+
+The ground gives no force at once: MuJoCo's contacts need 20 ms (their ``solref``), as rubber and a
+leg's gears do. M a + h is therefore averaged over ``SPREAD`` samples before it is shared. Where a
+plan jumps from one sample to the next, the force of one is taken back by the other.
 """
 
 from __future__ import annotations
@@ -40,6 +44,9 @@ from motions.placement import attitudes, turned
 from motions.plan import NORMAL_FORCE_MAX
 from motions.trajectory import Trajectory, zero_moment_points
 
+SPREAD = 3
+"""Samples, 30 ms, over which forces are averaged: with it torques and slips of jolts came out as in
+MuJoCo (motions drawn for that alone), where single samples gave three times as much."""
 ARM = 0.2
 """Length [m] that makes moments comparable to forces: half the distance of front and rear feet."""
 EVENNESS = 1e-4
@@ -91,7 +98,7 @@ def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     from go2_wbc.kernels.loads import share_loads  # compiled; only who needs it waits for it
 
     rows = zip(motion.q, motion.v, motion.a, strict=True)
-    needed = np.array([model.inverse_dynamics(*row) for row in rows])
+    needed = _spread(np.array([model.inverse_dynamics(*row) for row in rows]), motion)
     contact, tau = np.zeros((len(needed), 4, 3)), needed[:, 6:].copy()
     missing = np.empty((len(needed), 2))
     joints, load_share = (np.array(a, order="C") for a in (motion.q[:, 7:], motion.load_share))
@@ -100,6 +107,18 @@ def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     share_loads(*given, *tables, contact, tau, missing)
     wrench = given[2]
     return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench), wrench)
+
+
+def _spread(needed: Float[np.ndarray, "n 18"], motion: Trajectory) -> Float[np.ndarray, "n 18"]:
+    """Means over ``SPREAD`` samples; solved parts, judged by their own forces, are left out."""
+    half = SPREAD // 2
+    counts = np.pad(1.0 * ~motion.is_dynamic, half, mode="edge")
+    weighted = np.pad(needed * ~motion.is_dynamic[:, None], ((half, half), (0, 0)), mode="edge")
+    total, count = (
+        sum(rows[k : len(rows) - 2 * half + k] for k in range(SPREAD))
+        for rows in (weighted, counts[:, None])
+    )
+    return np.where(motion.is_dynamic[:, None], needed, total / np.maximum(count, 1.0))
 
 
 def numbers_of(model: RobotModel) -> Float[np.ndarray, "4"]:
@@ -123,14 +142,17 @@ def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     """The same as ``forces_of``, one snapshot and one QP after the other: what it is held to."""
     count = len(motion.times)
     contact, tau = np.zeros((count, 4, 3)), np.zeros((count, 12))
-    missing, wrench = np.zeros((count, 2)), np.zeros((count, 6))
+    missing, needed = np.zeros((count, 2)), np.zeros((count, 18))
     for row in range(count):
         snapshot = model.snapshot(_state(motion, row))
-        needed = snapshot.mass_matrix @ motion.a[row] + snapshot.bias
-        wrench[row] = needed[:6]
-        contact[row], missing[row] = _share(snapshot, needed[:6], motion.load_share[row], model)
+        needed[row] = snapshot.mass_matrix @ motion.a[row] + snapshot.bias
+    needed = _spread(needed, motion)
+    wrench = needed[:, :6]
+    for row in range(count):
+        snapshot = model.snapshot(_state(motion, row))
+        contact[row], missing[row] = _share(snapshot, wrench[row], motion.load_share[row], model)
         J = snapshot.J_contacts.reshape(12, 18)
-        tau[row] = needed[6:] - J[:, 6:].T @ contact[row].ravel()
+        tau[row] = needed[row, 6:] - J[:, 6:].T @ contact[row].ravel()
     return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench), wrench)
 
 
