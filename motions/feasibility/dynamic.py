@@ -234,7 +234,8 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
     than three feet have no inside, none at all count as 1 m outside.
 
     Two feet hold a trunk that passes over the line between them, as a trot does: if they stand for
-    a short time only, the zero-moment point must be near that line, and the CoM need not.
+    a short time only, the zero-moment point must be near that line, and the CoM need not. Over
+    three, while a foot is lifted shortly without a shift of the trunk, both may be as far outside.
     """
     values = np.full((len(motion.times), 2), -NO_SUPPORT)
     for rows in _same_support(motion):
@@ -242,26 +243,27 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
         feet = motion.p_feet[rows[0], stands, :2]
         for column, points in enumerate((motion.p_com[:, :2], forces.zmp)):
             values[rows, column] = support_margins(feet, points[rows])
-    passes = _passes_over_two(motion, limits)
+    passes, pair = _passes_over_few(motion, limits), motion.stance.sum(axis=1) == _FEW[0]
     com = ("support", "m", ("CoM",), motion.times, values[:, :1])
     zmp = ("support of ZMP", "m", ("ZMP",), motion.times, values[:, 1:])
     least = np.where(passes, -limits.off_line, limits.zero_moment)[:, None]
     written, tight = ~motion.is_dynamic, TIGHT_SUPPORT
-    where, both = (written & ~passes)[:, None], written[:, None]
+    where, both = (written & ~(passes & pair))[:, None], written[:, None]
+    inside = np.where(passes, -limits.off_line, limits.support)[:, None]
     return (
-        Series.against(*com, limits.support, is_floor=True, where=where, tight=tight),
+        Series.against(*com, inside, is_floor=True, where=where, tight=tight),
         Series.against(*zmp, least, is_floor=True, where=both, tight=tight),
     )
 
 
-def _passes_over_two(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.ndarray, " n"]:
-    """Samples in which two feet stand, for no longer than they may."""
-    two = motion.stance.sum(axis=1) == _PAIR
+def _passes_over_few(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.ndarray, " n"]:
+    """Samples in which the same two or three feet stand, for no longer than they may."""
+    few = np.isin(motion.stance.sum(axis=1), _FEW)
     changes = (motion.stance[1:] != motion.stance[:-1]).any(axis=1)
-    for rows in np.split(np.arange(len(two)), np.flatnonzero(changes) + 1):
+    for rows in np.split(np.arange(len(few)), np.flatnonzero(changes) + 1):
         lasts = motion.times[rows[-1]] - motion.times[rows[0]]
-        two[rows] &= lasts <= limits.pair_time
-    return two
+        few[rows] &= lasts <= limits.pair_time
+    return few
 
 
 def _same_support(motion: Trajectory) -> list[Int[np.ndarray, " k"]]:
@@ -342,6 +344,6 @@ def _loads(
     return relative_loads(places[:, :2], np.array(along) / pressure, most)
 
 
-_PAIR = 2
+_FEW = (2, 3)
 _PYRAMIDS = tuple(np.kron(np.eye(feet), friction_pyramid(PYRAMID)) for feet in (1, 2, 3, 4))
 """Rows of one to four feet."""

@@ -23,9 +23,10 @@ class FeasibilityLimits:
             were done.
         support: least distance [m] of the CoM to the edges of the support polygon.
         zero_moment: the same for the zero-moment point.
-        off_line: greatest distance [m] of the zero-moment point from the line between two feet.
-        pair_time: longest time [s] on two feet; in it a trunk that is off balance falls four times
-            as far off, exp(t / sqrt(0.29 m / g)).
+        off_line: greatest distance [m] of the zero-moment point from the line between two feet, and
+            of it and the CoM outside of three that stand for ``pair_time`` at most.
+        pair_time: longest time [s] on two feet, or on three with the CoM beside them; in it a trunk
+            that is off balance falls four times as far off, exp(t / sqrt(0.29 m / g)).
         wrench: greatest part [N] of the force that no contact forces can give for longer; of the
             moment as much on an arm of 0.2 m.
         lag, lag_angle: how far [m, rad] the trunk may be off its plan for what the ground cannot

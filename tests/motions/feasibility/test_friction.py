@@ -180,3 +180,17 @@ def test_a_knee_that_folds_no_farther_moves_less_than_one_too_short(
     assert folded.margin == 0.0
     stretched = checker.check(Timeline().body(pitch=-deg(26.0), z=0.04, over=1.0).home(over=1.0))
     assert stretched.margins["joint position"].margin < 0.0
+
+
+@pytest.mark.parametrize(
+    ("aside", "over", "is_done"),
+    [(0.0, 0.12, True), (0.01, 0.12, True), (0.0, 0.3, False), (0.03, 0.12, False)],
+)
+def test_a_foot_lifted_shortly_needs_no_shift(
+    checker: FeasibilityChecker, aside: float, over: float, is_done: bool
+) -> None:
+    # Without the shift the CoM lies on the edge; in MuJoCo the last is 31 mm off, the first two 9.
+    line = Timeline(balance=False).body(y=aside, over=0.6).foot("FL", z=0.03, over=over)
+    report = checker.check(line.down("FL", over=over).home(over=0.6))
+    assert report.ok is is_done
+    assert (report.margins["support"].margin >= 0.0) is is_done
