@@ -103,7 +103,8 @@ def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     missing = np.empty((len(needed), 2))
     joints, load_share = (np.array(a, order="C") for a in (motion.q[:, 7:], motion.load_share))
     given = (joints, attitudes(motion.rpy), needed[:, :6].copy(), load_share)
-    tables = (leg_table(model), friction_pyramid(PYRAMID), scale_of_wrench(), numbers_of(model))
+    scale = weights_of(motion, model)
+    tables = (leg_table(model), friction_pyramid(PYRAMID), scale, numbers_of(model))
     share_loads(*given, *tables, contact, tau, missing)
     wrench = given[2]
     return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench), wrench)
@@ -124,6 +125,22 @@ def _spread(needed: Float[np.ndarray, "n 18"], motion: Trajectory) -> Float[np.n
 def numbers_of(model: RobotModel) -> Float[np.ndarray, "4"]:
     """Evenness, weight [N], greatest normal force [N] and foot radius [m], for the kernels."""
     return np.array([EVENNESS, model.mass * model.gravity, NORMAL_FORCE_MAX, model.foot_radius])
+
+
+def weights_of(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "6"]:
+    """What a missing wrench costs, over a missing force: as in the whole-body controller.
+
+    That weighs accelerations, so moments count by the mass over the moments of inertia, and by the
+    weight of the attitude: where the ground cannot give both, the trunk stays level and lags.
+    """
+    config, inertia = WbcConfig(), _inertia(motion, model)
+    turning = np.sqrt(config.orientation_weight / config.position_weight)
+    return np.concatenate([np.ones(3), turning * model.mass / inertia[3:]])
+
+
+def _inertia(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "6"]:
+    """Mass [kg] and moments of inertia [kg m^2] of the robot as it stands at first."""
+    return np.diag(model.snapshot(_state(motion, 0)).mass_matrix)[:6]
 
 
 def scale_of_wrench() -> Float[np.ndarray, "6"]:
@@ -147,10 +164,11 @@ def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:
         snapshot = model.snapshot(_state(motion, row))
         needed[row] = snapshot.mass_matrix @ motion.a[row] + snapshot.bias
     needed = _spread(needed, motion)
-    wrench = needed[:, :6]
+    wrench, scale = needed[:, :6], weights_of(motion, model)
     for row in range(count):
         snapshot = model.snapshot(_state(motion, row))
-        contact[row], missing[row] = _share(snapshot, wrench[row], motion.load_share[row], model)
+        shares = motion.load_share[row]
+        contact[row], missing[row] = _share(snapshot, wrench[row], shares, scale, model)
         J = snapshot.J_contacts.reshape(12, 18)
         tau[row] = needed[row, 6:] - J[:, 6:].T @ contact[row].ravel()
     return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench), wrench)
@@ -207,8 +225,7 @@ def lagging(
     config = WbcConfig()
     gains = (config.body_position.arrays, config.body_orientation.arrays)
     kp, kd = (np.concatenate(pair) for pair in zip(*gains, strict=True))
-    inertia = np.diag(model.snapshot(_state(motion, 0)).mass_matrix)[:6]
-    pushes = _left(motion, forces, model) / inertia
+    pushes = _left(motion, forces, model) / _inertia(motion, model)
     pushes[motion.is_dynamic] = 0.0
     errors, dt = np.zeros(pushes.shape), float(np.mean(np.diff(motion.times)))
     lag(pushes, kp, kd, dt, errors)
@@ -291,12 +308,13 @@ def _share(
     snapshot: Snapshot,
     wrench: Float[np.ndarray, "6"],
     load_share: Float[np.ndarray, "4"],
+    scale: Float[np.ndarray, "6"],
     model: RobotModel,
 ) -> tuple[Float[np.ndarray, "4 3"], Float[np.ndarray, "2"]]:
     """Contact forces (4, 3) [N], and what force [N] and moment [N m] they leave over.
 
     Minimises |S (A f - w)|^2 + e |D (f - f_even)|^2 over the forces f of the loaded feet, with A
-    the base columns of their Jacobians, transposed, S = diag(1, 1, 1, 1/ARM, 1/ARM, 1/ARM), D^2 = 1
+    the base columns of their Jacobians, transposed, S = diag(``scale``), D^2 = 1
     for the normal forces and the mean load over the foot's for those along the ground, subject to
     |f_x|, |f_y| <= mu f_z and 0 <= f_z <= f_max s, where s is a foot's share of its load. As a QP,
     1/2 f' H f + g' f, with H = (S A)' (S A) + e D^2 and g = -(S A)' S w - e f_even.
@@ -308,11 +326,11 @@ def _share(
         even = np.zeros((len(legs), 3))
         shares = load_share[legs]
         even[:, 2] = model.mass * model.gravity * shares / shares.sum()
-        weighted = scale_of_wrench()[:, None] * A
+        weighted = scale[:, None] * A
         along = 1.0 / _loads(snapshot, wrench, legs, shares, model)
         D2 = np.column_stack([along, along, np.ones(len(legs))])
         H = weighted.T @ weighted + EVENNESS * np.diag(D2.ravel())
-        g = -weighted.T @ (scale_of_wrench() * wrench) - EVENNESS * even.ravel()
+        g = -weighted.T @ (scale * wrench) - EVENNESS * even.ravel()
         C = _PYRAMIDS[len(legs) - 1]
         lower = np.tile([-np.inf] * 4 + [0.0], len(legs))
         upper = np.zeros((len(legs), 5))

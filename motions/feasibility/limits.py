@@ -30,7 +30,7 @@ class FeasibilityLimits:
         wrench: greatest part [N] of the force that no contact forces can give for longer; of the
             moment as much on an arm of 0.2 m.
         lag, lag_angle: how far [m, rad] the trunk may be off its plan for what the ground cannot
-            give. In MuJoCo it was off by up to twice as much.
+            give. In MuJoCo it was off by 0.7 to 2.2 times as much.
         stop: how far [m] a raised foot, or the trunk over a knee that is bent as far as it goes,
             may be off for a joint at its stop: in MuJoCo it was off by 0.5 to 0.9 of it.
         stretch: the same of the trunk over any other standing leg: it was off by 1.1 to 2.2 times
@@ -66,7 +66,7 @@ class FeasibilityLimits:
     off_line: float = 0.01
     pair_time: float = 0.25
     wrench: float = 5.0
-    lag: float = 0.012
+    lag: float = 0.015
     lag_angle: float = 0.03
     stop: float = 0.03
     stretch: float = 0.018

@@ -173,7 +173,7 @@ AWAY = {
     "joint position": Timeline().body(z=-0.24, over=1.0).home(over=1.0),
     "continuity": Timeline().body(pitch=deg(18), over=0.03).home(over=0.03),
     "friction": Timeline().body(y=0.07, over=0.15).body(y=-0.07, over=0.15).home(over=0.2),
-    "slip": Timeline().body(y=0.06, over=0.2).body(y=-0.06, over=0.2).home(over=0.2),
+    "slip": Timeline().body(yaw=0.25, over=0.2).body(yaw=-0.25, over=0.2).home(over=0.3),
     "lag": Timeline().body(z=-0.1, over=0.6).body(z=0.02, over=0.11).home(over=0.6),
     "support": Timeline(balance=False).foot("FR", z=0.1, over=0.8).home(over=0.8),
     "landing speed": Timeline().foot("FR", z=0.15, over=0.6).foot("FR", over=0.1, ease="linear"),
