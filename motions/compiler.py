@@ -40,9 +40,9 @@ from motions.tracks import (
     swings,
 )
 
-REACH_TOLERANCE = 1e-3
-"""Distance [m] by which a place may be out of reach before it counts: own choice, less than what
-tracking adds."""
+REACH_TOLERANCE = 5e-3
+"""Distance [m] by which a place may be out of reach before it counts: own choice, less than the 12
+mm that tracking adds."""
 UNLOAD_TIME = 0.3
 """Time [s] over which a foot gives up its load before lift-off, if there is that much: own choice,
 so that the forces of the others change slowly."""

@@ -67,7 +67,7 @@ def solve_leg(leg, x, y, z, q):
     q[0] = wrapped(np.arctan2(z, y) + np.arctan2(down, width))
     q[1] = wrapped(swing)
     q[2] = knee
-    near = np.sqrt(-across) if across < 0.0 else 0.0
+    near = max(abs(width) - np.hypot(y, z), 0.0)
     far = max(reach - thigh - calf, abs(thigh - calf) - reach)
     return near if far <= 0.0 else np.hypot(near, far)
 

@@ -140,7 +140,7 @@ def readable_leg_angles(geometry: LegGeometry, p_base_foot: Float[np.ndarray, "n
     # direction of the foot minus that of the leg with q2 = 0: (l2 + l3 cos q3, l3 sin q3)
     swing = np.arctan2(-x, down) - np.arctan2(calf * np.sin(knee), thigh + calf * np.cos(knee))
     # nearer to the hip's axis than the leg's plane, and outside the ring |l2 - l3| .. l2 + l3 in it
-    too_near = np.sqrt(np.maximum(-across, 0.0))
+    too_near = np.maximum(abs(width) - np.hypot(y, z), 0.0)
     too_far = np.maximum(np.maximum(reach - thigh - calf, abs(thigh - calf) - reach), 0.0)
     return LegAngles(np.column_stack([hip, _wrapped(swing), knee]), np.hypot(too_near, too_far))
 

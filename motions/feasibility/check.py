@@ -157,7 +157,7 @@ class FeasibilityChecker:
             *(_failed(problem) for problem in problems if problem.check != "balance"),
             kinematic.reach(path, limits),
             kinematic.joint_position(path, model, limits),
-            self_distance(path, self._collision, limits),
+            self_distance(path, self._collision, model, limits),
             kinematic.clearance(path, model, self._hulls, limits),
             kinematic.dragging(path, model, limits),
             landing_place,

@@ -102,11 +102,13 @@ class SelfCollision:
 
 
 def self_distance(
-    motion: Trajectory, collision: SelfCollision, limits: FeasibilityLimits
+    motion: Trajectory, collision: SelfCollision, model: RobotModel, limits: FeasibilityLimits
 ) -> Series:
-    """Least distance of any two links that must not touch."""
+    """Least distance of any two links that must not touch; joints stay at their stops."""
     rows = slice(None, None, STRIDE)
-    found = collision.nearest_along(motion.q[rows])
+    q = motion.q[rows].copy()
+    q[:, 7:] = np.clip(q[:, 7:], model.q_lower, model.q_upper)
+    found = collision.nearest_along(q)
     values = np.array([[distance] for distance, _ in found])
     worst = found[int(np.argmin(values))][1]
     what = ("self-collision", "m", (worst,), motion.times[rows], values)

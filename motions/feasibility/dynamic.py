@@ -11,6 +11,10 @@ frame, so w too), f the forces of the ground on the rolling contact points in th
 motion. Of the f that give the trunk its wrench within the friction pyramid, the one that deviates
 least from an even share of the weight is taken, and along the ground from none, the less the less a
 foot bears, as the whole-body controller does it; see ``_share``.
+
+The ground gives no force at once: MuJoCo's contacts need 20 ms (their ``solref``), as rubber and a
+leg's gears do. M a + h is therefore averaged over ``SPREAD`` samples before it is shared. Where a
+plan jumps from one sample to the next, the force of one is taken back by the other.
 """
 
 from __future__ import annotations
@@ -40,6 +44,9 @@ from motions.placement import attitudes, turned
 from motions.plan import NORMAL_FORCE_MAX
 from motions.trajectory import Trajectory, zero_moment_points
 
+SPREAD = 3
+"""Samples, 30 ms, over which forces are averaged: with it torques and slips of jolts came out as in
+MuJoCo (motions drawn for that alone), where single samples gave three times as much."""
 ARM = 0.2
 """Length [m] that makes moments comparable to forces: half the distance of front and rear feet."""
 EVENNESS = 1e-4
@@ -91,20 +98,49 @@ def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     from go2_wbc.kernels.loads import share_loads  # compiled; only who needs it waits for it
 
     rows = zip(motion.q, motion.v, motion.a, strict=True)
-    needed = np.array([model.inverse_dynamics(*row) for row in rows])
+    needed = _spread(np.array([model.inverse_dynamics(*row) for row in rows]), motion)
     contact, tau = np.zeros((len(needed), 4, 3)), needed[:, 6:].copy()
     missing = np.empty((len(needed), 2))
     joints, load_share = (np.array(a, order="C") for a in (motion.q[:, 7:], motion.load_share))
     given = (joints, attitudes(motion.rpy), needed[:, :6].copy(), load_share)
-    tables = (leg_table(model), friction_pyramid(PYRAMID), scale_of_wrench(), numbers_of(model))
+    scale = weights_of(motion, model)
+    tables = (leg_table(model), friction_pyramid(PYRAMID), scale, numbers_of(model))
     share_loads(*given, *tables, contact, tau, missing)
     wrench = given[2]
     return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench), wrench)
 
 
+def _spread(needed: Float[np.ndarray, "n 18"], motion: Trajectory) -> Float[np.ndarray, "n 18"]:
+    """Means over ``SPREAD`` samples; solved parts, judged by their own forces, are left out."""
+    half = SPREAD // 2
+    counts = np.pad(1.0 * ~motion.is_dynamic, half, mode="edge")
+    weighted = np.pad(needed * ~motion.is_dynamic[:, None], ((half, half), (0, 0)), mode="edge")
+    total, count = (
+        sum(rows[k : len(rows) - 2 * half + k] for k in range(SPREAD))
+        for rows in (weighted, counts[:, None])
+    )
+    return np.where(motion.is_dynamic[:, None], needed, total / np.maximum(count, 1.0))
+
+
 def numbers_of(model: RobotModel) -> Float[np.ndarray, "4"]:
     """Evenness, weight [N], greatest normal force [N] and foot radius [m], for the kernels."""
     return np.array([EVENNESS, model.mass * model.gravity, NORMAL_FORCE_MAX, model.foot_radius])
+
+
+def weights_of(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "6"]:
+    """What a missing wrench costs, over a missing force: as in the whole-body controller.
+
+    That weighs accelerations, so moments count by the mass over the moments of inertia, and by the
+    weight of the attitude: where the ground cannot give both, the trunk stays level and lags.
+    """
+    config, inertia = WbcConfig(), _inertia(motion, model)
+    turning = np.sqrt(config.orientation_weight / config.position_weight)
+    return np.concatenate([np.ones(3), turning * model.mass / inertia[3:]])
+
+
+def _inertia(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "6"]:
+    """Mass [kg] and moments of inertia [kg m^2] of the robot as it stands at first."""
+    return np.diag(model.snapshot(_state(motion, 0)).mass_matrix)[:6]
 
 
 def scale_of_wrench() -> Float[np.ndarray, "6"]:
@@ -123,14 +159,18 @@ def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     """The same as ``forces_of``, one snapshot and one QP after the other: what it is held to."""
     count = len(motion.times)
     contact, tau = np.zeros((count, 4, 3)), np.zeros((count, 12))
-    missing, wrench = np.zeros((count, 2)), np.zeros((count, 6))
+    missing, needed = np.zeros((count, 2)), np.zeros((count, 18))
     for row in range(count):
         snapshot = model.snapshot(_state(motion, row))
-        needed = snapshot.mass_matrix @ motion.a[row] + snapshot.bias
-        wrench[row] = needed[:6]
-        contact[row], missing[row] = _share(snapshot, needed[:6], motion.load_share[row], model)
+        needed[row] = snapshot.mass_matrix @ motion.a[row] + snapshot.bias
+    needed = _spread(needed, motion)
+    wrench, scale = needed[:, :6], weights_of(motion, model)
+    for row in range(count):
+        snapshot = model.snapshot(_state(motion, row))
+        shares = motion.load_share[row]
+        contact[row], missing[row] = _share(snapshot, wrench[row], shares, scale, model)
         J = snapshot.J_contacts.reshape(12, 18)
-        tau[row] = needed[6:] - J[:, 6:].T @ contact[row].ravel()
+        tau[row] = needed[row, 6:] - J[:, 6:].T @ contact[row].ravel()
     return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench), wrench)
 
 
@@ -185,8 +225,7 @@ def lagging(
     config = WbcConfig()
     gains = (config.body_position.arrays, config.body_orientation.arrays)
     kp, kd = (np.concatenate(pair) for pair in zip(*gains, strict=True))
-    inertia = np.diag(model.snapshot(_state(motion, 0)).mass_matrix)[:6]
-    pushes = _left(motion, forces, model) / inertia
+    pushes = _left(motion, forces, model) / _inertia(motion, model)
     pushes[motion.is_dynamic] = 0.0
     errors, dt = np.zeros(pushes.shape), float(np.mean(np.diff(motion.times)))
     lag(pushes, kp, kd, dt, errors)
@@ -212,7 +251,8 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
     than three feet have no inside, none at all count as 1 m outside.
 
     Two feet hold a trunk that passes over the line between them, as a trot does: if they stand for
-    a short time only, the zero-moment point must be near that line, and the CoM need not.
+    a short time only, the zero-moment point must be near that line, and the CoM need not. Over
+    three, while a foot is lifted shortly without a shift of the trunk, both may be as far outside.
     """
     values = np.full((len(motion.times), 2), -NO_SUPPORT)
     for rows in _same_support(motion):
@@ -220,26 +260,27 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
         feet = motion.p_feet[rows[0], stands, :2]
         for column, points in enumerate((motion.p_com[:, :2], forces.zmp)):
             values[rows, column] = support_margins(feet, points[rows])
-    passes = _passes_over_two(motion, limits)
+    passes, pair = _passes_over_few(motion, limits), motion.stance.sum(axis=1) == _FEW[0]
     com = ("support", "m", ("CoM",), motion.times, values[:, :1])
     zmp = ("support of ZMP", "m", ("ZMP",), motion.times, values[:, 1:])
     least = np.where(passes, -limits.off_line, limits.zero_moment)[:, None]
     written, tight = ~motion.is_dynamic, TIGHT_SUPPORT
-    where, both = (written & ~passes)[:, None], written[:, None]
+    where, both = (written & ~(passes & pair))[:, None], written[:, None]
+    inside = np.where(passes, -limits.off_line, limits.support)[:, None]
     return (
-        Series.against(*com, limits.support, is_floor=True, where=where, tight=tight),
+        Series.against(*com, inside, is_floor=True, where=where, tight=tight),
         Series.against(*zmp, least, is_floor=True, where=both, tight=tight),
     )
 
 
-def _passes_over_two(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.ndarray, " n"]:
-    """Samples in which two feet stand, for no longer than they may."""
-    two = motion.stance.sum(axis=1) == _PAIR
+def _passes_over_few(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.ndarray, " n"]:
+    """Samples in which the same two or three feet stand, for no longer than they may."""
+    few = np.isin(motion.stance.sum(axis=1), _FEW)
     changes = (motion.stance[1:] != motion.stance[:-1]).any(axis=1)
-    for rows in np.split(np.arange(len(two)), np.flatnonzero(changes) + 1):
+    for rows in np.split(np.arange(len(few)), np.flatnonzero(changes) + 1):
         lasts = motion.times[rows[-1]] - motion.times[rows[0]]
-        two[rows] &= lasts <= limits.pair_time
-    return two
+        few[rows] &= lasts <= limits.pair_time
+    return few
 
 
 def _same_support(motion: Trajectory) -> list[Int[np.ndarray, " k"]]:
@@ -267,12 +308,13 @@ def _share(
     snapshot: Snapshot,
     wrench: Float[np.ndarray, "6"],
     load_share: Float[np.ndarray, "4"],
+    scale: Float[np.ndarray, "6"],
     model: RobotModel,
 ) -> tuple[Float[np.ndarray, "4 3"], Float[np.ndarray, "2"]]:
     """Contact forces (4, 3) [N], and what force [N] and moment [N m] they leave over.
 
     Minimises |S (A f - w)|^2 + e |D (f - f_even)|^2 over the forces f of the loaded feet, with A
-    the base columns of their Jacobians, transposed, S = diag(1, 1, 1, 1/ARM, 1/ARM, 1/ARM), D^2 = 1
+    the base columns of their Jacobians, transposed, S = diag(``scale``), D^2 = 1
     for the normal forces and the mean load over the foot's for those along the ground, subject to
     |f_x|, |f_y| <= mu f_z and 0 <= f_z <= f_max s, where s is a foot's share of its load. As a QP,
     1/2 f' H f + g' f, with H = (S A)' (S A) + e D^2 and g = -(S A)' S w - e f_even.
@@ -284,11 +326,11 @@ def _share(
         even = np.zeros((len(legs), 3))
         shares = load_share[legs]
         even[:, 2] = model.mass * model.gravity * shares / shares.sum()
-        weighted = scale_of_wrench()[:, None] * A
+        weighted = scale[:, None] * A
         along = 1.0 / _loads(snapshot, wrench, legs, shares, model)
         D2 = np.column_stack([along, along, np.ones(len(legs))])
         H = weighted.T @ weighted + EVENNESS * np.diag(D2.ravel())
-        g = -weighted.T @ (scale_of_wrench() * wrench) - EVENNESS * even.ravel()
+        g = -weighted.T @ (scale * wrench) - EVENNESS * even.ravel()
         C = _PYRAMIDS[len(legs) - 1]
         lower = np.tile([-np.inf] * 4 + [0.0], len(legs))
         upper = np.zeros((len(legs), 5))
@@ -320,6 +362,6 @@ def _loads(
     return relative_loads(places[:, :2], np.array(along) / pressure, most)
 
 
-_PAIR = 2
+_FEW = (2, 3)
 _PYRAMIDS = tuple(np.kron(np.eye(feet), friction_pyramid(PYRAMID)) for feet in (1, 2, 3, 4))
 """Rows of one to four feet."""

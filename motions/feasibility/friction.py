@@ -44,12 +44,12 @@ NEAR = 0.8
 """Share of the limit up to which the controller's own share of the load is looked at, no better."""
 MOST = 1.5
 """Friction coefficient above which none is looked for: rubber on dry concrete has 1."""
-FOOT_MASS = 1.4
+FOOT_MASS = 0.7
 """Mass [kg] of the block that a sliding foot is: with it 10 mm of slip in 600 generated motions
 (seeds that judge nothing) are told best. A leg weighs 2.2 kg."""
-CREEP = 160.0
+CREEP = 145.0
 """Rate b [1/s] at which a contact of MuJoCo stops a foot: 105 by its numbers (2 / 0.95 / 0.02 s);
-more, as trunks lag their plan. Own choice, seen on 17 motions of the train half."""
+more, as trunks lag their plan. Own choice, seen on motions that judge nothing."""
 SETTLED = 0.1
 """Time [s] after a touchdown, and before a lift-off, in which a foot without load may skid."""
 TIGHT_SLIP = 0.003

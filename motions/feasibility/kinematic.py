@@ -35,7 +35,10 @@ def joint_position(motion: Trajectory, model: RobotModel, limits: FeasibilityLim
     """Joint angles against the tighter of the URDF's and the published limits.
 
     A joint that is asked to go beyond its stop stays at it. Where its foot, or the trunk above a
-    standing one, is off by no more than ``limits.stop`` for it, the margin counts as 0: a warning.
+    standing one, is off by no more than it may for it, the margin counts as 0: a warning. A raised
+    foot and a knee that is bent as far as it goes may be off by ``limits.stop``: nothing else
+    moves. A standing leg that should be longer lets the trunk sink to its side, farther than that:
+    ``limits.stretch``.
     """
     q = motion.q[:, 7:]
     to_lower, to_upper = q - model.q_lower, model.q_upper - q
@@ -45,9 +48,10 @@ def joint_position(motion: Trajectory, model: RobotModel, limits: FeasibilityLim
         own = margins[:, leg.joints]
         beyond = own.min(axis=1) < 0.0
         if beyond.any():
-            stands = motion.stance[beyond, leg]
+            stands, is_folded = motion.stance[beyond, leg], to_lower[beyond, leg.joints][:, 2] < 0.0
+            most = np.where(stands & ~is_folded, limits.stretch, limits.stop)
             harmless = np.zeros(len(q), dtype=bool)
-            harmless[beyond] = _stopped(leg, q[beyond], stands, model) <= limits.stop
+            harmless[beyond] = _stopped(leg, q[beyond], stands, model) <= most
             own[harmless] = np.maximum(own[harmless], 0.0)
     return Series("joint position", "rad", JOINTS, motion.times, q, bounds, margins, TIGHT_ANGLE)
 
@@ -59,7 +63,8 @@ def _stopped(
 
     A raised foot by as much as the leg's end moves. The joints of a standing leg give way to each
     other: what a stopped knee takes from the distance of foot and hip is missing, and what a
-    stopped hip or thigh takes from the angle, times that distance.
+    stopped hip or thigh takes from the angle, times that distance: twice, as it is with both legs
+    of a side, and the trunk goes down over them besides.
     """
     geometry = LegGeometry.of(model, leg)
     asked = q[:, leg.joints]
@@ -71,7 +76,7 @@ def _stopped(
         for angles in (asked, kept)
     )
     turned = np.abs(asked[:, :2] - kept[:, :2]).sum(axis=1)
-    return np.where(stands, np.abs(reach - left) + turned * reach, moved)
+    return np.where(stands, np.abs(reach - left) + 2.0 * turned * reach, moved)
 
 
 def joint_speed(motion: Trajectory, model: RobotModel) -> Series:

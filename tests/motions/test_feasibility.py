@@ -173,7 +173,7 @@ AWAY = {
     "joint position": Timeline().body(z=-0.24, over=1.0).home(over=1.0),
     "continuity": Timeline().body(pitch=deg(18), over=0.03).home(over=0.03),
     "friction": Timeline().body(y=0.07, over=0.15).body(y=-0.07, over=0.15).home(over=0.2),
-    "slip": Timeline().body(y=0.06, over=0.2).body(y=-0.06, over=0.2).home(over=0.2),
+    "slip": Timeline().body(yaw=0.25, over=0.2).body(yaw=-0.25, over=0.2).home(over=0.3),
     "lag": Timeline().body(z=-0.1, over=0.6).body(z=0.02, over=0.11).home(over=0.6),
     "support": Timeline(balance=False).foot("FR", z=0.1, over=0.8).home(over=0.8),
     "landing speed": Timeline().foot("FR", z=0.15, over=0.6).foot("FR", over=0.1, ease="linear"),
@@ -278,9 +278,11 @@ def test_the_trajectory_puts_the_com_and_the_feet_where_the_plan_wants_them(
 
 def test_equations_of_motion_hold_along_a_trajectory(good: CompiledPlan, model: RobotModel) -> None:
     path = trajectory_of(good, model)
-    forces = forces_of(path, model)
+    forces, last = forces_of(path, model), len(path.times) - 1
     for row in range(0, len(path.times), 40):
-        generalised = model.inverse_dynamics(path.q[row], path.v[row], path.a[row])
+        near = [min(max(k, 0), last) for k in (row - 1, row, row + 1)]
+        needed = [model.inverse_dynamics(path.q[k], path.v[k], path.a[k]) for k in near]
+        generalised = np.mean(needed, axis=0)  # what the ground gives over 30 ms
         snapshot = model.snapshot(_state_at(path, row))
         applied = snapshot.J_contacts.reshape(12, 18).T @ forces.contact[row].ravel()
         residual = generalised - applied

@@ -12,10 +12,11 @@ import pytest
 
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
-from motions import compile_timeline, load_motion
+from motions import Timeline, compile_timeline, load_motion
 from motions.feasibility import collision
-from motions.feasibility.collision import SLACK, STRIDE, SelfCollision
+from motions.feasibility.collision import SLACK, STRIDE, SelfCollision, self_distance
 from motions.feasibility.hulls import hulls_of
+from motions.feasibility.limits import FeasibilityLimits
 from motions.trajectory import trajectory_of
 from tests.engine_helpers import standing_q
 
@@ -115,3 +116,17 @@ def test_bodies_are_loaded_once_and_again_if_the_file_has_changed(tmp_path: Path
     assert collision.geometry_of(own) is not first
     assert hulls_of(own) is not hulls
     assert hulls_of(own) is hulls_of(own)
+
+
+def test_a_joint_at_its_stop_brings_no_links_nearer(
+    model: RobotModel, bodies: SelfCollision
+) -> None:
+    asked = trajectory_of(compile_timeline(Timeline().body(z=-0.01, over=0.1), model), model)
+    asked.q[:, 7:] = standing_q()[7:]
+    asked.q[:, 9] = -3.0  # FL's calf, beyond its stop
+    stopped = asked.q[0].copy()
+    stopped[9] = model.q_lower[2]
+    real, beyond = (bodies.nearest(q)[0] for q in (stopped, asked.q[0]))
+    least = self_distance(asked, bodies, model, FeasibilityLimits()).values.min()
+    assert beyond < real - 0.005
+    assert least == pytest.approx(real, abs=TOLERANCE)

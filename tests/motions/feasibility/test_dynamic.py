@@ -17,7 +17,7 @@ from motions.placement import configurations
 from motions.trajectory import Trajectory, trajectory_of
 from tests.engine_helpers import state_of
 
-EXACT = 1e-6  # N; what the QP's solver leaves
+EXACT = 1e-5  # N; what the QP's solver leaves, and the motion itself
 
 
 @pytest.fixture(scope="module")
@@ -108,3 +108,12 @@ def test_the_forces_are_those_of_the_readable_form(pace: float, radius: float) -
         assert difference.max() < EXACT * max(1.0, pace), name
     if pace > 0.5:
         assert (np.abs(expected.missing) > 1.0).any()
+
+
+def test_a_trunk_that_the_ground_cannot_hold_stays_level_and_lags() -> None:
+    # In MuJoCo it is 18 mm off and turned by 2.5 deg.
+    line = Timeline().body(y=0.045, over=0.26).body(y=-0.045, over=0.26).home(over=0.26)
+    checked = FeasibilityChecker().evaluate(line)
+    force, moment = checked.forces.missing.max(axis=0)
+    assert force > 20.0
+    assert moment < 0.05

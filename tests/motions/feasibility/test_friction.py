@@ -159,11 +159,38 @@ def test_an_unloading_for_a_moment_passes_and_a_flight_does_not(
 
 
 def test_a_joint_at_its_stop_is_refused_by_what_it_moves(checker: FeasibilityChecker) -> None:
-    # The calves are asked for 0.01 rad too much in the first: it is done in MuJoCo, 2 mm off.
+    # The calves are asked for 0.1 rad too much in the first: it is done in MuJoCo, 12 mm off.
     def nose_up(angle: float, z: float) -> Timeline:
         return Timeline().body(pitch=-deg(angle), z=z, over=1.0).hold(0.3).home(over=1.0)
 
-    little = checker.check(nose_up(25.0, 0.04)).margins["joint position"]
+    little = checker.check(nose_up(22.0, 0.04)).margins["joint position"]
     assert little.value > little.limit
     assert little.margin == 0.0
     assert checker.check(nose_up(28.0, 0.04)).margins["joint position"].margin < 0.0
+
+
+def test_a_knee_that_folds_no_farther_moves_less_than_one_too_short(
+    checker: FeasibilityChecker,
+) -> None:
+    # In MuJoCo the first is done, 11 mm off; 22 mm are asked too much. The other is 26 mm off.
+    sit = Timeline().posture("sit", over=1.5).body(z=-0.042, over=0.8).hold(0.3).home(over=0.6)
+    report = checker.check(sit.posture("stand", over=1.5))
+    folded = report.margins["joint position"]
+    assert folded.subject.endswith("calf")
+    assert folded.margin == 0.0
+    stretched = checker.check(Timeline().body(pitch=-deg(26.0), z=0.04, over=1.0).home(over=1.0))
+    assert stretched.margins["joint position"].margin < 0.0
+
+
+@pytest.mark.parametrize(
+    ("aside", "over", "is_done"),
+    [(0.0, 0.12, True), (0.01, 0.12, True), (0.0, 0.3, False), (0.03, 0.12, False)],
+)
+def test_a_foot_lifted_shortly_needs_no_shift(
+    checker: FeasibilityChecker, aside: float, over: float, is_done: bool
+) -> None:
+    # Without the shift the CoM lies on the edge; in MuJoCo the last is 31 mm off, the first two 9.
+    line = Timeline(balance=False).body(y=aside, over=0.6).foot("FL", z=0.03, over=over)
+    report = checker.check(line.down("FL", over=over).home(over=0.6))
+    assert report.ok is is_done
+    assert (report.margins["support"].margin >= 0.0) is is_done

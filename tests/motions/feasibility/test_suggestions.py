@@ -23,7 +23,7 @@ CHECKER = FeasibilityChecker()
 FAST_TWIST = Timeline(name="twist").body(yaw=deg(25), over=0.12).home(over=0.12)
 TALL = Timeline(name="tall").body(z=0.12, over=1.0).body(roll=deg(15), over=0.8).home(over=1.0)
 HASTY_PAW = Timeline(name="paw", shift_time=0.2).foot("FL", z=0.08, over=0.5).home(over=0.6)
-SWAY = Timeline(name="sway").body(y=0.1, over=0.08).body(y=-0.1, over=0.08).home(over=0.2)
+SWAY = Timeline(name="sway").body(y=0.12, over=0.06).body(y=-0.12, over=0.06).home(over=0.2)
 FEASIBLE = Timeline(name="bow").body(pitch=deg(5), over=1.0).home(over=1.0)
 
 
