@@ -158,7 +158,7 @@ def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndar
             SETTLED_COMMAND,
             config.capture_margin,
             config.square_tolerance,
-            config.swing.apex,
+            config.swing.at_most(gait.apex).apex,
             config.swing.touchdown_depth,
             GROUND_SHARE,
             correction.rate,

@@ -7,7 +7,7 @@ goes from ``a`` to ``b`` as ``p = a + s (b - a)``; so ``v = s' (b - a) / T`` and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -39,6 +39,10 @@ class SwingConfig:
         """Raise ConfigError for a length that is out of range."""
         require_positive(self, "apex")
         require_not_negative(self, "touchdown_depth")
+
+    def at_most(self, apex: float) -> SwingConfig:
+        """The same with an apex [m] of ``apex`` if that is lower."""
+        return replace(self, apex=min(self.apex, apex))
 
 
 def swing_foot(

@@ -51,7 +51,7 @@ ODD_CONFIG = LocomotionConfig(
 ODD_MPC = MpcConfig(step=0.028, interval=0.012, force_max=180.0, prior_weight=4e-3, load_ramp=0.02)
 
 
-GALLOP = Gait("gallop", 0.36, 0.40, (0.0, 0.15, 0.5, 0.65), needs_mpc=True)
+GALLOP = Gait("gallop", 0.36, 0.40, (0.0, 0.15, 0.5, 0.65), apex=0.05, needs_mpc=True)
 
 
 def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.ndarray) -> Snapshot:

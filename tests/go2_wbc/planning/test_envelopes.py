@@ -42,6 +42,15 @@ def test_a_gait_of_ones_own_has_its_share_even_under_a_known_name() -> None:
     assert envelope_of(changed, USUAL) == USUAL.scaled(0.2)
 
 
+def test_a_named_gait_that_is_not_measured_yet_can_be_walked_to_measure_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # The benchmark that measures envelopes raised KeyError for a new gait.
+    hop = replace(GAITS["pronk"], name="hop", envelope_share=0.3)
+    monkeypatch.setitem(GAITS, "hop", hop)
+    assert envelope_of(hop, USUAL) == USUAL.scaled(0.3)
+
+
 class Follower:
     """Follows what the choice lets through, at the rate of a robot."""
 
