@@ -35,6 +35,19 @@ def test_an_envelope_keeps_the_trots_distance_to_what_was_measured(name: str) ->
         assert astuple(envelope_of(GAITS[name], trot)) == pytest.approx(tuple(expected))
 
 
+def test_however_fast_the_trot_may_be_the_other_gaits_stay_inside_what_was_measured() -> None:
+    # A trot that plans its forces has a far wider envelope; a walk was taken to 1.6 m/s with it.
+    fast = VelocityEnvelope(4.0, 0.5, 1.5, 8.0)
+    for name, measured in measured_envelopes().items():
+        own = envelope_of(GAITS[name], fast)
+        if name == "trot":
+            assert own == fast
+        else:
+            assert own.forward == measured.forward
+            assert own.backward < measured.backward
+            assert own.turning == measured.turning
+
+
 def test_a_gait_of_ones_own_has_its_share_even_under_a_known_name() -> None:
     own = Gait("mine", 0.4, 0.6, (0.0, 0.5, 0.5, 0.0), envelope_share=0.4)
     assert envelope_of(own, USUAL) == USUAL.scaled(0.4)
