@@ -160,6 +160,7 @@ def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndar
             config.square_tolerance,
             config.swing.at_most(gait.apex).apex,
             config.swing.touchdown_depth,
+            config.swing.full_depth_way,
             GROUND_SHARE,
             correction.rate,
             correction.position_window,

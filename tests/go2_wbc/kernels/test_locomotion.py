@@ -41,7 +41,7 @@ ODD_CONFIG = LocomotionConfig(
     settle_speed=0.3,
     capture_margin=0.07,
     square_tolerance=0.05,
-    swing=SwingConfig(apex=0.083, touchdown_depth=0.011),
+    swing=SwingConfig(apex=0.083, touchdown_depth=0.011, full_depth_way=0.17),
     slip=SlipConfig(0.12, 0.007, 0.015, 1.9, 0.18, 0.22, 0.14, 0.55, 0.34),
     contact=ContactConfig(0.62, 0.013),
     ground=GroundConfig(0.41, 0.59, 0.018, 0.052, 0.73, 0.057),
