@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -110,11 +111,12 @@ def trial(seed: int) -> Row:
 def holds(gait: str, axis: str, speed: float, seed: int) -> bool:
     """Whether a robot under the conditions of ``seed`` follows that speed; see the module."""
     x, y, turn = _components(axis, speed)
+    unbounded = replace(GAITS[gait], name=f"{gait}, unbounded")
     rate = CONFIG.locomotion.angular_acceleration if turn else CONFIG.locomotion.linear_acceleration
     try:
         with TrialRobot(plant_of(Trial(seed), FIRST_SEED, MASS_RANGE), CONFIG) as robot:
             robot.require(robot.go2.stand())
-            robot.require(robot.go2.walk(gait))
+            robot.require(robot.go2.walk(unbounded))
             robot.go2.move(x, turn, linear_y=y)
             robot.wait(speed / rate + LEAD)
             robot.truth.clear()

@@ -154,6 +154,8 @@ RUNS = (
     Run("walk", "walk", VelocityCommand(0.4), 5.0, None, 5.0, "gaits"),
     Run("pace", "pace", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
     Run("pronk", "pronk", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
+    Run("bound", "bound", VelocityCommand(0.6), 5.0, None, 5.0, "gaits"),
+    Run("gallop", "gallop", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
 )
 SENSED = tuple(
     Run(f"sensed-{speed:g}", "trot", VelocityCommand(speed), mean, group="sensors", sensors="imu")

@@ -223,6 +223,7 @@ LOCOMOTION = Layout(
     square_tolerance=(),
     apex=(),
     touchdown_depth=(),
+    full_depth_way=(),
     ground_share=(),
     correction_rate=(),
     correction_window=(),

@@ -44,7 +44,8 @@ _LEASH, _YAW_LEASH, _REACH = (_C[n] for n in ("position_leash", "yaw_leash", "fo
 _F_MIN, _F_MAX, _RAMP = (_C[n] for n in ("normal_force_min", "normal_force_max", "load_ramp"))
 _SETTLE_SPEED, _SETTLED = _C["settle_speed"], _C["settled_command"]
 _CAPTURE, _SQUARE = _C["capture_margin"], _C["square_tolerance"]
-_APEX, _DEPTH, _MID_SWING = (_C[n] for n in ("apex", "touchdown_depth", "mid_swing"))
+_APEX, _DEPTH, _FULL_WAY = (_C[n] for n in ("apex", "touchdown_depth", "full_depth_way"))
+_MID_SWING = _C["mid_swing"]
 _RATE, _WINDOW, _LIMIT = (
     _C[n] for n in ("correction_rate", "correction_window", "correction_limit")
 )
@@ -256,8 +257,10 @@ def swing(leg, s, c, progress, goal, target):
         target[_FOOT_A + k + i] = ddx / duration**2 * delta
     apex = max(start[2], goal[2]) + c[_APEX] + apex_raise(s, c)
     is_rising = progress < 0.5 - TIE
+    way = np.hypot(goal[0] - start[0], goal[1] - start[1])
+    depth = c[_DEPTH] * min(1.0, c[_FULL_WAY] / max(way, TIE)) ** 2
     begin = start[2] if is_rising else apex
-    delta = (apex if is_rising else goal[2] - c[_DEPTH]) - begin
+    delta = (apex if is_rising else goal[2] - depth) - begin
     x, dx, ddx = cubic(2.0 * progress - (0.0 if is_rising else 1.0))
     target[_FOOT_P + k + 2] = begin + x * delta
     target[_FOOT_V + k + 2] = dx * delta * 2.0 / duration

@@ -26,14 +26,18 @@ def envelope_of(gait: Gait, trot: VelocityEnvelope) -> VelocityEnvelope:
     """The envelope in which ``gait`` is walked.
 
     Args:
-        gait: with a name in ``GAITS``, or one of your own, which gets its ``envelope_share``.
-        trot: envelope of the trot. Those of the others are in the proportion that was measured, so
-            that all of them keep the same distance to what was measured.
+        gait: with a name in ``GAITS``, or one of your own, which gets its ``envelope_share``, as
+            does one that has not been measured yet.
+        trot: envelope of the trot, and the one that it has itself. Those of the others are in the
+            proportion that was measured, so that all of them keep the same distance to what was
+            measured, and never beyond that.
     """
-    if GAITS.get(gait.name) != gait:
-        return trot.scaled(gait.envelope_share)
+    if gait == GAITS["trot"]:
+        return trot
     measured = measured_envelopes()
+    if GAITS.get(gait.name) != gait or gait.name not in measured:
+        return trot.scaled(gait.envelope_share)
     own, usual = astuple(measured[gait.name]), astuple(measured["trot"])
     return VelocityEnvelope(
-        *(bound * a / b for bound, a, b in zip(astuple(trot), own, usual, strict=True))
+        *(min(bound / b, 1.0) * a for bound, a, b in zip(astuple(trot), own, usual, strict=True))
     )

@@ -173,7 +173,7 @@ class LocomotionPlanner(GaitPlanner):
         config = self._config
         plans_forces = config.plans_forces(gait)
         self._clock.change(gait, gait.stride if plans_forces else None)
-        self._ramp = config.ramp(gait)
+        self._ramp, self._swing = config.ramp(gait), config.swing.at_most(gait.apex)
         self._forces = ForcePlanner(self._model, config.mpc) if plans_forces else None
 
     @property
@@ -351,8 +351,7 @@ class LocomotionPlanner(GaitPlanner):
         remaining = np.where(phase.stance, 0.0, phase.remaining)
         goals = self._footholds(snapshot, remaining)
         progress = phase.progress
-        shape = self._config.swing
-        shape = replace(shape, apex=shape.apex + self._ground.apex_raise)
+        shape = replace(self._swing, apex=self._swing.apex + self._ground.apex_raise)
         for leg in LEGS:
             if not self._contacts.stance[leg]:
                 height = self._ground.at(goals[leg]) + self._model.foot_radius

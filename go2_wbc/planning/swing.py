@@ -7,7 +7,7 @@ goes from ``a`` to ``b`` as ``p = a + s (b - a)``; so ``v = s' (b - a) / T`` and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -30,15 +30,28 @@ class SwingConfig:
             the flat, 10 cm takes a third more torque at 1.5 m/s than 9.
         touchdown_depth: distance [m] below the ground at which touchdown is aimed, so that the
             foot arrives with certainty.
+        full_depth_way: length [m] of a swing up to which that is the depth; beyond, it shrinks with
+            the square of the length. A foot that is aimed below the ground by a share ``s`` of the
+            apex meets it while it still moves ahead, at ``3 sqrt(s / 3)`` times its mean speed: 2
+            m/s at 3 m/s, which threw 4 of 10 robots, all on floors of 0.8 and more; 0.9 as it is.
     """
 
     apex: float = 0.09
     touchdown_depth: float = 0.008
+    full_depth_way: float = 0.4
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a length that is out of range."""
-        require_positive(self, "apex")
+        require_positive(self, "apex", "full_depth_way")
         require_not_negative(self, "touchdown_depth")
+
+    def depth(self, way: float) -> float:
+        """How far [m] below the ground a swing of length ``way`` [m] is aimed."""
+        return self.touchdown_depth * min(1.0, self.full_depth_way / max(way, TIE)) ** 2
+
+    def at_most(self, apex: float) -> SwingConfig:
+        """The same with an apex [m] of ``apex`` if that is lower."""
+        return replace(self, apex=min(self.apex, apex))
 
 
 def swing_foot(
@@ -68,7 +81,8 @@ def swing_foot(
     a[:2] = dds / duration**2 * delta
     apex = max(start[2], goal[2]) + config.apex
     is_rising = progress < 0.5 - TIE
-    begin, end = (start[2], apex) if is_rising else (apex, goal[2] - config.touchdown_depth)
+    ground = goal[2] - config.depth(float(np.hypot(*delta)))
+    begin, end = (start[2], apex) if is_rising else (apex, ground)
     s, ds, dds = Ease.CUBIC.progress(2.0 * progress - (0.0 if is_rising else 1.0))
     p[2] = begin + s * (end - begin)
     v[2] = ds * (end - begin) * 2.0 / duration

@@ -217,6 +217,8 @@ def test_an_unknown_gait_is_answered_with_the_known_names() -> None:
     ("changes", "message"),
     [
         ({"period": 0.0}, "Gait.period must be positive"),
+        ({"apex": 0.0}, "Gait.apex must be positive"),
+        ({"apex": float("nan")}, "Gait.apex must be positive"),
         ({"duty": 1.2}, "Gait.duty must be above 0 and at most 1"),
         ({"offsets": (0.0, 0.5, 1.0, 0.0)}, "Gait.offsets must be four phases"),
     ],

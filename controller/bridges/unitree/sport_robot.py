@@ -49,7 +49,11 @@ MOTIONS: Final[Mapping[int, str]] = {
     Api.CROSS_STEP: "cross_step",
 }
 """The motion of the library that stands for each of Unitree's, if the library has it."""
-WALKS: Final[Mapping[int, str]] = {Api.STATIC_WALK: "walk", Api.TROT_RUN: "trot"}
+WALKS: Final[Mapping[int, str]] = {
+    Api.STATIC_WALK: "walk",
+    Api.TROT_RUN: "trot",
+    Api.FREE_BOUND: "bound",
+}
 """The gait that stands for each of Unitree's, if there is one of that name."""
 WALKING: Final = frozenset({Api.MOVE, *WALKS})
 """What enters walking mode, or stays in it."""

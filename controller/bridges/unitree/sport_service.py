@@ -145,6 +145,8 @@ class SportService:
             return lambda: robot.lean_to(POSE)
         if api is Api.POSE or (api is Api.CROSS_STEP and not sport_api.flag(parameter)):
             return lambda: robot.perform(Api.BALANCE_STAND)
+        if api is Api.FREE_BOUND and not sport_api.flag(parameter):
+            return lambda: robot.perform(Api.TROT_RUN)
         if api in STANDING_UP:
             return lambda: self._rise(api)
         return lambda: robot.perform(api)

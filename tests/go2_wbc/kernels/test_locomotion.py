@@ -41,7 +41,7 @@ ODD_CONFIG = LocomotionConfig(
     settle_speed=0.3,
     capture_margin=0.07,
     square_tolerance=0.05,
-    swing=SwingConfig(apex=0.083, touchdown_depth=0.011),
+    swing=SwingConfig(apex=0.083, touchdown_depth=0.011, full_depth_way=0.17),
     slip=SlipConfig(0.12, 0.007, 0.015, 1.9, 0.18, 0.22, 0.14, 0.55, 0.34),
     contact=ContactConfig(0.62, 0.013),
     ground=GroundConfig(0.41, 0.59, 0.018, 0.052, 0.73, 0.057),
@@ -51,7 +51,7 @@ ODD_CONFIG = LocomotionConfig(
 ODD_MPC = MpcConfig(step=0.028, interval=0.012, force_max=180.0, prior_weight=4e-3, load_ramp=0.02)
 
 
-GALLOP = Gait("gallop", 0.36, 0.40, (0.0, 0.15, 0.5, 0.65), needs_mpc=True)
+GALLOP = Gait("gallop", 0.36, 0.40, (0.0, 0.15, 0.5, 0.65), apex=0.05, needs_mpc=True)
 
 
 def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.ndarray) -> Snapshot:

@@ -35,11 +35,33 @@ def test_an_envelope_keeps_the_trots_distance_to_what_was_measured(name: str) ->
         assert astuple(envelope_of(GAITS[name], trot)) == pytest.approx(tuple(expected))
 
 
+def test_however_fast_the_trot_may_be_the_other_gaits_stay_inside_what_was_measured() -> None:
+    # A trot that plans its forces has a far wider envelope; a walk was taken to 1.6 m/s with it.
+    fast = VelocityEnvelope(4.0, 0.5, 1.5, 8.0)
+    for name, measured in measured_envelopes().items():
+        own = envelope_of(GAITS[name], fast)
+        if name == "trot":
+            assert own == fast
+        else:
+            assert own.forward == measured.forward
+            assert own.backward < measured.backward
+            assert own.turning == measured.turning
+
+
 def test_a_gait_of_ones_own_has_its_share_even_under_a_known_name() -> None:
     own = Gait("mine", 0.4, 0.6, (0.0, 0.5, 0.5, 0.0), envelope_share=0.4)
     assert envelope_of(own, USUAL) == USUAL.scaled(0.4)
     changed = replace(GAITS["walk"], period=0.7, envelope_share=0.2)
     assert envelope_of(changed, USUAL) == USUAL.scaled(0.2)
+
+
+def test_a_named_gait_that_is_not_measured_yet_can_be_walked_to_measure_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # The benchmark that measures envelopes raised KeyError for a new gait.
+    hop = replace(GAITS["pronk"], name="hop", envelope_share=0.3)
+    monkeypatch.setitem(GAITS, "hop", hop)
+    assert envelope_of(hop, USUAL) == USUAL.scaled(0.3)
 
 
 class Follower:

@@ -238,12 +238,12 @@ def test_what_the_library_has_no_motion_for_is_not_supported(stage: Stage) -> No
     assert [call.args for call in stage.robot.perform.call_args_list] == [(Api.FRONT_POUNCE,)]
 
 
-def test_at_least_twenty_four_calls_do_what_they_say() -> None:
+def test_at_least_twenty_eight_calls_do_what_they_say() -> None:
     there = motion_names()
     calls = {api for api in Api if api >= Api.DAMP}
     lacking = {api for api, name in MOTIONS.items() if name not in there}
     lacking |= {api for api, gait in WALKS.items() if gait not in GAITS}
-    assert len(calls - lacking) >= 24
+    assert len(calls - lacking) >= 28
 
 
 def test_a_motion_that_cannot_be_compiled_here_is_not_supported(
@@ -269,6 +269,16 @@ def test_cross_step_is_switched_on_and_off(stage: Stage) -> None:
     assert stage.code(Api.CROSS_STEP, '{"data": false}') == Code.OK
     performed = [call.args[0] for call in stage.robot.perform.call_args_list]
     assert performed == [Api.CROSS_STEP, Api.BALANCE_STAND]
+
+
+def test_free_bound_bounds_and_goes_back_to_the_trot(stage: Stage) -> None:
+    assert stage.code(Api.FREE_BOUND, '{"data": true}') == Code.OK
+    assert stage.code(Api.FREE_BOUND, '{"data": false}') == Code.OK
+    performed = [call.args[0] for call in stage.robot.perform.call_args_list]
+    assert performed == [Api.FREE_BOUND, Api.TROT_RUN]
+    assert WALKS[Api.FREE_BOUND] == "bound"
+    with pytest.raises(CommandError, match="true or false"):
+        stage.ask(Api.FREE_BOUND, "{}")
 
 
 def test_the_speed_level_and_the_recovery_can_be_asked_for(stage: Stage) -> None:
