@@ -38,7 +38,7 @@ _POSE, _POSE_RATE = _S["pose"], _S["pose_rate"]
 _LIFTOFF, _WAS_STANCE, _AWAITED = (_S[n] for n in ("liftoff", "was_stance", "is_awaited"))
 _PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
 _GAIT, _REST, _STRIDE, _RATES = (_C[n] for n in ("period", "rest_period", "stride", "adaptation"))
-_HEIGHT = _C["height"]
+_HEIGHT, _MARGIN = _C["height"], _C["stride_margin"]
 _ACCELERATION, _FEEDBACK = _C["acceleration"], _C["velocity_feedback"]
 _LEASH, _YAW_LEASH, _REACH = (_C[n] for n in ("position_leash", "yaw_leash", "foothold_reach"))
 _F_MIN, _F_MAX, _RAMP = (_C[n] for n in ("normal_force_min", "normal_force_max", "load_ramp"))
@@ -155,17 +155,22 @@ def advance_phase(snapshot, s, c, dt, command):
         s[_PERIOD : _PERIOD + 6] = c[_REST : _REST + 6]
 
 
-@subroutine("void(f8[::1], f8[::1], f8, f8[::1])")
-def adapt_gait(s, c, dt, command):
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
+def adapt_gait(snapshot, s, c, dt, command):
     """Bring period, duty and offsets towards those wanted; the phases of the feet do not jump."""
     wanted = np.empty(6)
     wanted[:] = c[_GAIT : _GAIT + 6]
+    fall = c[_RATES + 1]
     is_zero = command[0] == 0.0 and command[1] == 0.0 and command[2] == 0.0
     if is_zero and is_settled(s, c):
         wanted[:] = c[_REST : _REST + 6]
     elif c[_STRIDE] > 0.0:
         arm = np.hypot(c[_NOMINAL], c[_NOMINAL + 1])
-        speed = np.hypot(s[_VELOCITY], s[_VELOCITY + 1]) + arm * abs(s[_VELOCITY + 2])
+        speed = np.hypot(s[_VELOCITY], s[_VELOCITY + 1])
+        thrown = np.hypot(snapshot[_V_COM], snapshot[_V_COM + 1]) - c[_MARGIN]
+        if thrown > speed:
+            speed, fall = thrown, c[_RATES + 3]
+        speed += arm * abs(s[_VELOCITY + 2])
         stance = min(max(c[_STRIDE] / max(speed, TINY), c[_STRIDE + 1]), c[_STRIDE + 2])
         wanted[0] = stance + c[_STRIDE + 3] + c[_STRIDE + 4] * (speed - 1.0)
         wanted[1] = stance / wanted[0]
@@ -174,8 +179,7 @@ def adapt_gait(s, c, dt, command):
         period = s[_PERIOD] + min(max(wanted[0] - s[_PERIOD], -most), most)
         s[_PHASE_TIME] = s[_PHASE_TIME] % s[_PERIOD] * period / s[_PERIOD]
         s[_PERIOD] = period
-    most = c[_RATES + 1] * dt
-    s[_DUTY] += min(max(wanted[1] - s[_DUTY], -most), most)
+    s[_DUTY] += min(max(wanted[1] - s[_DUTY], -fall * dt), c[_RATES + 1] * dt)
     most = c[_RATES + 2] * dt
     for leg in range(4):
         if wanted[2 + leg] != s[_OFFSETS + leg]:
@@ -342,7 +346,7 @@ def plan(snapshot, time, contact, tau, s, c, command, target):
     advance_phase(snapshot, s, c, dt, command)
     integrate(snapshot, s, c, dt, command)
     if s[_STEPPING] != 0.0:
-        adapt_gait(s, c, dt, command)
+        adapt_gait(snapshot, s, c, dt, command)
     stance = np.ones(4, dtype=np.bool_)
     elapsed, remaining = np.full(4, np.inf), np.full(4, np.inf)
     if s[_STEPPING] != 0.0:

@@ -32,6 +32,7 @@ ODD_CONFIG = LocomotionConfig(
     linear_acceleration=1.1,
     angular_acceleration=3.3,
     velocity_feedback=0.17,
+    stride_margin=0.31,
     position_leash=0.05,
     yaw_leash=0.21,
     foothold_reach=0.13,

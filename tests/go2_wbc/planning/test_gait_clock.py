@@ -52,6 +52,6 @@ def run(clock: GaitClock, seconds: float = SECONDS, *, is_resting: bool) -> list
     phases = []
     for _ in range(int(seconds / TICK)):
         clock.time += TICK
-        clock.adapt(TICK, 2.0, is_resting=is_resting)
+        clock.adapt(TICK, 2.0, is_resting=is_resting, is_thrown=False)
         phases.append(clock.now())
     return phases

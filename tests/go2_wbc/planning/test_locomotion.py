@@ -15,6 +15,7 @@ from go2_wbc.planning.compiled import CompiledPlanner
 from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.ground import GROUND_SHARE
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
+from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
@@ -26,6 +27,7 @@ TROT = GAITS["trot"]
 TICK = 0.002
 EXACT = 1e-9  # rounding in sums of a few hundred ticks
 SWING_END = TROT.swing_time - TICK
+SHARE = 0.03  # of the ticks of a second that a foot stands: it holds no whole number of strides
 LAST_TICK = 5e-4  # [m] the swing curve's way in the last tick, with margin
 KINDS = [LocomotionPlanner, CompiledPlanner]
 
@@ -278,6 +280,26 @@ def test_a_turning_robot_steps_along_the_circle_about_its_middle() -> None:
         tangent = np.array([-y, x])
         share = TROT.stance_time / 2 + TROT.swing_time - SWING_END
         np.testing.assert_allclose(step, 0.6 * tangent * share, atol=LAST_TICK)
+
+
+def test_a_robot_that_is_thrown_takes_shorter_steps_and_longer_ones_again() -> None:
+    """With the stride of 0.5 m/s it fell over its standing feet at 3.4 m/s."""
+    planner = make_planner(MODEL, TROT, replace(CONFIG, mpc=MpcConfig(enabled=True)))
+    planner.start(resting())
+    speeds = 0.5, 0.5 + 0.9 * CONFIG.stride_margin, 3.4, 0.5
+    shares = [standing_share(planner, 2.0 * k, speed) for k, speed in enumerate(speeds)]
+    assert TROT.stride is not None
+    followed = 0.5, 0.5, 3.4 - CONFIG.stride_margin, 0.5
+    expected = [TROT.stride.at(speed)[1] for speed in followed]
+    np.testing.assert_allclose(shares, expected, atol=SHARE)
+
+
+def standing_share(planner: GaitPlanner, time: float, speed: float) -> float:
+    """Share of a second that a foot stands, 0.8 s after a robot told 0.5 m/s goes at ``speed``."""
+    snapshot, command = moving(resting(), np.array([speed, 0.0, 0.0])), VelocityCommand(0.5)
+    hold(planner, at(snapshot, time), command, 0.8)
+    ticks = time + 0.8 + TICK * np.arange(1, 501)
+    return float(np.mean([planner.update(at(snapshot, t), command).stance for t in ticks]))
 
 
 def test_a_foothold_stays_within_reach_of_the_hip() -> None:
