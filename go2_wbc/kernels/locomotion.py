@@ -270,7 +270,7 @@ def swing(leg, s, c, progress, goal, target):
 
 @subroutine("void(i8, f8[::1], f8[::1], f8[::1], f8[:,::1], f8, f8[::1])")
 def foothold(leg, snapshot, s, c, nominal, remaining, goal):
-    """Touchdown point: p_hip + v t + v T / 2 + k (v - v_ref), the last two within reach."""
+    """Touchdown point: as ``_footholds`` there, the offset from the way of the hip within reach."""
     cosine, sine = np.cos(s[_YAW]), np.sin(s[_YAW])
     ref_x = cosine * s[_VELOCITY] - sine * s[_VELOCITY + 1]
     ref_y = sine * s[_VELOCITY] + cosine * s[_VELOCITY + 1]
@@ -278,8 +278,9 @@ def foothold(leg, snapshot, s, c, nominal, remaining, goal):
     v_x = snapshot[_V_COM] - s[_VELOCITY + 2] * arm_y
     v_y = snapshot[_V_COM + 1] + s[_VELOCITY + 2] * arm_x
     half = s[_DUTY] * s[_PERIOD] / 2
-    x = v_x * half + c[_FEEDBACK] * (snapshot[_V_COM] - ref_x)
-    y = v_y * half + c[_FEEDBACK] * (snapshot[_V_COM + 1] - ref_y)
+    lean = s[_VELOCITY + 2] * c[_HEIGHT] / c[_GRAVITY]
+    x = v_x * half + c[_FEEDBACK] * (snapshot[_V_COM] - ref_x) + lean * ref_y
+    y = v_y * half + c[_FEEDBACK] * (snapshot[_V_COM + 1] - ref_y) - lean * ref_x
     share = min(1.0, c[_REACH] / max(np.hypot(x, y), TINY))
     goal[0] = nominal[leg, 0] + x * share + v_x * remaining
     goal[1] = nominal[leg, 1] + y * share + v_y * remaining

@@ -331,11 +331,13 @@ class LocomotionPlanner(GaitPlanner):
     def _footholds(
         self, snapshot: Snapshot, remaining: Float[np.ndarray, "4"]
     ) -> Float[np.ndarray, "4 2"]:
-        """Touchdown points [m]: ``p_hip + v t + v T / 2 + k (v - v_ref)``.
+        """Touchdown points [m]: ``p_hip + v t + v T / 2 + k (v - v_ref) - (h / g) w x v_ref``.
 
         ``t`` is the ``remaining`` time [s] of the swing, in which the hip moves on, ``T`` the
         stance time. ``v`` is the velocity of each hip: the CoM's and ``w x r`` of the turn about
-        the base. The last two terms together are clipped to ``foothold_reach``.
+        the base. In a curve a trunk of height ``h`` needs the force ``m w x v_ref``, whose moment
+        about the CoM the feet balance that much farther outside. The last three terms together are
+        clipped to ``foothold_reach``.
         """
         config = self._config
         v = snapshot.v_world_com[:2]
@@ -344,9 +346,10 @@ class LocomotionPlanner(GaitPlanner):
         arms = hips - snapshot.state.p_world_base[:2]
         spin = self._trunk.velocity[2] * np.column_stack([-arms[:, 1], arms[:, 0]])
         velocity = v + spin
-        travel = velocity * self._clock.gait.stance_time / 2 + config.velocity_feedback * (
-            v - v_ref
-        )
+        travel = velocity * self._clock.gait.stance_time / 2
+        travel += config.velocity_feedback * (v - v_ref)
+        lean = self._trunk.velocity[2] * config.height / self._model.gravity
+        travel += lean * np.array([v_ref[1], -v_ref[0]])
         length = np.linalg.norm(travel, axis=1, keepdims=True)
         reach = config.foothold_reach
         travel *= np.minimum(1.0, reach / np.maximum(length, _TINY))

@@ -282,6 +282,21 @@ def test_a_turning_robot_steps_along_the_circle_about_its_middle() -> None:
         np.testing.assert_allclose(step, 0.6 * tangent * share, atol=LAST_TICK)
 
 
+def test_in_a_curve_the_feet_land_outside_by_what_the_centripetal_force_needs() -> None:
+    """Without it the robot walked 20 mm inside its circle, and so 2 % too slowly."""
+    start, v = resting(), np.array([0.2, 0.1, 0.0])
+    straight = landing(moving(start, v), VelocityCommand(0.2, 0.1))
+    curve = landing(moving(start, v), VelocityCommand(0.2, 0.1, 0.3))
+    turning = landing(start, VelocityCommand(0.0, 0.0, 0.3))
+    swing, v_ref = ~curve.stance, curve.body.v_world
+    centripetal = 0.3 * np.array([-v_ref[1], v_ref[0]])
+    expected = -CONFIG.height / MODEL.gravity * centripetal
+    expected += CONFIG.velocity_feedback * (straight.body.v_world - v_ref)[:2]
+    of_turning = turning.p_world_feet[swing] - start.p_world_feet[swing]
+    found = (curve.p_world_feet - straight.p_world_feet)[swing] - of_turning
+    np.testing.assert_allclose(found[:, :2], np.tile(expected, (2, 1)), atol=LAST_TICK)
+
+
 def test_a_robot_that_is_thrown_takes_shorter_steps_and_longer_ones_again() -> None:
     """With the stride of 0.5 m/s it fell over its standing feet at 3.4 m/s."""
     planner = make_planner(MODEL, TROT, replace(CONFIG, mpc=MpcConfig(enabled=True)))
