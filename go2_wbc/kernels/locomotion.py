@@ -14,6 +14,7 @@ from go2_wbc.kernels.contact import follow_contact, loaded_time
 from go2_wbc.kernels.ground import (
     apex_raise,
     carry_ground,
+    delay,
     ground_at,
     learn_ground,
     note_stumble,
@@ -252,12 +253,16 @@ def swing(leg, s, c, progress, goal, target):
     duration = (1.0 - s[_DUTY]) * s[_PERIOD]
     start = s[_LIFTOFF + 3 * leg : _LIFTOFF + 3 * leg + 3]
     k = 3 * leg
-    x, dx, ddx = cubic(progress)
+    late = delay(s, c)
+    span = duration * (1.0 - late)
+    x, dx, ddx = 0.0, 0.0, 0.0
+    if progress >= late - TIE:
+        x, dx, ddx = cubic((progress - late) / (1.0 - late))
     for i in range(2):
         delta = goal[i] - start[i]
         target[_FOOT_P + k + i] = start[i] + x * delta
-        target[_FOOT_V + k + i] = dx / duration * delta
-        target[_FOOT_A + k + i] = ddx / duration**2 * delta
+        target[_FOOT_V + k + i] = dx / span * delta
+        target[_FOOT_A + k + i] = ddx / span**2 * delta
     apex = max(start[2], goal[2]) + c[_APEX] + apex_raise(s, c)
     is_rising = progress < 0.5 - TIE
     begin = start[2] if is_rising else apex

@@ -376,5 +376,6 @@ class LocomotionPlanner(GaitPlanner):
                     float(progress[leg]),
                     self._clock.gait.swing_time,
                     shape,
+                    self._ground.delay,
                 )
         return p, v, a
