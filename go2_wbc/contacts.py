@@ -244,6 +244,9 @@ GAITS: dict[str, Gait] = {
 PERIOD_RATE, DUTY_RATE, OFFSET_RATE = 0.2, 0.5, 0.8
 """Greatest change of a gait in a second: of its period [s/s], duty and offsets [1/s]. A foot's
 phase passes at 2 per second or more, so that no foot is put back to where it was."""
+DUTY_FALL = 4.0
+"""Greatest fall [1/s] of the duty of a robot that has been thrown: a foot that lifts off sooner
+is not put back. At 0.5 a push of 50 N s ahead threw a trot of 0.5 m/s over feet that stood on."""
 
 
 def find_gait(name: str | Gait) -> Gait:

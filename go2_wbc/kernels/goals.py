@@ -31,6 +31,7 @@ _POSITION, _ORIENTATION, _SWING, _POSTURE = (
     _P[n] for n in ("position_kp", "orientation_kp", "swing_kp", "posture_kp")
 )
 _FORCE_WEIGHT, _WEIGHT_OF_ROBOT = _P["force_weight"], _P["weight_of_robot"]
+_FLIGHT_WEIGHT = _P["flight_weight"]
 _CARRIED = _S["payload"] + 1
 """Weight of the payload [N]."""
 _FORCES, _PRIOR_WEIGHT = _T["f_world_feet"], _T["force_weight"]
@@ -116,7 +117,12 @@ def add_body_goals(snapshot, target, program, base, H, g):
         add_goal(H, g, row, desired - rest, weight)
     if not orientation_error(snapshot, target, error):
         return False
+    stands = False
+    for leg in range(4):
+        stands |= target[_LEGS + leg] == STANCE
     weight = program[_ORIENTATION + 6]
+    if not stands:
+        weight = min(weight, program[_FLIGHT_WEIGHT])
     for i in range(3):
         rate, desired = -v[3 + i], 0.0
         for n in range(3):

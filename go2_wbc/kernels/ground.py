@@ -15,7 +15,7 @@ _S, _C = PLANNER.start, LOCOMOTION.start
 _HEIGHT, _SLOPE, _P_SEEN = (_S[n] for n in ("ground", "slope", "p_seen"))
 _P_MET, _ROUGHNESS = _S["p_met"], _S["roughness"]
 _SHARE, _RADIUS, _GROUND = (_C[n] for n in ("ground_share", "foot_radius", "ground"))
-_SLOPE_SHARE, _FOLLOW, _SMOOTH, _RAISE, _CALMING, _STUMBLE = range(_GROUND, _GROUND + 6)
+_SLOPE_SHARE, _FOLLOW, _SMOOTH, _RAISE, _CALMING, _STUMBLE, _DELAY = range(_GROUND, _GROUND + 7)
 _LEAST, _MOST = _C["least_determinant"], _C["most_slope"]
 
 
@@ -29,6 +29,12 @@ def ground_at(s, x, y):
 def apex_raise(s, c):
     """Height by which a swing is higher than on smooth ground."""
     return min(max(s[_ROUGHNESS] - c[_SMOOTH], 0.0), c[_RAISE])
+
+
+@subroutine("f8(f8[::1], f8[::1])")
+def delay(s, c):
+    """Share of a swing in which the foot only rises."""
+    return c[_DELAY] * apex_raise(s, c) / c[_RAISE] if c[_RAISE] > 0.0 else 0.0
 
 
 @subroutine("Tuple((f8, f8))(f8[::1], f8[::1])")

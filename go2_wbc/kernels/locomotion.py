@@ -14,6 +14,7 @@ from go2_wbc.kernels.contact import follow_contact, loaded_time
 from go2_wbc.kernels.ground import (
     apex_raise,
     carry_ground,
+    delay,
     ground_at,
     learn_ground,
     note_stumble,
@@ -38,7 +39,7 @@ _POSE, _POSE_RATE = _S["pose"], _S["pose_rate"]
 _LIFTOFF, _WAS_STANCE, _AWAITED = (_S[n] for n in ("liftoff", "was_stance", "is_awaited"))
 _PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
 _GAIT, _REST, _STRIDE, _RATES = (_C[n] for n in ("period", "rest_period", "stride", "adaptation"))
-_HEIGHT = _C["height"]
+_HEIGHT, _MARGIN = _C["height"], _C["stride_margin"]
 _ACCELERATION, _FEEDBACK = _C["acceleration"], _C["velocity_feedback"]
 _LEASH, _YAW_LEASH, _REACH = (_C[n] for n in ("position_leash", "yaw_leash", "foothold_reach"))
 _F_MIN, _F_MAX, _RAMP = (_C[n] for n in ("normal_force_min", "normal_force_max", "load_ramp"))
@@ -156,17 +157,22 @@ def advance_phase(snapshot, s, c, dt, command):
         s[_PERIOD : _PERIOD + 6] = c[_REST : _REST + 6]
 
 
-@subroutine("void(f8[::1], f8[::1], f8, f8[::1])")
-def adapt_gait(s, c, dt, command):
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
+def adapt_gait(snapshot, s, c, dt, command):
     """Bring period, duty and offsets towards those wanted; the phases of the feet do not jump."""
     wanted = np.empty(6)
     wanted[:] = c[_GAIT : _GAIT + 6]
+    fall = c[_RATES + 1]
     is_zero = command[0] == 0.0 and command[1] == 0.0 and command[2] == 0.0
     if is_zero and is_settled(s, c):
         wanted[:] = c[_REST : _REST + 6]
     elif c[_STRIDE] > 0.0:
         arm = np.hypot(c[_NOMINAL], c[_NOMINAL + 1])
-        speed = np.hypot(s[_VELOCITY], s[_VELOCITY + 1]) + arm * abs(s[_VELOCITY + 2])
+        speed = np.hypot(s[_VELOCITY], s[_VELOCITY + 1])
+        thrown = np.hypot(snapshot[_V_COM], snapshot[_V_COM + 1]) - c[_MARGIN]
+        if thrown > speed:
+            speed, fall = thrown, c[_RATES + 3]
+        speed += arm * abs(s[_VELOCITY + 2])
         stance = min(max(c[_STRIDE] / max(speed, TINY), c[_STRIDE + 1]), c[_STRIDE + 2])
         wanted[0] = stance + c[_STRIDE + 3] + c[_STRIDE + 4] * (speed - 1.0)
         wanted[1] = stance / wanted[0]
@@ -175,8 +181,7 @@ def adapt_gait(s, c, dt, command):
         period = s[_PERIOD] + min(max(wanted[0] - s[_PERIOD], -most), most)
         s[_PHASE_TIME] = s[_PHASE_TIME] % s[_PERIOD] * period / s[_PERIOD]
         s[_PERIOD] = period
-    most = c[_RATES + 1] * dt
-    s[_DUTY] += min(max(wanted[1] - s[_DUTY], -most), most)
+    s[_DUTY] += min(max(wanted[1] - s[_DUTY], -fall * dt), c[_RATES + 1] * dt)
     most = c[_RATES + 2] * dt
     for leg in range(4):
         if wanted[2 + leg] != s[_OFFSETS + leg]:
@@ -249,12 +254,16 @@ def swing(leg, s, c, progress, goal, target):
     duration = (1.0 - s[_DUTY]) * s[_PERIOD]
     start = s[_LIFTOFF + 3 * leg : _LIFTOFF + 3 * leg + 3]
     k = 3 * leg
-    x, dx, ddx = cubic(progress)
+    late = delay(s, c)
+    span = duration * (1.0 - late)
+    x, dx, ddx = 0.0, 0.0, 0.0
+    if progress >= late - TIE:
+        x, dx, ddx = cubic((progress - late) / (1.0 - late))
     for i in range(2):
         delta = goal[i] - start[i]
         target[_FOOT_P + k + i] = start[i] + x * delta
-        target[_FOOT_V + k + i] = dx / duration * delta
-        target[_FOOT_A + k + i] = ddx / duration**2 * delta
+        target[_FOOT_V + k + i] = dx / span * delta
+        target[_FOOT_A + k + i] = ddx / span**2 * delta
     apex = max(start[2], goal[2]) + c[_APEX] + apex_raise(s, c)
     is_rising = progress < 0.5 - TIE
     way = np.hypot(goal[0] - start[0], goal[1] - start[1])
@@ -269,7 +278,7 @@ def swing(leg, s, c, progress, goal, target):
 
 @subroutine("void(i8, f8[::1], f8[::1], f8[::1], f8[:,::1], f8, f8[::1])")
 def foothold(leg, snapshot, s, c, nominal, remaining, goal):
-    """Touchdown point: p_hip + v t + v T / 2 + k (v - v_ref), the last two within reach."""
+    """Touchdown point: as ``_footholds`` there, the offset from the way of the hip within reach."""
     cosine, sine = np.cos(s[_YAW]), np.sin(s[_YAW])
     ref_x = cosine * s[_VELOCITY] - sine * s[_VELOCITY + 1]
     ref_y = sine * s[_VELOCITY] + cosine * s[_VELOCITY + 1]
@@ -277,8 +286,9 @@ def foothold(leg, snapshot, s, c, nominal, remaining, goal):
     v_x = snapshot[_V_COM] - s[_VELOCITY + 2] * arm_y
     v_y = snapshot[_V_COM + 1] + s[_VELOCITY + 2] * arm_x
     half = s[_DUTY] * s[_PERIOD] / 2
-    x = v_x * half + c[_FEEDBACK] * (snapshot[_V_COM] - ref_x)
-    y = v_y * half + c[_FEEDBACK] * (snapshot[_V_COM + 1] - ref_y)
+    lean = s[_VELOCITY + 2] * c[_HEIGHT] / c[_GRAVITY]
+    x = v_x * half + c[_FEEDBACK] * (snapshot[_V_COM] - ref_x) + lean * ref_y
+    y = v_y * half + c[_FEEDBACK] * (snapshot[_V_COM + 1] - ref_y) - lean * ref_x
     share = min(1.0, c[_REACH] / max(np.hypot(x, y), TINY))
     goal[0] = nominal[leg, 0] + x * share + v_x * remaining
     goal[1] = nominal[leg, 1] + y * share + v_y * remaining
@@ -345,7 +355,7 @@ def plan(snapshot, time, contact, tau, s, c, command, target):
     advance_phase(snapshot, s, c, dt, command)
     integrate(snapshot, s, c, dt, command)
     if s[_STEPPING] != 0.0:
-        adapt_gait(s, c, dt, command)
+        adapt_gait(snapshot, s, c, dt, command)
     stance = np.ones(4, dtype=np.bool_)
     elapsed, remaining = np.full(4, np.inf), np.full(4, np.inf)
     if s[_STEPPING] != 0.0:

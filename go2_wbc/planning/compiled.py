@@ -7,7 +7,7 @@ from dataclasses import astuple
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.contacts import DUTY_RATE, OFFSET_RATE, PERIOD_RATE, Gait
+from go2_wbc.contacts import DUTY_FALL, DUTY_RATE, OFFSET_RATE, PERIOD_RATE, Gait
 from go2_wbc.kernels.layout import COMMAND, FORCES, LOCOMOTION, MPC, PLANNER, REFERENCE
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.correction import CorrectionConfig
@@ -144,7 +144,8 @@ def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndar
             rest.duty,
             rest.offsets,
             np.zeros(5) if stride is None else astuple(stride),
-            [PERIOD_RATE, DUTY_RATE, OFFSET_RATE],
+            [PERIOD_RATE, DUTY_RATE, OFFSET_RATE, DUTY_FALL],
+            config.stride_margin,
             config.height,
             [config.linear_acceleration] * 2 + [config.angular_acceleration],
             config.velocity_feedback,

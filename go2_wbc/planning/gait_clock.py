@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from go2_wbc.contacts import (
+    DUTY_FALL,
     DUTY_RATE,
     GAITS,
     OFFSET_RATE,
@@ -53,17 +54,21 @@ class GaitClock:
         """The contacts of this instant."""
         return self._schedule.at(self.time)
 
-    def adapt(self, dt: float, speed: float, *, is_resting: bool) -> None:
-        """Let ``dt`` [s] of change pass, towards the gait for ``speed`` [m/s] or for resting."""
+    def adapt(self, dt: float, speed: float, *, is_resting: bool, is_thrown: bool) -> None:
+        """Let ``dt`` [s] of change pass, towards the gait for ``speed`` [m/s] or for resting.
+
+        A robot that ``is_thrown``, faster than it shall be, lifts its feet sooner at once.
+        """
         wanted = self._rest if is_resting else self._wanted
-        period, duty = wanted.period, wanted.duty
+        period, duty, fall = wanted.period, wanted.duty, DUTY_RATE
         if self._stride is not None and not is_resting:
             period, duty = self._stride.at(speed)
+            fall = DUTY_FALL if is_thrown else DUTY_RATE
         before = self.gait
         pairs = zip(before.offsets, wanted.offsets, strict=True)
         offsets = tuple(_turned(now, goal, OFFSET_RATE * dt) for now, goal in pairs)
         period = _moved(before.period, period, PERIOD_RATE * dt)
-        duty = _moved(before.duty, duty, DUTY_RATE * dt)
+        duty = before.duty + min(max(duty - before.duty, -fall * dt), DUTY_RATE * dt)
         if (period, duty, offsets) == (before.period, before.duty, before.offsets):
             return
         if period != before.period:

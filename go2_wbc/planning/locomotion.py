@@ -63,6 +63,9 @@ class LocomotionConfig:
         linear_acceleration: greatest change of the commanded velocity [m/s^2].
         angular_acceleration: greatest change of the commanded turning rate [rad/s^2].
         velocity_feedback: foothold offset [s] per velocity error.
+        stride_margin: speed [m/s] that the robot may have beyond the commanded one before the
+            stride follows it. A push of 50 N s throws it to 3.4 m/s: on a foot that stands as long
+            as at 0.5 m/s the trunk then travels half a metre, and falls.
         position_leash: distance [m] that the reference may run ahead of the robot.
         yaw_leash: angle [rad] that the heading reference may run ahead.
         foothold_reach: greatest horizontal distance [m] of a foothold from below its hip.
@@ -87,6 +90,7 @@ class LocomotionConfig:
     linear_acceleration: float = 1.5
     angular_acceleration: float = 4.0
     velocity_feedback: float = 0.12
+    stride_margin: float = 0.4
     position_leash: float = 0.08
     yaw_leash: float = 0.3
     foothold_reach: float = 0.22
@@ -207,7 +211,7 @@ class LocomotionPlanner(GaitPlanner):
         self._trunk.integrate(snapshot, command, pose, dt)
         self._ground.carry(snapshot)
         self._trunk.correct_height(snapshot, self._ground.height + self._config.height, dt)
-        phase = self._phase(command, dt)
+        phase = self._phase(snapshot, command, dt)
         self._contacts.update(snapshot, phase, self._ground.above(snapshot.p_world_feet), dt)
         stance = self._contacts.stance
         self._slip.update(snapshot, stance, dt)
@@ -234,13 +238,19 @@ class LocomotionPlanner(GaitPlanner):
         course = self._course(snapshot, command, pose, phase)
         return self._forces.update(snapshot, course, reference)
 
-    def _phase(self, command: VelocityCommand, dt: float) -> ContactPhase:
+    def _phase(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> ContactPhase:
         if not self._is_stepping:
             return standing().at(0.0)
         x, y, turn = self._trunk.velocity
         arm = np.hypot(*self._model.p_base_feet_nominal[0, :2])
-        is_resting = command.is_zero and self._trunk.is_settled
-        self._clock.adapt(dt, float(np.hypot(x, y) + arm * abs(turn)), is_resting=is_resting)
+        wanted = float(np.hypot(x, y))
+        thrown = float(np.linalg.norm(snapshot.v_world_com[:2])) - self._config.stride_margin
+        self._clock.adapt(
+            dt,
+            max(wanted, thrown) + float(arm * abs(turn)),
+            is_resting=command.is_zero and self._trunk.is_settled,
+            is_thrown=thrown > wanted,
+        )
         return self._clock.now()
 
     def _course(
@@ -321,11 +331,13 @@ class LocomotionPlanner(GaitPlanner):
     def _footholds(
         self, snapshot: Snapshot, remaining: Float[np.ndarray, "4"]
     ) -> Float[np.ndarray, "4 2"]:
-        """Touchdown points [m]: ``p_hip + v t + v T / 2 + k (v - v_ref)``.
+        """Touchdown points [m]: ``p_hip + v t + v T / 2 + k (v - v_ref) - (h / g) w x v_ref``.
 
         ``t`` is the ``remaining`` time [s] of the swing, in which the hip moves on, ``T`` the
         stance time. ``v`` is the velocity of each hip: the CoM's and ``w x r`` of the turn about
-        the base. The last two terms together are clipped to ``foothold_reach``.
+        the base. In a curve a trunk of height ``h`` needs the force ``m w x v_ref``, whose moment
+        about the CoM the feet balance that much farther outside. The last three terms together are
+        clipped to ``foothold_reach``.
         """
         config = self._config
         v = snapshot.v_world_com[:2]
@@ -334,9 +346,10 @@ class LocomotionPlanner(GaitPlanner):
         arms = hips - snapshot.state.p_world_base[:2]
         spin = self._trunk.velocity[2] * np.column_stack([-arms[:, 1], arms[:, 0]])
         velocity = v + spin
-        travel = velocity * self._clock.gait.stance_time / 2 + config.velocity_feedback * (
-            v - v_ref
-        )
+        travel = velocity * self._clock.gait.stance_time / 2
+        travel += config.velocity_feedback * (v - v_ref)
+        lean = self._trunk.velocity[2] * config.height / self._model.gravity
+        travel += lean * np.array([v_ref[1], -v_ref[0]])
         length = np.linalg.norm(travel, axis=1, keepdims=True)
         reach = config.foothold_reach
         travel *= np.minimum(1.0, reach / np.maximum(length, _TINY))
@@ -362,5 +375,6 @@ class LocomotionPlanner(GaitPlanner):
                     float(progress[leg]),
                     self._clock.gait.swing_time,
                     shape,
+                    self._ground.delay,
                 )
         return p, v, a

@@ -2,7 +2,8 @@
 
 With the share ``u`` of a span of ``T`` seconds and the ease ``s(u) = 3 u^2 - 2 u^3``, a coordinate
 goes from ``a`` to ``b`` as ``p = a + s (b - a)``; so ``v = s' (b - a) / T`` and
-``a = s'' (b - a) / T^2``. Horizontally the span is the swing, vertically each half of it.
+``a = s'' (b - a) / T^2``. Horizontally the span is the swing, or what is left of it after a delay,
+vertically each half of it.
 """
 
 from __future__ import annotations
@@ -60,6 +61,7 @@ def swing_foot(
     progress: float,
     duration: float,
     config: SwingConfig,
+    delay: float = 0.0,
 ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
     """Position, velocity, acceleration of the foot centre in the world.
 
@@ -72,13 +74,16 @@ def swing_foot(
         progress: share of the swing that has passed, 0 to 1.
         duration: of the whole swing [s].
         config: apex and touchdown depth.
+        delay: share of the swing, below 1, in which the foot only rises.
     """
     p, v, a = np.empty(3), np.empty(3), np.empty(3)
-    s, ds, dds = Ease.CUBIC.progress(progress)
-    delta = goal[:2] - start[:2]
-    p[:2] = start[:2] + s * delta
-    v[:2] = ds / duration * delta
-    a[:2] = dds / duration**2 * delta
+    delta, span = goal[:2] - start[:2], duration * (1.0 - delay)
+    p[:2], v[:2], a[:2] = start[:2], 0.0, 0.0
+    if progress >= delay - TIE:
+        s, ds, dds = Ease.CUBIC.progress((progress - delay) / (1.0 - delay))
+        p[:2] += s * delta
+        v[:2] = ds / span * delta
+        a[:2] = dds / span**2 * delta
     apex = max(start[2], goal[2]) + config.apex
     is_rising = progress < 0.5 - TIE
     ground = goal[2] - config.depth(float(np.hypot(*delta)))

@@ -186,7 +186,9 @@ class WholeBodyController:
 def _tasks(model: RobotModel, config: WbcConfig) -> tuple[Task, ...]:
     return (
         BodyPosition(*config.body_position.arrays, config.position_weight),
-        BodyOrientation(*config.body_orientation.arrays, config.orientation_weight),
+        BodyOrientation(
+            *config.body_orientation.arrays, config.orientation_weight, config.flight_weight
+        ),
         SwingFoot(*config.swing_foot.arrays, config.swing_weight),
         LegPosture(*config.leg_posture.arrays, config.posture_weight),
         ForceRegularisation(model.mass * model.gravity, config.force_weight),

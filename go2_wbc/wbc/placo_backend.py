@@ -103,7 +103,10 @@ class _Mode:
             self._solver.set_torque_limit(name, float(limit * config.torque_share))
         self._position = self._add_position_task()
         self._orientation = self._solver.add_orientation_task(_BASE, np.eye(3))
-        self._orientation.configure("orientation", "soft", config.orientation_weight)
+        weight = config.orientation_weight
+        if not self._stance:
+            weight = min(weight, config.flight_weight)
+        self._orientation.configure("orientation", "soft", weight)
         self._pressing: list[placo.Contact] = []
         self._contacts = {leg: self._add_contact(leg) for leg in self._stance}
         self._swing = {leg: self._add_swing(leg) for leg in LEGS if legs[leg] is LegTask.SWING}

@@ -69,6 +69,7 @@ class Program:
         self._numbers = PROGRAM.pack(
             [
                 *gains,
+                orientation.flight_weight,
                 force.weight,
                 force.weight_of_robot,
                 still.damping,

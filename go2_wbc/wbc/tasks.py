@@ -93,11 +93,16 @@ class BodyPosition(Task):
 
 @dataclass(frozen=True, slots=True)
 class BodyOrientation(Task):
-    """Turn the base along the reference; the error is log(R^T R_des) in the base frame."""
+    """Turn the base along the reference; the error is log(R^T R_des) in the base frame.
+
+    While no foot stands, only the legs turn the base, by swinging the other way: ``flight_weight``
+    is the most that it weighs then.
+    """
 
     kp: Float[np.ndarray, "3"]
     kd: Float[np.ndarray, "3"]
     weight: float = 10.0
+    flight_weight: float = 0.05
     name: str = "body orientation"
     unit: str = "rad/s^2"
 
@@ -110,6 +115,10 @@ class BodyOrientation(Task):
         error = log_rotation(R.T @ target.R_world_base)
         rate_error = R.T @ target.w_world - snapshot.state.v[3:6]
         return Rows(A, R.T @ target.dw_world + self.kd * rate_error + self.kp * error)
+
+    def weight_at(self, reference: Reference) -> float:
+        """``weight``, and in flight at most ``flight_weight``."""
+        return self.weight if reference.stance.any() else min(self.weight, self.flight_weight)
 
 
 @dataclass(frozen=True, slots=True)

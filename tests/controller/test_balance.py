@@ -15,6 +15,10 @@ from controller.behaviours.standing import (
     trot_against,
 )
 from controller.checks import is_standing
+from go2_wbc.config import Config
+from go2_wbc.contacts import GAITS
+from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from tests.controller.plants import PERIOD
@@ -25,9 +29,11 @@ PUSH_TIME = 0.1
 HARD, HARD_ASIDE = 30.0, 22.0
 # N s; 3 m/s ahead, 2.4 m/s aside.
 HARDEST, HARDEST_ASIDE = 45.0, 36.0
+HARDEST_TROTTING = 50.0
 SOFT = 6.0
 # s; in which it stands again.
 LIMIT = 3.0
+BY_MPC = Config(locomotion=LocomotionConfig(mpc=MpcConfig(enabled=True)))
 SNAPSHOT = RobotModel().snapshot(state_of(standing_q()))
 
 
@@ -64,6 +70,23 @@ def test_a_push_that_feet_in_place_cannot_hold_starts_steps(impulse: float, angl
         assert go2.mode is Mode.STANDING
         assert is_standing(go2._runner.loop.snapshot)
         assert np.linalg.norm(go2.state.q[:2]) > 0.1, "it was pushed away and stands there"
+
+
+@pytest.mark.parametrize("phase", [3, 11])
+def test_a_trot_withstands_a_hard_push_ahead(phase: int) -> None:
+    # It stood on its feet for as long as at 0.5 m/s, and swung them too late: 4 of 16 phases.
+    plant = MujocoPlant(control_period=PERIOD)
+    with GO2Controller(plant=plant, config=BY_MPC) as go2:
+        assert go2.stand()
+        assert go2.walk()
+        go2.move(0.5)
+        go2.wait(1.5 + phase * GAITS["trot"].period / 16)
+        plant.push(np.array([HARDEST_TROTTING / PUSH_TIME, 0.0, 0.0]), PUSH_TIME)
+        go2.wait(PUSH_TIME)
+        assert go2.state.v[0] > 3.0
+        go2.wait(2.0)
+        assert go2.mode is Mode.WALKING
+        assert go2.state.v[0] == pytest.approx(0.5, abs=0.25)
 
 
 def test_a_push_that_feet_in_place_hold_starts_no_step() -> None:

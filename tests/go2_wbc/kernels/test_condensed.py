@@ -43,6 +43,7 @@ ODD_NUMBERS = WbcConfig(
     position_weight=1.7,
     orientation_weight=3.1,
     swing_weight=0.7,
+    flight_weight=0.19,
     posture_weight=1.3,
     force_weight=2e-4,
     friction=0.37,

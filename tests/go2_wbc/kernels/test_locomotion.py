@@ -32,6 +32,7 @@ ODD_CONFIG = LocomotionConfig(
     linear_acceleration=1.1,
     angular_acceleration=3.3,
     velocity_feedback=0.17,
+    stride_margin=0.31,
     position_leash=0.05,
     yaw_leash=0.21,
     foothold_reach=0.13,
@@ -44,7 +45,7 @@ ODD_CONFIG = LocomotionConfig(
     swing=SwingConfig(apex=0.083, touchdown_depth=0.011, full_depth_way=0.17),
     slip=SlipConfig(0.12, 0.007, 0.015, 1.9, 0.18, 0.22, 0.14, 0.55, 0.34),
     contact=ContactConfig(0.62, 0.013),
-    ground=GroundConfig(0.41, 0.59, 0.018, 0.052, 0.73, 0.057),
+    ground=GroundConfig(0.41, 0.59, 0.018, 0.052, 0.73, 0.057, 0.29),
     pose=PoseConfig(0.13, 0.47, 4.1),
 )
 """No two numbers alike, so that one in another's place is seen."""

@@ -48,10 +48,23 @@ def test_no_foot_is_put_back_in_its_stride_while_the_gait_changes(gait: Gait) ->
         assert (before.progress[landed] > 1.0 - JUMP).all()
 
 
-def run(clock: GaitClock, seconds: float = SECONDS, *, is_resting: bool) -> list:
+def test_a_robot_that_is_thrown_lifts_its_feet_sooner_at_once() -> None:
+    """At the usual rate it fell over feet that stood on."""
+    stride = GAITS["trot"].stride
+    assert stride is not None
+    usual, thrown = (GaitClock(GAITS["trot"], stride) for _ in range(2))
+    run(usual, seconds=0.06, is_resting=False)
+    run(thrown, seconds=0.06, is_resting=False, is_thrown=True)
+    assert usual.gait.duty > 0.46
+    assert thrown.gait.duty < 0.42
+
+
+def run(
+    clock: GaitClock, seconds: float = SECONDS, *, is_resting: bool, is_thrown: bool = False
+) -> list:
     phases = []
     for _ in range(int(seconds / TICK)):
         clock.time += TICK
-        clock.adapt(TICK, 2.0, is_resting=is_resting)
+        clock.adapt(TICK, 2.0, is_resting=is_resting, is_thrown=is_thrown)
         phases.append(clock.now())
     return phases

@@ -79,6 +79,7 @@ def test_a_step_raises_the_swing_for_a_while_and_smooth_ground_does_not() -> Non
     assert ground.apex_raise == pytest.approx(0.05 - CONFIG.smooth)
     ground.stumble()
     assert ground.apex_raise == pytest.approx(CONFIG.stumble - CONFIG.smooth)
+    assert ground.delay == pytest.approx(CONFIG.delay * ground.apex_raise / CONFIG.most_raise)
     for _ in range(20):
         ground.learn(snapshot.p_world_feet, np.ones(4, dtype=bool))
     assert ground.apex_raise == 0.0

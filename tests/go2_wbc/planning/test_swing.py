@@ -86,6 +86,23 @@ def test_position_and_velocity_are_continuous_at_the_apex() -> None:
     np.testing.assert_allclose(before[1], after[1], atol=1e-9)
 
 
+@pytest.mark.parametrize("delay", [0.2, 0.7])
+def test_a_foot_that_waits_rises_first_and_then_moves_as_any_other(delay: float) -> None:
+    # On its way ahead at once it rubbed along the face of a step that it stood close to.
+    start, goal = np.random.default_rng(3).uniform(-0.2, 0.2, size=(2, 3))
+    span = (1.0 - delay) * DURATION
+    for progress in np.linspace(0.0, LAST, 24):
+        p, v, a = swing_foot(start, goal, progress, DURATION, CONFIG, delay)
+        at_once = swing(start, goal, progress)
+        np.testing.assert_allclose([p[2], v[2], a[2]], [part[2] for part in at_once])
+        if progress < delay:
+            np.testing.assert_array_equal([*p[:2], *v[:2], *a[:2]], [*start[:2], 0, 0, 0, 0])
+            continue
+        later = swing_foot(start, goal, (progress - delay) / (1.0 - delay), span, CONFIG)
+        for found, expected in zip((p, v, a), later, strict=True):
+            np.testing.assert_allclose(found[:2], expected[:2], atol=1e-9)
+
+
 def test_a_goal_that_moves_late_is_still_reached() -> None:
     start, goal, late = np.zeros(3), np.array([0.1, 0.0, 0.0]), np.array([0.14, 0.03, 0.01])
     assert not np.allclose(swing(start, goal, 0.9)[0], swing(start, late, 0.9)[0])

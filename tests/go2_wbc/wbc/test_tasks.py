@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.legs import LEGS
-from go2_wbc.reference import Reference, TrackedPoint
+from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import exp_rotation, log_rotation
 from go2_wbc.robot.snapshot import Snapshot
@@ -109,6 +109,16 @@ def test_a_trunk_turned_away_is_turned_back(axis: int) -> None:
     )
     rows = BodyOrientation(KP, KD).rows(snapshot, replace(reference, body=away))
     np.testing.assert_allclose(rows.b, -KP * turn, atol=EXACT)
+
+
+def test_in_flight_the_attitude_weighs_less_than_the_feet_that_turn_it() -> None:
+    """It weighed ten times as much, and feet landed 0.1 m behind their footholds."""
+    _, reference, _ = scene(1)
+    flying = replace(reference, legs=(LegTask.SWING,) * 4)
+    task = BodyOrientation(KP, KD, weight=10.0, flight_weight=0.05)
+    assert task.weight_at(reference) == 10.0
+    assert task.weight_at(flying) == 0.05
+    assert BodyOrientation(KP, KD, weight=0.0).weight_at(flying) == 0.0, "a task that is off"
 
 
 @pytest.mark.parametrize("seed", SEEDS)
