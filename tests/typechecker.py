@@ -56,20 +56,14 @@ def _rationed(jaxtyped: Callable[..., Any]) -> Callable[..., Any]:
             return partial(decorator, typechecker=typechecker)
         if getattr(decorated, "__globals__", None) is globals():  # inherited, and counted already
             return decorated
-        make = partial(jaxtyped, decorated, typechecker=typechecker)
-        return _counted(decorated, make) if isinstance(decorated, FunctionType) else make()
+        made = jaxtyped(decorated, typechecker=typechecker)
+        return _counted(decorated, made) if isinstance(decorated, FunctionType) else made
 
     return decorator
 
 
-def _counted(
-    plain: Callable[..., Any], make: Callable[[], Callable[..., Any]]
-) -> Callable[..., Any]:
-    """What ``make`` makes for the calls that are to be checked, ``plain`` for the others.
-
-    It is made at the first call: reading the annotations of all functions takes a second.
-    """
-    strict: list[Callable[..., Any]] = []
+def _counted(plain: Callable[..., Any], strict: Callable[..., Any]) -> Callable[..., Any]:
+    """``strict`` for the calls that are to be checked, ``plain`` for the others."""
 
     @wraps(plain)
     def counted(*args: object, **kwargs: object) -> object:
@@ -79,9 +73,7 @@ def _counted(
         calls = _calls[place] = _calls.get(place, 0) + 1
         if calls > CHECKED_CALLS and calls % STRIDE:
             return plain(*args, **kwargs)
-        if not strict:
-            strict.append(make())
-        return strict[0](*args, **kwargs)
+        return strict(*args, **kwargs)
 
     return counted
 
