@@ -61,7 +61,7 @@ def test_a_number_that_is_not_finite_is_refused_by_name(
         (lambda go2: go2.turn_right(90.0), r"angle must be within \+-62.8 rad, got -90.0"),
         (lambda go2: go2.move_forward(1e9), r"distance must be within \+-100 m, got 1"),
         (lambda go2: go2.high_five("up"), "unknown side 'up'; valid: left, right"),
-        (lambda go2: go2.walk("gallop"), "unknown gait 'gallop'; valid: .*trot"),
+        (lambda go2: go2.walk("canter"), "unknown gait 'canter'; valid: .*trot"),
         (lambda go2: go2.play("levitate"), "unknown motion 'levitate'; valid: .*high_five"),
         (lambda go2: go2.recording(rate=0.0), "rate must be positive, got 0.0"),
         (lambda go2: go2.recording(rate=nan), "rate must be positive, got nan"),
@@ -96,9 +96,9 @@ def test_a_plant_whose_time_does_not_wait_is_refused_without_realtime(
 def test_a_refused_call_is_the_last_outcome() -> None:
     with GO2Controller(plant=StillPlant()) as go2:
         with pytest.raises(CommandError):
-            go2.walk("gallop")
+            go2.walk("canter")
         assert not go2.last_outcome
-        assert "gallop" in go2.last_outcome.reason
+        assert "canter" in go2.last_outcome.reason
 
 
 WRONG_TYPES = """

@@ -137,9 +137,9 @@ def test_the_work_of_checking_grows_as_the_motion_does(
             counted(patch, counts, collision.pin, "computeDistance", lambda *_: 1)
             samples[seconds] = len(checker.evaluate(plan).path.times)
         assert counts["inverse_dynamics"] == samples[seconds]
-        # Nothing else is asked for one instant after the other; the moments of inertia once.
+        # Nothing else is asked for one instant after the other; the moments of inertia twice.
         assert counts["at"] == counts["center_of_mass"] == 0
-        assert counts["snapshot"] == 1
+        assert counts["snapshot"] == 2
     growth = samples[40] / samples[10]
     assert work[40]["computeDistance"] <= SPARE * growth * work[10]["computeDistance"]
 

@@ -351,7 +351,8 @@ def test_the_problem_knows_who_contributed_which_rows(model: RobotModel, legs: t
     assert sum(problem.counts[:5]) == len(problem.tasks.b) == len(problem.weights)
     assert sum(problem.counts[5:7]) == len(problem.equalities.b)
     assert sum(problem.counts[7:]) == len(problem.bounds.lower)
-    assert problem.weights[3] == CONFIG.orientation_weight
+    weight = CONFIG.orientation_weight if stance else CONFIG.flight_weight
+    assert problem.weights[3] == weight
 
 
 def test_solving_leaves_snapshot_and_reference_untouched_and_repeats_exactly(
