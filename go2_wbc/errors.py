@@ -171,6 +171,16 @@ class StanceMismatch(MotionError):
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> str:
     """Message for a name that does not exist, with all that do, and the nearest."""
     names = sorted(valid)
-    nearest = get_close_matches(str(name), names, 1)
-    hint = f"; did you mean {nearest[0]!r}?" if nearest else ""
+    nearest = _nearest(str(name), names)
+    hint = f"; did you mean {nearest!r}?" if nearest else ""
     return f"unknown {kind} {name!r}; valid: {', '.join(names)}{hint}"
+
+
+def _nearest(name: str, names: Sequence[str]) -> str | None:
+    """The name that is meant, whatever its case: with the same letters (LF is FL), or close."""
+    by_letters = {"".join(sorted(each.lower())): each for each in reversed(names)}
+    if same := by_letters.get("".join(sorted(name.lower()))):
+        return same
+    folded = {each.lower(): each for each in reversed(names)}
+    close = get_close_matches(name.lower(), list(folded), 1)
+    return folded[close[0]] if close else None

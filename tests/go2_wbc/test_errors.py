@@ -5,6 +5,8 @@ from __future__ import annotations
 import inspect
 import re
 
+import pytest
+
 from go2_wbc import errors
 from go2_wbc.errors import (
     CommandError,
@@ -15,7 +17,9 @@ from go2_wbc.errors import (
     ResidualRow,
     unknown_name,
 )
+from go2_wbc.legs import LEGS
 
+LEG_NAMES = tuple(leg.name for leg in LEGS)
 ROWS = (ResidualRow("torque limits", 3.25, "N m"), ResidualRow("stance feet", 0.5, "m/s^2"))
 
 
@@ -89,3 +93,12 @@ def test_an_unknown_name_is_answered_with_the_sorted_valid_ones() -> None:
     assert unknown_name("gait", "run", ("walk", "trot")) == "unknown gait 'run'; valid: trot, walk"
     nearly = unknown_name("gait", "tort", ("walk", "trot"))
     assert nearly == "unknown gait 'tort'; valid: trot, walk; did you mean 'trot'?"
+
+
+@pytest.mark.parametrize(("foot", "meant"), [("LF", "FL"), ("rl", "RL"), ("RF", "FR")])
+def test_letters_in_another_order_or_case_are_recognised(foot: str, meant: str) -> None:
+    assert unknown_name("foot", foot, LEG_NAMES).endswith(f"; did you mean {meant!r}?")
+
+
+def test_what_is_like_no_name_gets_no_advice() -> None:
+    assert unknown_name("foot", "XX", LEG_NAMES) == "unknown foot 'XX'; valid: FL, FR, RL, RR"
