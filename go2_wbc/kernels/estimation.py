@@ -15,16 +15,18 @@ import numpy as np
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.vectors import rotation_of
 
-STATE, ERROR, MEMORY, READING = 28, 27, 20, 35
+STATE, ERROR, MEMORY, READING = 28, 27, 21, 35
 """Lengths: of an estimate, of its error, of what is kept from tick to tick (the time [s] at rest,
-the ages [s] of the feet's contacts, the gyro, the joints' smoothed speeds), and of a reading (dt,
-gyro, accelerometer, angles, speeds, forces)."""
+the ages [s] of the feet's contacts, the gyro, the joints' smoothed speeds, the time [s] lying), and
+of a reading (dt, gyro, accelerometer, angles, speeds, forces)."""
 _QUATERNION, _GYRO_BIAS, _FORCE_BIAS, _FEET = 6, 10, 13, 16
 _THETA, _E_GYRO_BIAS, _E_FORCE_BIAS, _E_FEET = 6, 9, 12, 15
 LEAST_TRUST = 1e-3
 """Trust in a foot in the air: its place drifts a thousand times as fast as a standing one's."""
 _SMOOTHING = 0.05
 """Time constant [s] in which the joints' speeds are smoothed, to tell slow motion from noise."""
+_FLIGHT = 0.5
+"""Share of gravity that a trunk feels at least if something carries it; in flight it feels none."""
 _HEIGHT_GATE = 9.0
 """Square of the deviations by which a foot's height may be off that of flat ground; else it stands
 on something else, and its height says nothing."""
@@ -221,6 +223,39 @@ def is_at_rest(x, memory, reading, gravity, numbers):
     return memory[0] >= numbers[STILL_TIME]
 
 
+@subroutine("b1(f8[::1], f8[::1], f8[::1], b1, f8, f8[::1])")
+def lies(x, memory, reading, is_carried, gravity, numbers):
+    """Whether something else than the feet has carried the robot for long enough."""
+    force = 0.0
+    for k in range(3):
+        force += (reading[4 + k] - x[_FORCE_BIAS + k]) ** 2
+    is_lying = not is_carried and force > (_FLIGHT * gravity) ** 2
+    memory[20] = memory[20] + reading[0] if is_lying else 0.0
+    return memory[20] >= numbers[LYING_TIME]
+
+
+@subroutine("f8(f8[::1], f8)")
+def learning(x, speed):
+    """Share of their corrections that the biases take: 1 at rest, half at ``speed``."""
+    ratio = (x[3] * x[3] + x[4] * x[4]) / (speed * speed)
+    return 1.0 / (1.0 + ratio * ratio)
+
+
+@subroutine("void(f8[:,::1], f8[::1], f8[:,::1], f8)")
+def learn_in_part(P, dx, before, share):
+    """Take back all but a ``share`` of what corrects the biases; ``before``: their part of P.
+
+    Brink, *Partial-update Schmidt-Kalman filter*, J. Guidance, Control, and Dynamics 40 (2017):
+    the rest of the error stays as uncertain as if nothing had been measured.
+    """
+    left = (1.0 - share) ** 2
+    for i in range(6):
+        dx[_E_GYRO_BIAS + i] *= share
+        for j in range(6):
+            m, n = _E_GYRO_BIAS + i, _E_GYRO_BIAS + j
+            P[m, n] += left * (before[i, j] - P[m, n])
+
+
 @subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
 def take_in_rest(x, P, dx, column, reading, numbers):
     """Take in that nothing moves: no velocity, and a gyro that reads its bias."""
@@ -262,6 +297,7 @@ ACCELERATION, FOOT_DRIFT, PLACE, VELOCITY, HEIGHT, CONTACT, TRUSTED, REST = rang
 GYRO, GYRO_WALK, FORCE_WALK, GATE, STILL_TIME, STILL_JOINTS, STILL_TURNING = range(8, 15)
 STILL_FORCE, STILL_VELOCITY, STILL_DRIFT, RADIUS, GRAVITY = range(15, 20)
 TOUCHDOWN_SLIP, TOUCHDOWN_TIME, VERTICAL, COMPLIANCE, STILL_GYRO = range(20, 25)
+VERTICAL_SHARE, LYING_TIME, LEARNING_SPEED = range(25, 28)
 """What ``numbers`` holds: those of ``EstimatorConfig``, foot radius [m] and gravity [m/s^2]."""
 
 
@@ -291,6 +327,9 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
     rests = is_at_rest(x, memory, reading, gravity, numbers)
     predict(x, P, dt, mean, reading, gravity, R, noise)
     rotation_of(x[6], x[7], x[8], x[9], R)
+    vertical = numbers[VERTICAL] + numbers[VERTICAL_SHARE] * np.sqrt(x[3] * x[3] + x[4] * x[4])
+    biases = slice(_E_GYRO_BIAS, _E_FEET)
+    before, share_learnt = P[biases, biases].copy(), learning(x, numbers[LEARNING_SPEED])
     is_carried = False
     for leg in range(4):
         foot = feet[leg]
@@ -308,11 +347,11 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
         if trust > LEAST_TRUST:
             is_carried = True
             velocities[leg, :2] = (numbers[VELOCITY] / trust) ** 2 + slip * slip
-            velocities[leg, 2] = velocities[leg, 0] + numbers[VERTICAL] ** 2
+            velocities[leg, 2] = velocities[leg, 0] + vertical * vertical
             factor = slip_factor(x, P, foot, velocities[leg], numbers[GATE])
             velocities[leg] *= factor
         for k in range(3):
-            drift = level if k < 2 else level + numbers[VERTICAL]
+            drift = level if k < 2 else level + vertical
             if rests:
                 drift = numbers[STILL_DRIFT]
             P[_E_FEET + 3 * leg + k, _E_FEET + 3 * leg + k] += factor * (drift * dt) ** 2
@@ -328,11 +367,13 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
         if heights[leg] != np.inf:
             off = heights[leg]
             take_in_one(P, dx, column, _E_FEET + 2 + 3 * leg, off, numbers[HEIGHT] ** 2)
+    is_lying = lies(x, memory, reading, is_carried, gravity, numbers)
     if rests:
         take_in_rest(x, P, dx, column, reading, numbers)
-    elif not is_carried:
+    elif is_lying:
         for k in range(3):
             take_in_one(P, dx, column, 3 + k, -x[3 + k], numbers[REST] ** 2)
+    learn_in_part(P, dx, before, share_learnt)
     correct(x, dx)
     for k in range(3):
         w[k] = reading[1 + k] - x[_GYRO_BIAS + k]

@@ -13,7 +13,7 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import JointCommand
+from go2_wbc.robot.state import JointCommand, RobotState
 from tests.engine_helpers import STAND_JOINTS
 
 # m/s; of the estimate while trotting at 0.5 m/s. A foot taken for a point that does not roll would
@@ -151,6 +151,37 @@ def test_what_was_saved_goes_on_alike() -> None:
     first = [estimator.update(given).q for given in turning[20:]]
     estimator.restore(saved)
     assert np.array_equal([estimator.update(given).q for given in turning[20:]], first)
+
+
+def after_a_start(speed: float, accelerometer: list[float], forces: float) -> list[RobotState]:
+    """States over 0.5 s that begin with a kick that is over when the feet read ``forces``."""
+    estimator = StateEstimator(RobotModel())
+    estimator.update(reading(0.0))
+    kick = np.array([speed / 0.002, 0.0, 9.81])
+    air = np.zeros(4)
+    estimator.update(replace(reading(0.002), accelerometer=kick, foot_forces=air))
+    return [
+        estimator.update(
+            replace(
+                reading(0.004 + 0.002 * tick),
+                accelerometer=np.array(accelerometer),
+                foot_forces=np.full(4, forces),
+            )
+        )
+        for tick in range(250)
+    ]
+
+
+def test_a_robot_in_flight_goes_on_as_it_flew() -> None:
+    flown = after_a_start(2.0, [0.0, 0.0, 0.0], forces=0.0)[-1]
+    assert flown.v[0] == pytest.approx(2.0, rel=0.02)
+    assert flown.v[2] == pytest.approx(-9.81 * 0.5, rel=0.02)
+
+
+def test_a_robot_that_its_feet_do_not_carry_is_at_rest_soon() -> None:
+    states = after_a_start(2.0, [0.0, 0.0, 9.81], forces=0.0)
+    assert states[30].v[0] == pytest.approx(2.0, rel=0.05)  # 0.06 s: it may be in flight
+    assert abs(states[-1].v[0]) < 0.1
 
 
 def test_numbers_must_be_positive() -> None:

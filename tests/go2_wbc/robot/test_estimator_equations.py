@@ -23,7 +23,7 @@ STEP, COUNT = 0.002, 40  # s; of readings
 NUDGE = 1e-6
 EXACT = 2e-5  # m, m/s, rad; what is left is the differences' rounding, and dR / db half a step
 P_BASE_IMU = np.array([-0.02557, 0.0, 0.04232])  # m; the URDF's imu_joint
-CONFIG = EstimatorConfig()
+CONFIG = EstimatorConfig(lying_time=0.03, learning_speed=0.1)
 FORCES = {
     "some feet half loaded": np.array([40.0, 15.0, 12.0, 0.0]),
     "all feet in the air": np.zeros(4),
@@ -63,7 +63,7 @@ class Twin:
         tilt = [CONFIG.tilt, CONFIG.tilt, 1e-4]
         biases = [CONFIG.gyro_bias] * 3 + [CONFIG.accelerometer_bias] * 3
         self.P = np.diag([0.001] * 3 + [0.1] * 3 + tilt + biases + [0.01] * 12) ** 2
-        self.age, self.gyro = np.zeros(4), first.gyro
+        self.age, self.gyro, self.lying = np.zeros(4), first.gyro, 0.0
         self.step(first, 0.0)
 
     @staticmethod
@@ -132,16 +132,17 @@ class Twin:
         self.age = np.where(reading.foot_forces > c.contact_force, self.age, -dt)
         slip = c.touchdown_slip * np.exp(-np.maximum(self.age, 0.0) / c.touchdown_time)
         x[5] = x[5] + dt * rolling.ravel()
+        vertical = c.vertical + c.vertical_share * np.hypot(*x[1][:2])
         seen = x[2]
         told: list[tuple[Callable[[list[np.ndarray]], np.ndarray], np.ndarray]] = []
         for leg in range(4):
             level = (c.velocity / trust[leg]) ** 2 + slip[leg] ** 2
-            variance = np.array([level, level, level + c.vertical**2])
+            variance = np.array([level, level, level + vertical**2])
             own = slice(3 * leg, 3 * leg + 3)
             chi = ((velocity[leg] - x[1]) ** 2 / (np.diag(P)[3:6] + variance)).sum()
             stands = trust[leg] > 1e-3
             factor = max(1.0, chi / c.slip**2) if stands else 1.0
-            drift = c.foot_drift / trust[leg] + slip[leg] + np.array([0.0, 0.0, c.vertical])
+            drift = c.foot_drift / trust[leg] + slip[leg] + np.array([0.0, 0.0, vertical])
             P[15:, 15:][own, own] += np.diag(factor * (drift * dt) ** 2)
             s, m = place[leg], velocity[leg]
             told.append(
@@ -157,7 +158,10 @@ class Twin:
                 ground = self.model.foot_radius - c.compliance * reading.foot_forces[leg]
                 if (x[5][z] - ground) ** 2 < 9.0 * (P[15 + z.start, 15 + z.start] + height):
                     told.append((lambda y, z=z, ground=ground: y[5][z] - ground, height))
-        if not (trust > 1e-3).any():
+        felt = np.linalg.norm(reading.accelerometer - x[4]) / self.model.gravity
+        is_lying = felt > 0.5 and not (trust > 1e-3).any()
+        self.lying = self.lying + dt if is_lying else 0.0
+        if self.lying >= c.lying_time:
             told.append((lambda y: y[1], np.full(3, c.rest**2)))
         self.age = self.age + dt
         self._correct(x, P, told)
@@ -175,14 +179,17 @@ class Twin:
 
         H, V = self.jacobian(off), np.diag(np.concatenate([variance for _, variance in told]))
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + V)
-        self.x, self.P = self.plus(x, -K @ off(np.zeros(27))), P - K @ H @ P
+        learnt = np.ones(27)
+        learnt[9:15] = 1.0 / (1.0 + (np.hypot(*x[1][:2]) / CONFIG.learning_speed) ** 4)
+        self.x = self.plus(x, -learnt * (K @ off(np.zeros(27))))
+        self.P = P - (1.0 - np.outer(1.0 - learnt, 1.0 - learnt)) * (K @ H @ P)
 
 
 @pytest.mark.parametrize("case", FORCES)
 def test_the_estimate_is_that_of_the_documented_filter(case: str) -> None:
     model = RobotModel()
     given = readings(FORCES[case])
-    estimator, twin = StateEstimator(model), Twin(model, given[0])
+    estimator, twin = StateEstimator(model, CONFIG), Twin(model, given[0])
     states = [estimator.update(reading) for reading in given]
     for reading in given[1:]:
         twin.step(reading, STEP)
