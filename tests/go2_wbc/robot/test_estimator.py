@@ -23,6 +23,7 @@ STILL_BAR = 0.01  # m/s
 PLACE_BAR = 0.015  # of the distance walked
 CREEP_BAR = 0.003  # m in 4 s of standing or lying
 BIAS_BAR = 0.003  # rad/s; of the gyro
+NOISE_TILT = np.radians(0.05)  # in 18 s; 0.3 deg if the noise is in the gains
 TILT_BAR = 0.015  # rad; the accelerometer's bias of 0.05 m/s^2 is 0.005
 
 
@@ -182,6 +183,17 @@ def test_a_robot_that_its_feet_do_not_carry_is_at_rest_soon() -> None:
     states = after_a_start(2.0, [0.0, 0.0, 9.81], forces=0.0)
     assert states[30].v[0] == pytest.approx(2.0, rel=0.05)  # 0.06 s: it may be in flight
     assert abs(states[-1].v[0]) < 0.1
+
+
+def test_noise_of_the_joints_speeds_does_not_tilt_a_standing_robot() -> None:
+    # It stood in the gains, too: pitch and the accelerometer's bias ran away, 1 deg in a minute.
+    estimator, rng = StateEstimator(RobotModel()), np.random.default_rng(3)
+    noisy = (
+        replace(reading(0.002 * tick), v_joints=0.02 * rng.standard_normal(12))
+        for tick in range(10_000)
+    )
+    pitches = [float(estimator.update(given).rpy[1]) for given in noisy]
+    assert abs(pitches[-1] - pitches[1000]) < NOISE_TILT
 
 
 def test_numbers_must_be_positive() -> None:

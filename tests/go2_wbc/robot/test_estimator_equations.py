@@ -22,6 +22,7 @@ from tests.engine_helpers import STAND_JOINTS
 STEP, COUNT = 0.002, 40  # s; of readings
 NUDGE = 1e-6
 EXACT = 2e-5  # m, m/s, rad; what is left is the differences' rounding, and dR / db half a step
+ONE = np.eye(3)
 P_BASE_IMU = np.array([-0.02557, 0.0, 0.04232])  # m; the URDF's imu_joint
 CONFIG = EstimatorConfig(lying_time=0.03, learning_speed=0.1)
 FORCES = {
@@ -152,7 +153,12 @@ class Twin:
                 )
             )
             if stands:
-                told.append((lambda y, m=m: y[2] @ seen.T @ m - y[1], factor * variance))
+                told.append(
+                    (
+                        lambda y, m=m: (y[2] @ seen.T - ONE) @ x[1] + m - y[1],
+                        factor * variance,
+                    )
+                )
             if self.age[leg] < 3 * c.touchdown_time <= self.age[leg] + dt:
                 z, height = slice(own.stop - 1, own.stop), np.full(1, c.height**2)
                 ground = self.model.foot_radius - c.compliance * reading.foot_forces[leg]
