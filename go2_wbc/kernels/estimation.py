@@ -61,8 +61,9 @@ def see_foot(leg, q, u, p_imu, w, radius, R, foot):
     """Fill what a leg measures, along the world's axes.
 
     Place of the foot's centre from the IMU (3), the velocity of the IMU if the foot rolls on the
-    ground (3), and that of the foot's centre then (3). ``leg`` is ``LegGeometry.row``, q and u are
-    the angles and speeds of its joints, w the angular velocity of the base.
+    ground (3), that of the foot's centre then (3), and its speed along the trunk. ``leg`` is
+    ``LegGeometry.row``, q and u are the angles and speeds of its joints, w the angular velocity of
+    the base.
     """
     c1, s1, c2, s2 = np.cos(q[0]), np.sin(q[0]), np.cos(q[1]), np.sin(q[1])
     c3, s3, bend = np.cos(q[1] + q[2]), np.sin(q[1] + q[2]), u[1] + u[2]
@@ -72,8 +73,11 @@ def see_foot(leg, q, u, p_imu, w, radius, R, foot):
     x = leg[0] - thigh * s2 - calf * s3 - p_imu[0]
     y = leg[1] + width * c1 + down * s1 - p_imu[1]
     z = leg[2] + width * s1 - down * c1 - p_imu[2]
-    dx = -thigh * c2 * u[1] - calf * c3 * bend + w[1] * z - w[2] * y
-    dy = longer * s1 + (down * c1 - width * s1) * u[0] + w[2] * x - w[0] * z
+    dx = -thigh * c2 * u[1] - calf * c3 * bend
+    dy = longer * s1 + (down * c1 - width * s1) * u[0]
+    foot[9] = np.sqrt(dx * dx + dy * dy)
+    dx += w[1] * z - w[2] * y
+    dy += w[2] * x - w[0] * z
     dz = (width * c1 + down * s1) * u[0] - longer * c1 + w[0] * y - w[1] * x
     put_turned(R, x, y, z, foot, 0)
     put_turned(R, -dx, -dy, -dz, foot, 3)
@@ -302,7 +306,7 @@ ACCELERATION, FOOT_DRIFT, PLACE, VELOCITY, HEIGHT, CONTACT, TRUSTED, REST = rang
 GYRO, GYRO_WALK, FORCE_WALK, GATE, STILL_TIME, STILL_JOINTS, STILL_TURNING = range(8, 15)
 STILL_FORCE, STILL_VELOCITY, STILL_DRIFT, RADIUS, GRAVITY = range(15, 20)
 TOUCHDOWN_SLIP, TOUCHDOWN_TIME, VERTICAL, COMPLIANCE, STILL_GYRO = range(20, 25)
-VERTICAL_SHARE, LYING_TIME, LEARNING_SPEED = range(25, 28)
+VERTICAL_SHARE, LYING_TIME, LEARNING_SPEED, DRIFT_SHARE, VELOCITY_SHARE = range(25, 30)
 """What ``numbers`` holds: those of ``EstimatorConfig``, foot radius [m] and gravity [m/s^2]."""
 
 
@@ -322,7 +326,7 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
     """Take in a reading, ``reading[0]`` seconds after the last one, and fill the robot's state."""
     dt, radius, gravity = reading[0], numbers[RADIUS], numbers[GRAVITY]
     w, mean, R, noise = np.empty(3), np.empty(3), np.empty((3, 3)), np.zeros(ERROR)
-    feet, velocities, heights = np.empty((4, 9)), np.zeros((4, 3)), np.empty(4)
+    feet, velocities, heights = np.empty((4, 10)), np.zeros((4, 3)), np.empty(4)
     dx, column = np.zeros(ERROR), np.empty(ERROR)
     for k in range(3):
         w[k] = reading[1 + k] - x[_GYRO_BIAS + k]
@@ -348,10 +352,12 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
         share = (force - numbers[CONTACT]) / (numbers[TRUSTED] - numbers[CONTACT])
         trust = min(max(share, LEAST_TRUST), 1.0)
         memory[1 + leg] = age + dt
-        level, factor = numbers[FOOT_DRIFT] / trust + slip, 1.0
+        level = numbers[FOOT_DRIFT] / trust + slip + numbers[DRIFT_SHARE] * foot[9]
+        factor = 1.0
         if trust > LEAST_TRUST:
             is_carried = True
-            velocities[leg, :2] = (numbers[VELOCITY] / trust) ** 2 + slip * slip
+            creep = numbers[VELOCITY_SHARE] * foot[9]
+            velocities[leg, :2] = (numbers[VELOCITY] / trust) ** 2 + slip * slip + creep * creep
             velocities[leg, 2] = velocities[leg, 0] + vertical * vertical
             factor = slip_factor(x, P, foot, velocities[leg], numbers[GATE])
             velocities[leg] *= factor

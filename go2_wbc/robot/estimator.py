@@ -82,8 +82,11 @@ class EstimatorConfig:
     Attributes:
         acceleration: of the accelerometer, per sample [m/s^2].
         foot_drift: speed of a standing foot that rolling does not explain [m/s].
+        drift_share: the same, by which it grows with the foot's speed along the trunk [m/s per
+            m/s]: turning feet creep so that the trunk seems to turn faster.
         place: of a foot's place by kinematics [m].
         velocity: of the velocity by one standing foot [m/s].
+        velocity_share: the same, by which it grows with the foot's speed along the trunk.
         height: of the ground where a foot comes down, against flat ground [m].
         contact_force: force [N] above which a foot counts as touching: five deviations of its
             noise, which would else be felt by a foot in the middle of its swing.
@@ -120,8 +123,10 @@ class EstimatorConfig:
 
     acceleration: float = 0.2
     foot_drift: float = 0.05
+    drift_share: float = 0.2
     place: float = 0.002
     velocity: float = 0.05
+    velocity_share: float = 0.05
     height: float = 0.02
     contact_force: float = 10.0
     trusted_force: float = 30.0
@@ -194,6 +199,7 @@ class StateEstimator:
                 *(model.foot_radius, model.gravity),
                 *(c.touchdown_slip, c.touchdown_time, c.vertical, c.compliance, c.still_gyro),
                 *(c.vertical_share, c.lying_time, c.learning_speed),
+                *(c.drift_share, c.velocity_share),
             ]
         )
 

@@ -123,7 +123,8 @@ def test_roll_and_pitch_begin_as_gravity_says() -> None:
 
 def test_a_slipping_foot_counts_less_than_those_that_stand() -> None:
     def speed(slip: float) -> float:
-        estimator = StateEstimator(RobotModel(), EstimatorConfig(slip=slip))
+        config = EstimatorConfig(slip=slip, velocity_share=1e-9, drift_share=1e-9)
+        estimator = StateEstimator(RobotModel(), config)
         sliding = np.zeros((300, 12))
         sliding[:, 1], sliding[280:, 1] = 0.2, 10.0  # never at rest; then FL slides
         states = [

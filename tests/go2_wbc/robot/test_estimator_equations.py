@@ -91,12 +91,16 @@ class Twin:
 
     def legs(
         self, reading: SensorReading, w: np.ndarray, R: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Places of the feet, velocities of the IMU by each, those of rolling feet: world."""
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Places of the feet, velocities of the IMU by each, those of rolling feet: world.
+
+        And the feet's speeds along the trunk.
+        """
         q = np.concatenate([np.zeros(6), [1.0], reading.q_joints])
         v = np.concatenate([np.zeros(3), w, reading.v_joints])
         pin.forwardKinematics(self.pin, self.data, q, v)
         place, velocity, rolling = np.empty((4, 3)), np.empty((4, 3)), np.zeros((4, 3))
+        speed = np.empty(4)
         for leg, name in enumerate(FOOT_NAMES):
             frame = self.pin.getFrameId(name)
             place[leg] = pin.updateFramePlacement(self.pin, self.data, frame).translation
@@ -104,8 +108,10 @@ class Twin:
             calf = R @ u.angular
             radius = self.model.foot_radius - 0.5 * CONFIG.compliance * reading.foot_forces[leg]
             rolling[leg] = np.cross(calf, [0.0, 0.0, radius])
+            own = u.linear - np.cross(w, place[leg])
+            speed[leg] = np.hypot(own[0], own[1])
             velocity[leg] = rolling[leg] - R @ (u.linear - np.cross(w, P_BASE_IMU))
-        return (place - P_BASE_IMU) @ R.T, velocity, rolling
+        return (place - P_BASE_IMU) @ R.T, velocity, rolling, speed
 
     def step(self, reading: SensorReading, dt: float) -> None:
         """Take in a reading."""
@@ -128,7 +134,7 @@ class Twin:
         noise[6:9], noise[9:12] = c.gyro * dt, c.gyro_bias_walk * dt**0.5
         noise[12:15] = c.accelerometer_bias_walk * dt**0.5
         P = F @ self.P @ F.T + np.diag(noise**2)
-        place, velocity, rolling = self.legs(reading, w, x[2])
+        place, velocity, rolling, speed = self.legs(reading, w, x[2])
         trust = np.clip((reading.foot_forces - c.contact_force) / 20.0, 1e-3, 1.0)
         self.age = np.where(reading.foot_forces > c.contact_force, self.age, -dt)
         slip = c.touchdown_slip * np.exp(-np.maximum(self.age, 0.0) / c.touchdown_time)
@@ -138,12 +144,14 @@ class Twin:
         told: list[tuple[Callable[[list[np.ndarray]], np.ndarray], np.ndarray]] = []
         for leg in range(4):
             level = (c.velocity / trust[leg]) ** 2 + slip[leg] ** 2
+            level += (c.velocity_share * speed[leg]) ** 2
             variance = np.array([level, level, level + vertical**2])
             own = slice(3 * leg, 3 * leg + 3)
             chi = ((velocity[leg] - x[1]) ** 2 / (np.diag(P)[3:6] + variance)).sum()
             stands = trust[leg] > 1e-3
             factor = max(1.0, chi / c.slip**2) if stands else 1.0
-            drift = c.foot_drift / trust[leg] + slip[leg] + np.array([0.0, 0.0, vertical])
+            drift = c.foot_drift / trust[leg] + slip[leg] + c.drift_share * speed[leg]
+            drift = drift + np.array([0.0, 0.0, vertical])
             P[15:, 15:][own, own] += np.diag(factor * (drift * dt) ** 2)
             s, m = place[leg], velocity[leg]
             told.append(
