@@ -15,16 +15,18 @@ import numpy as np
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.vectors import rotation_of
 
-STATE, ERROR, MEMORY, READING = 28, 27, 20, 35
+STATE, ERROR, MEMORY, READING = 28, 27, 21, 35
 """Lengths: of an estimate, of its error, of what is kept from tick to tick (the time [s] at rest,
-the ages [s] of the feet's contacts, the gyro, the joints' smoothed speeds), and of a reading (dt,
-gyro, accelerometer, angles, speeds, forces)."""
+the ages [s] of the feet's contacts, the gyro, the joints' smoothed speeds, the time [s] lying), and
+of a reading (dt, gyro, accelerometer, angles, speeds, forces)."""
 _QUATERNION, _GYRO_BIAS, _FORCE_BIAS, _FEET = 6, 10, 13, 16
 _THETA, _E_GYRO_BIAS, _E_FORCE_BIAS, _E_FEET = 6, 9, 12, 15
 LEAST_TRUST = 1e-3
 """Trust in a foot in the air: its place drifts a thousand times as fast as a standing one's."""
 _SMOOTHING = 0.05
 """Time constant [s] in which the joints' speeds are smoothed, to tell slow motion from noise."""
+_FLIGHT = 0.5
+"""Share of gravity that a trunk feels at least if something carries it; in flight it feels none."""
 _HEIGHT_GATE = 9.0
 """Square of the deviations by which a foot's height may be off that of flat ground; else it stands
 on something else, and its height says nothing."""
@@ -59,8 +61,9 @@ def see_foot(leg, q, u, p_imu, w, radius, R, foot):
     """Fill what a leg measures, along the world's axes.
 
     Place of the foot's centre from the IMU (3), the velocity of the IMU if the foot rolls on the
-    ground (3), and that of the foot's centre then (3). ``leg`` is ``LegGeometry.row``, q and u are
-    the angles and speeds of its joints, w the angular velocity of the base.
+    ground (3), that of the foot's centre then (3), and its speed along the trunk. ``leg`` is
+    ``LegGeometry.row``, q and u are the angles and speeds of its joints, w the angular velocity of
+    the base.
     """
     c1, s1, c2, s2 = np.cos(q[0]), np.sin(q[0]), np.cos(q[1]), np.sin(q[1])
     c3, s3, bend = np.cos(q[1] + q[2]), np.sin(q[1] + q[2]), u[1] + u[2]
@@ -70,8 +73,11 @@ def see_foot(leg, q, u, p_imu, w, radius, R, foot):
     x = leg[0] - thigh * s2 - calf * s3 - p_imu[0]
     y = leg[1] + width * c1 + down * s1 - p_imu[1]
     z = leg[2] + width * s1 - down * c1 - p_imu[2]
-    dx = -thigh * c2 * u[1] - calf * c3 * bend + w[1] * z - w[2] * y
-    dy = longer * s1 + (down * c1 - width * s1) * u[0] + w[2] * x - w[0] * z
+    dx = -thigh * c2 * u[1] - calf * c3 * bend
+    dy = longer * s1 + (down * c1 - width * s1) * u[0]
+    foot[9] = np.sqrt(dx * dx + dy * dy)
+    dx += w[1] * z - w[2] * y
+    dy += w[2] * x - w[0] * z
     dz = (width * c1 + down * s1) * u[0] - longer * c1 + w[0] * y - w[1] * x
     put_turned(R, x, y, z, foot, 0)
     put_turned(R, -dx, -dy, -dz, foot, 3)
@@ -158,7 +164,12 @@ def take_in(P, dx, column, places, shares, count, innovation, variance):
 
 @subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], i8, f8, f8[::1])")
 def take_in_leg(x, P, dx, column, foot, leg, place, velocity):
-    """Take in what a leg measures, with these variances; velocities with 0 are left out."""
+    """Take in what a leg measures, with these variances; velocities with 0 are left out.
+
+    A turn of the estimate turns a leg's velocity with it, by theta x v. The estimate is put there
+    for v, not what the leg measures: its noise would stand in the gain and in what that multiplies,
+    and a mean of their product, which tilted a standing robot by a degree a minute.
+    """
     places, shares = np.empty(4, np.int64), np.empty(4)
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
@@ -174,7 +185,7 @@ def take_in_leg(x, P, dx, column, foot, leg, place, velocity):
         take_in(P, dx, column, places, shares, 4, off, place)
         if velocity[k] > 0.0:
             places[1], shares[1] = 3 + k, 1.0
-            shares[2], shares[3] = -foot[3 + j], foot[3 + i]
+            shares[2], shares[3] = -x[3 + j], x[3 + i]
             off = foot[3 + k] - x[3 + k]
             take_in(P, dx, column, places[1:], shares[1:], 3, off, velocity[k])
 
@@ -221,6 +232,39 @@ def is_at_rest(x, memory, reading, gravity, numbers):
     return memory[0] >= numbers[STILL_TIME]
 
 
+@subroutine("b1(f8[::1], f8[::1], f8[::1], b1, f8, f8[::1])")
+def lies(x, memory, reading, is_carried, gravity, numbers):
+    """Whether something else than the feet has carried the robot for long enough."""
+    force = 0.0
+    for k in range(3):
+        force += (reading[4 + k] - x[_FORCE_BIAS + k]) ** 2
+    is_lying = not is_carried and force > (_FLIGHT * gravity) ** 2
+    memory[20] = memory[20] + reading[0] if is_lying else 0.0
+    return memory[20] >= numbers[LYING_TIME]
+
+
+@subroutine("f8(f8[::1], f8)")
+def learning(x, speed):
+    """Share of their corrections that the biases take: 1 at rest, half at ``speed``."""
+    ratio = (x[3] * x[3] + x[4] * x[4]) / (speed * speed)
+    return 1.0 / (1.0 + ratio * ratio)
+
+
+@subroutine("void(f8[:,::1], f8[::1], f8[:,::1], f8)")
+def learn_in_part(P, dx, before, share):
+    """Take back all but a ``share`` of what corrects the biases; ``before``: their part of P.
+
+    Brink, *Partial-update Schmidt-Kalman filter*, J. Guidance, Control, and Dynamics 40 (2017):
+    the rest of the error stays as uncertain as if nothing had been measured.
+    """
+    left = (1.0 - share) ** 2
+    for i in range(6):
+        dx[_E_GYRO_BIAS + i] *= share
+        for j in range(6):
+            m, n = _E_GYRO_BIAS + i, _E_GYRO_BIAS + j
+            P[m, n] += left * (before[i, j] - P[m, n])
+
+
 @subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
 def take_in_rest(x, P, dx, column, reading, numbers):
     """Take in that nothing moves: no velocity, and a gyro that reads its bias."""
@@ -262,6 +306,7 @@ ACCELERATION, FOOT_DRIFT, PLACE, VELOCITY, HEIGHT, CONTACT, TRUSTED, REST = rang
 GYRO, GYRO_WALK, FORCE_WALK, GATE, STILL_TIME, STILL_JOINTS, STILL_TURNING = range(8, 15)
 STILL_FORCE, STILL_VELOCITY, STILL_DRIFT, RADIUS, GRAVITY = range(15, 20)
 TOUCHDOWN_SLIP, TOUCHDOWN_TIME, VERTICAL, COMPLIANCE, STILL_GYRO = range(20, 25)
+VERTICAL_SHARE, LYING_TIME, LEARNING_SPEED, DRIFT_SHARE, VELOCITY_SHARE = range(25, 30)
 """What ``numbers`` holds: those of ``EstimatorConfig``, foot radius [m] and gravity [m/s^2]."""
 
 
@@ -281,7 +326,7 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
     """Take in a reading, ``reading[0]`` seconds after the last one, and fill the robot's state."""
     dt, radius, gravity = reading[0], numbers[RADIUS], numbers[GRAVITY]
     w, mean, R, noise = np.empty(3), np.empty(3), np.empty((3, 3)), np.zeros(ERROR)
-    feet, velocities, heights = np.empty((4, 9)), np.zeros((4, 3)), np.empty(4)
+    feet, velocities, heights = np.empty((4, 10)), np.zeros((4, 3)), np.empty(4)
     dx, column = np.zeros(ERROR), np.empty(ERROR)
     for k in range(3):
         w[k] = reading[1 + k] - x[_GYRO_BIAS + k]
@@ -291,6 +336,9 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
     rests = is_at_rest(x, memory, reading, gravity, numbers)
     predict(x, P, dt, mean, reading, gravity, R, noise)
     rotation_of(x[6], x[7], x[8], x[9], R)
+    vertical = numbers[VERTICAL] + numbers[VERTICAL_SHARE] * np.sqrt(x[3] * x[3] + x[4] * x[4])
+    biases = slice(_E_GYRO_BIAS, _E_FEET)
+    before, share_learnt = P[biases, biases].copy(), learning(x, numbers[LEARNING_SPEED])
     is_carried = False
     for leg in range(4):
         foot = feet[leg]
@@ -304,15 +352,17 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
         share = (force - numbers[CONTACT]) / (numbers[TRUSTED] - numbers[CONTACT])
         trust = min(max(share, LEAST_TRUST), 1.0)
         memory[1 + leg] = age + dt
-        level, factor = numbers[FOOT_DRIFT] / trust + slip, 1.0
+        level = numbers[FOOT_DRIFT] / trust + slip + numbers[DRIFT_SHARE] * foot[9]
+        factor = 1.0
         if trust > LEAST_TRUST:
             is_carried = True
-            velocities[leg, :2] = (numbers[VELOCITY] / trust) ** 2 + slip * slip
-            velocities[leg, 2] = velocities[leg, 0] + numbers[VERTICAL] ** 2
+            creep = numbers[VELOCITY_SHARE] * foot[9]
+            velocities[leg, :2] = (numbers[VELOCITY] / trust) ** 2 + slip * slip + creep * creep
+            velocities[leg, 2] = velocities[leg, 0] + vertical * vertical
             factor = slip_factor(x, P, foot, velocities[leg], numbers[GATE])
             velocities[leg] *= factor
         for k in range(3):
-            drift = level if k < 2 else level + numbers[VERTICAL]
+            drift = level if k < 2 else level + vertical
             if rests:
                 drift = numbers[STILL_DRIFT]
             P[_E_FEET + 3 * leg + k, _E_FEET + 3 * leg + k] += factor * (drift * dt) ** 2
@@ -328,11 +378,13 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
         if heights[leg] != np.inf:
             off = heights[leg]
             take_in_one(P, dx, column, _E_FEET + 2 + 3 * leg, off, numbers[HEIGHT] ** 2)
+    is_lying = lies(x, memory, reading, is_carried, gravity, numbers)
     if rests:
         take_in_rest(x, P, dx, column, reading, numbers)
-    elif not is_carried:
+    elif is_lying:
         for k in range(3):
             take_in_one(P, dx, column, 3 + k, -x[3 + k], numbers[REST] ** 2)
+    learn_in_part(P, dx, before, share_learnt)
     correct(x, dx)
     for k in range(3):
         w[k] = reading[1 + k] - x[_GYRO_BIAS + k]

@@ -16,7 +16,9 @@ Roll and pitch follow from gravity, seen through the velocity; heading is dead r
 
 A foot whose velocity is not that of a standing one, by what the filter expects, counts less
 (``slip``). A robot whose joints and IMU read rest for a while has no velocity, and its gyro reads
-its bias: a zero-velocity update (Foxlin, IEEE Computer Graphics and Applications 25(6), 2005).
+its bias: a zero-velocity update (Foxlin, IEEE Computer Graphics and Applications 25(6), 2005). So
+has one that lies, which is told from one in flight by the gravity that its trunk feels. At speed
+the biases are hardly learnt (``learning_speed``).
 ``kernels.estimation`` is the arithmetic.
 """
 
@@ -80,17 +82,26 @@ class EstimatorConfig:
     Attributes:
         acceleration: of the accelerometer, per sample [m/s^2].
         foot_drift: speed of a standing foot that rolling does not explain [m/s].
+        drift_share: the same, by which it grows with the foot's speed along the trunk [m/s per
+            m/s]: turning feet creep so that the trunk seems to turn faster.
         place: of a foot's place by kinematics [m].
         velocity: of the velocity by one standing foot [m/s].
+        velocity_share: the same, by which it grows with the foot's speed along the trunk.
         height: of the ground where a foot comes down, against flat ground [m].
-        contact_force: force [N] above which a foot counts as touching.
+        contact_force: force [N] above which a foot counts as touching: five deviations of its
+            noise, which would else be felt by a foot in the middle of its swing.
         trusted_force: force [N] from which on a foot is fully believed to stand.
         rest: of the assumption that a robot whose feet carry nothing lies still [m/s].
+        lying_time: time [s] after which a robot is taken to lie that neither its feet carry nor
+            falls freely.
         gyro: of the gyro, per sample [rad/s].
         gyro_bias: of its bias at the start [rad/s].
         gyro_bias_walk: by which that changes in a second [rad/s].
         accelerometer_bias: of the accelerometer's bias at the start [m/s^2].
         accelerometer_bias_walk: by which that changes in a second [m/s^2].
+        learning_speed: speed of the trunk [m/s] at which half of what corrects the biases is
+            believed. A foot creeps ahead as it comes down and back as it pushes off, in step with
+            the trunk's bouncing: fast, that looks like a tilt, and a bias that hides it.
         tilt: of roll and pitch at the start, by the accelerometer [rad].
         slip: deviations of a standing foot's velocity above which it is taken for slipping.
         still_time: time [s] after which what reads as rest is taken for it.
@@ -104,23 +115,29 @@ class EstimatorConfig:
         touchdown_slip: speed of a foot's centre when it has just come down [m/s].
         touchdown_time: in which that decays by 1 / e [s].
         vertical: speed at which a standing foot is pressed flat and springs back [m/s].
+        vertical_share: the same, by which it grows with the trunk's speed [m/s per m/s]: at speed
+            a pitch is as good a reason for what feet spring back.
         compliance: by which a foot's sphere is pressed flat [m/N]; it rolls on its middle.
         longest_step: time [s] between two readings after which the filter begins anew.
     """
 
     acceleration: float = 0.2
     foot_drift: float = 0.05
+    drift_share: float = 0.2
     place: float = 0.002
     velocity: float = 0.05
+    velocity_share: float = 0.05
     height: float = 0.02
-    contact_force: float = 5.0
-    trusted_force: float = 25.0
+    contact_force: float = 10.0
+    trusted_force: float = 30.0
     rest: float = 0.3
+    lying_time: float = 0.1
     gyro: float = 0.02
     gyro_bias: float = 0.02
     gyro_bias_walk: float = 1e-4
     accelerometer_bias: float = 0.05
     accelerometer_bias_walk: float = 1e-3
+    learning_speed: float = 1.0
     tilt: float = 0.02
     slip: float = 3.0
     still_time: float = 0.3
@@ -133,6 +150,7 @@ class EstimatorConfig:
     touchdown_slip: float = 1.5
     touchdown_time: float = 0.009
     vertical: float = 0.5
+    vertical_share: float = 0.1
     compliance: float = 5e-5
     longest_step: float = 0.1
 
@@ -180,6 +198,8 @@ class StateEstimator:
                 *(c.still_turning, c.still_force, c.still_velocity, c.still_drift),
                 *(model.foot_radius, model.gravity),
                 *(c.touchdown_slip, c.touchdown_time, c.vertical, c.compliance, c.still_gyro),
+                *(c.vertical_share, c.lying_time, c.learning_speed),
+                *(c.drift_share, c.velocity_share),
             ]
         )
 
@@ -271,7 +291,7 @@ class StateEstimator:
         self._P[range(9, 15), range(9, 15)] = biases
         self._memory[:] = 0.0
         self._memory[5:8] = reading.gyro
-        self._memory[8:] = reading.v_joints
+        self._memory[8:20] = reading.v_joints
 
     def _feet(
         self, reading: SensorReading, R: Float[np.ndarray, "3 3"]

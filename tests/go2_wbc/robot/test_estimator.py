@@ -13,7 +13,7 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import JointCommand
+from go2_wbc.robot.state import JointCommand, RobotState
 from tests.engine_helpers import STAND_JOINTS
 
 # m/s; of the estimate while trotting at 0.5 m/s. A foot taken for a point that does not roll would
@@ -23,6 +23,7 @@ STILL_BAR = 0.01  # m/s
 PLACE_BAR = 0.015  # of the distance walked
 CREEP_BAR = 0.003  # m in 4 s of standing or lying
 BIAS_BAR = 0.003  # rad/s; of the gyro
+NOISE_TILT = np.radians(0.05)  # in 18 s; 0.3 deg if the noise is in the gains
 TILT_BAR = 0.015  # rad; the accelerometer's bias of 0.05 m/s^2 is 0.005
 
 
@@ -122,7 +123,8 @@ def test_roll_and_pitch_begin_as_gravity_says() -> None:
 
 def test_a_slipping_foot_counts_less_than_those_that_stand() -> None:
     def speed(slip: float) -> float:
-        estimator = StateEstimator(RobotModel(), EstimatorConfig(slip=slip))
+        config = EstimatorConfig(slip=slip, velocity_share=1e-9, drift_share=1e-9)
+        estimator = StateEstimator(RobotModel(), config)
         sliding = np.zeros((300, 12))
         sliding[:, 1], sliding[280:, 1] = 0.2, 10.0  # never at rest; then FL slides
         states = [
@@ -151,6 +153,48 @@ def test_what_was_saved_goes_on_alike() -> None:
     first = [estimator.update(given).q for given in turning[20:]]
     estimator.restore(saved)
     assert np.array_equal([estimator.update(given).q for given in turning[20:]], first)
+
+
+def after_a_start(speed: float, accelerometer: list[float], forces: float) -> list[RobotState]:
+    """States over 0.5 s that begin with a kick that is over when the feet read ``forces``."""
+    estimator = StateEstimator(RobotModel())
+    estimator.update(reading(0.0))
+    kick = np.array([speed / 0.002, 0.0, 9.81])
+    air = np.zeros(4)
+    estimator.update(replace(reading(0.002), accelerometer=kick, foot_forces=air))
+    return [
+        estimator.update(
+            replace(
+                reading(0.004 + 0.002 * tick),
+                accelerometer=np.array(accelerometer),
+                foot_forces=np.full(4, forces),
+            )
+        )
+        for tick in range(250)
+    ]
+
+
+def test_a_robot_in_flight_goes_on_as_it_flew() -> None:
+    flown = after_a_start(2.0, [0.0, 0.0, 0.0], forces=0.0)[-1]
+    assert flown.v[0] == pytest.approx(2.0, rel=0.02)
+    assert flown.v[2] == pytest.approx(-9.81 * 0.5, rel=0.02)
+
+
+def test_a_robot_that_its_feet_do_not_carry_is_at_rest_soon() -> None:
+    states = after_a_start(2.0, [0.0, 0.0, 9.81], forces=0.0)
+    assert states[30].v[0] == pytest.approx(2.0, rel=0.05)  # 0.06 s: it may be in flight
+    assert abs(states[-1].v[0]) < 0.1
+
+
+def test_noise_of_the_joints_speeds_does_not_tilt_a_standing_robot() -> None:
+    # It stood in the gains, too: pitch and the accelerometer's bias ran away, 1 deg in a minute.
+    estimator, rng = StateEstimator(RobotModel()), np.random.default_rng(3)
+    noisy = (
+        replace(reading(0.002 * tick), v_joints=0.02 * rng.standard_normal(12))
+        for tick in range(10_000)
+    )
+    pitches = [float(estimator.update(given).rpy[1]) for given in noisy]
+    assert abs(pitches[-1] - pitches[1000]) < NOISE_TILT
 
 
 def test_numbers_must_be_positive() -> None:

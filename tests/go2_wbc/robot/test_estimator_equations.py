@@ -22,8 +22,9 @@ from tests.engine_helpers import STAND_JOINTS
 STEP, COUNT = 0.002, 40  # s; of readings
 NUDGE = 1e-6
 EXACT = 2e-5  # m, m/s, rad; what is left is the differences' rounding, and dR / db half a step
+ONE = np.eye(3)
 P_BASE_IMU = np.array([-0.02557, 0.0, 0.04232])  # m; the URDF's imu_joint
-CONFIG = EstimatorConfig()
+CONFIG = EstimatorConfig(lying_time=0.03, learning_speed=0.1)
 FORCES = {
     "some feet half loaded": np.array([40.0, 15.0, 12.0, 0.0]),
     "all feet in the air": np.zeros(4),
@@ -63,7 +64,7 @@ class Twin:
         tilt = [CONFIG.tilt, CONFIG.tilt, 1e-4]
         biases = [CONFIG.gyro_bias] * 3 + [CONFIG.accelerometer_bias] * 3
         self.P = np.diag([0.001] * 3 + [0.1] * 3 + tilt + biases + [0.01] * 12) ** 2
-        self.age, self.gyro = np.zeros(4), first.gyro
+        self.age, self.gyro, self.lying = np.zeros(4), first.gyro, 0.0
         self.step(first, 0.0)
 
     @staticmethod
@@ -90,12 +91,16 @@ class Twin:
 
     def legs(
         self, reading: SensorReading, w: np.ndarray, R: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Places of the feet, velocities of the IMU by each, those of rolling feet: world."""
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Places of the feet, velocities of the IMU by each, those of rolling feet: world.
+
+        And the feet's speeds along the trunk.
+        """
         q = np.concatenate([np.zeros(6), [1.0], reading.q_joints])
         v = np.concatenate([np.zeros(3), w, reading.v_joints])
         pin.forwardKinematics(self.pin, self.data, q, v)
         place, velocity, rolling = np.empty((4, 3)), np.empty((4, 3)), np.zeros((4, 3))
+        speed = np.empty(4)
         for leg, name in enumerate(FOOT_NAMES):
             frame = self.pin.getFrameId(name)
             place[leg] = pin.updateFramePlacement(self.pin, self.data, frame).translation
@@ -103,8 +108,10 @@ class Twin:
             calf = R @ u.angular
             radius = self.model.foot_radius - 0.5 * CONFIG.compliance * reading.foot_forces[leg]
             rolling[leg] = np.cross(calf, [0.0, 0.0, radius])
+            own = u.linear - np.cross(w, place[leg])
+            speed[leg] = np.hypot(own[0], own[1])
             velocity[leg] = rolling[leg] - R @ (u.linear - np.cross(w, P_BASE_IMU))
-        return (place - P_BASE_IMU) @ R.T, velocity, rolling
+        return (place - P_BASE_IMU) @ R.T, velocity, rolling, speed
 
     def step(self, reading: SensorReading, dt: float) -> None:
         """Take in a reading."""
@@ -127,21 +134,24 @@ class Twin:
         noise[6:9], noise[9:12] = c.gyro * dt, c.gyro_bias_walk * dt**0.5
         noise[12:15] = c.accelerometer_bias_walk * dt**0.5
         P = F @ self.P @ F.T + np.diag(noise**2)
-        place, velocity, rolling = self.legs(reading, w, x[2])
+        place, velocity, rolling, speed = self.legs(reading, w, x[2])
         trust = np.clip((reading.foot_forces - c.contact_force) / 20.0, 1e-3, 1.0)
         self.age = np.where(reading.foot_forces > c.contact_force, self.age, -dt)
         slip = c.touchdown_slip * np.exp(-np.maximum(self.age, 0.0) / c.touchdown_time)
         x[5] = x[5] + dt * rolling.ravel()
+        vertical = c.vertical + c.vertical_share * np.hypot(*x[1][:2])
         seen = x[2]
         told: list[tuple[Callable[[list[np.ndarray]], np.ndarray], np.ndarray]] = []
         for leg in range(4):
             level = (c.velocity / trust[leg]) ** 2 + slip[leg] ** 2
-            variance = np.array([level, level, level + c.vertical**2])
+            level += (c.velocity_share * speed[leg]) ** 2
+            variance = np.array([level, level, level + vertical**2])
             own = slice(3 * leg, 3 * leg + 3)
             chi = ((velocity[leg] - x[1]) ** 2 / (np.diag(P)[3:6] + variance)).sum()
             stands = trust[leg] > 1e-3
             factor = max(1.0, chi / c.slip**2) if stands else 1.0
-            drift = c.foot_drift / trust[leg] + slip[leg] + np.array([0.0, 0.0, c.vertical])
+            drift = c.foot_drift / trust[leg] + slip[leg] + c.drift_share * speed[leg]
+            drift = drift + np.array([0.0, 0.0, vertical])
             P[15:, 15:][own, own] += np.diag(factor * (drift * dt) ** 2)
             s, m = place[leg], velocity[leg]
             told.append(
@@ -151,13 +161,21 @@ class Twin:
                 )
             )
             if stands:
-                told.append((lambda y, m=m: y[2] @ seen.T @ m - y[1], factor * variance))
+                told.append(
+                    (
+                        lambda y, m=m: (y[2] @ seen.T - ONE) @ x[1] + m - y[1],
+                        factor * variance,
+                    )
+                )
             if self.age[leg] < 3 * c.touchdown_time <= self.age[leg] + dt:
                 z, height = slice(own.stop - 1, own.stop), np.full(1, c.height**2)
                 ground = self.model.foot_radius - c.compliance * reading.foot_forces[leg]
                 if (x[5][z] - ground) ** 2 < 9.0 * (P[15 + z.start, 15 + z.start] + height):
                     told.append((lambda y, z=z, ground=ground: y[5][z] - ground, height))
-        if not (trust > 1e-3).any():
+        felt = np.linalg.norm(reading.accelerometer - x[4]) / self.model.gravity
+        is_lying = felt > 0.5 and not (trust > 1e-3).any()
+        self.lying = self.lying + dt if is_lying else 0.0
+        if self.lying >= c.lying_time:
             told.append((lambda y: y[1], np.full(3, c.rest**2)))
         self.age = self.age + dt
         self._correct(x, P, told)
@@ -175,14 +193,17 @@ class Twin:
 
         H, V = self.jacobian(off), np.diag(np.concatenate([variance for _, variance in told]))
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + V)
-        self.x, self.P = self.plus(x, -K @ off(np.zeros(27))), P - K @ H @ P
+        learnt = np.ones(27)
+        learnt[9:15] = 1.0 / (1.0 + (np.hypot(*x[1][:2]) / CONFIG.learning_speed) ** 4)
+        self.x = self.plus(x, -learnt * (K @ off(np.zeros(27))))
+        self.P = P - (1.0 - np.outer(1.0 - learnt, 1.0 - learnt)) * (K @ H @ P)
 
 
 @pytest.mark.parametrize("case", FORCES)
 def test_the_estimate_is_that_of_the_documented_filter(case: str) -> None:
     model = RobotModel()
     given = readings(FORCES[case])
-    estimator, twin = StateEstimator(model), Twin(model, given[0])
+    estimator, twin = StateEstimator(model, CONFIG), Twin(model, given[0])
     states = [estimator.update(reading) for reading in given]
     for reading in given[1:]:
         twin.step(reading, STEP)
