@@ -15,10 +15,12 @@ import numpy as np
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.vectors import rotation_of
 
-STATE, ERROR, MEMORY, READING = 28, 27, 20, 35
+STATE, ERROR, MEMORY, READING = 28, 27, 22, 35
 """Lengths: of an estimate, of its error, of what is kept from tick to tick (the time [s] at rest,
-the ages [s] of the feet's contacts, the gyro, the joints' smoothed speeds), and of a reading (dt,
-gyro, accelerometer, angles, speeds, forces)."""
+the ages [s] of the feet's contacts, the gyro, the joints' smoothed speeds, the height [m] of the
+ground, and the time [s] for which it is not believed), and of a reading (dt, gyro, accelerometer,
+angles, speeds, forces)."""
+_LEVEL, _DOUBT = 20, 21
 _QUATERNION, _GYRO_BIAS, _FORCE_BIAS, _FEET = 6, 10, 13, 16
 _THETA, _E_GYRO_BIAS, _E_FORCE_BIAS, _E_FEET = 6, 9, 12, 15
 LEAST_TRUST = 1e-3
@@ -28,6 +30,8 @@ _SMOOTHING = 0.05
 _HEIGHT_GATE = 9.0
 """Square of the deviations by which a foot's height may be off that of flat ground; else it stands
 on something else, and its height says nothing."""
+_LEVEL_SHARE = 0.2
+"""Share of a landing foot's height in that of the ground, while this is not believed."""
 
 
 @subroutine("void(f8[::1], f8, f8, f8, b1)")
@@ -221,6 +225,22 @@ def is_at_rest(x, memory, reading, gravity, numbers):
     return memory[0] >= numbers[STILL_TIME]
 
 
+@subroutine("f8(f8[::1], f8, f8, f8[::1])")
+def height_off(memory, ground, variance, numbers):
+    """How far the ground is above ``ground`` [m], where a foot stands on it; inf if unknown.
+
+    ``variance``: of that difference. Once a foot has come down on something else, the ground is
+    not level: its height follows the feet, and says nothing of them for a while.
+    """
+    off = memory[_LEVEL] - ground
+    if abs(off) > numbers[UNEVEN] or off * off > _HEIGHT_GATE * variance:
+        memory[_DOUBT] = numbers[UNEVEN_TIME]
+    if memory[_DOUBT] > 0.0:
+        memory[_LEVEL] -= _LEVEL_SHARE * off
+        return np.inf
+    return off
+
+
 @subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
 def take_in_rest(x, P, dx, column, reading, numbers):
     """Take in that nothing moves: no velocity, and a gyro that reads its bias."""
@@ -262,6 +282,7 @@ ACCELERATION, FOOT_DRIFT, PLACE, VELOCITY, HEIGHT, CONTACT, TRUSTED, REST = rang
 GYRO, GYRO_WALK, FORCE_WALK, GATE, STILL_TIME, STILL_JOINTS, STILL_TURNING = range(8, 15)
 STILL_FORCE, STILL_VELOCITY, STILL_DRIFT, RADIUS, GRAVITY = range(15, 20)
 TOUCHDOWN_SLIP, TOUCHDOWN_TIME, VERTICAL, COMPLIANCE, STILL_GYRO = range(20, 25)
+UNEVEN, UNEVEN_TIME = range(25, 27)
 """What ``numbers`` holds: those of ``EstimatorConfig``, foot radius [m] and gravity [m/s^2]."""
 
 
@@ -291,7 +312,7 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
     rests = is_at_rest(x, memory, reading, gravity, numbers)
     predict(x, P, dt, mean, reading, gravity, R, noise)
     rotation_of(x[6], x[7], x[8], x[9], R)
-    is_carried = False
+    is_carried, memory[_DOUBT] = False, max(memory[_DOUBT] - dt, 0.0)
     for leg in range(4):
         foot = feet[leg]
         angles = slice(7 + 3 * leg, 10 + 3 * leg)
@@ -317,12 +338,11 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
                 drift = numbers[STILL_DRIFT]
             P[_E_FEET + 3 * leg + k, _E_FEET + 3 * leg + k] += factor * (drift * dt) ** 2
             x[_FEET + 3 * leg + k] += dt * foot[6 + k]
-        z = 2 + 3 * leg
-        heights[leg] = radius - numbers[COMPLIANCE] * force - x[_FEET + z]
-        spread = P[_E_FEET + z, _E_FEET + z] + numbers[HEIGHT] ** 2
-        settled = 3.0 * numbers[TOUCHDOWN_TIME]
-        if not age < settled <= age + dt or heights[leg] ** 2 > _HEIGHT_GATE * spread:
-            heights[leg] = np.inf
+        z, heights[leg], settled = 2 + 3 * leg, np.inf, 3.0 * numbers[TOUCHDOWN_TIME]
+        if age < settled <= age + dt:
+            ground = x[_FEET + z] - radius + numbers[COMPLIANCE] * force
+            variance = P[_E_FEET + z, _E_FEET + z] + numbers[HEIGHT] ** 2
+            heights[leg] = height_off(memory, ground, variance, numbers)
     for leg in range(4):
         take_in_leg(x, P, dx, column, feet[leg], leg, numbers[PLACE] ** 2, velocities[leg])
         if heights[leg] != np.inf:

@@ -7,12 +7,14 @@ per foot on the ground it is corrected by
 
     place       f_i - p = R (p_i - r_imu)           (encoders through the leg's kinematics)
     velocity    v = w_i x (r n) - R u_i             (the same, differentiated)
-    height      f_i = r above flat ground           (once, when the foot has come down)
+    height      f_i = r above level ground          (once, when the foot has come down)
 
 where u_i is the velocity of the foot's centre relative to the IMU. A foot is a sphere of radius r
 that rolls: its centre moves with w_i x (r n), w_i being the calf's angular velocity and n the
 upward normal. Taken for a fixed point, as in the papers, it would make a walking robot seem slower.
-Roll and pitch follow from gravity, seen through the velocity; heading is dead reckoning.
+Roll and pitch follow from gravity, seen through the velocity; heading is dead reckoning. Where
+feet come down beside level ground their heights are not taken in: on a slope of 15 deg that had
+turned the pitch by 7 deg within 8 s.
 
 A foot whose velocity is not that of a standing one, by what the filter expects, counts less
 (``slip``). A robot whose joints and IMU read rest for a while has no velocity, and its gyro reads
@@ -82,7 +84,9 @@ class EstimatorConfig:
         foot_drift: speed of a standing foot that rolling does not explain [m/s].
         place: of a foot's place by kinematics [m].
         velocity: of the velocity by one standing foot [m/s].
-        height: of the ground where a foot comes down, against flat ground [m].
+        height: of the ground where a foot comes down, against level ground [m].
+        uneven: distance [m] from level ground at which a foot comes down on something else.
+        uneven_time: time [s] after which the ground counts as level again, where it is then.
         contact_force: force [N] above which a foot counts as touching.
         trusted_force: force [N] from which on a foot is fully believed to stand.
         rest: of the assumption that a robot whose feet carry nothing lies still [m/s].
@@ -113,6 +117,8 @@ class EstimatorConfig:
     place: float = 0.002
     velocity: float = 0.05
     height: float = 0.02
+    uneven: float = 0.02
+    uneven_time: float = 2.0
     contact_force: float = 5.0
     trusted_force: float = 25.0
     rest: float = 0.3
@@ -180,6 +186,7 @@ class StateEstimator:
                 *(c.still_turning, c.still_force, c.still_velocity, c.still_drift),
                 *(model.foot_radius, model.gravity),
                 *(c.touchdown_slip, c.touchdown_time, c.vertical, c.compliance, c.still_gyro),
+                *(c.uneven, c.uneven_time),
             ]
         )
 
@@ -271,7 +278,7 @@ class StateEstimator:
         self._P[range(9, 15), range(9, 15)] = biases
         self._memory[:] = 0.0
         self._memory[5:8] = reading.gyro
-        self._memory[8:] = reading.v_joints
+        self._memory[8:20] = reading.v_joints
 
     def _feet(
         self, reading: SensorReading, R: Float[np.ndarray, "3 3"]
