@@ -87,7 +87,10 @@ class EstimatorConfig:
         height: of the ground where a foot comes down, against level ground [m].
         uneven: distance [m] from level ground at which a foot comes down on something else.
         uneven_time: time [s] after which the ground counts as level again, where it is then.
-        contact_force: force [N] above which a foot counts as touching.
+        contact_force: force [N] above which a foot is believed to bear on something.
+        touch: force [N] above which it is reported in contact: five deviations of the noise. One
+            reading above ``contact_force`` in 160 is noise, and in mid-swing was taken for a stone:
+            the trunk of a trot on the level went up and down by 20 mm.
         trusted_force: force [N] from which on a foot is fully believed to stand.
         rest: of the assumption that a robot whose feet carry nothing lies still [m/s].
         gyro: of the gyro, per sample [rad/s].
@@ -120,6 +123,7 @@ class EstimatorConfig:
     uneven: float = 0.02
     uneven_time: float = 2.0
     contact_force: float = 5.0
+    touch: float = 10.0
     trusted_force: float = 25.0
     rest: float = 0.3
     gyro: float = 0.02
@@ -216,7 +220,7 @@ class StateEstimator:
             v=v,
             tau=reading.tau,
             foot_forces=reading.foot_forces,
-            feet_in_contact=reading.foot_forces > self._config.contact_force,
+            feet_in_contact=reading.foot_forces > self._config.touch,
         )
 
     def covariance(self) -> OdometryCovariance:
