@@ -30,6 +30,10 @@ _SMOOTHING = 0.05
 _HEIGHT_GATE = 9.0
 """Square of the deviations by which a foot's height may be off that of flat ground; else it stands
 on something else, and its height says nothing."""
+_HEADING, _TURN_BIAS = _THETA + 2, _E_GYRO_BIAS + 2
+_TURNING = 0.5
+"""Angular velocity [rad/s] about the trunk's z axis above which the gyro tells it alone: feet that
+twist tell 2 % too much of it, and the bias learnt of them made a robot turn 2 % too slowly."""
 _LEVEL_SHARE = 0.2
 """Share of a landing foot's height in that of the ground, while this is not believed."""
 
@@ -135,13 +139,16 @@ def predict(x, P, dt, w, reading, gravity, R, noise):
         P[i, i] += noise[i]
 
 
-@subroutine("void(f8[:,::1], f8[::1], f8[::1], i8[::1], f8[::1], i8, f8, f8)")
-def take_in(P, dx, column, places, shares, count, innovation, variance):
+@subroutine("void(f8[:,::1], f8[::1], f8[::1], i8[::1], f8[::1], i8, f8, f8, b1)")
+def take_in(P, dx, column, places, shares, count, innovation, variance, turns):
     """Take in a number that is a sum of ``count`` numbers of the error, at ``places``.
 
     ``innovation``: what was measured beyond the prediction. dx is the error as found so far,
-    ``column`` work space.
+    ``column`` work space. If the robot ``turns``, heading and the gyro's bias about it are only
+    considered (Schmidt, *Application of state-space methods to navigation problems*, 1966).
     """
+    heading, bias = dx[_HEADING], dx[_TURN_BIAS]
+    kept = P[_HEADING, _HEADING], P[_HEADING, _TURN_BIAS], P[_TURN_BIAS, _TURN_BIAS]
     expected, spread = 0.0, variance
     for i in range(ERROR):
         column[i] = 0.0
@@ -158,11 +165,18 @@ def take_in(P, dx, column, places, shares, count, innovation, variance):
         scaled = column[i] / spread
         for j in range(ERROR):
             P[i, j] -= scaled * column[j]
+    if turns:
+        dx[_HEADING], dx[_TURN_BIAS] = heading, bias
+        P[_HEADING, _HEADING], P[_TURN_BIAS, _TURN_BIAS] = kept[0], kept[2]
+        P[_HEADING, _TURN_BIAS] = P[_TURN_BIAS, _HEADING] = kept[1]
 
 
-@subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], i8, f8, f8[::1])")
-def take_in_leg(x, P, dx, column, foot, leg, place, velocity):
-    """Take in what a leg measures, with these variances; velocities with 0 are left out."""
+@subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], i8, f8, f8[::1], b1)")
+def take_in_leg(x, P, dx, column, foot, leg, place, velocity, turns):
+    """Take in what a leg measures, with these variances; velocities with 0 are left out.
+
+    ``turns`` as of ``take_in``.
+    """
     places, shares = np.empty(4, np.int64), np.empty(4)
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
@@ -175,19 +189,19 @@ def take_in_leg(x, P, dx, column, foot, leg, place, velocity):
         )
         shares[0], shares[1], shares[2], shares[3] = 1.0, -1.0, -foot[j], foot[i]
         off = foot[k] - x[_FEET + 3 * leg + k] + x[k]
-        take_in(P, dx, column, places, shares, 4, off, place)
+        take_in(P, dx, column, places, shares, 4, off, place, turns)
         if velocity[k] > 0.0:
             places[1], shares[1] = 3 + k, 1.0
             shares[2], shares[3] = -foot[3 + j], foot[3 + i]
             off = foot[3 + k] - x[3 + k]
-            take_in(P, dx, column, places[1:], shares[1:], 3, off, velocity[k])
+            take_in(P, dx, column, places[1:], shares[1:], 3, off, velocity[k], turns)
 
 
 @subroutine("void(f8[:,::1], f8[::1], f8[::1], i8, f8, f8)")
 def take_in_one(P, dx, column, place, innovation, variance):
     """Take in a measurement of one number of the error."""
     places, shares = np.full(1, place), np.ones(1)
-    take_in(P, dx, column, places, shares, 1, innovation, variance)
+    take_in(P, dx, column, places, shares, 1, innovation, variance, False)
 
 
 @subroutine("f8(f8[::1], f8[:,::1], f8[::1], f8[::1], f8)")
@@ -343,8 +357,9 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
             ground = x[_FEET + z] - radius + numbers[COMPLIANCE] * force
             variance = P[_E_FEET + z, _E_FEET + z] + numbers[HEIGHT] ** 2
             heights[leg] = height_off(memory, ground, variance, numbers)
+    turns, place = abs(w[2]) > _TURNING, numbers[PLACE] ** 2
     for leg in range(4):
-        take_in_leg(x, P, dx, column, feet[leg], leg, numbers[PLACE] ** 2, velocities[leg])
+        take_in_leg(x, P, dx, column, feet[leg], leg, place, velocities[leg], turns)
         if heights[leg] != np.inf:
             off = heights[leg]
             take_in_one(P, dx, column, _E_FEET + 2 + 3 * leg, off, numbers[HEIGHT] ** 2)

@@ -42,7 +42,7 @@ def readings(case: str) -> list[SensorReading]:
     return [
         SensorReading(
             time=STEP * tick,
-            gyro=np.array([0.4, -0.3, 0.5]) + 0.1 * rng.standard_normal(3),
+            gyro=np.array([0.4, -0.3, 0.1]) + 0.1 * rng.standard_normal(3),
             accelerometer=np.array([0.5, -0.3, 9.6]) + rng.standard_normal(3),
             q_joints=STAND_JOINTS + lifted + 0.01 * rng.standard_normal(12),
             v_joints=rng.standard_normal(12),
