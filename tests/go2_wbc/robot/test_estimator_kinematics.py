@@ -27,7 +27,7 @@ NUDGE = 1e-4  # s; of differences
 SPEED_ERROR, PLACE_ERROR = 3e-3, 2e-3
 TURNING_ERROR, TILT_ERROR = 2e-3, 2e-3  # rad/s, rad
 IN_THE_AIR = Leg.FL
-CONTACT_FORCE = EstimatorConfig().contact_force
+CONTACT_FORCE = EstimatorConfig().touch
 
 
 @dataclass(frozen=True, slots=True)
