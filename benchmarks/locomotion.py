@@ -12,19 +12,20 @@ seeds 0 to 9; those judged begin at ``FIRST_SEED``.
 - turning: from the heading (unwrapped) at both ends of the window;
 - saturated ticks: share of ticks in which some motor gives all it has at its speed.
 
-The rows of the group ``unknown`` are those of ``benchmarks.unknown_world``.
+``benchmarks.unknown_world`` has the groups ``unknown`` and ``unknown-sensors``, and
+``benchmarks.other_robots`` the group ``robots``.
 """
 
 from __future__ import annotations
 
 import argparse
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from benchmarks import sensed
+from benchmarks import other_robots, sensed
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
 from benchmarks.steps import plant_of
@@ -149,6 +150,7 @@ RUNS = (
     Run("aside-1.0", "trot", VelocityCommand(0.0, 1.0), 2.0),
     Run("turn-2", "trot", VelocityCommand(0.0, 0.0, 2.0), 2.0),
     Run("turn-4", "trot", VelocityCommand(0.0, 0.0, 4.0), 2.0),
+    Run("turn-6", "trot", VelocityCommand(0.0, 0.0, 6.0), 2.0),
     Run("curve", "trot", VelocityCommand(0.8, 0.3, 1.0), 2.0),
     Run("flying-trot", "flying_trot", VelocityCommand(1.5), 5.0, None, 5.0, "gaits"),
     Run("walk", "walk", VelocityCommand(0.4), 5.0, None, 5.0, "gaits"),
@@ -157,18 +159,26 @@ RUNS = (
     Run("bound", "bound", VelocityCommand(0.6), 5.0, None, 5.0, "gaits"),
     Run("gallop", "gallop", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
 )
-SENSED = tuple(
-    Run(f"sensed-{speed:g}", "trot", VelocityCommand(speed), mean, group="sensors", sensors="imu")
-    for speed, mean in ((0.5, 2.0), (1.0, 2.0), (1.5, 2.0), (2.0, 2.0), (2.5, 3.0), (3.0, None))
+SENSED = (
+    *(
+        Run(f"sensed-{speed:g}", "trot", VelocityCommand(speed), mean)
+        for speed, mean in ((0.5, 2.0), (1.0, 2.0), (1.5, 2.0), (2.0, 2.0), (2.5, 3.0), (3.0, None))
+    ),
+    *(
+        replace(run, name=f"sensed-{run.name}", mae=None)
+        for run in RUNS
+        if not run.name.startswith("ahead")
+    ),
 )
 """The same on its own sensors; at 3 m/s all that is asked for is not to fall."""
 SCENARIOS = (
     *(
         Scenario(run.name, run.metrics, partial(measure_run, run=run), group=run.group)
-        for run in (*RUNS, *SENSED)
+        for run in (*RUNS, *(replace(run, group="sensors", sensors="imu") for run in SENSED))
     ),
     *sensed.SCENARIOS,
     *UNKNOWN,
+    *other_robots.SCENARIOS,
 )
 """In the order of the report."""
 

@@ -15,10 +15,12 @@ import numpy as np
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.vectors import rotation_of
 
-STATE, ERROR, MEMORY, READING = 28, 27, 21, 35
+STATE, ERROR, MEMORY, READING = 28, 27, 23, 35
 """Lengths: of an estimate, of its error, of what is kept from tick to tick (the time [s] at rest,
-the ages [s] of the feet's contacts, the gyro, the joints' smoothed speeds, the time [s] lying), and
-of a reading (dt, gyro, accelerometer, angles, speeds, forces)."""
+the ages [s] of the feet's contacts, the gyro, the joints' smoothed speeds, the time [s] lying, the
+height [m] of the ground, and the time [s] for which it is not believed), and of a reading (dt,
+gyro, accelerometer, angles, speeds, forces)."""
+_LYING, _LEVEL, _DOUBT = 20, 21, 22
 _QUATERNION, _GYRO_BIAS, _FORCE_BIAS, _FEET = 6, 10, 13, 16
 _THETA, _E_GYRO_BIAS, _E_FORCE_BIAS, _E_FEET = 6, 9, 12, 15
 LEAST_TRUST = 1e-3
@@ -30,6 +32,8 @@ _FLIGHT = 0.5
 _HEIGHT_GATE = 9.0
 """Square of the deviations by which a foot's height may be off that of flat ground; else it stands
 on something else, and its height says nothing."""
+_LEVEL_SHARE = 0.2
+"""Share of a landing foot's height in that of the ground, while this is not believed."""
 
 
 @subroutine("void(f8[::1], f8, f8, f8, b1)")
@@ -239,8 +243,8 @@ def lies(x, memory, reading, is_carried, gravity, numbers):
     for k in range(3):
         force += (reading[4 + k] - x[_FORCE_BIAS + k]) ** 2
     is_lying = not is_carried and force > (_FLIGHT * gravity) ** 2
-    memory[20] = memory[20] + reading[0] if is_lying else 0.0
-    return memory[20] >= numbers[LYING_TIME]
+    memory[_LYING] = memory[_LYING] + reading[0] if is_lying else 0.0
+    return memory[_LYING] >= numbers[LYING_TIME]
 
 
 @subroutine("f8(f8[::1], f8)")
@@ -263,6 +267,22 @@ def learn_in_part(P, dx, before, share):
         for j in range(6):
             m, n = _E_GYRO_BIAS + i, _E_GYRO_BIAS + j
             P[m, n] += left * (before[i, j] - P[m, n])
+
+
+@subroutine("f8(f8[::1], f8, f8, f8[::1])")
+def height_off(memory, ground, variance, numbers):
+    """How far the ground is above ``ground`` [m], where a foot stands on it; inf if unknown.
+
+    ``variance``: of that difference. Once a foot has come down on something else, the ground is
+    not level: its height follows the feet, and says nothing of them for a while.
+    """
+    off = memory[_LEVEL] - ground
+    if abs(off) > numbers[UNEVEN] or off * off > _HEIGHT_GATE * variance:
+        memory[_DOUBT] = numbers[UNEVEN_TIME]
+    if memory[_DOUBT] > 0.0:
+        memory[_LEVEL] -= _LEVEL_SHARE * off
+        return np.inf
+    return off
 
 
 @subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
@@ -307,6 +327,7 @@ GYRO, GYRO_WALK, FORCE_WALK, GATE, STILL_TIME, STILL_JOINTS, STILL_TURNING = ran
 STILL_FORCE, STILL_VELOCITY, STILL_DRIFT, RADIUS, GRAVITY = range(15, 20)
 TOUCHDOWN_SLIP, TOUCHDOWN_TIME, VERTICAL, COMPLIANCE, STILL_GYRO = range(20, 25)
 VERTICAL_SHARE, LYING_TIME, LEARNING_SPEED, DRIFT_SHARE, VELOCITY_SHARE = range(25, 30)
+UNEVEN, UNEVEN_TIME = range(30, 32)
 """What ``numbers`` holds: those of ``EstimatorConfig``, foot radius [m] and gravity [m/s^2]."""
 
 
@@ -339,7 +360,7 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
     vertical = numbers[VERTICAL] + numbers[VERTICAL_SHARE] * np.sqrt(x[3] * x[3] + x[4] * x[4])
     biases = slice(_E_GYRO_BIAS, _E_FEET)
     before, share_learnt = P[biases, biases].copy(), learning(x, numbers[LEARNING_SPEED])
-    is_carried = False
+    is_carried, memory[_DOUBT] = False, max(memory[_DOUBT] - dt, 0.0)
     for leg in range(4):
         foot = feet[leg]
         angles = slice(7 + 3 * leg, 10 + 3 * leg)
@@ -367,14 +388,14 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
                 drift = numbers[STILL_DRIFT]
             P[_E_FEET + 3 * leg + k, _E_FEET + 3 * leg + k] += factor * (drift * dt) ** 2
             x[_FEET + 3 * leg + k] += dt * foot[6 + k]
-        z = 2 + 3 * leg
-        heights[leg] = radius - numbers[COMPLIANCE] * force - x[_FEET + z]
-        spread = P[_E_FEET + z, _E_FEET + z] + numbers[HEIGHT] ** 2
-        settled = 3.0 * numbers[TOUCHDOWN_TIME]
-        if not age < settled <= age + dt or heights[leg] ** 2 > _HEIGHT_GATE * spread:
-            heights[leg] = np.inf
+        z, heights[leg], settled = 2 + 3 * leg, np.inf, 3.0 * numbers[TOUCHDOWN_TIME]
+        if age < settled <= age + dt:
+            ground = x[_FEET + z] - radius + numbers[COMPLIANCE] * force
+            variance = P[_E_FEET + z, _E_FEET + z] + numbers[HEIGHT] ** 2
+            heights[leg] = height_off(memory, ground, variance, numbers)
+    place = numbers[PLACE] ** 2
     for leg in range(4):
-        take_in_leg(x, P, dx, column, feet[leg], leg, numbers[PLACE] ** 2, velocities[leg])
+        take_in_leg(x, P, dx, column, feet[leg], leg, place, velocities[leg])
         if heights[leg] != np.inf:
             off = heights[leg]
             take_in_one(P, dx, column, _E_FEET + 2 + 3 * leg, off, numbers[HEIGHT] ** 2)

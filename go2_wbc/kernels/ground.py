@@ -17,6 +17,7 @@ _P_MET, _ROUGHNESS = _S["p_met"], _S["roughness"]
 _SHARE, _RADIUS, _GROUND = (_C[n] for n in ("ground_share", "foot_radius", "ground"))
 _SLOPE_SHARE, _FOLLOW, _SMOOTH, _RAISE, _CALMING, _STUMBLE, _DELAY = range(_GROUND, _GROUND + 7)
 _LEAST, _MOST = _C["least_determinant"], _C["most_slope"]
+_FRICTION, _LEAST_FRICTION = _S["friction"], _C["slip"] + 6
 
 
 @subroutine("f8(f8[::1], f8, f8)")
@@ -41,6 +42,13 @@ def delay(s, c):
 def tilt(s, c):
     """Slope that the trunk follows."""
     return c[_FOLLOW] * s[_SLOPE], c[_FOLLOW] * s[_SLOPE + 1]
+
+
+@subroutine("f8(f8[::1], f8[::1])")
+def level_friction(s, c):
+    """Coefficient of the upright cone that lies within that about the ground's normal."""
+    friction, steep = s[_FRICTION], np.hypot(s[_SLOPE], s[_SLOPE + 1])
+    return max((friction - steep) / (1.0 + friction * steep), c[_LEAST_FRICTION])
 
 
 @subroutine("void(f8[::1], f8[::1])")

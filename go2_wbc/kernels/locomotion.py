@@ -17,6 +17,7 @@ from go2_wbc.kernels.ground import (
     delay,
     ground_at,
     learn_ground,
+    level_friction,
     note_stumble,
     tilt,
 )
@@ -55,7 +56,7 @@ _IS_COM, _BODY_P, _BODY_V = (_T[n] for n in ("is_com", "p_world", "v_world"))
 _BODY_R, _BODY_W = _T["R_world_base"], _T["w_world"]
 _LEGS, _T_F_MIN, _T_F_MAX = (_T[n] for n in ("legs", "normal_force_min", "normal_force_max"))
 _FOOT_P, _FOOT_V, _FOOT_A = (_T[n] for n in ("p_world_feet", "v_world_feet", "a_world_feet"))
-_JOINT_Q, _T_FRICTION, _FRICTION = _T["q_joints"], _T["friction"], _S["friction"]
+_JOINT_Q, _T_FRICTION = _T["q_joints"], _T["friction"]
 
 
 @subroutine("f8(f8[::1])")
@@ -372,7 +373,7 @@ def plan(snapshot, time, contact, tau, s, c, command, target):
     observe_slip(snapshot, contact, tau, s, c, stands, dt)
     note_liftoffs(snapshot, contact, s, c, stance, progress)
     target[:] = 0.0
-    target[_T_FRICTION] = s[_FRICTION]
+    target[_T_FRICTION] = level_friction(s, c)
     fill_body(s, c, target)
     fill_feet(snapshot, s, c, stance, stands, elapsed, remaining, target)
     for n in range(12):

@@ -43,11 +43,15 @@ def observe_slip(snapshot, contact, tau, s, c, stance, dt):
         v = _V_CONTACTS + 3 * leg
         speed = np.hypot(snapshot[v], snapshot[v + 1])
         is_level = abs(snapshot[v + 2]) <= c[_STEEPNESS] * speed
-        stands = stance[leg] and contact[leg] != 0.0
-        s[_LOADED + leg] = s[_LOADED + leg] + dt if stands else 0.0
-        slides = s[_LOADED + leg] > c[_MASK] and speed > c[_SPEED] and is_level
-        s[_SLIDING + leg] = s[_SLIDING + leg] + dt if slides else 0.0
-        if s[_SLIDING + leg] > c[_PATIENCE]:
+        touches, loaded = contact[leg] != 0.0, s[_LOADED + leg] + dt
+        if not touches:
+            loaded = max(min(loaded, 2.0 * c[_MASK]) - 2.0 * dt, 0.0)
+        s[_LOADED + leg] = loaded if stance[leg] else 0.0
+        may_slide = s[_LOADED + leg] > c[_MASK]
+        slides = may_slide and touches and speed > c[_SPEED] and is_level
+        if touches or not may_slide:
+            s[_SLIDING + leg] = s[_SLIDING + leg] + dt if slides else 0.0
+        if slides and s[_SLIDING + leg] > c[_PATIENCE]:
             slips = True
             ratio = exerted_ratio(snapshot, tau, leg)
             shown = min(shown, ratio / (1.0 + speed / c[_HALF_SPEED]))

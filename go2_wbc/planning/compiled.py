@@ -26,6 +26,7 @@ from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 
+_TARGET_FRICTION = REFERENCE.start["friction"]
 _STATE = PLANNER.start
 _FORM = slice(PLANNER.start["period"], PLANNER.start["offsets"] + 4)
 _RESTING = slice(LOCOMOTION.start["rest_period"], LOCOMOTION.start["rest_offsets"] + 4)
@@ -123,7 +124,7 @@ class CompiledPlanner(GaitPlanner):
         self._plan(snapshot.row, state.time, self._contact, state.tau, own, numbers, wanted, row)
         if self._plans_forces:
             forces = self._forces
-            self._mpc[MPC.start["friction"]] = min(self._mpc_friction, own[_STATE["friction"]])
+            self._mpc[MPC.start["friction"]] = min(self._mpc_friction, row[_TARGET_FRICTION])
             self._steer(snapshot.row, state.time, own, numbers, self._mpc, wanted, forces, row)
         return Reference.of_row(row)
 

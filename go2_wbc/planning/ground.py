@@ -110,6 +110,16 @@ class GroundPlane:
         """Height [m] of feet, of which the centres are given, over the ground."""
         return np.array([p[2] - self._radius - self.at(p[:2]) for p in p_feet])
 
+    def level_friction(self, friction: float, least: float) -> float:
+        """Coefficient of the upright cone that lies within that about the ground's normal.
+
+        A foot on a slope of 15 deg and a coefficient of 0.65 slides when it is pushed ahead with
+        0.6 of what it carries, although that is less: tan(atan(0.65) - 15 deg) is 0.33. Never below
+        ``least``.
+        """
+        steep = float(np.hypot(*self.slope))
+        return max((friction - steep) / (1.0 + friction * steep), least)
+
     def carry(self, snapshot: Snapshot) -> None:
         """Follow the CoM."""
         p_com = snapshot.p_world_com[:2]

@@ -231,12 +231,17 @@ class LocomotionPlanner(GaitPlanner):
             q_joints=q,
             v_joints=np.zeros(12),
             a_joints=np.zeros(12),
-            friction=self._slip.friction,
+            friction=self._friction,
         )
         if self._forces is None or not self._is_stepping:
             return reference
         course = self._course(snapshot, command, pose, phase)
         return self._forces.update(snapshot, course, reference)
+
+    @property
+    def _friction(self) -> float:
+        """Greatest coefficient that feet may count on, seen in the world's axes."""
+        return self._ground.level_friction(self._slip.friction, self._config.slip.least)
 
     def _phase(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> ContactPhase:
         if not self._is_stepping:
@@ -270,7 +275,7 @@ class LocomotionPlanner(GaitPlanner):
             acceleration=config.trunk_limits.rate,
             footholds=self._footholds(snapshot, remaining),
             ground=self._ground,
-            friction=self._slip.friction,
+            friction=self._friction,
         )
 
     def _advance_phase(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> None:

@@ -48,3 +48,11 @@ def test_every_trial_has_a_plant_of_its_own(monkeypatch: pytest.MonkeyPatch) -> 
         boxes.plant(seed)
     first, second = seen
     assert all(first[name] != second[name] for name in ("friction", "mass_scale", "terrain"))
+
+
+def test_on_its_own_sensors_a_robot_is_not_given_the_truth() -> None:
+    plant = QUICK.sensed.plant(0)
+    assert plant.read().q[2] != plant.truth().q[2]
+    assert QUICK.plant(0).read().q[2] == QUICK.plant(0).truth().q[2]
+    names = {scenario.name for scenario in unknown_world.SCENARIOS}
+    assert {world.sensed.name for world in WORLDS} < names

@@ -60,6 +60,20 @@ def test_it_is_carried_along_with_the_robot() -> None:
     assert ground.height == pytest.approx(0.4 + SLOPE @ [0.5, 0.2], abs=EXACT)
 
 
+@pytest.mark.parametrize("friction", [0.3, 0.6])
+def test_an_upright_cone_lies_within_that_about_the_normal_of_a_slope(friction: float) -> None:
+    ground = plane(on_plane(SLOPE))
+    level = ground.level_friction(friction, 0.01)
+    around = np.linspace(0.0, 2.0 * np.pi, 3600)
+    forces = np.column_stack([level * np.cos(around), level * np.sin(around), np.ones(3600)])
+    normal = np.array([-SLOPE[0], -SLOPE[1], 1.0]) / np.sqrt(1.0 + SLOPE @ SLOPE)
+    into = forces @ normal
+    along = np.linalg.norm(forces - into[:, None] * normal, axis=1)
+    assert (along / into).max() == pytest.approx(friction, abs=1e-5)
+    assert ground.level_friction(0.1, 0.12) == 0.12
+    assert plane(on_plane(np.zeros(2))).level_friction(friction, 0.01) == friction
+
+
 def test_feet_that_land_on_another_plane_turn_it_there() -> None:
     ground, new = plane(on_plane(np.zeros(2))), on_plane(SLOPE, 0.43)
     pairs = np.array([True, False, False, True])

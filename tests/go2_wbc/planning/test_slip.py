@@ -88,6 +88,26 @@ def test_a_foot_may_slide_just_after_touchdown() -> None:
     assert after(sliding(0.3), CONFIG.mask).friction == CONFIG.most
 
 
+def test_a_foot_that_chatters_while_it_slides_has_not_come_down_anew() -> None:
+    """On sensors the trot fell on a friction of 0.2: the estimate stayed at 0.44."""
+    observer, slides = SlipObserver(CONFIG), sliding(0.3)
+    for tick in range(100):
+        is_lost = tick > 15 and tick % 8 >= 5
+        observer.update(sliding(0.3, touches=False) if is_lost else slides, STANCE, TICK)
+    assert observer.friction < 0.2
+
+
+def test_a_foot_that_was_off_for_long_comes_down_anew() -> None:
+    observer, slides = SlipObserver(CONFIG), sliding(0.3)
+    for _ in range(round(CONFIG.mask / TICK)):
+        observer.update(slides, STANCE, TICK)
+    for _ in range(round(2.0 * CONFIG.mask / TICK)):
+        observer.update(sliding(0.3, touches=False), STANCE, TICK)
+    for _ in range(round(CONFIG.mask / TICK)):
+        observer.update(slides, STANCE, TICK)
+    assert observer.friction == CONFIG.most
+
+
 def test_the_friction_comes_back_slowly() -> None:
     observer = after(sliding(0.3), 0.2)
     low = observer.friction
