@@ -16,13 +16,10 @@ import numpy as np
 
 from benchmarks.exam.drawing import TEST, TRAIN
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit
-from benchmarks.probability_runs import WORLDS, exam, trial
-from benchmarks.session import make_folder_of, publish
+from benchmarks.probability_runs import runs, trial
+from benchmarks.session import add_sweep_options, positive, publish, run_sweep
 from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.cli.progress import ProgressLine
-from controller.cli.sweep import tell
 from controller.sweeps.rows import Row
-from controller.sweeps.run import sweep
 from controller.sweeps.summary import rate_interval
 from go2_wbc.files import write_atomically
 from motions.feasibility.probability import FILE, ProbabilityModel, fitted
@@ -30,11 +27,11 @@ from motions.feasibility.probability import FILE, ProbabilityModel, fitted
 ERROR, BRIER_SHARE = 0.05, 0.5
 """Greatest expected calibration error, and Brier score over that of the base rate."""
 EXAMPLES = """
-python -m benchmarks probability              all motions, five worlds each
+python -m benchmarks probability              all motions; two worlds each to fit,
+                                              five to judge
 python -m benchmarks probability --motions 60
 python -m benchmarks probability --fit        also fit the model, and store it
 """
-ROWS = Path("out/benchmarks/probability.sqlite")
 
 
 def register(subparsers: Subparsers) -> None:
@@ -47,26 +44,14 @@ def register(subparsers: Subparsers) -> None:
         "is calibrated and no motion that passed fell, 1 if not.",
         examples=EXAMPLES,
     )
-    parser.add_argument("--motions", metavar="N", type=int, help="only the first N")
+    parser.add_argument("--motions", metavar="N", type=positive, help="only the first N")
     parser.add_argument("--fit", action="store_true", help="fit to the train half, and store")
-    parser.add_argument("--rows", metavar="FILE", type=Path, default=ROWS, help="keep rows here")
-    parser.add_argument("--jobs", metavar="N", type=int, default=2, help="default 2")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
-    parser.add_argument("--out", metavar="FILE", type=Path, help="also write the JSON here")
+    add_sweep_options(parser, jobs=2)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run what is not kept, fit if asked, and judge the test half."""
-    make_folder_of(args.rows)
-    with ProgressLine() as line:
-        result = sweep(
-            trial,
-            WORLDS * (args.motions or len(exam())),
-            workers=args.jobs,
-            out=args.rows,
-            keep_going=True,
-            on_progress=lambda progress: tell(line, progress),
-        )
+    result = run_sweep(args, trial, len(runs(args.motions)))
     model = fitted()
     if args.fit:
         model = fit(_samples(_of_half(result.rows, TRAIN)))
