@@ -29,10 +29,9 @@ from viz.render.figure_style import PLOT_SUFFIXES, save_figure
 ERROR, BRIER_SHARE = 0.05, 0.5
 """Greatest expected calibration error, and Brier score over that of the base rate."""
 EXAMPLES = """
-python -m benchmarks probability              all motions; two worlds each to fit,
-                                              five to judge
+python -m benchmarks probability         all: two worlds to fit, five to judge
 python -m benchmarks probability --motions 60
-python -m benchmarks probability --fit        also fit the model, and store it
+python -m benchmarks probability --fit   also fit the model, and store it
 python -m benchmarks probability --data docs/data/probability.csv
                                  --plot docs/images/reliability.svg
 """
