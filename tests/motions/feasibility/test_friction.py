@@ -182,7 +182,7 @@ def test_a_knee_that_folds_no_farther_moves_less_than_one_too_short(
     assert stretched.margins["joint position"].margin < 0.0
 
 
-@pytest.mark.parametrize(("angle", "is_refused"), [(38.0, False), (46.0, True)])
+@pytest.mark.parametrize(("angle", "is_refused"), [(38.0, False), (42.0, True), (44.0, True)])
 def test_hips_of_a_pair_that_stands_keep_clear_of_their_stops(
     checker: FeasibilityChecker, angle: float, is_refused: bool
 ) -> None:
