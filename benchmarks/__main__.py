@@ -24,6 +24,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("moonshots", "benchmarks.moonshots", "the greatest jumps, and what forbids more"),
     Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),
     Command("trust", "benchmarks.trust", "do motions fall that the check has passed?"),
+    Command("sweeps", "benchmarks.sweeping", "a second worker, memory, the time of a certificate"),
     Command("nearest", "benchmarks.nearest", "the nearest to motions that the check refuses"),
     Command("solve", "benchmarks.solved_plans", "solve the library's dynamic plans, to ship them"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),

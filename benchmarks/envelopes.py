@@ -19,14 +19,11 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.session import make_folder_of, positive, publish
+from benchmarks.session import add_sweep_options, publish, run_sweep
 from benchmarks.steps import plant_of
 from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.cli.progress import ProgressLine
-from controller.cli.sweep import tell
 from controller.motion_measurement import FULL
 from controller.sweeps.rows import Row
-from controller.sweeps.run import sweep
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS
@@ -52,7 +49,6 @@ STEPS = 6
 """Halvings: a bound is exact to a 64th of ``MOST``."""
 ITEMS = tuple(product(GAITS, MOST))
 CONFIG = Config(envelope=VelocityEnvelope(forward=1e3, backward=1e3, lateral=1e3, turning=1e3))
-ROWS = Path("out/benchmarks/envelopes.sqlite")
 EXAMPLES = """
 python -m benchmarks envelopes           measure and print; ten minutes
 python -m benchmarks envelopes --store   also store them in the package
@@ -69,24 +65,12 @@ def register(subparsers: Subparsers) -> None:
         examples=EXAMPLES,
     )
     parser.add_argument("--store", action="store_true", help="store them in the package")
-    parser.add_argument("--rows", metavar="FILE", type=Path, default=ROWS, help="keep rows here")
-    parser.add_argument("--jobs", metavar="N", type=positive, default=1, help="default 1")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
-    parser.add_argument("--out", metavar="FILE", type=Path, help="also write the JSON here")
+    add_sweep_options(parser, jobs=1)
 
 
 def run(args: argparse.Namespace) -> int:
     """Measure what is not kept yet, and store it if asked."""
-    make_folder_of(args.rows)
-    with ProgressLine() as line:
-        result = sweep(
-            trial,
-            len(ITEMS),
-            workers=args.jobs,
-            out=args.rows,
-            keep_going=True,
-            on_progress=lambda progress: tell(line, progress),
-        )
+    result = run_sweep(args, trial, len(ITEMS))
     bounds = collected(result.rows)
     is_whole = not result.failures and all(len(b) == len(MOST) for b in bounds.values())
     if args.store and is_whole:

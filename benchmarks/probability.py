@@ -15,26 +15,26 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.exam.drawing import TEST, TRAIN
+from benchmarks.probability_evidence import csv_of, reliability_figure
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit
-from benchmarks.probability_runs import WORLDS, exam, trial
-from benchmarks.session import make_folder_of, publish
+from benchmarks.probability_runs import runs, trial
+from benchmarks.session import add_sweep_options, positive, publish, run_sweep
 from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.cli.progress import ProgressLine
-from controller.cli.sweep import tell
 from controller.sweeps.rows import Row
-from controller.sweeps.run import sweep
 from controller.sweeps.summary import rate_interval
-from go2_wbc.files import write_atomically
+from go2_wbc.files import checked_output, write_atomically
 from motions.feasibility.probability import FILE, ProbabilityModel, fitted
+from viz.render.figure_style import PLOT_SUFFIXES, save_figure
 
 ERROR, BRIER_SHARE = 0.05, 0.5
 """Greatest expected calibration error, and Brier score over that of the base rate."""
 EXAMPLES = """
-python -m benchmarks probability              all motions, five worlds each
+python -m benchmarks probability         all: two worlds to fit, five to judge
 python -m benchmarks probability --motions 60
-python -m benchmarks probability --fit        also fit the model, and store it
+python -m benchmarks probability --fit   also fit the model, and store it
+python -m benchmarks probability --data docs/data/probability.csv
+                                 --plot docs/images/reliability.svg
 """
-ROWS = Path("out/benchmarks/probability.sqlite")
 
 
 def register(subparsers: Subparsers) -> None:
@@ -47,31 +47,29 @@ def register(subparsers: Subparsers) -> None:
         "is calibrated and no motion that passed fell, 1 if not.",
         examples=EXAMPLES,
     )
-    parser.add_argument("--motions", metavar="N", type=int, help="only the first N")
+    parser.add_argument("--motions", metavar="N", type=positive, help="only the first N")
     parser.add_argument("--fit", action="store_true", help="fit to the train half, and store")
-    parser.add_argument("--rows", metavar="FILE", type=Path, default=ROWS, help="keep rows here")
-    parser.add_argument("--jobs", metavar="N", type=int, default=2, help="default 2")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
-    parser.add_argument("--out", metavar="FILE", type=Path, help="also write the JSON here")
+    parser.add_argument(
+        "--data", metavar="FILE", type=Path, help="write a .csv with a line for every run"
+    )
+    parser.add_argument("--plot", metavar="FILE", type=Path, help="draw the reliability: .svg, ...")
+    add_sweep_options(parser, jobs=2)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run what is not kept, fit if asked, and judge the test half."""
-    make_folder_of(args.rows)
-    with ProgressLine() as line:
-        result = sweep(
-            trial,
-            WORLDS * (args.motions or len(exam())),
-            workers=args.jobs,
-            out=args.rows,
-            keep_going=True,
-            on_progress=lambda progress: tell(line, progress),
-        )
+    data = args.data and checked_output(args.data, [".csv"])
+    plot = args.plot and checked_output(args.plot, PLOT_SUFFIXES)
+    result = run_sweep(args, trial, len(runs(args.motions)))
     model = fitted()
     if args.fit:
         model = fit(_samples(_of_half(result.rows, TRAIN)))
-        store(model, result.rows)
+        store(model, result.rows, result.about["code"])
     judged, falls = judge(model, _of_half(result.rows, TEST)), passed_that_fell(result.rows)
+    if data:
+        write_atomically(data, csv_of(model, result.rows))
+    if plot:
+        save_figure(reliability_figure(judged), plot)
     is_ok = is_calibrated(judged) and falls[0] == 0 and not result.failures
     values = {
         "passed": is_ok,
@@ -83,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
         "passed_that_fell": falls,
         "lost": result.failures,
     }
-    publish(args, values, render(judged, falls, result.failures))
+    publish(args, values, render(judged, result.rows, result.failures))
     return ExitCode.OK if is_ok else ExitCode.FAILED
 
 
@@ -98,13 +96,17 @@ def _samples(rows: Sequence[Row]) -> list[Sample]:
     ]
 
 
-def store(model: ProbabilityModel, rows: Sequence[Row], file: Path = FILE) -> None:
-    """Write the model where the package looks for it, with what it was fitted to."""
+def store(model: ProbabilityModel, rows: Sequence[Row], code: str, file: Path = FILE) -> None:
+    """Write the model where the package looks for it, with what it was fitted to.
+
+    ``code`` names that of the check and of physics, as files of sweeps do.
+    """
     motions = {row["motion"] for row in _of_half(rows, TRAIN)}
     about = {
         "fitted_by": "python -m benchmarks probability --fit",
         "motions": len(motions),
         "runs": len(_of_half(rows, TRAIN)),
+        "code": code,
     }
     text = json.dumps({"about": about, **model.as_dict()}, indent=1)
     write_atomically(file, (text + "\n").encode())
@@ -129,8 +131,9 @@ def passed_that_fell(rows: Sequence[Row]) -> tuple[int, int]:
     return sum(bool(row["fell"]) for row in passed), len(passed)
 
 
-def render(judged: Calibration, falls: tuple[int, int], lost: dict[int, str]) -> str:
+def render(judged: Calibration, rows: Sequence[Row], lost: dict[int, str]) -> str:
     """The reliability table and the verdicts, at most 80 columns wide."""
+    falls = passed_that_fell(rows)
     lines = ["chance stated    done    runs", "-" * 80]
     for chance, share, count in judged.bins:
         low, high = rate_interval(round(share * count), count)
@@ -144,6 +147,12 @@ def render(judged: Calibration, falls: tuple[int, int], lost: dict[int, str]) ->
         f"Brier score {judged.brier:.3f}, of the base rate {judged.brier_of_base_rate:.3f}, "
         f"bar half of it",
         f"motions that passed in their world and fell there: {falls[0]} of {falls[1]}",
+    ]
+    lines += [
+        f"seed {row['seed']}: {row['motion']:.40}, friction {row['friction']:.2f}, "
+        f"{row['payload']:.1f} kg"
+        for row in rows
+        if row["fell"] and not row["refused"]
     ]
     lines += [f"seed {seed} gave no row: {why:.55}" for seed, why in lost.items()]
     return "\n".join(lines)

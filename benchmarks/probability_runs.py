@@ -1,16 +1,20 @@
 """One motion of the exam in one random world: what the check says of it there, and what happens.
 
 A function of a seed for ``controller.sweep``: seeds count the worlds of the first motion, then
-those of the second, and so on.
+those of the second, and so on. Motions are in an order of which every beginning holds halves and
+strata in the shares that they have of all, and families evenly.
 """
 
 from __future__ import annotations
 
 import json
+from collections import Counter, defaultdict
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
 
+from benchmarks.exam.drawing import TEST, TRAIN
 from benchmarks.exam.questions import IMPOSSIBLE, Question, questions
 from benchmarks.exam.stored import read_borders
 from controller.motion_measurement import measure_motion
@@ -23,8 +27,8 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
 from motions import FeasibilityChecker
 
-WORLDS = 5
-"""Worlds of each motion."""
+WORLDS = {TRAIN: 2, TEST: 5}
+"""Worlds of each motion: a fit learns more from other motions than from other worlds."""
 FRICTION, PAYLOAD = (0.3, 1.0), (0.0, 4.0)
 """What the worlds are drawn from; half of them have no payload [kg]."""
 PLACE = ((-0.08, 0.08), (-0.04, 0.04), (0.0, 0.10))
@@ -38,7 +42,7 @@ NOT_READY = "not ready"
 
 def trial(seed: int) -> dict[str, object]:
     """The row of a seed: motion, verdict, margins (JSON) and outcome by the strict definition."""
-    question, plan = _asked(seed // WORLDS)
+    question, plan = _asked(runs()[seed])
     world = world_of(seed)
     report = FeasibilityChecker(model(), world=world).check(plan)
     harm = played(plan, world, seed)
@@ -98,11 +102,37 @@ def _asked(number: int) -> tuple[Question, MotionPlan]:
 
 @lru_cache(maxsize=1)
 def exam() -> list[Question]:
-    """The motions of the exam, shuffled, but for impossible ones that are to be solved.
+    """The motions of the exam, mixed evenly, but for impossible ones that are to be solved.
 
     To see that one has no plan takes 20 s, and the chance of what has none is clear.
     """
     asked = questions(read_borders())
-    found = [one for one in asked if not (one.family.is_dynamic and one.stratum == IMPOSSIBLE)]
-    order = np.random.default_rng(_STREAM).permutation(len(found))
-    return [found[place] for place in order]
+    return mixed([q for q in asked if not (q.family.is_dynamic and q.stratum == IMPOSSIBLE)])
+
+
+@lru_cache(maxsize=2)
+def runs(motions: int | None = None) -> list[int]:
+    """The number of the motion of every seed; of the first ``motions`` only, if that is given."""
+    asked = exam()[:motions]
+    return [number for number, one in enumerate(asked) for _ in range(WORLDS[one.family.half])]
+
+
+def mixed(asked: Sequence[Question]) -> list[Question]:
+    """All of them at random, every kind in equal steps; in each, no family twice before all once.
+
+    A kind is half, stratum and whether it is solved. Of ``n`` of a kind, number ``k`` stands at
+    ``(k + 1/2) / n`` of the whole.
+    """
+    order = np.random.default_rng(_STREAM).permutation(len(asked))
+    kinds: dict[object, list[tuple[int, Question]]] = defaultdict(list)
+    turns: Counter[object] = Counter()
+    for one in (asked[place] for place in order):
+        kind = (one.family.half, one.stratum, one.family.is_dynamic)
+        kinds[kind].append((turns[kind, one.family.name], one))
+        turns[kind, one.family.name] += 1
+    placed = [
+        ((k + 0.5) / len(found), one)
+        for found in kinds.values()
+        for k, (_, one) in enumerate(sorted(found, key=lambda item: item[0]))
+    ]
+    return [one for _, one in sorted(placed, key=lambda item: item[0])]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,9 @@ from benchmarks.runner import Results, Task, run_tasks
 from benchmarks.scenario import Scenario
 from controller.cli.common import ExitCode, print_json
 from controller.cli.progress import ProgressLine
+from controller.cli.sweep import tell
+from controller.sweeps.rows import Row
+from controller.sweeps.run import SweepResult, sweep
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
@@ -53,16 +56,51 @@ def _output(name: str) -> Path:
     return checked_output(name, [".json"])
 
 
-def make_folder_of(rows: Path) -> None:
-    """Make the folder of a file of rows.
+def add_sweep_options(parser: argparse.ArgumentParser, *, jobs: int) -> None:
+    """Add what benchmarks take that are a sweep; ``jobs`` is the default."""
+    parser.add_argument(
+        "--rows", metavar="FILE", type=Path, help=f"keep rows here, default in {LOG_FOLDER}"
+    )
+    parser.add_argument(
+        "--jobs", metavar="N", type=positive, default=jobs, help="processes, default %(default)s"
+    )
+    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
+    parser.add_argument("--out", metavar="FILE", type=_output, help="also write the JSON here")
+
+
+def run_sweep(
+    args: argparse.Namespace,
+    trial: Callable[[int], object],
+    n: int,
+    *,
+    is_enough: Callable[[Sequence[Row]], bool] | None = None,
+) -> SweepResult:
+    """Run those of ``n`` seeds whose rows are not kept yet, and tell of the progress.
+
+    Args:
+        args: with the options of ``add_sweep_options``.
+        trial: a function ``(seed) -> row`` of a module.
+        n: how many seeds.
+        is_enough: see ``controller.sweep``.
 
     Raises:
-        ConfigError: if it cannot be made.
+        ConfigError: if the folder of the rows cannot be made, or they depend on something else.
     """
+    rows: Path = args.rows or LOG_FOLDER / f"{args.command}.sqlite"
     try:
         rows.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"cannot make the folder of {rows}: {error.strerror}") from error
+    with ProgressLine() as line:
+        return sweep(
+            trial,
+            n,
+            workers=args.jobs,
+            out=rows,
+            keep_going=True,
+            is_enough=is_enough,
+            on_progress=lambda progress: tell(line, progress),
+        )
 
 
 def tasks_of(scenarios: Sequence[Scenario], seeds: int) -> list[Task]:

@@ -9,22 +9,17 @@ from __future__ import annotations
 import argparse
 from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
 
 from benchmarks.probability_runs import NOT_READY
-from benchmarks.session import make_folder_of, positive, publish
+from benchmarks.session import add_sweep_options, positive, publish, run_sweep
 from benchmarks.trust_runs import passed_play
 from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.cli.progress import ProgressLine
-from controller.cli.sweep import tell
 from controller.sweeps.rows import Row
-from controller.sweeps.run import sweep
 from controller.sweeps.summary import rate_interval
 
 PLAYS = 2000
 MOST_ASKED = 20
 """Worlds that are asked for at most, for each play that is wanted; the check passes half."""
-ROWS = Path("out/benchmarks/trust.sqlite")
 EXAMPLES = """
 python -m benchmarks trust                2,000 plays, about an hour, 2 cores
 python -m benchmarks trust --plays 100
@@ -44,25 +39,17 @@ def register(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--plays", metavar="N", type=positive, default=PLAYS, help="default %(default)s"
     )
-    parser.add_argument("--rows", metavar="FILE", type=Path, default=ROWS, help="keep rows here")
-    parser.add_argument("--jobs", metavar="N", type=positive, default=2, help="default 2")
-    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
-    parser.add_argument("--out", metavar="FILE", type=Path, help="also write the JSON here")
+    add_sweep_options(parser, jobs=2)
 
 
 def run(args: argparse.Namespace) -> int:
     """Play what is not kept yet, count the falls."""
-    make_folder_of(args.rows)
-    with ProgressLine() as line:
-        result = sweep(
-            passed_play,
-            MOST_ASKED * args.plays,
-            workers=args.jobs,
-            out=args.rows,
-            keep_going=True,
-            is_enough=lambda rows: len(_played(rows)) >= args.plays,
-            on_progress=lambda progress: tell(line, progress),
-        )
+    result = run_sweep(
+        args,
+        passed_play,
+        MOST_ASKED * args.plays,
+        is_enough=lambda rows: len(_played(rows)) >= args.plays,
+    )
     values = judged(result.rows, args.plays)
     values["lost"] = result.failures
     is_ok = values["passed"] = bool(values["passed"]) and not result.failures

@@ -11,11 +11,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.probability_runs import WORLDS, exam, model, played, world_of
+from benchmarks.probability_runs import exam, model, played, world_of
 from controller.motion_outcome import FELL
 from go2_wbc.reference import MotionPlan, Posture
 from motions import FeasibilityChecker, compile_motion, motion_names
 
+WORLDS = 5
+"""Worlds of each motion."""
 FIRST_WORLD = 10_000_000
 """Added to seeds, so that the worlds are not those that probabilities are fitted or judged in."""
 EVERY = 4

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from controller.go2_controller import GO2Controller
+from controller.modes import Mode
 from controller.placed_plan import PlacedPlan
 from controller.written_motion import off_written
 from go2_wbc.kernels.layout import REFERENCE
@@ -31,7 +32,7 @@ class MotionMeasurement:
     """What was measured while a motion was played.
 
     Attributes:
-        fall: why the robot fell, or None.
+        fall: why the robot fell, or went limp because it fell, or None.
         said: what ``play`` said.
         reason: in its words.
         slip: largest distance [m] that the material of a standing foot slid at its contact point.
@@ -103,7 +104,7 @@ def measure_motion(
     """
     truth.clear()
     said = go2.play(plan, check=False)
-    fall, dt = truth.fall(), truth.control_period
+    fall, dt = truth.fall() or _given_up(go2), truth.control_period
     recorded = during_motion(go2, truth, plan.name)
     shares = recorded.torque_shares(model)
     force = np.maximum(recorded.trunk_force, recorded.limb_force)
@@ -124,6 +125,15 @@ def measure_motion(
         touched=dt * float((recorded.touches_itself | (force > TOUCH)).sum()),
         **asdict(off_written(recorded, plan, model)),
     )
+
+
+def _given_up(go2: GO2Controller) -> str | None:
+    """Why the controller let the robot go limp, or None.
+
+    It does so as soon as a fall cannot be stopped, and ``play`` returns before the trunk lies on
+    the ground: what the simulator says at that moment is no proof that the robot is up.
+    """
+    return go2.last_outcome.reason if go2.mode in (Mode.FALLEN, Mode.DAMPED) else None
 
 
 def during_motion(go2: GO2Controller, truth: GroundTruth, name: str) -> TruthRecording:

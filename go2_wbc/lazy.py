@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from types import ModuleType
 
 
 def lazy_exports(package: str, homes: Mapping[str, Sequence[str]]) -> Callable[[str], object]:
@@ -19,6 +20,9 @@ def lazy_exports(package: str, homes: Mapping[str, Sequence[str]]) -> Callable[[
     Args:
         package: its dotted name.
         homes: the public names by the module that defines them, relative to ``package``.
+
+    Raises:
+        ImportError: by what is returned, if a module cannot be imported.
     """
     home_of = {name: f"{package}.{home}" for home, names in homes.items() for name in names}
 
@@ -26,10 +30,22 @@ def lazy_exports(package: str, homes: Mapping[str, Sequence[str]]) -> Callable[[
         if name not in home_of:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         with without_collecting():
-            module = import_module(home_of[name])
+            module = _imported(home_of[name])
         return getattr(module, name)
 
     return load
+
+
+def _imported(name: str) -> ModuleType:
+    """The module of that name; an ``AttributeError`` of its own is told as what it is.
+
+    ``from package import name`` takes one that leaves ``__getattr__`` for a missing name, and drops
+    its story.
+    """
+    try:
+        return import_module(name)
+    except AttributeError as error:
+        raise ImportError(f"{name} cannot be imported: {error}", name=name) from error
 
 
 @contextmanager

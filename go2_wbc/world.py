@@ -19,7 +19,8 @@ PAYLOAD_HALF_SIZE = (0.10, 0.06, 0.04)
 class World:
     """What a check counts on, and what a simulated robot meets.
 
-    The controller is told nothing of it: it works with the robot as its description has it.
+    The controller is told nothing of it: it works with the robot as its description has it. What is
+    uncertain stays in the range of its value.
 
     Attributes:
         friction: coefficient of feet and floor, 0.0001 to 2. Wet tiles have 0.5, dry rubber on
@@ -77,24 +78,35 @@ class World:
 
     def _shifted(self, shares: Sequence[float]) -> World:
         """The world at these shares, -1 to 1, of each uncertainty, in the order of _UNCERTAIN."""
-        values = {
-            name: getattr(self, name) * (1.0 + share * getattr(self, f"{part}_uncertainty"))
-            for (name, part), share in zip(_UNCERTAIN.items(), shares, strict=True)
-        }
+        values = {}
+        for (name, part), share in zip(_UNCERTAIN.items(), shares, strict=True):
+            shifted = getattr(self, name) * (1.0 + share * getattr(self, f"{part}_uncertainty"))
+            low, high = _RANGES[name]
+            values[name] = min(max(shifted, low), high)
         return replace(
             self, **values, **{f"{part}_uncertainty": 0.0 for part in _UNCERTAIN.values()}
         )
 
+    @property
+    def is_late_or_noisy(self) -> bool:
+        """Whether commands are late or sensors not ideal: what only a simulation counts with."""
+        return self.delay > 0.0 or self.sensors != "ideal"
+
     def __str__(self) -> str:
         """In words, what is not as usual."""
-        words = [f"friction {self.friction:g}"]
+        words = [f"friction {_told(self.friction, self.friction_uncertainty)}"]
         if self.payload:
             words.append(f"payload {self.payload:g} kg")
-        words += [
-            f"{name.replace('_', ' ')} {getattr(self, name):g}"
-            for name in ("friction_uncertainty", "mass_scale", "mass_uncertainty", "joint_friction")
-            if getattr(self, name) != getattr(_USUAL, name)
-        ]
+            if self.payload_place != _USUAL.payload_place:
+                words[-1] += " at " + " ".join(f"{part:g}" for part in self.payload_place) + " m"
+        for name, own in (("mass_scale", "mass"), ("joint_friction", "joint friction")):
+            told = _told(getattr(self, name), getattr(self, f"{_UNCERTAIN[name]}_uncertainty"))
+            if told != "1":
+                words.append(f"{own} {told}")
+        if self.delay:
+            words.append(f"delay {self.delay:g} s")
+        if self.sensors != _USUAL.sensors:
+            words.append(f"sensors {self.sensors}")
         return ", ".join(words)
 
 
@@ -115,3 +127,8 @@ _USUAL = World()
 DOUBTFUL = World(friction_uncertainty=0.1, mass_uncertainty=0.05, joint_friction_uncertainty=0.5)
 """What is usually not known: the floor within 10 %; the mass within 5 %, which batteries and cables
 make; the joints' friction within half, by which motors of one type differ."""
+
+
+def _told(value: float, uncertainty: float) -> str:
+    """A value with its uncertainty, if it has any."""
+    return f"{value:g} +-{100.0 * uncertainty:g} %" if uncertainty else f"{value:g}"

@@ -236,6 +236,7 @@ def test_the_limits_in_the_table_are_those_of_the_checker() -> None:
     limits = FeasibilityLimits()
     shown = {
         "reach": f"<= {1000 * limits.reach:g} mm",
+        "joint position": f"less {limits.pair_hip:g} rad",
         "torque": f"{limits.torque_share:g} tau_max",
         "torque at speed": f"min(1, (1 - abs(v) / v_max) / {1 - KNEE_SHARE:g})",
         "support": f">= {1000 * limits.support:g} mm",

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from controller.sweeps.rows import SEED, Row
@@ -77,7 +78,7 @@ class Certificate:
             lines.append(f"{row[SEED]:>6}  {world}  {told(row):.54}")
         lines.append("-" * 80)
         about = {**self.about, "world": str(world_of(self.about["world"]))}
-        lines += [f"{name}: {value}"[:80] for name, value in about.items()]
+        lines += [line for item in about.items() for line in wrap(": ".join(item), 80)]
         return "\n".join(lines)
 
     def as_dict(self) -> dict[str, Any]:

@@ -22,6 +22,8 @@ from motions.trajectory import Trajectory
 JOINTS = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 FEET = tuple(leg.name for leg in LEGS)
 ENDS = ("entry", "exit")
+PAIR = 2
+"""Standing feet over which a trunk can fall to its side."""
 TIGHT_ANGLE, TIGHT_SPEED = 0.03, 0.1
 """Margins below which a warning is due: rad, and share of the least speed limit; own choice."""
 
@@ -38,11 +40,16 @@ def joint_position(motion: Trajectory, model: RobotModel, limits: FeasibilityLim
     standing one, is off by no more than it may for it, the margin counts as 0: a warning. A raised
     foot and a knee that is bent as far as it goes may be off by ``limits.stop``: nothing else
     moves. A standing leg that should be longer lets the trunk sink to its side, farther than that:
-    ``limits.stretch``.
+    ``limits.stretch``. Hips of two standing legs keep ``limits.pair_hip`` to their stops: a trunk
+    that rolls late needs them, and no third foot holds it.
     """
-    q = motion.q[:, 7:]
-    to_lower, to_upper = q - model.q_lower, model.q_upper - q
-    bounds = np.where(to_lower < to_upper, model.q_lower, model.q_upper)
+    q, room = motion.q[:, 7:], np.zeros((len(motion.times), 12))
+    few = (motion.stance.sum(axis=1) <= PAIR) & ~motion.is_dynamic
+    held = motion.stance & few[:, None]
+    room[:, ::3] = limits.pair_hip * held
+    lower, upper = model.q_lower + room, model.q_upper - room
+    to_lower, to_upper = q - lower, upper - q
+    bounds = np.where(to_lower < to_upper, lower, upper)
     margins = np.minimum(to_lower, to_upper)
     for leg in LEGS:
         own = margins[:, leg.joints]
@@ -52,6 +59,7 @@ def joint_position(motion: Trajectory, model: RobotModel, limits: FeasibilityLim
             most = np.where(stands & ~is_folded, limits.stretch, limits.stop)
             harmless = np.zeros(len(q), dtype=bool)
             harmless[beyond] = _stopped(leg, q[beyond], stands, model) <= most
+            harmless &= ~(held[:, leg] & (own[:, 0] < 0.0))
             own[harmless] = np.maximum(own[harmless], 0.0)
     return Series("joint position", "rad", JOINTS, motion.times, q, bounds, margins, TIGHT_ANGLE)
 

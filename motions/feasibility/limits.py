@@ -35,6 +35,9 @@ class FeasibilityLimits:
             may be off for a joint at its stop: in MuJoCo it was off by 0.5 to 0.9 of it.
         stretch: the same of the trunk over any other standing leg: it was off by 1.1 to 2.2 times
             as much.
+        pair_hip: least distance [rad] of a standing leg's hip to its stop while no more than two
+            feet stand: the roll of a trunk that turns fast lags by 0.1 to 0.2. Of trots that roll
+            by 44 to 56 deg and kept less, nearly all went wrong, and some fell.
         self_distance: least distance [m] between links that must not touch.
         clearance: least height [m] of trunk and hips: every point of their hulls.
         thigh_clearance: the same of the thighs, which come near to the ground where it sits.
@@ -70,6 +73,7 @@ class FeasibilityLimits:
     lag_angle: float = 0.03
     stop: float = 0.03
     stretch: float = 0.018
+    pair_hip: float = 0.05
     self_distance: float = 0.005
     clearance: float = 0.02
     thigh_clearance: float = 0.008

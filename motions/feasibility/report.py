@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -216,7 +217,9 @@ class FeasibilityReport:
         tight = f", {_count(len(self.warnings), 'tight margin')}" if self.warnings else ""
         lines += ["-" * 80, f"{self.motion}, {self.duration:.1f} s: the robot {verdict}{tight}."]
         if self.world != World():
-            lines.append(f"That holds for {self.world}.")
+            lines += wrap(f"That holds for {self.world}.", 80)
+        if self.world.is_late_or_noisy:
+            lines.append("Delay and sensors are simulated only: no limit here counts with them.")
         lines.append(f"Chance that it is done so: {100.0 * self.probability:.0f} %.")
         if self.end_pose is not None and max(map(abs, self.end_pose)) > STAYS:
             x, y, yaw = self.end_pose

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from controller.go2_controller import GO2Controller
+from controller.modes import Mode
 from controller.motion_measurement import SETTLED_CONTACT, _slip, measure_motion
+from controller.motion_outcome import FELL, outcome_of
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
-from motions import Timeline, compile_timeline
+from motions import Timeline, compile_timeline, deg
 from tests.go2_wbc.plant.helpers import empty_recording
 
 PERIOD = 0.002
@@ -77,3 +79,22 @@ def test_a_played_motion_is_measured_from_its_begin_to_its_end(
         **{name: getattr(found, name) for name in found.__slots__},
     }
     assert [unit for _, _, unit in found.lines()] == ["mm", "mm", "%", "%", "rad"]
+
+
+def test_a_robot_that_goes_limp_has_fallen_before_it_lies(
+    model: RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`play` returns as it lets go: tilted, but not yet on the ground."""
+    head_down = Timeline(name="head down").body(pitch=deg(28.0), z=-0.1, over=1.0).hold(0.6)
+    plan = compile_timeline(head_down.home(over=1.0), model)
+    monkeypatch.setattr(GroundTruth, "fall", lambda _truth: None)
+    with (
+        closing(GroundTruth(MujocoPlant(friction=0.5))) as truth,
+        GO2Controller(plant=truth) as go2,
+    ):
+        assert go2.stand()
+        found = measure_motion(go2, truth, plan, model)
+        assert go2.mode in (Mode.FALLEN, Mode.DAMPED)
+    assert found.fall == found.reason
+    assert "fell" in str(found.fall)
+    assert FELL in outcome_of(found, plan).strict

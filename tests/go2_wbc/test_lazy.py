@@ -48,6 +48,22 @@ def test_an_import_that_fails_leaves_the_collector_as_it_was(is_collecting: bool
     assert gc.isenabled() is is_collecting
 
 
+def test_an_attribute_that_a_module_lacks_is_not_taken_for_a_missing_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "lazy_broken"
+    folder.mkdir()
+    (folder / "__init__.py").write_text(
+        "from go2_wbc.lazy import lazy_exports\n"
+        "__getattr__ = lazy_exports(__name__, {'home': ('Thing',)})\n"
+    )
+    (folder / "home.py").write_text("import math\nmath.no_such_function\nThing = 1\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ImportError, match=r"lazy_broken\.home .*'no_such_function'") as caught:
+        exec("from lazy_broken import Thing", {})
+    assert isinstance(caught.value.__cause__, AttributeError)
+
+
 def test_an_unknown_name_is_refused() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'Other'"):
         lazy_exports("go2_wbc", {"legs": ("Leg",)})("Other")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,46 @@ def test_a_drawn_world_lies_within_the_uncertainties_and_follows_its_seed() -> N
     assert world.worst.friction == pytest.approx(0.4)
     assert all(own.sample(np.random.default_rng(0)) == own for own in drawn)
     assert (world.worst.mass_scale, world.worst.joint_friction) == pytest.approx((1.1, 1.8))
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        {"friction": 2.0, "friction_uncertainty": 0.1},
+        {"friction": 0.0001, "friction_uncertainty": 0.9},
+        {"mass_scale": 3.0, "mass_uncertainty": 0.5},
+        {"mass_scale": 0.25, "mass_uncertainty": 0.5},
+        {"joint_friction": 10.0, "joint_friction_uncertainty": 1.0},
+    ],
+)
+def test_what_is_uncertain_stays_in_its_range(setting: dict) -> None:
+    world, name = World(**setting), next(iter(setting))
+    drawn = [world.sample(np.random.default_rng(seed)) for seed in range(20)]
+    values = [getattr(own, name) for own in (*drawn, world.worst)]
+    assert setting[name] in values  # at the end of its range
+    assert len(set(values)) > 1
+
+
+def test_a_world_is_told_with_all_that_is_not_as_usual() -> None:
+    assert str(World()) == "friction 0.5"
+    world = World(
+        friction=0.4,
+        payload=2.0,
+        payload_place=(0.1, 0.0, 0.06),
+        joint_friction_uncertainty=0.5,
+        delay=0.004,
+        sensors="imu",
+    )
+    assert str(world) == (
+        "friction 0.4, payload 2 kg at 0.1 0 0.06 m, joint friction 1 +-50 %, delay 0.004 s, "
+        "sensors imu"
+    )
+    usual = World()
+    other = {"friction": 0.6, "payload_place": (0.1, 0.0, 0.0), "sensors": "noisy", "delay": 0.01}
+    for field in fields(World):
+        if field.name != "payload_place":  # means nothing without a payload
+            value = other.get(field.name, 1.25 if field.name == "mass_scale" else 0.375)
+            assert str(replace(usual, **{field.name: value})) != str(usual), field.name
 
 
 def test_the_loaded_model_is_the_simulated_one() -> None:

@@ -182,6 +182,21 @@ def test_a_knee_that_folds_no_farther_moves_less_than_one_too_short(
     assert stretched.margins["joint position"].margin < 0.0
 
 
+@pytest.mark.parametrize(("angle", "is_refused"), [(38.0, False), (42.0, True), (44.0, True)])
+def test_hips_of_a_pair_that_stands_keep_clear_of_their_stops(
+    checker: FeasibilityChecker, angle: float, is_refused: bool
+) -> None:
+    # A trot that rolled by 52 deg, its hip 0.001 rad past its stop, passed and fell in MuJoCo.
+    trot = Timeline().walk(-0.2, turn=deg(10.0), gait="trot")
+    over = trot.end / 5.0
+    lean = Timeline().body(roll=deg(angle), over=over).body(roll=-0.5 * deg(angle), over=over)
+    line = Timeline().together(trot, lean.home(over=over))
+    found = checker.check(line).margins["joint position"]
+    assert (found.margin < 0.0) is is_refused
+    standing = checker.check(lean.home(over=over)).margins["joint position"]
+    assert standing.margin >= 0.0  # on four feet a hip may come to its stop
+
+
 @pytest.mark.parametrize(
     ("aside", "over", "is_done"),
     [(0.0, 0.12, True), (0.01, 0.12, True), (0.0, 0.3, False), (0.03, 0.12, False)],

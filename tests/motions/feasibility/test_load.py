@@ -75,6 +75,22 @@ def test_a_slippery_floor_is_refused_and_named() -> None:
     assert loaded.as_dict()["world"]["payload"] == 3.0
 
 
+def test_the_table_is_narrow_in_every_world_and_says_what_no_limit_counts_with() -> None:
+    world = World(
+        friction_uncertainty=0.1,
+        payload=2.0,
+        payload_place=(0.1, 0.0, 0.06),
+        mass_uncertainty=0.05,
+        joint_friction_uncertainty=0.5,
+        sensors="imu",
+    )
+    text = check(SWAY, world=world).table()
+    assert max(map(len, text.splitlines())) <= 80
+    assert str(world) in text.replace("\n", " ")
+    assert "simulated only" in text
+    assert "simulated only" not in check(SWAY, payload=2.0).table()
+
+
 def test_a_world_out_of_range_is_told() -> None:
     with pytest.raises(ConfigError, match=r"World\.friction must be between 0\.0001 and 2, got 9"):
         check(SWAY, friction=9.0)
