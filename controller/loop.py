@@ -102,7 +102,7 @@ class ControlLoop:
         self._last_command = JointCommand.damping(DAMPING)
         self._unanswered = 0
         self._qp_failures_in_a_row = 0
-        self.behaviour: Behaviour = Damped("lying")
+        self.behaviour: Behaviour = Damped("lying", stays_on_belly=True)
         self.engage(self.behaviour)
 
     def engage(self, behaviour: Behaviour, *, observe: bool = True) -> None:

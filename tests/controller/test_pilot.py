@@ -9,11 +9,12 @@ import pytest
 
 from controller import GO2Controller, Mode
 from controller.navigation import DriveStraight, TurnInPlace
+from go2_wbc.errors import ModeError
 from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
-from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant
+from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant, is_limp
 
 
 @pytest.fixture
@@ -130,10 +131,27 @@ def test_a_robot_on_its_back_does_not_try_to_stand(go2: GO2Controller, plant: Wa
     q[2], q[3:7] = 0.12, [1.0, 0.0, 0.0, 0.0]
     plant.inner.place(q)
     go2.wait(0.5)
-    assert go2.stand() is False
-    assert "cannot stand up from roll" in go2.last_outcome.reason
-    assert "call recover()" in go2.last_outcome.reason
-    assert go2.mode is not Mode.STANDING
+    assert go2.mode is Mode.FALLEN
+    with pytest.raises(ModeError, match=r"call recover\(\) first"):
+        go2.stand()
+    assert go2.recover()
+
+
+def test_a_robot_that_is_found_on_its_back_says_so_when_it_shall_stand() -> None:
+    # It went on moving its legs there, and recover() then said again to call recover().
+    plant = WatchedPlant()
+    q = plant.inner.read().q.copy()
+    q[2], q[3:7] = 0.12, [1.0, 0.0, 0.0, 0.0]
+    plant.inner.place(q)
+    with GO2Controller(plant=plant) as go2:
+        go2.wait(0.5)
+        assert go2.mode is Mode.LYING
+        assert go2.stand() is False
+        assert "cannot stand up from roll" in go2.last_outcome.reason
+        assert "call recover()" in go2.last_outcome.reason
+        assert go2.mode is Mode.FALLEN
+        assert is_limp(plant.commands[-1])
+        assert go2.recover()
 
 
 def test_figures_are_measured_only_when_it_was_done(go2: GO2Controller) -> None:
