@@ -41,6 +41,8 @@ PAUSE = (1.0, 6.0)
 """Range of the time [s] between two pushes."""
 RISEN = 0.2
 """Height [m] of the base over the lowest foot from which on a trunk has left the ground."""
+LEAST_FEET, STOOD = 2, 0.2
+"""Feet on the ground and time [s] by which it has not just been lifted by a push."""
 STUMBLE = 0.05
 """Time [s] for which a trunk may touch the ground without having fallen."""
 NOTICED = 0.2
@@ -84,6 +86,7 @@ class Watch:
         self._next = float(rng.uniform(*PAUSE))
         self._touches_since = self._fell = math.inf
         self._said = self._fell_as = robot.go2.mode
+        self._stands_since = math.inf
         self._has_risen = False
         self.falls: list[Fall] = []
         self.call, self.may_lie = "", False
@@ -109,7 +112,7 @@ class Watch:
             has_fallen = mode is Mode.FALLEN or math.isfinite(self._fell)
             if has_fallen and self._said not in DOWN:
                 self._note(now)
-            self._touches_since = self._fell = math.inf
+            self._touches_since = self._fell = self._stands_since = math.inf
             self._has_risen = False
         else:
             self._judge(mode, now)
@@ -133,10 +136,13 @@ class Watch:
     def _judge(self, mode: Mode, now: float) -> None:
         plant = self._robot.plant
         state = plant.truth()
+        touches = plant.base_contact_force > TOUCH
         height = float(state.q[2] - plant.p_world_feet[:, 2].min())
-        self._has_risen = mode.is_upright and (self._has_risen or height > RISEN)
-        must_be_up = self._has_risen and not self.may_lie
-        is_down = must_be_up and plant.base_contact_force > TOUCH
+        stands = height > RISEN and not touches and state.feet_in_contact.sum() >= LEAST_FEET
+        self._stands_since = min(self._stands_since, now) if stands else math.inf
+        has_stood = now - self._stands_since > STOOD
+        self._has_risen = mode.is_upright and (self._has_risen or has_stood)
+        is_down = self._has_risen and not self.may_lie and touches
         self._touches_since = min(self._touches_since, now) if is_down else math.inf
         lies = now - self._touches_since > STUMBLE
         if math.isinf(self._fell) and (lies or state.tilt > FALLEN_TILT):

@@ -14,13 +14,15 @@ import numpy as np
 from jaxtyping import Float
 
 from controller.behaviours.base import Behaviour
-from controller.behaviours.joints import ON_BELLY, Damped, ServoJoints
+from controller.behaviours.joints import Damped, ServoJoints
 from controller.checks import unfolded_legs
 from controller.loop import ControlLoop
 from controller.procedures import ProcedureRunner
 from go2_wbc.legs import LEGS, Leg
 from motions.postures import SPLAYED_JOINTS, TUCKED_JOINTS
 
+ON_BELLY = 0.6
+"""Tilt [rad] below which the robot lies on its belly."""
 TUCK_TIME = 0.9
 """Time [s] of drawing the feet under the hips while lying."""
 SPLAY_TIME = 0.5

@@ -12,22 +12,15 @@ from go2_wbc.robot.snapshot import Snapshot
 
 DAMPING = 3.0
 """Joint damping [N m s/rad] of the safe state: the robot sinks in about a second."""
-ON_BELLY = 0.6
-"""Tilt [rad] below which the robot lies on its belly."""
 
 
 class _OnTheGround(Behaviour):
     """Something that a robot does on the ground, where only a large tilt can be a fall."""
 
-    needs_balance = False
     may_lie = True
 
     def __init__(self, label: str, *, stays_on_belly: bool) -> None:
-        self.label, self._stays_on_belly = label, stays_on_belly
-
-    def start(self, snapshot: Snapshot) -> None:
-        super().start(snapshot)
-        self.needs_balance = self._stays_on_belly and snapshot.state.tilt < ON_BELLY
+        self.label, self.needs_balance = label, stays_on_belly
 
 
 class Damped(_OnTheGround):
@@ -41,7 +34,7 @@ class Damped(_OnTheGround):
         Args:
             label: see ``Behaviour``.
             duration: time [s] before it counts as finished.
-            stays_on_belly: whether a robot that begins on its belly has fallen if it is tipped.
+            stays_on_belly: whether a robot that is tipped over, or was before, has fallen.
         """
         super().__init__(label, stays_on_belly=stays_on_belly)
         self.duration = duration
@@ -75,7 +68,7 @@ class ServoJoints(_OnTheGround):
             targets: (duration [s], joint angles (12,) [rad]) of each leg of the way.
             kp: stiffness [N m/rad].
             kd: damping [N m s/rad].
-            stays_on_belly: whether a robot that begins on its belly has fallen if it is tipped.
+            stays_on_belly: whether a robot that is tipped over, or was before, has fallen.
         """
         super().__init__(label, stays_on_belly=stays_on_belly)
         self._targets = targets

@@ -36,8 +36,9 @@ class SafetyConfig:
         tilt_limit: tilt [rad] of the trunk beyond which a balancing robot counts as fallen.
         height_limit: height [m] of the base over the centre of the lowest foot below which a
             balancing robot counts as collapsed; on its belly it is 0.063.
-        touch_limit: time [s] for which the trunk of a balancing robot may touch the ground; of the
-            robots that withstood a push in simulation none touched it.
+        touch_limit: time [s] for which the trunk of a balancing robot may touch the ground, or
+            bounce off it, deeper than half of ``sink_limit`` or leaning by more than half of
+            ``lean_limit``; of the robots that withstood a push in simulation hardly one did.
         sink_limit: depth [m] of the trunk below where it shall be, beyond which it has sunk; in
             simulation 0.01 at most in every motion, 0.07 with a payload of 8 kg.
         sink_limit_time: time [s] for which it may; after pushes that a trot withstood 0.16 at most.
@@ -89,8 +90,10 @@ class FallDetector:
         """
         state, config = snapshot.state, self._config
         height, clearance = self._heights(snapshot.row, TRUNK_UNDERSIDE, FOOT_RADIUS)
-        is_touching = not may_lie and clearance < TOUCH
         has_sunk = not may_lie and sag > config.sink_limit
+        is_off = sag > config.sink_limit / 2 or lean > config.lean_limit / 2
+        is_bouncing = is_off and "touch" in self._since
+        is_touching = not may_lie and (clearance < TOUCH or is_bouncing)
         leans = lean > config.lean_limit
         what = None
         if state.tilt > config.tilt_limit:

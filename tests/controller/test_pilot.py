@@ -158,3 +158,16 @@ def test_figures_are_measured_only_when_it_was_done(go2: GO2Controller) -> None:
     assert go2.stand()
     assert go2.last_outcome.measured["feet in contact"] == 4.0
     assert bool(go2.last_outcome) is True
+
+
+def test_a_robot_that_lies_down_on_its_back_has_fallen(
+    go2: GO2Controller, plant: WatchedPlant
+) -> None:
+    # It was limp and said to move, for ever; so was one that a push had thrown up on its way down.
+    q = go2.state.q.copy()
+    q[2], q[3:7] = 0.12, [1.0, 0.0, 0.0, 0.0]
+    go2.damp()
+    plant.inner.place(q)
+    assert go2.lie_down() is False
+    assert go2.mode is Mode.FALLEN
+    assert go2.recover()
