@@ -9,9 +9,8 @@ Numbers were chosen on seeds 0 to 9; those judged begin at ``FIRST_SEED``.
 - trotting: a push of 0.1 s at 16 phases of the stride, at 0.5 m/s; survived as in ``behaviour``;
 - recover: limp, any attitude, any joint angles, up to 0.5 m above the ground;
 - gaits: ten changes to a random gait, or stops, with a random velocity in its envelope;
-- disturbed: random calls and velocities, and pushes of up to 90 N s at random moments. A fall is
-  the trunk on the ground for 0.05 s, or a tilt of 60 deg, in truth; the delay is to the mode. An
-  error that a call must not raise ends the benchmark.
+- disturbed: random calls and velocities under random pushes, recovering from every fall; see
+  ``benchmarks.disturbed``.
 """
 
 from __future__ import annotations
@@ -22,21 +21,19 @@ from functools import partial
 
 import numpy as np
 
+from benchmarks import disturbed
 from benchmarks.locomotion import CONFIG, FIRST_SEED, MASS_RANGE
-from benchmarks.pushes import PUSH_TIME
+from benchmarks.pushes import PUSH_TIME, heading_force
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
 from benchmarks.steps import plant_of
 from controller.checks import is_standing
 from controller.cli.common import Subparsers, add_parser
-from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
-from go2_wbc.errors import ModeError
 from go2_wbc.planning.command import VelocityEnvelope
 from go2_wbc.planning.envelopes import envelope_of
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT, TOUCH
 from go2_wbc.robot.model import RobotModel
 
 ASIDE, AHEAD = 36.0, 45.0
@@ -60,25 +57,12 @@ DROP_TIME = 1.0
 GENTLE = VelocityEnvelope(forward=1.2, backward=1.2, lateral=0.5, turning=1.5)
 """Of the trot's changes; those of the other gaits are in proportion."""
 CHANGES = 10
-CALLS = 6
-CALLED = ("stand", "sit", "lie_down", "high_five", "walk", "bow", "turn")
-RISEN = 0.2
-"""Height [m] of the base over the lowest foot from which on a trunk has left the ground."""
-HARDEST = 90.0
-"""Greatest impulse [N s] of a disturbance."""
-STUMBLE = 0.05
-"""Time [s] for which a trunk may touch the ground without having fallen."""
 EXAMPLES = """
 python -m benchmarks balance              everything
 python -m benchmarks balance --quick      three seeds
 python -m benchmarks balance --rows recover --seeds 200
 python -m benchmarks balance --list       the metrics and their thresholds
 """
-
-
-def heading_force(angle: float, impulse: float) -> np.ndarray:
-    """Force (3,) [N] that gives ``impulse`` [N s] at ``angle`` [rad] from ahead to the left."""
-    return impulse / PUSH_TIME * np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
 def impulse_at(angle: float) -> float:
@@ -180,83 +164,6 @@ def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
     robot.wait(float(rng.uniform(0.3, 1.5)))
 
 
-def measure_disturbed(trial: Trial) -> Measurement:
-    """Call at random, push at random, until the robot has fallen or all calls are made."""
-    rng = np.random.default_rng(FIRST_SEED + trial.seed)
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
-        watch = Watch(robot, rng)
-        robot.truth.on_tick = watch.look
-        for _ in range(CALLS):
-            if robot.go2.mode in (Mode.FALLEN, Mode.DAMPED):
-                break
-            what = str(rng.choice(CALLED))
-            watch.may_lie = what == "lie_down"
-            _call(robot, what, rng)
-        robot.go2.wait(1.0)
-        delay = watch.delay
-    notes = {"disturbed.fell": str(watch.fell)}
-    return Measurement({"disturbed.delay": delay}, notes=notes)
-
-
-def _call(robot: TrialRobot, what: str, rng: np.random.Generator) -> None:
-    """One call that may end in a fall, and time after it."""
-    go2 = robot.go2
-    try:
-        if what == "walk":
-            go2.walk(str(rng.choice(list(GAITS))))
-            go2.move(*rng.uniform((-1.0, -1.5), (1.5, 1.5)).tolist())
-        elif what == "bow":
-            if go2.stand():
-                go2.play("bow")
-        elif what == "turn":
-            go2.turn_left(float(rng.uniform(-1.5, 1.5)))
-        else:
-            getattr(go2, what)()
-        go2.wait(float(rng.uniform(0.2, 1.5)))
-    except ModeError:  # it fell in between, and says so
-        return
-
-
-class Watch:
-    """Pushes at random moments, and compares what the mode says with the truth, every tick.
-
-    Attributes:
-        fell: when [s] the robot fell in truth, infinite if it did not.
-        may_lie: whether it was told to lie down.
-    """
-
-    def __init__(self, robot: TrialRobot, rng: np.random.Generator) -> None:
-        self._robot, self._rng = robot, rng
-        self._next = float(rng.uniform(1.0, 6.0))
-        self._touches_since = self.fell = self._noticed = math.inf
-        self.may_lie = self._has_risen = False
-
-    @property
-    def delay(self) -> float:
-        """From the fall to the mode that says so [s]; 0 if it did not fall, or said so before."""
-        return max(self._noticed - self.fell, 0.0) if math.isfinite(self.fell) else 0.0
-
-    def look(self) -> None:
-        """Once a tick."""
-        plant, mode = self._robot.plant, self._robot.go2.mode
-        now = plant.time
-        if now >= self._next:
-            angle, impulse = self._rng.uniform((0.0, 0.0), (2.0 * math.pi, HARDEST)).tolist()
-            plant.push(heading_force(angle, impulse), PUSH_TIME)
-            self._next = now + float(self._rng.uniform(1.0, 6.0))
-        if mode in (Mode.FALLEN, Mode.DAMPED):
-            self._noticed = min(self._noticed, now)
-        height = float(plant.read().q[2] - plant.p_world_feet[:, 2].min())
-        self._has_risen = mode.is_upright and (self._has_risen or height > RISEN)
-        must_be_up = self._has_risen and not self.may_lie
-        is_down = must_be_up and plant.base_contact_force > TOUCH
-        self._touches_since = min(self._touches_since, now) if is_down else math.inf
-        if plant.read().tilt > FALLEN_TILT:
-            self.fell = min(self.fell, now)
-        if now - self._touches_since > STUMBLE:
-            self.fell = min(self.fell, self._touches_since)
-
-
 def _share(name: str, item: str, quantity: str, least: float) -> Metric:
     return Metric(name, item, quantity, "", least, Direction.AT_LEAST)
 
@@ -292,12 +199,7 @@ SCENARIOS = (
     Scenario(
         "gaits", (_share("gaits", "ten changes of gait and stops", "done", 1.0),), measure_gaits
     ),
-    Scenario(
-        "disturbed",
-        (Metric("disturbed.delay", "random calls and pushes", "delay of notice", "s", 0.2),),
-        measure_disturbed,
-        50,
-    ),
+    disturbed.SCENARIO,
 )
 """In the order of the report."""
 

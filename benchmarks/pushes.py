@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -23,6 +24,11 @@ DIRECTIONS: dict[str, tuple[float, float, float]] = {
 """Unit vectors ahead, left, up of the robot."""
 FailureOf = Callable[[float, str], str | None]
 """Pushes a robot with an impulse [N s] in a direction; says what went wrong, or None."""
+
+
+def heading_force(angle: float, impulse: float) -> np.ndarray:
+    """Force (3,) [N] that gives ``impulse`` [N s] at ``angle`` [rad] from ahead to the left."""
+    return impulse / PUSH_TIME * np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
 def push_metrics(prefix: str, item: str, lateral: float, forward: float) -> tuple[Metric, ...]:

@@ -12,13 +12,14 @@ from pathlib import Path
 import motions  # what is named motions.X below is imported when it is used, scipy with it
 from controller import arguments
 from controller.assembly import PilotSettings, build_pilot
+from controller.calls import Calls
 from controller.modes import Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
-from controller.procedures import Aborted, Measurements, interruption
+from controller.procedures import Measurements
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
-from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError
+from go2_wbc.errors import ClosedError, CommandError
 from go2_wbc.legs import front_leg
 from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.planning.pose import BodyPose
@@ -98,10 +99,8 @@ class GO2Controller:
         self._runner, self._pilot, self._description = built.runner, built.pilot, description
         self._motor = config.motor
         self._closed = False
-        self._busy = threading.Lock()
-        self._busy_with = ""
+        self._calls = Calls(built.pilot, built.runner)
         self._planning = threading.Lock()
-        self._last_outcome = Outcome(True, "lying, nothing asked yet", 0.0)
 
     # --- postures -------------------------------------------------------------------------
 
@@ -185,7 +184,7 @@ class GO2Controller:
         if self._pilot.mode is not Mode.WALKING:
             return
         ends_goal = self._pilot.halt()
-        if not (ends_goal or self._runner.is_realtime or self._busy.locked()):
+        if not (ends_goal or self._runner.is_realtime or self._calls.is_running):
             self._call("stop", self._pilot.rest)
 
     def turn_left(self, angle: float) -> bool:
@@ -317,7 +316,7 @@ class GO2Controller:
     @property
     def last_outcome(self) -> Outcome:
         """What came of the last blocking call, and why."""
-        return self._last_outcome
+        return self._calls.last
 
     @property
     def namespace(self) -> str:
@@ -365,35 +364,7 @@ class GO2Controller:
         self, name: str, procedure: Callable[[], Measurements], *, allow_fallen: bool = False
     ) -> bool:
         self._check_open()
-        if self._pilot.mode is Mode.FALLEN and not allow_fallen:
-            raise ModeError(f"{name}() needs a robot that has not fallen: call recover() first")
-        if not self._busy.acquire(blocking=False):
-            raise ModeError(f"{name}() while {self._busy_with}() is still running")
-        self._busy_with, start = name, self.state.time
-        ok, reason = False, ""
-        measured: Measurements = {}
-        try:
-            self._pilot.begin()
-            measured = procedure()
-            ok, reason = True, "done"
-        except Aborted as aborted:
-            reason, measured = str(aborted), aborted.measured
-        except Go2WbcError as error:
-            reason = str(error)
-            raise
-        except BaseException as error:
-            reason = interruption(name, error)
-            self._pilot.collapse(reason)
-            reason = f"{reason}, damped"
-            raise
-        finally:
-            self._last_outcome = Outcome(ok, reason, self.state.time - start, dict(measured))
-            fault = self._runner.loop.fault
-            is_known = fault is not None and fault.reason in reason  # the loop has logged it
-            if not (ok or is_known):
-                _log.warning("%s", reason)
-            self._busy.release()
-        return ok
+        return self._calls.make(name, procedure, allow_fallen=allow_fallen)
 
     def _check_open(self) -> None:
         if self._closed:

@@ -102,7 +102,8 @@ class ControlLoop:
         self._last_command = JointCommand.damping(DAMPING)
         self._unanswered = 0
         self._qp_failures_in_a_row = 0
-        self.behaviour: Behaviour = Damped("lying")
+        is_up = self.state.tilt < safety.tilt_limit  # one that is found on its back has not fallen
+        self.behaviour: Behaviour = Damped("lying", stays_on_belly=is_up)
         self.engage(self.behaviour)
 
     def engage(self, behaviour: Behaviour, *, observe: bool = True) -> None:

@@ -7,6 +7,7 @@ procedures into calls.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from functools import partial
 from statistics import fmean
@@ -16,14 +17,10 @@ from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
 from controller.checks import (
     LYING_HEIGHT,
-    arrival_measurements,
     base_height,
-    deviation_measurements,
     ground_height,
-    has_arrived,
     is_lying,
     is_sitting,
-    is_small,
     is_standing,
 )
 from controller.modes import Mode
@@ -33,6 +30,7 @@ from controller.procedures import (
     Measurements,
     ProcedureRunner,
     Touches,
+    judged,
     listed,
     refuse_dynamic_on_hardware,
 )
@@ -73,6 +71,7 @@ class Pilot:
         self._procedures = ProcedureRunner(runner)
         self._walker = Walker(runner, config)
         self._goal: Goal | None = None
+        self._commands = threading.Lock()  # held to take one, and to begin what takes none
         self.playing: PlayPlan | None = None
         self._must_return = False
         self._mode = Mode.LYING if self._is_on_the_ground else Mode.DAMPED
@@ -115,7 +114,7 @@ class Pilot:
         self._procedures.stop_stepping()
         mode = self.mode
         if mode is Mode.WALKING:
-            self.rest()
+            self._finish_walking("come to rest")
         if mode in (Mode.LYING, Mode.DAMPED) or self._is_on_the_ground:
             self._mode = Mode.MOVING
             tuck(self._procedures)
@@ -195,11 +194,13 @@ class Pilot:
             CommandError: if the pose is beyond its envelope.
             ModeError: outside walking mode, or during a goal.
         """
-        if self._goal is not None:
-            raise ModeError(f"move() during a goal ({self._goal.name}): end it by stop()")
-        if self.mode is not Mode.WALKING:
-            raise ModeError(f"move() needs walking mode, not {self.mode.value}: call walk() first")
-        return self._walker.follow(command, pose)
+        with self._commands:
+            goal, mode = self._goal, self.mode
+            if goal is not None:
+                raise ModeError(f"move() during a goal ({goal.name}): end it by stop()")
+            if mode is not Mode.WALKING:
+                raise ModeError(f"move() needs walking mode, not {mode.value}: call walk() first")
+            return self._walker.follow(command, pose)
 
     def rest(self) -> Measurements:
         """Zero the command, level the trunk and let the walking robot come to rest."""
@@ -208,9 +209,22 @@ class Pilot:
             self._walker.finish("come to rest")
         return self._procedures.measurements()
 
+    def _finish_walking(self, what: str) -> None:
+        """Come to rest in order to do something else: no command is taken any more."""
+        with self._commands:
+            self._mode = Mode.MOVING
+            self._walker.halt()
+        try:
+            self._walker.finish(what)
+        except Aborted:
+            self._mode = Mode.WALKING  # it still does, unless there is a fault
+            raise
+
     def run_goal(self, goal: Goal) -> Measurements:
         """Walk a goal to its measured end and come to rest."""
-        self._goal, loop = goal, self._loop
+        loop = self._loop
+        with self._commands:
+            self._goal = goal
         try:
             if self.mode is not Mode.WALKING:
                 self.walk("trot")
@@ -264,15 +278,7 @@ class Pilot:
         if not allow_dynamic:
             refuse_dynamic_on_hardware(plan, plant)
         self._meet_entry(plan)
-        if self._must_return:
-            raise Aborted(
-                f"{plan.name} was cancelled before it began", self._procedures.measurements()
-            )
-        self._mode = Mode.MOVING
         behaviour = PlayPlan(plan, self._config.wbc.joint_friction)
-        self._procedures.engage(behaviour)
-        start, self.playing = self._loop.state.time, behaviour
-
         touches = Touches(plant)
 
         def finished() -> bool:
@@ -281,7 +287,14 @@ class Pilot:
                 watch(self._loop.state.time - start)
             return behaviour.is_finished(self._loop.snapshot)
 
+        self.playing = behaviour  # from now on a cancel() reaches it; one before is seen here
         try:
+            if self._must_return:
+                measured = self._procedures.measurements()
+                raise Aborted(f"{plan.name} was cancelled before it began", measured)
+            self._mode = Mode.MOVING
+            self._procedures.engage(behaviour)
+            start = self._loop.state.time
             self._procedures.until(finished, plan.duration + 1.0, plan.name)
             if self._must_return:
                 raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
@@ -291,20 +304,7 @@ class Pilot:
         finally:
             self.playing = None
         touches.require_few(plan)
-        return self._judged(behaviour, at_rest)
-
-    def _judged(self, played: PlayPlan, at_rest: Measurements) -> Measurements:
-        """What was measured of a motion, if that shows that it was done."""
-        deviation, name = played.deviation, played.plan.name
-        measured = {**at_rest, **deviation_measurements(deviation)}
-        if played.plan.footsteps is not None:
-            arrival = *played.end_error(self._loop.snapshot), played.landings
-            measured |= arrival_measurements(*arrival)
-            if not has_arrived(*arrival):
-                raise Aborted(f"{name} ended elsewhere: {listed(measured)}", measured)
-        if not is_small(deviation, is_dynamic=played.plan.has_dynamic_spans):
-            raise Aborted(f"{name} went another way: {listed(measured)}", measured)
-        return measured
+        return judged(behaviour, self._loop.snapshot, at_rest)
 
     def return_safely(self) -> None:
         """Let the procedure that plays a motion leave it and stand; any thread may call it."""
@@ -354,8 +354,7 @@ class Pilot:
         """Stand with the feet below the hips, stepping in place if need be."""
         self._ensure_standing()
         if not self._walker.square_up():
-            self._mode = Mode.WALKING
-            self._walker.finish("square the feet")
+            self._finish_walking("square the feet")
             self._mode = Mode.STANDING
         self.stand()
 

@@ -6,8 +6,16 @@ from collections.abc import Callable, Mapping
 from typing import NoReturn
 
 from controller.behaviours.base import Behaviour
+from controller.behaviours.plans import PlayPlan
 from controller.behaviours.standing import Standing
-from controller.checks import is_standing, posture_measurements
+from controller.checks import (
+    arrival_measurements,
+    deviation_measurements,
+    has_arrived,
+    is_small,
+    is_standing,
+    posture_measurements,
+)
 from controller.loop import Fault
 from controller.runner import Runner
 from go2_wbc.errors import DynamicMotionRefused
@@ -144,6 +152,26 @@ class Touches:
             raise Aborted(
                 f"{plan.name} touched the ground with trunk or legs for {self._time:.2f} s"
             )
+
+
+def judged(played: PlayPlan, snapshot: Snapshot, at_rest: Measurements) -> Measurements:
+    """What was measured of a motion, if that shows that it was done; else raise ``Aborted``.
+
+    Args:
+        played: the motion, which is over.
+        snapshot: of the robot at rest.
+        at_rest: what was measured of it then.
+    """
+    deviation, name = played.deviation, played.plan.name
+    measured = {**at_rest, **deviation_measurements(deviation)}
+    if played.plan.footsteps is not None:
+        arrival = *played.end_error(snapshot), played.landings
+        measured |= arrival_measurements(*arrival)
+        if not has_arrived(*arrival):
+            raise Aborted(f"{name} ended elsewhere: {listed(measured)}", measured)
+    if not is_small(deviation, is_dynamic=played.plan.has_dynamic_spans):
+        raise Aborted(f"{name} went another way: {listed(measured)}", measured)
+    return measured
 
 
 def refuse_dynamic_on_hardware(plan: MotionPlan, plant: Plant) -> None:

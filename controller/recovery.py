@@ -17,7 +17,7 @@ from controller.behaviours.base import Behaviour
 from controller.behaviours.joints import Damped, ServoJoints
 from controller.checks import unfolded_legs
 from controller.loop import ControlLoop
-from controller.procedures import Aborted, ProcedureRunner
+from controller.procedures import ProcedureRunner
 from go2_wbc.legs import LEGS, Leg
 from motions.postures import SPLAYED_JOINTS, TUCKED_JOINTS
 
@@ -47,23 +47,25 @@ def tuck(procedures: ProcedureRunner) -> None:
     """Fold the legs below the trunk, ready to rise.
 
     Raises:
-        Aborted: if the robot does not lie on its belly, or a leg does not fold.
+        Aborted: if the robot does not lie on its belly, or a leg does not fold; it then counts as
+            fallen. Also if it is tipped meanwhile.
     """
     loop = procedures.loop
     if loop.state.tilt > ON_BELLY:
-        raise Aborted(f"cannot stand up from {_attitude(loop)}; call recover()")
-    procedures.run(ServoJoints("tuck", ((TUCK_TIME, TUCKED_JOINTS),)), TUCK_TIME + GRACE)
+        procedures.give_up(f"cannot stand up from {_attitude(loop)}; call recover()")
+    way = ((TUCK_TIME, TUCKED_JOINTS),)
+    procedures.run(ServoJoints("tuck", way, stays_on_belly=True), TUCK_TIME + GRACE)
     jammed = unfolded_legs(loop.snapshot)
     if jammed:
-        raise Aborted(f"cannot stand up: {_names(jammed)} not below the trunk; call recover()")
+        procedures.give_up(f"cannot stand up: {_names(jammed)} not below the trunk; call recover()")
 
 
 def lie_limp(procedures: ProcedureRunner) -> None:
     """Spread the folded legs and go limp."""
     if procedures.loop.state.tilt < ON_BELLY:  # or it would rest on folded legs, belly in the air
-        splay = ServoJoints("splay", ((SPLAY_TIME, SPLAYED_JOINTS),))
+        splay = ServoJoints("splay", ((SPLAY_TIME, SPLAYED_JOINTS),), stays_on_belly=True)
         procedures.run(splay, SPLAY_TIME + GRACE)
-    procedures.run(Damped("lie", LIMP_TIME), LIMP_TIME + GRACE)
+    procedures.run(Damped("lie", LIMP_TIME, stays_on_belly=True), LIMP_TIME + GRACE)
 
 
 def get_onto_belly(procedures: ProcedureRunner) -> None:

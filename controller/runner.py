@@ -62,7 +62,7 @@ class Runner:
         self._stopping = False
         self._interruption: str | None = None
         self._known_fault = loop.fault
-        self._failure: Exception | None = None
+        self._failure: BaseException | None = None
         self._thread: threading.Thread | None = None
         if realtime:
             self._thread = threading.Thread(target=self._keep_pace, name="go2-loop", daemon=True)
@@ -229,8 +229,8 @@ class Runner:
                     self._obey_interruption()
                     self.loop.tick()
                     self._after_tick()
-                except Exception as error:  # whatever it is, a waiting call must end with it
-                    self._failure = error
+                except BaseException as error:  # whatever it is, a waiting call ends with it
+                    self._fail(error)
                     return
                 finally:
                     with self._changed:
@@ -240,6 +240,13 @@ class Runner:
             self.loop.telemetry.missed_deadlines = pacer.missed
             if lag:
                 _log.warning("the loop is %.0f ms behind the wall clock", 1000 * lag)
+
+    def _fail(self, error: BaseException) -> None:
+        """The end of the background thread: nothing moves the robot any more."""
+        self._failure = error
+        if self.loop.fault is None:  # it came after the tick
+            self.loop.abandon(Fault(f"{type(error).__name__}: {error}"))
+        self.loop.go_limp()
 
     def close(self) -> None:
         """Go limp and stop: no tick after this, and a call that runs ends; idempotent."""

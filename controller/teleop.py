@@ -97,7 +97,10 @@ class Teleop:
             self._sticks_rest = True
         elif not (wanted.is_zero and self._sticks_rest):
             self._sticks_rest = wanted.is_zero
-            self._go2.move(wanted.linear_x, wanted.angular_z, linear_y=wanted.linear_y)
+            try:
+                self._go2.move(wanted.linear_x, wanted.angular_z, linear_y=wanted.linear_y)
+            except Go2WbcError as error:  # it fell in between
+                self._news.put(str(error))
         return goes_on
 
     def status(self) -> str:

@@ -67,6 +67,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.mpc",
         "go2_wbc.kernels.payload",
         "go2_wbc.kernels.playing",
+        "go2_wbc.kernels.levelling",
         "go2_wbc.kernels.pose",
         "go2_wbc.kernels.preview",
         "go2_wbc.kernels.rigid_body",

@@ -14,14 +14,30 @@ DAMPING = 3.0
 """Joint damping [N m s/rad] of the safe state: the robot sinks in about a second."""
 
 
-class Damped(Behaviour):
+class _OnTheGround(Behaviour):
+    """Something that a robot does on the ground, where only a large tilt can be a fall."""
+
+    may_lie = True
+
+    def __init__(self, label: str, *, stays_on_belly: bool) -> None:
+        self.label, self.needs_balance = label, stays_on_belly
+
+
+class Damped(_OnTheGround):
     """Limp: no stiffness, only damping."""
 
-    needs_balance = False
+    def __init__(
+        self, label: str = "damped", duration: float = 0.0, *, stays_on_belly: bool = False
+    ) -> None:
+        """Go limp.
 
-    def __init__(self, label: str = "damped", duration: float = 0.0) -> None:
-        """Go limp for ``duration`` seconds before counting as finished."""
-        self.label, self.duration = label, duration
+        Args:
+            label: see ``Behaviour``.
+            duration: time [s] before it counts as finished.
+            stays_on_belly: whether a robot that is tipped over, or was before, has fallen.
+        """
+        super().__init__(label, stays_on_belly=stays_on_belly)
+        self.duration = duration
 
     def start(self, snapshot: Snapshot) -> None:
         """Note the time and the joints."""
@@ -33,10 +49,8 @@ class Damped(Behaviour):
         return JointReference(self._joints, np.zeros(12), 0.0, DAMPING)
 
 
-class ServoJoints(Behaviour):
+class ServoJoints(_OnTheGround):
     """Move the joints through keyframes by a stiff servo; for when the trunk lies on the ground."""
-
-    needs_balance = False
 
     def __init__(
         self,
@@ -44,9 +58,19 @@ class ServoJoints(Behaviour):
         targets: tuple[tuple[float, Float[np.ndarray, "12"]], ...],
         kp: float = 40.0,
         kd: float = 2.0,
+        *,
+        stays_on_belly: bool = False,
     ) -> None:
-        """Args: targets: (duration [s], joint angles (12,) [rad]) of each leg of the way."""
-        self.label = label
+        """Move.
+
+        Args:
+            label: see ``Behaviour``.
+            targets: (duration [s], joint angles (12,) [rad]) of each leg of the way.
+            kp: stiffness [N m/rad].
+            kd: damping [N m s/rad].
+            stays_on_belly: whether a robot that is tipped over, or was before, has fallen.
+        """
+        super().__init__(label, stays_on_belly=stays_on_belly)
         self._targets = targets
         self._kp, self._kd = kp, kd
 

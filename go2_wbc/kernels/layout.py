@@ -197,6 +197,7 @@ PLANNER = Layout(
     roughness=(),
     pose=(4,),
     pose_rate=(4,),
+    lean_offset=(2,),
 )
 """State of the locomotion planner from tick to tick."""
 
@@ -240,6 +241,7 @@ LOCOMOTION = Layout(
     most_slope=(),
     mid_swing=(),
     pose_path=(3,),
+    levelling=(3,),
 )
 """Numbers of the locomotion planner: gait, configuration, robot."""
 
@@ -270,7 +272,7 @@ FORCES = Layout(next=(), forces=(4, 3))
 PLAN_CURVES = 30
 """Curves of a plan: CoM, roll pitch yaw, twelve joints, and the places of the four feet."""
 
-CORRECTION = Layout(rate=(), window=(6,), limit=(6,))
+CORRECTION = Layout(rate=(), window=(6,), limit=(6,), handed_over=(3,))
 """Numbers of the steady-state correction."""
 
 PLAYBACK = Layout(
@@ -290,10 +292,12 @@ PLAYBACK = Layout(
     touchdown=(4,),
     missed=(),
     landing_error=(),
+    carried=(3,),
 )
 """State of a playback: the correction, how far the robot has been off its plan, and is now; where
 the plan is (x, y, z, yaw), now and at first; and of each foot that steps what the plan asks of it,
-whether it is in the air, whether its landing is still to be judged, and when it came down."""
+whether it is in the air, whether its landing is still to be judged, and when it came down; last
+what the correction would have to do against the payload that is known."""
 
 LANDING = Layout(
     earliest=(),

@@ -22,6 +22,7 @@ from go2_wbc.kernels.ground import (
     tilt,
 )
 from go2_wbc.kernels.layout import LOCOMOTION, PLANNER, REFERENCE, SNAPSHOT
+from go2_wbc.kernels.levelling import level
 from go2_wbc.kernels.pose import advance_pose, lean_rotation, pose_turn
 from go2_wbc.kernels.slip import observe_slip
 from go2_wbc.kernels.vectors import cross
@@ -375,6 +376,7 @@ def plan(snapshot, time, contact, tau, s, c, command, target):
     target[:] = 0.0
     target[_T_FRICTION] = level_friction(s, c)
     fill_body(s, c, target)
+    level(snapshot, contact, s, c, dt, target)
     fill_feet(snapshot, s, c, stance, stands, elapsed, remaining, target)
     for n in range(12):
         target[_JOINT_Q + n] = snapshot[_Q + 7 + n]

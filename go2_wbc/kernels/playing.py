@@ -28,6 +28,8 @@ _OFFSET, _PLACE, _ATTITUDE, _OFF_JOINTS = (_S[n] for n in ("offset", "place", "a
 _TICKS, _RAISED_TICKS = _S["ticks"], _S["raised_ticks"]
 _SAG, _LEAN, _ANCHOR = _S["sag"], _S["lean"], _S["anchor"]
 _RATE, _WINDOW, _LIMIT = _C["rate"], _C["window"], _C["limit"]
+_HANDED_OVER, _CARRIED = _C["handed_over"], _S["carried"]
+_M, _PAYLOAD, _SHIFT = (_N[n] for n in ("mass_matrix", "payload", "com_shift"))
 
 _TABLE, _LIST = "Array(f8, 2, 'A', readonly=True)", "Array(f8, 1, 'A', readonly=True)"
 
@@ -210,6 +212,35 @@ def is_in_flight(row):
     return not stands
 
 
+@subroutine("void(f8[::1], f8[::1], f8[::1])")
+def hand_over(snapshot, correction, state):
+    """Take out of the correction what is known of the payload since the last tick.
+
+    In ``state`` the load is kept in the heading frame: upward [m], about x and about y [rad].
+    """
+    share = correction[_HANDED_OVER : _HANDED_OVER + 3]
+    mass, weight = snapshot[_PAYLOAD], snapshot[_PAYLOAD + 1]
+    gravity = weight / mass if mass > 0.0 else 0.0
+    x, y = snapshot[_R], snapshot[_R + 3]
+    length = max(np.hypot(x, y), TIE)
+    cosine, sine = x / length, y / length
+    moment = snapshot[_M] * gravity
+    x, y = moment * snapshot[_SHIFT], moment * snapshot[_SHIFT + 1]
+    now, change = np.empty(3), np.empty(3)
+    now[0] = share[0] * weight
+    now[1] = share[1] * (cosine * y - sine * x)
+    now[2] = -share[2] * (cosine * x + sine * y)
+    for i in range(3):
+        change[i] = now[i] - state[_CARRIED + i] if state[_TICKS] > 1.0 else 0.0
+        state[_CARRIED + i] = now[i]
+    about_x, about_y = change[1], change[2]
+    change[1], change[2] = cosine * about_x - sine * about_y, sine * about_x + cosine * about_y
+    for i in range(3):
+        k = _OFFSET + 2 + i
+        held = state[k]
+        state[k] -= max(min(change[i], max(held, 0.0)), min(held, 0.0))
+
+
 @subroutine("void(f8[::1], f8, f8[::1], f8[::1], f8[::1])")
 def correct(snapshot, dt, correction, state, row):
     """Note how far the robot is off ``row``, and correct it after ``dt`` seconds of that error."""
@@ -223,6 +254,7 @@ def correct(snapshot, dt, correction, state, row):
             turn[i, k] = wanted[i, 0] * R[k, 0] + wanted[i, 1] * R[k, 1] + wanted[i, 2] * R[k, 2]
     log_rotation(turn, error[3:])
     note(row, snapshot, error, state)
+    hand_over(snapshot, correction, state)
     offset, flies = state[_OFFSET : _OFFSET + 6], is_in_flight(row)
     for i in range(6):
         window, limit = correction[_WINDOW + i], correction[_LIMIT + i]

@@ -21,7 +21,7 @@ from go2_wbc.planning.ground import (
 )
 from go2_wbc.planning.locomotion import MID_SWING, LocomotionConfig
 from go2_wbc.planning.pose import LEVEL, BodyPose
-from go2_wbc.planning.trunk import SETTLED_COMMAND
+from go2_wbc.planning.trunk import READY, SETTLED_COMMAND
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -80,6 +80,7 @@ class CompiledPlanner(GaitPlanner):
                 0.0,
                 np.zeros(4),
                 np.zeros(4),
+                np.zeros(2),
             ]
         )
 
@@ -177,5 +178,6 @@ def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndar
             MOST_SLOPE,
             MID_SWING,
             astuple(config.pose),
+            [READY.rate, READY.angle_window, READY.angle_limit],
         ]
     )

@@ -220,8 +220,9 @@ class LocomotionPlanner(GaitPlanner):
         legs = tuple(LegTask.STANCE if s else LegTask.SWING for s in stance)
         q = snapshot.state.joint_positions
         load = self._contacts.load_share(phase, self._ramp)
+        body = self._trunk.target(self._ground, self._config.height)
         reference = Reference(
-            body=self._trunk.target(self._ground, self._config.height),
+            body=self._trunk.levelled(body, snapshot, dt, is_stepping=self._is_stepping),
             legs=legs,
             normal_force_min=self._config.normal_force_min * load,
             normal_force_max=self._config.normal_force_max * load,

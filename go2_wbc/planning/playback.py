@@ -91,7 +91,9 @@ class Playback(PlanFollower):
         config = config or CorrectionConfig()
         self._follow, self._follow_steps = follow, follow_steps
         self._steps = None if footsteps is None else _tables(footsteps)
-        self._correction = CORRECTION.pack([config.rate, config.window, config.limit])
+        self._correction = CORRECTION.pack(
+            [config.rate, config.window, config.limit, config.handed_over]
+        )
         self._contact = np.zeros(4)
         self._state = np.zeros(PLAYBACK.size)
         for name in ("anchor", "origin"):

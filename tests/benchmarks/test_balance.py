@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks import balance
+from benchmarks import disturbed
 from benchmarks.balance import SCENARIOS, dropped, heading_force, impulse_at
 from benchmarks.pushes import PUSH_TIME
+from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
@@ -49,17 +50,29 @@ def test_a_dropped_robot_stands_again() -> None:
 
 
 def test_a_disturbed_robot_says_in_time_that_it_has_fallen() -> None:
-    assert measured("disturbed", 0)["disturbed.delay"] <= 0.2
+    values = measured("disturbed", 0)
+    assert values["disturbed.delay"] <= 0.2
+    assert values["disturbed.falls"] > 0.0
 
 
 def test_a_fall_that_nobody_notices_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FallDetector, "reason", lambda *_, **__: None)
     patient = Config(safety=SafetyConfig(qp_patience=10_000))
     with TrialRobot(MujocoPlant(control_period=0.004), patient) as robot:
-        watch = balance.Watch(robot, np.random.default_rng(0))
+        watch = disturbed.Watch(robot, np.random.default_rng(0))
         robot.require(robot.go2.stand())
         robot.truth.on_tick = watch.look
         robot.plant.push(heading_force(math.pi / 2, 90.0), PUSH_TIME)
         robot.go2.wait(2.0)
-        assert math.isfinite(watch.fell)
-        assert watch.delay == math.inf
+        (fall,) = watch.all_falls
+        assert fall.mode is Mode.MOVING  # it steps for balance
+        assert watch.delay == fall.delay == math.inf
+
+
+def test_going_limp_to_recover_is_no_fall() -> None:
+    with TrialRobot(MujocoPlant(control_period=0.004)) as robot:
+        watch = disturbed.Watch(robot, np.random.default_rng(0))
+        watch._next = math.inf
+        robot.truth.on_tick = watch.look
+        robot.require(robot.go2.recover())
+        assert not watch.all_falls

@@ -12,8 +12,9 @@ import pytest
 from controller import GO2Controller, Mode
 from controller.behaviours.plans import ChangePosture
 from controller.procedures import ProcedureRunner
+from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT
 from motions.postures import lean
-from tests.controller.plants import WatchedPlant
+from tests.controller.plants import PERIOD, WatchedPlant
 
 # s; a push is as short as a kick.
 PUSH_TIME = 0.1
@@ -155,6 +156,27 @@ def test_a_robot_whose_trunk_comes_to_rest_on_the_ground_says_so_at_once(name: s
         assert not go2.last_outcome
         assert go2.mode in (Mode.FALLEN, Mode.DAMPED)
     assert noticed[0] < plant.came_to_rest + NOTICED
+
+
+@pytest.mark.parametrize("act", [lambda go2: go2.wait(1.0), lambda go2: go2.stand()])
+def test_a_robot_that_is_turned_over_on_the_ground_says_so_at_once(act: Do) -> None:
+    # On the ground nothing looked at the tilt: it was said to lie, or to rise for another second.
+    plant, over = WatchedPlant(), []
+    with GO2Controller(plant=plant) as go2:
+        plant.inner.push(np.array([0.0, 0.0, 450.0]), PUSH_TIME, "FL_hip")
+
+        def watch() -> None:
+            if go2.state.tilt > FALLEN_TILT:
+                over.append((go2.state.time, go2.mode))
+
+        plant.on_write = watch
+        act(go2)
+        assert not go2.last_outcome
+        assert go2.mode is Mode.FALLEN
+        assert go2.last_outcome.reason.startswith("fell at t=")
+        start = over[0][0]
+        assert all(mode is Mode.FALLEN for time, mode in over if time > start + 2 * PERIOD)
+        assert go2.recover()
 
 
 @pytest.mark.parametrize("impulse", [22.0, -22.0, 23.0])

@@ -20,6 +20,7 @@ from controller.gamepad import (
 )
 from controller.modes import Mode
 from controller.teleop import ACTIONS, DAMP, STOP, Teleop
+from go2_wbc.errors import ModeError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from tests.controller.fake_go2 import FakeGo2
 
@@ -114,6 +115,22 @@ def test_a_gamepad_drives_only_while_its_sticks_say_something() -> None:
     assert go2.calls.count("move") == 3, "ahead twice, then once to stop; keys are left alone"
     teleop.follow(PadReading((), (1,)))
     assert go2.calls[-1] == "stop"
+
+
+def test_a_robot_that_falls_just_when_the_sticks_move_does_not_end_the_drive(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    go2 = FakeGo2()
+    teleop = Teleop(go2)
+    go2.walk()
+
+    def move(*_: float, **__: float) -> None:
+        raise ModeError("move() needs walking mode, not fallen: call walk() first")
+
+    monkeypatch.setattr(go2, "move", move)
+    assert teleop.follow(PadReading((0.0, -1.0, 0.0, 0.0)))
+    (told,) = teleop.news()
+    assert "not fallen" in told
 
 
 def test_the_state_line_of_a_limp_robot_says_what_helps() -> None:

@@ -9,11 +9,12 @@ import pytest
 
 from controller import GO2Controller, Mode
 from controller.navigation import DriveStraight, TurnInPlace
+from go2_wbc.errors import ModeError
 from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
-from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant
+from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant, is_limp
 
 
 @pytest.fixture
@@ -130,13 +131,43 @@ def test_a_robot_on_its_back_does_not_try_to_stand(go2: GO2Controller, plant: Wa
     q[2], q[3:7] = 0.12, [1.0, 0.0, 0.0, 0.0]
     plant.inner.place(q)
     go2.wait(0.5)
-    assert go2.stand() is False
-    assert "cannot stand up from roll" in go2.last_outcome.reason
-    assert "call recover()" in go2.last_outcome.reason
-    assert go2.mode is not Mode.STANDING
+    assert go2.mode is Mode.FALLEN
+    with pytest.raises(ModeError, match=r"call recover\(\) first"):
+        go2.stand()
+    assert go2.recover()
+
+
+def test_a_robot_that_is_found_on_its_back_says_so_when_it_shall_stand() -> None:
+    # It went on moving its legs there, and recover() then said again to call recover().
+    plant = WatchedPlant()
+    q = plant.inner.read().q.copy()
+    q[2], q[3:7] = 0.12, [1.0, 0.0, 0.0, 0.0]
+    plant.inner.place(q)
+    with GO2Controller(plant=plant) as go2:
+        go2.wait(0.5)
+        assert go2.mode is Mode.LYING
+        assert go2.stand() is False
+        assert "cannot stand up from roll" in go2.last_outcome.reason
+        assert "call recover()" in go2.last_outcome.reason
+        assert go2.mode is Mode.FALLEN
+        assert is_limp(plant.commands[-1])
+        assert go2.recover()
 
 
 def test_figures_are_measured_only_when_it_was_done(go2: GO2Controller) -> None:
     assert go2.stand()
     assert go2.last_outcome.measured["feet in contact"] == 4.0
     assert bool(go2.last_outcome) is True
+
+
+def test_a_robot_that_lies_down_on_its_back_has_fallen(
+    go2: GO2Controller, plant: WatchedPlant
+) -> None:
+    # It was limp and said to move, for ever; so was one that a push had thrown up on its way down.
+    q = go2.state.q.copy()
+    q[2], q[3:7] = 0.12, [1.0, 0.0, 0.0, 0.0]
+    go2.damp()
+    plant.inner.place(q)
+    assert go2.lie_down() is False
+    assert go2.mode is Mode.FALLEN
+    assert go2.recover()

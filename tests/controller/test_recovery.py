@@ -76,6 +76,7 @@ def test_standing_up_on_a_leg_that_does_not_fold_is_refused() -> None:
     with GO2Controller(plant=LamePlant(wrapped().inner)) as go2:
         assert go2.stand() is False
         assert go2.last_outcome.reason.startswith("cannot stand up: RL not below the trunk")
+        assert go2.mode is Mode.FALLEN
         assert go2.state.q[2] < 0.2
 
 

@@ -53,6 +53,8 @@ ODD_MPC = MpcConfig(step=0.028, interval=0.012, force_max=180.0, prior_weight=4e
 
 
 GALLOP = Gait("gallop", 0.36, 0.40, (0.0, 0.15, 0.5, 0.65), apex=0.05, needs_mpc=True)
+AT_ONCE = Gait("at once", 0.31, 0.42, (0.0, 0.5, 0.5, 0.0), needs_mpc=True, starts_at_once=True)
+"""A first stride like that of steps for balance, which has a flight."""
 
 
 def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.ndarray) -> Snapshot:
@@ -89,8 +91,9 @@ def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.nda
         (ODD, ODD_CONFIG),
         (GAITS["trot"], LocomotionConfig(mpc=MpcConfig(enabled=True))),
         (GALLOP, replace(ODD_CONFIG, mpc=ODD_MPC)),
+        (AT_ONCE, replace(ODD_CONFIG, mpc=ODD_MPC)),
     ],
-    ids=["trot", "odd", "trot by MPC", "gallop"],
+    ids=["trot", "odd", "trot by MPC", "gallop", "flight at once"],
 )
 def test_references_are_those_of_the_readable_planner(gait: Gait, config: LocomotionConfig) -> None:
     model, rng, of_poses = RobotModel(), np.random.default_rng(8), np.random.default_rng(9)

@@ -15,6 +15,7 @@ from go2_wbc.planning.playback import Playback, ReadablePlayback
 from go2_wbc.reference import Anchor, BodyTarget, LegTask, Posture, Reference, TrackedPoint
 from go2_wbc.robot import rotations
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from motions import compile_motion
 from motions.compiled_plan import CompiledPlan
 from motions.postures import PosturePlan
@@ -24,7 +25,14 @@ MODEL = RobotModel()
 TICK = 0.002
 ROUNDING = 1e-10
 ODD = CorrectionConfig(
-    rate=1.7, position_limit=0.013, position_window=0.31, angle_limit=0.11, angle_window=0.47
+    rate=1.7,
+    position_limit=0.013,
+    position_window=0.31,
+    angle_limit=0.11,
+    angle_window=0.47,
+    height_per_weight=0.0007,
+    roll_per_moment=0.043,
+    pitch_per_moment=0.019,
 )
 """No two numbers alike, so that one in another's place is seen."""
 
@@ -85,7 +93,10 @@ def test_a_playback_is_the_readable_one_tick_by_tick(config: CorrectionConfig) -
         reference = random_reference(rng, near)
         q = state.q.copy()
         q[:3] = anchor.p_world + turn.T @ reference.body.p_world + rng.normal(scale=0.03, size=3)
-        snapshot = MODEL.snapshot(replace(state, q=q))
+        carried = NO_PAYLOAD
+        if tick // 100 % 2:  # and it grows, and lies anywhere
+            carried = Payload(0.02 * (tick % 100), (*rng.uniform(-0.1, 0.1, size=2), 0.02))
+        snapshot = MODEL.snapshot(replace(state, q=q), carried)
         plan = reference.row.copy()
         tracked = ours.follow(plan, snapshot, 0.02 * tick, 0.02)
         expected = theirs.follow(plan, snapshot, 0.02 * tick, 0.02)

@@ -108,6 +108,33 @@ def test_touches_that_end_in_between_are_stumbles(falls: FallDetector, model: Ro
         assert falls.reason(standing(model, time + 0.01), 0.0, 0.0, may_lie=False) is None
 
 
+@pytest.mark.parametrize(
+    ("touch", "sag", "lean", "falls_at"),
+    [
+        (0.05, 0.1, 0.0, 1.1),
+        (0.05, 0.0, 0.4, 1.1),
+        (0.05, 0.05, 0.2, None),
+        (0.02, 0.1, 0.4, None),
+    ],
+)
+def test_a_trunk_that_bounces_off_the_ground_has_fallen_unless_it_rises(
+    falls: FallDetector,
+    model: RobotModel,
+    touch: float,
+    sag: float,
+    lean: float,
+    falls_at: float | None,
+) -> None:
+    # Thrown up by a push, it struck the ground for 0.06 s and was said to stand for 0.28 s.
+    # A trot that withstood a hard push had grazed it.
+    first = None
+    for time in np.arange(1.0, 1.2, TICK).tolist():
+        posture = on_the_belly if time < 1.0 + touch else standing
+        reason = falls.reason(posture(model, time), sag, lean, may_lie=False)
+        first = time if reason and first is None else first
+    assert first == (None if falls_at is None else pytest.approx(falls_at, abs=1.5 * TICK))
+
+
 def test_where_the_belly_may_be_down_it_may_lie_for_ever(
     falls: FallDetector, model: RobotModel
 ) -> None:

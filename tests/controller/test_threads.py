@@ -1,0 +1,289 @@
+"""Whoever calls, interrupts or fails, and whenever: a clear error, a safe robot, and no hanging."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from controller import GO2Controller, Mode
+from controller.behaviours.plans import PlayPlan
+from controller.loop import ControlLoop
+from go2_wbc.errors import ModeError, PlantError
+from go2_wbc.reference import Reference
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.problem import SIZE, Rows
+from go2_wbc.wbc.tasks import Task
+from tests.controller.plants import HANG_GUARD, WatchedPlant, in_thread, is_limp
+
+# s into a call, when it is well under way.
+UNDER_WAY = 0.1
+# m/s
+SLOW = 0.3
+
+Do = Callable[[GO2Controller], object]
+
+
+@pytest.fixture
+def plant() -> WatchedPlant:
+    return WatchedPlant()
+
+
+@pytest.fixture
+def go2(plant: WatchedPlant) -> Iterator[GO2Controller]:
+    with GO2Controller(plant=plant) as robot:
+        yield robot
+
+
+def _trot(go2: GO2Controller) -> None:
+    assert go2.walk()
+    go2.move(SLOW)
+    go2.wait(0.6)
+
+
+def _stand(go2: GO2Controller) -> None:
+    assert go2.stand()
+
+
+def _sit(go2: GO2Controller) -> None:
+    assert go2.sit()
+
+
+def _nothing(_go2: GO2Controller) -> None: ...
+
+
+def _wait(go2: GO2Controller) -> None:
+    go2.wait(1e6)
+
+
+# --- calls from other threads -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda go2: go2.stand(),
+        lambda go2: go2.sit(),
+        lambda go2: go2.high_five(hold=0.5),
+        lambda go2: go2.play("nod", check=False),
+        lambda go2: go2.lie_down(),
+    ],
+    ids=["stand", "sit", "high five", "play", "lie down"],
+)
+@pytest.mark.parametrize("delay", [0.05, 0.5])
+def test_a_robot_that_leaves_walking_mode_takes_no_command(
+    go2: GO2Controller, plant: WatchedPlant, call: Do, delay: float
+) -> None:
+    # While it came to rest for the call it took one more, walked on, and the call gave up.
+    _trot(go2)
+    refused: list[str] = []
+
+    def intrude() -> None:
+        with pytest.raises(ModeError) as caught:
+            go2.move(SLOW)
+        refused.append(str(caught.value))
+
+    at = go2.state.time + delay
+    plant.once_at(at, lambda: in_thread(intrude).result(HANG_GUARD))
+    assert call(go2), go2.last_outcome.reason
+    assert refused == ["move() needs walking mode, not moving: call walk() first"]
+
+
+def test_a_robot_that_cannot_come_to_rest_walks_on_and_takes_commands(
+    go2: GO2Controller, plant: WatchedPlant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _trot(go2)
+    with monkeypatch.context() as patch:
+        patch.setattr("controller.walker.STOP_LIMIT", 0.02)
+        assert go2.stand() is False
+    assert "come to rest not done" in go2.last_outcome.reason
+    assert go2.mode is Mode.WALKING
+    go2.move(SLOW)
+    go2.wait(0.5)
+    assert go2.stand()
+
+
+def test_a_second_play_is_refused_and_the_first_goes_on(
+    go2: GO2Controller, plant: WatchedPlant
+) -> None:
+    assert go2.stand()
+    refused: list[str] = []
+
+    def intrude() -> None:
+        with pytest.raises(ModeError) as caught:
+            go2.play("bow", check=False)
+        refused.append(str(caught.value))
+
+    start = go2.state.time
+    plant.once_at(start + 1.5, lambda: in_thread(intrude).result(HANG_GUARD))
+    assert go2.play("nod", check=False)
+    assert refused == ["play() while play() is still running"]
+
+
+def test_stop_does_not_disturb_what_is_no_walk(go2: GO2Controller, plant: WatchedPlant) -> None:
+    assert go2.stand()
+    plant.once_at(go2.state.time + 1.5, lambda: in_thread(go2.stop).result(HANG_GUARD))
+    assert go2.play("nod", check=False)
+
+
+def test_a_motion_that_is_cancelled_while_it_begins_is_left_at_once(
+    go2: GO2Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # It was played to its end, and then said to have been cancelled.
+    assert go2.stand()
+    begin = PlayPlan.start
+
+    def start(self: PlayPlan, snapshot: Snapshot) -> None:
+        begin(self, snapshot)
+        if self.label == "bow":
+            in_thread(go2.cancel).result(HANG_GUARD)
+
+    monkeypatch.setattr(PlayPlan, "start", start)
+    before = go2.state.time
+    assert go2.play("bow", check=False) is False
+    assert "cancelled" in go2.last_outcome.reason
+    assert go2.mode is Mode.STANDING
+    assert go2.state.time - before < 4.0
+
+
+# --- Ctrl-C -----------------------------------------------------------------------------------
+
+INTERRUPTED: dict[str, tuple[Do, Do, str]] = {
+    "lying": (_nothing, _wait, "wait"),
+    "tucking its legs": (_nothing, lambda go2: go2.stand(), "stand"),
+    "standing": (_stand, _wait, "wait"),
+    "sitting down": (_stand, lambda go2: go2.sit(), "sit"),
+    "sitting": (_sit, _wait, "wait"),
+    "lying down": (_stand, lambda go2: go2.lie_down(), "lie_down"),
+    "trotting": (_trot, _wait, "wait"),
+    "changing its gait": (_trot, lambda go2: go2.walk("flying_trot"), "walk"),
+    "coming to rest": (_trot, lambda go2: go2.stop(), "stop"),
+    "turning": (_trot, lambda go2: go2.turn_left(1.0), "turn_left"),
+    "high five": (_stand, lambda go2: go2.high_five(), "high_five"),
+    "playing": (_stand, lambda go2: go2.play("bow", check=False), "play"),
+    "recovering": (_nothing, lambda go2: go2.recover(), "recover"),
+}
+
+
+@pytest.mark.parametrize("name", INTERRUPTED)
+def test_ctrl_c_leaves_a_limp_robot_that_gets_up_again(
+    go2: GO2Controller, plant: WatchedPlant, name: str
+) -> None:
+    before, call, what = INTERRUPTED[name]
+    before(go2)
+
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    plant.once_at(go2.state.time + UNDER_WAY, interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        call(go2)
+    assert go2.mode is Mode.DAMPED
+    assert is_limp(plant.commands[-1])
+    assert go2.last_outcome.reason == f"interrupted during {what}(), damped"
+    go2.wait(1.0)
+    assert go2.recover(), go2.last_outcome.reason
+
+
+@pytest.mark.parametrize("name", ["trotting", "high five"])
+def test_in_realtime_a_real_ctrl_c_leaves_a_limp_robot(plant: WatchedPlant, name: str) -> None:
+    before, call, what = INTERRUPTED[name]
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
+    main = threading.get_ident()
+    try:
+        with GO2Controller(plant=plant, realtime=True) as go2:
+            before(go2)
+            at = go2.state.time + UNDER_WAY
+
+            def interrupt() -> None:
+                if plant.inner.time > at and go2._calls.is_running:  # planning is no call yet
+                    plant.on_write = lambda: None
+                    signal.pthread_kill(main, signal.SIGINT)
+
+            plant.on_write = interrupt
+            with pytest.raises(KeyboardInterrupt):
+                call(go2)
+            assert go2.mode is Mode.DAMPED
+            assert go2.last_outcome.reason == f"interrupted during {what}(), damped"
+            go2.wait(0.1)
+            assert is_limp(plant.commands[-1])
+    finally:
+        signal.signal(signal.SIGINT, usual)
+
+
+# --- a user's own code ------------------------------------------------------------------------
+
+
+class Failing(Task):
+    """A task of a user's that works until it does not."""
+
+    name, unit, weight = "failing", "m/s^2", 1e-3
+
+    def __init__(self) -> None:
+        self.is_broken = False
+
+    def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
+        if self.is_broken:
+            raise ZeroDivisionError("a bug of mine")
+        return Rows(np.eye(SIZE)[6:7], np.zeros(1))
+
+
+def with_task(go2: GO2Controller, task: Task) -> ControlLoop:
+    loop = go2._runner.loop
+    with go2._runner.lock():
+        loop.wbc = WholeBodyController(RobotModel(), extra_tasks=[task])
+    return loop
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+def test_a_task_of_ones_own_that_fails_at_a_trot_leaves_a_limp_robot(
+    plant: WatchedPlant, *, realtime: bool
+) -> None:
+    task = Failing()
+    with GO2Controller(plant=plant, realtime=realtime) as go2:
+        loop = with_task(go2, task)
+        in_thread(lambda: _trot(go2)).result(HANG_GUARD)
+        task.is_broken = True
+        with pytest.raises(ZeroDivisionError, match="a bug of mine"):
+            in_thread(lambda: go2.wait(1.0)).result(HANG_GUARD)
+        assert go2.mode is Mode.DAMPED
+        assert is_limp(plant.commands[-1])
+        assert "ZeroDivisionError" in go2.last_outcome.reason
+        assert loop.fault is not None
+        task.is_broken = False
+        if realtime:
+            with pytest.raises(PlantError, match="close this controller and make a new one"):
+                go2.stand()
+        else:
+            go2.wait(1.0)
+            assert go2.recover()
+
+
+@pytest.mark.parametrize("error", [RuntimeError("a bug of mine"), SystemExit()])
+def test_in_realtime_a_failure_after_a_tick_leaves_a_limp_robot_even_if_nobody_waits(
+    plant: WatchedPlant, error: BaseException
+) -> None:
+    # The thread ended, the mode stayed as it was, and the last torques were held.
+    fails, has_failed = threading.Event(), threading.Event()
+
+    def after_tick() -> None:
+        if fails.is_set():
+            has_failed.set()
+            raise error
+
+    with GO2Controller(plant=plant, realtime=True, after_tick=after_tick) as go2:
+        assert in_thread(go2.stand).result(HANG_GUARD)
+        fails.set()
+        assert has_failed.wait(HANG_GUARD)
+        runner = go2._runner
+        assert runner._thread is not None
+        runner._thread.join(HANG_GUARD)
+        assert go2.mode is Mode.DAMPED
+        assert is_limp(plant.commands[-1])
+        with pytest.raises(PlantError, match="the loop in the background has ended"):
+            go2.sit()
