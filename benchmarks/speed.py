@@ -32,6 +32,7 @@ python -m benchmarks evidence docs/explanation/speed.md speed.json
 SCENARIOS = (
     Scenario("solves", speed_solves.METRICS, speed_solves.measure_solves),
     Scenario("ticks", speed_ticks.TICK_METRICS, speed_ticks.measure_ticks),
+    Scenario("estimated", speed_ticks.ESTIMATED_METRICS, speed_ticks.measure_estimated),
     Scenario("parts", speed_parts.METRICS, speed_parts.measure_parts),
     Scenario("commands", speed_ticks.COMMAND_METRICS, speed_ticks.measure_commands),
     Scenario("checks", speed_check.CHECK_METRICS, speed_check.measure_checks),

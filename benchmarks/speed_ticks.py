@@ -16,6 +16,9 @@ from benchmarks.speed_bare import BareWork, timed
 from benchmarks.speed_solves import recorded_ticks, slowness
 from controller.go2_controller import GO2Controller
 from controller.sweeps.trials import Trial, TrialFailed
+from go2_wbc.config import Config
+from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.plant import MujocoPlant
 
 PERIOD = 2000.0
@@ -29,6 +32,8 @@ COMMAND_TIME = 60.0
 """Robot time [s] of random velocity commands, a new one each second."""
 FASTEST = (1.0, 0.4, 1.5)
 """Ahead and sideways [m/s], turning [rad/s]: the greatest of these commands."""
+ESTIMATED_TIME = 10.0
+"""Robot time [s] of the trot on sensors."""
 REPEATS = 3
 """How often the same walk is done."""
 TRACED_TICKS = 500
@@ -63,6 +68,21 @@ COMMAND_METRICS = (
     Metric("commands.collections", _COMMANDS, "garbage collections", "", None),
     Metric("commands.peak", _COMMANDS, "allocated in a tick", "kB", None),
     Metric("commands.kept", _COMMANDS, "blocks kept of a tick", "", None),
+)
+_ESTIMATED = "whole tick on sensors, forces by the MPC: trot 1 m/s"
+ESTIMATED_METRICS = (
+    Metric("estimated.median", _ESTIMATED, "median", "us", None),
+    Metric("estimated.p99", _ESTIMATED, "99 of 100, by median", "", None),
+    Metric("estimated.worst", _ESTIMATED, "worst by median", "", None),
+    Metric("estimated.least", _ESTIMATED, "worst of the least of three runs", "", 10.0),
+    Metric(
+        "estimated.factor",
+        _ESTIMATED,
+        "real-time factor, scaled",
+        "",
+        10.0,
+        Direction.AT_LEAST,
+    ),
 )
 
 
@@ -109,6 +129,47 @@ def _prepared(go2: GO2Controller, mode: str) -> Callable[[], object]:
         "lie down": go2.lie_down,
     }
     return acts[mode]
+
+
+def measure_estimated(trial: Trial) -> Measurement:
+    """Ticks of a trot whose forces are planned ahead, on its own sensors.
+
+    The worst tick is told as in ``measure_commands``.
+    """
+    slow = slowness(recorded_ticks(trial)[2])
+    walks = np.array([_estimated(trial) for _ in range(REPEATS)])
+    spent, least = walks[0], walks.min(axis=0)
+    median = float(np.median(spent))
+    return Measurement(
+        {
+            "estimated.median": median,
+            "estimated.p99": float(np.quantile(spent, 0.99)) / median,
+            "estimated.worst": float(spent.max()) / median,
+            "estimated.least": float(least.max() / np.median(least)),
+            "estimated.factor": PERIOD / float(spent.mean()) * slow,
+        }
+    )
+
+
+def _estimated(trial: Trial) -> np.ndarray:
+    """Time [us] of each tick; a fresh robot, the same each time."""
+    ends: list[int] = []
+    config = Config(locomotion=LocomotionConfig(mpc=MpcConfig(enabled=True)))
+    with (
+        closing(MujocoPlant(sensors="imu", seed=trial.seed)) as plant,
+        GO2Controller(
+            plant=plant, config=config, after_tick=lambda: ends.append(time.thread_time_ns())
+        ) as go2,
+    ):
+        if not go2.walk():
+            raise TrialFailed(go2.last_outcome.reason)
+        go2.move(1.0)
+        go2.wait(1.0)
+        ends.clear()
+        go2.wait(ESTIMATED_TIME)
+        if not go2.last_outcome.ok:
+            raise TrialFailed(go2.last_outcome.reason)
+        return np.diff(ends) / 1e3
 
 
 def measure_commands(trial: Trial) -> Measurement:

@@ -80,6 +80,14 @@ def test_the_worst_tick_of_random_commands_is_found(monkeypatch: pytest.MonkeyPa
     assert measured.values["commands.peak"] > 0.0
 
 
+def test_ticks_on_sensors_with_planned_forces_are_timed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed_ticks, "ESTIMATED_TIME", 0.5)
+    monkeypatch.setattr(speed_ticks, "REPEATS", 2)
+    measured = speed_ticks.measure_estimated(Trial(0))
+    assert_complete(measured, speed_ticks.ESTIMATED_METRICS)
+    assert measured.values["estimated.worst"] >= measured.values["estimated.p99"] >= 1.0
+
+
 def test_a_start_is_measured_in_a_process_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(speed_startup, "PROCESSES", 1)
     starts = {
