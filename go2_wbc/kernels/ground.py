@@ -48,6 +48,8 @@ def tilt(s, c):
 def level_friction(s, c):
     """Coefficient of the upright cone that lies within that about the ground's normal."""
     friction, steep = s[_FRICTION], np.hypot(s[_SLOPE], s[_SLOPE + 1])
+    if s[_ROUGHNESS] > c[_SMOOTH]:
+        return friction
     return max((friction - steep) / (1.0 + friction * steep), c[_LEAST_FRICTION])
 
 

@@ -30,7 +30,7 @@ def test_a_robot_that_does_it_all_has_every_value() -> None:
 
 @pytest.mark.usefixtures("short")
 def test_what_comes_after_a_call_that_fails_is_not_done() -> None:
-    stuck = Robot("any", "joints that hardly move", JointDynamics(friction_loss=(12.0,) * 3))
+    stuck = Robot("any", "joints that hardly move", JointDynamics(friction_loss=(12.0, 12.0, 12.0)))
     measured = measure(Trial(0), stuck, TUNING_SEED)
     assert measured.reason != ""
     assert measured.values["any.high-five"] == 0.0

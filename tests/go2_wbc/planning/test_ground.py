@@ -71,6 +71,8 @@ def test_an_upright_cone_lies_within_that_about_the_normal_of_a_slope(friction: 
     along = np.linalg.norm(forces - into[:, None] * normal, axis=1)
     assert (along / into).max() == pytest.approx(friction, abs=1e-5)
     assert ground.level_friction(0.1, 0.12) == 0.12
+    ground.learn(on_plane(SLOPE, 0.5).p_world_feet, np.ones(4, dtype=bool))
+    assert ground.level_friction(friction, 0.01) == pytest.approx(friction)  # as on stairs
     assert plane(on_plane(np.zeros(2))).level_friction(friction, 0.01) == friction
 
 
