@@ -54,6 +54,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.contact",
         "go2_wbc.kernels.elimination",
         "go2_wbc.kernels.estimation",
+        "go2_wbc.kernels.filtering",
         "go2_wbc.kernels.friction",
         "go2_wbc.kernels.goals",
         "go2_wbc.kernels.ground",

@@ -1,11 +1,7 @@
 """One step of the state estimator; ``robot.estimator`` describes the filter.
 
-An estimate is a row of ``STATE`` numbers: position and velocity of the IMU in the world, the
-quaternion x y z w, the biases of gyro and accelerometer, the feet's centres. Its error is a row of
-``ERROR`` numbers, the same with a rotation vector along the world's axes in place of the
-quaternion: R_true = exp(theta) R. Measurements are taken in one number after the other, which for
-independent ones is the same as all at once (Bierman, *Factorization Methods for Discrete Sequential
-Estimation*, 1977, ch. II), and needs no matrix inverse.
+What feet, gyro and accelerometer tell, and how far each is believed; estimates, their errors and
+the filter's equations are those of ``kernels.filtering``.
 """
 
 from __future__ import annotations
@@ -13,16 +9,29 @@ from __future__ import annotations
 import numpy as np
 
 from go2_wbc.kernels.compilation import kernel, subroutine
+from go2_wbc.kernels.filtering import (
+    E_FEET,
+    E_GYRO_BIAS,
+    ERROR,
+    FEET,
+    FORCE_BIAS,
+    GYRO_BIAS,
+    THETA,
+    correct,
+    learn_in_part,
+    predict,
+    put_turned,
+    take_in,
+    take_in_one,
+)
 from go2_wbc.kernels.vectors import rotation_of
 
-STATE, ERROR, MEMORY, READING = 28, 27, 23, 35
-"""Lengths: of an estimate, of its error, of what is kept from tick to tick (the time [s] at rest,
-the ages [s] of the feet's contacts, the gyro, the joints' smoothed speeds, the time [s] lying, the
-height [m] of the ground, and the time [s] for which it is not believed), and of a reading (dt,
-gyro, accelerometer, angles, speeds, forces)."""
+MEMORY, READING = 23, 35
+"""Lengths: of what is kept from tick to tick (the time [s] at rest, the ages [s] of the feet's
+contacts, the gyro, the joints' smoothed speeds, the time [s] lying, the height [m] of the ground,
+and the time [s] for which it is not believed), and of a reading (dt, gyro, accelerometer, angles,
+speeds, forces)."""
 _LYING, _LEVEL, _DOUBT = 20, 21, 22
-_QUATERNION, _GYRO_BIAS, _FORCE_BIAS, _FEET = 6, 10, 13, 16
-_THETA, _E_GYRO_BIAS, _E_FORCE_BIAS, _E_FEET = 6, 9, 12, 15
 LEAST_TRUST = 1e-3
 """Trust in a foot in the air: its place drifts a thousand times as fast as a standing one's."""
 _SMOOTHING = 0.05
@@ -34,30 +43,6 @@ _HEIGHT_GATE = 9.0
 on something else, and its height says nothing."""
 _LEVEL_SHARE = 0.2
 """Share of a landing foot's height in that of the ground, while this is not believed."""
-
-
-@subroutine("void(f8[::1], f8, f8, f8, b1)")
-def turn(x, a, b, c, in_world):
-    """Turn the quaternion of an estimate by a vector along the world's axes or its own."""
-    angle = np.sqrt(a * a + b * b + c * c)
-    factor = 0.5 if angle < 1e-9 else np.sin(0.5 * angle) / angle
-    e0, e1, e2, e3 = factor * a, factor * b, factor * c, np.cos(0.5 * angle)
-    q0, q1, q2, q3 = x[6], x[7], x[8], x[9]
-    sign = 1.0 if in_world else -1.0  # e q or q e: the vectors' cross product changes its sign
-    x[6] = e3 * q0 + q3 * e0 + sign * (e1 * q2 - e2 * q1)
-    x[7] = e3 * q1 + q3 * e1 + sign * (e2 * q0 - e0 * q2)
-    x[8] = e3 * q2 + q3 * e2 + sign * (e0 * q1 - e1 * q0)
-    x[9] = e3 * q3 - e0 * q0 - e1 * q1 - e2 * q2
-    length = np.sqrt(x[6] * x[6] + x[7] * x[7] + x[8] * x[8] + x[9] * x[9])
-    for i in range(6, 10):
-        x[i] /= length
-
-
-@subroutine("void(f8[:,::1], f8, f8, f8, f8[::1], i8)")
-def put_turned(R, a, b, c, row, start):
-    """Put R (a, b, c) into its place in a row."""
-    for i in range(3):
-        row[start + i] = R[i, 0] * a + R[i, 1] * b + R[i, 2] * c
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8, f8[:,::1], f8[::1])")
@@ -91,81 +76,6 @@ def see_foot(leg, q, u, p_imu, w, radius, R, foot):
     foot[4] += foot[7]
 
 
-@subroutine("void(f8[:,::1], f8, f8[:,::1], f8[::1], f8[::1])")
-def mix(P, dt, R, force, row):
-    """One side of F P F': adds to the rows of P what the errors of the state bring about.
-
-    d theta = -R d bias dt; dv = (theta x f - R d bias) dt with f the force in the world.
-    """
-    for j in range(ERROR):
-        t0, t1, t2 = P[_THETA, j], P[_THETA + 1, j], P[_THETA + 2, j]
-        row[0] = t1 * force[2] - t2 * force[1]
-        row[1] = t2 * force[0] - t0 * force[2]
-        row[2] = t0 * force[1] - t1 * force[0]
-        for i in range(3):
-            turning = 0.0
-            for k in range(3):
-                row[i] -= R[i, k] * P[_E_FORCE_BIAS + k, j]
-                turning += R[i, k] * P[_E_GYRO_BIAS + k, j]
-            P[i, j] += dt * P[3 + i, j] + 0.5 * dt * dt * row[i]
-            P[3 + i, j] += dt * row[i]
-            P[_THETA + i, j] -= dt * turning
-
-
-@subroutine("void(f8[::1], f8[:,::1], f8, f8[::1], f8[::1], f8, f8[:,::1], f8[::1])")
-def predict(x, P, dt, w, reading, gravity, R, noise):
-    """Move the estimate on by ``dt``: turned by w, driven by the accelerometer.
-
-    ``noise``: variances that the step adds to each number of the error. R is work space.
-    """
-    force, row = np.empty(3), np.empty(3)
-    turn(x, 0.5 * dt * w[0], 0.5 * dt * w[1], 0.5 * dt * w[2], False)
-    rotation_of(x[6], x[7], x[8], x[9], R)
-    a, b, c = (
-        reading[4] - x[_FORCE_BIAS],
-        reading[5] - x[_FORCE_BIAS + 1],
-        reading[6] - x[_FORCE_BIAS + 2],
-    )
-    put_turned(R, a, b, c, force, 0)
-    for i in range(3):
-        acceleration = force[i] - (gravity if i == 2 else 0.0)
-        x[i] += dt * x[3 + i] + 0.5 * dt * dt * acceleration
-        x[3 + i] += dt * acceleration
-    turn(x, 0.5 * dt * w[0], 0.5 * dt * w[1], 0.5 * dt * w[2], False)
-    mix(P, dt, R, force, row)
-    for i in range(ERROR):
-        for j in range(i):
-            P[i, j], P[j, i] = P[j, i], P[i, j]
-    mix(P, dt, R, force, row)
-    for i in range(ERROR):
-        P[i, i] += noise[i]
-
-
-@subroutine("void(f8[:,::1], f8[::1], f8[::1], i8[::1], f8[::1], i8, f8, f8)")
-def take_in(P, dx, column, places, shares, count, innovation, variance):
-    """Take in a number that is a sum of ``count`` numbers of the error, at ``places``.
-
-    ``innovation``: what was measured beyond the prediction. dx is the error as found so far,
-    ``column`` work space.
-    """
-    expected, spread = 0.0, variance
-    for i in range(ERROR):
-        column[i] = 0.0
-    for n in range(count):
-        row, share = P[places[n]], shares[n]
-        expected += share * dx[places[n]]
-        for i in range(ERROR):
-            column[i] += share * row[i]
-    for n in range(count):
-        spread += shares[n] * column[places[n]]
-    gain = (innovation - expected) / spread
-    for i in range(ERROR):
-        dx[i] += gain * column[i]
-        scaled = column[i] / spread
-        for j in range(ERROR):
-            P[i, j] -= scaled * column[j]
-
-
 @subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], i8, f8, f8[::1])")
 def take_in_leg(x, P, dx, column, foot, leg, place, velocity):
     """Take in what a leg measures, with these variances; velocities with 0 are left out.
@@ -179,26 +89,19 @@ def take_in_leg(x, P, dx, column, foot, leg, place, velocity):
         i, j = (k + 1) % 3, (k + 2) % 3
         # R s = f - p - theta x R s; the k-th number of the product has those at i and j
         places[0], places[1], places[2], places[3] = (
-            _E_FEET + 3 * leg + k,
+            E_FEET + 3 * leg + k,
             k,
-            _THETA + i,
-            _THETA + j,
+            THETA + i,
+            THETA + j,
         )
         shares[0], shares[1], shares[2], shares[3] = 1.0, -1.0, -foot[j], foot[i]
-        off = foot[k] - x[_FEET + 3 * leg + k] + x[k]
+        off = foot[k] - x[FEET + 3 * leg + k] + x[k]
         take_in(P, dx, column, places, shares, 4, off, place)
         if velocity[k] > 0.0:
             places[1], shares[1] = 3 + k, 1.0
             shares[2], shares[3] = -x[3 + j], x[3 + i]
             off = foot[3 + k] - x[3 + k]
             take_in(P, dx, column, places[1:], shares[1:], 3, off, velocity[k])
-
-
-@subroutine("void(f8[:,::1], f8[::1], f8[::1], i8, f8, f8)")
-def take_in_one(P, dx, column, place, innovation, variance):
-    """Take in a measurement of one number of the error."""
-    places, shares = np.full(1, place), np.ones(1)
-    take_in(P, dx, column, places, shares, 1, innovation, variance)
 
 
 @subroutine("f8(f8[::1], f8[:,::1], f8[::1], f8[::1], f8)")
@@ -225,8 +128,8 @@ def is_at_rest(x, memory, reading, gravity, numbers):
         memory[8 + n] += share * (reading[19 + n] - memory[8 + n])
         speed += memory[8 + n] ** 2 / 12.0
     for k in range(3):
-        turning += (reading[1 + k] - x[_GYRO_BIAS + k]) ** 2
-        force += (reading[4 + k] - x[_FORCE_BIAS + k]) ** 2
+        turning += (reading[1 + k] - x[GYRO_BIAS + k]) ** 2
+        force += (reading[4 + k] - x[FORCE_BIAS + k]) ** 2
     is_still = (
         speed < numbers[STILL_JOINTS] ** 2
         and turning < numbers[STILL_TURNING] ** 2
@@ -241,7 +144,7 @@ def lies(x, memory, reading, is_carried, gravity, numbers):
     """Whether something else than the feet has carried the robot for long enough."""
     force = 0.0
     for k in range(3):
-        force += (reading[4 + k] - x[_FORCE_BIAS + k]) ** 2
+        force += (reading[4 + k] - x[FORCE_BIAS + k]) ** 2
     is_lying = not is_carried and force > (_FLIGHT * gravity) ** 2
     memory[_LYING] = memory[_LYING] + reading[0] if is_lying else 0.0
     return memory[_LYING] >= numbers[LYING_TIME]
@@ -252,21 +155,6 @@ def learning(x, speed):
     """Share of their corrections that the biases take: 1 at rest, half at ``speed``."""
     ratio = (x[3] * x[3] + x[4] * x[4]) / (speed * speed)
     return 1.0 / (1.0 + ratio * ratio)
-
-
-@subroutine("void(f8[:,::1], f8[::1], f8[:,::1], f8)")
-def learn_in_part(P, dx, before, share):
-    """Take back all but a ``share`` of what corrects the biases; ``before``: their part of P.
-
-    Brink, *Partial-update Schmidt-Kalman filter*, J. Guidance, Control, and Dynamics 40 (2017):
-    the rest of the error stays as uncertain as if nothing had been measured.
-    """
-    left = (1.0 - share) ** 2
-    for i in range(6):
-        dx[_E_GYRO_BIAS + i] *= share
-        for j in range(6):
-            m, n = _E_GYRO_BIAS + i, _E_GYRO_BIAS + j
-            P[m, n] += left * (before[i, j] - P[m, n])
 
 
 @subroutine("f8(f8[::1], f8, f8, f8[::1])")
@@ -290,18 +178,8 @@ def take_in_rest(x, P, dx, column, reading, numbers):
     """Take in that nothing moves: no velocity, and a gyro that reads its bias."""
     for k in range(3):
         take_in_one(P, dx, column, 3 + k, -x[3 + k], numbers[STILL_VELOCITY] ** 2)
-        off = reading[1 + k] - x[_GYRO_BIAS + k]
-        take_in_one(P, dx, column, _E_GYRO_BIAS + k, off, numbers[STILL_GYRO] ** 2)
-
-
-@subroutine("void(f8[::1], f8[::1])")
-def correct(x, dx):
-    """Put the error that was found into the estimate."""
-    for i in range(6):
-        x[i] += dx[i]
-    turn(x, dx[_THETA], dx[_THETA + 1], dx[_THETA + 2], True)
-    for i in range(_E_GYRO_BIAS, ERROR):
-        x[i + 1] += dx[i]
+        off = reading[1 + k] - x[GYRO_BIAS + k]
+        take_in_one(P, dx, column, E_GYRO_BIAS + k, off, numbers[STILL_GYRO] ** 2)
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1])")
@@ -350,15 +228,15 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
     feet, velocities, heights = np.empty((4, 10)), np.zeros((4, 3)), np.empty(4)
     dx, column = np.zeros(ERROR), np.empty(ERROR)
     for k in range(3):
-        w[k] = reading[1 + k] - x[_GYRO_BIAS + k]
-        mean[k] = 0.5 * (reading[1 + k] + memory[5 + k]) - x[_GYRO_BIAS + k]
+        w[k] = reading[1 + k] - x[GYRO_BIAS + k]
+        mean[k] = 0.5 * (reading[1 + k] + memory[5 + k]) - x[GYRO_BIAS + k]
         memory[5 + k] = reading[1 + k]
     add_noise(dt, numbers, noise)
     rests = is_at_rest(x, memory, reading, gravity, numbers)
     predict(x, P, dt, mean, reading, gravity, R, noise)
     rotation_of(x[6], x[7], x[8], x[9], R)
     vertical = numbers[VERTICAL] + numbers[VERTICAL_SHARE] * np.sqrt(x[3] * x[3] + x[4] * x[4])
-    biases = slice(_E_GYRO_BIAS, _E_FEET)
+    biases = slice(E_GYRO_BIAS, E_FEET)
     before, share_learnt = P[biases, biases].copy(), learning(x, numbers[LEARNING_SPEED])
     is_carried, memory[_DOUBT] = False, max(memory[_DOUBT] - dt, 0.0)
     for leg in range(4):
@@ -386,19 +264,19 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
             drift = level if k < 2 else level + vertical
             if rests:
                 drift = numbers[STILL_DRIFT]
-            P[_E_FEET + 3 * leg + k, _E_FEET + 3 * leg + k] += factor * (drift * dt) ** 2
-            x[_FEET + 3 * leg + k] += dt * foot[6 + k]
+            P[E_FEET + 3 * leg + k, E_FEET + 3 * leg + k] += factor * (drift * dt) ** 2
+            x[FEET + 3 * leg + k] += dt * foot[6 + k]
         z, heights[leg], settled = 2 + 3 * leg, np.inf, 3.0 * numbers[TOUCHDOWN_TIME]
         if age < settled <= age + dt:
-            ground = x[_FEET + z] - radius + numbers[COMPLIANCE] * force
-            variance = P[_E_FEET + z, _E_FEET + z] + numbers[HEIGHT] ** 2
+            ground = x[FEET + z] - radius + numbers[COMPLIANCE] * force
+            variance = P[E_FEET + z, E_FEET + z] + numbers[HEIGHT] ** 2
             heights[leg] = height_off(memory, ground, variance, numbers)
     place = numbers[PLACE] ** 2
     for leg in range(4):
         take_in_leg(x, P, dx, column, feet[leg], leg, place, velocities[leg])
         if heights[leg] != np.inf:
             off = heights[leg]
-            take_in_one(P, dx, column, _E_FEET + 2 + 3 * leg, off, numbers[HEIGHT] ** 2)
+            take_in_one(P, dx, column, E_FEET + 2 + 3 * leg, off, numbers[HEIGHT] ** 2)
     is_lying = lies(x, memory, reading, is_carried, gravity, numbers)
     if rests:
         take_in_rest(x, P, dx, column, reading, numbers)
@@ -408,5 +286,5 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
     learn_in_part(P, dx, before, share_learnt)
     correct(x, dx)
     for k in range(3):
-        w[k] = reading[1 + k] - x[_GYRO_BIAS + k]
+        w[k] = reading[1 + k] - x[GYRO_BIAS + k]
     report(x, reading, w, p_imu, R, q, v)

@@ -21,7 +21,7 @@ A foot whose velocity is not that of a standing one, by what the filter expects,
 its bias: a zero-velocity update (Foxlin, IEEE Computer Graphics and Applications 25(6), 2005). So
 has one that lies, which is told from one in flight by the gravity that its trunk feels. At speed
 the biases are hardly learnt (``learning_speed``).
-``kernels.estimation`` is the arithmetic.
+``kernels.estimation`` and ``kernels.filtering`` are the arithmetic.
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ class StateEstimator:
     def __init__(self, model: RobotModel, config: EstimatorConfig | None = None) -> None:
         """Estimate the state of ``model``'s robot."""
         with without_collecting():
-            from go2_wbc.kernels import estimation  # compiled; only who needs it waits for it
+            from go2_wbc.kernels import estimation, filtering  # compiled; who needs it waits
 
         self._config = config or EstimatorConfig()
         pin_model = model.pin_model
@@ -189,9 +189,9 @@ class StateEstimator:
         self._numbers = self._in_order(model)
         self._step = estimation.estimate
         self._time = -np.inf  # before the first reading
-        self._x = np.zeros(estimation.STATE)
+        self._x = np.zeros(filtering.STATE)
         self._x[9] = 1.0
-        self._P = np.zeros((estimation.ERROR, estimation.ERROR))
+        self._P = np.zeros((filtering.ERROR, filtering.ERROR))
         self._memory = np.zeros(estimation.MEMORY)
 
     def _in_order(self, model: RobotModel) -> Float[np.ndarray, " n"]:
