@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.exam.drawing import TEST, TRAIN
-from benchmarks.probability_evidence import csv_of, reliability_figure
+from benchmarks.probability_evidence import csv_of, save_reliability
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit
 from benchmarks.probability_runs import runs, trial
 from benchmarks.session import add_sweep_options, positive, publish, run_sweep
@@ -24,7 +24,7 @@ from controller.sweeps.rows import Row
 from controller.sweeps.summary import rate_interval
 from go2_wbc.files import checked_output, write_atomically
 from motions.feasibility.probability import FILE, ProbabilityModel, fitted
-from viz.render.figure_style import PLOT_SUFFIXES, save_figure
+from viz.render.figure_style import PLOT_SUFFIXES
 
 ERROR, BRIER_SHARE = 0.05, 0.5
 """Greatest expected calibration error, and Brier score over that of the base rate."""
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     if data:
         write_atomically(data, csv_of(model, result.rows))
     if plot:
-        save_figure(reliability_figure(judged), plot)
+        save_reliability(judged, plot)
     is_ok = is_calibrated(judged) and falls[0] == 0 and not result.failures
     values = {
         "passed": is_ok,

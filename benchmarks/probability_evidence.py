@@ -6,23 +6,20 @@ import csv
 import io
 import json
 from collections.abc import Sequence
+from pathlib import Path
 
-import matplotlib
 import numpy as np
-from matplotlib.figure import Figure
 
-from benchmarks.probability_fit import BINS, Calibration
+from benchmarks.probability_fit import Calibration
 from controller.sweeps.rows import Row
 from controller.sweeps.summary import rate_interval
 from motions.feasibility.probability import ProbabilityModel
-from viz.palette import ACCENT, INK, MUTED, TRACK
-from viz.render.figure_style import STYLE
+from viz.render.figure_style import save_figure
+from viz.render.reliability_plot import reliability_figure
 
 COLUMNS = ("seed", "motion", "half", "stratum", "friction", "payload", "refused", "done", "fell")
 """Of a run, besides the chance that was stated."""
 _DIGITS = 3
-_SIZE = (4.6, 4.0)
-"""Of the figure [inch]."""
 
 
 def csv_of(model: ProbabilityModel, rows: Sequence[Row]) -> bytes:
@@ -39,34 +36,20 @@ def csv_of(model: ProbabilityModel, rows: Sequence[Row]) -> bytes:
     return text.getvalue().encode()
 
 
-def reliability_figure(judged: Calibration) -> Figure:
-    """Share of the runs that were done over the chance stated, in bins, with 95 % intervals.
+def save_reliability(judged: Calibration, path: Path) -> Path:
+    """Draw the share of the runs that were done over the chance stated, in bins.
 
-    The intervals (Clopper-Pearson) take runs for independent, which those of one motion are not.
+    The intervals (Clopper-Pearson, 95 %) take runs for independent, which those of one motion
+    are not.
     """
     stated, done, counts = (np.array(column) for column in zip(*judged.bins, strict=True))
-    low, high = np.array(
+    intervals = np.array(
         [rate_interval(round(s * n), int(n)) for s, n in zip(done, counts, strict=True)]
-    ).T
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=_SIZE, layout="constrained")
-        axes = figure.add_subplot()
-        axes.plot([0.0, 1.0], [0.0, 1.0], color=TRACK, lw=1.2)
-        axes.vlines(stated, low, high, color=ACCENT, lw=1.6)
-        axes.plot(stated, done, "o", color=INK, ms=4)
-        for x, y, n in zip(stated, done, counts, strict=True):
-            axes.annotate(f"{n:.0f}", (x, y), (5, -8), textcoords="offset points", color=MUTED)
-        axes.set(xlim=(-0.02, 1.02), ylim=(-0.02, 1.02))
-        axes.set(xlabel="chance stated", ylabel="share done")
-        axes.set_xticks(np.linspace(0.0, 1.0, BINS + 1), minor=True)
-        axes.spines[["top", "right"]].set_visible(False)
-        axes.set_aspect("equal")
-        low_error, high_error = judged.error_interval
-        axes.set_title(
-            f"{int(counts.sum())} runs of the test half; expected error {judged.error:.3f} "
-            f"({low_error:.3f} to {high_error:.3f})",
-            loc="left",
-            size=8.0,
-            color=INK,
-        )
-    return figure
+    )
+    low, high = judged.error_interval
+    title = (
+        f"{int(counts.sum())} runs of the test half; expected error {judged.error:.3f} "
+        f"({low:.3f} to {high:.3f})"
+    )
+    figure = reliability_figure(stated, done, counts.astype(float), intervals, title=title)
+    return save_figure(figure, path)

@@ -18,6 +18,8 @@ _SHARE, _RADIUS, _GROUND = (_C[n] for n in ("ground_share", "foot_radius", "grou
 _SLOPE_SHARE, _FOLLOW, _SMOOTH, _RAISE, _CALMING, _STUMBLE, _DELAY = range(_GROUND, _GROUND + 7)
 _LEAST, _MOST = _C["least_determinant"], _C["most_slope"]
 _FRICTION, _LEAST_FRICTION = _S["friction"], _C["slip"] + 6
+_LEVEL_SLOPE = 0.05
+"""As ``planning.ground.LEVEL_SLOPE``."""
 
 
 @subroutine("f8(f8[::1], f8, f8)")
@@ -48,6 +50,7 @@ def tilt(s, c):
 def level_friction(s, c):
     """Coefficient of the upright cone that lies within that about the ground's normal."""
     friction, steep = s[_FRICTION], np.hypot(s[_SLOPE], s[_SLOPE + 1])
+    steep *= min(max(steep / _LEVEL_SLOPE - 1.0, 0.0), 1.0)
     if s[_ROUGHNESS] > c[_SMOOTH]:
         return friction
     return max((friction - steep) / (1.0 + friction * steep), c[_LEAST_FRICTION])

@@ -252,10 +252,7 @@ def cubic(x):
 
 @subroutine("void(i8, f8[::1], f8[::1], f8, f8[::1], f8[::1])")
 def swing(leg, s, c, progress, goal, target):
-    """As ``planning.swing.swing_foot``, from the foot's lift-off to ``goal`` (3,).
-
-    As deep as ``SwingConfig.at_stride``.
-    """
+    """As ``planning.swing.swing_foot``, from the foot's lift-off to ``goal`` (3,)."""
     duration = (1.0 - s[_DUTY]) * s[_PERIOD]
     start = s[_LIFTOFF + 3 * leg : _LIFTOFF + 3 * leg + 3]
     k = 3 * leg
@@ -271,7 +268,7 @@ def swing(leg, s, c, progress, goal, target):
         target[_FOOT_A + k + i] = ddx / span**2 * delta
     apex = max(start[2], goal[2]) + c[_APEX] + apex_raise(s, c)
     is_rising = progress < 0.5 - TIE
-    way = s[_PERIOD] * np.hypot(s[_VELOCITY], s[_VELOCITY + 1])
+    way = np.hypot(goal[0] - start[0], goal[1] - start[1])
     depth = c[_DEPTH] * min(1.0, c[_FULL_WAY] / max(way, TIE)) ** 2
     begin = start[2] if is_rising else apex
     delta = (apex if is_rising else goal[2] - depth) - begin

@@ -30,6 +30,8 @@ LEAST_DETERMINANT = 1e-4
 """Of the feet's second moments [m^4], 0.01 when they stand squarely; below it they are in line."""
 MOST_SLOPE = 0.6
 """Greatest slope that is believed; no foot holds on a steeper one."""
+LEVEL_SLOPE = 0.05
+"""Slope up to which the ground counts as level for the friction; from twice that on in full."""
 MOST_DELAY = 0.8
 """Share of a swing after which it must go ahead at the latest."""
 
@@ -115,12 +117,14 @@ class GroundPlane:
 
         A foot on a slope of 15 deg and a coefficient of 0.65 slides when it is pushed ahead with
         0.6 of what it carries, although that is less: tan(atan(0.65) - 15 deg) is 0.33. Never below
-        ``least``. Rough ground that rises is taken for stairs, whose steps are level: with less
-        friction there one run of twelve up stairs fell, none without.
+        ``least``. What feet find of a slope on level ground takes nothing. Rough ground that rises
+        is taken for stairs, whose steps are level: with less friction there one run of twelve up
+        stairs fell, none without.
         """
         if self.roughness > self._config.smooth:
             return friction
         steep = float(np.hypot(*self.slope))
+        steep *= min(max(steep / LEVEL_SLOPE - 1.0, 0.0), 1.0)
         return max((friction - steep) / (1.0 + friction * steep), least)
 
     def carry(self, snapshot: Snapshot) -> None:

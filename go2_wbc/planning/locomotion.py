@@ -370,9 +370,7 @@ class LocomotionPlanner(GaitPlanner):
         remaining = np.where(phase.stance, 0.0, phase.remaining)
         goals = self._footholds(snapshot, remaining)
         progress = phase.progress
-        stride = self._clock.gait.period * float(np.hypot(*self._trunk.velocity[:2]))
-        shape = self._swing.at_stride(stride)
-        shape = replace(shape, apex=shape.apex + self._ground.apex_raise)
+        shape = replace(self._swing, apex=self._swing.apex + self._ground.apex_raise)
         for leg in LEGS:
             if not self._contacts.stance[leg]:
                 height = self._ground.at(goals[leg]) + self._model.foot_radius

@@ -31,12 +31,10 @@ class SwingConfig:
             the flat, 10 cm takes a third more torque at 1.5 m/s than 9.
         touchdown_depth: distance [m] below the ground at which touchdown is aimed, so that the
             foot arrives with certainty.
-        full_depth_way: length [m] of a commanded stride up to which that is the depth; beyond, it
-            shrinks with the square of the length. A foot that is aimed below the ground by a share
-            ``s`` of the apex meets it while it still moves ahead, at ``3 sqrt(s / 3)`` times its
-            mean speed: 2 m/s at 3 m/s, which threw 4 of 10 robots, all on floors of 0.8 and more;
-            0.9 as it is. The foot of a robot that was pushed goes far too, but must arrive: of 60
-            trots with three pushes of 30 N s 4 fell when such swings were as shallow, FALLS now.
+        full_depth_way: length [m] of a swing up to which that is the depth; beyond, it shrinks with
+            the square of the length. A foot that is aimed below the ground by a share ``s`` of the
+            apex meets it while it still moves ahead, at ``3 sqrt(s / 3)`` times its mean speed: 2
+            m/s at 3 m/s, which threw 4 of 10 robots, all on floors of 0.8 and more; 0.9 as it is.
     """
 
     apex: float = 0.09
@@ -48,10 +46,9 @@ class SwingConfig:
         require_positive(self, "apex", "full_depth_way")
         require_not_negative(self, "touchdown_depth")
 
-    def at_stride(self, length: float) -> SwingConfig:
-        """The same with the touchdown depth for a commanded stride of ``length`` [m]."""
-        share = min(1.0, self.full_depth_way / max(length, TIE)) ** 2
-        return replace(self, touchdown_depth=self.touchdown_depth * share)
+    def depth(self, way: float) -> float:
+        """How far [m] below the ground a swing of length ``way`` [m] is aimed."""
+        return self.touchdown_depth * min(1.0, self.full_depth_way / max(way, TIE)) ** 2
 
     def at_most(self, apex: float) -> SwingConfig:
         """The same with an apex [m] of ``apex`` if that is lower."""
@@ -89,7 +86,7 @@ def swing_foot(
         a[:2] = dds / span**2 * delta
     apex = max(start[2], goal[2]) + config.apex
     is_rising = progress < 0.5 - TIE
-    ground = goal[2] - config.touchdown_depth
+    ground = goal[2] - config.depth(float(np.hypot(*delta)))
     begin, end = (start[2], apex) if is_rising else (apex, ground)
     s, ds, dds = Ease.CUBIC.progress(2.0 * progress - (0.0 if is_rising else 1.0))
     p[2] = begin + s * (end - begin)

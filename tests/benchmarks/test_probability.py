@@ -11,10 +11,9 @@ import pytest
 
 from benchmarks.exam.drawing import TEST, TRAIN
 from benchmarks.probability import judge, passed_that_fell, render, store
-from benchmarks.probability_evidence import COLUMNS, csv_of, reliability_figure
+from benchmarks.probability_evidence import COLUMNS, csv_of, save_reliability
 from controller.sweeps.rows import Row
 from motions.feasibility.probability import ProbabilityModel, Rise
-from viz.render.figure_style import save_figure
 
 MODEL = ProbabilityModel({"slip": Rise(0.01, 0.0, 0.4)}, rest=3.0, leak=0.05)
 
@@ -62,7 +61,7 @@ def test_every_run_is_a_line_with_the_chance_that_was_stated() -> None:
 def test_the_diagram_has_a_point_for_every_bin_with_runs(tmp_path: Path) -> None:
     judged = judge(MODEL, ROWS)
     assert sum(count for *_, count in judged.bins) == len(ROWS)
-    text = save_figure(reliability_figure(judged), tmp_path / "reliability.svg").read_text()
+    text = save_reliability(judged, tmp_path / "reliability.svg").read_text()
     assert "20 runs of the test half" in text
     assert "chance stated" in text
     assert all(f">{count}<" in text for *_, count in judged.bins)

@@ -111,10 +111,10 @@ def test_touches_that_end_in_between_are_stumbles(falls: FallDetector, model: Ro
 @pytest.mark.parametrize(
     ("touch", "sag", "lean", "falls_at"),
     [
-        (0.05, 0.1, 0.0, 1.1),
-        (0.05, 0.0, 0.4, 1.1),
-        (0.05, 0.05, 0.2, None),
-        (0.02, 0.1, 0.4, None),
+        (0.07, 0.1, 0.0, 1.1),
+        (0.07, 0.0, 0.4, 1.1),
+        (0.07, 0.05, 0.2, None),
+        (0.04, 0.1, 0.4, None),
     ],
 )
 def test_a_trunk_that_bounces_off_the_ground_has_fallen_unless_it_rises(
