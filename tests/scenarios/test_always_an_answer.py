@@ -10,10 +10,8 @@ import pytest
 from benchmarks.answers import SCENARIOS
 from controller.sweeps.trials import Trial
 
-SAMPLES = [("boxes", 19), ("pushes", 12), ("stops", 5)]
-"""Scenario and seed. In those of ``GIVES_WAY`` the hard QP has no solution in some ticks; of forty
-layouts of boxes one is left where it has none, and that robot falls."""
-GIVES_WAY = ("pushes", "stops")
+SAMPLES = [("boxes", 19), ("pushes", 12), ("stops", 13)]
+"""Scenario and seed; in all of these the hard QP has no solution in some ticks."""
 GRAVE = 0.1  # [%] of the ticks
 
 
@@ -25,6 +23,5 @@ def test_contradictions_are_answered_and_never_damp_an_upright_robot(name: str, 
     assert values[f"{name}.failures"] == 0.0
     assert values[f"{name}.damped"] == 0.0
     assert values[f"{name}.unreported"] == values[f"{name}.falls"] == 0.0
-    if name in GIVES_WAY:
-        assert values[f"{name}.relaxed"] > 0.0, "or the test would say nothing"
+    assert values[f"{name}.relaxed"] > 0.0, "or the test would say nothing"
     assert values[f"{name}.grave"] <= GRAVE
