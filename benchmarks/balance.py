@@ -109,11 +109,11 @@ def measure_trotting(trial: Trial, name: str) -> Measurement:
     return Measurement({f"trot.{name}": survived / PHASES})
 
 
-def dropped(seed: int) -> MujocoPlant:
+def dropped(seed: int, sensors: str = "ideal") -> MujocoPlant:
     """A robot in the air, in any attitude, with any joint angles."""
     rng, model = np.random.default_rng(seed), RobotModel()
     friction, mass = float(rng.uniform(*DROP_FRICTION)), float(rng.uniform(*MASS_RANGE))
-    plant = MujocoPlant(friction=friction, mass_scale=mass, seed=seed)
+    plant = MujocoPlant(friction=friction, mass_scale=mass, seed=seed, sensors=sensors)
     q = np.concatenate(
         [[0.0, 0.0, 1.0], rng.normal(size=4), rng.uniform(model.q_lower, model.q_upper)]
     )

@@ -26,12 +26,13 @@ from go2_wbc.kernels.filtering import (
 )
 from go2_wbc.kernels.vectors import rotation_of
 
-MEMORY, READING = 23, 35
+MEMORY, READING = 26, 35
 """Lengths: of what is kept from tick to tick (the time [s] at rest, the ages [s] of the feet's
 contacts, the gyro, the joints' smoothed speeds, the time [s] lying, the height [m] of the ground,
-and the time [s] for which it is not believed), and of a reading (dt, gyro, accelerometer, angles,
-speeds, forces)."""
-_LYING, _LEVEL, _DOUBT = 20, 21, 22
+the time [s] for which it is not believed, the times [s] for which the estimate has been lost and
+for which no biases are learnt, and whether the robot has tumbled), and of a reading (dt, gyro,
+accelerometer, angles, speeds, forces)."""
+_LYING, LEVEL, _DOUBT, _LOST, _UPSET, _TUMBLED = range(20, 26)
 LEAST_TRUST = 1e-3
 """Trust in a foot in the air: its place drifts a thousand times as fast as a standing one's."""
 _SMOOTHING = 0.05
@@ -41,6 +42,16 @@ _FLIGHT = 0.5
 _HEIGHT_GATE = 9.0
 """Square of the deviations by which a foot's height may be off that of flat ground; else it stands
 on something else, and its height says nothing."""
+KNOWN, TUMBLED, LOST = range(3)
+"""Whether an estimate holds, or has to begin anew."""
+_UPRIGHT = np.cos(np.radians(15.0))
+"""Cosine of the angle between the accelerometer's up and the estimate's, at rest, if it is lost."""
+_OVER, _CALM = np.cos(np.radians(50.0)), 1.0
+"""Cosine of the tilt from which on a robot is tumbling, and for how long [s] after it has lain or
+tumbled no biases are learnt: the trunk and what slides beside it tell wrong velocities."""
+_RUNAWAY, _BIASES = 0.5, 5.0
+"""Speed [m/s] that an estimate of a robot at rest has if it is lost, and by how many deviations a
+bias is then off 0."""
 _LEVEL_SHARE = 0.2
 """Share of a landing foot's height in that of the ground, while this is not believed."""
 
@@ -150,6 +161,39 @@ def lies(x, memory, reading, is_carried, gravity, numbers):
     return memory[_LYING] >= numbers[LYING_TIME]
 
 
+@subroutine("i8(f8[::1], f8[::1], f8[::1], f8[:,::1], f8, f8[::1])")
+def begin_anew(x, memory, reading, R, gravity, numbers):
+    """``KNOWN``, ``TUMBLED`` if a robot that did is at rest on its belly or feet, or ``LOST``.
+
+    Lost is who has taken a trunk at rest, for long enough, for one that is tilted or moves. Rest is
+    told by the readings alone: an estimate that is lost has lost the biases, too. Jolts, as of legs
+    that are drawn in, are taken off the time at rest.
+    """
+    turning, force, upwards, speed, joints, most = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        turning += reading[1 + k] ** 2
+        force += reading[4 + k] ** 2
+        upwards += R[2, k] * reading[4 + k]
+        speed += x[3 + k] ** 2
+        most = max(most, abs(x[GYRO_BIAS + k]) / numbers[GYRO_BIAS_DEVIATION])
+        most = max(most, abs(x[FORCE_BIAS + k]) / numbers[FORCE_BIAS_DEVIATION])
+    for n in range(12):
+        joints += memory[8 + n] ** 2 / 12.0
+    force = np.sqrt(force)
+    if R[2, 2] < _OVER:
+        memory[_TUMBLED] = 1.0
+    moves = speed > _RUNAWAY**2 and joints < numbers[STILL_JOINTS] ** 2
+    is_lost = moves or upwards < _UPRIGHT * force or most > _BIASES
+    if not (is_lost or (memory[_TUMBLED] > 0.0 and R[2, 2] > _OVER)):
+        memory[_LOST] = 0.0
+        return KNOWN
+    is_still = turning < numbers[STILL_TURNING] ** 2 and abs(force - gravity) < numbers[STILL_FORCE]
+    memory[_LOST] = max(memory[_LOST] + (reading[0] if is_still else -reading[0]), 0.0)
+    if memory[_LOST] < numbers[STILL_TIME]:
+        return KNOWN
+    return LOST if is_lost else TUMBLED
+
+
 @subroutine("f8(f8[::1], f8)")
 def learning(x, speed):
     """Share of their corrections that the biases take: 1 at rest, half at ``speed``."""
@@ -164,11 +208,11 @@ def height_off(memory, ground, variance, numbers):
     ``variance``: of that difference. Once a foot has come down on something else, the ground is
     not level: its height follows the feet, and says nothing of them for a while.
     """
-    off = memory[_LEVEL] - ground
+    off = memory[LEVEL] - ground
     if abs(off) > numbers[UNEVEN] or off * off > _HEIGHT_GATE * variance:
         memory[_DOUBT] = numbers[UNEVEN_TIME]
     if memory[_DOUBT] > 0.0:
-        memory[_LEVEL] -= _LEVEL_SHARE * off
+        memory[LEVEL] -= _LEVEL_SHARE * off
         return np.inf
     return off
 
@@ -205,7 +249,7 @@ GYRO, GYRO_WALK, FORCE_WALK, GATE, STILL_TIME, STILL_JOINTS, STILL_TURNING = ran
 STILL_FORCE, STILL_VELOCITY, STILL_DRIFT, RADIUS, GRAVITY = range(15, 20)
 TOUCHDOWN_SLIP, TOUCHDOWN_TIME, VERTICAL, COMPLIANCE, STILL_GYRO = range(20, 25)
 VERTICAL_SHARE, LYING_TIME, LEARNING_SPEED, DRIFT_SHARE, VELOCITY_SHARE = range(25, 30)
-UNEVEN, UNEVEN_TIME = range(30, 32)
+UNEVEN, UNEVEN_TIME, GYRO_BIAS_DEVIATION, FORCE_BIAS_DEVIATION = range(30, 34)
 """What ``numbers`` holds: those of ``EstimatorConfig``, foot radius [m] and gravity [m/s^2]."""
 
 
@@ -220,9 +264,12 @@ def add_noise(dt, numbers, noise):
         noise[12 + k] = numbers[FORCE_WALK] ** 2 * dt
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+@kernel("i8(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
 def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
-    """Take in a reading, ``reading[0]`` seconds after the last one, and fill the robot's state."""
+    """Take in a reading, ``reading[0]`` seconds after the last one, and fill the robot's state.
+
+    Returns whether the estimate has to begin anew, and why; see ``begin_anew``.
+    """
     dt, radius, gravity = reading[0], numbers[RADIUS], numbers[GRAVITY]
     w, mean, R, noise = np.empty(3), np.empty(3), np.empty((3, 3)), np.zeros(ERROR)
     feet, velocities, heights = np.empty((4, 10)), np.zeros((4, 3)), np.empty(4)
@@ -278,6 +325,10 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
             off = heights[leg]
             take_in_one(P, dx, column, E_FEET + 2 + 3 * leg, off, numbers[HEIGHT] ** 2)
     is_lying = lies(x, memory, reading, is_carried, gravity, numbers)
+    is_upset = is_lying or R[2, 2] < _OVER
+    memory[_UPSET] = _CALM if is_upset else max(memory[_UPSET] - dt, 0.0)
+    if memory[_UPSET] > 0.0 and not rests:
+        share_learnt = 0.0
     if rests:
         take_in_rest(x, P, dx, column, reading, numbers)
     elif is_lying:
@@ -288,3 +339,4 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
     for k in range(3):
         w[k] = reading[1 + k] - x[GYRO_BIAS + k]
     report(x, reading, w, p_imu, R, q, v)
+    return begin_anew(x, memory, reading, R, gravity, numbers)

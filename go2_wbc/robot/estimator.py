@@ -20,7 +20,8 @@ A foot whose velocity is not that of a standing one, by what the filter expects,
 (``slip``). A robot whose joints and IMU read rest for a while has no velocity, and its gyro reads
 its bias: a zero-velocity update (Foxlin, IEEE Computer Graphics and Applications 25(6), 2005). So
 has one that lies, which is told from one in flight by the gravity that its trunk feels. At speed
-the biases are hardly learnt (``learning_speed``).
+the biases are hardly learnt (``learning_speed``), and not at all from a trunk on the ground. After a
+tumble, or when what is at rest has been taken for something else, the filter begins anew.
 ``kernels.estimation`` and ``kernels.filtering`` are the arithmetic.
 """
 
@@ -48,6 +49,8 @@ IMU_FRAME = "imu"
 _START_DEVIATIONS = (0.001, 0.1, 0.01)
 """Of position [m], velocity [m/s] and feet [m] when the filter begins (own choice); the position is
 the origin by definition."""
+_THROWN_DEVIATIONS, _THROWN_TILT = (0.001, 2.0, 1.0), 1.0
+"""The same of a robot that falls, or is thrown, and of its roll and pitch [rad]."""
 _STEADY_HEADING = 1e-4
 """Deviation [rad] of the heading when the filter begins: it is 0 by definition."""
 
@@ -186,8 +189,13 @@ class StateEstimator:
         self._p_base_imu = np.array(placement.translation)
         self._geometry = [LegGeometry.of(model, leg) for leg in LEGS]
         self._legs, self._radius = leg_table(model), model.foot_radius
+        self._gravity = model.gravity
         self._numbers = self._in_order(model)
-        self._step = estimation.estimate
+        self._step, self._level, self._tumbled = (
+            estimation.estimate,
+            estimation.LEVEL,
+            estimation.TUMBLED,
+        )
         self._time = -np.inf  # before the first reading
         self._x = np.zeros(filtering.STATE)
         self._x[9] = 1.0
@@ -207,7 +215,7 @@ class StateEstimator:
                 *(c.touchdown_slip, c.touchdown_time, c.vertical, c.compliance, c.still_gyro),
                 *(c.vertical_share, c.lying_time, c.learning_speed),
                 *(c.drift_share, c.velocity_share),
-                *(c.uneven, c.uneven_time),
+                *(c.uneven, c.uneven_time, c.gyro_bias, c.accelerometer_bias),
             ]
         )
 
@@ -228,8 +236,10 @@ class StateEstimator:
             ]
         )
         q, v = np.empty(19), np.empty(18)
-        kept = self._x, self._P, self._memory
-        self._step(*kept, row, self._legs, self._p_base_imu, self._numbers, q, v)
+        if off := self._advance(row, q, v):
+            self._forget(reading, keeps_height=off == self._tumbled)
+            row[0] = 0.0
+            self._advance(row, q, v)
         self._time = reading.time
         return RobotState(
             time=reading.time,
@@ -239,6 +249,13 @@ class StateEstimator:
             foot_forces=reading.foot_forces,
             feet_in_contact=reading.foot_forces > self._config.contact_force,
         )
+
+    def _advance(
+        self, row: Float[np.ndarray, "35"], q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"]
+    ) -> int:
+        """One step of the filter, which fills q and v; returns why to begin anew, or 0."""
+        kept = self._x, self._P, self._memory
+        return int(self._step(*kept, row, self._legs, self._p_base_imu, self._numbers, q, v))
 
     def covariance(self) -> OdometryCovariance:
         """How sure the last state is of the base, from the covariance of the filter's errors.
@@ -276,28 +293,39 @@ class StateEstimator:
         self._time = saved["time"]
         self._x[:], self._P[:], self._memory[:] = saved["x"], saved["P"], saved["memory"]
 
-    def _begin(self, reading: SensorReading) -> None:
+    def _forget(self, reading: SensorReading, keeps_height: bool) -> None:
+        """Begin anew, without biases; at the height where the robot has been taken to be, or 0."""
+        self._x[10:16] = 0.0
+        self._begin(reading, float(self._x[2]) if keeps_height else None, knows_biases=False)
+
+    def _begin(
+        self, reading: SensorReading, height: float | None = None, knows_biases: bool = True
+    ) -> None:
         """At rest above the last known spot, the lowest foot on the ground; gravity says the tilt.
 
-        Heading and biases stay what they were.
+        Heading and biases stay what they were. ``height`` [m] of the IMU: None for level ground.
         """
         is_first, config, x = np.isinf(self._time), self._config, self._x
         R = _upright(pin.Quaternion(x[6:10]).toRotationMatrix(), reading.accelerometer - x[13:16])
         p_feet = self._feet(reading, R)
         if is_first:
             x[:3] = R @ self._p_base_imu
-        x[2] = self._radius - p_feet[:, 2].min()
+        above = self._radius - float(p_feet[:, 2].min())
+        x[2] = above if height is None else height
         x[3:6], x[6:10] = 0.0, pin.Quaternion(R).coeffs()
         x[16:] = (x[:3] + p_feet).ravel()
-        place, velocity, feet = _START_DEVIATIONS
         biases = np.diag(self._P)[9:15].copy()
-        if is_first:
+        if is_first or not knows_biases:
             biases[:3], biases[3:] = config.gyro_bias**2, config.accelerometer_bias**2
-        turning = [config.tilt, config.tilt, _STEADY_HEADING]
+        is_thrown = abs(np.linalg.norm(reading.accelerometer) - self._gravity) > config.still_force
+        place, velocity, feet = _THROWN_DEVIATIONS if is_thrown else _START_DEVIATIONS
+        tilt = _THROWN_TILT if is_thrown else config.tilt
+        turning = [tilt, tilt, _STEADY_HEADING]
         deviations = np.array([*[place] * 3, *[velocity] * 3, *turning, *[0.0] * 6, *[feet] * 12])
         self._P[:] = np.diag(deviations**2)
         self._P[range(9, 15), range(9, 15)] = biases
         self._memory[:] = 0.0
+        self._memory[self._level] = x[2] - above
         self._memory[5:8] = reading.gyro
         self._memory[8:20] = reading.v_joints
 

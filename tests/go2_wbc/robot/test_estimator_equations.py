@@ -69,7 +69,7 @@ class Twin:
         tilt = [CONFIG.tilt, CONFIG.tilt, 1e-4]
         biases = [CONFIG.gyro_bias] * 3 + [CONFIG.accelerometer_bias] * 3
         self.P = np.diag([0.001] * 3 + [0.1] * 3 + tilt + biases + [0.01] * 12) ** 2
-        self.age, self.gyro, self.lying = np.zeros(4), first.gyro, 0.0
+        self.age, self.gyro, self.lying, self.upset = np.zeros(4), first.gyro, 0.0, 0.0
         self.level, self.doubt = 0.0, 0.0
         self.step(first, 0.0)
 
@@ -189,7 +189,9 @@ class Twin:
         felt = np.linalg.norm(reading.accelerometer - x[4]) / self.model.gravity
         is_lying = felt > 0.5 and not (trust > 1e-3).any()
         self.lying = self.lying + dt if is_lying else 0.0
+        self.upset = max(self.upset - dt, 0.0)
         if self.lying >= c.lying_time:
+            self.upset = 1.0
             told.append((lambda y: y[1], np.full(3, c.rest**2)))
         self.age = self.age + dt
         self._correct(x, P, told)
@@ -209,6 +211,8 @@ class Twin:
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + V)
         learnt = np.ones(27)
         learnt[9:15] = 1.0 / (1.0 + (np.hypot(*x[1][:2]) / CONFIG.learning_speed) ** 4)
+        if self.upset:
+            learnt[9:15] = 0.0
         self.x = self.plus(x, -learnt * (K @ off(np.zeros(27))))
         self.P = P - (1.0 - np.outer(1.0 - learnt, 1.0 - learnt)) * (K @ H @ P)
 
