@@ -1,8 +1,9 @@
 """``python -m benchmarks balance``: pushes, drops, changes of gait, and whether a fall is noticed.
 
-Ground truth as the state, motors with their torque-speed line, friction 0.6 to 1.0 (drops: 0.4 to
-1.0), masses within 10 %, of which the controller is not told; forces planned ahead by the MPC.
-Numbers were chosen on seeds 0 to 9; those judged begin at ``FIRST_SEED``.
+Every row twice, with the true state and (``sensed-``) with what the robot's own sensors tell, and
+MuJoCo judges. Motors with their torque-speed line, friction 0.6 to 1.0 (drops: 0.4 to 1.0), masses
+within 10 %, of which the controller is not told; forces planned ahead by the MPC. Numbers were
+chosen on seeds 0 to 9 and from 9000 on; those judged begin at ``FIRST_SEED``.
 
 - standing: a push of 0.1 s in each of eight directions, 36 N s aside, 45 ahead and back, on an
   ellipse in between; survived is who stands again within 3 s;
@@ -17,6 +18,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -60,7 +62,8 @@ CHANGES = 10
 EXAMPLES = """
 python -m benchmarks balance              everything
 python -m benchmarks balance --quick      three seeds
-python -m benchmarks balance --rows recover --seeds 200
+python -m benchmarks balance --rows sensors
+python -m benchmarks balance --rows recover sensed-recover
 python -m benchmarks balance --list       the metrics and their thresholds
 """
 
@@ -70,33 +73,33 @@ def impulse_at(angle: float) -> float:
     return 1.0 / math.hypot(math.cos(angle) / AHEAD, math.sin(angle) / ASIDE)
 
 
-def measure_standing(trial: Trial, direction: int) -> Measurement:
+def measure_standing(trial: Trial, name: str, sensors: str, direction: int) -> Measurement:
     """Push the standing robot in one direction."""
-    angle, name = 2.0 * math.pi * direction / DIRECTIONS, f"stand.{45 * direction}"
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+    angle = 2.0 * math.pi * direction / DIRECTIONS
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
         robot.require(robot.go2.stand())
         start, since = robot.plant.time, math.inf
         try:
             robot.push(heading_force(angle, impulse_at(angle)), PUSH_TIME)
             while robot.plant.time - start < STANDING_LIMIT:
                 robot.wait(LOOK)
-                stands = is_standing(RobotModel().snapshot(robot.plant.read()))
+                stands = is_standing(RobotModel().snapshot(robot.plant.truth()))
                 since = min(since, robot.plant.time) if stands else math.inf
         except TrialFailed as failed:
             return Measurement({name: 0.0}, notes={name: str(failed)})
     return Measurement({name: float(since <= start + STANDING_LIMIT - CALM)})
 
 
-def measure_trotting(trial: Trial, name: str) -> Measurement:
+def measure_trotting(trial: Trial, name: str, sensors: str, push: str) -> Measurement:
     """Push the trotting robot at every phase; the share of phases that it survives."""
-    angle, impulse = TROT_PUSHES[name]
+    angle, impulse = TROT_PUSHES[push]
     survived, period = 0, GAITS["trot"].period
     for phase in range(PHASES):
-        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
             robot.require(robot.go2.stand())
             robot.require(robot.go2.walk())
             robot.go2.move(TROT_SPEED)
-            side = 1.0 if phase % 2 or name != "lateral" else -1.0
+            side = 1.0 if phase % 2 or push != "lateral" else -1.0
             try:
                 robot.wait(TROT_TIME + phase * period / PHASES)
                 robot.push(heading_force(side * angle, impulse), PUSH_TIME)
@@ -106,7 +109,7 @@ def measure_trotting(trial: Trial, name: str) -> Measurement:
             strides = robot.truth.recording(since=robot.plant.time - 2.0 * period)
             speed = float(strides.com_velocity[:, 0].mean())
             survived += abs(speed - TROT_SPEED) < SPEED_TOLERANCE
-    return Measurement({f"trot.{name}": survived / PHASES})
+    return Measurement({name: survived / PHASES})
 
 
 def dropped(seed: int, sensors: str = "ideal") -> MujocoPlant:
@@ -124,21 +127,21 @@ def dropped(seed: int, sensors: str = "ideal") -> MujocoPlant:
     return plant
 
 
-def measure_recovery(trial: Trial) -> Measurement:
+def measure_recovery(trial: Trial, name: str, sensors: str) -> Measurement:
     """Drop the limp robot and let it get up."""
-    with TrialRobot(dropped(FIRST_SEED + trial.seed), CONFIG) as robot:
+    with TrialRobot(dropped(FIRST_SEED + trial.seed, sensors), CONFIG) as robot:
         robot.go2.wait(DROP_TIME)
         said = robot.go2.recover()
         is_up = said and robot.truth.fall() is None
-        stands = is_up and is_standing(RobotModel().snapshot(robot.plant.read()))
-        notes = {} if stands else {"recover": robot.go2.last_outcome.reason}
-    return Measurement({"recover": float(stands)}, notes=notes)
+        stands = is_up and is_standing(RobotModel().snapshot(robot.plant.truth()))
+        notes = {} if stands else {name: robot.go2.last_outcome.reason}
+    return Measurement({name: float(stands)}, notes=notes)
 
 
-def measure_gaits(trial: Trial) -> Measurement:
+def measure_gaits(trial: Trial, name: str, sensors: str) -> Measurement:
     """Change the gait, or stop, again and again."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         try:
@@ -146,8 +149,8 @@ def measure_gaits(trial: Trial) -> Measurement:
                 _change(robot, rng)
                 done += 1
         except TrialFailed as failed:
-            return Measurement({"gaits": done / CHANGES}, notes={"gaits": str(failed)})
-    return Measurement({"gaits": 1.0})
+            return Measurement({name: done / CHANGES}, notes={name: str(failed)})
+    return Measurement({name: 1.0})
 
 
 def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
@@ -164,43 +167,54 @@ def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
     robot.wait(float(rng.uniform(0.3, 1.5)))
 
 
-def _share(name: str, item: str, quantity: str, least: float) -> Metric:
-    return Metric(name, item, quantity, "", least, Direction.AT_LEAST)
+def _scenario(
+    name: str,
+    item: str,
+    quantity: str,
+    measure: Callable[..., Measurement],
+    sensors: str,
+    least: float = 1.0,
+    times: int = 1,
+) -> Scenario:
+    """A row whose value is a share; ``measure`` takes its name and the sensors, too."""
+    if sensors != "ideal":
+        name, item = f"sensed-{name}", f"sensors: {item}"
+    metric = Metric(name, item, quantity, "", least, Direction.AT_LEAST)
+    measured = partial(measure, name=name, sensors=sensors)
+    return Scenario(name, (metric,), measured, times, "truth" if sensors == "ideal" else "sensors")
 
 
-_TROT = "trot 0.5 m/s, push 0.1 s, 16 phases"
-SCENARIOS = (
-    *(
-        Scenario(
-            f"stand-{45 * k}",
-            (
-                _share(
-                    f"stand.{45 * k}",
-                    "standing, push 0.1 s, 36 N s aside, 45 ahead",
-                    f"survived at {45 * k} deg",
-                    1.0,
-                ),
-            ),
-            partial(measure_standing, direction=k),
-            group="standing",
-        )
-        for k in range(DIRECTIONS)
-    ),
-    *(
-        Scenario(
-            f"trot-{name}",
-            (_share(f"trot.{name}", _TROT, f"{name} {impulse:g} N s survived", 1.0),),
-            partial(measure_trotting, name=name),
-            group="trotting",
-        )
-        for name, (_, impulse) in TROT_PUSHES.items()
-    ),
-    Scenario("recover", (_share("recover", "drops", "stand again", 0.98),), measure_recovery, 10),
-    Scenario(
-        "gaits", (_share("gaits", "ten changes of gait and stops", "done", 1.0),), measure_gaits
-    ),
-    disturbed.SCENARIO,
-)
+def _scenarios(sensors: str) -> tuple[Scenario, ...]:
+    """All rows with the plant's ``sensors``."""
+    standing, trot = "standing, push 0.1 s", f"trot {TROT_SPEED:g} m/s, push 0.1 s, 16 phases"
+    return (
+        *(
+            _scenario(
+                f"stand-{45 * k}",
+                f"{standing}, {ASIDE:g} N s aside, {AHEAD:g} ahead",
+                f"survived at {45 * k} deg",
+                partial(measure_standing, direction=k),
+                sensors,
+            )
+            for k in range(DIRECTIONS)
+        ),
+        *(
+            _scenario(
+                f"trot-{push}",
+                trot,
+                f"{push} {impulse:g} N s survived",
+                partial(measure_trotting, push=push),
+                sensors,
+            )
+            for push, (_, impulse) in TROT_PUSHES.items()
+        ),
+        _scenario("recover", "drops", "stand again", measure_recovery, sensors, 0.98, 10),
+        _scenario("gaits", "ten changes of gait and stops", "done", measure_gaits, sensors),
+        disturbed.scenario(sensors),
+    )
+
+
+SCENARIOS = (*_scenarios("ideal"), *_scenarios("imu"))
 """In the order of the report."""
 
 

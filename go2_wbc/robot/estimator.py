@@ -20,8 +20,8 @@ A foot whose velocity is not that of a standing one, by what the filter expects,
 (``slip``). A robot whose joints and IMU read rest for a while has no velocity, and its gyro reads
 its bias: a zero-velocity update (Foxlin, IEEE Computer Graphics and Applications 25(6), 2005). So
 has one that lies, which is told from one in flight by the gravity that its trunk feels. At speed
-the biases are hardly learnt (``learning_speed``), and not at all from a trunk on the ground. After a
-tumble, or when what is at rest has been taken for something else, the filter begins anew.
+the biases are hardly learnt (``learning_speed``), and not at all from a trunk on the ground. After
+a tumble, or when what is at rest has been taken for something else, the filter begins anew.
 ``kernels.estimation`` and ``kernels.filtering`` are the arithmetic.
 """
 

@@ -45,14 +45,16 @@ def test_a_drop_begins_above_the_floor() -> None:
     plant.close()
 
 
-def test_a_dropped_robot_stands_again() -> None:
-    assert measured("recover", 1) == {"recover": 1.0}
+@pytest.mark.parametrize("name", ["recover", "sensed-recover", "sensed-gaits", "sensed-stand-90"])
+def test_a_robot_stands_again(name: str) -> None:
+    assert measured(name, 1) == {name: 1.0}
 
 
-def test_a_disturbed_robot_says_in_time_that_it_has_fallen() -> None:
-    values = measured("disturbed", 0)
-    assert values["disturbed.delay"] <= 0.2
-    assert values["disturbed.falls"] > 0.0
+@pytest.mark.parametrize("name", ["disturbed", "sensed-disturbed"])
+def test_a_disturbed_robot_says_in_time_that_it_has_fallen(name: str) -> None:
+    values = measured(name, 0)
+    assert values[f"{name}.delay"] <= 0.2
+    assert values[f"{name}.falls"] > 0.0
 
 
 def test_a_fall_that_nobody_notices_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
