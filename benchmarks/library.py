@@ -38,7 +38,7 @@ def measure(trial: Trial) -> Measurement:
             robot.require(robot.go2.stand())
             while remaining:
                 name = remaining.pop(0)
-                plan = _plan(name)
+                plan = plan_of(name)
                 run = measure_motion(robot.go2, robot.truth, plan, model)
                 for metric, value in (
                     (SLIP if plan.footsteps is None else LANDED_SLIP, 1000.0 * run.slip),
@@ -56,7 +56,7 @@ def measure(trial: Trial) -> Measurement:
 
 
 @cache
-def _plan(name: str) -> MotionPlan:
+def plan_of(name: str) -> MotionPlan:
     """The motion, compiled once for all trials of a process: it depends on nothing of theirs."""
     return compile_timeline(load_motion(name), RobotModel())
 

@@ -25,7 +25,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks import other_robots, sensed
+from benchmarks import other_robots, sensed, sensed_library
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
 from benchmarks.steps import plant_of
@@ -177,6 +177,7 @@ SCENARIOS = (
         for run in (*RUNS, *(replace(run, group="sensors", sensors="imu") for run in SENSED))
     ),
     *sensed.SCENARIOS,
+    sensed_library.SCENARIO,
     *UNKNOWN,
     *other_robots.SCENARIOS,
 )

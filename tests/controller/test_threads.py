@@ -19,6 +19,8 @@ from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task
+from motions import Timeline
+from motions.dynamics.search import Clock
 from tests.controller.plants import HANG_GUARD, WatchedPlant, in_thread, is_limp
 
 # s into a call, when it is well under way.
@@ -212,6 +214,35 @@ def test_in_realtime_a_real_ctrl_c_leaves_a_limp_robot(plant: WatchedPlant, name
             assert go2.last_outcome.reason == f"interrupted during {what}(), damped"
             go2.wait(0.1)
             assert is_limp(plant.commands[-1])
+    finally:
+        signal.signal(signal.SIGINT, usual)
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+def test_ctrl_c_while_a_motion_is_planned_is_raised_at_once_and_the_robot_stands_on(
+    plant: WatchedPlant, monkeypatch: pytest.MonkeyPatch, *, realtime: bool
+) -> None:
+    count, asked = Clock.__call__, []
+
+    def interrupt(clock: Clock, solver: object) -> None:
+        count(clock, solver)
+        asked.append(clock.iterations)
+        if len(asked) == 2:
+            signal.raise_signal(signal.SIGINT)
+
+    jump = Timeline().jump(height=0.1234)  # in no cache of plans
+    usual = signal.signal(signal.SIGINT, signal.default_int_handler)
+    monkeypatch.setattr(Clock, "__call__", interrupt)
+    try:
+        with GO2Controller(plant=plant, realtime=realtime) as go2:
+            assert go2.stand()
+            with pytest.raises(KeyboardInterrupt):
+                go2.play(jump, check=False)
+            assert len(asked) == 2, "in the middle of the search"
+            assert go2.mode is Mode.STANDING
+            assert not is_limp(plant.commands[-1])
+            assert go2.play("nod", check=False), go2.last_outcome.reason
+        assert is_limp(plant.commands[-1])
     finally:
         signal.signal(signal.SIGINT, usual)
 
