@@ -23,6 +23,7 @@ from go2_wbc.kernels.filtering import (
     put_turned,
     take_in,
     take_in_one,
+    turn_world_about_robot,
 )
 from go2_wbc.kernels.vectors import rotation_of
 
@@ -335,6 +336,7 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
         for k in range(3):
             take_in_one(P, dx, column, 3 + k, -x[3 + k], numbers[REST] ** 2)
     learn_in_part(P, dx, before, share_learnt)
+    turn_world_about_robot(P)
     correct(x, dx)
     for k in range(3):
         w[k] = reading[1 + k] - x[GYRO_BIAS + k]

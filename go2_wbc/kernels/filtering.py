@@ -19,6 +19,7 @@ STATE, ERROR = 28, 27
 QUATERNION, GYRO_BIAS, FORCE_BIAS, FEET = 6, 10, 13, 16
 """Where they are in an estimate; the velocity is at 3."""
 THETA, E_GYRO_BIAS, E_FORCE_BIAS, E_FEET = 6, 9, 12, 15
+HEADING = THETA + 2
 """Where they are in its error."""
 
 
@@ -145,6 +146,29 @@ def learn_in_part(P, dx, before, share):
         for j in range(6):
             m, n = E_GYRO_BIAS + i, E_GYRO_BIAS + j
             P[m, n] += left * (before[i, j] - P[m, n])
+
+
+@subroutine("void(f8[:,::1])")
+def turn_world_about_robot(P):
+    """Let an error of the heading turn the world about the robot, no more about where it began.
+
+    All places share an error that goes with the heading's, by the whole way walked since: what
+    tells of the heading would move them, and a robot that is to stay where it stands would follow
+    over its feet. That error is kept in P, as one that is independent of the heading.
+    """
+    variance = P[HEADING, HEADING]
+    if variance <= 0.0:
+        return
+    gains, heading = np.zeros(ERROR), P[HEADING].copy()
+    for k in range(2):
+        gain = heading[k] / variance
+        gains[k] = gain
+        for foot in range(4):
+            gains[E_FEET + 3 * foot + k] = gain
+    for i in range(ERROR):
+        for j in range(ERROR):
+            both = gains[i] * gains[j] * variance
+            P[i, j] += 2.0 * both - gains[i] * heading[j] - heading[i] * gains[j]
 
 
 @subroutine("void(f8[::1], f8[::1])")

@@ -16,6 +16,12 @@ Roll and pitch follow from gravity, seen through the velocity; heading is dead r
 feet come down beside level ground their heights are not taken in: on a slope of 15 deg that had
 turned the pitch by 7 deg within 8 s.
 
+An error of the heading moves all places by the way walked since. Feet that stand tell of the
+heading, and by that lever had moved base and feet together by 6 cm/s: a robot that was to stand on
+a slope followed until it stood beside its feet. So the heading's error turns the world about the
+robot (``turn_world_about_robot``; robot-centred filters do it by their choice of the state: Bloesch
+et al., IROS 2015, *Robust visual inertial odometry using a direct EKF-based approach*).
+
 A foot whose velocity is not that of a standing one, by what the filter expects, counts less
 (``slip``). A robot whose joints and IMU read rest for a while has no velocity, and its gyro reads
 its bias: a zero-velocity update (Foxlin, IEEE Computer Graphics and Applications 25(6), 2005). So
@@ -262,7 +268,7 @@ class StateEstimator:
 
         With the IMU at r in the base frame, and the error of the orientation theta in the world:
         dp_base = dp - theta x R r, dv_base = R' (dv - theta x v) - dw x r, and dw is the bias's
-        error and the gyro's noise.
+        error and the gyro's noise. That place and heading go wrong together is not kept.
         """
         R, r = pin.Quaternion(self._x[6:10]).toRotationMatrix(), pin.skew(self._p_base_imu)
         one = np.eye(3)
