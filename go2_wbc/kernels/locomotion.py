@@ -285,15 +285,18 @@ def foothold(leg, snapshot, s, c, nominal, remaining, goal):
     ref_x = cosine * s[_VELOCITY] - sine * s[_VELOCITY + 1]
     ref_y = sine * s[_VELOCITY] + cosine * s[_VELOCITY + 1]
     arm_x, arm_y = nominal[leg, 0] - snapshot[_Q], nominal[leg, 1] - snapshot[_Q + 1]
-    v_x = snapshot[_V_COM] - s[_VELOCITY + 2] * arm_y
-    v_y = snapshot[_V_COM + 1] + s[_VELOCITY + 2] * arm_x
-    half = s[_DUTY] * s[_PERIOD] / 2
+    v_x, v_y, half = snapshot[_V_COM], snapshot[_V_COM + 1], s[_DUTY] * s[_PERIOD] / 2
+    cosine, sine = np.cos(s[_VELOCITY + 2] * remaining), np.sin(s[_VELOCITY + 2] * remaining)
+    hip_x, hip_y = cosine * arm_x - sine * arm_y, sine * arm_x + cosine * arm_y
+    cosine, sine = np.cos(s[_VELOCITY + 2] * half), np.sin(s[_VELOCITY + 2] * half)
     lean = s[_VELOCITY + 2] * c[_HEIGHT] / c[_GRAVITY]
-    x = v_x * half + c[_FEEDBACK] * (snapshot[_V_COM] - ref_x) + lean * ref_y
-    y = v_y * half + c[_FEEDBACK] * (snapshot[_V_COM + 1] - ref_y) - lean * ref_x
+    x = cosine * hip_x - sine * hip_y - hip_x + v_x * half
+    y = sine * hip_x + cosine * hip_y - hip_y + v_y * half
+    x += c[_FEEDBACK] * (v_x - ref_x) + lean * ref_y
+    y += c[_FEEDBACK] * (v_y - ref_y) - lean * ref_x
     share = min(1.0, c[_REACH] / max(np.hypot(x, y), TINY))
-    goal[0] = nominal[leg, 0] + x * share + v_x * remaining
-    goal[1] = nominal[leg, 1] + y * share + v_y * remaining
+    goal[0] = snapshot[_Q] + hip_x + x * share + v_x * remaining
+    goal[1] = snapshot[_Q + 1] + hip_y + y * share + v_y * remaining
     goal[2] = ground_at(s, goal[0], goal[1]) + c[_RADIUS]
 
 

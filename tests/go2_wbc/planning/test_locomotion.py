@@ -27,6 +27,7 @@ TICK = 0.002
 EXACT = 1e-9  # rounding in sums of a few hundred ticks
 SWING_END = TROT.swing_time - TICK
 LAST_TICK = 5e-4  # [m] the swing curve's way in the last tick, with margin
+OUTSIDE = 0.01  # m
 KINDS = [LocomotionPlanner, CompiledPlanner]
 
 
@@ -276,13 +277,24 @@ def test_a_turning_robot_steps_along_the_circle_about_its_middle(ahead: float, l
     reference = landing(start, VelocityCommand(ahead, left, 0.6))
     v_x, v_y, _ = v_ref = reference.body.v_world
     outside = 0.6 * CONFIG.height / MODEL.gravity * np.array([v_y, -v_x])
+    R = yaw_rotation(0.6 * (TROT.stance_time / 2 + TROT.swing_time - SWING_END))[:2, :2]
     for leg in np.flatnonzero(~reference.stance):
-        x, y = start.p_world_feet[leg, :2]
-        step = (reference.p_world_feet[leg] - start.p_world_feet[leg])[:2]
-        tangent = np.array([-y, x])
-        share = TROT.stance_time / 2 + TROT.swing_time - SWING_END
-        expected = 0.6 * tangent * share - CONFIG.velocity_feedback * v_ref[:2] + outside
-        np.testing.assert_allclose(step, expected, atol=LAST_TICK)
+        hip = start.p_world_feet[leg, :2]
+        found = reference.p_world_feet[leg, :2]
+        expected = R @ hip - CONFIG.velocity_feedback * v_ref[:2] + outside
+        np.testing.assert_allclose(found, expected, atol=LAST_TICK)
+
+
+def test_feet_of_a_fast_turn_stay_on_their_circle_all_the_way() -> None:
+    """They went 5 cm outside of it in mid-swing: motors saturated, and the robot fell."""
+    start = resting()
+    planner = make_planner(MODEL, TROT, replace(CONFIG, angular_acceleration=1e4))
+    planner.start(start)
+    radius = np.linalg.norm(start.p_world_feet[:, :2], axis=1).max()
+    for tick in range(round(SWING_END / TICK)):
+        reference = planner.update(at(start, TICK * tick), VelocityCommand(0.0, 0.0, 6.0))
+        feet = reference.p_world_feet[~reference.stance, :2]
+        assert np.linalg.norm(feet, axis=1).max() < radius + OUTSIDE
 
 
 def test_a_foothold_stays_within_reach_of_the_hip() -> None:
