@@ -10,7 +10,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
 from motions.assembly import compile_timeline
 from motions.compiled_plan import CompiledPlan
-from motions.feasibility import dynamic, flight, friction, kinematic
+from motions.feasibility import dynamic, flight, friction, kinematic, tracking
 from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion, timeline_of
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.departure import departure_measurements, departures
@@ -147,7 +147,9 @@ class FeasibilityChecker:
             in_flight = flight.flight(plan, model, heavy.mass, spans)
         forces = dynamic.resisted(forces, path, self.world.worst)
         lag = dynamic.lagging(path, forces, heavy, limits)
+        off = tracking.tracking(path, forces, heavy, self.world.worst, limits)
         com, zero_moment_point = dynamic.support(carried, forces, limits)
+        tips = tracking.tipping(carried, forces, zero_moment_point.values[:, 0], heavy, limits)
         slip = friction.slip(path, forces, heavy, limits, floor)
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
         wrench, load = dynamic.contacts(path, forces, limits)
@@ -171,6 +173,8 @@ class FeasibilityChecker:
             wrench if lag.is_broken else wrench.excused(),
             load if slips else load.excused(),
             lag,
+            tips,
+            off,
             grip if slips else grip.excused(),
             slip,
             *dynamic.torque(path, forces, model, limits),

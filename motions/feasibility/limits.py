@@ -31,6 +31,11 @@ class FeasibilityLimits:
             moment as much on an arm of 0.2 m.
         lag, lag_angle: how far [m, rad] the trunk may be off its plan for what the ground cannot
             give. In MuJoCo it was off by 0.7 to 2.2 times as much.
+        off, off_angle: how far [m, rad] the trunk may be off its plan in all, for the friction of
+            the joints too: what an author sees is 0.030 and 0.14, and MuJoCo's trunk was off by
+            0.85 to 1.2 times as much.
+        tipping: how far [m] the trunk may fall over the edge of three feet: up to 5 mm motions were
+            done, from 7 on the robot fell.
         stop: how far [m] a raised foot, or the trunk over a knee that is bent as far as it goes,
             may be off for a joint at its stop: in MuJoCo it was off by 0.5 to 0.9 of it.
         stretch: the same of the trunk over any other standing leg: it was off by 1.1 to 2.2 times
@@ -71,6 +76,9 @@ class FeasibilityLimits:
     wrench: float = 5.0
     lag: float = 0.015
     lag_angle: float = 0.03
+    off: float = 0.025
+    off_angle: float = 0.13
+    tipping: float = 0.006
     stop: float = 0.03
     stretch: float = 0.018
     pair_hip: float = 0.05
