@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from go2_wbc.errors import MotionError
@@ -23,6 +25,8 @@ from motions.language.written import NEAREST
 from motions.problem import Problem
 from motions.trajectory import trajectory_of
 
+BALANCE, WAY = "balance", "way of a foot"
+"""Problems of the compiler."""
 FLIGHT_SHARE = 1.1
 """What solved plans may use of the floor's friction: they are solved for 0.5, and reach 0.55."""
 
@@ -156,7 +160,7 @@ class FeasibilityChecker:
         grip = friction.friction(path, forces, heavy, limits, floor)
         landing_place, landing_speed = kinematic.landing(path, model, limits)
         in_order_of_causes = [
-            *(_failed(problem) for problem in problems if problem.check != "balance"),
+            *_missed(problems, limits),
             kinematic.reach(path, limits),
             kinematic.joint_position(path, model, limits),
             self_distance(path, self._collision, model, limits),
@@ -211,6 +215,17 @@ def check(
         ConfigError: for a world that is out of range.
     """
     return FeasibilityChecker(world=World.of(friction, payload, world)).check(motion)
+
+
+def _missed(problems: Sequence[Problem], limits: FeasibilityLimits) -> list[Series]:
+    """What else than balance is not as written; a place that a foot nearly reaches is a warning."""
+    found = [_failed(problem) for problem in problems if problem.check not in (BALANCE, WAY)]
+    for problem in problems:
+        if problem.check == WAY:
+            times, values = np.array([problem.time]), np.full((1, 1), problem.miss)
+            what = (WAY, "m", (problem.subject,), times, values, limits.reach)
+            found.append(Series.against(*what, tight=limits.reach))
+    return found
 
 
 def _failed(problem: Problem) -> Series:
