@@ -230,10 +230,15 @@ def lagging(
     return Series.against("lag", "m, rad", subjects, motion.times, values, bounds)
 
 
-def errors_of(motion: Trajectory, pushes: Float[np.ndarray, "n 6"]) -> Float[np.ndarray, "n 6"]:
+def errors_of(
+    motion: Trajectory,
+    pushes: Float[np.ndarray, "n 6"],
+    damping: Float[np.ndarray, "6"] | float = 0.0,
+) -> Float[np.ndarray, "n 6"]:
     """How far trunk and attitude [m, rad] are off for accelerations that are taken from them.
 
-    Solved parts, in which they are followed otherwise, take none.
+    Solved parts, in which they are followed otherwise, take none. ``damping`` [1/s] is what damps
+    the errors besides the gains.
     """
     from go2_wbc.kernels.loads import lag  # compiled; only who needs it waits for it
 
@@ -242,7 +247,7 @@ def errors_of(motion: Trajectory, pushes: Float[np.ndarray, "n 6"]) -> Float[np.
     kp, kd = (np.concatenate(pair) for pair in zip(*gains, strict=True))
     taken = np.where(motion.is_dynamic[:, None], 0.0, pushes)
     errors, dt = np.zeros(taken.shape), float(np.mean(np.diff(motion.times)))
-    lag(taken, kp, kd, dt, errors)
+    lag(taken, kp, kd + damping, dt, errors)
     return errors
 
 

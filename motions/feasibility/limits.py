@@ -34,7 +34,7 @@ class FeasibilityLimits:
             give. In MuJoCo it was off by 0.7 to 2.2 times as much.
         off, off_angle: how far [m, rad] the trunk may be off its plan in all, for the friction of
             the joints too: what an author sees is 0.030 and 0.14, and MuJoCo's trunk was off by
-            0.85 to 1.2 times as much.
+            1.05 to 1.3 times as much.
         tipping: how far [m] the trunk may fall over the edge of three feet: up to 5 mm motions were
             done, from 7 on the robot fell.
         stop: how far [m] a raised foot, or the trunk over a knee that is bent as far as it goes,
@@ -80,7 +80,7 @@ class FeasibilityLimits:
     lag: float = 0.015
     lag_angle: float = 0.03
     off: float = 0.025
-    off_angle: float = 0.13
+    off_angle: float = 0.112
     tipping: float = 0.006
     stop: float = 0.03
     stretch: float = 0.018

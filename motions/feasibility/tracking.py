@@ -9,7 +9,7 @@ their friction moves the trunk like a force T' r, against the inertia of trunk a
               [T]
 
 The controller pulls the trunk back with its gains. Light as the trunk is against the friction of
-four hips, a roll lags by degrees where nothing else does: 8 at 190 deg/s.
+four hips, a roll lags by degrees where nothing else does: 9 at 190 deg/s.
 
 Over three feet nothing pulls back a trunk whose zero-moment point is at their edge. The foot that
 bears least lifts off, and the trunk tips over the line between the others. With the force F that
@@ -30,6 +30,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.world import World
 from motions.feasibility.dynamic import (
+    VISCOUS,
     Forces,
     errors_of,
     joint_friction,
@@ -56,42 +57,49 @@ def tracking(
 ) -> Series:
     """How far the trunk is off its plan in all: m, rad; solved parts, played otherwise, count 0.
 
-    In MuJoCo it was off by 0.85 to 1.2 times as much for friction (motions drawn for that alone).
+    In MuJoCo it was off by 1.05 to 1.3 times as much for friction (motions drawn for that alone).
     """
-    pushes = lost(motion, forces, model) + resistance(motion, model, world)
-    errors = errors_of(motion, pushes)
+    taken, damping = resistance(motion, model, world)
+    errors = errors_of(motion, lost(motion, forces, model) + taken, damping)
     values = np.column_stack([np.linalg.norm(e, axis=1) for e in (errors[:, :3], errors[:, 3:])])
     bounds, subjects = np.array([limits.off, limits.off_angle]), ("trunk", "trunk turning")
     return Series.against("tracking", "m, rad", subjects, motion.times, values, bounds)
 
 
-def resistance(motion: Trajectory, model: RobotModel, world: World) -> Float[np.ndarray, "n 6"]:
-    """What the joints' friction takes of the trunk's acceleration [m/s^2, rad/s^2].
+def resistance(
+    motion: Trajectory, model: RobotModel, world: World
+) -> tuple[Float[np.ndarray, "n 6"], Float[np.ndarray, "6"]]:
+    """What the joints' friction takes of the trunk's acceleration [m/s^2, rad/s^2], and damps.
 
-    Of the place along the axes of the motion, of the turning along those of the trunk.
+    Of the place along the axes of the motion, of the turning along those of the trunk. It is that
+    at the speeds of the plan; a trunk that falls behind turns the joints less, so the viscous part
+    damps its errors [1/s], on average over the motion.
     """
     count = len(motion.times)
     rows = np.unique(np.append(np.arange(0, count, EVERY), count - 1))
     v, a = motion.v[rows, 6:], motion.a[rows, 6:]
     fed = WbcConfig().joint_friction.torque
     rest = joint_friction(v, world) - [fed(*both) for both in zip(v, a, strict=True)]
-    taken = [_taken(motion, int(row), one, model) for row, one in zip(rows, rest, strict=True)]
-    columns = [np.interp(motion.times, motion.times[rows], column) for column in np.array(taken).T]
-    return np.column_stack(columns)
+    found = [_taken(motion, int(row), one, model) for row, one in zip(rows, rest, strict=True)]
+    taken, damped = (np.array(parts) for parts in zip(*found, strict=True))
+    columns = [np.interp(motion.times, motion.times[rows], column) for column in taken.T]
+    return np.column_stack(columns), world.joint_friction * VISCOUS * damped.mean(axis=0)
 
 
 def _taken(
     motion: Trajectory, row: int, rest: Float[np.ndarray, "12"], model: RobotModel
-) -> Float[np.ndarray, "6"]:
+) -> tuple[Float[np.ndarray, "6"], Float[np.ndarray, "6"]]:
+    """The acceleration, and by which damping a unit of viscous friction damps."""
     snapshot = model.snapshot(state_at(motion, row))
     follow = np.vstack([np.eye(6), np.zeros((12, 6))])
     for leg in LEGS:
         if motion.stance[row, leg]:
             J, own = snapshot.J_contacts[leg], slice(6 + 3 * leg, 9 + 3 * leg)
             follow[own] = -np.linalg.lstsq(J[:, own], J[:, :6], rcond=RCOND)[0]
-    inertia = follow.T @ snapshot.mass_matrix @ follow
-    a = -np.linalg.solve(inertia, follow[6:].T @ rest)
-    return np.concatenate([snapshot.R_world_base @ a[:3], a[3:]])
+    inertia, turned = follow.T @ snapshot.mass_matrix @ follow, follow[6:]
+    a = -np.linalg.solve(inertia, turned.T @ rest)
+    damped = np.diag(np.linalg.solve(inertia, turned.T @ turned))
+    return np.concatenate([snapshot.R_world_base @ a[:3], a[3:]]), damped
 
 
 def tipping(

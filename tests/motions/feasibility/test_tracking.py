@@ -44,7 +44,7 @@ def test_a_trunk_that_moves_fast_turns_behind_its_plan_by_the_friction_of_the_jo
 ) -> None:
     report = checker.check(to_and_fro(channel, size, over, times))
     found = np.degrees(tracked(report)["trunk turning"])
-    assert 0.65 * turned <= found <= 1.05 * turned  # in deg, of MuJoCo's trunk
+    assert turned / 1.35 - 0.3 <= found <= turned  # in deg, of MuJoCo, which stands 0.3 off
 
 
 @pytest.mark.parametrize(("angle", "is_refused"), [(17.0, False), (35.0, True)])
@@ -61,7 +61,7 @@ def test_stiff_joints_hold_the_trunk_back_more_and_free_ones_do_not(
 ) -> None:
     path = checker.evaluate(to_and_fro("roll", 0.4, 0.4)).path
     by_friction = [
-        np.abs(resistance(path, checker.model, World(joint_friction=share))).max()
+        np.abs(resistance(path, checker.model, World(joint_friction=share))[0]).max()
         for share in (0.5, 1.0, 2.0)
     ]
     assert by_friction == sorted(by_friction)
