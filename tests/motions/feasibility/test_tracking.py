@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -18,7 +20,8 @@ def checker() -> FeasibilityChecker:
 def to_and_fro(channel: str, size: float, over: float, times: int = 1) -> Timeline:
     line = Timeline()
     for _ in range(times):
-        line = line.body(**{channel: size}, over=over).body(**{channel: -size}, over=over)
+        there, back = dict[str, Any]({channel: size}), dict[str, Any]({channel: -size})
+        line = line.body(**there, over=over).body(**back, over=over)
     return line.home(over=0.5)
 
 
