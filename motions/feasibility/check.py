@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -153,6 +154,8 @@ class FeasibilityChecker:
         lag = dynamic.lagging(path, forces, heavy, limits)
         off = tracking.tracking(path, forces, heavy, self.world.worst, limits)
         com, zero_moment_point = dynamic.support(carried, forces, limits)
+        if carried is not path:  # the controller feels the load, and shifts the CoM back
+            com = _lesser(com, dynamic.support(path, forces, limits)[0])
         tips = tracking.tipping(carried, forces, zero_moment_point.values[:, 0], heavy, limits)
         slip = friction.slip(path, forces, heavy, limits, floor)
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
@@ -226,6 +229,12 @@ def _missed(problems: Sequence[Problem], limits: FeasibilityLimits) -> list[Seri
             what = (WAY, "m", (problem.subject,), times, values, limits.reach)
             found.append(Series.against(*what, tight=limits.reach))
     return found
+
+
+def _lesser(one: Series, other: Series) -> Series:
+    """The lesser values of two series that may not fall below the same limits."""
+    values = np.minimum(one.values, other.values)
+    return replace(one, values=values, margins=np.minimum(one.margins, other.margins))
 
 
 def _failed(problem: Problem) -> Series:
