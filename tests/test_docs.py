@@ -245,6 +245,8 @@ def test_the_limits_in_the_table_are_those_of_the_checker() -> None:
         "foot load": f">= {limits.foot_load:g} N",
         "slip": f"<= {1000 * limits.slip:g} mm",
         "lag": f"<= {1000 * limits.lag:g} mm, {limits.lag_angle:g} rad",
+        "tipping": f"<= {1000 * limits.tipping:g} mm",
+        "tracking": f"<= {1000 * limits.off:g} mm, {limits.off_angle:g} rad",
         "friction": f"<= {World().friction:g}",
         "self-collision": f">= {1000 * limits.self_distance:g} mm",
         "clearance": f">= {1000 * limits.clearance:g} mm; "

@@ -16,6 +16,7 @@ from go2_wbc.errors import PlantError, StanceMismatch
 
 if TYPE_CHECKING:
     from controller.motion_measurement import MotionMeasurement
+    from go2_wbc.world import World
 
 TELL_EVERY = 50
 """Ticks between two looks at the progress line."""
@@ -34,9 +35,9 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "run",
-        "Check a motion, then play it in MuJoCo under the whole-body controller, and\n"
-        "print what came of it. Exit code 0 if it was done, 1 if it is infeasible or\n"
-        "was not done.",
+        "Check a motion, then play it in MuJoCo under the whole-body controller, in the\n"
+        "world that it was checked for (friction 0.5 by default), and print what came\n"
+        "of it. Exit code 0 if it was done, 1 if it is infeasible or was not done.",
         examples=EXAMPLES,
     )
     add_motion(parser)
@@ -54,26 +55,24 @@ def run(args: argparse.Namespace) -> int:
     from controller.motion_measurement import measure_motion
     from controller.report_view import performed
     from go2_wbc.files import checked_output
-    from go2_wbc.plant import MujocoPlant
+    from go2_wbc.plant import plant_in_world
     from go2_wbc.plant.mujoco.ground_truth import GroundTruth
     from go2_wbc.reference import Posture
     from motions import FeasibilityChecker
     from viz import HTML_SUFFIXES, export_html
 
-    motion = the_motion(args.motion, args.values)
+    motion, world = the_motion(args.motion, args.values), world_of(args)
     target = None if args.html is None else checked_output(args.html, HTML_SUFFIXES)
     with ProgressLine(is_quiet=args.json) as line:
         line.update(0.0, f"checking {motion.name}")
-        checker = FeasibilityChecker(world=world_of(args), progress=line.solving)
+        checker = FeasibilityChecker(world=world, progress=line.solving)
         checked = checker.evaluate(motion)
     plan, report = checked.plan, checked.report
     if not args.force:
         report.raise_if_infeasible()
     with (
         line,
-        closing(
-            GroundTruth(MujocoPlant(friction=args.friction, payload=args.payload or 0.0))
-        ) as truth,
+        closing(GroundTruth(plant_in_world(world))) as truth,
         GO2Controller(plant=truth) as go2,
     ):
         truth.on_tick = teller(line, truth.control_period, plan.name, plan.duration)
@@ -86,9 +85,11 @@ def run(args: argparse.Namespace) -> int:
         result = measure_motion(go2, truth, plan, checker.model)
         recording = go2.recording()
     if args.json:
-        print_json({"motion": plan.name, "feasible": report.ok, **result.as_dict()})
+        print_json(
+            {"motion": plan.name, "feasible": report.ok, **_where(world), **result.as_dict()}
+        )
     else:
-        _print(plan.name, plan.duration, result)
+        _print(plan.name, plan.duration, world, result)
     if target is not None:
         export_html(performed(checked, recording, checker.model), target, title=plan.name)
         if not args.json:
@@ -108,8 +109,15 @@ def teller(line: ProgressLine, period: float, name: str, duration: float) -> Cal
     return tell
 
 
-def _print(name: str, duration: float, result: MotionMeasurement) -> None:
-    print(f"{name}, {duration:.1f} s in MuJoCo")
+def _where(world: World) -> dict[str, float]:
+    return {"friction": world.friction, "payload": world.payload}
+
+
+def _print(name: str, duration: float, world: World, result: MotionMeasurement) -> None:
+    load = f", {world.payload:g} kg on its trunk" if world.payload else ""
+    print(
+        f"{name}, {duration:.1f} s in MuJoCo, as it was checked: friction {world.friction:g}{load}"
+    )
     print("-" * 80)
     for label, value, unit in result.lines():
         print(f"  {label:<38}{value:>10} {unit}")

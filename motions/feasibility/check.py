@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from go2_wbc.errors import MotionError
@@ -10,7 +13,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
 from motions.assembly import compile_timeline
 from motions.compiled_plan import CompiledPlan
-from motions.feasibility import dynamic, flight, friction, kinematic
+from motions.feasibility import dynamic, flight, friction, kinematic, tracking
 from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion, timeline_of
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.departure import departure_measurements, departures
@@ -23,6 +26,8 @@ from motions.language.written import NEAREST
 from motions.problem import Problem
 from motions.trajectory import trajectory_of
 
+BALANCE, WAY = "balance", "way of a foot"
+"""Problems of the compiler."""
 FLIGHT_SHARE = 1.1
 """What solved plans may use of the floor's friction: they are solved for 0.5, and reach 0.55."""
 
@@ -147,14 +152,18 @@ class FeasibilityChecker:
             in_flight = flight.flight(plan, model, heavy.mass, spans)
         forces = dynamic.resisted(forces, path, self.world.worst)
         lag = dynamic.lagging(path, forces, heavy, limits)
+        off = tracking.tracking(path, forces, heavy, self.world.worst, limits)
         com, zero_moment_point = dynamic.support(carried, forces, limits)
+        if carried is not path:  # the controller feels the load, and shifts the CoM back
+            com = _lesser(com, dynamic.support(path, forces, limits)[0])
+        tips = tracking.tipping(carried, forces, zero_moment_point.values[:, 0], heavy, limits)
         slip = friction.slip(path, forces, heavy, limits, floor)
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
         wrench, load = dynamic.contacts(path, forces, limits)
         grip = friction.friction(path, forces, heavy, limits, floor)
         landing_place, landing_speed = kinematic.landing(path, model, limits)
         in_order_of_causes = [
-            *(_failed(problem) for problem in problems if problem.check != "balance"),
+            *_missed(problems, limits),
             kinematic.reach(path, limits),
             kinematic.joint_position(path, model, limits),
             self_distance(path, self._collision, model, limits),
@@ -171,6 +180,8 @@ class FeasibilityChecker:
             wrench if lag.is_broken else wrench.excused(),
             load if slips else load.excused(),
             lag,
+            tips,
+            off,
             grip if slips else grip.excused(),
             slip,
             *dynamic.torque(path, forces, model, limits),
@@ -207,6 +218,23 @@ def check(
         ConfigError: for a world that is out of range.
     """
     return FeasibilityChecker(world=World.of(friction, payload, world)).check(motion)
+
+
+def _missed(problems: Sequence[Problem], limits: FeasibilityLimits) -> list[Series]:
+    """What else than balance is not as written; a place that a foot nearly reaches is a warning."""
+    found = [_failed(problem) for problem in problems if problem.check not in (BALANCE, WAY)]
+    for problem in problems:
+        if problem.check == WAY:
+            times, values = np.array([problem.time]), np.full((1, 1), problem.miss)
+            what = (WAY, "m", (problem.subject,), times, values, limits.reach)
+            found.append(Series.against(*what, tight=limits.reach))
+    return found
+
+
+def _lesser(one: Series, other: Series) -> Series:
+    """The lesser values of two series that may not fall below the same limits."""
+    values = np.minimum(one.values, other.values)
+    return replace(one, values=values, margins=np.minimum(one.margins, other.margins))
 
 
 def _failed(problem: Problem) -> Series:

@@ -140,7 +140,7 @@ def weights_of(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "6"]:
 
 def _inertia(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "6"]:
     """Mass [kg] and moments of inertia [kg m^2] of the robot as it stands at first."""
-    return np.diag(model.snapshot(_state(motion, 0)).mass_matrix)[:6]
+    return np.diag(model.snapshot(state_at(motion, 0)).mass_matrix)[:6]
 
 
 def scale_of_wrench() -> Float[np.ndarray, "6"]:
@@ -150,9 +150,13 @@ def scale_of_wrench() -> Float[np.ndarray, "6"]:
 
 def resisted(forces: Forces, motion: Trajectory, world: World) -> Forces:
     """``forces`` with what the motors need besides for the friction of their joints."""
-    v = motion.v[:, 6:]
-    friction = world.joint_friction * (DRY * np.tanh(v / CREEP) + VISCOUS * v)
+    friction = joint_friction(motion.v[:, 6:], world)
     return replace(forces, tau=forces.tau + np.where(motion.is_dynamic[:, None], 0.0, friction))
+
+
+def joint_friction(v: Float[np.ndarray, "n 12"], world: World) -> Float[np.ndarray, "n 12"]:
+    """What the friction of the joints takes [N m] at the speeds ``v`` [rad/s]."""
+    return world.joint_friction * (DRY * np.tanh(v / CREEP) + VISCOUS * v)
 
 
 def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:
@@ -161,12 +165,12 @@ def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     contact, tau = np.zeros((count, 4, 3)), np.zeros((count, 12))
     missing, needed = np.zeros((count, 2)), np.zeros((count, 18))
     for row in range(count):
-        snapshot = model.snapshot(_state(motion, row))
+        snapshot = model.snapshot(state_at(motion, row))
         needed[row] = snapshot.mass_matrix @ motion.a[row] + snapshot.bias
     needed = _spread(needed, motion)
     wrench, scale = needed[:, :6], weights_of(motion, model)
     for row in range(count):
-        snapshot = model.snapshot(_state(motion, row))
+        snapshot = model.snapshot(state_at(motion, row))
         shares = motion.load_share[row]
         contact[row], missing[row] = _share(snapshot, wrench[row], shares, scale, model)
         J = snapshot.J_contacts.reshape(12, 18)
@@ -220,18 +224,36 @@ def lagging(
     e'' + kd e' + kp e = w / m, with the missing force over the mass and the missing moment over the
     moments of inertia of the robot as it stands at first. A moment without them moves little.
     """
+    errors = errors_of(motion, lost(motion, forces, model))
+    values = np.column_stack([np.linalg.norm(e, axis=1) for e in (errors[:, :3], errors[:, 3:])])
+    bounds, subjects = np.array([limits.lag, limits.lag_angle]), ("trunk", "trunk turning")
+    return Series.against("lag", "m, rad", subjects, motion.times, values, bounds)
+
+
+def errors_of(
+    motion: Trajectory,
+    pushes: Float[np.ndarray, "n 6"],
+    damping: Float[np.ndarray, "6"] | float = 0.0,
+) -> Float[np.ndarray, "n 6"]:
+    """How far trunk and attitude [m, rad] are off for accelerations that are taken from them.
+
+    Solved parts, in which they are followed otherwise, take none. ``damping`` [1/s] is what damps
+    the errors besides the gains.
+    """
     from go2_wbc.kernels.loads import lag  # compiled; only who needs it waits for it
 
     config = WbcConfig()
     gains = (config.body_position.arrays, config.body_orientation.arrays)
     kp, kd = (np.concatenate(pair) for pair in zip(*gains, strict=True))
-    pushes = _left(motion, forces, model) / _inertia(motion, model)
-    pushes[motion.is_dynamic] = 0.0
-    errors, dt = np.zeros(pushes.shape), float(np.mean(np.diff(motion.times)))
-    lag(pushes, kp, kd, dt, errors)
-    values = np.column_stack([np.linalg.norm(e, axis=1) for e in (errors[:, :3], errors[:, 3:])])
-    bounds, subjects = np.array([limits.lag, limits.lag_angle]), ("trunk", "trunk turning")
-    return Series.against("lag", "m, rad", subjects, motion.times, values, bounds)
+    taken = np.where(motion.is_dynamic[:, None], 0.0, pushes)
+    errors, dt = np.zeros(taken.shape), float(np.mean(np.diff(motion.times)))
+    lag(taken, kp, kd + damping, dt, errors)
+    return errors
+
+
+def lost(motion: Trajectory, forces: Forces, model: RobotModel) -> Float[np.ndarray, "n 6"]:
+    """The acceleration [m/s^2, rad/s^2] that the feet do not give, along world axes."""
+    return _left(motion, forces, model) / _inertia(motion, model)
 
 
 def _left(motion: Trajectory, forces: Forces, model: RobotModel) -> Float[np.ndarray, "n 6"]:
@@ -260,7 +282,7 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
         feet = motion.p_feet[rows[0], stands, :2]
         for column, points in enumerate((motion.p_com[:, :2], forces.zmp)):
             values[rows, column] = support_margins(feet, points[rows])
-    passes, pair = _passes_over_few(motion, limits), motion.stance.sum(axis=1) == _FEW[0]
+    passes, pair = passes_over_few(motion, limits), motion.stance.sum(axis=1) == _FEW[0]
     com = ("support", "m", ("CoM",), motion.times, values[:, :1])
     zmp = ("support of ZMP", "m", ("ZMP",), motion.times, values[:, 1:])
     least = np.where(passes, -limits.off_line, limits.zero_moment)[:, None]
@@ -273,7 +295,7 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
     )
 
 
-def _passes_over_few(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.ndarray, " n"]:
+def passes_over_few(motion: Trajectory, limits: FeasibilityLimits) -> Bool[np.ndarray, " n"]:
     """Samples in which the same two or three feet stand, for no longer than they may."""
     few = np.isin(motion.stance.sum(axis=1), _FEW)
     changes = (motion.stance[1:] != motion.stance[:-1]).any(axis=1)
@@ -293,7 +315,8 @@ def _same_support(motion: Trajectory) -> list[Int[np.ndarray, " k"]]:
     return [rows for rows in groups if motion.stance[rows[0]].any()]
 
 
-def _state(motion: Trajectory, row: int) -> RobotState:
+def state_at(motion: Trajectory, row: int) -> RobotState:
+    """The state of the robot at a sample, in the frame of the motion."""
     return RobotState(
         time=float(motion.times[row]),
         q=motion.q[row],

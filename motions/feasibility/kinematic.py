@@ -22,6 +22,8 @@ from motions.trajectory import Trajectory
 JOINTS = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 FEET = tuple(leg.name for leg in LEGS)
 ENDS = ("entry", "exit")
+RAISED = 0.006
+"""Height [m] from which on a foot that does not stand is raised when a motion begins."""
 PAIR = 2
 """Standing feet over which a trunk can fall to its side."""
 TIGHT_ANGLE, TIGHT_SPEED = 0.03, 0.1
@@ -192,7 +194,7 @@ def ends(
         turn[2] = wrap_angle(float(turn[2]) - feet.yaw)
         off = (motion.q[row, :3] - place, turn, motion.v[row])
         values += [float(np.abs(part).max()) for part in off]
-    is_raised = (places[:, 2] - model.foot_radius > limits.reach) & ~motion.stance[0]
+    is_raised = (places[:, 2] - model.foot_radius > RAISED) & ~motion.stance[0]
     if plan.entry is Posture.LIE or is_raised.any():
         values[0] = np.inf
     if not motion.stance[-1].all():

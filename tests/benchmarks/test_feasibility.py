@@ -162,6 +162,7 @@ def test_physics_is_asked_only_where_no_outcome_is_stored(
 
     monkeypatch.setattr(feasibility, "play", play)
     monkeypatch.setattr(feasibility, "outcome_of", lambda _run, _plan: BAD)
+    monkeypatch.setattr(feasibility, "_known", dict[str, object])
     first = ask(Trial(0), of=EXAM, is_played=False)
     assert len(played) == 1
     assert first.notes[f"feasibility.{STRICT}"] == "fell"

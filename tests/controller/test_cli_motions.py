@@ -12,6 +12,8 @@ import pytest
 
 from controller.cli.common import ExitCode
 from controller.cli.main import main
+from go2_wbc.errors import PlantError
+from go2_wbc.world import World
 from motions import load_plan, motion_names
 from tests.viz.page_reader import read_data
 
@@ -168,6 +170,24 @@ def test_new_and_export_tell_a_program_what_they_wrote(
     assert len(table.read_text().splitlines()) == told["rows"] + 1
 
 
+@pytest.mark.parametrize(
+    ("options", "friction", "payload"),
+    [([], 0.5, 0.0), (["--friction", "0.7"], 0.7, 0.0), (["--payload", "2"], 0.5, 2.0)],
+)
+def test_a_motion_is_played_in_the_world_that_it_is_checked_for(
+    monkeypatch: pytest.MonkeyPatch, options: list[str], friction: float, payload: float
+) -> None:
+    worlds: list[World] = []
+
+    def plant(world: World) -> None:
+        worlds.append(world)
+        raise PlantError("enough")
+
+    monkeypatch.setattr("go2_wbc.plant.plant_in_world", plant)
+    assert main(["run", "bow", *options]) == ExitCode.RUNTIME
+    assert [(world.friction, world.payload) for world in worlds] == [(friction, payload)]
+
+
 def test_a_robot_that_cannot_get_up_is_a_message(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "bow", "--friction", "0.0001", "--force"]) == ExitCode.RUNTIME
     assert "the robot did not get ready: " in capsys.readouterr().err
@@ -193,6 +213,8 @@ def test_run_plays_a_motion_and_measures_it(
     assert main(["run", "bow", "--html", str(page)]) == ExitCode.OK
     text = capsys.readouterr().out
     assert "\ndone\n" in text
+    assert text.startswith("bow, ")
+    assert "as it was checked: friction 0.5\n" in text
     header, arrays = read_data(page.read_text(encoding="utf-8"))
     assert not header["is_plan"]
     assert header["verdict"]["ok"]

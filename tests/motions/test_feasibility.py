@@ -122,6 +122,8 @@ CAUSES = (
         "contact wrench",
         "foot load",
         "lag",
+        "tipping",
+        "tracking",
         "friction",
         "slip",
         "torque",
@@ -175,6 +177,16 @@ AWAY = {
     "friction": Timeline().body(y=0.07, over=0.15).body(y=-0.07, over=0.15).home(over=0.2),
     "slip": Timeline().body(yaw=0.25, over=0.2).body(yaw=-0.25, over=0.2).home(over=0.3),
     "lag": Timeline().body(z=-0.1, over=0.6).body(z=0.02, over=0.11).home(over=0.6),
+    "tracking": Timeline()
+    .body(roll=deg(35), over=0.5)
+    .body(roll=-deg(35), over=0.5)
+    .home(over=0.5),
+    "tipping": Timeline()
+    .foot("RL", z=0.09, over=0.7)
+    .body(z=-0.097, over=0.56)
+    .body(z=0.097, over=0.56)
+    .foot("RL", z=0.0, over=0.8)
+    .home(over=0.9),
     "support": Timeline(balance=False).foot("FR", z=0.1, over=0.8).home(over=0.8),
     "landing speed": Timeline().foot("FR", z=0.15, over=0.6).foot("FR", over=0.1, ease="linear"),
     "dragging": Timeline().foot("FR", x=0.05, z=0.0, over=0.6).home(over=0.6),
@@ -302,6 +314,6 @@ def test_a_table_fits_80_columns_and_names_every_check(
 
 
 def _state_at(path, row: int):  # noqa: ANN001, ANN202
-    from motions.feasibility.dynamic import _state
+    from motions.feasibility.dynamic import state_at
 
-    return _state(path, row)
+    return state_at(path, row)

@@ -11,7 +11,7 @@ from go2_wbc.kernels.loads import lag, least_friction, slide
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, deg
-from motions.feasibility.dynamic import _state, numbers_of, scale_of_wrench
+from motions.feasibility.dynamic import numbers_of, scale_of_wrench, state_at
 from motions.feasibility.friction import CREEP, cone, creep
 from tests.engine_helpers import standing_q, state_of
 
@@ -133,7 +133,7 @@ def test_feet_creep_by_what_contacts_leave_out(checker: FeasibilityChecker) -> N
     path = checker.evaluate(to_and_fro("roll", 0.371, 0.130)).path
     found, model = creep(path, checker.model), checker.model
     for row in range(0, len(path.times), 7):
-        J_a = model.snapshot(_state(path, row)).J_contacts @ path.a[row]
+        J_a = model.snapshot(state_at(path, row)).J_contacts @ path.a[row]
         np.testing.assert_allclose(found[row], -J_a[:, :2] / CREEP, atol=1e-12)
     assert np.abs(found).max() > 0.01
 

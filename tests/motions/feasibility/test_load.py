@@ -94,3 +94,12 @@ def test_the_table_is_narrow_in_every_world_and_says_what_no_limit_counts_with()
 def test_a_world_out_of_range_is_told() -> None:
     with pytest.raises(ConfigError, match=r"World\.friction must be between 0\.0001 and 2, got 9"):
         check(SWAY, friction=9.0)
+
+
+def test_a_load_that_brings_the_com_inside_does_not_help_a_controller_that_feels_it() -> None:
+    # The robot shifts the CoM back to where it is without the load, and fell (MuJoCo, 5 of 5).
+    line = Timeline(balance=False).foot("FR", z=0.05, over=0.8).home(over=1.0)
+    without = FeasibilityChecker().check(line).margins["support"]
+    assert without.margin < 0.0
+    world = World(payload=4.0, payload_place=(-0.08, 0.04, 0.05))
+    assert FeasibilityChecker(world=world).check(line).margins["support"].value <= without.value
