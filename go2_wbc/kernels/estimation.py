@@ -195,6 +195,14 @@ def begin_anew(x, memory, reading, R, gravity, numbers):
     return LOST if is_lost else TUMBLED
 
 
+@subroutine("b1(f8[::1], f8, b1, f8[:,::1])")
+def is_upset(memory, dt, is_lying, R):
+    """Whether the robot lies or is tilted far, or has been until a moment ago."""
+    is_down = is_lying or R[2, 2] < _OVER
+    memory[_UPSET] = _CALM if is_down else max(memory[_UPSET] - dt, 0.0)
+    return memory[_UPSET] > 0.0
+
+
 @subroutine("f8(f8[::1], f8)")
 def learning(x, speed):
     """Share of their corrections that the biases take: 1 at rest, half at ``speed``."""
@@ -326,9 +334,7 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
             off = heights[leg]
             take_in_one(P, dx, column, E_FEET + 2 + 3 * leg, off, numbers[HEIGHT] ** 2)
     is_lying = lies(x, memory, reading, is_carried, gravity, numbers)
-    is_upset = is_lying or R[2, 2] < _OVER
-    memory[_UPSET] = _CALM if is_upset else max(memory[_UPSET] - dt, 0.0)
-    if memory[_UPSET] > 0.0 and not rests:
+    if is_upset(memory, dt, is_lying, R) and not rests:
         share_learnt = 0.0
     if rests:
         take_in_rest(x, P, dx, column, reading, numbers)

@@ -160,6 +160,7 @@ class FeasibilityChecker:
         slip = friction.slip(path, forces, heavy, limits, floor)
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
         wrench, load = dynamic.contacts(path, forces, limits)
+        is_lacking = lag.is_broken or wrench.worst(0) > limits.jolt
         grip = friction.friction(path, forces, heavy, limits, floor)
         landing_place, landing_speed = kinematic.landing(path, model, limits)
         in_order_of_causes = [
@@ -177,7 +178,7 @@ class FeasibilityChecker:
             landing_speed,
             kinematic.smoothness(path, limits),
             zero_moment_point if lag.is_broken else zero_moment_point.excused(),
-            wrench if lag.is_broken else wrench.excused(),
+            wrench if is_lacking else wrench.excused(),
             load if slips else load.excused(),
             lag,
             tips,

@@ -30,6 +30,10 @@ class FeasibilityLimits:
             that is off balance falls four times as far off, exp(t / sqrt(0.29 m / g)).
         wrench: greatest part [N] of the force that no contact forces can give for longer; of the
             moment as much on an arm of 0.2 m.
+        jolt: greatest part [N] of the force that they may not give for a moment, however little the
+            trunk lags by it: a fifth of the weight. Of the motions that passed without this limit
+            three lacked more, 41 to 127 N, and went wrong; a fast nod that lacked 82 N fell on
+            friction 0.35. Who lacked up to 21 N was done.
         lag, lag_angle: how far [m, rad] the trunk may be off its plan for what the ground cannot
             give. In MuJoCo it was off by 0.7 to 2.2 times as much.
         off, off_angle: how far [m, rad] the trunk may be off its plan in all, for the friction of
@@ -77,6 +81,7 @@ class FeasibilityLimits:
     off_line: float = 0.01
     pair_time: float = 0.25
     wrench: float = 5.0
+    jolt: float = 30.0
     lag: float = 0.015
     lag_angle: float = 0.03
     off: float = 0.025

@@ -99,6 +99,11 @@ class Series:
         """Whether any margin is negative."""
         return bool((self.margins < 0.0).any())
 
+    def worst(self, column: int) -> float:
+        """The greatest value of a subject where it was checked; 0 if it never was."""
+        is_checked = ~np.isnan(self.margins[:, column])
+        return float(self.values[is_checked, column].max(initial=0.0))
+
     def excused(self) -> Series:
         """The same with 0 for negative margins: broken for so short that it does no harm."""
         return replace(self, margins=np.maximum(self.margins, 0.0))

@@ -29,7 +29,7 @@ def nod(checker: FeasibilityChecker) -> CheckedMotion:
 
 @pytest.fixture(scope="module")
 def stretched(checker: FeasibilityChecker) -> CheckedMotion:
-    line = Timeline(name="up").body(z=0.15, over=1.0).hold(0.5).home(over=1.0)
+    line = Timeline(name="up").body(z=0.17, over=1.0).hold(0.5).home(over=1.0)
     return checker.evaluate(line)
 
 

@@ -27,7 +27,7 @@ from motions import (
     load_motion,
     tracks,
 )
-from motions.feasibility import collision
+from motions.feasibility import collision, tracking
 from motions.keys import Mark
 
 CHECK = import_module("motions.feasibility.check")  # the package has a function of that name
@@ -137,9 +137,10 @@ def test_the_work_of_checking_grows_as_the_motion_does(
             counted(patch, counts, collision.pin, "computeDistance", lambda *_: 1)
             samples[seconds] = len(checker.evaluate(plan).path.times)
         assert counts["inverse_dynamics"] == samples[seconds]
-        # Nothing else is asked for one instant after the other; the moments of inertia twice.
+        # Nothing else is asked for one instant after the other; the moments of inertia twice, and
+        # the inertia by which friction delays the trunk now and then.
         assert counts["at"] == counts["center_of_mass"] == 0
-        assert counts["snapshot"] == 2
+        assert counts["snapshot"] <= samples[seconds] / tracking.EVERY + 4
     growth = samples[40] / samples[10]
     assert work[40]["computeDistance"] <= SPARE * growth * work[10]["computeDistance"]
 

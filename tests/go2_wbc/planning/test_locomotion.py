@@ -14,14 +14,13 @@ from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.compiled import CompiledPlanner
 from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.ground import GROUND_SHARE
-from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
+from go2_wbc.planning.locomotion import LocomotionPlanner
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
-from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
+from go2_wbc.robot.rotations import log_rotation, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from tests import engine_helpers as helpers
+from tests.go2_wbc.planning.squared import CONFIG, MODEL, at, moving, resting
 
-MODEL = helpers.symmetric_model()
-CONFIG = LocomotionConfig()
 TROT = GAITS["trot"]
 TICK = 0.002
 EXACT = 1e-9  # rounding in sums of a few hundred ticks
@@ -41,25 +40,6 @@ def planner_kind(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 make_planner: type[LocomotionPlanner] | type[CompiledPlanner] = LocomotionPlanner
-
-
-def resting(time: float = 0.0, yaw: float = 0.0) -> Snapshot:
-    """Standing squarely at rest: every foot below its hip, the CoM amid them at its height."""
-    q = helpers.standing_q()
-    q[3:7] = pin.Quaternion(rotation_from_rpy(0.0, 0.0, yaw)).coeffs()
-    snapshot = MODEL.snapshot(helpers.state_of(q, time=time))
-    feet = MODEL.p_base_feet_nominal @ yaw_rotation(yaw).T
-    feet[:, 2] = MODEL.foot_radius
-    com = np.array([*feet[:, :2].mean(axis=0), CONFIG.height])
-    return replace(snapshot, p_world_feet=feet, p_world_com=com)
-
-
-def at(snapshot: Snapshot, time: float) -> Snapshot:
-    return replace(snapshot, state=replace(snapshot.state, time=time))
-
-
-def moving(snapshot: Snapshot, v_world: np.ndarray) -> Snapshot:
-    return replace(snapshot, v_world_com=v_world)
 
 
 def started(snapshot: Snapshot, gait: Gait = TROT) -> GaitPlanner:

@@ -117,3 +117,23 @@ def test_a_trunk_that_the_ground_cannot_hold_stays_level_and_lags() -> None:
     force, moment = checked.forces.missing.max(axis=0)
     assert force > 20.0
     assert moment < 0.05
+
+
+def nods(half: float, pitch: float) -> Timeline:
+    """Up and down and up again, ``half`` [s] each way."""
+    line = Timeline(name="nods").body(pitch=pitch, over=half / 2)
+    for sign in (-1, 1) * 3:
+        line = line.body(pitch=sign * pitch, over=half)
+    return line.home(over=0.3)
+
+
+def test_what_the_feet_cannot_give_for_a_moment_is_refused_if_it_is_much(
+    model: RobotModel,
+) -> None:
+    # The trunk lags by a few millimetres only, but the feet slide: such a nod fell.
+    quick = nods(0.1, 0.1)
+    (failure,) = FeasibilityChecker(model).check(quick).failures
+    assert (failure.check, failure.subject) == ("contact wrench", "force")
+    assert failure.value > FeasibilityLimits().jolt
+    assert FeasibilityChecker(model, FeasibilityLimits(jolt=1e3)).check(quick).ok
+    assert FeasibilityChecker(model).check(nods(0.12, 0.08)).ok
