@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from go2_wbc.errors import MotionError
+from go2_wbc.legs import LEGS
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
@@ -28,6 +29,8 @@ from motions.trajectory import trajectory_of
 
 BALANCE, WAY = "balance", "way of a foot"
 """Problems of the compiler."""
+SLIDING = 0.25
+"""Share of the slip that is allowed, from which on a force that lacks for a moment matters."""
 FLIGHT_SHARE = 1.1
 """What solved plans may use of the floor's friction: they are solved for 0.5, and reach 0.55."""
 
@@ -160,7 +163,8 @@ class FeasibilityChecker:
         slip = friction.slip(path, forces, heavy, limits, floor)
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
         wrench, load = dynamic.contacts(path, forces, limits)
-        is_lacking = lag.is_broken or wrench.worst(0) > limits.jolt
+        slides = max(map(slip.worst, LEGS)) > SLIDING * limits.slip
+        is_lacking = lag.is_broken or (slides and wrench.worst(0) > limits.jolt)
         grip = friction.friction(path, forces, heavy, limits, floor)
         landing_place, landing_speed = kinematic.landing(path, model, limits)
         in_order_of_causes = [
