@@ -23,7 +23,7 @@ IROS 2001):
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
@@ -80,26 +80,34 @@ def resistance(
     v, a = motion.v[rows, 6:], motion.a[rows, 6:]
     fed = WbcConfig().joint_friction.torque
     rest = joint_friction(v, world) - [fed(*both) for both in zip(v, a, strict=True)]
-    found = [_taken(motion, int(row), one, model) for row, one in zip(rows, rest, strict=True)]
-    taken, damped = (np.array(parts) for parts in zip(*found, strict=True))
+    taken, damped = _taken(motion, rows, rest, model)
     columns = [np.interp(motion.times, motion.times[rows], column) for column in taken.T]
     return np.column_stack(columns), world.joint_friction * VISCOUS * damped.mean(axis=0)
 
 
 def _taken(
-    motion: Trajectory, row: int, rest: Float[np.ndarray, "12"], model: RobotModel
-) -> tuple[Float[np.ndarray, "6"], Float[np.ndarray, "6"]]:
-    """The acceleration, and by which damping a unit of viscous friction damps."""
-    snapshot = model.snapshot(state_at(motion, row))
-    follow = np.vstack([np.eye(6), np.zeros((12, 6))])
+    motion: Trajectory,
+    rows: Int[np.ndarray, " m"],
+    rest: Float[np.ndarray, "m 12"],
+    model: RobotModel,
+) -> tuple[Float[np.ndarray, "m 6"], Float[np.ndarray, "m 6"]]:
+    """The acceleration, and by which damping a unit of viscous friction damps, at these samples."""
+    snapshots = [model.snapshot(state_at(motion, row)) for row in rows.tolist()]
+    J = np.array([one.J_contacts for one in snapshots])
+    follow = np.zeros((len(rows), 18, 6))
+    follow[:, :6] = np.eye(6)
     for leg in LEGS:
-        if motion.stance[row, leg]:
-            J, own = snapshot.J_contacts[leg], slice(6 + 3 * leg, 9 + 3 * leg)
-            follow[own] = -np.linalg.lstsq(J[:, own], J[:, :6], rcond=RCOND)[0]
-    inertia, turned = follow.T @ snapshot.mass_matrix @ follow, follow[6:]
-    a = -np.linalg.solve(inertia, turned.T @ rest)
-    damped = np.diag(np.linalg.solve(inertia, turned.T @ turned))
-    return np.concatenate([snapshot.R_world_base @ a[:3], a[3:]]), damped
+        stands, own = motion.stance[rows, leg], slice(6 + 3 * leg, 9 + 3 * leg)
+        turns = np.linalg.pinv(J[stands, leg][:, :, own], rcond=RCOND)
+        follow[stands, own] = -turns @ J[stands, leg][:, :, :6]
+    ahead, turned = follow.transpose(0, 2, 1), follow[:, 6:]
+    inertia = ahead @ np.array([one.mass_matrix for one in snapshots]) @ follow
+    push = ahead[:, :, 6:] @ rest[:, :, None]
+    a = -np.linalg.solve(inertia, push)[:, :, 0]
+    damping = np.linalg.solve(inertia, ahead[:, :, 6:] @ turned)
+    R = np.array([one.R_world_base for one in snapshots])
+    forth = np.hstack([(R @ a[:, :3, None])[:, :, 0], a[:, 3:]])
+    return forth, np.diagonal(damping, axis1=1, axis2=2)
 
 
 def tipping(
