@@ -18,9 +18,8 @@ from go2_wbc.kernels.vectors import rotation_of
 STATE, ERROR = 28, 27
 QUATERNION, GYRO_BIAS, FORCE_BIAS, FEET = 6, 10, 13, 16
 """Where they are in an estimate; the velocity is at 3."""
-THETA, E_GYRO_BIAS, E_FORCE_BIAS, E_FEET = 6, 9, 12, 15
-HEADING = THETA + 2
-"""Where they are in its error."""
+THETA, HEADING, E_GYRO_BIAS, E_FORCE_BIAS, E_FEET = 6, 8, 9, 12, 15
+"""Where they are in its error; the heading's is the last one of theta."""
 
 
 @subroutine("void(f8[::1], f8, f8, f8, b1)")

@@ -197,11 +197,8 @@ class StateEstimator:
         self._legs, self._radius = leg_table(model), model.foot_radius
         self._gravity = model.gravity
         self._numbers = self._in_order(model)
-        self._step, self._level, self._tumbled = (
-            estimation.estimate,
-            estimation.LEVEL,
-            estimation.TUMBLED,
-        )
+        self._kernel = estimation
+        self._biases = slice(filtering.GYRO_BIAS, filtering.FEET)
         self._time = -np.inf  # before the first reading
         self._x = np.zeros(filtering.STATE)
         self._x[9] = 1.0
@@ -243,7 +240,7 @@ class StateEstimator:
         )
         q, v = np.empty(19), np.empty(18)
         if off := self._advance(row, q, v):
-            self._forget(reading, keeps_height=off == self._tumbled)
+            self._forget(reading, keeps_height=off == self._kernel.TUMBLED)
             row[0] = 0.0
             self._advance(row, q, v)
         self._time = reading.time
@@ -261,7 +258,9 @@ class StateEstimator:
     ) -> int:
         """One step of the filter, which fills q and v; returns why to begin anew, or 0."""
         kept = self._x, self._P, self._memory
-        return int(self._step(*kept, row, self._legs, self._p_base_imu, self._numbers, q, v))
+        return int(
+            self._kernel.estimate(*kept, row, self._legs, self._p_base_imu, self._numbers, q, v)
+        )
 
     def covariance(self) -> OdometryCovariance:
         """How sure the last state is of the base, from the covariance of the filter's errors.
@@ -300,8 +299,8 @@ class StateEstimator:
         self._x[:], self._P[:], self._memory[:] = saved["x"], saved["P"], saved["memory"]
 
     def _forget(self, reading: SensorReading, keeps_height: bool) -> None:
-        """Begin anew, without biases; at the height where the robot has been taken to be, or 0."""
-        self._x[10:16] = 0.0
+        """Begin anew, without biases; at the height that the IMU had, or on level ground at 0."""
+        self._x[self._biases] = 0.0
         self._begin(reading, float(self._x[2]) if keeps_height else None, knows_biases=False)
 
     def _begin(
@@ -331,7 +330,7 @@ class StateEstimator:
         self._P[:] = np.diag(deviations**2)
         self._P[range(9, 15), range(9, 15)] = biases
         self._memory[:] = 0.0
-        self._memory[self._level] = x[2] - above
+        self._memory[self._kernel.LEVEL] = x[2] - above
         self._memory[5:8] = reading.gyro
         self._memory[8:20] = reading.v_joints
 

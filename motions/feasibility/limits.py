@@ -31,7 +31,7 @@ class FeasibilityLimits:
         wrench: greatest part [N] of the force that no contact forces can give for longer; of the
             moment as much on an arm of 0.2 m.
         jolt: greatest part [N] of the force that they may not give for a moment, however little the
-            trunk lags by it, while a foot slides by more than a quarter of ``slip``: a fifth of the
+            trunk lags by it, where a foot slides by more than a quarter of ``slip``: a fifth of the
             weight. A fast nod that lacked 82 N, and three motions that lacked 41 to 127 N, passed
             without this limit and went wrong; the nod fell on friction 0.35.
         lag, lag_angle: how far [m, rad] the trunk may be off its plan for what the ground cannot
