@@ -1,9 +1,10 @@
 """The control loop: one tick is read, check, snapshot, behaviour, whole-body QP, write, record.
 
 Where the QP's constraints contradict each other, the nearest answer is followed
-(``wbc.relaxation``) and the tick is counted. Only here a QP failure is caught: the last good torque
-is held for one tick, then the robot is damped while the failure lasts, and for good after
-``qp_patience`` ticks; every one is counted.
+(``wbc.relaxation``) and the tick is counted; if they give way gravely for ``grave_limit_time``, the
+robot is damped for good. Only here a QP failure is caught: the last good torque is held for one
+tick, then the robot is damped while the failure lasts, and for good after ``qp_patience`` ticks;
+every one is counted.
 A plant that fails, gives no new state, or gives one that is not finite, ends the behaviour too.
 """
 
@@ -12,7 +13,7 @@ from __future__ import annotations
 import logging
 from contextlib import suppress
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 
 from controller.behaviours.base import Behaviour
 from controller.behaviours.joints import DAMPING, Damped
@@ -101,7 +102,7 @@ class ControlLoop:
         self._payloads = payloads
         self._last_command = JointCommand.damping(DAMPING)
         self._unanswered = 0
-        self._qp_failures_in_a_row = 0
+        self._qp_failures_in_a_row, self._grave_since = 0, inf
         is_up = self.state.tilt < safety.tilt_limit  # one that is found on its back has not fallen
         self.behaviour: Behaviour = Damped("lying", stays_on_belly=is_up)
         self.engage(self.behaviour)
@@ -120,7 +121,7 @@ class ControlLoop:
             self._observe()
         self.snapshot = self.model.snapshot(self.state, self._payload_of(behaviour))
         self.fault = None
-        self._qp_failures_in_a_row = 0
+        self._qp_failures_in_a_row, self._grave_since = 0, inf
         self._falls.begin()
         self._sag = self._lean = 0.0
         behaviour.start(self.snapshot)
@@ -224,22 +225,23 @@ class ControlLoop:
             return self._without_solution(error)
         if solution.is_relaxed:
             return self._relaxed(solution)
-        self._qp_failures_in_a_row = 0
+        self._qp_failures_in_a_row, self._grave_since = 0, inf
         return solution.command
 
     def _relaxed(self, solution: WbcSolution) -> JointCommand:
         """Follow a solution whose constraints gave way, unless they do gravely for too long."""
         self.telemetry.relaxed_ticks += 1
+        self._qp_failures_in_a_row = 0
         if not is_grave(solution.violations):
-            self._qp_failures_in_a_row = 0
+            self._grave_since = inf
             return solution.command
         self.telemetry.grave_ticks += 1
-        self._qp_failures_in_a_row += 1
-        streak = self._qp_failures_in_a_row
-        if streak < self._safety.qp_patience:
+        self._grave_since = min(self._grave_since, self.state.time)
+        lasted = self.state.time - self._grave_since
+        if lasted < self._safety.grave_limit_time:
             return solution.command
         worst = ", ".join(f"{row.name} {row.norm:.0f} {row.unit}" for row in solution.violations)
-        reason = f"damped after {streak} ticks that break their constraints: {worst}"
+        reason = f"damped after {lasted:.2f} s of broken constraints: {worst}"
         self.abandon(Fault(reason, may_fall=True))
         return JointCommand.damping(DAMPING)
 

@@ -208,20 +208,21 @@ def test_a_relaxed_answer_is_followed_and_counted(
 def test_grave_violations_damp_the_robot_only_when_they_last(
     loop: ControlLoop, plant: StillPlant, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    within = round(SAFETY.grave_limit_time / plant.control_period)
     loop.engage(Balance(loop.model))
     with monkeypatch.context() as patch:
         relax(patch, 1.1 * LIMITS["stance feet"])
-        run(loop, SAFETY.qp_patience - 1)
+        run(loop, within)
     run(loop, 1)
     assert loop.fault is None
     assert not any(is_limp(command) for command in plant.commands)
     relax(monkeypatch, 1.1 * LIMITS["stance feet"])
-    run(loop, SAFETY.qp_patience)
+    run(loop, within + 2)
     assert loop.fault is not None
-    assert "break their constraints" in loop.fault.reason
+    assert "s of broken constraints: " in loop.fault.reason
     assert "stance feet 33 m/s^2" in loop.fault.reason
     assert is_limp(plant.commands[-1])
-    assert loop.telemetry.grave_ticks == 2 * SAFETY.qp_patience - 1
+    assert 2 * within <= loop.telemetry.grave_ticks <= 2 * within + 2
 
 
 # --- plants that fail -------------------------------------------------------------------------

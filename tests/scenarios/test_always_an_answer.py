@@ -5,10 +5,15 @@ A sample of ``python -m benchmarks answers``, one seed of each row.
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from benchmarks.answers import SCENARIOS
-from controller.sweeps.trials import Trial
+from benchmarks.locomotion import CONFIG, MASS_RANGE
+from benchmarks.pushes import PUSH_TIME, heading_force
+from benchmarks.steps import plant_of
+from controller.sweeps.trials import Trial, TrialRobot
 
 SAMPLES = [("boxes", 19), ("pushes", 12), ("stops", 13)]
 """Scenario and seed; in all of these the hard QP has no solution in some ticks."""
@@ -25,3 +30,18 @@ def test_contradictions_are_answered_and_never_damp_an_upright_robot(name: str, 
     assert values[f"{name}.unreported"] == values[f"{name}.falls"] == 0.0
     assert values[f"{name}.relaxed"] > 0.0, "or the test would say nothing"
     assert values[f"{name}.grave"] <= GRAVE
+
+
+@pytest.mark.parametrize(("seed", "time"), [(2, 2.27), (4, 2.27)])
+def test_a_hip_at_its_stop_for_a_moment_does_not_damp_a_robot_that_is_pushed(
+    seed: int, time: float
+) -> None:
+    """They were damped after 0.02 s; left alone they step on."""
+    with TrialRobot(plant_of(Trial(seed), 7100, MASS_RANGE, "imu"), CONFIG) as robot:
+        robot.require(robot.go2.stand())
+        robot.require(robot.go2.walk())
+        robot.go2.move(0.5)
+        robot.wait(time)
+        robot.push(heading_force(-math.pi / 2, 26.0), PUSH_TIME)
+        robot.wait(2.0)
+        assert robot.go2.telemetry.grave_ticks > 10
