@@ -1,9 +1,9 @@
 """The control loop: one tick is read, check, snapshot, behaviour, whole-body QP, write, record.
 
 Where the QP's constraints contradict each other, the nearest answer is followed
-(``wbc.relaxation``) and the tick is counted. Only here a QP failure is caught: the last good torque
-is held for one tick, then the robot is damped while the failure lasts, and for good after
-``qp_patience`` ticks; every one is counted.
+(``wbc.relaxation``) and the tick is counted; after ``grave_patience`` grave ones the robot is
+damped. Only here a QP failure is caught: the last good torque is held for one tick, then the robot
+is damped while the failure lasts, and for good after ``qp_patience`` ticks; every one is counted.
 A plant that fails, gives no new state, or gives one that is not finite, ends the behaviour too.
 """
 
@@ -236,7 +236,7 @@ class ControlLoop:
         self.telemetry.grave_ticks += 1
         self._qp_failures_in_a_row += 1
         streak = self._qp_failures_in_a_row
-        if streak < self._safety.qp_patience:
+        if streak < self._safety.grave_patience:
             return solution.command
         worst = ", ".join(f"{row.name} {row.norm:.0f} {row.unit}" for row in solution.violations)
         reason = f"damped after {streak} ticks that break their constraints: {worst}"

@@ -59,7 +59,7 @@ def test_a_disturbed_robot_says_in_time_that_it_has_fallen(name: str) -> None:
 
 def test_a_fall_that_nobody_notices_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FallDetector, "reason", lambda *_, **__: None)
-    patient = Config(safety=SafetyConfig(qp_patience=10_000))
+    patient = Config(safety=SafetyConfig(qp_patience=10_000, grave_patience=10_000))
     with TrialRobot(MujocoPlant(control_period=0.004), patient) as robot:
         watch = disturbed.Watch(robot, np.random.default_rng(0))
         robot.require(robot.go2.stand())

@@ -211,17 +211,17 @@ def test_grave_violations_damp_the_robot_only_when_they_last(
     loop.engage(Balance(loop.model))
     with monkeypatch.context() as patch:
         relax(patch, 1.1 * LIMITS["stance feet"])
-        run(loop, SAFETY.qp_patience - 1)
+        run(loop, SAFETY.grave_patience - 1)
     run(loop, 1)
     assert loop.fault is None
     assert not any(is_limp(command) for command in plant.commands)
     relax(monkeypatch, 1.1 * LIMITS["stance feet"])
-    run(loop, SAFETY.qp_patience)
+    run(loop, SAFETY.grave_patience)
     assert loop.fault is not None
     assert "break their constraints" in loop.fault.reason
     assert "stance feet 33 m/s^2" in loop.fault.reason
     assert is_limp(plant.commands[-1])
-    assert loop.telemetry.grave_ticks == 2 * SAFETY.qp_patience - 1
+    assert loop.telemetry.grave_ticks == 2 * SAFETY.grave_patience - 1
 
 
 # --- plants that fail -------------------------------------------------------------------------
