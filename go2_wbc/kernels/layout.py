@@ -263,6 +263,7 @@ MPC = Layout(
     least_share=(),
     interval=(),
     prior=(),
+    throw_time=(),
 )
 """Numbers of the MPC: the turn's axes before those of the way."""
 

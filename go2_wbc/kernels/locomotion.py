@@ -164,7 +164,7 @@ def adapt_gait(snapshot, s, c, dt, command):
     """Bring period, duty and offsets towards those wanted; the phases of the feet do not jump."""
     wanted = np.empty(6)
     wanted[:] = c[_GAIT : _GAIT + 6]
-    fall = c[_RATES + 1]
+    rise, fall, is_thrown = c[_RATES + 1], c[_RATES + 1], False
     is_zero = command[0] == 0.0 and command[1] == 0.0 and command[2] == 0.0
     if is_zero and is_settled(s, c):
         wanted[:] = c[_REST : _REST + 6]
@@ -173,21 +173,24 @@ def adapt_gait(snapshot, s, c, dt, command):
         speed = np.hypot(s[_VELOCITY], s[_VELOCITY + 1])
         thrown = np.hypot(snapshot[_V_COM], snapshot[_V_COM + 1]) - c[_MARGIN]
         if thrown > speed:
-            speed, fall = thrown, c[_RATES + 3]
+            speed, fall, is_thrown = thrown, c[_RATES + 3], True
         speed += arm * abs(s[_VELOCITY + 2])
         stance = min(max(c[_STRIDE] / max(speed, TINY), c[_STRIDE + 1]), c[_STRIDE + 2])
         wanted[0] = stance + c[_STRIDE + 3] + c[_STRIDE + 4] * (speed - 1.0)
         wanted[1] = stance / wanted[0]
+    left = abs(s[_PERIOD] - wanted[0]) / c[_RATES]
+    if left > 0.0 and not is_thrown and (wanted[2:] != s[_OFFSETS : _OFFSETS + 4]).any():
+        rise = fall = min(fall, abs(wanted[1] - s[_DUTY]) / left)
     if wanted[0] != s[_PERIOD]:
         most = c[_RATES] * dt
         period = s[_PERIOD] + min(max(wanted[0] - s[_PERIOD], -most), most)
         s[_PHASE_TIME] = s[_PHASE_TIME] % s[_PERIOD] * period / s[_PERIOD]
         s[_PERIOD] = period
-    s[_DUTY] += min(max(wanted[1] - s[_DUTY], -fall * dt), c[_RATES + 1] * dt)
-    most = c[_RATES + 2] * dt
+    s[_DUTY] += min(max(wanted[1] - s[_DUTY], -fall * dt), rise * dt)
     for leg in range(4):
         if wanted[2 + leg] != s[_OFFSETS + leg]:
             way = (wanted[2 + leg] - s[_OFFSETS + leg] + 0.5) % 1.0 - 0.5
+            most = min(c[_RATES + 2] * dt, abs(way) * (dt / max(left, dt)))
             if abs(way) <= most:
                 s[_OFFSETS + leg] = wanted[2 + leg]
             else:

@@ -37,9 +37,10 @@ _PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
 _STEPPING, _SLOPE = _S["is_stepping"], _S["slope"]
 _POSE, _POSE_RATE = _S["pose"], _S["pose_rate"]
 _ACCELERATION, _HEIGHT, _RADIUS = (_C[n] for n in ("acceleration", "height", "foot_radius"))
-_NOMINAL = _C["p_base_feet_nominal"]
+_NOMINAL, _MARGIN = _C["p_base_feet_nominal"], _C["stride_margin"]
 _STEP, _MASS, _GRAVITY = (MPC.start[n] for n in ("step", "mass", "gravity"))
 _LEAST_SHARE, _INTERVAL, _PRIOR = (MPC.start[n] for n in ("least_share", "interval", "prior"))
+_THROW_TIME = MPC.start["throw_time"]
 _NEXT, _PLANNED = FORCES.start["next"], FORCES.start["forces"]
 _LEGS, _A, _DW = (_T[n] for n in ("legs", "a_world", "dw_world"))
 _T_FORCES, _WEIGHT = _T["f_world_feet"], _T["force_weight"]
@@ -153,10 +154,21 @@ def fill_contacts(s, step, share, landings):
                 landings[k, leg] = stride - first
 
 
-@subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[:,::1], f8[:,::1], f8[:,:,::1])")
-def fill_arms(snapshot, s, c, step, goals, landings, arms):
+@subroutine("Tuple((f8, f8))(f8[::1], f8[::1], f8[::1])")
+def excess_velocity(snapshot, s, c):
+    """What the CoM has beyond the wanted velocity and the margin."""
+    cosine, sine = np.cos(s[_YAW]), np.sin(s[_YAW])
+    x = snapshot[_V_COM] - cosine * s[_VELOCITY] + sine * s[_VELOCITY + 1]
+    y = snapshot[_V_COM + 1] - sine * s[_VELOCITY] - cosine * s[_VELOCITY + 1]
+    speed = np.hypot(x, y)
+    share = max(0.0, 1.0 - c[_MARGIN] / max(speed, TIE))
+    return share * x, share * y
+
+
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1])")
+def fill_arms(snapshot, s, c, m, goals, landings, arms):
     """From the CoM in the middle of each node to the contact points."""
-    period, duty = s[_PERIOD], s[_DUTY]
+    period, duty, step, fading = s[_PERIOD], s[_DUTY], m[_STEP], m[_THROW_TIME]
     com = vector(snapshot, _P_COM)
     base = plus(vector(snapshot, _Q), vector(snapshot, _SHIFT))
     nominal, goal, footholds = np.empty((4, 2)), np.empty(3), np.empty((4, 2))
@@ -166,9 +178,12 @@ def fill_arms(snapshot, s, c, step, goals, landings, arms):
         foothold(leg, snapshot, s, c, nominal, remaining, goal)
         footholds[leg] = goal[:2]
     before_x, before_y = s[_POSITION], s[_POSITION + 1]
+    excess_x, excess_y = excess_velocity(snapshot, s, c)
     for k in range(MPC_NODES):
-        way_x = (before_x + goals[k, 3]) / 2 - s[_POSITION]
-        way_y = (before_y + goals[k, 4]) / 2 - s[_POSITION + 1]
+        left = np.exp(-(k + 0.5) * step / fading)
+        thrown = fading * (1.0 - left)
+        way_x = (before_x + goals[k, 3]) / 2 - s[_POSITION] + excess_x * thrown
+        way_y = (before_y + goals[k, 4]) / 2 - s[_POSITION + 1] + excess_y * thrown
         before_x, before_y = goals[k, 3], goals[k, 4]
         rate = goals[k, 8]
         for leg in range(4):
@@ -189,8 +204,9 @@ def fill_arms(snapshot, s, c, step, goals, landings, arms):
                 x, y = c[_NOMINAL + 3 * leg], c[_NOMINAL + 3 * leg + 1]
                 hip_x, hip_y = cosine * x - sine * y, sine * x + cosine * y
                 early = duty * period / 2 + wait - (k + 0.5) * step
-                arm[0] = base[0] - com[0] + hip_x + (goals[k, 9] - rate * hip_y) * early
-                arm[1] = base[1] - com[1] + hip_y + (goals[k, 10] + rate * hip_x) * early
+                v_x, v_y = goals[k, 9] + excess_x * left, goals[k, 10] + excess_y * left
+                arm[0] = base[0] - com[0] + hip_x + (v_x - rate * hip_y) * early
+                arm[1] = base[1] - com[1] + hip_y + (v_y + rate * hip_x) * early
                 arm[2] = ground_at(s, com[0] + arm[0], com[1] + arm[1]) - com[2]
 
 
@@ -209,7 +225,7 @@ def plan_forces(snapshot, s, c, m, command, inertia, f):
     forces = np.empty((MPC_NODES, 4, 3))
     fill_goals(s, c, command, m[_STEP], goals)
     fill_contacts(s, m[_STEP], share, landings)
-    fill_arms(snapshot, s, c, m[_STEP], goals, landings, arms)
+    fill_arms(snapshot, s, c, m, goals, landings, arms)
     numbers = m.copy()
     numbers[_MASS] += snapshot[_CARRIED]
     lean_goals(s, c, command, m[_STEP], goals)

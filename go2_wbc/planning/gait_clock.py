@@ -3,6 +3,10 @@
 Period, duty and offsets are state: they move towards those that are wanted, at rates below that at
 which a foot's phase passes. So any gait becomes any other at any moment, and no foot that has
 lifted off is told that it still stands.
+
+Offsets and duty arrive together with the period. Ahead of it, a walk had become a pace or a bound
+with strides of half a second, in which the robot tips over the one pair of feet that stands, and a
+bound a walk with swings of a tenth of a second.
 """
 
 from __future__ import annotations
@@ -60,15 +64,20 @@ class GaitClock:
         A robot that ``is_thrown``, faster than it shall be, lifts its feet sooner at once.
         """
         wanted = self._rest if is_resting else self._wanted
-        period, duty, fall = wanted.period, wanted.duty, DUTY_RATE
+        period, duty, rise, fall = wanted.period, wanted.duty, DUTY_RATE, DUTY_RATE
         if self._stride is not None and not is_resting:
             period, duty = self._stride.at(speed)
             fall = DUTY_FALL if is_thrown else DUTY_RATE
         before = self.gait
+        left = abs(period - before.period) / PERIOD_RATE
+        if left > 0.0 and fall == DUTY_RATE and wanted.offsets != before.offsets:
+            rise = fall = min(fall, abs(duty - before.duty) / left)
         pairs = zip(before.offsets, wanted.offsets, strict=True)
-        offsets = tuple(_turned(now, goal, OFFSET_RATE * dt) for now, goal in pairs)
+        offsets = tuple(
+            _turned(now, goal, OFFSET_RATE * dt, dt / max(left, dt)) for now, goal in pairs
+        )
         period = _moved(before.period, period, PERIOD_RATE * dt)
-        duty = before.duty + min(max(duty - before.duty, -fall * dt), DUTY_RATE * dt)
+        duty = before.duty + min(max(duty - before.duty, -fall * dt), rise * dt)
         if (period, duty, offsets) == (before.period, before.duty, before.offsets):
             return
         if period != before.period:
@@ -81,9 +90,10 @@ def _moved(value: float, goal: float, most: float) -> float:
     return value + min(max(goal - value, -most), most)
 
 
-def _turned(phase: float, goal: float, most: float) -> float:
-    """``phase`` moved the shorter way round to ``goal``, by ``most`` at the most."""
+def _turned(phase: float, goal: float, most: float, share: float) -> float:
+    """``phase`` moved the shorter way round to ``goal``, by ``most`` or ``share`` of the way."""
     way = (goal - phase + 0.5) % 1.0 - 0.5
+    most = min(most, abs(way) * share)
     if abs(way) <= most:
         return goal
     return (phase + (most if way > 0.0 else -most)) % 1.0

@@ -36,7 +36,7 @@ from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.ground import GroundConfig, GroundPlane
 from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.planning.pose import LEVEL, BodyPose, PoseConfig
-from go2_wbc.planning.preview import Course, ForcePlanner
+from go2_wbc.planning.preview import Course, ForcePlanner, beyond
 from go2_wbc.planning.slip import SlipConfig, SlipObserver
 from go2_wbc.planning.swing import SwingConfig, swing_foot
 from go2_wbc.planning.trunk import TrunkLimits, TrunkPath
@@ -264,6 +264,7 @@ class LocomotionPlanner(GaitPlanner):
     ) -> Course:
         config = self._config
         remaining = np.where(phase.stance, 0.0, phase.remaining)
+        error = snapshot.v_world_com[:2] - self._trunk.world_velocity[:2]
         return Course(
             gait=self._clock.gait,
             time=self._clock.time,
@@ -277,6 +278,7 @@ class LocomotionPlanner(GaitPlanner):
             footholds=self._footholds(snapshot, remaining),
             ground=self._ground,
             friction=self._friction,
+            excess=beyond(error, config.stride_margin),
         )
 
     def _advance_phase(self, snapshot: Snapshot, command: VelocityCommand, dt: float) -> None:

@@ -44,6 +44,7 @@ class MpcConfig:
         least_share: part of a node below which a foot counts as in the air.
         prior_weight: by which the whole-body controller keeps to the forces.
         load_ramp: as ``LocomotionConfig.load_ramp``, in its place: the forces come without a jump.
+        throw_time: time constant [s] with which a robot that has been thrown is taken to slow down.
     """
 
     enabled: bool = False
@@ -59,13 +60,14 @@ class MpcConfig:
     least_share: float = 0.02
     prior_weight: float = 3e-3
     load_ramp: float = 0.01
+    throw_time: float = 0.4
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a number that is out of range."""
         weights = "angle_weights", "position_weights", "angular_weights", "linear_weights"
         require_not_negative(self, *weights)
         require_positive(self, "step", "interval", "force_weight", "friction", "force_max")
-        require_positive(self, "prior_weight", "load_ramp")
+        require_positive(self, "prior_weight", "load_ramp", "throw_time")
         require_share(self, "least_share")
 
     def numbers(self, mass: float, gravity: float) -> Float[np.ndarray, " size"]:
@@ -83,6 +85,7 @@ class MpcConfig:
                 self.least_share,
                 self.interval,
                 self.prior_weight,
+                self.throw_time,
             ]
         )
 

@@ -3,8 +3,11 @@
 The MPC (``planning.mpc``) looks at the command as it will be ramped, at the feet that stand where
 they are, and at those that come down where their footholds are planned. Lever arms are taken from
 the measured CoM on its wanted way: taken from the reference, which may run ahead of the robot, they
-make it drift aside. Between two solutions the forces of the first node are kept, and the trunk's
-acceleration that the whole-body controller is given is what they make of the feet that stand now.
+make it drift aside. One that a push throws goes on as it is thrown, and slows down: thrown to 3.7
+m/s and taken for one that trots at 0.5, it would have its next feet 0.4 m too far ahead, and be
+tipped by forces planned for these. Between two solutions the forces of the first node are kept, and
+the trunk's acceleration that the whole-body controller is given is what they make of the feet that
+stand now.
 
 This is the readable form; ``kernels.preview`` is the compiled one.
 """
@@ -44,6 +47,7 @@ class Course:
         footholds: where the feet in the air come down [m].
         ground: what is known of the ground.
         friction: greatest coefficient that the feet may count on.
+        excess: velocity [m/s] of the CoM beyond the wanted one and the margin; see ``beyond``.
     """
 
     gait: Gait
@@ -58,6 +62,7 @@ class Course:
     footholds: Float[np.ndarray, "4 2"]
     ground: GroundPlane
     friction: float
+    excess: Float[np.ndarray, "2"]
 
 
 class ForcePlanner:
@@ -101,7 +106,7 @@ class ForcePlanner:
 
     def _plan(self, snapshot: Snapshot, course: Course) -> bool:
         """Solve for the forces of the first node, while its feet stand; False without solution."""
-        horizon = look_ahead(snapshot, course, self._config.step, self._model)
+        horizon = look_ahead(snapshot, course, self._config, self._model)
         forces = np.empty((MPC_NODES, 4, 3))
         friction = min(self._config.friction, course.friction)
         self._numbers[MPC.start["friction"]] = friction
@@ -121,13 +126,19 @@ def inertia_about_com(snapshot: Snapshot) -> Float[np.ndarray, "3 3"]:
     return R @ about_com @ R.T
 
 
-def look_ahead(snapshot: Snapshot, course: Course, step: float, model: RobotModel) -> Horizon:
-    """What the MPC looks at, in nodes of ``step`` [s]."""
+def beyond(velocity: Float[np.ndarray, "2"], margin: float) -> Float[np.ndarray, "2"]:
+    """What is left of a velocity when its length is less by ``margin`` [m/s]; 0 if it is less."""
+    return velocity * max(0.0, 1.0 - margin / max(float(np.hypot(*velocity)), TIE))
+
+
+def look_ahead(snapshot: Snapshot, course: Course, config: MpcConfig, model: RobotModel) -> Horizon:
+    """What the MPC looks at, in nodes of ``config.step`` [s]."""
+    step = config.step
     turn = log_rotation(snapshot.R_world_base @ yaw_rotation(course.yaw + course.lean[3]).T)
     w = snapshot.R_world_base @ snapshot.state.v[3:6]
     goals = _goals(course, step)
     share, landings = _contacts(course, step)
-    arms = _arms(snapshot, course, step, model, goals, landings)
+    arms = _arms(snapshot, course, config, model, goals, landings)
     return Horizon(
         state=np.concatenate([turn, snapshot.p_world_com, w, snapshot.v_world_com]),
         goals=_leaned(course, goals),
@@ -197,7 +208,7 @@ def _contacts(
 def _arms(
     snapshot: Snapshot,
     course: Course,
-    step: float,
+    config: MpcConfig,
     model: RobotModel,
     goals: Float[np.ndarray, "nodes 12"],
     landings: Float[np.ndarray, "nodes 4"],
@@ -211,8 +222,11 @@ def _arms(
     base = snapshot.state.p_world_base - com + snapshot.com_shift
     before = course.position[:2]
     for k in range(MPC_NODES):
+        middle = (k + 0.5) * config.step
+        left = np.exp(-middle / config.throw_time)
         way = (before + goals[k, 3:5]) / 2 - course.position[:2]
-        before, middle = goals[k, 3:5], (k + 0.5) * step
+        way += course.excess * config.throw_time * (1.0 - left)
+        before = goals[k, 3:5]
         for leg in range(4):
             arm = arms[k, leg]
             wait = landings[k, leg] * gait.period
@@ -225,7 +239,7 @@ def _arms(
             else:
                 yaw, rate = course.yaw + goals[k, 8] * wait, goals[k, 8]
                 hip = (yaw_rotation(yaw) @ model.p_base_feet_nominal[leg])[:2]
-                speed = goals[k, 9:11] + rate * np.array([-hip[1], hip[0]])
+                speed = goals[k, 9:11] + course.excess * left + rate * np.array([-hip[1], hip[0]])
                 arm[:2] = base[:2] + hip + speed * (gait.stance_time / 2 + wait - middle)
                 arm[2] = course.ground.at(com[:2] + arm[:2]) - com[2]
     return arms

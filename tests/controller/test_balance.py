@@ -66,7 +66,7 @@ def test_a_push_that_feet_in_place_cannot_hold_starts_steps(impulse: float, angl
             go2.wait(0.1)
             if go2.mode is Mode.STANDING:
                 break
-        go2.wait(0.5)
+        go2.wait(1.0)  # it still moves over its feet, at up to 0.05 m/s
         assert go2.mode is Mode.STANDING
         assert is_standing(go2._runner.loop.snapshot)
         assert np.linalg.norm(go2.state.q[:2]) > 0.1, "it was pushed away and stands there"

@@ -49,7 +49,14 @@ ODD_CONFIG = LocomotionConfig(
     pose=PoseConfig(0.13, 0.47, 4.1),
 )
 """No two numbers alike, so that one in another's place is seen."""
-ODD_MPC = MpcConfig(step=0.028, interval=0.012, force_max=180.0, prior_weight=4e-3, load_ramp=0.02)
+ODD_MPC = MpcConfig(
+    step=0.028,
+    interval=0.012,
+    force_max=180.0,
+    prior_weight=4e-3,
+    load_ramp=0.02,
+    throw_time=0.3,
+)
 
 
 GALLOP = Gait("gallop", 0.36, 0.40, (0.0, 0.15, 0.5, 0.65), apex=0.05, needs_mpc=True)

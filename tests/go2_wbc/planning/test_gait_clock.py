@@ -48,6 +48,25 @@ def test_no_foot_is_put_back_in_its_stride_while_the_gait_changes(gait: Gait) ->
         assert (before.progress[landed] > 1.0 - JUMP).all()
 
 
+@pytest.mark.parametrize("there", ["pace", "bound"])
+def test_between_walk_and_pairs_neither_is_walked_at_the_pace_of_the_other(there: str) -> None:
+    """A pace or bound at half a second a stride tipped over a pair; a fast walk's swings missed."""
+    gait, walk = GAITS[there], GAITS["walk"]
+    clock = GaitClock(gait, None)
+    run(clock, is_resting=False)
+    for wanted in (walk, gait):
+        clock.change(wanted, None)
+        for _ in range(int(SECONDS / TICK)):
+            run(clock, seconds=TICK, is_resting=False)
+            now = clock.gait
+            share = (now.period - gait.period) / (walk.period - gait.period)
+            assert now.duty == pytest.approx(gait.duty + share * (walk.duty - gait.duty))
+            way = (now.offsets[2] - gait.offsets[2] + 0.5) % 1.0 - 0.5
+            whole = (walk.offsets[2] - gait.offsets[2] + 0.5) % 1.0 - 0.5
+            assert way == pytest.approx(share * whole, abs=1e-9)
+        assert clock.gait == wanted
+
+
 def test_a_robot_that_is_thrown_lifts_its_feet_sooner_at_once() -> None:
     """At the usual rate it fell over feet that stood on."""
     stride = GAITS["trot"].stride
