@@ -187,10 +187,11 @@ def adapt_gait(snapshot, s, c, dt, command):
         s[_PHASE_TIME] = s[_PHASE_TIME] % s[_PERIOD] * period / s[_PERIOD]
         s[_PERIOD] = period
     s[_DUTY] += min(max(wanted[1] - s[_DUTY], -fall * dt), rise * dt)
+    share = dt / left if left > dt else 1.0
     for leg in range(4):
         if wanted[2 + leg] != s[_OFFSETS + leg]:
             way = (wanted[2 + leg] - s[_OFFSETS + leg] + 0.5) % 1.0 - 0.5
-            most = min(c[_RATES + 2] * dt, abs(way) * (dt / max(left, dt)))
+            most = min(c[_RATES + 2] * dt, abs(way) * share)
             if abs(way) <= most:
                 s[_OFFSETS + leg] = wanted[2 + leg]
             else:

@@ -72,10 +72,9 @@ class GaitClock:
         left = abs(period - before.period) / PERIOD_RATE
         if left > 0.0 and fall == DUTY_RATE and wanted.offsets != before.offsets:
             rise = fall = min(fall, abs(duty - before.duty) / left)
+        share = dt / left if left > dt else 1.0
         pairs = zip(before.offsets, wanted.offsets, strict=True)
-        offsets = tuple(
-            _turned(now, goal, OFFSET_RATE * dt, dt / max(left, dt)) for now, goal in pairs
-        )
+        offsets = tuple(_turned(now, goal, OFFSET_RATE * dt, share) for now, goal in pairs)
         period = _moved(before.period, period, PERIOD_RATE * dt)
         duty = before.duty + min(max(duty - before.duty, -fall * dt), rise * dt)
         if (period, duty, offsets) == (before.period, before.duty, before.offsets):
