@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from go2_wbc.reference import Posture
     from motions.assembly import compile_timeline
     from motions.authoring import Choice, Motion, Range, motion
     from motions.compiled_plan import CompiledPlan
@@ -38,6 +39,7 @@ __all__ = [
     "Finding",
     "Motion",
     "Playable",
+    "Posture",
     "Range",
     "Suggestion",
     "Timeline",
@@ -76,6 +78,7 @@ __getattr__ = lazy_exports(
             "compile_motion",
             "suggest",
         ),
+        "language.written": ("Posture",),
         "music.finding": ("Beats", "beats"),
         "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
         "saved.motion_file": ("save_motion",),

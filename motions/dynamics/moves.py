@@ -64,8 +64,9 @@ def jump(
     Raises:
         TimelineError: for what no Go2 can jump.
     """
-    for name, value in (("x", x), ("y", y), ("yaw", yaw), ("height", height)):
+    for name, value in (("x", x), ("y", y), ("height", height)):
         _require(f"a jump's {name}", value, -FARTHEST[name], FARTHEST[name])
+    _require_angle("a jump's yaw", yaw, -FARTHEST["yaw"], FARTHEST["yaw"])
     _require("a jump's height", height, LOWEST, FARTHEST["height"])
     half = _half_flight(height)
     if flight is not None:
@@ -122,7 +123,7 @@ def rear(pitch: float = math.radians(-25.0), hold: float = 0.6) -> tuple[Phase, 
     Raises:
         TimelineError: for a pitch or time that the robot cannot do.
     """
-    _require("the pitch of rearing", pitch, math.radians(-60.0), math.radians(-5.0))
+    _require_angle("the pitch of rearing", pitch, math.radians(-60.0), math.radians(-5.0))
     _require("the time of rearing", hold, 0.2, 1.0)
     half = _whole(0.5 * hold)
     back = float(FOOTPRINT[Leg.RL, 0]) * (1.0 - 1.0 / math.cosh(half / PENDULUM_TIME))
@@ -184,6 +185,20 @@ def _moved(
     x, y, yaw = (share * part for part in way)
     moved = footprint @ yaw_rotation(yaw)[:2, :2].T - footprint + [x, y]
     return {leg: (float(moved[leg, 0]), float(moved[leg, 1]), z) for leg in LEGS}
+
+
+def _require_angle(what: str, angle: float, least: float, greatest: float) -> None:
+    """As ``_require``, with what may have been meant: degrees, or the other sign."""
+    if is_number(angle) and not least <= angle <= greatest:
+        degrees = math.radians(angle)
+        meant = {f"deg({angle:g})": degrees, f"{-angle:g}": -angle, f"-deg({angle:g})": -degrees}
+        for text, value in meant.items():
+            if least <= value <= greatest:
+                raise TimelineError(
+                    f"{what} must be from {least:.3g} to {greatest:.3g} rad, got {angle!r}: did "
+                    f"you mean {text}?"
+                )
+    _require(what, angle, least, greatest)
 
 
 def _require(what: str, value: float, least: float, greatest: float) -> None:

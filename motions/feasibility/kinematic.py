@@ -5,6 +5,8 @@ Everything is geometry of the ``Trajectory``, in the frame of the motion: z up, 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool, Float
 
@@ -201,7 +203,12 @@ def ends(
         values[3] = np.inf
     times, own = np.array([0.0, plan.duration]), np.repeat(np.eye(2, dtype=bool), 3, axis=1)
     table = np.tile(values, (2, 1))
-    return Series.against("entry and exit", "m, rad", names, times, table, bounds, where=own)
+    series = Series.against("entry and exit", "m, rad", names, times, table, bounds, where=own)
+    if not (series.margins[-1, 3:] < 0.0).any():
+        return series
+    end = plan.exit.value
+    way = "home()" if plan.exit is plan.entry else f"posture({end!r})"
+    return replace(series, note=f"it is to end in {end}: {way}")
 
 
 def _feet(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "n 4 3"]:

@@ -47,7 +47,8 @@ class Finding:
         """One line for a person."""
         line = f"{self.check}: {self.subject} at {self.time:.2f} s"
         if np.isfinite(self.value):
-            line += f" is {self.value:.3g} {self.unit}, limit {self.limit:.3g}"
+            value = self.value if abs(self.value) >= NOISE else 0.0
+            line += f" is {value:.3g} {self.unit}, limit {self.limit:.3g}"
         return f"{line} ({self.note})" if self.note else line
 
 

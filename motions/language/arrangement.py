@@ -78,10 +78,11 @@ class Arrangement(Written):
         """This motion, then the others; each starts in the posture in which the last one ends.
 
         Raises:
-            TimelineError: if the postures differ, or one before the last does not end at home.
+            TimelineError: for what is no timeline, if the postures differ, or one before the last
+                does not end at home.
         """
         line = self
-        for other in others:
+        for other in _written("then()", others):
             if other.entry is not line.exit:
                 raise TimelineError(
                     f"then(): this ends in {line.exit.value}, the next starts in "
@@ -96,7 +97,7 @@ class Arrangement(Written):
     def together(self: _Line, *others: Written) -> _Line:
         """Do all of ``others`` at the same time, from the cursor on; they may not share a part."""
         line, start = self, self.cursor
-        for other in others:
+        for other in _written("together()", others):
             line = line._joined(other, start)
         return replace(line, cursor=max([start, *(start + other.end for other in others)]))
 
@@ -117,3 +118,11 @@ class Arrangement(Written):
             away.append("balance")
         if away:
             raise TimelineError(f"{what} needs motions that end at home(); away: {', '.join(away)}")
+
+
+def _written(call: str, others: tuple[_Line, ...]) -> tuple[_Line, ...]:
+    for other in others:
+        if not isinstance(other, Written):
+            hint = f"; is it of the library? load_motion({other!r})" if type(other) is str else ""
+            raise TimelineError(f"{call} takes timelines, got {other!r}{hint}")
+    return others

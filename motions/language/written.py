@@ -71,7 +71,10 @@ class Written:
         for name in ("entry", "exit"):
             if not isinstance(getattr(self, name), Posture):
                 valid = ", ".join(f"Posture.{posture.name}" for posture in Posture)
-                raise TimelineError(f"{name} must be one of {valid}, got {getattr(self, name)!r}")
+                raise TimelineError(
+                    f"{name} must be one of {valid} (from motions import Posture), got "
+                    f"{getattr(self, name)!r}"
+                )
         positive("shift_time", self.shift_time)
         if self.physics not in PHYSICS:
             raise TimelineError(unknown_name("physics", str(self.physics), PHYSICS))

@@ -258,6 +258,16 @@ def test_a_motion_that_starts_lying_or_ends_elsewhere_is_refused(
         assert "entry and exit" in failed(checker.check(line))
 
 
+@pytest.mark.parametrize(("exit", "way"), [(Posture.STAND, "home()"), (Posture.SIT, "'sit')")])
+def test_a_motion_that_ends_elsewhere_is_told_what_ends_it(
+    checker: FeasibilityChecker, exit: Posture, way: str
+) -> None:
+    (finding,) = checker.check(Timeline(exit=exit).body(z=-0.03, over=0.5)).failures[:1]
+    assert str(finding).endswith(f"{way})")
+    home = checker.check(Timeline().body(z=-0.03, over=0.5).home(over=0.5))
+    assert "home()" not in home.table()
+
+
 # --- what the numbers mean ------------------------------------------------------------------------
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -221,6 +223,27 @@ def test_what_is_written_wrongly_is_refused_with_what_would_be_right(
 ) -> None:
     with pytest.raises(TimelineError, match=message):
         write()
+
+
+WRONG_TYPES = """
+from motions import Timeline
+for write in ('Timeline().then("bow")', "Timeline().together(7)", 'Timeline(entry="sit")'):
+    try:
+        eval(write)
+    except Exception as error:
+        print(type(error).__name__, error)
+"""
+
+
+def test_what_has_the_wrong_type_is_refused_with_what_would_be_right() -> None:
+    """In a process of its own: here types are checked before that."""
+    run = subprocess.run([sys.executable, "-c", WRONG_TYPES], capture_output=True, text=True)
+    then, together, entry = run.stdout.splitlines()
+    assert then.startswith("TimelineError then() takes timelines, got 'bow'")
+    assert then.endswith("load_motion('bow')")
+    assert together == "TimelineError together() takes timelines, got 7"
+    assert entry.startswith("TimelineError entry must be one of Posture.LIE, ")
+    assert "from motions import Posture" in entry
 
 
 # --- the leg's inverse kinematics -----------------------------------------------------------------
