@@ -1,4 +1,4 @@
-"""``python -m benchmarks evidence``: fills a table of the documentation from the results."""
+"""``python -m benchmarks evidence``: fills tables of the documentation from the results."""
 
 from __future__ import annotations
 
@@ -11,12 +11,18 @@ from pathlib import Path
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from go2_wbc.errors import ConfigError
 
-BEGIN, SPEED_BEGIN, END = "<!-- evidence:begin", "<!-- evidence:speed", "<!-- evidence:end -->"
-"""What a table stands between: the first for the behaviour, the second for the speed."""
+BEGIN, SENSED_BEGIN, SPEED_BEGIN = (
+    "<!-- evidence:begin",
+    "<!-- evidence:sensors",
+    "<!-- evidence:speed",
+)
+"""What stands above a table: of the behaviour, of what is done on sensors, of the speed."""
+END = "<!-- evidence:end -->"
 HEAD = "| what | n | mean | worst | closest peer |\n|---|---|---|---|---|"
 SPEED_HEAD = "| what | runs | mean | worst | before |\n|---|---|---|---|---|"
 EXAMPLES = """
 python -m benchmarks evidence docs/evidence.md behaviour.json
+python -m benchmarks evidence docs/evidence.md locomotion.json balance.json
 python -m benchmarks evidence docs/explanation/speed.md speed.json
 python -m benchmarks evidence docs/evidence.md behaviour.json more.json
 """
@@ -108,7 +114,51 @@ SPEED_LINES: tuple[Line, ...] = (
     Line("realtime.missed", "500 Hz at the wall clock's pace: late ticks", "{:.2f} %"),
     Line("realtime.bare", "a bare loop after it", "{:.2f} %"),
 )
-TABLES = {BEGIN: (HEAD, LINES), SPEED_BEGIN: (SPEED_HEAD, SPEED_LINES)}
+SENSED_LINES: tuple[Line, ...] = (
+    Line("sensed-0.5.mean", "trot 0.5 m/s: error of the mean speed", "{:.2f} %", "+7 %"),
+    Line("sensed-1.mean", "trot 1.0 m/s: error of the mean speed", "{:.2f} %", "+12 %"),
+    Line("sensed-2.mean", "trot 2.0 m/s: error of the mean speed", "{:.2f} %", "limit 0.8 m/s"),
+    Line("sensed-3.mean", "trot 3.0 m/s: error of the mean speed", "{:.2f} %", "limit 0.8 m/s"),
+    Line(
+        "sensed-aside-0.5.mean",
+        "trot sideways 0.5 m/s: error of the mean speed",
+        "{:.2f} %",
+        "+19 % at 0.3 m/s, falls at 0.5",
+    ),
+    Line(
+        "sensed-turn-2.turn",
+        "turning 2 rad/s: error of the mean rate",
+        "{:.2f} %",
+        "-16 % at 1 rad/s",
+    ),
+    Line("sensed-curve.mean", "(0.8, 0.3) m/s and 1 rad/s: error of the speed", "{:.2f} %"),
+    Line("creep", "standing 60 s: creep", "{:.1f} mm"),
+    Line("drift", "odometry over 10 m at 0.5 m/s: off, of the way", "{:.1f} %"),
+    Line("sensed-boxes.done", "boxes of 8 cm, not known: crossed", "{:.0%}"),
+    Line("sensed-stairs.done", "four stairs of 8 cm: climbed", "{:.0%}"),
+    Line("sensed-step.done", "step of 10 cm: climbed", "{:.0%}"),
+    Line("sensed-up.done", "15 deg up: walked", "{:.0%}"),
+    Line("sensed-across.done", "15 deg across: walked", "{:.0%}"),
+    Line("sensed-slippery.done", "friction 0.2, not known, 0.5 m/s: walked", "{:.0%}"),
+    Line("sensed-heavy.height", "payload of 6 kg, not known: height off", "{:.1f} mm"),
+    Line("sensed-heavy.tilt", "the same: trunk off", "{:.1f} deg"),
+    Line("sensed-stand-90", "standing, pushed by 36 N s aside: stands again", "{:.0%}"),
+    Line("sensed-stand-0", "standing, pushed by 45 N s ahead: stands again", "{:.0%}"),
+    Line(
+        "sensed-trot-lateral",
+        "trot 0.5 m/s, pushed by 26 N s aside at 16 phases: walks on",
+        "{:.0%}",
+        "14 N s in 0.2 s",
+    ),
+    Line("sensed-trot-forward", "the same, 50 N s ahead", "{:.0%}", "20 N s in 0.2 s"),
+    Line("sensed-recover", "dropped at random, `recover()`: stands", "{:.0%}", "cannot"),
+    Line("sensed_library.done", "the motions of the library: done", "{:.0%}", "cannot"),
+)
+TABLES = {
+    BEGIN: (HEAD, LINES),
+    SENSED_BEGIN: (HEAD, SENSED_LINES),
+    SPEED_BEGIN: (SPEED_HEAD, SPEED_LINES),
+}
 """Head and lines by the mark above the table."""
 
 
@@ -117,8 +167,8 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "evidence",
-        "Fill the page's table from what `behaviour --out` or `speed --out` wrote; a\n"
-        "metric that is in several files is taken from the last.",
+        "Fill those tables of the page of whose metrics there are some in what the\n"
+        "benchmarks' `--out` wrote; of several files, the last one that has a metric.",
         examples=EXAMPLES,
     )
     parser.add_argument("page", metavar="PAGE", type=Path)
@@ -157,15 +207,22 @@ def table(rows: Mapping[str, Mapping[str, float]], mark: str = BEGIN) -> str:
 
 
 def filled(text: str, rows: Mapping[str, Mapping[str, float]]) -> str:
-    """``text`` with the table between its marks replaced.
+    """``text`` with those tables between marks replaced of which ``rows`` has any metric.
 
     Raises:
-        ConfigError: if the marks are missing, or a metric is.
+        ConfigError: if there is no such table, its end is missing, or one of its metrics.
     """
-    mark = next((mark for mark in TABLES if mark in text), BEGIN)
-    begin = text.find(mark)
-    end = text.find(END, begin)
-    if begin < 0 or end < 0:
-        raise ConfigError(f"the text has no {BEGIN} ... {END}")
-    start = text.index("\n", begin) + 1
-    return f"{text[:start]}{table(rows, mark)}\n{text[end:]}"
+    marks = [
+        mark
+        for mark, (_, lines) in TABLES.items()
+        if mark in text and not rows.keys().isdisjoint(line.metric for line in lines)
+    ]
+    if not marks:
+        raise ConfigError(f"the text has no {BEGIN} ... {END} for these results")
+    for mark in marks:
+        start = text.index("\n", text.index(mark)) + 1
+        end = text.find(END, start)
+        if end < 0:
+            raise ConfigError(f"the text has no {END} after {mark}")
+        text = f"{text[:start]}{table(rows, mark)}\n{text[end:]}"
+    return text

@@ -80,13 +80,16 @@ def blocks(name: str, language: str | None = None) -> list[Block]:
 
 
 def table_rows(text: str, first: str) -> list[list[str]]:
-    """The cells of the table whose head's first cell starts with ``first``, without the head."""
-    cells = [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in text[text.index(f"| {first}") :].split("\n\n")[0].splitlines()
-        if line.startswith("|")
-    ]
-    return cells[2:]
+    """The cells of the tables whose head's first cell starts with ``first``, without the heads."""
+    cells = []
+    for table in text.split(f"\n| {first}")[1:]:
+        lines = table.split("\n\n")[0].splitlines()[2:]
+        cells += [
+            [cell.strip() for cell in line.strip("|").split("|")]
+            for line in lines
+            if line.startswith("|")
+        ]
+    return cells
 
 
 def name_of(block: Block) -> str:

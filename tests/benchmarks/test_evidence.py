@@ -7,13 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import speed
+from benchmarks import balance, locomotion, speed
 from benchmarks.__main__ import main
 from benchmarks.behaviour import SCENARIOS
 from benchmarks.evidence import (
     BEGIN,
     END,
     LINES,
+    SENSED_BEGIN,
+    SENSED_LINES,
     SPEED_BEGIN,
     SPEED_LINES,
     Line,
@@ -30,7 +32,12 @@ ROWS = {line.metric: {"n": 20, "mean": 0.5, "worst": 0.25} for line in LINES}
 
 
 @pytest.mark.parametrize(
-    ("lines", "scenarios"), [(LINES, SCENARIOS), (SPEED_LINES, speed.SCENARIOS)]
+    ("lines", "scenarios"),
+    [
+        (LINES, SCENARIOS),
+        (SPEED_LINES, speed.SCENARIOS),
+        (SENSED_LINES, (*locomotion.SCENARIOS, *balance.SCENARIOS)),
+    ],
 )
 def test_every_line_is_a_metric_of_the_benchmark(
     lines: tuple[Line, ...], scenarios: tuple[Scenario, ...]
@@ -51,6 +58,13 @@ def test_the_table_is_put_between_the_marks_and_nothing_else_changes() -> None:
     assert filled(text, ROWS) == f"before\n{BEGIN}: x -->\n{table(ROWS)}\n{END}\nafter\n"
 
 
+def test_of_two_tables_of_a_page_only_that_is_filled_of_which_there_are_results() -> None:
+    text = f"{BEGIN} -->\nold\n{END}\n{SENSED_BEGIN} -->\nolder\n{END}\n"
+    assert filled(text, ROWS) == text.replace("old\n", f"{table(ROWS)}\n", 1)
+    sensed = {line.metric: {"n": 10, "mean": 0.5, "worst": 0.25} for line in SENSED_LINES}
+    assert filled(text, sensed) == text.replace("older\n", f"{table(sensed, SENSED_BEGIN)}\n")
+
+
 def test_the_command_fills_a_file_from_several_results(tmp_path: Path) -> None:
     readme, results = tmp_path / "PAGE.md", []
     readme.write_text(f"before\n{BEGIN}: x -->\nold\n{END}\n")
@@ -69,14 +83,21 @@ def test_a_missing_metric_or_mark_is_named() -> None:
         table(short)
     with pytest.raises(ConfigError, match="the text has no"):
         filled("nothing here", ROWS)
+    with pytest.raises(ConfigError, match="end --> after <!-- evidence:begin"):
+        filled(f"{BEGIN} -->\n", ROWS)
 
 
 @pytest.mark.parametrize(
-    ("page", "mark", "content"), [(PAGE, BEGIN, LINES), (SPEED_PAGE, SPEED_BEGIN, SPEED_LINES)]
+    ("page", "mark", "content"),
+    [
+        (PAGE, BEGIN, LINES),
+        (PAGE, SENSED_BEGIN, SENSED_LINES),
+        (SPEED_PAGE, SPEED_BEGIN, SPEED_LINES),
+    ],
 )
 def test_no_figure_of_the_page_is_blank(page: Path, mark: str, content: tuple[Line, ...]) -> None:
     text = page.read_text(encoding="utf-8")
-    block = text[text.index(mark) : text.index(END)]
+    block = text[text.index(mark) : text.index(END, text.index(mark))]
     lines = [line for line in block.splitlines() if line.startswith("|")][2:]
     assert len(lines) == len(content)
     for line in lines:
