@@ -120,7 +120,7 @@ class Arrangement(Written):
             raise TimelineError(f"{what} needs motions that end at home(); away: {', '.join(away)}")
 
 
-def _written(call: str, others: tuple[_Line, ...]) -> tuple[_Line, ...]:
+def _written(call: str, others: tuple[Written, ...]) -> tuple[Written, ...]:
     for other in others:
         if not isinstance(other, Written):
             hint = f"; is it of the library? load_motion({other!r})" if type(other) is str else ""
