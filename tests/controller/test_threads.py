@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import threading
 from collections.abc import Callable, Iterator
@@ -257,10 +258,11 @@ class Failing(Task):
     name, unit, weight = "failing", "m/s^2", 1e-3
 
     def __init__(self) -> None:
-        self.is_broken = False
+        self.ticks_left = math.inf
 
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
-        if self.is_broken:
+        self.ticks_left -= 1
+        if self.ticks_left < 0:
             raise ZeroDivisionError("a bug of mine")
         return Rows(np.eye(SIZE)[6:7], np.zeros(1))
 
@@ -280,14 +282,14 @@ def test_a_task_of_ones_own_that_fails_at_a_trot_leaves_a_limp_robot(
     with GO2Controller(plant=plant, realtime=realtime) as go2:
         loop = with_task(go2, task)
         in_thread(lambda: _trot(go2)).result(HANG_GUARD)
-        task.is_broken = True
+        task.ticks_left = 250  # by which the call has begun
         with pytest.raises(ZeroDivisionError, match="a bug of mine"):
-            in_thread(lambda: go2.wait(1.0)).result(HANG_GUARD)
+            in_thread(lambda: go2.wait(2.0)).result(HANG_GUARD)
         assert go2.mode is Mode.DAMPED
         assert is_limp(plant.commands[-1])
         assert "ZeroDivisionError" in go2.last_outcome.reason
         assert loop.fault is not None
-        task.is_broken = False
+        task.ticks_left = math.inf
         if realtime:
             with pytest.raises(PlantError, match="close this controller and make a new one"):
                 go2.stand()
