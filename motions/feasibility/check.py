@@ -29,7 +29,7 @@ from motions.trajectory import trajectory_of
 
 BALANCE, WAY = "balance", "way of a foot"
 """Problems of the compiler."""
-SLIDING = 0.25
+SLIDING = 0.17
 """Share of the slip that is allowed, from which on a force that lacks for a moment matters."""
 FLIGHT_SHARE = 1.1
 """What solved plans may use of the floor's friction: they are solved for 0.5, and reach 0.55."""
@@ -164,7 +164,8 @@ class FeasibilityChecker:
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
         wrench, load = dynamic.contacts(path, forces, limits)
         slides = max(map(slip.worst, LEGS)) > SLIDING * limits.slip
-        is_lacking = lag.is_broken or (slides and wrench.worst(0) > limits.jolt)
+        lacks = wrench.worst(0, begin=dynamic.SPREAD) > limits.jolt
+        is_lacking = lag.is_broken or (slides and lacks)
         grip = friction.friction(path, forces, heavy, limits, floor)
         landing_place, landing_speed = kinematic.landing(path, model, limits)
         in_order_of_causes = [

@@ -183,8 +183,10 @@ def torque(
 ) -> tuple[Series, Series]:
     """Torques against the motors' peak, and against what ``model.motor`` gives at that speed.
 
-    Only a driving motor, tau v > 0, meets the line of torque and speed; rounding moves none.
+    Only a driving motor, tau v > 0, meets the line of torque and speed; rounding moves none. A plan
+    that begins at speed is followed late: what its first ``SPREAD`` samples need is not asked for.
     """
+    begun = ((np.arange(len(motion.times)) >= SPREAD) | motion.is_dynamic)[:, None]
     share = np.where(motion.is_dynamic, limits.solved_torque_share, limits.torque_share)
     asked, most = np.abs(forces.tau), share[:, None] * model.torque_limits
     v = motion.v[:, 6:] if forces.v_motors is None else forces.v_motors
@@ -194,8 +196,8 @@ def torque(
     tight = TIGHT_TORQUE * float(model.torque_limits.min())
     what = ("N m", JOINTS, motion.times, asked)
     return (
-        Series.against("torque", *what, most, tight=tight),
-        Series.against("torque at speed", *what, at_speed, where=drives, tight=tight),
+        Series.against("torque", *what, most, where=begun, tight=tight),
+        Series.against("torque at speed", *what, at_speed, where=drives & begun, tight=tight),
     )
 
 

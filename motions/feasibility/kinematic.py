@@ -126,8 +126,9 @@ def clearance(
 def dragging(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) -> Series:
     """Ways [m] that feet in the air go sideways while they are on the ground nevertheless.
 
-    Such a foot is not raised, or moves on before it is put down: it would rub, with forces that the
-    plan and this check leave out. The way is summed for as long as the foot stays that low.
+    Such a foot is not raised, or moves on before it is put down: it rubs, with forces that the plan
+    and this check leave out, small as long as it bears nothing. From ``limits.rub`` on that is a
+    warning. The way is summed for as long as the foot stays that low.
     """
     places = _feet(motion, model)
     rubs = (places[:, :, 2] - model.foot_radius < limits.drag_height) & ~motion.stance
@@ -136,7 +137,8 @@ def dragging(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) -
     ways = np.zeros(rubs.shape)
     for row, leg in np.argwhere(rubs[1:] & rubs[:-1]):
         ways[row + 1, leg] = ways[row, leg] + steps[row, leg]
-    return Series.against("dragging", "m", FEET, motion.times, ways, limits.drag)
+    tight = limits.drag - limits.rub
+    return Series.against("dragging", "m", FEET, motion.times, ways, limits.drag, tight=tight)
 
 
 def landing(

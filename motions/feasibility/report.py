@@ -100,9 +100,10 @@ class Series:
         """Whether any margin is negative."""
         return bool((self.margins < 0.0).any())
 
-    def worst(self, column: int) -> float:
-        """The greatest value of a subject where it was checked; 0 if it never was."""
+    def worst(self, column: int, begin: int = 0) -> float:
+        """The greatest value of a subject where it was checked, from row ``begin`` on, or 0."""
         is_checked = ~np.isnan(self.margins[:, column])
+        is_checked[:begin] = False
         return float(self.values[is_checked, column].max(initial=0.0))
 
     def excused(self) -> Series:

@@ -189,7 +189,10 @@ AWAY = {
     .home(over=0.9),
     "support": Timeline(balance=False).foot("FR", z=0.1, over=0.8).home(over=0.8),
     "landing speed": Timeline().foot("FR", z=0.15, over=0.6).foot("FR", over=0.1, ease="linear"),
-    "dragging": Timeline().foot("FR", x=0.05, z=0.0, over=0.6).home(over=0.6),
+    "dragging": Timeline()
+    .foot("FR", x=0.1, z=0.0, over=0.6)
+    .foot("FR", x=-0.1, z=0.0, over=0.6)
+    .home(over=0.6),
     "clearance": Timeline().body(pitch=deg(35), z=-0.2, over=1.0).home(over=1.0),
     "entry and exit": Timeline().body(z=-0.08, over=1.0),
     "balance": Timeline().foot("FR", z=0.1, over=0.8).foot("RL", z=0.1, over=0.8),
@@ -207,17 +210,18 @@ def test_what_the_robot_cannot_do_is_found_under_its_name(
 def test_a_foot_that_moves_along_the_ground_is_found_and_one_that_rises_on_its_way_is_not(
     checker: FeasibilityChecker,
 ) -> None:
-    (finding,) = checker.check(AWAY["dragging"]).failures
+    line = Timeline().foot("FR", x=0.05, z=0.0, over=0.6).home(over=0.6)
+    (finding,) = checker.check(line).warnings
     assert (finding.check, finding.subject, finding.unit) == ("dragging", "FR", "m")
     assert finding.value == pytest.approx(0.1, abs=1e-3)  # there, and back with home()
-    assert finding.limit == 0.02
     for line in (
         Timeline().foot("FR", z=0.03, over=0.3).foot("FR", x=0.05, z=0.0, over=0.6),
         Timeline().foot("FR", x=0.1, z=0.03, over=0.6).foot("FR", x=0.1, z=0.05, over=0.6),
     ):
-        assert "dragging" not in failed(checker.check(line))
+        report = checker.check(line)
+        assert "dragging" not in failed(report) | {f.check for f in report.warnings}
     back = Timeline().foot("FR", z=0.03, over=0.3).foot("FR", x=0.05, over=0.6).home(over=0.6)
-    (finding,) = checker.check(back).failures
+    (finding,) = checker.check(back).warnings
     assert finding.check == "dragging"
     assert finding.value == pytest.approx(0.05, abs=3e-3)  # and the last bit of the way down
 

@@ -137,3 +137,15 @@ def test_what_the_feet_cannot_give_for_a_moment_is_refused_if_it_is_much(
     assert failure.value > FeasibilityLimits().jolt
     assert FeasibilityChecker(model, FeasibilityLimits(jolt=1e3)).check(quick).ok
     assert FeasibilityChecker(model).check(nods(0.12, 0.08)).ok
+
+
+def test_a_force_that_lacks_as_a_plan_begins_at_speed_is_not_asked_for(model: RobotModel) -> None:
+    # In MuJoCo the first slides by 2.7 mm, though it lacks four times as much.
+    checker, start = FeasibilityChecker(model), Timeline()
+    jumps = [
+        line.body(x=0.02, over=0.4, ease="out") for line in (start, start.body(x=-0.02, over=0.5))
+    ]
+    begins, later = (checker.check(line.home(over=0.6)) for line in jumps)
+    assert begins.margins["contact wrench"].value > later.margins["contact wrench"].value > 30.0
+    assert begins.ok
+    assert "contact wrench" in {finding.check for finding in later.failures}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, deg
 from motions.feasibility.dynamic import numbers_of, scale_of_wrench, state_at
-from motions.feasibility.friction import CREEP, cone, creep
+from motions.feasibility.friction import CREEP, HELD, cone, creep, slip
+from motions.feasibility.limits import FeasibilityLimits
 from tests.engine_helpers import standing_q, state_of
 
 BISECTION = 1.5 / 2**7  # what is left of the interval
@@ -81,6 +83,18 @@ def test_a_foot_slides_as_a_block_does() -> None:
     assert ways[-1, 3] == pytest.approx(0.05 * 4000 * dt)
     assert ways[1999, 2] == pytest.approx(expected, rel=1e-2)
     assert ways[2000:, 2].max() == 0.0
+
+
+def test_joints_hold_a_foot_that_lacks_little(
+    checker: FeasibilityChecker, model: RobotModel
+) -> None:
+    checked = checker.evaluate(Timeline().body(z=-0.001, over=1.0).home(over=1.0))
+    for lacks, slides in ((0.9 * HELD, False), (2.0 * HELD, True)):
+        forces = np.zeros_like(checked.forces.contact)
+        forces[:, 0] = 2.5 + lacks, 0.0, 5.0
+        given = replace(checked.forces, contact=forces)
+        series = slip(checked.path, given, model, FeasibilityLimits(), floor=0.5)
+        assert (series.values[:, 0].max() > 0.1) == slides
 
 
 def test_a_lasting_push_is_held_by_the_gains_and_a_short_one_forgotten() -> None:
