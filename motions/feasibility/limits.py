@@ -137,7 +137,8 @@ class FlightLimits:
         balance: longest time [s] on two feet without that: of pairs lifted at once, 0.86 s were
             done, 40 mm off, and 0.96 s were not.
         unlike: greatest share by which the mass may differ from that it was solved for: with 2 kg,
-            0.13, a rear is still done, with 4 kg it falls.
+            0.13, a rear is still done, with 4 kg it falls. Of 14 jumps and lifts of the train half
+            that differ by 0.15 to 0.23 all were done, from 0.24 on half of six.
     """
 
     step: float = 1e-3
@@ -149,7 +150,7 @@ class FlightLimits:
     touchdown: float = 1.0
     settling: float = 0.3
     balance: float = 0.7
-    unlike: float = 0.15
+    unlike: float = 0.22
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a limit that is not positive."""
