@@ -313,8 +313,7 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
         share = (force - numbers[CONTACT]) / (numbers[TRUSTED] - numbers[CONTACT])
         trust = min(max(share, LEAST_TRUST), 1.0)
         memory[1 + leg] = age + dt
-        is_settled = age > numbers[SETTLED_TIME]
-        creeping = numbers[SETTLED_DRIFT] if is_settled else numbers[FOOT_DRIFT]
+        creeping = numbers[SETTLED_DRIFT if age > numbers[SETTLED_TIME] else FOOT_DRIFT]
         level = creeping / trust + slip + numbers[DRIFT_SHARE] * foot[9]
         factor = 1.0
         if trust > LEAST_TRUST:
