@@ -23,7 +23,11 @@ from go2_wbc.robot.rotations import wrap_angle
 from motions import motion_names
 
 DRIFT, TURN_DRIFT = 0.015, 0.02
-"""What leg odometry may add to where a motion ends: a share of its way, and an angle [rad]."""
+"""What leg odometry may add to where a motion ends: a share of its way, and an angle [rad].
+
+The heading of the longest motion, of 67 s, drifted by 0.37 deg (rms of 18 other seeds, at most
+0.66); the estimator itself is unsure of it by 0.8 deg then. The angle is three times the former.
+"""
 _ITEM = "sensors: every motion of the library"
 DONE = Metric("sensed_library.done", _ITEM, "share of motions done", "", 0.95, Direction.AT_LEAST)
 TRUE = Metric("sensed_library.true", _ITEM, "share of True that is true", "", 1.0, DONE.direction)

@@ -76,6 +76,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.slip",
         "go2_wbc.kernels.standing",
         "go2_wbc.kernels.supervision",
+        "go2_wbc.kernels.swing",
         "go2_wbc.kernels.vectors",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",

@@ -226,13 +226,18 @@ def height_off(memory, ground, variance, numbers):
     return off
 
 
-@subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
-def take_in_rest(x, P, dx, column, reading, numbers):
-    """Take in that nothing moves: no velocity, and a gyro that reads its bias."""
+@subroutine("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], b1)")
+def take_in_rest(x, P, dx, column, reading, numbers, is_carried):
+    """Take in that nothing moves: no velocity, and a gyro that reads its bias.
+
+    Of a robot that its feet carry the gyro's bias is learnt by these: slow turns of its trunk read
+    as rest, too.
+    """
     for k in range(3):
         take_in_one(P, dx, column, 3 + k, -x[3 + k], numbers[STILL_VELOCITY] ** 2)
-        off = reading[1 + k] - x[GYRO_BIAS + k]
-        take_in_one(P, dx, column, E_GYRO_BIAS + k, off, numbers[STILL_GYRO] ** 2)
+        if not is_carried:
+            off = reading[1 + k] - x[GYRO_BIAS + k]
+            take_in_one(P, dx, column, E_GYRO_BIAS + k, off, numbers[STILL_GYRO] ** 2)
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1])")
@@ -259,6 +264,7 @@ STILL_FORCE, STILL_VELOCITY, STILL_DRIFT, RADIUS, GRAVITY = range(15, 20)
 TOUCHDOWN_SLIP, TOUCHDOWN_TIME, VERTICAL, COMPLIANCE, STILL_GYRO = range(20, 25)
 VERTICAL_SHARE, LYING_TIME, LEARNING_SPEED, DRIFT_SHARE, VELOCITY_SHARE = range(25, 30)
 UNEVEN, UNEVEN_TIME, GYRO_BIAS_DEVIATION, FORCE_BIAS_DEVIATION = range(30, 34)
+SETTLED_DRIFT, SETTLED_TIME = range(34, 36)
 """What ``numbers`` holds: those of ``EstimatorConfig``, foot radius [m] and gravity [m/s^2]."""
 
 
@@ -307,7 +313,8 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
         share = (force - numbers[CONTACT]) / (numbers[TRUSTED] - numbers[CONTACT])
         trust = min(max(share, LEAST_TRUST), 1.0)
         memory[1 + leg] = age + dt
-        level = numbers[FOOT_DRIFT] / trust + slip + numbers[DRIFT_SHARE] * foot[9]
+        creeping = numbers[SETTLED_DRIFT if age > numbers[SETTLED_TIME] else FOOT_DRIFT]
+        level = creeping / trust + slip + numbers[DRIFT_SHARE] * foot[9]
         factor = 1.0
         if trust > LEAST_TRUST:
             is_carried = True
@@ -337,7 +344,7 @@ def estimate(x, P, memory, reading, legs, p_imu, numbers, q, v):
     if is_upset(memory, dt, is_lying, R) and not rests:
         share_learnt = 0.0
     if rests:
-        take_in_rest(x, P, dx, column, reading, numbers)
+        take_in_rest(x, P, dx, column, reading, numbers, is_carried)
     elif is_lying:
         for k in range(3):
             take_in_one(P, dx, column, 3 + k, -x[3 + k], numbers[REST] ** 2)

@@ -198,6 +198,9 @@ PLANNER = Layout(
     pose=(4,),
     pose_rate=(4,),
     lean_offset=(2,),
+    swing_raised=(4,),
+    swing_delay=(4,),
+    swing_begun=(4,),
 )
 """State of the locomotion planner from tick to tick."""
 

@@ -12,9 +12,7 @@ import numpy as np
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.contact import follow_contact, loaded_time
 from go2_wbc.kernels.ground import (
-    apex_raise,
     carry_ground,
-    delay,
     ground_at,
     learn_ground,
     level_friction,
@@ -25,10 +23,11 @@ from go2_wbc.kernels.layout import LOCOMOTION, PLANNER, REFERENCE, SNAPSHOT
 from go2_wbc.kernels.levelling import level
 from go2_wbc.kernels.pose import advance_pose, lean_rotation, pose_turn
 from go2_wbc.kernels.slip import observe_slip
+from go2_wbc.kernels.swing import begin_swing, resume_swing, swing
 from go2_wbc.kernels.vectors import cross
 
 TIE = 1e-9
-"""As ``contacts.TIE`` and ``swing.TIE``."""
+"""As ``contacts.TIE``."""
 TINY = 1e-9
 
 _N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLANNER.start, LOCOMOTION.start
@@ -38,7 +37,7 @@ _YAW, _POSITION, _VELOCITY = (_S[n] for n in ("yaw", "position", "velocity"))
 _STEPPING, _PHASE_TIME, _TIME = (_S[n] for n in ("is_stepping", "phase_time", "time"))
 _GROUND, _SLOPE, _HEIGHT_OFFSET = (_S[n] for n in ("ground", "slope", "height_offset"))
 _POSE, _POSE_RATE = _S["pose"], _S["pose_rate"]
-_LIFTOFF, _WAS_STANCE, _AWAITED = (_S[n] for n in ("liftoff", "was_stance", "is_awaited"))
+_WAS_STANCE, _AWAITED = _S["was_stance"], _S["is_awaited"]
 _PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
 _GAIT, _REST, _STRIDE, _RATES = (_C[n] for n in ("period", "rest_period", "stride", "adaptation"))
 _HEIGHT, _MARGIN = _C["height"], _C["stride_margin"]
@@ -47,7 +46,6 @@ _LEASH, _YAW_LEASH, _REACH = (_C[n] for n in ("position_leash", "yaw_leash", "fo
 _F_MIN, _F_MAX, _RAMP = (_C[n] for n in ("normal_force_min", "normal_force_max", "load_ramp"))
 _SETTLE_SPEED, _SETTLED = _C["settle_speed"], _C["settled_command"]
 _CAPTURE, _SQUARE = _C["capture_margin"], _C["square_tolerance"]
-_APEX, _DEPTH, _FULL_WAY = (_C[n] for n in ("apex", "touchdown_depth", "full_depth_way"))
 _MID_SWING = _C["mid_swing"]
 _RATE, _WINDOW, _LIMIT = (
     _C[n] for n in ("correction_rate", "correction_window", "correction_limit")
@@ -226,17 +224,16 @@ def integrate(snapshot, s, c, dt, command):
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], b1[::1], f8[::1])")
 def note_liftoffs(snapshot, contact, s, c, stance, progress):
-    """Remember where feet leave the ground; learn of it where they meet it."""
-    met, stumbles = np.zeros(4, dtype=np.bool_), False
+    """Remember where feet leave the ground; learn of it where they meet it, or stumble."""
+    met, stumbles = np.zeros(4, dtype=np.bool_), np.zeros(4, dtype=np.bool_)
     for leg in range(4):
         was_stance = s[_WAS_STANCE + leg] != 0.0
         if was_stance and not stance[leg]:
-            for i in range(3):
-                s[_LIFTOFF + 3 * leg + i] = snapshot[_P_FEET + 3 * leg + i]
+            begin_swing(leg, snapshot, s, c)
         if not stance[leg]:
             s[_AWAITED + leg] = 0.0
             is_middle = abs(progress[leg] - 0.5) <= c[_MID_SWING] + TIE
-            stumbles |= is_middle and contact[leg] != 0.0
+            stumbles[leg] = is_middle and contact[leg] != 0.0
         elif not was_stance:
             s[_AWAITED + leg] = 1.0
         if s[_AWAITED + leg] != 0.0 and contact[leg] != 0.0:
@@ -244,42 +241,11 @@ def note_liftoffs(snapshot, contact, s, c, stance, progress):
             s[_AWAITED + leg] = 0.0
         s[_WAS_STANCE + leg] = 1.0 if stance[leg] else 0.0
     learn_ground(snapshot, s, c, met)
-    if stumbles:
+    if stumbles.any():
         note_stumble(s, c)
-
-
-@subroutine("Tuple((f8, f8, f8))(f8)")
-def cubic(x):
-    """As ``curves.Ease.CUBIC``."""
-    return x * x * (3 - 2 * x), 6 * x * (1 - x), 6 - 12 * x
-
-
-@subroutine("void(i8, f8[::1], f8[::1], f8, f8[::1], f8[::1])")
-def swing(leg, s, c, progress, goal, target):
-    """As ``planning.swing.swing_foot``, from the foot's lift-off to ``goal`` (3,)."""
-    duration = (1.0 - s[_DUTY]) * s[_PERIOD]
-    start = s[_LIFTOFF + 3 * leg : _LIFTOFF + 3 * leg + 3]
-    k = 3 * leg
-    late = delay(s, c)
-    span = duration * (1.0 - late)
-    x, dx, ddx = 0.0, 0.0, 0.0
-    if progress >= late - TIE:
-        x, dx, ddx = cubic((progress - late) / (1.0 - late))
-    for i in range(2):
-        delta = goal[i] - start[i]
-        target[_FOOT_P + k + i] = start[i] + x * delta
-        target[_FOOT_V + k + i] = dx / span * delta
-        target[_FOOT_A + k + i] = ddx / span**2 * delta
-    apex = max(start[2], goal[2]) + c[_APEX] + apex_raise(s, c)
-    is_rising = progress < 0.5 - TIE
-    way = np.hypot(goal[0] - start[0], goal[1] - start[1])
-    depth = c[_DEPTH] * min(1.0, c[_FULL_WAY] / max(way, TIE)) ** 2
-    begin = start[2] if is_rising else apex
-    delta = (apex if is_rising else goal[2] - depth) - begin
-    x, dx, ddx = cubic(2.0 * progress - (0.0 if is_rising else 1.0))
-    target[_FOOT_P + k + 2] = begin + x * delta
-    target[_FOOT_V + k + 2] = dx * delta * 2.0 / duration
-    target[_FOOT_A + k + 2] = ddx * delta * 4.0 / duration**2
+    for leg in range(4):
+        if stumbles[leg]:
+            resume_swing(leg, snapshot, s, c, progress[leg])
 
 
 @subroutine("void(i8, f8[::1], f8[::1], f8[::1], f8[:,::1], f8, f8[::1])")

@@ -81,6 +81,9 @@ class CompiledPlanner(GaitPlanner):
                 np.zeros(4),
                 np.zeros(4),
                 np.zeros(2),
+                np.zeros(4),
+                np.zeros(4),
+                np.zeros(4),
             ]
         )
 

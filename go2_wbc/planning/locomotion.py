@@ -20,7 +20,7 @@ frame (z up, x along the reference's yaw).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from jaxtyping import Float
@@ -38,7 +38,7 @@ from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.planning.pose import LEVEL, BodyPose, PoseConfig
 from go2_wbc.planning.preview import Course, ForcePlanner, beyond
 from go2_wbc.planning.slip import SlipConfig, SlipObserver
-from go2_wbc.planning.swing import SwingConfig, swing_foot
+from go2_wbc.planning.swing import Swing, SwingConfig
 from go2_wbc.planning.trunk import TrunkLimits, TrunkPath
 from go2_wbc.reference import LegTask, Reference
 from go2_wbc.robot.model import RobotModel
@@ -168,7 +168,7 @@ class LocomotionPlanner(GaitPlanner):
             self._forces.start()
         self._last_time = snapshot.state.time
         self._ground = GroundPlane(snapshot, self._model.foot_radius, self._config.ground)
-        self._liftoff = snapshot.p_world_feet.copy()
+        self._swings = [Swing(foot) for foot in snapshot.p_world_feet]
         self._was_stance = np.ones(4, dtype=bool)
         self._is_awaited = np.zeros(4, dtype=bool)
 
@@ -316,14 +316,18 @@ class LocomotionPlanner(GaitPlanner):
     def _note_liftoffs(self, snapshot: Snapshot, phase: ContactPhase) -> None:
         """Remember where feet leave the ground; learn of it where they meet it."""
         stance, contact = phase.stance, snapshot.state.feet_in_contact
-        lifted = self._was_stance & ~stance
-        self._liftoff[lifted] = snapshot.p_world_feet[lifted]
+        for leg in np.flatnonzero(self._was_stance & ~stance):
+            self._swings[leg] = Swing.from_ground(snapshot.p_world_feet[leg], self._ground)
         self._is_awaited = (self._is_awaited | ~self._was_stance) & stance
         landed = self._is_awaited & contact
         if landed.any():
             self._ground.learn(snapshot.p_world_feet, landed)
-        if (contact & ~stance & (np.abs(phase.progress - 0.5) <= MID_SWING + TIE)).any():
+        is_middle = np.abs(phase.progress - 0.5) <= MID_SWING + TIE
+        for leg in np.flatnonzero(contact & ~stance & is_middle):
             self._ground.stumble()
+            self._swings[leg] = self._swings[leg].resumed(
+                snapshot.p_world_feet[leg], float(phase.progress[leg]), self._ground
+            )
         self._is_awaited &= ~landed
         self._was_stance = stance.copy()
 
@@ -372,19 +376,14 @@ class LocomotionPlanner(GaitPlanner):
             return p, v, a
         remaining = np.where(phase.stance, 0.0, phase.remaining)
         goals = self._footholds(snapshot, remaining)
-        progress = phase.progress
-        shape = replace(self._swing, apex=self._swing.apex + self._ground.apex_raise)
         for leg in LEGS:
             if not self._contacts.stance[leg]:
                 height = self._ground.at(goals[leg]) + self._model.foot_radius
-                goal = np.array([*goals[leg], height])
-                p[leg], v[leg], a[leg] = swing_foot(
-                    self._liftoff[leg],
-                    goal,
-                    float(progress[leg]),
+                p[leg], v[leg], a[leg] = self._swings[leg].at(
+                    np.array([*goals[leg], height]),
+                    float(phase.progress[leg]),
                     self._clock.gait.swing_time,
-                    shape,
-                    self._ground.delay,
+                    self._swing,
                 )
         return p, v, a
 

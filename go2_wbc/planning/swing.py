@@ -4,6 +4,12 @@ With the share ``u`` of a span of ``T`` seconds and the ease ``s(u) = 3 u^2 - 2 
 goes from ``a`` to ``b`` as ``p = a + s (b - a)``; so ``v = s' (b - a) / T`` and
 ``a = s'' (b - a) / T^2``. Horizontally the span is the swing, or what is left of it after a delay,
 vertically each half of it.
+
+How high a foot is raised, and how late it goes ahead, is settled when it leaves the ground. What is
+learnt of the ground meanwhile is for the next swing: a curve that was changed on the way jumped by
+5 cm, and feet that swung beside the one that had stumbled came down too early, too far back. A foot
+that is stopped in the middle of its swing begins another one where it is, in the time that is left:
+it rises along what it has met before it goes on.
 """
 
 from __future__ import annotations
@@ -14,6 +20,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.curves import Ease
+from go2_wbc.planning.ground import GroundPlane
 from go2_wbc.validation import require_not_negative, require_positive
 
 TIE = 1e-9
@@ -53,6 +60,47 @@ class SwingConfig:
     def at_most(self, apex: float) -> SwingConfig:
         """The same with an apex [m] of ``apex`` if that is lower."""
         return replace(self, apex=min(self.apex, apex))
+
+
+@dataclass(frozen=True, slots=True)
+class Swing:
+    """How the swing of one foot has begun.
+
+    Attributes:
+        start: where the foot was [m].
+        raised: height [m] by which its apex is higher than on smooth ground.
+        delay: share of it in which the foot only rises.
+        begun: share of the gait's swing that had passed by then.
+    """
+
+    start: Float[np.ndarray, "3"]
+    raised: float = 0.0
+    delay: float = 0.0
+    begun: float = 0.0
+
+    @staticmethod
+    def from_ground(start: Float[np.ndarray, "3"], ground: GroundPlane) -> Swing:
+        """That of a foot which leaves the ``ground``."""
+        return Swing(start.copy(), ground.apex_raise, ground.delay)
+
+    def resumed(
+        self, p_foot: Float[np.ndarray, "3"], progress: float, ground: GroundPlane
+    ) -> Swing:
+        """That of a foot which has been stopped at ``progress``; it goes on so once in a swing.
+
+        It is raised as high as the time allows that is left, and not higher for the ground: to lift
+        it by 7 cm within 44 ms took 590 N from the standing feet.
+        """
+        return self if self.begun else Swing(p_foot.copy(), 0.0, ground.delay, progress)
+
+    def at(
+        self, goal: Float[np.ndarray, "3"], progress: float, duration: float, config: SwingConfig
+    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        """See ``swing_foot``; ``progress`` and ``duration`` are those of the gait's swing."""
+        share = 1.0 - self.begun
+        shape = replace(config, apex=share * (config.apex + self.raised))
+        inside = (progress - self.begun) / share
+        return swing_foot(self.start, goal, inside, share * duration, shape, self.delay)
 
 
 def swing_foot(
