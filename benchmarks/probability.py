@@ -1,8 +1,8 @@
 """``python -m benchmarks probability``: is the chance that the check states the one that it has?
 
 Every motion of the exam is checked and played in random worlds. ``--fit`` fits the model of
-``motions.feasibility.probability`` to the train half and stores it; what is reported is of the test
-half, whose families no threshold and no fit has seen.
+``motions.feasibility.probability`` to the train half and to random sentences of the language, and
+stores it; what is reported is of the test half, whose families no threshold and no fit has seen.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.exam.drawing import TEST, TRAIN
 from benchmarks.probability_evidence import csv_of, save_reliability
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit
-from benchmarks.probability_runs import runs, trial
+from benchmarks.probability_runs import DRAWN, seeds, trial
 from benchmarks.session import add_sweep_options, positive, publish, run_sweep
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.sweeps.rows import Row
@@ -26,10 +26,13 @@ from go2_wbc.files import checked_output, write_atomically
 from motions.feasibility.probability import FILE, ProbabilityModel, fitted
 from viz.render.figure_style import PLOT_SUFFIXES
 
+FITTED = (TRAIN, DRAWN)
+"""What the model may be fitted to."""
 ERROR, BRIER_SHARE = 0.05, 0.5
 """Greatest expected calibration error, and Brier score over that of the base rate."""
 EXAMPLES = """
-python -m benchmarks probability         all: two worlds to fit, five to judge
+python -m benchmarks probability         all: two worlds to fit, five to judge,
+                                         and 3,000 sentences to fit
 python -m benchmarks probability --motions 60
 python -m benchmarks probability --fit   also fit the model, and store it
 python -m benchmarks probability --data docs/data/probability.csv
@@ -47,8 +50,12 @@ def register(subparsers: Subparsers) -> None:
         "is calibrated and no motion that passed fell, 1 if not.",
         examples=EXAMPLES,
     )
-    parser.add_argument("--motions", metavar="N", type=positive, help="only the first N")
-    parser.add_argument("--fit", action="store_true", help="fit to the train half, and store")
+    parser.add_argument(
+        "--motions", metavar="N", type=positive, help="only the first N, and no sentences"
+    )
+    parser.add_argument(
+        "--fit", action="store_true", help="fit to train half and sentences, and store"
+    )
     parser.add_argument(
         "--data", metavar="FILE", type=Path, help="write a .csv with a line for every run"
     )
@@ -60,12 +67,12 @@ def run(args: argparse.Namespace) -> int:
     """Run what is not kept, fit if asked, and judge the test half."""
     data = args.data and checked_output(args.data, [".csv"])
     plot = args.plot and checked_output(args.plot, PLOT_SUFFIXES)
-    result = run_sweep(args, trial, len(runs(args.motions)))
+    result = run_sweep(args, trial, seeds(args.motions))
     model = fitted()
     if args.fit:
-        model = fit(_samples(_of_half(result.rows, TRAIN)))
+        model = fit(_samples(_of_halves(result.rows, *FITTED)))
         store(model, result.rows, result.about["code"])
-    judged, falls = judge(model, _of_half(result.rows, TEST)), passed_that_fell(result.rows)
+    judged, falls = judge(model, _of_halves(result.rows, TEST)), passed_that_fell(result.rows)
     if data:
         write_atomically(data, csv_of(model, result.rows))
     if plot:
@@ -85,8 +92,8 @@ def run(args: argparse.Namespace) -> int:
     return ExitCode.OK if is_ok else ExitCode.FAILED
 
 
-def _of_half(rows: Sequence[Row], half: str) -> list[Row]:
-    return [row for row in rows if row["half"] == half]
+def _of_halves(rows: Sequence[Row], *halves: str) -> list[Row]:
+    return [row for row in rows if row["half"] in halves]
 
 
 def _samples(rows: Sequence[Row]) -> list[Sample]:
@@ -101,11 +108,12 @@ def store(model: ProbabilityModel, rows: Sequence[Row], code: str, file: Path = 
 
     ``code`` names that of the check and of physics, as files of sweeps do.
     """
-    motions = {row["motion"] for row in _of_half(rows, TRAIN)}
+    fitted_to = _of_halves(rows, *FITTED)
+    motions = {row["motion"] for row in fitted_to}
     about = {
         "fitted_by": "python -m benchmarks probability --fit",
         "motions": len(motions),
-        "runs": len(_of_half(rows, TRAIN)),
+        "runs": len(fitted_to),
         "code": code,
     }
     text = json.dumps({"about": about, **model.as_dict()}, indent=1)

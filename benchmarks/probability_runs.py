@@ -2,7 +2,8 @@
 
 A function of a seed for ``controller.sweep``: seeds count the worlds of the first motion, then
 those of the second, and so on. Motions are in an order of which every beginning holds halves and
-strata in the shares that they have of all, and families evenly.
+strata in the shares that they have of all, and families evenly. After them come random sentences of
+the language, each in the world of the exam: a fit needs more than fifty structures.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from functools import lru_cache
 import numpy as np
 
 from benchmarks.exam.drawing import TEST, TRAIN
+from benchmarks.exam.outcome import play
 from benchmarks.exam.questions import IMPOSSIBLE, Question, questions
+from benchmarks.exam.sentences import Sentence, sentences
 from benchmarks.exam.stored import read_borders
 from controller.motion_measurement import measure_motion
 from controller.motion_outcome import outcome_of
@@ -25,8 +28,10 @@ from go2_wbc.plant.mujoco.worlds import plant_in_world
 from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
-from motions import FeasibilityChecker
+from motions import FeasibilityChecker, FeasibilityReport
 
+DRAWN, SENTENCES = "drawn", 500
+"""What random sentences are, besides the two halves, and how many."""
 WORLDS = {TRAIN: 2, TEST: 5}
 """Worlds of each motion: a fit learns more from other motions than from other worlds."""
 FRICTION, PAYLOAD = (0.3, 1.0), (0.0, 4.0)
@@ -42,15 +47,37 @@ NOT_READY = "not ready"
 
 def trial(seed: int) -> dict[str, object]:
     """The row of a seed: motion, verdict, margins (JSON) and outcome by the strict definition."""
+    if seed >= len(runs()):
+        return _drawn(_sentences()[seed - len(runs())])
     question, plan = _asked(runs()[seed])
     world = world_of(seed)
     report = FeasibilityChecker(model(), world=world).check(plan)
-    harm = played(plan, world, seed)
+    kind = (question.family.name, question.family.half, question.stratum)
+    return _row(question.name, kind, world, report, played(plan, world, seed))
+
+
+def _drawn(sentence: Sentence) -> dict[str, object]:
+    """The row of a sentence."""
+    checker = FeasibilityChecker(model())
+    plan = checker.plan(sentence.line, check=False)
+    harm = outcome_of(play(plan, model(), sentence.number), plan).strict
+    kind = (f"sentence {sentence.number}", DRAWN, DRAWN)
+    return _row(sentence.name, kind, checker.world, checker.check(plan), harm)
+
+
+def _row(
+    motion: str,
+    kind: tuple[str, str, str],
+    world: World,
+    report: FeasibilityReport,
+    harm: tuple[str, ...],
+) -> dict[str, object]:
+    family, half, stratum = kind
     return {
-        "motion": question.name,
-        "family": question.family.name,
-        "half": question.family.half,
-        "stratum": question.stratum,
+        "motion": motion,
+        "family": family,
+        "half": half,
+        "stratum": stratum,
         "friction": world.friction,
         "payload": world.payload,
         "refused": not report.ok,
@@ -112,9 +139,19 @@ def exam() -> list[Question]:
 
 @lru_cache(maxsize=2)
 def runs(motions: int | None = None) -> list[int]:
-    """The number of the motion of every seed; of the first ``motions`` only, if that is given."""
+    """The number of the exam's motion of every seed; of the first ``motions`` only, if given."""
     asked = exam()[:motions]
     return [number for number, one in enumerate(asked) for _ in range(WORLDS[one.family.half])]
+
+
+def seeds(motions: int | None = None) -> int:
+    """How many seeds there are; of the first ``motions`` of the exam only, if that is given."""
+    return len(runs(motions)) + (len(_sentences()) if motions is None else 0)
+
+
+@lru_cache(maxsize=1)
+def _sentences() -> list[Sentence]:
+    return sentences(SENTENCES)
 
 
 def mixed(asked: Sequence[Question]) -> list[Question]:

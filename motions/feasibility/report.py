@@ -17,6 +17,8 @@ from motions.feasibility.probability import fitted
 
 NOISE = 1e-6
 """A value below this is nothing but rounding, and is shown as 0."""
+SURE = 0.99
+"""A chance above this, or below 1 - this, is not told more exactly."""
 STAYS = 1e-3
 """m, rad; a motion that ends nearer than this to where it starts does not go anywhere."""
 
@@ -227,7 +229,7 @@ class FeasibilityReport:
             lines += wrap(f"That holds for {self.world}.", 80)
         if self.world.is_late_or_noisy:
             lines.append("Delay and sensors are simulated only: no limit here counts with them.")
-        lines.append(f"Chance that it is done so: {100.0 * self.probability:.0f} %.")
+        lines.append(f"Chance that it is done so: {_percent(self.probability)}.")
         if self.end_pose is not None and max(map(abs, self.end_pose)) > STAYS:
             x, y, yaw = self.end_pose
             lines.append(
@@ -267,3 +269,10 @@ def _share_left(finding: Finding) -> float:
 
 def _count(number: int, what: str) -> str:
     return f"{number} {what}{'' if number == 1 else 's'}"
+
+
+def _percent(chance: float) -> str:
+    """Rounded to 1 %; nothing is certain."""
+    if chance > SURE:
+        return f"over {100.0 * SURE:.0f} %"
+    return f"{100.0 * chance:.0f} %" if chance >= 1.0 - SURE else "under 1 %"

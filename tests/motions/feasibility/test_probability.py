@@ -9,6 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from motions import check
+from motions.feasibility import report
 from motions.feasibility.probability import ProbabilityModel, Rise
 
 MODEL = ProbabilityModel({"slip": Rise(0.01, 0.5, 0.4), "torque": Rise(2.0, -1.0, 0.5)}, rest=3.0)
@@ -50,3 +52,13 @@ def test_the_leak_is_what_is_left_where_a_margin_says_no_but_not_to_what_no_fit_
 def test_a_model_comes_back_from_its_values() -> None:
     for model in (MODEL, replace(MODEL, leak=0.1)):
         assert ProbabilityModel.of(model.as_dict()) == model
+
+
+@pytest.mark.parametrize(
+    ("rest", "words"), [(9.0, "over 99 %"), (1.0, "73 %"), (-9.0, "under 1 %")]
+)
+def test_nothing_is_told_to_be_certain(
+    monkeypatch: pytest.MonkeyPatch, rest: float, words: str
+) -> None:
+    monkeypatch.setattr(report, "fitted", lambda: ProbabilityModel({}, rest))
+    assert f"Chance that it is done so: {words}." in check("nod").table()

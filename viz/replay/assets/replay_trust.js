@@ -4,14 +4,15 @@
 function showTrust({ chance, world, certified }) {
   const card = document.getElementById("trust");
   card.hidden = chance === null && certified === null;
-  const stated = document.getElementById("chance");
-  stated.hidden = chance === null;
+  const place = document.getElementById("chance");
+  place.hidden = chance === null;
   if (chance !== null) {
     const line = plainText("p", "Chance that it is done so: ");
-    line.append(plainText("b", percent(chance, 0), chanceRank(chance)));
+    const stated = chance > 0.99 ? "over 99 %" : chance < 0.01 ? "under 1 %" : percent(chance, 0);
+    line.append(plainText("b", stated, chanceRank(chance)));
     const where = plainText("p", world, "calm");
     where.title = world;
-    stated.replaceChildren(line, where);
+    place.replaceChildren(line, where);
   }
   const details = document.getElementById("certificate");
   details.hidden = certified === null;
