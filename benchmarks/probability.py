@@ -31,8 +31,8 @@ FITTED = (TRAIN, DRAWN)
 ERROR, BRIER_SHARE = 0.05, 0.5
 """Greatest expected calibration error, and Brier score over that of the base rate."""
 EXAMPLES = """
-python -m benchmarks probability         all: two worlds to fit, five to judge,
-                                         and 3,000 sentences to fit
+python -m benchmarks probability         two worlds to fit, five to judge,
+                                         3,000 sentences to fit
 python -m benchmarks probability --motions 60
 python -m benchmarks probability --fit   also fit the model, and store it
 python -m benchmarks probability --data docs/data/probability.csv
