@@ -48,7 +48,7 @@ NOT_READY = "not ready"
 def trial(seed: int) -> dict[str, object]:
     """The row of a seed: motion, verdict, margins (JSON) and outcome by the strict definition."""
     if seed >= len(runs()):
-        return _drawn(_sentences()[seed - len(runs())])
+        return _drawn(drawn()[seed - len(runs())])
     question, plan = _asked(runs()[seed])
     world = world_of(seed)
     report = FeasibilityChecker(model(), world=world).check(plan)
@@ -146,11 +146,12 @@ def runs(motions: int | None = None) -> list[int]:
 
 def seeds(motions: int | None = None) -> int:
     """How many seeds there are; of the first ``motions`` of the exam only, if that is given."""
-    return len(runs(motions)) + (len(_sentences()) if motions is None else 0)
+    return len(runs(motions)) + (len(drawn()) if motions is None else 0)
 
 
 @lru_cache(maxsize=1)
-def _sentences() -> list[Sentence]:
+def drawn() -> list[Sentence]:
+    """The random sentences, in the order of their seeds."""
     return sentences(SENTENCES)
 
 

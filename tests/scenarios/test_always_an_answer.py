@@ -15,8 +15,11 @@ from benchmarks.pushes import PUSH_TIME, heading_force
 from benchmarks.steps import plant_of
 from controller.sweeps.trials import Trial, TrialRobot
 
-SAMPLES = [("boxes", 19), ("pushes", 12), ("stops", 13)]
-"""Scenario and seed; in all of these the hard QP has no solution in some ticks."""
+SAMPLES = [("boxes", 19), ("pushes", 12), ("stops", 17)]
+"""Scenario and seed."""
+CONTRADICTORY = ("pushes", "stops")
+"""Where the hard QP has no solution in some ticks; over boxes it had none until feet that stumble
+began another swing."""
 GRAVE = 0.1  # [%] of the ticks
 
 
@@ -28,7 +31,8 @@ def test_contradictions_are_answered_and_never_damp_an_upright_robot(name: str, 
     assert values[f"{name}.failures"] == 0.0
     assert values[f"{name}.damped"] == 0.0
     assert values[f"{name}.unreported"] == values[f"{name}.falls"] == 0.0
-    assert values[f"{name}.relaxed"] > 0.0, "or the test would say nothing"
+    if name in CONTRADICTORY:
+        assert values[f"{name}.relaxed"] > 0.0, "or the test would say nothing"
     assert values[f"{name}.grave"] <= GRAVE
 
 
