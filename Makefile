@@ -13,14 +13,13 @@ unexport PYTHONDONTWRITEBYTECODE
 export PIP_DISABLE_PIP_VERSION_CHECK = 1
 
 PYTHON ?=
-WORKERS ?= 2
 ARGS ?=
 VENV := .venv
 COMMA := ,
 BIN := $(VENV)/bin
 
 help: ## show this list
-	@echo "Usage: make TARGET [PYTHON=python3.12] [WORKERS=2] [ARGS='...']"
+	@echo "Usage: make TARGET [PYTHON=python3.12] [WORKERS=3] [ARGS='...']"
 	@echo
 	@while IFS= read -r line; do \
 		if [[ $$line =~ ^([a-z0-9-]+):.*'## '(.*)$$ ]]; then \
@@ -33,9 +32,13 @@ help: ## show this list
 demo: $(VENV)/.stamp-run ## install, then run the demo headless
 	$(BIN)/go2-wbc demo $(ARGS)
 
+# One worker more than two cores have: tests in real time and those of browsers wait, too.
+test: WORKERS ?= 3
 test: $(VENV)/.stamp-dev ## install with the test tools, then run every test
 	$(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder $(ARGS)
 
+# Robots on a network keep the time of the clock: no more workers than cores.
+test-ros2 test-unitree: WORKERS ?= 2
 test-ros2: ## build the ROS 2 interfaces, install the extra [ros2], run its tests
 	WORKERS=$(WORKERS) ros2/test.sh $(ARGS)
 
