@@ -102,7 +102,7 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
     is_dynamic = _are_within(times, spans)
     v, a = np.zeros((len(times), 18)), np.zeros((len(times), 18))
-    for rows in _runs(is_dynamic):
+    for rows in runs(is_dynamic):
         if not is_dynamic[rows.start] and rows.stop - rows.start > 1:
             v[rows], a[rows] = rates(times[rows], q[rows], rpy[rows])
     greatest = asked.normal_force_max
@@ -147,7 +147,7 @@ def _are_within(
     return within
 
 
-def _runs(mask: Bool[np.ndarray, " n"]) -> list[slice]:
+def runs(mask: Bool[np.ndarray, " n"]) -> list[slice]:
     """Rows between changes of ``mask``."""
     edges = [0, *(np.flatnonzero(np.diff(mask)) + 1).tolist(), len(mask)]
     return [slice(a, b) for a, b in pairwise(edges)]

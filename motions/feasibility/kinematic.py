@@ -19,7 +19,7 @@ from motions.feasibility.hulls import LinkHulls
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
 from motions.tracks import home_poses
-from motions.trajectory import Trajectory
+from motions.trajectory import Trajectory, runs
 
 JOINTS = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 FEET = tuple(leg.name for leg in LEGS)
@@ -44,11 +44,13 @@ def joint_position(motion: Trajectory, model: RobotModel, limits: FeasibilityLim
     standing one, is off by no more than it may for it, the margin counts as 0: a warning. A raised
     foot and a knee that is bent as far as it goes may be off by ``limits.stop``: nothing else
     moves. A standing leg that should be longer lets the trunk sink to its side, farther than that:
-    ``limits.stretch``. Hips of two standing legs keep ``limits.pair_hip`` to their stops: a trunk
-    that rolls late needs them, and no third foot holds it.
+    ``limits.stretch``, or ``limits.stop`` for ``limits.stop_time`` while three feet stand or more:
+    the trunk comes too late for it. Hips of two standing legs keep ``limits.pair_hip`` to their
+    stops: a trunk that rolls late needs them, and no third foot holds it.
     """
     q, room = motion.q[:, 7:], np.zeros((len(motion.times), 12))
     few = (motion.stance.sum(axis=1) <= PAIR) & ~motion.is_dynamic
+    is_steady = ~few & ~motion.is_dynamic
     held = motion.stance & few[:, None]
     room[:, ::3] = limits.pair_hip * held
     lower, upper = model.q_lower + room, model.q_upper - room
@@ -59,13 +61,23 @@ def joint_position(motion: Trajectory, model: RobotModel, limits: FeasibilityLim
         own = margins[:, leg.joints]
         beyond = own.min(axis=1) < 0.0
         if beyond.any():
-            stands, is_folded = motion.stance[beyond, leg], to_lower[beyond, leg.joints][:, 2] < 0.0
-            most = np.where(stands & ~is_folded, limits.stretch, limits.stop)
-            harmless = np.zeros(len(q), dtype=bool)
-            harmless[beyond] = _stopped(leg, q[beyond], stands, model) <= most
+            stands, off = motion.stance[:, leg], np.full(len(q), np.inf)
+            off[beyond] = _stopped(leg, q[beyond], stands[beyond], model)
+            sinks = stands & (to_lower[:, leg.joints][:, 2] >= 0.0)
+            harmless = off <= np.where(sinks, limits.stretch, limits.stop)
             harmless &= ~(held[:, leg] & (own[:, 0] < 0.0))
+            late = beyond & ~harmless & sinks & is_steady
+            harmless |= _brief(late, motion, limits.stop_time) & (off <= limits.stop)
             own[harmless] = np.maximum(own[harmless], 0.0)
     return Series("joint position", "rad", JOINTS, motion.times, q, bounds, margins, TIGHT_ANGLE)
+
+
+def _brief(mask: Bool[np.ndarray, " n"], motion: Trajectory, most: float) -> Bool[np.ndarray, " n"]:
+    """The rows of ``mask`` that are True for no longer than ``most`` [s] at a time."""
+    kept = mask.copy()
+    for rows in runs(mask):
+        kept[rows] &= motion.times[rows.stop - 1] - motion.times[rows.start] <= most
+    return kept
 
 
 def _stopped(
@@ -103,10 +115,13 @@ def clearance(
 ) -> Series:
     """Heights of the lowest points of the links, and of the feet in the air, over the ground.
 
-    In solved parts a foot that lifts off stands until then: where it sinks in the last step of a
-    push-off, by half the square of the step times its J' v, that is the planner's integration.
+    A foot in the air that is to be below the ground stays above, and its calf with it: that may be
+    lower by as much. In solved parts a foot that lifts off stands until then: where it sinks in the
+    last step of a push-off, by half the square of the step times its J' v, that is the planner's
+    integration.
     """
     feet = _feet(motion, model)[:, :, 2] - model.foot_radius
+    sunk = np.where(motion.stance | motion.is_dynamic[:, None], 0.0, np.minimum(feet, 0.0))
     links, count = hulls.heights(motion), len(hulls.links)
     lower = {"thigh": limits.thigh_clearance, "calf": limits.calf_clearance}
     parts = [name.rpartition(" ")[2] for name in hulls.names]
@@ -114,6 +129,8 @@ def clearance(
     floor = np.tile([*least, *(-limits.swing_depth for _ in LEGS)], (len(motion.times), 1))
     calves = np.flatnonzero([part == "calf" for part in parts])
     floor[np.ix_(motion.is_dynamic, calves)] = limits.solved_calf_clearance
+    for calf in calves:
+        floor[:, calf] += sunk[:, Leg[hulls.names[calf].partition(" ")[0]]]
     values = np.hstack([links, feet])
     is_checked = np.ones_like(values, dtype=bool)
     stood = np.vstack([motion.stance[:1], motion.stance[:-1]]) & motion.is_dynamic[:, None]

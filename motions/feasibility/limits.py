@@ -48,6 +48,9 @@ class FeasibilityLimits:
             may be off for a joint at its stop: in MuJoCo it was off by 0.5 to 0.9 of it.
         stretch: the same of the trunk over any other standing leg: it was off by 1.1 to 2.2 times
             as much.
+        stop_time: longest time [s] for which a trunk on three feet or four may be off by ``stop``
+            there: of random sentences that were refused for it alone all five up to 0.17 s were
+            done, from 0.22 s on half.
         pair_hip: least distance [rad] of a standing leg's hip to its stop while no more than two
             feet stand: the roll of a trunk that turns fast lags by 0.1 to 0.2. Of trots that roll
             by 44 to 56 deg and kept less, nearly all went wrong, and some fell.
@@ -95,6 +98,7 @@ class FeasibilityLimits:
     tipping: float = 0.006
     stop: float = 0.03
     stretch: float = 0.018
+    stop_time: float = 0.18
     pair_hip: float = 0.05
     self_distance: float = 0.005
     clearance: float = 0.014

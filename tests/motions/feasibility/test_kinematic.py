@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from go2_wbc.legs import LEGS
+from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
 from motions.feasibility.collision import SelfCollision
 from motions.feasibility.hulls import LinkHulls
-from motions.feasibility.kinematic import clearance, ends
+from motions.feasibility.kinematic import clearance, ends, joint_position
 from motions.feasibility.limits import FeasibilityLimits
 from motions.trajectory import Trajectory, trajectory_of
 
@@ -109,3 +109,32 @@ def test_calves_of_solved_parts_may_come_nearer_to_the_ground(
     floor = series.limits[:, series.subjects.index("FL calf")]
     assert set(floor[:10]) == {limits.solved_calf_clearance}
     assert set(floor[10:]) == {limits.calf_clearance}
+
+
+@pytest.mark.parametrize(("rows", "passes"), [(15, True), (25, False)])
+def test_a_trunk_may_sink_to_a_leg_at_its_stop_for_a_moment(
+    rows: int, passes: bool, model: RobotModel, raising: Trajectory
+) -> None:
+    """Up to 0.17 s all were done that were refused for this alone, from 0.22 s on half."""
+    limits, calf = FeasibilityLimits(), int(Leg.FL.joints.stop) - 1
+    at = slice(10, 10 + rows)
+    assert raising.stance[at].all()
+    for beyond, is_near in ((0.2, True), (0.3, passes), (0.7, False)):  # 9, 21 and 35 mm
+        q = raising.q.copy()
+        q[at, 7 + calf] = model.q_upper[calf] + beyond
+        margins = joint_position(replace(raising, q=q), model, limits).margins[at, calf]
+        assert (margins >= 0.0).all() == is_near, beyond
+
+
+def test_a_calf_may_go_down_with_a_foot_that_is_to_be_below_the_ground(
+    model: RobotModel, hulls: LinkHulls, raising: Trajectory
+) -> None:
+    """The foot stays above it, and the calf with it: all five refused for it were done."""
+    limits, stance, q = FeasibilityLimits(), raising.stance.copy(), raising.q.copy()
+    stance[:10, Leg.FL] = False
+    q[:10, 2] -= 0.005
+    series = clearance(replace(raising, stance=stance, q=q), model, hulls, limits)
+    floor = series.limits[:10, series.subjects.index("FL calf")]
+    np.testing.assert_allclose(floor, limits.calf_clearance - 0.005, atol=1e-4)
+    standing = series.limits[:10, series.subjects.index("RR calf")]
+    assert set(standing) == {limits.calf_clearance}
