@@ -111,7 +111,7 @@ def test_references_are_those_of_the_readable_planner(gait: Gait, config: Locomo
     compiled.start(start)
     command, pose, at = ZERO_COMMAND, LEVEL, start.p_world_com[:2]
     starts, frictions, early = 0, set[float](), 0
-    for tick in range(1, 5001):
+    for tick in range(1, 3501):
         if tick % 200 == 0:
             command = VelocityCommand(*rng.normal(size=3)) if rng.random() < 0.6 else ZERO_COMMAND
         if tick % 300 == 0:
