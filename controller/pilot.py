@@ -121,6 +121,10 @@ class Pilot:
         entry = {Mode.SITTING: Posture.SIT, Mode.LYING: Posture.LIE}.get(mode, Posture.STAND)
         duration = HOLD_TIME if mode in (Mode.STANDING, Mode.WALKING) else 1.2
         self._take_posture(self._make_standing(entry, duration))
+        if self._procedures.settles(is_standing):
+            return self._rest(Posture.STAND)
+        # It stands on other ground than it believed in as it began: feet slid, or left a box.
+        self._take_posture(self._make_standing(Posture.STAND, HOLD_TIME))
         return self._settle(Posture.STAND, "stand")
 
     def sit(self) -> Measurements:
@@ -158,9 +162,12 @@ class Pilot:
         return Standing(make_plan, self._model, self._config.locomotion)
 
     def _settle(self, posture: Posture, what: str) -> Measurements:
-        mode, check = _RESTING[posture]
+        _, check = _RESTING[posture]
         self._procedures.settle(what, check)
-        self._mode = mode
+        return self._rest(posture)
+
+    def _rest(self, posture: Posture) -> Measurements:
+        self._mode, _ = _RESTING[posture]
         return self._procedures.measurements()
 
     def _ensure_standing(self) -> None:

@@ -77,6 +77,11 @@ class ProcedureRunner:
 
     def settle(self, what: str, check: Callable[[Snapshot], bool]) -> None:
         """Let time pass until ``check`` has held for a while."""
+        if not self.settles(check):
+            raise self._late(what, SETTLE_LIMIT)
+
+    def settles(self, check: Callable[[Snapshot], bool]) -> bool:
+        """Let time pass until ``check`` has held for a while; whether it came to that."""
         loop = self.loop
         calm_since: list[float] = []
 
@@ -87,19 +92,28 @@ class ProcedureRunner:
             calm_since.append(loop.state.time)
             return loop.state.time - calm_since[0] >= CALM_TIME
 
-        self.until(calm, SETTLE_LIMIT, what)
+        return self._comes(calm, SETTLE_LIMIT)
 
     def until(self, is_done: Callable[[], bool], limit: float, what: str) -> None:
         """Let time pass until ``is_done()``, for ``limit`` seconds at most."""
+        if not self._comes(is_done, limit):
+            raise self._late(what, limit)
+
+    def _comes(self, is_done: Callable[[], bool], limit: float) -> bool:
+        """Whether ``is_done()`` came within ``limit`` seconds; a fault is raised."""
         if self._runner.advance_until(is_done, limit):
-            return
+            return True
         fault = self.loop.fault
         if fault is not None and fault.may_fall:
             self.let_pass(SINK_TIME)
             fault = self.loop.fault or fault
         if fault is not None:
             raise self._aborted(fault.reason)
-        raise self._aborted(f"{what} not done within {limit:.1f} s: {listed(self.measurements())}")
+        return False
+
+    def _late(self, what: str, limit: float) -> Aborted:
+        reason = f"{what} not done within {limit:.1f} s: {listed(self.measurements())}"
+        return self._aborted(reason)
 
     @property
     def is_stepping(self) -> bool:

@@ -24,7 +24,7 @@ CHECKED_CALLS = 10
 STRIDE = 251
 """Prime, so that the calls of a loop come up in turn, whatever their number. A control loop makes
 its calls as often in half a second; at every 61st the checks took a quarter of a tick."""
-_ARRAY = type(jaxtyping.Float[np.ndarray, "1"])
+_ARRAY: Any = type(jaxtyping.Float[np.ndarray, "1"])
 _check = beartype(conf=BeartypeConf(is_pep484_tower=True))
 _calls: dict[int, int] = {}
 """By place: how many calls it has made since the last ``renew``."""

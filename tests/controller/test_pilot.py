@@ -78,7 +78,7 @@ def test_after_a_stand_that_timed_out_the_robot_can_try_again(
     go2: GO2Controller, plant: WatchedPlant
 ) -> None:
     force = np.array([0.0, 30.0, -250.0])
-    plant.once_at(MID_RISE, lambda: plant.inner.push(force, 4.0))
+    plant.once_at(MID_RISE, lambda: plant.inner.push(force, 7.4))
     assert go2.stand() is False
     assert go2.last_outcome.reason.startswith("stand not done")
     assert go2.mode is Mode.MOVING

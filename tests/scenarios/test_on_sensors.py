@@ -75,6 +75,13 @@ def test_feet_that_sink_into_the_floor_are_not_taken_for_steps(
     assert measured.values["gym.high-five"] == 1.0, measured.notes
 
 
+def test_a_robot_whose_feet_slid_as_it_stood_up_stands_at_its_height() -> None:
+    # It believed in ground 24 mm too high, stood there, and `stand()` said False.
+    ice = Unknown("ice", "friction 0.2", friction=0.2, sensors="imu")
+    with GO2Controller(plant=ice.plant(4214)) as go2:
+        assert go2.stand(), go2.last_outcome.reason
+
+
 def test_the_noise_of_a_foot_in_the_air_is_no_contact() -> None:
     # 5 N, 2.5 deviations, were felt three times in a hundred swings, as feet that stumble.
     assert EstimatorConfig().contact_force >= 5.0 * SensorErrors().force
