@@ -122,8 +122,9 @@ class Pilot:
         duration = HOLD_TIME if mode in (Mode.STANDING, Mode.WALKING) else 1.2
         self._take_posture(self._make_standing(entry, duration))
         if self._procedures.settles(is_standing):
-            return self._rest(Posture.STAND)
+            return self._arrive(Posture.STAND)
         # It stands on other ground than it believed in as it began: feet slid, or left a box.
+        self._procedures.stop_stepping()
         self._take_posture(self._make_standing(Posture.STAND, HOLD_TIME))
         return self._settle(Posture.STAND, "stand")
 
@@ -164,9 +165,9 @@ class Pilot:
     def _settle(self, posture: Posture, what: str) -> Measurements:
         _, check = _RESTING[posture]
         self._procedures.settle(what, check)
-        return self._rest(posture)
+        return self._arrive(posture)
 
-    def _rest(self, posture: Posture) -> Measurements:
+    def _arrive(self, posture: Posture) -> Measurements:
         self._mode, _ = _RESTING[posture]
         return self._procedures.measurements()
 

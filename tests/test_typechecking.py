@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import sys
+from types import FunctionType
 
 import numpy as np
 import pytest
-from jaxtyping import TypeCheckError
+from jaxtyping import Float, TypeCheckError
 
 from go2_wbc.errors import unknown_name
 from go2_wbc.robot.state import JointCommand
@@ -64,6 +65,25 @@ def spent() -> int:
 @checking
 def test_every_phase_of_a_test_begins_with_its_first_calls(spent: int) -> None:
     assert spent == refusals(typechecker.STRIDE - 1) == typechecker.CHECKED_CALLS
+
+
+Way = Float[np.ndarray, " n"]
+
+
+def _private(way: Way, name: str) -> None: ...
+
+
+def _plain(name: str) -> None: ...
+
+
+def public(name: str) -> None: ...
+
+
+@pytest.mark.parametrize(("function", "is_wrapped"), [(_private, 1), (_plain, 0), (public, 1)])
+def test_a_private_function_is_checked_where_it_takes_arrays(
+    function: FunctionType, is_wrapped: bool
+) -> None:
+    assert typechecker._may_be_called_wrongly(function) == is_wrapped
 
 
 @checking

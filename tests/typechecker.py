@@ -69,8 +69,8 @@ def _rationed(jaxtyped: Callable[..., Any]) -> Callable[..., Any]:
 def _may_be_called_wrongly(function: FunctionType) -> bool:
     """Whether a call may be wrong that the static check of types (pyright) finds right.
 
-    That is one with arrays, whose shapes it does not know, or by who gives public functions
-    anything. A tick of the control loop makes 30 calls of others.
+    That is one with arrays, whose shapes pyright does not know, or one of a public function, to
+    which a test may give anything. A tick of the control loop makes 30 calls of others.
     """
     types = function.__annotations__
     is_own = function.__name__.startswith("_") or not types.keys() - {"return"}
