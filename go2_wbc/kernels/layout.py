@@ -183,6 +183,7 @@ PLANNER = Layout(
     period=(),
     duty=(),
     offsets=(4,),
+    width=(),
     liftoff=(4, 3),
     was_stance=(4,),
     is_awaited=(4,),
@@ -208,11 +209,13 @@ LOCOMOTION = Layout(
     period=(),
     duty=(),
     offsets=(4,),
+    width=(),
     rest_period=(),
     rest_duty=(),
     rest_offsets=(4,),
+    rest_width=(),
     stride=(5,),
-    adaptation=(4,),
+    adaptation=(5,),
     stride_margin=(),
     height=(),
     acceleration=(3,),
@@ -244,7 +247,7 @@ LOCOMOTION = Layout(
     most_slope=(),
     mid_swing=(),
     pose_path=(3,),
-    levelling=(3,),
+    levelling=(2, 3),
 )
 """Numbers of the locomotion planner: gait, configuration, robot."""
 

@@ -1,4 +1,4 @@
-"""The attitude of a trunk that stands ready to walk: part of ``locomotion.plan``.
+"""The attitude of a trunk that stands ready to walk, or walks: part of ``locomotion.plan``.
 
 ``planning.trunk`` is its readable form, and says why.
 """
@@ -20,12 +20,11 @@ _WANTED = REFERENCE.start["R_world_base"]
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8[::1], f8, f8[::1])")
 def level(snapshot, contact, s, c, dt, target):
     """Integrate what is left of the lean, and turn the trunk's reference by that."""
-    rate, window, limit = c[_NUMBERS], c[_NUMBERS + 1], c[_NUMBERS + 2]
+    is_stepping = s[_STEPPING] != 0.0
+    n = _NUMBERS + 3 if is_stepping else _NUMBERS
+    rate, window, limit = c[n], c[n + 1], c[n + 2]
     wanted = target[_WANTED : _WANTED + 9].reshape(3, 3)
-    if s[_STEPPING] != 0.0:
-        for i in range(2):
-            s[_OFFSET + i] *= max(1.0 - rate * dt, 0.0)
-    elif contact.all():
+    if is_stepping or contact.all():
         measured = snapshot[_R + 2], snapshot[_R + 5], snapshot[_R + 8]
         error = cross(measured, (wanted[0, 2], wanted[1, 2], wanted[2, 2]))
         for i in range(2):

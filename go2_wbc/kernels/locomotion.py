@@ -38,7 +38,7 @@ _STEPPING, _PHASE_TIME, _TIME = (_S[n] for n in ("is_stepping", "phase_time", "t
 _GROUND, _SLOPE, _HEIGHT_OFFSET = (_S[n] for n in ("ground", "slope", "height_offset"))
 _POSE, _POSE_RATE = _S["pose"], _S["pose_rate"]
 _WAS_STANCE, _AWAITED = _S["was_stance"], _S["is_awaited"]
-_PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
+_PERIOD, _DUTY, _OFFSETS, _WIDTH = (_S[n] for n in ("period", "duty", "offsets", "width"))
 _GAIT, _REST, _STRIDE, _RATES = (_C[n] for n in ("period", "rest_period", "stride", "adaptation"))
 _HEIGHT, _MARGIN = _C["height"], _C["stride_margin"]
 _ACCELERATION, _FEEDBACK = _C["acceleration"], _C["velocity_feedback"]
@@ -77,14 +77,14 @@ def foot_phase(t, offset, period, duty):
     return False, max(elapsed - stance_time, 0.0), period - elapsed
 
 
-@subroutine("void(f8[::1], f8[::1], f8[::1], f8[:,::1])")
-def nominal_feet(snapshot, s, c, feet):
+@subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[:,::1])")
+def nominal_feet(snapshot, s, c, width, feet):
     """Points below the hips of a level trunk with the measured heading, moved by ``com_shift``."""
     q = snapshot[_Q : _Q + 19]
     yaw = yaw_of(q) - s[_POSE + 3]
     cosine, sine = np.cos(yaw), np.sin(yaw)
     for leg in range(4):
-        x, y = c[_NOMINAL + 3 * leg], c[_NOMINAL + 3 * leg + 1]
+        x, y = c[_NOMINAL + 3 * leg], width * c[_NOMINAL + 3 * leg + 1]
         feet[leg, 0] = q[0] + cosine * x - sine * y + snapshot[_SHIFT]
         feet[leg, 1] = q[1] + sine * x + cosine * y + snapshot[_SHIFT + 1]
 
@@ -93,7 +93,7 @@ def nominal_feet(snapshot, s, c, feet):
 def is_square(snapshot, s, c):
     """Whether the feet form the nominal rectangle, wherever its middle is."""
     offsets, mean = np.empty((4, 2)), np.zeros(2)
-    nominal_feet(snapshot, s, c, offsets)
+    nominal_feet(snapshot, s, c, c[_REST + 6], offsets)
     for leg in range(4):
         for i in range(2):
             offsets[leg, i] = snapshot[_P_FEET + 3 * leg + i] - offsets[leg, i]
@@ -154,18 +154,18 @@ def advance_phase(snapshot, s, c, dt, command):
             s[_STEPPING] = 0.0
     elif not is_zero or must_step(snapshot, c):
         s[_STEPPING], s[_PHASE_TIME] = 1.0, 0.0
-        s[_PERIOD : _PERIOD + 6] = c[_REST : _REST + 6]
+        s[_PERIOD : _PERIOD + 7] = c[_REST : _REST + 7]
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
 def adapt_gait(snapshot, s, c, dt, command):
-    """Bring period, duty and offsets towards those wanted; the phases of the feet do not jump."""
-    wanted = np.empty(6)
-    wanted[:] = c[_GAIT : _GAIT + 6]
+    """Bring the gait's form towards that wanted; the phases of the feet do not jump."""
+    wanted = np.empty(7)
+    wanted[:] = c[_GAIT : _GAIT + 7]
     rise, fall, is_thrown = c[_RATES + 1], c[_RATES + 1], False
     is_zero = command[0] == 0.0 and command[1] == 0.0 and command[2] == 0.0
     if is_zero and is_settled(s, c):
-        wanted[:] = c[_REST : _REST + 6]
+        wanted[:] = c[_REST : _REST + 7]
     elif c[_STRIDE] > 0.0:
         arm = np.hypot(c[_NOMINAL], c[_NOMINAL + 1])
         speed = np.hypot(s[_VELOCITY], s[_VELOCITY + 1])
@@ -177,7 +177,7 @@ def adapt_gait(snapshot, s, c, dt, command):
         wanted[0] = stance + c[_STRIDE + 3] + c[_STRIDE + 4] * (speed - 1.0)
         wanted[1] = stance / wanted[0]
     left = abs(s[_PERIOD] - wanted[0]) / c[_RATES]
-    if left > 0.0 and not is_thrown and (wanted[2:] != s[_OFFSETS : _OFFSETS + 4]).any():
+    if left > 0.0 and not is_thrown and (wanted[2:6] != s[_OFFSETS : _OFFSETS + 4]).any():
         rise = fall = min(fall, abs(wanted[1] - s[_DUTY]) / left)
     if wanted[0] != s[_PERIOD]:
         most = c[_RATES] * dt
@@ -185,6 +185,8 @@ def adapt_gait(snapshot, s, c, dt, command):
         s[_PHASE_TIME] = s[_PHASE_TIME] % s[_PERIOD] * period / s[_PERIOD]
         s[_PERIOD] = period
     s[_DUTY] += min(max(wanted[1] - s[_DUTY], -fall * dt), rise * dt)
+    most = c[_RATES + 4] * dt
+    s[_WIDTH] += min(max(wanted[6] - s[_WIDTH], -most), most)
     share = dt / left if left > dt else 1.0
     for leg in range(4):
         if wanted[2 + leg] != s[_OFFSETS + leg]:
@@ -303,7 +305,7 @@ def fill_body(s, c, target):
 def fill_feet(snapshot, s, c, stance, stands, elapsed, remaining, target):
     """What each leg does, its load, and the way of a foot in the air."""
     nominal, goal = np.empty((4, 2)), np.empty(3)
-    nominal_feet(snapshot, s, c, nominal)
+    nominal_feet(snapshot, s, c, s[_WIDTH], nominal)
     for leg in range(4):
         target[_LEGS + leg] = 0.0 if stands[leg] else 1.0
         for i in range(3):

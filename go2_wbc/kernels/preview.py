@@ -33,7 +33,7 @@ _P_COM, _V_COM, _P_FEET = (_N[n] for n in ("p_world_com", "v_world_com", "p_worl
 _SHIFT, _CARRIED = _N["com_shift"], _N["payload"]
 _YAW, _POSITION, _VELOCITY = (_S[n] for n in ("yaw", "position", "velocity"))
 _PHASE_TIME, _HEIGHT_OFFSET = _S["phase_time"], _S["height_offset"]
-_PERIOD, _DUTY, _OFFSETS = (_S[n] for n in ("period", "duty", "offsets"))
+_PERIOD, _DUTY, _OFFSETS, _WIDTH = (_S[n] for n in ("period", "duty", "offsets", "width"))
 _STEPPING, _SLOPE = _S["is_stepping"], _S["slope"]
 _POSE, _POSE_RATE = _S["pose"], _S["pose_rate"]
 _ACCELERATION, _HEIGHT, _RADIUS = (_C[n] for n in ("acceleration", "height", "foot_radius"))
@@ -172,7 +172,7 @@ def fill_arms(snapshot, s, c, m, goals, landings, arms):
     com = vector(snapshot, _P_COM)
     base = plus(vector(snapshot, _Q), vector(snapshot, _SHIFT))
     nominal, goal, footholds = np.empty((4, 2)), np.empty(3), np.empty((4, 2))
-    nominal_feet(snapshot, s, c, nominal)
+    nominal_feet(snapshot, s, c, s[_WIDTH], nominal)
     for leg in range(4):
         remaining = max(landings[0, leg], 0.0) * period
         foothold(leg, snapshot, s, c, nominal, remaining, goal)
@@ -201,7 +201,7 @@ def fill_arms(snapshot, s, c, m, goals, landings, arms):
             else:
                 yaw = s[_YAW] + rate * wait
                 cosine, sine = np.cos(yaw), np.sin(yaw)
-                x, y = c[_NOMINAL + 3 * leg], c[_NOMINAL + 3 * leg + 1]
+                x, y = c[_NOMINAL + 3 * leg], s[_WIDTH] * c[_NOMINAL + 3 * leg + 1]
                 hip_x, hip_y = cosine * x - sine * y, sine * x + cosine * y
                 early = duty * period / 2 + wait - (k + 0.5) * step
                 v_x, v_y = goals[k, 9] + excess_x * left, goals[k, 10] + excess_y * left

@@ -7,7 +7,7 @@ from dataclasses import astuple
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.contacts import DUTY_FALL, DUTY_RATE, OFFSET_RATE, PERIOD_RATE, Gait
+from go2_wbc.contacts import DUTY_FALL, DUTY_RATE, OFFSET_RATE, PERIOD_RATE, WIDTH_RATE, Gait
 from go2_wbc.kernels.layout import COMMAND, FORCES, LOCOMOTION, MPC, PLANNER, REFERENCE
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.correction import CorrectionConfig
@@ -21,15 +21,15 @@ from go2_wbc.planning.ground import (
 )
 from go2_wbc.planning.locomotion import MID_SWING, LocomotionConfig
 from go2_wbc.planning.pose import LEVEL, BodyPose
-from go2_wbc.planning.trunk import READY, SETTLED_COMMAND
+from go2_wbc.planning.trunk import READY, SETTLED_COMMAND, STRIDE
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 
 _TARGET_FRICTION = REFERENCE.start["friction"]
 _STATE = PLANNER.start
-_FORM = slice(PLANNER.start["period"], PLANNER.start["offsets"] + 4)
-_RESTING = slice(LOCOMOTION.start["rest_period"], LOCOMOTION.start["rest_offsets"] + 4)
+_FORM = slice(PLANNER.start["period"], PLANNER.start["width"] + 1)
+_RESTING = slice(LOCOMOTION.start["rest_period"], LOCOMOTION.start["rest_width"] + 1)
 """Period, duty and offsets: those of the gait now, and those in which the robot comes to rest."""
 
 
@@ -65,7 +65,7 @@ class CompiledPlanner(GaitPlanner):
                 snapshot.state.time,
                 ground.height,
                 0.0,
-                *LOCOMOTION.views(self._numbers)[3:6],
+                *LOCOMOTION.views(self._numbers)[4:8],
                 feet,
                 np.ones(4),
                 np.zeros(4),
@@ -145,13 +145,15 @@ def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndar
             gait.period,
             gait.duty,
             gait.offsets,
+            gait.width,
             rest.period,
             rest.duty,
             rest.offsets,
+            rest.width,
             np.zeros(5) if stride is None else astuple(stride),
-            [PERIOD_RATE, DUTY_RATE, OFFSET_RATE, DUTY_FALL],
+            [PERIOD_RATE, DUTY_RATE, OFFSET_RATE, DUTY_FALL, WIDTH_RATE],
             config.stride_margin,
-            config.height,
+            config.height_on_feet,
             [config.linear_acceleration] * 2 + [config.angular_acceleration],
             config.velocity_feedback,
             config.position_leash,
@@ -181,6 +183,6 @@ def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndar
             MOST_SLOPE,
             MID_SWING,
             astuple(config.pose),
-            [READY.rate, READY.angle_window, READY.angle_limit],
+            [[n.rate, n.angle_window, n.angle_limit] for n in (READY, STRIDE)],
         ]
     )

@@ -1,8 +1,8 @@
 """Where in its stride a gait is, while the gait itself may change.
 
-Period, duty and offsets are state: they move towards those that are wanted, at rates below that at
-which a foot's phase passes. So any gait becomes any other at any moment, and no foot that has
-lifted off is told that it still stands.
+Period, duty, offsets and width are state: they move towards those that are wanted, at rates below
+that at which a foot's phase passes. So any gait becomes any other at any moment, and no foot that
+has lifted off is told that it still stands.
 
 Offsets and duty arrive together with the period. Ahead of it, a walk had become a pace or a bound
 with strides of half a second, in which the robot tips over the one pair of feet that stands, and a
@@ -19,6 +19,7 @@ from go2_wbc.contacts import (
     GAITS,
     OFFSET_RATE,
     PERIOD_RATE,
+    WIDTH_RATE,
     ContactPhase,
     ContactSchedule,
     Gait,
@@ -37,6 +38,7 @@ class GaitClock:
 
     Attributes:
         gait: as it is now.
+        rest: the one in which the robot comes to rest.
         time: since the stride's start or a whole number of strides before [s].
     """
 
@@ -47,11 +49,11 @@ class GaitClock:
 
     def change(self, gait: Gait, stride: Stride | None) -> None:
         """Move towards another gait from now on."""
-        self._wanted, self._rest, self._stride = gait, resting_gait(gait), stride
+        self._wanted, self.rest, self._stride = gait, resting_gait(gait), stride
 
     def restart(self) -> None:
         """Begin the first stride."""
-        self.gait, self.time = self._rest, 0.0
+        self.gait, self.time = self.rest, 0.0
         self._schedule: ContactSchedule = self.gait.schedule()
 
     def now(self) -> ContactPhase:
@@ -63,7 +65,7 @@ class GaitClock:
 
         A robot that ``is_thrown``, faster than it shall be, lifts its feet sooner at once.
         """
-        wanted = self._rest if is_resting else self._wanted
+        wanted = self.rest if is_resting else self._wanted
         period, duty, rise, fall = wanted.period, wanted.duty, DUTY_RATE, DUTY_RATE
         if self._stride is not None and not is_resting:
             period, duty = self._stride.at(speed)
@@ -77,11 +79,13 @@ class GaitClock:
         offsets = tuple(_turned(now, goal, OFFSET_RATE * dt, share) for now, goal in pairs)
         period = _moved(before.period, period, PERIOD_RATE * dt)
         duty = before.duty + min(max(duty - before.duty, -fall * dt), rise * dt)
-        if (period, duty, offsets) == (before.period, before.duty, before.offsets):
+        width = _moved(before.width, wanted.width, WIDTH_RATE * dt)
+        form = (period, duty, offsets, width)
+        if form == (before.period, before.duty, before.offsets, before.width):
             return
         if period != before.period:
             self.time = self.time % before.period * period / before.period
-        self.gait = replace(wanted, period=period, duty=duty, offsets=offsets)
+        self.gait = replace(wanted, period=period, duty=duty, offsets=offsets, width=width)
         self._schedule = self.gait.schedule()
 
 

@@ -42,7 +42,7 @@ from go2_wbc.planning.swing import Swing, SwingConfig
 from go2_wbc.planning.trunk import TrunkLimits, TrunkPath
 from go2_wbc.reference import LegTask, Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import yaw_rotation
+from go2_wbc.robot.rotations import turned, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_not_negative, require_positive
 
@@ -59,7 +59,9 @@ class LocomotionConfig:
     """Numbers of the locomotion planner, from a search on this robot in simulation.
 
     Attributes:
-        height: CoM height [m] above the feet's contact points.
+        height: CoM height [m] above the ground.
+        compression: by which feet under the trunk's weight are pressed flat, or into the ground,
+            [m]: in MuJoCo 1 to 6 mm, by the friction of the joints.
         linear_acceleration: greatest change of the commanded velocity [m/s^2].
         angular_acceleration: greatest change of the commanded turning rate [rad/s^2].
         velocity_feedback: foothold offset [s] per velocity error.
@@ -87,6 +89,7 @@ class LocomotionConfig:
     """
 
     height: float = 0.29
+    compression: float = 0.004
     linear_acceleration: float = 1.5
     angular_acceleration: float = 4.0
     velocity_feedback: float = 0.12
@@ -109,7 +112,7 @@ class LocomotionConfig:
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a number that is out of range."""
-        zero_is_valid = {"velocity_feedback", "normal_force_min"}
+        zero_is_valid = {"velocity_feedback", "normal_force_min", "compression"}
         parts = {"swing", "slip", "contact", "ground", "mpc", "pose"}
         positive = {f.name for f in fields(self)} - zero_is_valid - parts
         require_positive(self, *sorted(positive))
@@ -124,6 +127,11 @@ class LocomotionConfig:
                 f"normal_force_min must be below normal_force_max, got {self.normal_force_min} "
                 f"and {self.normal_force_max} N"
             )
+
+    @property
+    def height_on_feet(self) -> float:
+        """CoM height [m] above where feet that stayed round would end."""
+        return self.height + self.compression
 
     @property
     def trunk_limits(self) -> TrunkLimits:
@@ -210,7 +218,7 @@ class LocomotionPlanner(GaitPlanner):
         self._advance_phase(snapshot, command, dt)
         self._trunk.integrate(snapshot, command, pose, dt)
         self._ground.carry(snapshot)
-        self._trunk.correct_height(snapshot, self._ground.height + self._config.height, dt)
+        self._trunk.correct_height(snapshot, self._ground.height + self._config.height_on_feet, dt)
         phase = self._phase(snapshot, command, dt)
         self._contacts.update(snapshot, phase, self._ground.above(snapshot.p_world_feet), dt)
         stance = self._contacts.stance
@@ -220,7 +228,7 @@ class LocomotionPlanner(GaitPlanner):
         legs = tuple(LegTask.STANCE if s else LegTask.SWING for s in stance)
         q = snapshot.state.joint_positions
         load = self._contacts.load_share(phase, self._ramp)
-        body = self._trunk.target(self._ground, self._config.height)
+        body = self._trunk.target(self._ground, self._config.height_on_feet)
         reference = Reference(
             body=self._trunk.levelled(body, snapshot, dt, is_stepping=self._is_stepping),
             legs=legs,
@@ -269,7 +277,7 @@ class LocomotionPlanner(GaitPlanner):
             gait=self._clock.gait,
             time=self._clock.time,
             yaw=self._trunk.yaw,
-            position=self._trunk.place(self._ground, config.height),
+            position=self._trunk.place(self._ground, config.height_on_feet),
             velocity=self._trunk.velocity,
             command=np.array([command.linear_x, command.linear_y, command.angular_z]),
             lean=self._trunk.pose.pose,
@@ -302,13 +310,13 @@ class LocomotionPlanner(GaitPlanner):
 
     def _is_square(self, snapshot: Snapshot) -> bool:
         """Whether the feet form the nominal rectangle; their mean may be off: the body moves."""
-        offsets = snapshot.p_world_feet[:, :2] - self._nominal_feet(snapshot)
+        offsets = snapshot.p_world_feet[:, :2] - self._nominal_feet(snapshot, self._clock.rest)
         offsets -= offsets.mean(axis=0)
         return bool(np.linalg.norm(offsets, axis=1).max() < self._config.square_tolerance)
 
     def _must_step(self, snapshot: Snapshot) -> bool:
         """Whether the capture point ``p + v / sqrt(g / h)`` is too far from the feet's middle."""
-        omega = np.sqrt(self._model.gravity / self._config.height)
+        omega = np.sqrt(self._model.gravity / self._config.height_on_feet)
         capture = snapshot.p_world_com[:2] + snapshot.v_world_com[:2] / omega
         middle = snapshot.p_world_feet[:, :2].mean(axis=0)
         return bool(np.linalg.norm(capture - middle) > self._config.capture_margin)
@@ -331,13 +339,13 @@ class LocomotionPlanner(GaitPlanner):
         self._is_awaited &= ~landed
         self._was_stance = stance.copy()
 
-    def _nominal_feet(self, snapshot: Snapshot) -> Float[np.ndarray, "4 2"]:
+    def _nominal_feet(self, snapshot: Snapshot, gait: Gait) -> Float[np.ndarray, "4 2"]:
         """Points [m] on the ground below the hips of a level trunk with the measured heading.
 
         A payload moves them as it does the CoM, which so stays above the feet's middle.
         """
         R = yaw_rotation(snapshot.state.yaw - self._trunk.pose.pose[3])
-        feet = self._model.p_base_feet_nominal @ R.T
+        feet = gait.placed(self._model.p_base_feet_nominal) @ R.T
         return snapshot.state.p_world_base[:2] + feet[:, :2] + snapshot.com_shift[:2]
 
     def _footholds(
@@ -355,13 +363,13 @@ class LocomotionPlanner(GaitPlanner):
         config = self._config
         v = snapshot.v_world_com[:2]
         v_ref = self._trunk.world_velocity[:2]
-        hips = self._nominal_feet(snapshot)
+        hips = self._nominal_feet(snapshot, self._clock.gait)
         arms = hips - snapshot.state.p_world_base[:2]
         half, rate = self._clock.gait.stance_time / 2, self._trunk.velocity[2]
-        there = _turned(arms, rate * remaining)
-        travel = v * half + _turned(there, np.full(4, rate * half)) - there
+        there = turned(arms, rate * remaining)
+        travel = v * half + turned(there, np.full(4, rate * half)) - there
         travel += config.velocity_feedback * (v - v_ref)
-        lean = rate * config.height / self._model.gravity
+        lean = rate * config.height_on_feet / self._model.gravity
         travel += lean * np.array([v_ref[1], -v_ref[0]])
         length = np.linalg.norm(travel, axis=1, keepdims=True)
         reach = config.foothold_reach
@@ -386,13 +394,3 @@ class LocomotionPlanner(GaitPlanner):
                     self._swing,
                 )
         return p, v, a
-
-
-def _turned(
-    vectors: Float[np.ndarray, "4 2"], angles: Float[np.ndarray, "4"]
-) -> Float[np.ndarray, "4 2"]:
-    """Each of the vectors turned by its angle [rad]."""
-    x, y = vectors.T
-    return np.column_stack(
-        [np.cos(angles) * x - np.sin(angles) * y, np.sin(angles) * x + np.cos(angles) * y]
-    )

@@ -220,7 +220,7 @@ def _arms(
     arms = np.empty((MPC_NODES, 4, 3))
     com, gait = snapshot.p_world_com, course.gait
     base = snapshot.state.p_world_base - com + snapshot.com_shift
-    before = course.position[:2]
+    before, nominal = course.position[:2], gait.placed(model.p_base_feet_nominal)
     for k in range(MPC_NODES):
         middle = (k + 0.5) * config.step
         left = np.exp(-middle / config.throw_time)
@@ -238,7 +238,7 @@ def _arms(
                 arm[2] = course.ground.at(course.footholds[leg]) - com[2]
             else:
                 yaw, rate = course.yaw + goals[k, 8] * wait, goals[k, 8]
-                hip = (yaw_rotation(yaw) @ model.p_base_feet_nominal[leg])[:2]
+                hip = (yaw_rotation(yaw) @ nominal[leg])[:2]
                 speed = goals[k, 9:11] + course.excess * left + rate * np.array([-hip[1], hip[0]])
                 arm[:2] = base[:2] + hip + speed * (gait.stance_time / 2 + wait - middle)
                 arm[2] = course.ground.at(com[:2] + arm[:2]) - com[2]

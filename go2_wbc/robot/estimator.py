@@ -148,7 +148,7 @@ class EstimatorConfig:
     foot_drift: float = 0.05
     drift_share: float = 0.2
     settled_drift: float = 0.005
-    settled_time: float = 0.4
+    settled_time: float = 0.45
     place: float = 0.002
     velocity: float = 0.05
     velocity_share: float = 0.05

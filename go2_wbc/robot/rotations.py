@@ -60,6 +60,14 @@ def yaw_rotation(yaw: float) -> Float[np.ndarray, "3 3"]:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+def turned(
+    vectors: Float[np.ndarray, "n 2"], angles: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, "n 2"]:
+    """Each of the vectors turned by its angle [rad]."""
+    (x, y), cosine, sine = vectors.T, np.cos(angles), np.sin(angles)
+    return np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
+
+
 def angular_velocity_from_rpy(
     rpy: Float[np.ndarray, "3"],
     rate: Float[np.ndarray, "3"],

@@ -83,6 +83,15 @@ def test_a_robot_that_stands_ready_levels_a_payload_that_reaches_too_far() -> No
         assert np.abs(leans(go2, 6.0)[-2:]).max() < READY
 
 
+def test_a_walking_robot_levels_a_payload_that_reaches_too_far() -> None:
+    # It leaned by 2.3 deg as long as it walked.
+    plant = MujocoPlant(payload=2.0, payload_place=(0.0, 0.15, 0.1))
+    with GO2Controller(plant=plant) as go2:
+        assert go2.walk()
+        go2.move(SPEED)
+        assert np.abs(leans(go2, 5.0)[-2:]).max() < READY
+
+
 @pytest.mark.parametrize(("roll", "pitch"), [(0.15, 0.0), (-0.15, 0.0), (0.0, 0.15)])
 def test_a_pose_is_held_by_a_robot_that_stands_ready(roll: float, pitch: float) -> None:
     # Dry friction in the joints left 2.5 deg of it undone.

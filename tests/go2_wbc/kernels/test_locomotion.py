@@ -26,7 +26,7 @@ from tests.engine_helpers import random_state, standing_q, state_of
 TICK = 0.002
 ROUNDING = 1e-8  # of accelerations up to 100 m/s^2; measured 2e-10
 OF_FORCES = 1e-6  # of planned forces up to 250 N and what they make of the trunk
-ODD = Gait("odd", period=0.37, duty=0.61, offsets=(0.13, 0.58, 0.0, 0.83))
+ODD = Gait("odd", period=0.37, duty=0.61, offsets=(0.13, 0.58, 0.0, 0.83), width=0.87)
 ODD_CONFIG = LocomotionConfig(
     height=0.27,
     linear_acceleration=1.1,

@@ -23,7 +23,7 @@ def resting(time: float = 0.0, yaw: float = 0.0) -> Snapshot:
     snapshot = MODEL.snapshot(helpers.state_of(q, time=time))
     feet = MODEL.p_base_feet_nominal @ yaw_rotation(yaw).T
     feet[:, 2] = MODEL.foot_radius
-    com = np.array([*feet[:, :2].mean(axis=0), CONFIG.height])
+    com = np.array([*feet[:, :2].mean(axis=0), CONFIG.height_on_feet])
     return replace(snapshot, p_world_feet=feet, p_world_com=com)
 
 
