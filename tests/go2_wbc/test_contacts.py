@@ -221,6 +221,8 @@ def test_an_unknown_gait_is_answered_with_the_known_names() -> None:
         ({"apex": float("nan")}, "Gait.apex must be positive"),
         ({"duty": 1.2}, "Gait.duty must be above 0 and at most 1"),
         ({"offsets": (0.0, 0.5, 1.0, 0.0)}, "Gait.offsets must be four phases"),
+        ({"width": 0.0}, "Gait.width must be above 0 and at most 1"),
+        ({"width": 1.1}, "Gait.width must be above 0 and at most 1"),
     ],
 )
 def test_a_gait_out_of_range_is_refused(changes: dict[str, Any], message: str) -> None:
@@ -270,6 +272,14 @@ def test_a_foot_takes_up_its_load_after_touchdown_and_gives_it_up_before_lift_of
         share[phase.stance],
         np.clip(np.minimum(phase.elapsed, phase.remaining) / ramp, 0, 1)[phase.stance],
     )
+
+
+def test_a_narrow_gait_places_its_feet_nearer_to_the_middle_and_no_farther_back() -> None:
+    feet = np.array([[x, y, -0.3] for x in (0.2, -0.2) for y in (0.14, -0.14)])
+    narrow = replace(GAITS["trot"], width=0.5).placed(feet)
+    np.testing.assert_allclose(narrow[:, 1], feet[:, 1] / 2)
+    np.testing.assert_array_equal(narrow[:, ::2], feet[:, ::2])
+    np.testing.assert_array_equal(GAITS["trot"].placed(feet), feet)
 
 
 def test_a_gait_is_found_by_its_name_or_is_itself() -> None:

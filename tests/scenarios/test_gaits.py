@@ -44,7 +44,26 @@ def test_a_gait_walks_at_the_edge_of_its_envelope_and_comes_to_rest(name: str) -
         go2.stop()
         assert go2.stand()
         assert truth.fall() is None
-        assert np.abs(go2.state.v).max() < 0.1
+        assert np.abs(go2.state.v[:6]).max() < 0.1
+    truth.close()
+
+
+@pytest.mark.slow
+def test_a_pace_needs_no_more_friction_than_a_narrow_stance_does() -> None:
+    # With its feet as far apart as a trot's it fell here: it pushed them aside by half its weight.
+    truth = GroundTruth(MujocoPlant(sensors="imu", friction=0.4, seed=71))
+    with GO2Controller(plant=truth) as go2:
+        assert go2.stand()
+        assert go2.walk("pace")
+        go2.move(0.5)
+        go2.wait(2.0)
+        truth.clear()
+        go2.wait(2.0)
+        velocity = truth.recording().com_velocity.mean(axis=0)
+        np.testing.assert_allclose(velocity, [0.5, 0.0, 0.0], atol=0.03)
+        go2.stop()
+        assert go2.stand()
+        assert truth.fall() is None
     truth.close()
 
 

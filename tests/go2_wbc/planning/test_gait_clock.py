@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from go2_wbc.contacts import GAITS, Gait
+from go2_wbc.contacts import GAITS, WIDTH_RATE, Gait
 from go2_wbc.planning.gait_clock import GaitClock, resting_gait
 
 TICK = 0.002
@@ -65,6 +65,17 @@ def test_between_walk_and_pairs_neither_is_walked_at_the_pace_of_the_other(there
             whole = (walk.offsets[2] - gait.offsets[2] + 0.5) % 1.0 - 0.5
             assert way == pytest.approx(share * whole, abs=1e-9)
         assert clock.gait == wanted
+
+
+def test_the_feet_come_together_and_apart_without_a_jump() -> None:
+    clock = GaitClock(GAITS["pace"], None)
+    widths = [clock.gait.width]
+    for is_resting in (False, True):
+        for _ in range(int(SECONDS / TICK)):
+            run(clock, seconds=TICK, is_resting=is_resting)
+            widths.append(clock.gait.width)
+        assert clock.gait.width == (1.0 if is_resting else GAITS["pace"].width)
+    assert np.abs(np.diff(widths)).max() == pytest.approx(WIDTH_RATE * TICK)
 
 
 def test_a_robot_that_is_thrown_lifts_its_feet_sooner_at_once() -> None:
