@@ -194,5 +194,14 @@ def test_every_key_of_the_configuration_has_a_meaning_and_a_default() -> None:
     assert rows["posture_weight"][1].startswith("task weights, 1e-3 to 1e3; ")
 
 
+def test_every_gait_that_has_a_name_is_in_the_table_of_envelopes() -> None:
+    from go2_wbc.contacts import GAITS
+    from go2_wbc.planning.envelopes import measured_envelopes
+
+    rows = extension("reference_pages").envelope_rows()[2:]
+    assert [row.split("`")[1] for row in rows] == list(GAITS)
+    assert f" {measured_envelopes()['pace'].forward:.2f} m/s " in rows[list(GAITS).index("pace")]
+
+
 def _rows(kind: type) -> list[tuple[str, str, str]]:
     return list(extension("reference_pages").config_rows(kind))

@@ -4,6 +4,7 @@
 - ``{cli-help} NAME``: what ``go2-wbc NAME --help`` prints.
 - ``{examples}``: the scripts of ``examples/``.
 - ``{config-table} MODULE.CLASS``: the fields of a configuration with default and meaning.
+- ``{envelopes}``: how fast each gait may be walked, as it was measured.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 from controller.cli.main import COMMANDS, PROGRAM
+from go2_wbc.planning.envelopes import measured_envelopes
 from go2_wbc.wbc.tasks import Gains
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -143,6 +145,26 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
+def envelope_rows() -> list[str]:
+    """The table of the measured envelopes in Markdown."""
+    bounds = measured_envelopes().items()
+    return [
+        "| gait | ahead | back | aside | turning |",
+        "|---|---|---|---|---|",
+        *(
+            f"| `{name}` | {b.forward:.2f} m/s | {b.backward:.2f} m/s | {b.lateral:.2f} m/s "
+            f"| {b.turning:.1f} rad/s |"
+            for name, b in bounds
+        ),
+    ]
+
+
+def _parsed(directive: SphinxDirective, lines: list[str], source: str) -> list[nodes.Node]:
+    parent = nodes.container()
+    directive.state.nested_parse(StringList(lines, source), 0, parent)
+    return parent.children
+
+
 class CliHelp(SphinxDirective):
     """The directive ``cli-help``."""
 
@@ -166,9 +188,15 @@ class ConfigTable(SphinxDirective):
         for key, default, meaning in config_rows(getattr(import_module(module), name)):
             shown = f"`{default}`" if default else ""
             lines.append(f"| `{key}` | {shown} | {meaning.replace('|', chr(92) + '|')} |")
-        parent = nodes.container()
-        self.state.nested_parse(StringList(lines, self.arguments[0]), 0, parent)
-        return parent.children
+        return _parsed(self, lines, self.arguments[0])
+
+
+class Envelopes(SphinxDirective):
+    """The directive ``envelopes``."""
+
+    def run(self) -> list[nodes.Node]:
+        """Make a table of the gaits that are measured."""
+        return _parsed(self, envelope_rows(), "envelopes.json")
 
 
 class Examples(SphinxDirective):
@@ -194,5 +222,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
     app.connect("builder-inited", write_api_pages)
     app.add_directive("cli-help", CliHelp)
     app.add_directive("config-table", ConfigTable)
+    app.add_directive("envelopes", Envelopes)
     app.add_directive("examples", Examples)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
