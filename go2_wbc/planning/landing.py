@@ -28,7 +28,6 @@ from jaxtyping import Float
 
 from go2_wbc.contacts import TIE, ContactPhase
 from go2_wbc.legs import LEGS
-from go2_wbc.planning.ground import GROUND_SHARE
 from go2_wbc.reference import Anchor, Footsteps, LegTask, Reference
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
@@ -42,7 +41,8 @@ PRESS_DEPTH = 0.06
 """Greatest depth [m] below the ground that it looks for: what a standing leg can still reach."""
 TIME_OUT = 0.2
 """Time [s] after which a foot without contact counts as standing: it reaches the depth in 0.15."""
-
+PLAN_SHARE = 0.3
+"""Share of how much higher than planned a foot landed by which the rest of the plan is raised."""
 NEAR = 0.02
 """Distance [m] by which the CoM may be off its plan when feet come down in their places all the
 same: a tenth of the way to the edge of their support. Far jumps land half as far beside."""
@@ -139,7 +139,7 @@ class ReadableLanding:
 
     def _learn_ground(self, height: float) -> None:
         p = self.anchor.p_world
-        higher = np.array([0.0, 0.0, GROUND_SHARE * (height - p[2])])
+        higher = np.array([0.0, 0.0, PLAN_SHARE * (height - p[2])])
         self.anchor = Anchor(p + higher, self.anchor.yaw)
 
     def _task(self, leg: int) -> LegTask:
@@ -204,7 +204,7 @@ def landing_numbers(footsteps: Footsteps) -> Sequence[float]:
         PRESS_SPEED,
         PRESS_DEPTH,
         TIME_OUT,
-        GROUND_SHARE,
+        PLAN_SHARE,
         FOOT_RADIUS,
         NEAR,
         footsteps.ramp,
