@@ -6,9 +6,10 @@ import numpy as np
 
 from controller.behaviours.base import Behaviour
 from go2_wbc.contacts import Gait
-from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.compiled import CompiledPlanner
-from go2_wbc.planning.gait_choice import GaitChoice
+from go2_wbc.planning.gait_choice import DWELL, GaitChoice
+from go2_wbc.planning.gait_clock import time_between
 from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.planning.pose import LEVEL, BodyPose
@@ -33,6 +34,7 @@ class Walking(Behaviour):
         self.command: VelocityCommand = ZERO_COMMAND
         self.pose: BodyPose = LEVEL
         self.choice: GaitChoice | None = None
+        self._limit, self._is_limited_until = VelocityEnvelope(), -np.inf
         self._planner: GaitPlanner = CompiledPlanner(model, gait, config)
 
     def start(self, snapshot: Snapshot) -> None:
@@ -41,10 +43,12 @@ class Walking(Behaviour):
 
     def update(self, snapshot: Snapshot) -> Reference:
         """The planner's reference."""
-        command = self.command
+        command, now = self.command, snapshot.state.time
+        if now < self._is_limited_until:
+            command = self._limit.clip(command)
         if self.choice is not None:
             velocity = self._planner.velocity
-            gait, command = self.choice.update(snapshot.state.time, velocity, command)
+            gait, command = self.choice.update(now, velocity, command)
             if gait != self.gait:
                 self.change_gait(gait)
         return self._planner.update(snapshot, command, self.pose)
@@ -57,6 +61,18 @@ class Walking(Behaviour):
         """Walk on with another gait, within whose envelope the robot must walk already."""
         self._planner.change_gait(gait)
         self.gait = gait
+
+    def pass_over(self, gait: Gait, limit: VelocityEnvelope, now: float) -> None:
+        """Change the gait, the velocity clipped into ``limit`` until that has happened.
+
+        Args:
+            gait: wanted.
+            limit: in which the robot walks already.
+            now: time of the robot [s].
+        """
+        time = max(time_between(self.gait, gait), DWELL)
+        self._limit, self._is_limited_until = limit, now + time
+        self.change_gait(gait)
 
     @property
     def follows_command(self) -> bool:

@@ -184,6 +184,7 @@ PLANNER = Layout(
     duty=(),
     offsets=(4,),
     width=(),
+    goal_offsets=(4,),
     liftoff=(4, 3),
     was_stance=(4,),
     is_awaited=(4,),

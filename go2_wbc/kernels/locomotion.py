@@ -29,6 +29,8 @@ from go2_wbc.kernels.vectors import cross
 TIE = 1e-9
 """As ``contacts.TIE``."""
 TINY = 1e-9
+RESOLUTION = 1e12
+"""Of phases, that adding and dividing may have blurred, in steps a turn."""
 
 _N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLANNER.start, LOCOMOTION.start
 _Q, _P_COM, _V_COM, _P_FEET = (_N[n] for n in ("q", "p_world_com", "v_world_com", "p_world_feet"))
@@ -39,6 +41,7 @@ _GROUND, _SLOPE, _HEIGHT_OFFSET = (_S[n] for n in ("ground", "slope", "height_of
 _POSE, _POSE_RATE = _S["pose"], _S["pose_rate"]
 _WAS_STANCE, _AWAITED = _S["was_stance"], _S["is_awaited"]
 _PERIOD, _DUTY, _OFFSETS, _WIDTH = (_S[n] for n in ("period", "duty", "offsets", "width"))
+_GOAL = _S["goal_offsets"]
 _GAIT, _REST, _STRIDE, _RATES = (_C[n] for n in ("period", "rest_period", "stride", "adaptation"))
 _HEIGHT, _MARGIN = _C["height"], _C["stride_margin"]
 _ACCELERATION, _FEEDBACK = _C["acceleration"], _C["velocity_feedback"]
@@ -155,6 +158,28 @@ def advance_phase(snapshot, s, c, dt, command):
     elif not is_zero or must_step(snapshot, c):
         s[_STEPPING], s[_PHASE_TIME] = 1.0, 0.0
         s[_PERIOD : _PERIOD + 7] = c[_REST : _REST + 7]
+        s[_GOAL : _GOAL + 4] = c[_REST + 2 : _REST + 6]
+
+
+@subroutine("void(f8[::1], f8[::1])")
+def align(s, goal):
+    """Name the phases of now so that they are near to the ``goal``, as ``aligned``."""
+    ways = np.empty(4)
+    for leg in range(4):
+        ways[leg] = (goal[leg] - s[_OFFSETS + leg]) % 1.0
+    ways.sort()
+    widest, last = 0.0, 3
+    for k in range(4):
+        gap = ways[k + 1] - ways[k] if k < 3 else 1.0 - (ways[3] - ways[0])
+        gap = np.floor(gap * RESOLUTION + 0.5)
+        if gap > widest:
+            widest, last = gap, k
+    shift = ways[(last + 1) % 4] + (1.0 - widest / RESOLUTION) / 2.0
+    for leg in range(4):
+        turns = np.floor((s[_OFFSETS + leg] + shift) * RESOLUTION + 0.5) / RESOLUTION
+        s[_OFFSETS + leg] = turns % 1.0 % 1.0
+        s[_GOAL + leg] = goal[leg]
+    s[_PHASE_TIME] = (s[_PHASE_TIME] + shift * s[_PERIOD]) % s[_PERIOD]
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")
@@ -176,6 +201,8 @@ def adapt_gait(snapshot, s, c, dt, command):
         stance = min(max(c[_STRIDE] / max(speed, TINY), c[_STRIDE + 1]), c[_STRIDE + 2])
         wanted[0] = stance + c[_STRIDE + 3] + c[_STRIDE + 4] * (speed - 1.0)
         wanted[1] = stance / wanted[0]
+    if (wanted[2:6] != s[_GOAL : _GOAL + 4]).any():
+        align(s, wanted[2:6])
     left = abs(s[_PERIOD] - wanted[0]) / c[_RATES]
     if left > 0.0 and not is_thrown and (wanted[2:6] != s[_OFFSETS : _OFFSETS + 4]).any():
         rise = fall = min(fall, abs(wanted[1] - s[_DUTY]) / left)
@@ -195,7 +222,7 @@ def adapt_gait(snapshot, s, c, dt, command):
             if abs(way) <= most:
                 s[_OFFSETS + leg] = wanted[2 + leg]
             else:
-                s[_OFFSETS + leg] = (s[_OFFSETS + leg] + (most if way > 0.0 else -most)) % 1.0
+                s[_OFFSETS + leg] = (s[_OFFSETS + leg] + (most if way > 0.0 else -most)) % 1.0 % 1.0
 
 
 @subroutine("void(f8[::1], f8[::1], f8[::1], f8, f8[::1])")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from numbers import Real
 
 from go2_wbc.errors import CommandError
@@ -72,6 +72,10 @@ class VelocityEnvelope:
         """All bounds multiplied by ``share``."""
         bounds = (self.forward, self.backward, self.lateral, self.turning)
         return VelocityEnvelope(*(share * bound for bound in bounds))
+
+    def within(self, other: VelocityEnvelope) -> VelocityEnvelope:
+        """The smaller one of each bound of both."""
+        return VelocityEnvelope(*map(min, astuple(self), astuple(other)))
 
     def clip(self, command: VelocityCommand) -> VelocityCommand:
         """``command``, scaled down if it lies outside."""

@@ -28,6 +28,7 @@ from go2_wbc.robot.snapshot import Snapshot
 
 _TARGET_FRICTION = REFERENCE.start["friction"]
 _STATE = PLANNER.start
+_GOAL = PLANNER.slice("goal_offsets")
 _FORM = slice(PLANNER.start["period"], PLANNER.start["width"] + 1)
 _RESTING = slice(LOCOMOTION.start["rest_period"], LOCOMOTION.start["rest_width"] + 1)
 """Period, duty and offsets: those of the gait now, and those in which the robot comes to rest."""
@@ -66,6 +67,7 @@ class CompiledPlanner(GaitPlanner):
                 ground.height,
                 0.0,
                 *LOCOMOTION.views(self._numbers)[4:8],
+                LOCOMOTION.view(self._numbers, "rest_offsets"),
                 feet,
                 np.ones(4),
                 np.zeros(4),
@@ -113,6 +115,7 @@ class CompiledPlanner(GaitPlanner):
         self._state[_STATE["is_stepping"]] = not stands
         self._state[_STATE["phase_time"]] = 0.0
         self._state[_FORM] = self._numbers[_RESTING]
+        self._state[_GOAL] = LOCOMOTION.view(self._numbers, "rest_offsets")
         return stands
 
     def update(

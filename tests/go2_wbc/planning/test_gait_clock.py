@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.contacts import GAITS, WIDTH_RATE, Gait
-from go2_wbc.planning.gait_clock import GaitClock, resting_gait
+from go2_wbc.planning.gait_clock import GaitClock, aligned, resting_gait
 
 TICK = 0.002
 SECONDS = 2.0
@@ -56,15 +57,60 @@ def test_between_walk_and_pairs_neither_is_walked_at_the_pace_of_the_other(there
     run(clock, is_resting=False)
     for wanted in (walk, gait):
         clock.change(wanted, None)
+        whole = longest_way(aligned(clock.gait.offsets, wanted.offsets), wanted.offsets)
         for _ in range(int(SECONDS / TICK)):
             run(clock, seconds=TICK, is_resting=False)
             now = clock.gait
             share = (now.period - gait.period) / (walk.period - gait.period)
             assert now.duty == pytest.approx(gait.duty + share * (walk.duty - gait.duty))
-            way = (now.offsets[2] - gait.offsets[2] + 0.5) % 1.0 - 0.5
-            whole = (walk.offsets[2] - gait.offsets[2] + 0.5) % 1.0 - 0.5
-            assert way == pytest.approx(share * whole, abs=1e-9)
+            left = share if wanted is gait else 1.0 - share
+            way = longest_way(now.offsets, wanted.offsets)
+            assert way == pytest.approx(left * whole, abs=1e-9)
         assert clock.gait == wanted
+
+
+@pytest.mark.parametrize("there", GAITS.values(), ids=lambda gait: gait.name)
+@pytest.mark.parametrize("here", GAITS.values(), ids=lambda gait: gait.name)
+def test_the_longest_way_of_a_foot_to_another_gait_is_the_shortest_there_is(
+    here: Gait, there: Gait
+) -> None:
+    found = longest_way(aligned(here.offsets, there.offsets), there.offsets)
+    shifted = [
+        longest_way(tuple((o + shift) % 1.0 for o in here.offsets), there.offsets)
+        for shift in np.linspace(0.0, 1.0, 201)
+    ]
+    assert found <= min(shifted) + 1e-9
+    back = aligned(aligned(here.offsets, there.offsets), here.offsets)
+    assert back == pytest.approx(here.offsets)  # the same gait, named otherwise
+
+
+def test_a_walk_becomes_a_flying_trot_without_a_pace() -> None:
+    """Its front feet went half a stride, and with both feet of a side together it fell."""
+    clock = GaitClock(GAITS["walk"], None)
+    run(clock, is_resting=False)
+    clock.change(GAITS["flying_trot"], None)
+    for _ in range(int(SECONDS / TICK)):
+        run(clock, seconds=TICK, is_resting=False)
+        fl, fr, rl, rr = clock.gait.offsets
+        for diagonal in (fl - rr, fr - rl):
+            assert abs((diagonal + 0.5) % 1.0 - 0.5) < 0.251
+        for side in (fl - rl, fr - rr):
+            assert abs((side + 0.5) % 1.0 - 0.5) > 0.249
+
+
+def test_no_foot_notices_that_its_phase_is_named_otherwise() -> None:
+    clock = GaitClock(GAITS["walk"], None)
+    run(clock, is_resting=False)
+    rng = np.random.default_rng(3)
+    for wanted in (*GAITS.values(), *GAITS.values()):
+        clock.time += rng.uniform(0.0, 1.0)
+        before = clock.now()
+        clock.change(wanted, None)
+        clock.adapt(1e-9, 1.0, is_resting=False, is_thrown=False)
+        after = clock.now()
+        np.testing.assert_array_equal(after.stance, before.stance)
+        np.testing.assert_allclose(after.elapsed, before.elapsed, atol=1e-7)
+        run(clock, seconds=rng.uniform(0.2, 1.0), is_resting=False)
 
 
 def test_the_feet_come_together_and_apart_without_a_jump() -> None:
@@ -87,6 +133,11 @@ def test_a_robot_that_is_thrown_lifts_its_feet_sooner_at_once() -> None:
     run(thrown, seconds=0.06, is_resting=False, is_thrown=True)
     assert usual.gait.duty > 0.46
     assert thrown.gait.duty < 0.42
+
+
+def longest_way(offsets: Sequence[float], goal: Sequence[float]) -> float:
+    """Greatest share of a stride by which a foot's phase is off."""
+    return max(abs((b - a + 0.5) % 1.0 - 0.5) for a, b in zip(offsets, goal, strict=True))
 
 
 def run(
