@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -76,9 +77,9 @@ def pushed(
         yield 2.5
 
 
-def commanded(robot: TrialRobot, rng: np.random.Generator) -> Iterator[float]:
-    """A minute of random velocities, a new one every 1.5 s."""
-    for _ in range(40):
+def commanded(robot: TrialRobot, rng: np.random.Generator, count: int = 40) -> Iterator[float]:
+    """Random velocities, ``count`` of them, a new one every 1.5 s."""
+    for _ in range(count):
         linear_x, linear_y, angular_z = rng.uniform((-1.0, -0.6, -2.0), (1.5, 0.6, 2.0)).tolist()
         robot.go2.move(linear_x, angular_z, linear_y=linear_y)
         yield 1.5
@@ -138,21 +139,22 @@ def is_up(robot: TrialRobot) -> bool:
 def measure_boxes(trial: Trial) -> Measurement:
     """8 cm boxes at 1.0 m/s."""
     layout = FIRST_LAYOUT + trial.seed
-    plant = MujocoPlant(terrain=Boxes(height=BOX_HEIGHT, seed=layout), seed=layout)
+    terrain = Boxes(height=BOX_HEIGHT, seed=layout)
+    plant = MujocoPlant(terrain=terrain, seed=layout, sensors=trial.sensors)
     return _measure("boxes", TrialRobot(plant), over_boxes, layout)
 
 
 def measure_pushes(trial: Trial) -> Measurement:
     """30 N s while trotting at 0.5 m/s."""
     seed = FIRST_PUSH + trial.seed
-    robot = TrialRobot(Trial(seed, has_nominal_friction=True))
+    robot = TrialRobot(replace(trial, seed=seed, has_nominal_friction=True))
     return _measure("pushes", robot, partial(pushed, impulse=IMPULSE, speed=0.5), seed)
 
 
 def measure_commands(trial: Trial) -> Measurement:
     """Random commands on a floor and with a mass that the controller does not know."""
     seed = FIRST_COMMANDS + trial.seed
-    return _measure("commands", TrialRobot(Trial(seed)), commanded, seed)
+    return _measure("commands", TrialRobot(replace(trial, seed=seed)), commanded, seed)
 
 
 def measure_stops(trial: Trial) -> Measurement:
@@ -160,7 +162,7 @@ def measure_stops(trial: Trial) -> Measurement:
     seed = FIRST_PUSH + trial.seed
     height = (GREATEST_HEIGHT, LEAST_HEIGHT)[trial.seed % 2]
     config = Config(locomotion=LocomotionConfig(height=height))
-    robot = TrialRobot(Trial(seed, has_nominal_friction=True), config)
+    robot = TrialRobot(replace(trial, seed=seed, has_nominal_friction=True), config)
     course = partial(pushed, impulse=IMPULSE_AT_STOPS, speed=0.8)
     with robot:
         measured = watch("stops", robot, course(robot, np.random.default_rng(seed)))
@@ -191,7 +193,7 @@ SCENARIOS = (
         "stops",
         (
             *metrics_of("stops", STOPS),
-            Metric("stops.near", STOPS, "ticks with a calf at its stop", "%", None),
+            Metric("stops.near", STOPS, "ticks, a calf at its stop", "%", None),
         ),
         measure_stops,
     ),
@@ -209,7 +211,7 @@ def register(subparsers: Subparsers) -> None:
         "Exit code 0 if every threshold is met, 1 if one is not.",
         examples=EXAMPLES,
     )
-    add_seeded_options(parser)
+    add_seeded_options(parser, has_sensors=True)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -10,6 +10,7 @@ chosen on seeds 0 to 9 and from 9000 on; those judged begin at ``FIRST_SEED``.
 - trotting: a push of 0.1 s at 16 phases of the stride, at 0.5 m/s; survived as in ``behaviour``;
 - recover: limp, any attitude, any joint angles, up to 0.5 m above the ground;
 - gaits: ten changes to a random gait, or stops, with a random velocity in its envelope;
+- commands: random velocities ahead, aside and turning for two minutes, a new one every 1.5 s;
 - disturbed: random calls and velocities under random pushes, recovering from every fall; see
   ``benchmarks.disturbed``.
 """
@@ -24,6 +25,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks import disturbed
+from benchmarks.answers import commanded
 from benchmarks.locomotion import CONFIG, FIRST_SEED, MASS_RANGE
 from benchmarks.pushes import PUSH_TIME, heading_force
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
@@ -59,6 +61,8 @@ DROP_TIME = 1.0
 GENTLE = VelocityEnvelope(forward=1.2, backward=1.2, lateral=0.5, turning=1.5)
 """Of the trot's changes; those of the other gaits are in proportion."""
 CHANGES = 10
+COMMANDS = 80
+"""Random velocities of a run, two minutes of them."""
 EXAMPLES = """
 python -m benchmarks balance              everything
 python -m benchmarks balance --quick      three seeds
@@ -167,6 +171,36 @@ def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
     robot.wait(float(rng.uniform(0.3, 1.5)))
 
 
+def measure_commands(trial: Trial, name: str, sensors: str) -> Measurement:
+    """Follow random velocities; ticks in which the QP had no answer are counted."""
+    rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
+        robot.require(robot.go2.stand())
+        robot.require(robot.go2.walk())
+        counts, why = robot.go2.telemetry, ""
+        try:
+            for seconds in commanded(robot, rng, COMMANDS):
+                robot.wait(seconds)
+                robot.truth.clear()  # two minutes' recording would be two gigabytes
+                done += 1
+        except TrialFailed as failed:
+            why = str(failed)
+        values = {name: done / COMMANDS, f"{name}.failures": float(counts.qp_failures)}
+    return Measurement(values, notes={name: why} if why else {})
+
+
+def _commands(sensors: str) -> Scenario:
+    name, item = "commands", "random commands, 120 s"
+    if sensors != "ideal":
+        name, item = f"sensed-{name}", f"sensors: {item}"
+    metrics = (
+        Metric(name, item, "followed without a fall", "", 1.0, Direction.AT_LEAST),
+        Metric(f"{name}.failures", item, "ticks without an answer", "", 0.0),
+    )
+    measured = partial(measure_commands, name=name, sensors=sensors)
+    return Scenario(name, metrics, measured, group="truth" if sensors == "ideal" else "sensors")
+
+
 def _scenario(
     name: str,
     item: str,
@@ -210,6 +244,7 @@ def _scenarios(sensors: str) -> tuple[Scenario, ...]:
         ),
         _scenario("recover", "drops", "stand again", measure_recovery, sensors, 0.98, 10),
         _scenario("gaits", "ten changes of gait and stops", "done", measure_gaits, sensors),
+        _commands(sensors),
         disturbed.scenario(sensors),
     )
 

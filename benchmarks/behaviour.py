@@ -6,7 +6,7 @@ import argparse
 
 from benchmarks import goals, high_fives, library, model, postures, sequence, slaps, trotting
 from benchmarks.scenario import Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
+from benchmarks.seeded import IDEAL, add_seeded_options, run_seeded
 from controller.cli.common import Subparsers, add_parser
 
 SCENARIOS: tuple[Scenario, ...] = (
@@ -23,6 +23,8 @@ SCENARIOS: tuple[Scenario, ...] = (
     sequence.SCENARIO,
 )
 """In the order of the report."""
+OF_EQUATIONS = 2
+"""The first ones, which ask no plant's sensors."""
 EXAMPLES = """
 python -m benchmarks behaviour            everything; 11 minutes, two cores
 python -m benchmarks behaviour --quick    three seeds
@@ -30,6 +32,7 @@ python -m benchmarks behaviour --resume   go on after an interruption
 python -m benchmarks behaviour --list     the metrics and their thresholds
 python -m benchmarks behaviour --rows stand trot --jobs 4
 python -m benchmarks behaviour --json --out behaviour.json
+python -m benchmarks behaviour --sensors imu --seeds 4
 """
 
 
@@ -43,9 +46,10 @@ def register(subparsers: Subparsers) -> None:
         "Exit code 0 if every threshold is met, 1 if one is not.",
         examples=EXAMPLES,
     )
-    add_seeded_options(parser, "; the demo takes 5 times N")
+    add_seeded_options(parser, "; the demo takes 5 times N", has_sensors=True)
 
 
 def run(args: argparse.Namespace) -> int:
     """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+    on_robots = SCENARIOS if args.sensors == IDEAL else SCENARIOS[OF_EQUATIONS:]
+    return run_seeded(args, on_robots)

@@ -59,7 +59,7 @@ def metrics_of(kind: str, item: str) -> tuple[Metric, ...]:
         Metric(f"{kind}.moves", item, "moves", "", LEAST_MOVES, at_least),
         Metric(f"{kind}.on_beat", item, "accents within 40 ms", "", 0.95, at_least),
         Metric(f"{kind}.late", item, "accent off its beat, mean", "ms", None),
-        Metric(f"{kind}.heard", item, "heard beat off the true, mean", "ms", None),
+        Metric(f"{kind}.heard", item, "heard beat off, mean", "ms", None),
     )
 
 

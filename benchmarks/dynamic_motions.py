@@ -45,6 +45,7 @@ EXAMPLES = """
 python -m benchmarks dynamic_motions            everything; some minutes
 python -m benchmarks dynamic_motions --quick    three seeds
 python -m benchmarks dynamic_motions --rows up turn --json
+python -m benchmarks dynamic_motions --sensors imu
 python -m benchmarks dynamic_motions --list     the metrics, their thresholds
 """
 
@@ -115,6 +116,7 @@ def plant_of(trial: Trial) -> MujocoPlant:
         seed=FIRST_SEED + trial.seed,
         initial_yaw=yaw,
         initial_joint_noise=JOINT_NOISE,
+        sensors=trial.sensors,
     )
 
 
@@ -247,7 +249,7 @@ def metrics_of(name: str, title: str, done: float) -> list[Metric]:
         Metric(f"{name}.place", title, "lands off its place", "mm", 40.0),
         Metric(f"{name}.yaw", title, "lands off its heading", "deg", 3.0),
         Metric(f"{name}.torque", title, "peak torque / motors' line", "", 1.0),
-        Metric(f"{name}.asked", title, "torque asked / motors' line", "", 1.0),
+        Metric(f"{name}.asked", title, "asked for / motors' line", "", 1.0),
         Metric(f"{name}.speed", title, "peak joint speed / limit", "", 1.0),
         Metric(f"{name}.saturated", title, "saturated ticks", "%", 2.0),
     ]
@@ -282,7 +284,7 @@ def register(subparsers: Subparsers) -> None:
         "Exit code 0 if every threshold is met, 1 if one is not.",
         examples=EXAMPLES,
     )
-    add_seeded_options(parser)
+    add_seeded_options(parser, has_sensors=True)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from benchmarks import both_states
+from benchmarks.both_states import Pair, Row
+from benchmarks.speed_figure import save_speeds
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from go2_wbc.errors import ConfigError
+from go2_wbc.files import checked_output
+from viz.render.figure_style import PLOT_SUFFIXES
 
-BEGIN, SENSED_BEGIN, SPEED_BEGIN = (
+BEGIN, SENSED_BEGIN, SPEED_BEGIN, BOTH_BEGIN = (
     "<!-- evidence:begin",
     "<!-- evidence:sensors",
     "<!-- evidence:speed",
+    "<!-- evidence:both",
 )
-"""What stands above a table: of the behaviour, of what is done on sensors, of the speed."""
+"""What stands above a table: of the behaviour, of what is done on sensors, of the speed, and of
+locomotion with both columns."""
 END = "<!-- evidence:end -->"
 HEAD = "| what | n | mean | worst | closest peer |\n|---|---|---|---|---|"
 SPEED_HEAD = "| what | runs | mean | worst | before |\n|---|---|---|---|---|"
@@ -25,6 +32,8 @@ python -m benchmarks evidence docs/evidence.md behaviour.json
 python -m benchmarks evidence docs/evidence.md locomotion.json balance.json
 python -m benchmarks evidence docs/explanation/speed.md speed.json
 python -m benchmarks evidence docs/evidence.md behaviour.json more.json
+python -m benchmarks evidence docs/evidence.md locomotion.json balance.json
+                              --plot docs/images/speeds.svg
 """
 
 
@@ -36,6 +45,23 @@ class Line:
     what: str
     shown: str
     peer: str = ""
+
+    @property
+    def metrics(self) -> tuple[str, ...]:
+        """Those that it needs."""
+        return (self.metric,)
+
+    def row(self, rows: Mapping[str, Row]) -> str:
+        """The line, from the results by metric.
+
+        Raises:
+            ConfigError: if the metric is missing or has no value.
+        """
+        found = rows.get(self.metric)
+        if found is None or found["mean"] is None or found["worst"] is None:
+            raise ConfigError(f"the results have no value for {self.metric}")
+        mean, worst = (self.shown.format(found[key]) for key in ("mean", "worst"))
+        return f"| {self.what} | {found['n']} | {mean} | {worst} | {self.peer} |"
 
 
 LINES: tuple[Line, ...] = (
@@ -154,10 +180,11 @@ SENSED_LINES: tuple[Line, ...] = (
     Line("sensed-recover", "dropped at random, `recover()`: stands", "{:.0%}", "cannot"),
     Line("sensed_library.done", "the motions of the library: done", "{:.0%}", "cannot"),
 )
-TABLES = {
+TABLES: dict[str, tuple[str, Sequence[Line | Pair]]] = {
     BEGIN: (HEAD, LINES),
     SENSED_BEGIN: (HEAD, SENSED_LINES),
     SPEED_BEGIN: (SPEED_HEAD, SPEED_LINES),
+    BOTH_BEGIN: (both_states.HEAD, both_states.PAIRS),
 }
 """Head and lines by the mark above the table."""
 
@@ -173,19 +200,29 @@ def register(subparsers: Subparsers) -> None:
     )
     parser.add_argument("page", metavar="PAGE", type=Path)
     parser.add_argument("results", metavar="JSON", type=Path, nargs="+")
+    parser.add_argument(
+        "--plot", metavar="FILE", type=_figure, help="also draw the trot's errors over its speed"
+    )
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fill the file from the results."""
+    """Fill the file from the results, and draw what is asked for."""
     rows = {}
     for file in args.results:
         rows |= {row["name"]: row for row in json.loads(file.read_text())["rows"]}
     text = filled(args.page.read_text(encoding="utf-8"), rows)
     args.page.write_text(text, encoding="utf-8")
+    if args.plot is not None:
+        save_speeds(rows, args.plot)
     return ExitCode.OK
 
 
-def table(rows: Mapping[str, Mapping[str, float]], mark: str = BEGIN) -> str:
+def _figure(name: str) -> Path:
+    """The type of ``--plot``."""
+    return checked_output(name, PLOT_SUFFIXES)
+
+
+def table(rows: Mapping[str, Row], mark: str = BEGIN) -> str:
     """The table as Markdown.
 
     Args:
@@ -196,27 +233,20 @@ def table(rows: Mapping[str, Mapping[str, float]], mark: str = BEGIN) -> str:
         ConfigError: if a metric is missing or has no value.
     """
     head, content = TABLES[mark]
-    lines = [head]
-    for line in content:
-        found = rows.get(line.metric)
-        if found is None or found["mean"] is None or found["worst"] is None:
-            raise ConfigError(f"the results have no value for {line.metric}")
-        mean, worst = (line.shown.format(found[key]) for key in ("mean", "worst"))
-        lines.append(f"| {line.what} | {found['n']} | {mean} | {worst} | {line.peer} |")
-    return "\n".join(lines)
+    return "\n".join([head, *(line.row(rows) for line in content)])
 
 
-def filled(text: str, rows: Mapping[str, Mapping[str, float]]) -> str:
+def filled(text: str, rows: Mapping[str, Row]) -> str:
     """``text`` with those tables between marks replaced of which ``rows`` has any metric.
 
     Raises:
         ConfigError: if there is no such table, its end is missing, or one of its metrics.
     """
-    marks = [
-        mark
+    metrics = {
+        mark: [name for line in lines for name in line.metrics]
         for mark, (_, lines) in TABLES.items()
-        if mark in text and not rows.keys().isdisjoint(line.metric for line in lines)
-    ]
+    }
+    marks = [m for m, names in metrics.items() if m in text and not rows.keys().isdisjoint(names)]
     if not marks:
         raise ConfigError(f"the text has no {BEGIN} ... {END} for these results")
     for mark in marks:

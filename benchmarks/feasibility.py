@@ -32,10 +32,12 @@ from benchmarks.exam.stored import (
 )
 from benchmarks.exam.table import HALVES, noticed, render, scores, wrong_ones
 from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.seeded import IDEAL, add_sensors_option, on_sensors
 from benchmarks.session import add_options, measure_all, positive, publish
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_outcome import FELL, LENIENT, STOPS, STRICT, Outcome, outcome_of
 from controller.sweeps.trials import Trial
+from go2_wbc.errors import CommandError
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
 
@@ -54,6 +56,8 @@ python -m benchmarks feasibility --rows causes
 python -m benchmarks feasibility --rows dynamic --half test
 python -m benchmarks feasibility --wrong      also what is wrong, train half
 python -m benchmarks feasibility --remake     play all, store the outcomes
+python -m benchmarks feasibility --sensors imu
+                                              play all on its own sensors
 python -m benchmarks feasibility --borders    bisect missing borders, with
                                               --remake all: half an hour
 """
@@ -91,22 +95,33 @@ def register(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--borders", action="store_true", help="bisect where physics changes its mind"
     )
+    add_sensors_option(parser)
     add_options(parser, has_jobs=True)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Bisect borders, or hold the exam and report it."""
+    """Bisect borders, or hold the exam and report it.
+
+    Raises:
+        CommandError: if outcomes on the robot's own sensors are to be stored.
+    """
+    if args.remake and args.sensors != IDEAL:
+        raise CommandError(
+            f"--remake stores outcomes on the true state: leave out --sensors {args.sensors}, "
+            "or --remake, which plays every motion anyway"
+        )
     if args.borders:
         return _bisect(args)
     if args.rows == CAUSES_ROW:
-        cases = _measured(args, CAUSE_SCENARIO, examples())
+        cases = _measured(args, on_sensors(CAUSE_SCENARIO, args.sensors), examples())
         wrong = sum(bool(case.refusal) is not bool(case.outcome.strict) for case in cases)
         publish(args, {"wrong": wrong, "cases": _plain(cases)}, render_causes(cases))
         return ExitCode.OK if not wrong else ExitCode.FAILED
     asked = _QUESTIONS[args.rows]()
-    chosen = (REMADE if args.remake else STORED)[args.rows]
+    is_played = args.remake or args.sensors != IDEAL
+    chosen = on_sensors((REMADE if is_played else STORED)[args.rows], args.sensors)
     scenario = replace(chosen, name=f"{chosen.name} {borders_version()}")
-    if not args.remake and (why := read_outcomes()[1]):
+    if not is_played and (why := read_outcomes()[1]):
         print(f"{why}: physics is asked again", file=sys.stderr)
     cases = _measured(args, scenario, asked)
     judge = judged if args.rows == EXAM else judged_dynamic
@@ -156,7 +171,8 @@ def ask(trial: Trial, *, of: str, is_played: bool) -> Measurement:
     report, name = checker.check(plan), f"{question.name} {digest(plan)}"
     outcome = None if is_played else _known().get(name)
     if outcome is None:
-        outcome = outcome_of(play(plan, checker.model, question.draw), plan)
+        played = play(plan, checker.model, question.draw, trial.sensors)
+        outcome = outcome_of(played, plan)
     reasons = {REFUSED.name: tuple(dict.fromkeys(found.check for found in report.failures))}
     reasons |= {metric.name: outcome.by(kind) for kind, metric in OUTCOMES.items()}
     values = {metric: float(bool(reason)) for metric, reason in reasons.items()}

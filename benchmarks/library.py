@@ -13,8 +13,8 @@ from motions import compile_timeline, load_motion, motion_names
 
 _ITEM = "every motion of the library"
 DONE = Metric("library.done", _ITEM, "share of motions done", "", 1.0, Direction.AT_LEAST)
-SLIP = Metric("library.slip", _ITEM, "support slip, feet that stay", "mm", 5.0)
-LANDED_SLIP = Metric("library.landed_slip", _ITEM, "slip, feet that step or jump", "mm", None)
+SLIP = Metric("library.slip", _ITEM, "slip of feet that stay", "mm", 5.0)
+LANDED_SLIP = Metric("library.landed_slip", _ITEM, "slip of feet that step", "mm", None)
 TORQUE = Metric("library.torque", _ITEM, "peak torque / limit", "", 1.0)
 SPEED = Metric("library.speed", _ITEM, "peak joint speed / limit", "", 1.0)
 TRACKING = Metric("library.tracking", _ITEM, "CoM off its plan, worst", "mm", None)

@@ -72,6 +72,7 @@ class Run:
         saturated: greatest share of saturated ticks [%]; None if it only informs.
         group: of the scenario.
         sensors: of the plant.
+        speed: greatest joint speed, as a share of its limit; None if it only informs.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Run:
     saturated: float | None = None
     group: str = "trot"
     sensors: str = "ideal"
+    speed: float | None = 1.0
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -98,7 +100,7 @@ class Run:
             *(moving if speed_of(c) else ()),
             *(turning if c.angular_z else ()),
             Metric(f"{self.name}.saturated", item, "saturated ticks", "%", self.saturated),
-            Metric(f"{self.name}.speed", item, "peak joint speed / limit", "", 1.0),
+            Metric(f"{self.name}.speed", item, "peak joint speed / limit", "", self.speed),
         )
 
 
@@ -152,6 +154,7 @@ RUNS = (
     Run("turn-4", "trot", VelocityCommand(0.0, 0.0, 4.0), 2.0),
     Run("turn-6", "trot", VelocityCommand(0.0, 0.0, 6.0), 2.0),
     Run("curve", "trot", VelocityCommand(0.8, 0.3, 1.0), 2.0),
+    Run("ahead-3.5", "trot", VelocityCommand(3.5), None, group="moonshot", speed=None),
     Run("flying-trot", "flying_trot", VelocityCommand(1.5), 5.0, None, 5.0, "gaits"),
     Run("walk", "walk", VelocityCommand(0.4), 5.0, None, 5.0, "gaits"),
     Run("pace", "pace", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
@@ -169,8 +172,9 @@ SENSED = (
         for run in RUNS
         if not run.name.startswith("ahead")
     ),
+    Run("sensed-3.5", "trot", VelocityCommand(3.5), None, speed=None),
 )
-"""The same on its own sensors; at 3 m/s all that is asked for is not to fall."""
+"""The same on its own sensors; at 3 m/s all that is asked for is not to fall, at 3.5 nothing."""
 SCENARIOS = (
     *(
         Scenario(run.name, run.metrics, partial(measure_run, run=run), group=run.group)

@@ -56,7 +56,7 @@ AGREEMENT_METRICS = tuple(
 )
 SOLUTION_METRICS = (
     *(
-        Metric(f"wbc.motion_{name}", _SOLUTION_ITEM, f"motion, {name}", "N, N m", MOTION_LIMIT)
+        Metric(f"wbc.motion_{name}", _SOLUTION_ITEM, f"motion, {name}", "SI", MOTION_LIMIT)
         for name in BACKENDS
     ),
     Metric("wbc.torque", _SOLUTION_ITEM, "torque between back ends", "N m", TORQUE_LIMIT),

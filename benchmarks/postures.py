@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -75,7 +76,7 @@ def measure_pushes(trial: Trial) -> Measurement:
     mode, in which no foot is ever swung. A pushed robot may rock onto two feet, and the other two
     come down elsewhere: ``MOVED`` says how far, for impulses up to the thresholds.
     """
-    trial = Trial(trial.seed, has_nominal_friction=True)
+    trial = replace(trial, has_nominal_friction=True)
     moved = [0.0]
 
     def failure_of(impulse: float, direction: str) -> str | None:

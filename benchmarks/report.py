@@ -1,4 +1,4 @@
-"""Means, worst seeds and verdicts of the metrics, as a table of at most 80 columns and as JSON."""
+"""Means, deviations, worst seeds and verdicts, as a table of at most 80 columns and as JSON."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby
-from statistics import fmean
+from statistics import fmean, stdev
 
 from benchmarks.runner import Results
 from benchmarks.scenario import Measurement, Metric, Scenario
 
 WIDTH = 80
-_LINE = "  {quantity:<28}{threshold:>13}{n:>4}{mean:>9}{worst:>9}{seed:>5}{falls:>5} {verdict}"
+_LINE = " {quantity:<26}{threshold:>12}{n:>4}{mean:>8}{sd:>8}{worst:>8}{seed:>5}{falls:>5}{verdict}"
 _NOTES = 3
 """Failed seeds of a metric whose reasons are printed; JSON has all."""
 
@@ -26,6 +26,7 @@ class MetricResult:
         metric: which.
         n: number of seeds that were run.
         mean: over the seeds that gave a value; None if none did.
+        sd: standard deviation over these seeds (of the sample: n - 1); None if there are not two.
         worst: the worst value; None if a seed gave none, since nothing is worse than that.
         worst_seed: the seed of ``worst``, or the first that gave no value.
         values: by seed.
@@ -35,6 +36,7 @@ class MetricResult:
     metric: Metric
     n: int
     mean: float | None
+    sd: float | None
     worst: float | None
     worst_seed: int | None
     values: Mapping[int, float]
@@ -61,6 +63,7 @@ class MetricResult:
             "direction": self.metric.direction.value,
             "n": self.n,
             "mean": _finite(self.mean),
+            "sd": _finite(self.sd),
             "worst": _finite(self.worst),
             "worst_seed": self.worst_seed,
             "falls": self.falls,
@@ -107,6 +110,7 @@ def summarise_metric(metric: Metric, trials: Mapping[int, Measurement]) -> Metri
         metric=metric,
         n=len(ordered),
         mean=fmean(values.values()) if values else None,
+        sd=_deviation(list(values.values())),
         worst=None if missing or worst is None else values[worst],
         worst_seed=missing[0] if missing else worst,
         values=values,
@@ -116,8 +120,9 @@ def summarise_metric(metric: Metric, trials: Mapping[int, Measurement]) -> Metri
 
 def render(report: Report) -> str:
     """The table, with the reasons of failed seeds below, and the verdict."""
-    titles = {"quantity": "", "threshold": "threshold", "n": "n", "mean": "mean", "worst": "worst"}
-    head = _LINE.format(**titles, seed="seed", falls="fell", verdict="")
+    names = ("threshold", "n", "mean", "sd", "worst", "seed")
+    titles = {name: name for name in names}
+    head = _LINE.format(quantity="", **titles, falls="fell", verdict="")
     lines = [head.rstrip(), "-" * WIDTH]
     for item, group in groupby(report.rows, key=lambda result: result.metric.item):
         lines.append(item)
@@ -139,12 +144,13 @@ def threshold_text(metric: Metric) -> str:
 
 
 def _line(result: MetricResult) -> str:
-    verdict = {True: "ok", False: "NO", None: ""}[result.passed]
+    verdict = {True: " ok", False: " NO", None: ""}[result.passed]
     return _LINE.format(
         quantity=result.metric.quantity,
         threshold=threshold_text(result.metric),
         n=result.n,
         mean=_number(result.mean),
+        sd=_number(result.sd),
         worst=_number(result.worst) if result.worst is not None or not result.falls else "fell",
         seed="-" if result.worst_seed is None else result.worst_seed,
         falls=result.falls,
@@ -162,8 +168,16 @@ def _notes(result: MetricResult) -> Iterator[str]:
         yield f"    and {result.falls - _NOTES} more"
 
 
+def _deviation(values: Sequence[float]) -> float | None:
+    return stdev(values) if len(values) > 1 and all(map(math.isfinite, values)) else None
+
+
 def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}"
+    """Three digits; two where there is an exponent beside them, so that columns stay apart."""
+    if value is None:
+        return "-"
+    text = f"{value:.3g}"
+    return f"{value:.2g}" if "e" in text else text
 
 
 def _finite(value: float | None) -> float | None:

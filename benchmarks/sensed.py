@@ -32,7 +32,7 @@ STANDING_METRICS = (
     Metric("moved", _STANDING, "way in truth", "mm", None),
 )
 WALKING_METRICS = (
-    Metric("drift", _WALKING, "drift of the leg odometry / way", "%", 1.5),
+    Metric("drift", _WALKING, "drift of odometry / way", "%", 1.5),
     Metric("turned", _WALKING, "drift of the heading", "deg", None),
 )
 CALLS = ("stand", "high_five", "sit", "stand_again", "stop", "lie_down")

@@ -31,8 +31,8 @@ The heading of the longest motion, of 67 s, drifted by 0.37 deg (rms of 18 other
 _ITEM = "sensors: every motion of the library"
 DONE = Metric("sensed_library.done", _ITEM, "share of motions done", "", 0.95, Direction.AT_LEAST)
 TRUE = Metric("sensed_library.true", _ITEM, "share of True that is true", "", 1.0, DONE.direction)
-PLACE = Metric("sensed_library.place", _ITEM, "end place in truth, worst", "mm", None)
-TURN = Metric("sensed_library.turn", _ITEM, "end heading in truth, worst", "deg", None)
+PLACE = Metric("sensed_library.place", _ITEM, "end place off, worst", "mm", None)
+TURN = Metric("sensed_library.turn", _ITEM, "end heading off, worst", "deg", None)
 
 
 @dataclass(frozen=True, slots=True)

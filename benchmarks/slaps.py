@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -44,7 +44,7 @@ class Slap:
     def metrics(self) -> tuple[Metric, Metric, Metric]:
         """Directions survived, how far the paw stays off its place, and what the call said."""
         count = float(len(DIRECTIONS))
-        survived, off = "directions survived, of 6", "paw off its place after 2 s"
+        survived, off = "directions survived, of 6", "paw off after 2 s"
         return (
             Metric(f"{self.name}.survived", self.item, survived, "", count, Direction.AT_LEAST),
             Metric(f"{self.name}.off", self.item, off, "mm", PLACE_TOLERANCE),
@@ -71,9 +71,7 @@ def measure(trial: Trial) -> Measurement:
     failures: dict[str, str] = {}
     for slap in SLAPS:
         survived, off, said = (metric.name for metric in slap.metrics)
-        distances, lost, values[said] = _slap_all(
-            Trial(trial.seed, has_nominal_friction=True), slap
-        )
+        distances, lost, values[said] = _slap_all(replace(trial, has_nominal_friction=True), slap)
         values[survived] = float(len(DIRECTIONS) - len(lost))
         if distances:
             values[off] = max(distances.values())

@@ -63,15 +63,15 @@ def plant_of(
     trial: Trial,
     first_seed: int = FIRST_SEED,
     mass_range: tuple[float, float] = MASS_RANGE,
-    sensors: str = "ideal",
+    sensors: str | None = None,
 ) -> MujocoPlant:
-    """A simulated robot under the conditions of the trial."""
+    """A simulated robot under the conditions of the trial, whose ``sensors`` are the usual ones."""
     rng = np.random.default_rng(first_seed + trial.seed)
     friction, mass, yaw = (rng.uniform(*r) for r in (FRICTION_RANGE, mass_range, YAW_RANGE))
     return MujocoPlant(
         friction=float(friction),
         mass_scale=float(mass),
-        sensors=sensors,
+        sensors=sensors or trial.sensors,
         seed=first_seed + trial.seed,
         initial_yaw=float(yaw),
         initial_joint_noise=JOINT_NOISE,
@@ -227,7 +227,7 @@ def register(subparsers: Subparsers) -> None:
         "Exit code 0 if every threshold is met, 1 if one is not.",
         examples=EXAMPLES,
     )
-    add_seeded_options(parser)
+    add_seeded_options(parser, has_sensors=True)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -46,7 +46,7 @@ SCALING = (
     Metric(
         "sweeps.share",
         "two workers against one",
-        "share of what two bare processes reach",
+        "rate / two bare processes",
         "",
         SHARE,
         Direction.AT_LEAST,
@@ -55,7 +55,7 @@ SCALING = (
     Metric("sweeps.two", "two workers", "runs a second", "1/s", None, Direction.AT_LEAST),
 )
 MEMORY = (
-    Metric("sweeps.growth", "a worker over 1,000 runs", "memory at the end by before", "", GROWTH),
+    Metric("sweeps.growth", "a worker over 1,000 runs", "memory at the end / before", "", GROWTH),
     Metric("sweeps.memory", "a worker over 1,000 runs", "memory at the end", "MB", None),
 )
 CERTIFY = (

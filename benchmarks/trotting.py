@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -109,7 +110,7 @@ def measure_pushes(trial: Trial) -> Measurement:
     The phases are eight instants of the stride, evenly spread. Survived is: 2 s later the robot is
     upright, and its mean velocity over the last two strides is within 0.15 m/s of the command.
     """
-    trial = Trial(trial.seed, has_nominal_friction=True)
+    trial = replace(trial, has_nominal_friction=True)
     trotting: list[TrialRobot] = []  # one for many pushes; after a failure a new one
 
     def failure_of(impulse: float, direction: str) -> str | None:

@@ -12,13 +12,15 @@ FRICTION = 0.5
 """Friction coefficient of the floor: the one that the check counts on."""
 
 
-def play(plan: MotionPlan, model: RobotModel, seed: int) -> MotionMeasurement:
-    """Play a plan, unchecked, from its entry posture.
+def play(
+    plan: MotionPlan, model: RobotModel, seed: int, sensors: str = "ideal"
+) -> MotionMeasurement:
+    """Play a plan, unchecked, from its entry posture, on a plant of these ``sensors``.
 
     Raises:
         TrialFailed: if the robot does not get ready.
     """
-    with TrialRobot(MujocoPlant(friction=FRICTION, seed=seed)) as robot:
+    with TrialRobot(MujocoPlant(friction=FRICTION, seed=seed, sensors=sensors)) as robot:
         robot.require(robot.go2.stand())
         if plan.entry is Posture.SIT:
             robot.require(robot.go2.sit())

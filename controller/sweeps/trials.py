@@ -37,10 +37,12 @@ class Trial:
     Attributes:
         seed: of every random number of the trial.
         has_nominal_friction: keep the friction at ``NOMINAL_FRICTION``, as for pushes.
+        sensors: of the plant: what the controller is given of the state.
     """
 
     seed: int
     has_nominal_friction: bool = False
+    sensors: str = "ideal"
 
     @property
     def friction(self) -> float:
@@ -69,6 +71,7 @@ class Trial:
             seed=self.seed,
             initial_yaw=self.initial_yaw,
             initial_joint_noise=JOINT_NOISE,
+            sensors=self.sensors,
         )
 
 

@@ -156,7 +156,7 @@ def test_physics_is_asked_only_where_no_outcome_is_stored(
 ) -> None:
     played: list[int] = []
 
-    def play(_plan: object, _model: RobotModel, seed: int) -> object:
+    def play(_plan: object, _model: RobotModel, seed: int, _sensors: str) -> object:
         played.append(seed)
         return object()
 

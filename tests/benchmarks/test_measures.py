@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 from benchmarks.high_fives import highest_window, largest_slip, longest_run
 from benchmarks.pushes import IMPULSE_STEP, largest_impulse
+from benchmarks.scenario import Measurement, Scenario
+from benchmarks.seeded import IDEAL, IMU, on_sensors
 from benchmarks.sequence import CRITERIA, StepCheck
 from controller.demo.report import StepResult
 from controller.demo.run import DemoProgress
@@ -26,6 +29,18 @@ from go2_wbc.legs import LEGS, Leg
 from tests.go2_wbc.plant.helpers import empty_recording
 
 # --- trials -------------------------------------------------------------------------------------
+
+
+def test_a_trial_on_sensors_is_the_same_trial_with_another_plant() -> None:
+    scenario = Scenario("fake", (), lambda trial: Measurement({}, reason=f"{trial}"))
+    assert on_sensors(scenario, IDEAL) is scenario
+    sensed = on_sensors(scenario, IMU)
+    assert sensed.name != scenario.name  # results of both are kept in one file
+    assert sensed.measure(Trial(7)).reason == str(Trial(7, sensors=IMU))
+    with closing(Trial(3).plant()) as ideal, closing(Trial(3, sensors=IMU).plant()) as plant:
+        np.testing.assert_array_equal(ideal.truth().q, plant.truth().q)
+        assert plant.read().time == plant.truth().time
+        assert not np.array_equal(plant.read().q, plant.truth().q)
 
 
 def test_trials_draw_inside_their_ranges_and_fill_them() -> None:

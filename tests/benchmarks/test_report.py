@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import math
 
 import pytest
 
-from benchmarks.behaviour import SCENARIOS
-from benchmarks.report import WIDTH, render, summarise, summarise_metric, threshold_text
+from benchmarks.report import WIDTH, render, summarise, summarise_metric
 from benchmarks.scenario import Measurement, Metric, Scenario
 from controller.sweeps.trials import Trial
 from tests.benchmarks.support import ERROR, NOTE, SPEED, fake, measure_well, measured
 
 NEEDED = {
-    *("name", "item", "quantity", "unit", "threshold", "direction", "n", "mean", "worst"),
+    *("name", "item", "quantity", "unit", "threshold", "direction", "n", "mean", "sd", "worst"),
     *("worst_seed", "falls", "passed", "values", "failures"),
 }
 """Keys of a row in the JSON that programs rely on."""
@@ -86,22 +86,43 @@ def test_a_metric_without_a_threshold_is_not_judged() -> None:
 def test_the_table_fits_80_columns_and_names_the_fallen_seed() -> None:
     long_reason = "fell at t=3.20 s: " + "roll 71 deg, pitch -3 deg, " * 20
     trials = {s: Measurement({}, reason=long_reason) for s in range(9)}
-    widest = {s: Measurement({row: -1.23456e-123}) for s in range(999) for row in ("fake.speed",)}
+    widest = {s: Measurement({row: -1.23456e-12}) for s in range(999) for row in ("fake.speed",)}
     for results in (trials, widest, measured(1.0)):
         text = render(summarise([fake()], {"fake": results}))
         assert max(map(len, text.splitlines())) <= WIDTH
     assert "seed 2: fell at t=3.20 s" in render(summarise([fake()], {"fake": trials}))
 
 
-def test_every_real_metric_fits_the_table_and_has_its_own_name() -> None:
-    rows = [row for scenario in SCENARIOS for row in scenario.metrics]
+@pytest.mark.parametrize(
+    "name",
+    [
+        "answers",
+        "balance",
+        "behaviour",
+        "dance",
+        "dynamic_motions",
+        "locomotion",
+        "nearest",
+        "steps",
+    ],
+)
+def test_every_real_metric_fits_the_table_and_has_its_own_name(name: str) -> None:
+    scenarios = importlib.import_module(f"benchmarks.{name}").SCENARIOS
+    rows = [row for scenario in scenarios for row in scenario.metrics]
     assert len({row.name for row in rows}) == len(rows)
-    assert [row.quantity for row in rows if len(row.quantity) > 28] == []
+    assert [row.quantity for row in rows if len(row.quantity) > 26] == []
     assert [row.item for row in rows if len(row.item) > WIDTH] == []
-    assert [threshold_text(row) for row in rows if len(threshold_text(row)) > 15] == []
-    results = {s.name: {0: Measurement({m.name: -1.2e-12 for m in s.metrics})} for s in SCENARIOS}
-    text = render(summarise(SCENARIOS, results))
-    assert max(map(len, text.splitlines())) <= WIDTH
+    for value in (-1.2e-12, 0.975):
+        gave = {seed: {m.name: value for s in scenarios for m in s.metrics} for seed in range(12)}
+        results = {s.name: {seed: Measurement(v) for seed, v in gave.items()} for s in scenarios}
+        text = render(summarise(scenarios, results))
+        assert max(map(len, text.splitlines())) <= WIDTH
+
+
+def test_the_deviation_is_that_of_a_sample() -> None:
+    result = summarise_metric(SPEED, measured(3.0, 0.5, 1.0))
+    assert result.sd == pytest.approx(math.sqrt((1.5**2 + 1.0**2 + 0.5**2) / 2))
+    assert summarise_metric(SPEED, measured(3.0)).sd is None
 
 
 def test_the_json_has_every_key_and_no_nan() -> None:
