@@ -1,7 +1,7 @@
 """What the robot does on its own sensors: IMU, encoders and feet, nothing else, judged by MuJoCo.
 
 The estimator's numbers were tuned on seeds 0 to 9 and 7000 to 7035, at 0.5 to 3 m/s; those judged
-begin at 14000, as in ``benchmarks.locomotion``, whose runs are repeated here. Its errors, in a world
+begin at 14000, as in ``benchmarks.locomotion``, whose runs are repeated here. Errors, in a world
 that begins where the robot lies:
 
 - creep: way of the estimate of a standing robot over 60 s, beyond the way in truth;

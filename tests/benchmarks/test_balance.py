@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
-from benchmarks import disturbed
+from benchmarks import balance, disturbed
 from benchmarks.balance import SCENARIOS, dropped, heading_force, impulse_at
 from benchmarks.pushes import PUSH_TIME
 from controller.modes import Mode
@@ -51,6 +52,22 @@ def test_a_drop_begins_above_the_floor() -> None:
 )
 def test_a_robot_stands_again(name: str, seed: int) -> None:
     assert measured(name, seed) == {name: 1.0}
+
+
+def test_random_commands_are_followed_and_what_falls_is_not(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(balance, "COMMANDS", 4)
+    name = "sensed-commands"
+    assert measured(name, 1) == {name: 1.0, f"{name}.failures": 0.0}
+    monkeypatch.setattr(balance, "commanded", lambda robot, *_: _thrown(robot))
+    assert measured(name, 1)[name] == 0.25
+
+
+def _thrown(robot: TrialRobot) -> Iterator[float]:
+    yield 0.1
+    robot.push(np.array([0.0, 900.0, 0.0]), PUSH_TIME)
+    yield 2.0
 
 
 @pytest.mark.parametrize("name", ["disturbed", "sensed-disturbed"])

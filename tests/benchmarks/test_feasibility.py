@@ -26,6 +26,7 @@ from benchmarks.feasibility import (
 )
 from benchmarks.runner import run_trial
 from benchmarks.scenario import Measurement
+from benchmarks.seeded import IDEAL, IMU, on_sensors
 from controller.cli.common import ExitCode
 from controller.go2_controller import GO2Controller
 from controller.motion_outcome import STRICT, Outcome
@@ -172,6 +173,22 @@ def test_physics_is_asked_only_where_no_outcome_is_stored(
     assert stored.values[f"feasibility.{STRICT}"] == 0.0
     ask(Trial(0), of=EXAM, is_played=True)
     assert len(played) == 2
+
+
+def test_on_sensors_all_is_played_and_nothing_is_stored(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+
+    def play(_plan: object, _model: RobotModel, _seed: int, sensors: str) -> object:
+        asked.append(sensors)
+        return object()
+
+    monkeypatch.setattr(feasibility, "play", play)
+    monkeypatch.setattr(feasibility, "outcome_of", lambda _run, _plan: BAD)
+    on_sensors(feasibility.REMADE[EXAM], IMU).measure(Trial(0))
+    feasibility.REMADE[EXAM].measure(Trial(0))
+    assert asked == [IMU, IDEAL]
+    assert main(["feasibility", "--remake", "--sensors", "imu"]) != ExitCode.OK
+    assert asked == [IMU, IDEAL]
 
 
 def test_a_robot_that_does_not_get_ready_is_a_lost_run_and_not_a_bug(
