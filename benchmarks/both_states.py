@@ -53,8 +53,10 @@ class Pair:
 
     def _cell(self, rows: Mapping[str, Row], name: str) -> str:
         found = rows.get(name)
-        if found is None or found["mean"] is None:
+        if found is None or (found["mean"] is None and not found["falls"]):
             raise ConfigError(f"the results have no value for {name}")
+        if found["mean"] is None:
+            return f"all fell (n {found['n']})"
         values = (found[key] for key in ("mean", "sd", "worst"))
         numbers = "; ".join("-" if value is None else self.shown.format(value) for value in values)
         fell = f", {found['falls']} fell" if found["falls"] else ""

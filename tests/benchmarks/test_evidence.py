@@ -68,6 +68,8 @@ def test_a_line_of_both_states_tells_mean_deviation_worst_and_falls() -> None:
     rows = {"a": good, "sensed-a": {**good, "worst": None, "sd": None, "falls": 3}}
     line = Pair("what", "a", "sensed-a", "2 %", peer="none").row(rows)
     assert line == "| what | 2 % | 0.50; 0.10; 0.75 (n 10) | 0.50; -; - (n 10, 3 fell) | none |"
+    none = {"n": 4, "mean": None, "sd": None, "worst": None, "falls": 4}
+    assert "| all fell (n 4) |" in Pair("what", "a", "b").row({"a": good, "b": none})
     assert "| - |" in Pair("what", "", "a").row(rows)
     with pytest.raises(ConfigError, match="no value for missing"):
         Pair("what", "missing", "").row(rows)
