@@ -14,6 +14,8 @@ from benchmarks.scenario import Measurement, Metric, Scenario
 
 WIDTH = 80
 _LINE = " {quantity:<26}{threshold:>12}{n:>4}{mean:>8}{sd:>8}{worst:>8}{seed:>5}{falls:>5}{verdict}"
+_COLUMN = 8
+"""Width of a number's column in it."""
 _NOTES = 3
 """Failed seeds of a metric whose reasons are printed; JSON has all."""
 
@@ -173,11 +175,11 @@ def _deviation(values: Sequence[float]) -> float | None:
 
 
 def _number(value: float | None) -> str:
-    """Three digits; two where there is an exponent beside them, so that columns stay apart."""
+    """Three digits, or as many as leave a space before the number."""
     if value is None:
         return "-"
-    text = f"{value:.3g}"
-    return f"{value:.2g}" if "e" in text else text
+    texts = [f"{value:.{digits}g}" for digits in (3, 2, 1)]
+    return next((text for text in texts if len(text) < _COLUMN), texts[-1])
 
 
 def _finite(value: float | None) -> float | None:

@@ -112,11 +112,18 @@ def test_every_real_metric_fits_the_table_and_has_its_own_name(name: str) -> Non
     assert len({row.name for row in rows}) == len(rows)
     assert [row.quantity for row in rows if len(row.quantity) > 26] == []
     assert [row.item for row in rows if len(row.item) > WIDTH] == []
-    for value in (-1.2e-12, 0.975):
+    for value in (-1.2e-12, 0.975, 0.000602):
         gave = {seed: {m.name: value for s in scenarios for m in s.metrics} for seed in range(12)}
         results = {s.name: {seed: Measurement(v) for seed, v in gave.items()} for s in scenarios}
         text = render(summarise(scenarios, results))
         assert max(map(len, text.splitlines())) <= WIDTH
+
+
+def test_numbers_stay_apart() -> None:
+    trials = {seed: Measurement({"fake.speed": 0.00894 + 0.000602 * seed}) for seed in range(9)}
+    (line,) = [s for s in render(summarise([fake()], {"fake": trials})).splitlines() if "0.0" in s]
+    assert len(line.split()[-6:-3]) == 3
+    assert all(float(word) < 0.02 for word in line.split()[-6:-3]), line
 
 
 def test_the_deviation_is_that_of_a_sample() -> None:
