@@ -49,6 +49,7 @@ class LegTask(IntEnum):
 _LEG_TASKS = tuple(LegTask)
 _STANCE = int(LegTask.STANCE)  # a number: looking an enumeration's members up takes longer
 _BODY_PARTS = ("p_world", "v_world", "a_world", "R_world_base", "w_world", "dw_world")
+_NUMBERS = ("force_weight", "friction", "orientation_discount")
 
 
 class TrackedPoint(Enum):
@@ -104,6 +105,8 @@ class Reference:
             with the controller's own weight.
         friction: greatest coefficient that the stance feet may count on; 0 for the controller's
             own, which is never exceeded.
+        orientation_discount: the weight of the trunk's attitude is divided by 1 plus this, 0 or
+            more.
         stance: feet in stance, from ``legs``.
     """
 
@@ -120,6 +123,7 @@ class Reference:
     f_world_feet: Float[np.ndarray, "4 3"] = field(default_factory=partial(np.zeros, (4, 3)))
     force_weight: float = 0.0
     friction: float = 0.0
+    orientation_discount: float = 0.0
     stance: Bool[np.ndarray, "4"] = field(init=False)
     _row: Float[np.ndarray, " size"] | None = field(init=False, repr=False, default=None)
 
@@ -157,7 +161,7 @@ class Reference:
             return view("legs") == _STANCE
         if name == "legs":
             return tuple(_LEG_TASKS[int(task)] for task in view("legs").tolist())
-        if name in ("force_weight", "friction"):
+        if name in _NUMBERS:
             return float(view(name))
         return view(name)
 
@@ -195,6 +199,7 @@ class Reference:
                 self.f_world_feet,
                 self.force_weight,
                 self.friction,
+                self.orientation_discount,
             ]
             try:
                 row = REFERENCE.pack(values)
@@ -206,8 +211,10 @@ class Reference:
                     f"reference: force_weight must be 0 or {LEAST_WEIGHT:g} to {MOST_WEIGHT:g}, "
                     f"got {weight:g}"
                 )
-            if np.isfinite(self.friction) and self.friction < 0.0:
-                raise CommandError(f"reference: friction must be 0 or more, got {self.friction:g}")
+            for name in ("friction", "orientation_discount"):
+                value = getattr(self, name)
+                if np.isfinite(value) and value < 0.0:
+                    raise CommandError(f"reference: {name} must be 0 or more, got {value:g}")
             _set(self, "_row", row)
         return row
 

@@ -96,9 +96,14 @@ def random_reference(
 
 
 def with_planned_forces(reference: Reference, rng: np.random.Generator) -> Reference:
-    """The same with forces to be kept near, as a gait has that plans them."""
+    """The same with forces to be kept near, as a gait has that plans them, thrown or not."""
     forces = rng.normal(loc=[0.0, 0.0, 80.0], scale=[20.0, 20.0, 40.0], size=(4, 3))
-    return replace(reference, f_world_feet=forces, force_weight=float(rng.choice([3e-3, 1e-1])))
+    return replace(
+        reference,
+        f_world_feet=forces,
+        force_weight=float(rng.choice([3e-3, 1e-1])),
+        orientation_discount=float(rng.choice([0.0, 3.0])),
+    )
 
 
 def holding_reference(snapshot: Snapshot, legs: Legs = FOUR_FEET) -> Reference:

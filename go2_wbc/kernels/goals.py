@@ -35,6 +35,7 @@ _FLIGHT_WEIGHT = _P["flight_weight"]
 _CARRIED = _S["payload"] + 1
 """Weight of the payload [N]."""
 _FORCES, _PRIOR_WEIGHT = _T["f_world_feet"], _T["force_weight"]
+_DISCOUNT = _T["orientation_discount"]
 
 
 @subroutine("void(f8[:,::1], f8[::1], f8[::1], f8, f8)")
@@ -120,7 +121,7 @@ def add_body_goals(snapshot, target, program, base, H, g):
     stands = False
     for leg in range(4):
         stands |= target[_LEGS + leg] == STANCE
-    weight = program[_ORIENTATION + 6]
+    weight = program[_ORIENTATION + 6] / (1.0 + target[_DISCOUNT])
     if not stands:
         weight = min(weight, program[_FLIGHT_WEIGHT])
     for i in range(3):

@@ -134,6 +134,7 @@ REFERENCE = Layout(
     f_world_feet=(4, 3),
     force_weight=(),
     friction=(),
+    orientation_discount=(),
 )
 """Of ``reference.Reference`` and its ``BodyTarget``."""
 
@@ -271,6 +272,7 @@ MPC = Layout(
     interval=(),
     prior=(),
     throw_time=(),
+    throw_speed=(),
 )
 """Numbers of the MPC: the turn's axes before those of the way."""
 

@@ -40,10 +40,12 @@ _ACCELERATION, _HEIGHT, _RADIUS = (_C[n] for n in ("acceleration", "height", "fo
 _NOMINAL, _MARGIN = _C["p_base_feet_nominal"], _C["stride_margin"]
 _STEP, _MASS, _GRAVITY = (MPC.start[n] for n in ("step", "mass", "gravity"))
 _LEAST_SHARE, _INTERVAL, _PRIOR = (MPC.start[n] for n in ("least_share", "interval", "prior"))
-_THROW_TIME = MPC.start["throw_time"]
+_THROW_TIME, _THROW_SPEED = MPC.start["throw_time"], MPC.start["throw_speed"]
 _NEXT, _PLANNED = FORCES.start["next"], FORCES.start["forces"]
 _LEGS, _A, _DW = (_T[n] for n in ("legs", "a_world", "dw_world"))
-_T_FORCES, _WEIGHT = _T["f_world_feet"], _T["force_weight"]
+_T_FORCES, _WEIGHT, _DISCOUNT = (
+    _T[n] for n in ("f_world_feet", "force_weight", "orientation_discount")
+)
 
 
 @subroutine("void(f8[::1], f8[:,::1])")
@@ -269,3 +271,5 @@ def steer(snapshot, time, s, c, m, command, f, target):
         target[_A + i], target[_DW + i] = a[i], system[i, 3]
     target[_A + 2] -= m[_GRAVITY]
     target[_WEIGHT] = m[_PRIOR]
+    x, y = excess_velocity(snapshot, s, c)
+    target[_DISCOUNT] = np.hypot(x, y) / m[_THROW_SPEED]

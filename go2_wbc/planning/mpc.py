@@ -45,6 +45,10 @@ class MpcConfig:
         prior_weight: by which the whole-body controller keeps to the forces.
         load_ramp: as ``LocomotionConfig.load_ramp``, in its place: the forces come without a jump.
         throw_time: time constant [s] with which a robot that has been thrown is taken to slow down.
+        throw_speed: speed [m/s] of such a robot, beyond ``LocomotionConfig.stride_margin``, at
+            which the trunk's attitude weighs half as much in the whole-body QP. With all its weight
+            and the feet far from below the CoM, the legs in the air are swung to turn the trunk:
+            feet that should have come down were 0.16 m high, and the robot fell onto them.
     """
 
     enabled: bool = False
@@ -61,13 +65,14 @@ class MpcConfig:
     prior_weight: float = 3e-3
     load_ramp: float = 0.01
     throw_time: float = 0.4
+    throw_speed: float = 0.05
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a number that is out of range."""
         weights = "angle_weights", "position_weights", "angular_weights", "linear_weights"
         require_not_negative(self, *weights)
         require_positive(self, "step", "interval", "force_weight", "friction", "force_max")
-        require_positive(self, "prior_weight", "load_ramp", "throw_time")
+        require_positive(self, "prior_weight", "load_ramp", "throw_time", "throw_speed")
         require_share(self, "least_share")
 
     def numbers(self, mass: float, gravity: float) -> Float[np.ndarray, " size"]:
@@ -86,6 +91,7 @@ class MpcConfig:
                 self.interval,
                 self.prior_weight,
                 self.throw_time,
+                self.throw_speed,
             ]
         )
 

@@ -102,6 +102,7 @@ class ForcePlanner:
             body=replace(reference.body, a_world=a, dw_world=dw),
             f_world_feet=forces,
             force_weight=self._config.prior_weight,
+            orientation_discount=float(np.hypot(*course.excess)) / self._config.throw_speed,
         )
 
     def _plan(self, snapshot: Snapshot, course: Course) -> bool:

@@ -103,10 +103,6 @@ class _Mode:
             self._solver.set_torque_limit(name, float(limit * config.torque_share))
         self._position = self._add_position_task()
         self._orientation = self._solver.add_orientation_task(_BASE, np.eye(3))
-        weight = config.orientation_weight
-        if not self._stance:
-            weight = min(weight, config.flight_weight)
-        self._orientation.configure("orientation", "soft", weight)
         self._pressing: list[placo.Contact] = []
         self._contacts = {leg: self._add_contact(leg) for leg in self._stance}
         self._swing = {leg: self._add_swing(leg) for leg in LEGS if legs[leg] is LegTask.SWING}
@@ -186,6 +182,10 @@ class _Mode:
         self._position.ddtarget_world = _acceleration(
             self._config.body_position, target.a_world, target.v_world - v, target.p_world - p
         )
+        weight = self._config.orientation_weight / (1.0 + reference.orientation_discount)
+        if not self._stance:
+            weight = min(weight, self._config.flight_weight)
+        self._orientation.configure("orientation", "soft", weight)
         self._orientation.domega_world = R @ _acceleration(
             self._config.body_orientation,
             R.T @ target.dw_world,

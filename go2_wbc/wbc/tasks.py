@@ -96,7 +96,7 @@ class BodyOrientation(Task):
     """Turn the base along the reference; the error is log(R^T R_des) in the base frame.
 
     While no foot stands, only the legs turn the base, by swinging the other way: ``flight_weight``
-    is the most that it weighs then.
+    is the most that it weighs then. The reference may divide the weight.
     """
 
     kp: Float[np.ndarray, "3"]
@@ -117,8 +117,9 @@ class BodyOrientation(Task):
         return Rows(A, R.T @ target.dw_world + self.kd * rate_error + self.kp * error)
 
     def weight_at(self, reference: Reference) -> float:
-        """``weight``, and in flight at most ``flight_weight``."""
-        return self.weight if reference.stance.any() else min(self.weight, self.flight_weight)
+        """``weight`` less the reference's discount, and in flight at most ``flight_weight``."""
+        weight = self.weight / (1.0 + reference.orientation_discount)
+        return weight if reference.stance.any() else min(weight, self.flight_weight)
 
 
 @dataclass(frozen=True, slots=True)

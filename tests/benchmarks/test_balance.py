@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from benchmarks import balance, disturbed
-from benchmarks.balance import SCENARIOS, dropped, heading_force, impulse_at
+from benchmarks.balance import SCENARIOS, dropped, heading_force, impulse_at, trots_on
+from benchmarks.locomotion import CONFIG, MASS_RANGE
 from benchmarks.pushes import PUSH_TIME
+from benchmarks.steps import plant_of
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
@@ -52,6 +54,16 @@ def test_a_drop_begins_above_the_floor() -> None:
 )
 def test_a_robot_stands_again(name: str, seed: int) -> None:
     assert measured(name, seed) == {name: 1.0}
+
+
+@pytest.mark.parametrize(("seed", "phase", "side"), [(0, 5, 1.0), (1, 4, 1.0), (4, 12, -1.0)])
+def test_a_trot_holds_a_push_by_a_fifth_harder_than_is_asked(
+    seed: int, phase: int, side: float
+) -> None:
+    # With all the weight on the attitude the legs in the air were swung aside, and it fell here.
+    angle, impulse = balance.TROT_PUSHES["lateral"]
+    with TrialRobot(plant_of(Trial(seed), 41000, MASS_RANGE), CONFIG) as robot:
+        assert trots_on(robot, phase, heading_force(side * angle, 1.2 * impulse))
 
 
 def test_random_commands_are_followed_and_what_falls_is_not(

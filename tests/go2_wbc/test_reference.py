@@ -132,9 +132,10 @@ def test_a_weight_of_planned_forces_that_costs_accuracy_is_refused(weight: float
         _ = replace(REFERENCE, force_weight=weight).row
 
 
-def test_a_friction_below_zero_is_refused() -> None:
-    with pytest.raises(CommandError, match=r"friction must be 0 or more, got -0\.1"):
-        _ = replace(REFERENCE, friction=-0.1).row
+@pytest.mark.parametrize("name", ["friction", "orientation_discount"])
+def test_a_number_below_zero_is_refused(name: str) -> None:
+    with pytest.raises(CommandError, match=rf"{name} must be 0 or more, got -0\.1"):
+        _ = replace(REFERENCE, **{name: -0.1}).row
 
 
 def test_the_row_of_a_reference_holds_its_planned_forces() -> None:

@@ -42,3 +42,14 @@ def test_within_the_margin_the_wanted_way_counts() -> None:
     np.testing.assert_array_equal(beyond(np.array([0.6, -0.8]) * margin, margin), 0.0)
     np.testing.assert_allclose(beyond(np.array([0.0, 1.4]), 0.4), [0.0, 1.0])
     np.testing.assert_array_equal(beyond(np.zeros(2), margin), 0.0)
+
+
+def test_the_attitude_of_a_thrown_robot_weighs_less() -> None:
+    """Kept with all its weight, feet in the air were swung 0.2 m off to turn the trunk."""
+    planner = LocomotionPlanner(MODEL, GAITS["trot"], CONFIG)
+    planner.start(resting())
+    margin, unit, discounts = CONFIG.stride_margin, CONFIG.mpc.throw_speed, []
+    for tick, aside in enumerate((0.0, 0.9 * margin, margin + unit, margin + 4.0 * unit), 1):
+        thrown = at(moving(resting(), np.array([0.0, aside, 0.0])), 0.001 * tick)
+        discounts.append(planner.update(thrown, COMMAND).orientation_discount)
+    np.testing.assert_allclose(discounts, [0.0, 0.0, 1.0, 4.0], atol=1e-3)

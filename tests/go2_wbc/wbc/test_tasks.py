@@ -174,6 +174,15 @@ def test_planned_forces_and_their_weight_take_the_place_of_the_even_share(legs: 
     np.testing.assert_allclose(found, wanted, atol=EXACT)
 
 
+def test_a_discount_divides_the_weight_of_the_attitude() -> None:
+    _, reference, _ = scene(0)
+    task = BodyOrientation(np.ones(3), np.ones(3), weight=10.0, flight_weight=3.0)
+    discounted = replace(reference, orientation_discount=4.0)
+    assert (task.weight_at(reference), task.weight_at(discounted)) == (10.0, 2.0)
+    flying = replace(discounted, legs=(SW,) * 4, orientation_discount=1.0)
+    assert task.weight_at(flying) == 3.0
+
+
 @pytest.mark.parametrize("legs", MODES)
 def test_each_leg_has_rows_in_the_task_it_is_given_and_in_no_other(legs: tuple) -> None:
     snapshot, reference, _ = scene(0)
