@@ -43,9 +43,8 @@ class Walking(Behaviour):
 
     def update(self, snapshot: Snapshot) -> Reference:
         """The planner's reference."""
-        command, now = self.command, snapshot.state.time
-        if now < self._is_limited_until:
-            command = self._limit.clip(command)
+        now = snapshot.state.time
+        command = self.asked(now)
         if self.choice is not None:
             velocity = self._planner.velocity
             gait, command = self.choice.update(now, velocity, command)
@@ -65,14 +64,21 @@ class Walking(Behaviour):
     def pass_over(self, gait: Gait, limit: VelocityEnvelope, now: float) -> None:
         """Change the gait, the velocity clipped into ``limit`` until that has happened.
 
+        A change within another one takes as long as what is left of that takes, and both together.
+
         Args:
             gait: wanted.
             limit: in which the robot walks already.
             now: time of the robot [s].
         """
-        time = max(time_between(self.gait, gait), DWELL)
-        self._limit, self._is_limited_until = limit, now + time
+        until = max(self._is_limited_until, now)
+        self._limit = limit if until == now else limit.within(self._limit)
+        self._is_limited_until = until + max(time_between(self.gait, gait), DWELL)
         self.change_gait(gait)
+
+    def asked(self, now: float) -> VelocityCommand:
+        """The command, within what a change of gait permits at ``now`` [s]."""
+        return self._limit.clip(self.command) if now < self._is_limited_until else self.command
 
     @property
     def follows_command(self) -> bool:

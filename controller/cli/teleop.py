@@ -14,14 +14,16 @@ from typing import TYPE_CHECKING
 
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from go2_wbc.errors import CommandError
+from go2_wbc.world import SENSORS
 
 if TYPE_CHECKING:
     from controller.gamepad import Gamepad
     from controller.teleop import Teleop
 
 EXAMPLES = """
-go2-wbc teleop              headless: a line tells what the robot does
-go2-wbc teleop --viewer     watch it in MuJoCo's window
+go2-wbc teleop                 headless: a line tells what the robot does
+go2-wbc teleop --viewer        watch it in MuJoCo's window
+go2-wbc teleop --sensors imu   drive it on what a robot's own sensors tell
 """
 REFRESH = 0.1
 """Time [s] between two looks at the keyboard and the robot."""
@@ -38,6 +40,9 @@ def register(subparsers: Subparsers) -> None:
     )
     parser.add_argument("--viewer", action="store_true", help="also open MuJoCo's window")
     parser.add_argument("--keyboard", action="store_true", help="look for no gamepad")
+    parser.add_argument(
+        "--sensors", choices=SENSORS, default="ideal", help="what its state comes from"
+    )
     parser.add_argument("--mjcf", metavar="FILE", type=Path, help="your own Go2 model or scene")
     parser.add_argument("--config", metavar="FILE", type=Path, help="TOML with other numbers")
 
@@ -56,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     print(keys_help(), said, *([] if pad is None else [LEGEND]), sep="\n")
     numbers = config(args.config)
     with (
-        closing(MujocoPlant(args.mjcf, motor=numbers.motor)) as plant,
+        closing(MujocoPlant(args.mjcf, motor=numbers.motor, sensors=args.sensors)) as plant,
         GO2Controller(plant=plant, realtime=True, viewer=args.viewer, config=numbers) as go2,
     ):
         teleop = Teleop(go2)

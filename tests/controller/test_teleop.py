@@ -101,7 +101,7 @@ def test_in_a_real_terminal_keys_drive_it_and_the_terminal_is_left_as_it_was() -
 
     ours, theirs = pty.openpty()
     before = termios.tcgetattr(theirs)
-    command = [sys.executable, "-m", "controller.cli.main", "teleop"]
+    command = [sys.executable, "-m", "controller.cli.main", "teleop", "--sensors", "imu"]
     process = subprocess.Popen(command, cwd=ROOT, stdin=theirs, stdout=theirs, stderr=theirs)
     try:
         assert "high five" in read_until(ours, "lying")

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from controller import GO2Controller
+from controller.behaviours.walking import Walking
 from controller.walker import CHANGE_SHARE
 from go2_wbc.contacts import GAITS
-from go2_wbc.planning.command import VelocityEnvelope
+from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.envelopes import envelope_of
+from go2_wbc.planning.gait_choice import DWELL
 from go2_wbc.planning.gait_clock import time_between
+from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
+from go2_wbc.robot.model import RobotModel
 
 FRICTION = 0.7
 SLOW = 0.05
@@ -117,6 +123,21 @@ def test_a_command_that_comes_with_a_gait_is_followed_once_the_gait_is_there() -
         speed = truth.recording().com_velocity[:, 0]
         assert float(speed.mean()) == pytest.approx(-0.8, rel=2.0 * SLOW)
     truth.close()
+
+
+def test_a_change_of_gait_within_another_one_waits_for_both() -> None:
+    model, config = RobotModel(), LocomotionConfig()
+    walking = Walking(model, GAITS["trot"], config)
+    walking.start(model.snapshot(MujocoPlant().read()))
+    slow, wide = VelocityEnvelope(forward=0.2), VelocityEnvelope()
+    walking.pass_over(GAITS["pace"], slow, 1.0)
+    walking.pass_over(GAITS["bound"], wide, 1.1)
+    walking.command = VelocityCommand(1.0)
+    both = sum(
+        max(time_between(GAITS[a], GAITS[b]), DWELL) for a, b in pairwise(("trot", "pace", "bound"))
+    )
+    assert walking.asked(1.0 + both - 0.01).linear_x == 0.2
+    assert walking.asked(1.0 + both + 0.01).linear_x == 1.0
 
 
 @pytest.mark.slow
