@@ -3,7 +3,7 @@
 Every row twice, with the true state and (``sensed-``) with what the robot's own sensors tell, and
 MuJoCo judges. Motors with their torque-speed line, friction 0.6 to 1.0 (drops: 0.4 to 1.0), masses
 within 10 %, of which the controller is not told; forces planned ahead by the MPC. Numbers were
-chosen on seeds 0 to 9, from 9000 and from 30000 to 49999; those judged begin at ``FIRST_SEED``.
+chosen on seeds 0 to 9, from 9000 and from 30000 to 63999; those judged begin at ``FIRST_SEED``.
 
 - standing: a push of 0.1 s in each of eight directions, 36 N s aside, 45 ahead and back, on an
   ellipse in between; survived is who stands again within 3 s;
