@@ -125,7 +125,7 @@ PUSHES = {
     "walking, forward": Push(_walk, (55.0, 0.0, 0.0)),
     "walking, aslant": Push(_walk, (29.4, 29.4, 0.0)),
     "bounding, sat down": Push(_bound, (-70.0, 0.0, -80.0)),
-    "bounding, aslant": Push(_bound, (40.0, 40.0, 0.0)),
+    "bounding, aslant": Push(_bound, (70.0, 70.0, 0.0)),
     "turning": Push(_trot_ready, (-60.0, 0.0, 0.0), lambda go2: go2.turn_left(1.5)),
     "push-ups": Push(_nothing, (26.0, 0.0, 0.0), lambda go2: go2.play("push_ups"), 3.0),
     "high five": Push(_nothing, (26.0, 0.0, 0.0), lambda go2: go2.high_five(), 3.0),

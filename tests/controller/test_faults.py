@@ -37,7 +37,7 @@ FEEBLE = 0.05
 # kg; two and a half times the robot's own mass.
 HEAVY = 40.0
 # N for 0.2 s at the trunk: 60 N s, three times what a standing robot withstands.
-SHOVE = np.array([0.0, 300.0, 0.0])
+SHOVE = np.array([0.0, 500.0, 0.0])
 
 
 @pytest.fixture
