@@ -209,12 +209,24 @@ def run(args: argparse.Namespace) -> int:
     """Fill the file from the results, and draw what is asked for."""
     rows = {}
     for file in args.results:
-        rows |= {row["name"]: row for row in json.loads(file.read_text())["rows"]}
+        rows |= rows_of(file)
     text = filled(args.page.read_text(encoding="utf-8"), rows)
     args.page.write_text(text, encoding="utf-8")
     if args.plot is not None:
         save_speeds(rows, args.plot)
     return ExitCode.OK
+
+
+def rows_of(file: Path) -> dict[str, Row]:
+    """The rows of what a benchmark's ``--out`` wrote, by their names.
+
+    Raises:
+        ConfigError: if the file is none of these.
+    """
+    try:
+        return {row["name"]: row for row in json.loads(file.read_text(encoding="utf-8"))["rows"]}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ConfigError(f"{file} is not what --out of a benchmark writes: {error}") from error
 
 
 def _figure(name: str) -> Path:

@@ -22,6 +22,7 @@ from benchmarks.evidence import (
     SPEED_LINES,
     Line,
     filled,
+    rows_of,
     table,
 )
 from benchmarks.scenario import Scenario
@@ -120,6 +121,15 @@ def test_the_command_fills_a_file_from_several_results(tmp_path: Path) -> None:
     assert main(["evidence", str(readme), *map(str, results)]) == ExitCode.OK
     expected = table({**ROWS, LINES[0].metric: {**ROWS[LINES[0].metric], "n": 7}})
     assert readme.read_text() == f"before\n{BEGIN}: x -->\n{expected}\n{END}\n"
+
+
+@pytest.mark.parametrize("text", ["# a page", "{}", "[1]", None])
+def test_a_file_that_holds_no_results_is_named(tmp_path: Path, text: str | None) -> None:
+    file = tmp_path / "other.md"
+    if text is not None:
+        file.write_text(text)
+    with pytest.raises(ConfigError, match=r"other\.md is not what --out of a benchmark writes"):
+        rows_of(file)
 
 
 def test_a_missing_metric_or_mark_is_named() -> None:
