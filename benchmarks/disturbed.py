@@ -165,6 +165,8 @@ def measure_disturbed(trial: Trial, name: str, sensors: str) -> Measurement:
                     break
                 _make(robot, watch, "recover", rng)
         robot.go2.wait(1.0)
+        if math.isinf(watch.delay):  # it fell just now: whether that is noticed is not known yet
+            robot.go2.wait(2.0 * NOTICED)
         falls, longest = watch.all_falls, watch.delay  # what comes now is the end
     late = [str(fall) for fall in falls if not fall.delay <= NOTICED]
     return Measurement(
