@@ -56,7 +56,8 @@ class Pair:
         if found is None or (found["mean"] is None and not found["falls"]):
             raise ConfigError(f"the results have no value for {name}")
         if found["mean"] is None:
-            return f"all fell (n {found['n']})"
+            who = "all" if found["falls"] == found["n"] else found["falls"]
+            return f"{who} fell (n {found['n']})"
         values = (found[key] for key in ("mean", "sd", "worst"))
         numbers = "; ".join("-" if value is None else self.shown.format(value) for value in values)
         fell = f", {found['falls']} fell" if found["falls"] else ""

@@ -60,7 +60,6 @@ SHORT_LEASH = 0.02
 """Distance [m] that the place it is to be at may be behind the robot. With the 0.08 of a walk it
 came back to that place at 0.4 m/s, which it then was to go on at: after 72 pushes of 45 N s
 straight back it stood again in 1.7 s in the mean, twice too late, now in 1.5 s, at most 2.25."""
-
 SHARE_OF_NODE = 0.8
 """Part of a node of the MPC below which a foot counts as in the air. With the 0.02 of a walk a foot
 that is left far behind was to give, in the last milliseconds of its stance, what the whole node

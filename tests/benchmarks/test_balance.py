@@ -92,6 +92,13 @@ def test_a_disturbed_robot_says_in_time_that_it_has_fallen(
     assert values[f"{name}.falls"] > 0.0
 
 
+def test_a_fall_in_the_last_moment_of_a_run_may_yet_be_noticed() -> None:
+    # The run ended 2 ms after it, and it was counted as never noticed.
+    values = measured("sensed-disturbed", 573)
+    assert values["sensed-disturbed.delay"] <= 0.2
+    assert values["sensed-disturbed.falls"] > 0.0
+
+
 def test_a_fall_that_nobody_notices_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(FallDetector, "reason", lambda *_, **__: None)
     patient = Config(safety=SafetyConfig(grave_limit_time=100.0))

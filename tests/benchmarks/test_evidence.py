@@ -71,6 +71,7 @@ def test_a_line_of_both_states_tells_mean_deviation_worst_and_falls() -> None:
     assert line == "| what | 2 % | 0.50; 0.10; 0.75 (n 10) | 0.50; -; - (n 10, 3 fell) | none |"
     none = {"n": 4, "mean": None, "sd": None, "worst": None, "falls": 4}
     assert "| all fell (n 4) |" in Pair("what", "a", "b").row({"a": good, "b": none})
+    assert "| 1 fell (n 4) |" in Pair("what", "a", "b").row({"a": good, "b": {**none, "falls": 1}})
     assert "| - |" in Pair("what", "", "a").row(rows)
     with pytest.raises(ConfigError, match="no value for missing"):
         Pair("what", "missing", "").row(rows)
