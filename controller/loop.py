@@ -11,6 +11,7 @@ A plant that fails, gives no new state, or gives one that is not finite, ends th
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, isfinite
@@ -60,6 +61,7 @@ class ControlLoop:
         behaviour: what the robot does now.
         snapshot: of the last tick.
         fault: why the last behaviour was ended by the loop, or None.
+        warn: writes a line of the log, as ``logging.Logger.warning`` does.
     """
 
     def __init__(
@@ -95,6 +97,7 @@ class ControlLoop:
         self._falls = FallDetector(safety)
         self._sag = self._lean = 0.0
         self.fault: Fault | None = None
+        self.warn: Callable[..., None] = _log.warning
         self.state: RobotState = plant.read()
         if not self._is_plausible(self.state):
             raise PlantError(f"the first state of the plant is not finite: q={self.state.q}")
@@ -132,7 +135,7 @@ class ControlLoop:
         self.fault = fault
         self.behaviour = Damped("fallen" if fault.is_fall else "damped")
         self.behaviour.start(self.snapshot)
-        _log.warning("%s", fault.reason)
+        self.warn("%s", fault.reason)
 
     def go_limp(self) -> None:
         """Send the safe command once, even to a plant that fails."""
@@ -190,7 +193,7 @@ class ControlLoop:
 
     def _guard(self) -> None:
         fault = self.fault
-        is_tipping = fault is not None and self.state.tilt > self._safety.tilt_limit
+        is_tipping = fault is not None and self.state.tilt > self._safety.astray_tilt_limit
         if not (self.behaviour.needs_balance or is_tipping):
             return
         may_lie = self.behaviour.may_lie
@@ -257,6 +260,6 @@ class ControlLoop:
             is_first = self.telemetry.qp_failures == 1
             what = str(error) if is_first else str(error).splitlines()[0]  # one table is enough
             time = self.state.time
-            _log.warning("QP failure at t=%.3f s, holding the last torque: %s", time, what)
+            self.warn("QP failure at t=%.3f s, holding the last torque: %s", time, what)
             return self._last_command
         return JointCommand.damping(DAMPING)

@@ -38,8 +38,9 @@ LEAST_TRUST = 1e-3
 """Trust in a foot in the air: its place drifts a thousand times as fast as a standing one's."""
 _SMOOTHING = 0.05
 """Time constant [s] in which the joints' speeds are smoothed, to tell slow motion from noise."""
-_FLIGHT = 0.5
-"""Share of gravity that a trunk feels at least if something carries it; in flight it feels none."""
+_FLIGHT, _ARM = 0.5, 0.1
+"""Share of gravity that a trunk feels at least if something carries it, while in flight it feels
+none; and the greatest distance [m] of the CoM from the IMU, by which a turning one feels a force."""
 _HEIGHT_GATE = 9.0
 """Square of the deviations by which a foot's height may be off that of flat ground; else it stands
 on something else, and its height says nothing."""
@@ -154,10 +155,11 @@ def is_at_rest(x, memory, reading, gravity, numbers):
 @subroutine("b1(f8[::1], f8[::1], f8[::1], b1, f8, f8[::1])")
 def lies(x, memory, reading, is_carried, gravity, numbers):
     """Whether something else than the feet has carried the robot for long enough."""
-    force = 0.0
+    force, turning = 0.0, 0.0
     for k in range(3):
         force += (reading[4 + k] - x[FORCE_BIAS + k]) ** 2
-    is_lying = not is_carried and force > (_FLIGHT * gravity) ** 2
+        turning += (reading[1 + k] - x[GYRO_BIAS + k]) ** 2
+    is_lying = not is_carried and np.sqrt(force) > _FLIGHT * gravity + _ARM * turning  # w^2 r
     memory[_LYING] = memory[_LYING] + reading[0] if is_lying else 0.0
     return memory[_LYING] >= numbers[LYING_TIME]
 

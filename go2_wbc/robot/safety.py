@@ -26,6 +26,9 @@ TRUNK_UNDERSIDE = np.array(
 to 60 deg: vertices of the collision mesh of the robot description."""
 TOUCH = 0.01
 """Height [m] of the trunk's lowest point over the ground below which it touches."""
+ASTRAY_TOUCH = 0.025
+"""The same [m] for a trunk that is not where it shall be: feet press into the ground in a fall, and
+an attitude that is off by a degree puts the nose off by 5 mm."""
 STRIKE = 0.05
 """Time [s] of a touch from which on it counts until the trunk is back. With 0.03 two of sixteen
 trots counted as fallen that a push of 50 N s ahead let touch the ground, and that trotted on."""
@@ -36,7 +39,11 @@ class SafetyConfig:
     """When to give up and go limp.
 
     Attributes:
-        tilt_limit: tilt [rad] of the trunk beyond which a balancing robot counts as fallen.
+        tilt_limit: tilt [rad] of the trunk beyond which a balancing robot counts as fallen, also
+            where a motion wants it; rearing by 59 deg is done.
+        astray_tilt_limit: the same for a robot that leans by half of ``lean_limit`` or more from
+            how it shall be, or that may lie. A thrown one may be at 60 deg for a moment only, and
+            its sensors off by a degree.
         height_limit: height [m] of the base over the centre of the lowest foot below which a
             balancing robot counts as collapsed; on its belly it is 0.063.
         touch_limit: time [s] for which the trunk of a balancing robot may touch the ground, or
@@ -58,6 +65,7 @@ class SafetyConfig:
     """
 
     tilt_limit: float = 1.05
+    astray_tilt_limit: float = 1.0
     height_limit: float = 0.075
     touch_limit: float = 0.1
     sink_limit: float = 0.12
@@ -100,15 +108,17 @@ class FallDetector:
         state, config = snapshot.state, self._config
         height, clearance = self._heights(snapshot.row, TRUNK_UNDERSIDE, FOOT_RADIUS)
         has_sunk = not may_lie and sag > config.sink_limit
-        is_off = sag > config.sink_limit / 2 or lean > config.lean_limit / 2
-        is_touching = not may_lie and clearance < TOUCH
+        is_aslant = lean > config.lean_limit / 2
+        is_off = sag > config.sink_limit / 2 or is_aslant
+        is_touching = not may_lie and clearance < (ASTRAY_TOUCH if is_off else TOUCH)
         is_bouncing = self._has_struck and is_off and not may_lie
         strikes = self._lasts("strike", STRIKE, state.time, holds=is_touching)
         self._has_struck = strikes or is_bouncing
         is_touching |= is_bouncing
         leans = lean > config.lean_limit
+        tilt_limit = config.astray_tilt_limit if may_lie or is_aslant else config.tilt_limit
         what = None
-        if state.tilt > config.tilt_limit:
+        if state.tilt > tilt_limit:
             roll, pitch, _ = (round(angle) for angle in np.degrees(state.rpy).tolist())
             what = f"roll {roll} deg, pitch {pitch} deg"
         elif not may_lie and height < config.height_limit:

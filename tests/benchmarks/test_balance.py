@@ -92,10 +92,19 @@ def test_a_disturbed_robot_says_in_time_that_it_has_fallen(
     assert values[f"{name}.falls"] > 0.0
 
 
-def test_a_fall_in_the_last_moment_of_a_run_may_yet_be_noticed() -> None:
-    # The run ended 2 ms after it, and it was counted as never noticed.
-    values = measured("sensed-disturbed", 573)
-    assert values["sensed-disturbed.delay"] <= 0.2
+@pytest.mark.parametrize(
+    ("seed", "what"),
+    [
+        (573, "2 ms before the end of a run"),
+        (208, "60.0 to 60.1 deg for a moment, thrown in a jump"),
+    ],
+)
+def test_falls_that_were_not_noticed_in_time_are(
+    seed: int, what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(disturbed, "FIRST_SEED", 64000)
+    values = measured("sensed-disturbed", seed)
+    assert values["sensed-disturbed.delay"] <= 0.2, what
     assert values["sensed-disturbed.falls"] > 0.0
 
 

@@ -12,7 +12,7 @@ import pytest
 from controller import GO2Controller, Mode
 from controller.behaviours.plans import ChangePosture
 from controller.procedures import ProcedureRunner
-from go2_wbc.plant.mujoco.ground_truth import FALLEN_TILT
+from go2_wbc.robot.safety import SafetyConfig
 from motions.postures import lean
 from tests.controller.plants import PERIOD, WatchedPlant
 
@@ -166,7 +166,7 @@ def test_a_robot_that_is_turned_over_on_the_ground_says_so_at_once(act: Do) -> N
         plant.inner.push(np.array([0.0, 0.0, 450.0]), PUSH_TIME, "FL_hip")
 
         def watch() -> None:
-            if go2.state.tilt > FALLEN_TILT:
+            if go2.state.tilt > SafetyConfig().astray_tilt_limit:
                 over.append((go2.state.time, go2.mode))
 
         plant.on_write = watch

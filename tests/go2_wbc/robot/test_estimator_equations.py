@@ -187,8 +187,9 @@ class Twin:
                 else:
                     ground = self.level + pressed
                     told.append((lambda y, z=z, ground=ground: y[5][z] - ground, height))
-        felt = np.linalg.norm(reading.accelerometer - x[4]) / self.model.gravity
-        is_lying = felt > 0.5 and not (trust > 1e-3).any()
+        felt = np.linalg.norm(reading.accelerometer - x[4])
+        carried = 0.5 * self.model.gravity + 0.1 * w @ w
+        is_lying = felt > carried and not (trust > 1e-3).any()
         self.lying = self.lying + dt if is_lying else 0.0
         self.upset = max(self.upset - dt, 0.0)
         if self.lying >= c.lying_time:

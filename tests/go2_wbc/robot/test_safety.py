@@ -80,14 +80,29 @@ def test_a_standing_robot_has_not_fallen(falls: FallDetector, model: RobotModel)
     assert trunk_clearance(snapshot, 0.0) == pytest.approx(0.3 - 0.107, abs=1e-6)
 
 
-def test_a_tilted_trunk_is_a_fall_at_once_even_where_the_belly_may_be_down(
-    falls: FallDetector, model: RobotModel
+CONFIG = SafetyConfig()
+
+
+@pytest.mark.parametrize(
+    ("lean", "may_lie", "limit", "degrees"),
+    [
+        (0.0, False, CONFIG.tilt_limit, 61),  # a motion rears by 59 deg
+        (0.0, True, CONFIG.astray_tilt_limit, 58),
+        (0.6 * CONFIG.lean_limit, False, CONFIG.astray_tilt_limit, 58),
+    ],
+)
+def test_a_tilted_trunk_is_a_fall_at_once(
+    falls: FallDetector,
+    model: RobotModel,
+    *,
+    lean: float,
+    may_lie: bool,
+    limit: float,
+    degrees: int,
 ) -> None:
-    limit = SafetyConfig().tilt_limit
-    for may_lie in (False, True):
-        assert falls.reason(tilted(model, limit - 0.01), 0.0, 0.0, may_lie=may_lie) is None
-        reason = falls.reason(tilted(model, limit + 0.01), 0.0, 0.0, may_lie=may_lie)
-        assert reason == "fell at t=0.00 s: roll 61 deg, pitch 0 deg"
+    assert falls.reason(tilted(model, limit - 0.01), 0.0, lean, may_lie=may_lie) is None
+    reason = falls.reason(tilted(model, limit + 0.01), 0.0, lean, may_lie=may_lie)
+    assert reason == f"fell at t=0.00 s: roll {degrees} deg, pitch 0 deg"
 
 
 def test_a_trunk_on_the_ground_is_a_fall_after_the_limit(
