@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import final
 
 from controller.modes import Mode, Outcome
@@ -14,6 +15,12 @@ from controller.runner import Runner
 from go2_wbc.errors import Go2WbcError, ModeError
 
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Call:
+    name: str
+    start: float
 
 
 @final
@@ -27,14 +34,14 @@ class Calls:
     def __init__(self, pilot: Pilot, runner: Runner) -> None:
         """Call procedures of ``pilot``, whose time passes on ``runner``."""
         self._pilot, self._runner = pilot, runner
-        self._busy = threading.Lock()
-        self._busy_with = ""
+        self._starting = threading.Lock()
+        self._running: _Call | None = None
         self.last = Outcome(True, "lying, nothing asked yet", 0.0)
 
     @property
     def is_running(self) -> bool:
         """Whether a call runs now, in any thread."""
-        return self._busy.locked()
+        return self._running is not None
 
     def make(
         self, name: str, procedure: Callable[[], Measurements], *, allow_fallen: bool = False
@@ -53,31 +60,52 @@ class Calls:
         """
         if self._pilot.mode is Mode.FALLEN and not allow_fallen:
             raise ModeError(f"{name}() needs a robot that has not fallen: call recover() first")
-        if not self._busy.acquire(blocking=False):
-            raise ModeError(f"{name}() while {self._busy_with}() is still running")
-        loop = self._runner.loop
-        self._busy_with, start = name, loop.state.time
-        ok, reason = False, ""
-        measured: Measurements = {}
-        try:
-            self._pilot.begin()
-            measured = procedure()
-            ok, reason = True, "done"
-        except Aborted as aborted:
-            reason, measured = str(aborted), aborted.measured
-        except Go2WbcError as error:
-            reason = str(error)
+        call = _Call(name, self._runner.loop.state.time)
+        try:  # Ctrl-C may come anywhere: whose turn it is must be seen from what is stored
+            self._take_turn(call)
+            return self._run(call, procedure)
+        except Go2WbcError:
             raise
         except BaseException as error:
             reason = interruption(name, error)
-            self._pilot.collapse(reason)
-            reason = f"{reason}, damped"
+            try:
+                self._pilot.collapse(reason)
+                reason = f"{reason}, damped"
+            finally:
+                self._note(call, reason)
             raise
         finally:
-            self.last = Outcome(ok, reason, loop.state.time - start, dict(measured))
-            fault = loop.fault
-            is_known = fault is not None and fault.reason in reason  # the loop has logged it
-            if not (ok or is_known):
-                _log.warning("%s", reason)
-            self._busy.release()
-        return ok
+            if self._running is call:
+                self._running = None
+
+    def _take_turn(self, call: _Call) -> None:
+        with self._starting:
+            running = self._running
+            if running is None:
+                self._running = running = call
+        if running is not call:
+            raise ModeError(f"{call.name}() while {running.name}() is still running")
+
+    def _run(self, call: _Call, procedure: Callable[[], Measurements]) -> bool:
+        try:
+            self._pilot.begin()
+            measured = procedure()
+        except Aborted as aborted:
+            self._note(call, str(aborted), aborted.measured)
+            return False
+        except Go2WbcError as error:
+            self._note(call, str(error))
+            raise
+        self._note(call, "done", measured, ok=True)
+        return True
+
+    def _note(
+        self, call: _Call, reason: str, measured: Measurements | None = None, *, ok: bool = False
+    ) -> None:
+        """What came of ``call``."""
+        loop = self._runner.loop
+        self.last = Outcome(ok, reason, loop.state.time - call.start, dict(measured or {}))
+        fault = loop.fault
+        is_known = fault is not None and fault.reason in reason  # the loop has logged it
+        if not (ok or is_known):
+            _log.warning("%s", reason)

@@ -335,8 +335,7 @@ class GO2Controller:
 
     def recording(self, rate: float = 100.0) -> Recording:
         """The run so far (its last minutes), at about ``rate`` samples a second."""
-        with self._runner.lock():
-            samples = self.telemetry.samples(rate)
+        samples = self._runner.between_ticks(lambda: self.telemetry.samples(rate))
         return samples.recording()
 
     # --- ending ---------------------------------------------------------------------------

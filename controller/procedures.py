@@ -54,7 +54,7 @@ class ProcedureRunner:
     """Lets time pass on a runner until something is measured.
 
     Attributes:
-        loop: what it lets run; hold the runner's lock to change it.
+        loop: what it lets run; to be changed between ticks of the runner.
 
     Every method but ``measurements`` and ``let_pass`` raises ``Aborted`` if it cannot do its work.
     """
@@ -135,8 +135,7 @@ class ProcedureRunner:
 
     def give_up(self, reason: str) -> NoReturn:
         """Go limp; the robot counts as fallen."""
-        with self._runner.lock():
-            self.loop.abandon(Fault(reason, is_fall=True))
+        self._runner.between_ticks(lambda: self.loop.abandon(Fault(reason, is_fall=True)))
         raise self._aborted(reason)
 
     def measurements(self) -> Measurements:

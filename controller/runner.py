@@ -10,14 +10,17 @@ import gc
 import logging
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TypeVar
 from weakref import WeakValueDictionary
 
+from controller.background_log import BackgroundLog
 from controller.behaviours.base import Behaviour
+from controller.errands import NOT_YET, Errands, LoopEnded, LoopHangs, Pending
 from controller.loop import ControlLoop, Fault
 from controller.pacing import Pacer
-from go2_wbc.errors import ClosedError, PlantError, PlantTimeout
+from go2_wbc.errors import ClosedError, ModeError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
 
 _log = logging.getLogger(__name__)
@@ -25,22 +28,46 @@ _log = logging.getLogger(__name__)
 GREATEST_LAG = 0.1
 """Lag [s] behind the wall clock after which the pace is given up and taken up anew."""
 LEAST_PAUSE = 1e-4
-"""Least pause [s] between two ticks, in which waiting calls get hold of the lock."""
-POLL = 0.05
-"""Time [s] after which a waiting thread looks again, should it have missed a notice."""
+"""Least pause [s] between two ticks, in which other threads get hold of the interpreter."""
+POLL = 0.001
+"""Time [s] after which a thread that interrupts another one's call looks again."""
 HANG_LIMIT = 2.0
 """Time [s] for which one tick may keep others waiting; a plant that blocks longer hangs."""
 _DRIVEN: WeakValueDictionary[int, Plant] = WeakValueDictionary()
 """Plants that have a runner, by their ``id``."""
 
+Result = TypeVar("Result")
+
+
+class _Wait:
+    """What a call waits for while time passes.
+
+    Attributes:
+        end: time [s] of the loop after which it has not come.
+    """
+
+    def __init__(self, loop: ControlLoop, is_done: Callable[[], bool], limit: float) -> None:
+        """Wait from now on until ``is_done``, for ``limit`` seconds of what ``loop`` does now."""
+        self._loop, self._is_done, self._behaviour = loop, is_done, loop.behaviour
+        self.end = loop.state.time + limit
+
+    def verdict(self) -> bool | Pending:
+        """After a tick: whether it has come, or not yet."""
+        if self._loop.fault is not None or self._loop.behaviour is not self._behaviour:
+            return False
+        if self._is_done():
+            return True
+        return NOT_YET if self._loop.state.time < self.end else False
+
 
 class Runner:
     """Owns the passing of time for one loop.
 
-    Whoever ticks the loop, or reads more of it than one attribute, holds ``lock``. Without
-    ``realtime`` a waiting call holds it until it ends, so other threads never wait for the lock to
-    end a call: ``interrupt`` and ``close`` set a flag that is read before every tick. Should the
-    plant block in the background, calls end with ``PlantTimeout`` instead of waiting with it.
+    Whoever changes the loop, or reads more of it than one attribute, does so ``between_ticks``.
+    Without ``realtime`` the thread that calls ticks the loop and holds a lock until its call ends;
+    ``interrupt`` and ``close`` set a flag that is read before every tick. With it the thread in the
+    background alone touches the loop, and others hand in errands; should the plant block there,
+    they end with ``PlantTimeout`` instead of waiting with it.
     """
 
     def __init__(
@@ -55,16 +82,19 @@ class Runner:
         if _DRIVEN.get(id(loop.plant)) is loop.plant:
             raise PlantError("another controller drives this plant: close that one first")
         _DRIVEN[id(loop.plant)] = loop.plant
-        self._lock = threading.RLock()
         self._after_tick = after_tick
-        self._changed = threading.Condition()  # with a lock of its own, which no tick holds
-        self._ticks = 0
+        self._lock = threading.RLock()  # without realtime, or after the thread has ended
+        self._holder: int | None = None  # the thread that holds it
+        self._errands = Errands()  # with realtime
         self._stopping = False
         self._interruption: str | None = None
         self._known_fault = loop.fault
         self._failure: BaseException | None = None
         self._thread: threading.Thread | None = None
+        self._lines: BackgroundLog | None = None
         if realtime:
+            self._lines = BackgroundLog(loop.warn)
+            loop.warn = self._lines.warning
             self._thread = threading.Thread(target=self._keep_pace, name="go2-loop", daemon=True)
             self._thread.start()
 
@@ -73,39 +103,57 @@ class Runner:
         """Whether time passes by itself."""
         return self._thread is not None
 
-    @contextmanager
-    def lock(self) -> Iterator[None]:
-        """Holds the loop between two ticks.
-
-        Raises:
-            PlantTimeout: if a tick does not end.
-        """
-        limit = HANG_LIMIT if self.is_realtime else -1.0  # else: until the call that runs ends
-        if not self._lock.acquire(timeout=limit):
-            raise self._hanging()
-        try:
-            yield
-        finally:
-            self._lock.release()
-
     @property
     def is_alive(self) -> bool:
         """Whether the background thread, if there is one, can still move the robot."""
         return self._failure is None
+
+    def between_ticks(self, work: Callable[[], Result]) -> Result:
+        """Do ``work`` while no tick is under way, but for the one that may call this.
+
+        Raises:
+            PlantTimeout: if a tick does not end.
+        """
+        if self._is_in_background:
+            with suppress(LoopEnded):
+                return self._ask(work)
+        return self._hold(work)
+
+    def _hold(self, work: Callable[[], Result]) -> Result:
+        """Do ``work`` in this thread, while no other one does anything with the loop."""
+        with self._lock:
+            before, self._holder = self._holder, threading.get_ident()
+            try:
+                return work()
+            finally:
+                self._holder = before
+
+    @property
+    def _is_in_background(self) -> bool:
+        """Whether another thread ticks the loop all the time."""
+        return self._thread not in (None, threading.current_thread())
+
+    def _ask(self, work: Callable[[], Result | Pending]) -> Result:
+        try:
+            return self._errands.ask(work, HANG_LIMIT)
+        except LoopHangs:
+            raise self._hanging() from None
 
     def begin(self) -> None:
         """Begin a call: a fault from before it may be cleared, one during it ends it.
 
         Raises:
             PlantError: if the background thread has ended, since nothing would move any more.
+            ModeError: from within a tick of that thread, for which time would have to pass.
         """
+        if self.is_realtime and not self._is_in_background:
+            raise ModeError("a call waits for ticks: it cannot be made from within one")
         if self._failure is not None:
             raise PlantError(
                 f"the loop in the background has ended ({self._failure}); "
                 "close this controller and make a new one"
             )
-        with self.lock():
-            self._known_fault = self.loop.fault
+        self._known_fault = self.loop.fault
 
     def engage(self, behaviour: Behaviour) -> Fault | None:
         """Switch to ``behaviour``, unless a fault has come up since ``begin``.
@@ -117,13 +165,16 @@ class Runner:
             PlantError: if the plant fails.
             ClosedError: if the controller is closed meanwhile.
         """
-        with self.lock():
+
+        def switch() -> Fault | None:
             self._obey()
             fault = self.loop.fault
             if fault is not None and fault is not self._known_fault:
                 return fault
             self.loop.engage(behaviour, observe=not self.is_realtime)
             return None
+
+        return self.between_ticks(switch)
 
     def interrupt(self, reason: str) -> None:
         """Go limp at once, from any thread; returns when the loop has taken notice.
@@ -132,20 +183,26 @@ class Runner:
             PlantTimeout: if the loop does not, since a tick does not end.
         """
         self._interruption = reason
+        if self._is_in_background:
+            self.between_ticks(self._obey_interruption)
+            return
         deadline = time.monotonic() + HANG_LIMIT
-        while self._interruption is not None:
+        while self._holder not in (None, threading.get_ident()):
+            if self._interruption is None:  # that thread has obeyed
+                return
             if time.monotonic() > deadline:
                 raise self._hanging()
-            if self._lock.acquire(timeout=POLL):
-                try:
-                    self._obey_interruption()
-                    if not self.is_realtime:
-                        self.loop.go_limp()
-                finally:
-                    self._lock.release()
+            time.sleep(POLL)
+        self._hold(self._go_limp_if_interrupted)
+
+    def _go_limp_if_interrupted(self) -> None:
+        if self._obey_interruption() and not self.is_realtime:
+            self.loop.go_limp()
 
     def advance_until(self, is_done: Callable[[], bool], limit: float) -> bool:
         """Let time pass until ``is_done()`` holds after a tick, for ``limit`` seconds at most.
+
+        With ``realtime`` the thread in the background calls ``is_done``.
 
         Returns:
             Whether it held. A fault of the loop ends the wait with False.
@@ -154,46 +211,29 @@ class Runner:
             PlantError: if the plant fails.
             ClosedError: if the controller is closed meanwhile.
         """
-        with self.lock():
-            end, behaviour = self.loop.state.time + limit, self.loop.behaviour
-            if not self.is_realtime:
-                return self._advance(is_done, behaviour, end)
-        return self._watch(is_done, behaviour, end)
+        if not self.is_realtime:
+            return self._hold(lambda: self._advance(_Wait(self.loop, is_done, limit)))
+        wait = self.between_ticks(lambda: _Wait(self.loop, is_done, limit))
 
-    def _advance(self, is_done: Callable[[], bool], behaviour: Behaviour, end: float) -> bool:
-        while self.loop.state.time < end:
+        def verdict() -> bool | Pending:
+            self._obey()
+            if self._failure is not None:
+                raise self._failure
+            return wait.verdict()
+
+        with suppress(LoopEnded):
+            return self._ask(verdict)
+        return verdict() is True  # it raises what has ended the loop
+
+    def _advance(self, wait: _Wait) -> bool:
+        while self.loop.state.time < wait.end:
             self._obey()
             self.loop.tick()
             self._after_tick()
-            if self._is_ended(behaviour):
-                return False
-            if is_done():
-                return True
+            verdict = wait.verdict()
+            if not isinstance(verdict, Pending):
+                return verdict
         return False
-
-    def _watch(self, is_done: Callable[[], bool], behaviour: Behaviour, end: float) -> bool:
-        seen = self._ticks
-        while True:
-            with self._changed:
-                if not self._changed.wait_for(lambda seen=seen: self._has_news(seen), HANG_LIMIT):
-                    raise self._hanging()
-            with self.lock():
-                self._obey()
-                if self._failure is not None:
-                    raise self._failure
-                seen = self._ticks
-                if self._is_ended(behaviour):
-                    return False
-                if is_done():
-                    return True
-                if self.loop.state.time >= end:
-                    return False
-
-    def _has_news(self, seen: int) -> bool:
-        return self._ticks != seen or self._failure is not None or self._stopping
-
-    def _is_ended(self, behaviour: Behaviour) -> bool:
-        return self.loop.fault is not None or self.loop.behaviour is not behaviour
 
     def _hanging(self) -> PlantTimeout:
         return PlantTimeout(f"the plant has kept the loop waiting for more than {HANG_LIMIT:g} s")
@@ -203,43 +243,39 @@ class Runner:
             raise ClosedError("the controller was closed during a call")
         self._obey_interruption()
 
-    def _obey_interruption(self) -> None:
+    def _obey_interruption(self) -> bool:
+        """Whether there was one."""
         reason, self._interruption = self._interruption, None
-        if reason is not None:
-            fault = self.loop.fault
-            self.loop.abandon(Fault(reason, is_fall=fault is not None and fault.is_fall))
+        if reason is None:
+            return False
+        fault = self.loop.fault
+        self.loop.abandon(Fault(reason, is_fall=fault is not None and fault.is_fall))
+        return True
 
     def _keep_pace(self) -> None:
         are_frozen = gc.get_freeze_count() > 0  # a program's own objects, which stay so
         gc.freeze()  # else a collection looks through all that was imported, for tens of ms
         try:
             self._tick_at_pace()
+        except BaseException as error:  # whatever it is, a waiting call ends with it
+            self._fail(error)
         finally:
+            self._errands.end()
             if not are_frozen:
                 gc.unfreeze()
 
     def _tick_at_pace(self) -> None:
         pacer = Pacer(self.loop.plant.control_period, GREATEST_LAG, LEAST_PAUSE)
-        while True:
-            with self._lock:
-                if self._stopping:
-                    self.loop.go_limp()  # ``close`` may have given up waiting for this
-                    return
-                try:
-                    self._obey_interruption()
-                    self.loop.tick()
-                    self._after_tick()
-                except BaseException as error:  # whatever it is, a waiting call ends with it
-                    self._fail(error)
-                    return
-                finally:
-                    with self._changed:
-                        self._ticks += 1
-                        self._changed.notify_all()
+        while not self._stopping:
+            self._obey_interruption()
+            self.loop.tick()
+            self._after_tick()
+            self._errands.serve()
             lag = pacer.wait()
             self.loop.telemetry.missed_deadlines = pacer.missed
             if lag:
-                _log.warning("the loop is %.0f ms behind the wall clock", 1000 * lag)
+                self.loop.warn("the loop is %.0f ms behind the wall clock", 1000 * lag)
+        self.loop.go_limp()  # ``close`` may have given up waiting for this
 
     def _fail(self, error: BaseException) -> None:
         """The end of the background thread: nothing moves the robot any more."""
@@ -252,12 +288,11 @@ class Runner:
         """Go limp and stop: no tick after this, and a call that runs ends; idempotent."""
         self._stopping = True
         _DRIVEN.pop(id(self.loop.plant), None)
-        with self._changed:
-            self._changed.notify_all()
         if self._thread is None:
-            with self.lock():
-                self.loop.go_limp()
-        elif self._thread is not threading.current_thread():
+            self._hold(self.loop.go_limp)
+        elif self._is_in_background:
             self._thread.join(HANG_LIMIT)
             if self._thread.is_alive():
                 _log.warning("%s; left behind", self._hanging())
+        if self._lines is not None:
+            self._lines.close()

@@ -65,8 +65,7 @@ class Walker:
         """Walk on with ``gait``, slowing down into its envelope before."""
         walking, choice = self.walking, self._choice(gait)
         if choice is not None:
-            with self._runner.lock():  # the planner may be at work in another thread
-                walking.choice = walking.choice or choice
+            walking.choice = walking.choice or choice
             self._envelope = self._envelope_of(walking)
         elif walking.choice is not None or find_gait(gait) != walking.gait:
             self._change(find_gait(gait))
@@ -84,9 +83,12 @@ class Walker:
         middle = before.within(self._envelope).scaled(CHANGE_SHARE)
         walking.command = slowed = middle.clip(asked)
         self._procedures.until(lambda: walking.follows_command, STOP_LIMIT, "slow down")
-        with self._runner.lock():
+
+        def pass_over() -> None:
             walking.choice = None
             walking.pass_over(gait, middle, self._runner.loop.state.time)
+
+        self._runner.between_ticks(pass_over)
         if walking.command is slowed:  # nobody has asked for another one
             walking.command = asked
 
@@ -127,5 +129,5 @@ class Walker:
     def square_up(self) -> bool:
         """Start to put the feet below the hips; returns whether they are."""
         self.start("trot")
-        with self._runner.lock():  # the planner may be at work in another thread
-            return self.walking.square_up(self._runner.loop.snapshot)
+        walking, loop = self.walking, self._runner.loop
+        return self._runner.between_ticks(lambda: walking.square_up(loop.snapshot))

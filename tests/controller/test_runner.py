@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import gc
+import io
+import logging
 import threading
 from collections.abc import Callable, Iterator
 
+import numpy as np
 import pytest
 
 import controller.runner
@@ -13,11 +16,12 @@ from controller.behaviours.joints import Damped, ServoJoints
 from controller.loop import ControlLoop
 from controller.runner import Runner
 from controller.telemetry import Telemetry
-from go2_wbc.errors import ClosedError, PlantTimeout
+from go2_wbc.errors import ClosedError, ModeError, PlantTimeout
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from motions.postures import TUCKED_JOINTS
+from tests.controller.interrupts import interrupt_somewhere_in
 from tests.controller.plants import HANG_GUARD, PERIOD, StillPlant, in_thread, is_limp
 
 # s of robot time; far more than any of these tests lets pass.
@@ -41,7 +45,12 @@ def make_runner(plant: StillPlant, model: RobotModel) -> Iterator[MakeRunner]:
     """Makes a runner; closes it at the end."""
     made: list[Runner] = []
 
-    def make(*, realtime: bool, after_tick: Callable[[], None] = lambda: None) -> Runner:
+    def make(
+        *,
+        realtime: bool,
+        after_tick: Callable[[], None] = lambda: None,
+        plant: StillPlant = plant,
+    ) -> Runner:
         wbc = WholeBodyController(model)
         loop = ControlLoop(plant, model, wbc, Telemetry(model, 1000), SafetyConfig())
         made.append(Runner(loop, realtime=realtime, after_tick=after_tick))
@@ -279,6 +288,88 @@ def test_in_realtime_an_interruption_ends_a_waiting_call(
     assert call.result(HANG_GUARD) is False
     assert runner.loop.fault is not None
     assert runner.loop.fault.reason == "a test"
+
+
+def test_in_realtime_ctrl_c_at_any_moment_of_a_wait_leaves_a_loop_that_runs(
+    make_runner: MakeRunner,
+) -> None:
+    # It was raised just after a lock had been taken, or before it was given back: 1 of 80 hung.
+    runner = make_runner(realtime=True, plant=StillPlant(period=2e-4))
+    rng = np.random.default_rng(0)
+    for _ in range(800):
+        interrupt_somewhere_in(lambda: runner.advance_until(lambda: False, FOREVER), rng)
+        runner.interrupt("a test")
+        runner.begin()
+        assert runner.engage(Damped()) is None
+        assert runner.advance_until(lambda: True, FOREVER)
+
+
+def test_in_realtime_a_log_handler_that_is_taken_keeps_no_robot_from_going_limp(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    # Ctrl-C in a program that logged left its lock taken: the loop waited for it before it damped.
+    runner = make_runner(realtime=True)
+    assert runner.engage(ServoJoints("hold", ((1.0, TUCKED_JOINTS),))) is None
+    handler = logging.StreamHandler(io.StringIO())
+    logging.getLogger().addHandler(handler)
+    handler.acquire()
+    try:
+        runner.interrupt("a test")
+        ticks = len(plant.commands)
+        assert not runner.advance_until(lambda: True, FOREVER)
+        assert runner.between_ticks(lambda: len(plant.commands)) > ticks
+        assert is_limp(plant.commands[-1])
+    finally:
+        handler.release()
+        logging.getLogger().removeHandler(handler)
+    close(runner)
+    assert handler.stream.getvalue() == "a test\n"
+
+
+def test_in_realtime_no_call_begins_within_a_tick(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    refused = threading.Event()
+
+    def call() -> None:
+        plant.on_write = lambda: None
+        with pytest.raises(ModeError, match="within"):
+            runner.begin()
+        assert runner.between_ticks(lambda: True)
+        refused.set()
+
+    runner = make_runner(realtime=True)
+    plant.on_write = call
+    assert runner.advance_until(refused.is_set, FOREVER)
+
+
+def test_an_interruption_is_told_if_what_another_thread_does_to_the_loop_does_not_end(
+    make_runner: MakeRunner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(controller.runner, "HANG_LIMIT", 0.1)
+    runner = make_runner(realtime=False)
+    begun, released = threading.Event(), threading.Event()
+
+    def hang() -> None:
+        begun.set()
+        released.wait(HANG_GUARD)
+
+    work = in_thread(lambda: runner.between_ticks(hang))
+    wait_for(begun)
+    with pytest.raises(PlantTimeout):
+        in_thread(lambda: runner.interrupt("a test")).result(HANG_GUARD)
+    released.set()
+    work.result(HANG_GUARD)
+
+
+def test_what_is_done_between_ticks_is_done_after_the_end_too(
+    make_runner: MakeRunner, plant: StillPlant
+) -> None:
+    runner = make_runner(realtime=True)
+    here = threading.current_thread()
+    assert runner.between_ticks(threading.current_thread) is not here
+    close(runner)
+    assert runner.between_ticks(threading.current_thread) is here
 
 
 def test_in_realtime_closing_ends_a_waiting_call_and_the_thread(

@@ -22,7 +22,8 @@ from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task
 from motions import Timeline
 from motions.dynamics.search import Clock
-from tests.controller.plants import HANG_GUARD, WatchedPlant, in_thread, is_limp
+from tests.controller.interrupts import interrupt_somewhere_in
+from tests.controller.plants import HANG_GUARD, StillPlant, WatchedPlant, in_thread, is_limp
 
 # s into a call, when it is well under way.
 UNDER_WAY = 0.1
@@ -219,6 +220,44 @@ def test_in_realtime_a_real_ctrl_c_leaves_a_limp_robot(plant: WatchedPlant, name
         signal.signal(signal.SIGINT, usual)
 
 
+def test_ctrl_c_at_any_moment_of_many_calls_leaves_a_robot_that_can_be_called() -> None:
+    # A call that was interrupted as it began was "still running" ever after.
+    def call_again_and_again() -> None:
+        while True:
+            go2.wait(0.0)
+
+    rng = np.random.default_rng(0)
+    with GO2Controller(plant=StillPlant()) as go2:
+        for _ in range(800):
+            interrupt_somewhere_in(call_again_and_again, rng)
+            go2.wait(0.01)
+
+
+def test_no_call_begins_while_one_runs_that_began_as_another_one_ended(
+    go2: GO2Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # Between two looks at who is running the first call ended: the second one ran unseen.
+    calls = go2._calls
+    lock, ended = calls._starting, threading.Event()
+
+    class LateLock:
+        def __enter__(self) -> None:
+            lock.acquire()
+
+        def __exit__(self, *_: object) -> None:
+            lock.release()
+            release.set()
+            first.result(HANG_GUARD)
+
+    release = threading.Event()
+    first = in_thread(lambda: calls.make("first", lambda: {"": float(release.wait(HANG_GUARD))}))
+    while not calls.is_running:
+        pass
+    monkeypatch.setattr(calls, "_starting", LateLock())
+    with pytest.raises(ModeError, match="while first"):
+        calls.make("second", lambda: {"": float(ended.is_set())})
+
+
 @pytest.mark.parametrize("realtime", [False, True])
 def test_ctrl_c_while_a_motion_is_planned_is_raised_at_once_and_the_robot_stands_on(
     plant: WatchedPlant, monkeypatch: pytest.MonkeyPatch, *, realtime: bool
@@ -269,8 +308,8 @@ class Failing(Task):
 
 def with_task(go2: GO2Controller, task: Task) -> ControlLoop:
     loop = go2._runner.loop
-    with go2._runner.lock():
-        loop.wbc = WholeBodyController(RobotModel(), extra_tasks=[task])
+    wbc = WholeBodyController(RobotModel(), extra_tasks=[task])
+    go2._runner.between_ticks(lambda: setattr(loop, "wbc", wbc))
     return loop
 
 

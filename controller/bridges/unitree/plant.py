@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 
+from controller.background_log import BackgroundLog
 from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree.codec import encode_message
 from controller.bridges.unitree.extra import require_dds
@@ -145,6 +146,7 @@ class UnitreePlant(Plant):
         self._is_taken_over = True
         atexit.register(self.close)
         _exit_on_signals()
+        self._lines = BackgroundLog(_log.warning)
         self._watchdog = threading.Thread(target=self._watch, name="unitree-watchdog", daemon=True)
         self._watchdog.start()
         self._synchronise()
@@ -205,6 +207,7 @@ class UnitreePlant(Plant):
         for _ in range(EXIT_DAMPINGS):
             self._damp_once()
             time.sleep(DAMPING_PERIOD)
+        self._lines.close()
 
     def _check_open(self) -> None:
         if self._is_closed:
@@ -221,7 +224,7 @@ class UnitreePlant(Plant):
         try:
             self._send(JointCommand.damping(DAMPING))
         except PlantError as error:  # others may get through
-            _log.warning("a damping command could not be sent: %s", error)
+            self._lines.warning("a damping command could not be sent: %s", error)
 
     def _stop(self, error: PlantError) -> PlantError:
         """Damp the robot for good, once it was taken over; returns ``error`` to be raised."""
@@ -249,8 +252,8 @@ class UnitreePlant(Plant):
                         f"no command for {1000 * self._config.hang_limit:.0f} ms; a robot needs "
                         "one every 2 ms: GO2Controller(plant=..., realtime=True)"
                     )
-                    _log.warning("damped: %s", reason)
                     self._stop(PlantTimeout(reason))
+                    self._lines.warning("damped: %s", reason)
 
     # --- states ---------------------------------------------------------------------------
 

@@ -44,8 +44,7 @@ def robot(plant: MujocoPlant, monkeypatch: pytest.MonkeyPatch) -> Iterator[Sport
 
 def test_a_lean_waits_for_steps_for_balance(robot: SportRobot, plant: MujocoPlant) -> None:
     # It leaned in the middle of a step.
-    with robot._runner.lock():
-        plant.push(np.array([PUSH, 0.0, 0.0]), PUSH_TIME)
+    robot._runner.between_ticks(lambda: plant.push(np.array([PUSH, 0.0, 0.0]), PUSH_TIME))
     assert wait_until(lambda: robot.mode is Mode.MOVING, HANG_GUARD)
     were_stepping: list[bool] = []
     run = robot._procedures.run

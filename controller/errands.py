@@ -1,0 +1,121 @@
+"""Work that other threads hand to the thread of a loop, so that none of them can stop it.
+
+Ctrl-C raises ``KeyboardInterrupt`` between two instructions of the main thread, also just after it
+has taken a lock. A lock of the loop that it kept so would leave the robot without commands. So
+whoever wants something of the loop hands in an errand and waits for the answer; all that the
+threads share are queues whose ``put`` never waits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from enum import Enum
+from queue import Empty, SimpleQueue
+from typing import Generic, NoReturn, TypeVar, final
+
+POLL = 0.05
+"""Time [s] after which a waiting thread looks whether the loop still runs."""
+
+Result = TypeVar("Result")
+
+
+class Pending(Enum):
+    """What an errand returns that is to be done again after the next tick."""
+
+    NOT_YET = "not yet"
+
+
+NOT_YET = Pending.NOT_YET
+
+
+class LoopEnded(Exception):
+    """No errand is done any more, nor has this one been."""
+
+
+class LoopHangs(Exception):
+    """The loop has kept others waiting for too long."""
+
+
+@dataclass(slots=True, eq=False)
+class _Errand(Generic[Result]):
+    work: Callable[[], Result | Pending]
+    is_abandoned: bool = False
+    answer: SimpleQueue[Callable[[], Result]] = field(default_factory=SimpleQueue)
+
+    def is_over(self) -> bool:
+        """Do it, unless nobody waits for it any more; returns whether that was the last time."""
+        if self.is_abandoned:
+            return True
+        try:
+            result = self.work()
+        except BaseException as error:  # it is its asker's, whatever it is
+            self.answer.put(_raising(error))
+            return True
+        if isinstance(result, Pending):
+            return False
+        self.answer.put(lambda: result)
+        return True
+
+
+def _raising(error: BaseException) -> Callable[[], NoReturn]:
+    def fail() -> NoReturn:
+        raise error
+
+    return fail
+
+
+@final
+class Errands:
+    """What the thread of a loop has been asked to do between its ticks."""
+
+    def __init__(self) -> None:
+        """Nothing has been asked yet."""
+        self._asked: SimpleQueue[_Errand] = SimpleQueue()
+        self._under_way: list[_Errand] = []
+        self._rounds = 0
+        self._is_ended = False
+
+    def serve(self) -> None:
+        """Do what has been asked; once between two ticks, by the loop's thread."""
+        while not self._asked.empty():
+            self._under_way.append(self._asked.get_nowait())
+        self._under_way = [errand for errand in self._under_way if not errand.is_over()]
+        self._rounds += 1
+
+    def end(self) -> None:
+        """Serve for the last time."""
+        self.serve()
+        self._is_ended = True
+
+    def ask(self, work: Callable[[], Result | Pending], patience: float) -> Result:
+        """Have ``work`` done by the loop's thread, until it returns something but ``NOT_YET``.
+
+        Args:
+            work: what to do; an error that it raises is raised here.
+            patience: time [s] for which the loop may keep others waiting.
+
+        Raises:
+            LoopEnded: after ``end``.
+            LoopHangs: if nobody serves for longer than ``patience``.
+        """
+        errand = _Errand(work)
+        try:
+            self._asked.put(errand)
+            return self._answer(errand, patience)()
+        finally:
+            errand.is_abandoned = True  # by Ctrl-C, say: it must not be done after that
+
+    def _answer(self, errand: _Errand[Result], patience: float) -> Callable[[], Result]:
+        seen, waited = self._rounds, 0.0
+        while True:
+            is_last = self._is_ended
+            try:
+                return errand.answer.get(timeout=0.0 if is_last else POLL)
+            except Empty:
+                if is_last:
+                    raise LoopEnded from None
+            waited = waited + POLL if self._rounds == seen else 0.0
+            seen = self._rounds
+            if waited >= patience:
+                raise LoopHangs
