@@ -362,9 +362,7 @@ def test_an_interruption_is_told_if_what_another_thread_does_to_the_loop_does_no
     work.result(HANG_GUARD)
 
 
-def test_what_is_done_between_ticks_is_done_after_the_end_too(
-    make_runner: MakeRunner, plant: StillPlant
-) -> None:
+def test_what_is_done_between_ticks_is_done_after_the_end_too(make_runner: MakeRunner) -> None:
     runner = make_runner(realtime=True)
     here = threading.current_thread()
     assert runner.between_ticks(threading.current_thread) is not here
