@@ -40,7 +40,7 @@ _SMOOTHING = 0.05
 """Time constant [s] in which the joints' speeds are smoothed, to tell slow motion from noise."""
 _FLIGHT, _ARM = 0.5, 0.1
 """Share of gravity that a trunk feels at least if something carries it, while in flight it feels
-none; and the greatest distance [m] of the CoM from the IMU, by which a turning one feels a force."""
+none; and the greatest distance [m] of the CoM from the IMU, by which one that turns feels w^2 r."""
 _HEIGHT_GATE = 9.0
 """Square of the deviations by which a foot's height may be off that of flat ground; else it stands
 on something else, and its height says nothing."""

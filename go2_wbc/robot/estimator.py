@@ -30,9 +30,9 @@ A robot whose joints and IMU read rest for a while has no velocity, and if it li
 its bias: a zero-velocity update (Foxlin, IEEE Computer Graphics and Applications 25(6), 2005). On
 its feet it may turn slowly and read rest: the bias taken from that let the heading of a dance of a
 minute drift by 1.7 deg, and 0.35 as it is. One that lies is told from one in flight by the gravity
-that its trunk feels, beyond what the IMU of a turning one feels beside the CoM. At speed the biases are hardly learnt (``learning_speed``), and not at all
-from a trunk on the ground. After a tumble, or when what is at rest has been taken for something
-else, the filter begins anew.
+that its trunk feels, beyond what the IMU of a turning one feels beside the CoM. At speed the biases
+are hardly learnt (``learning_speed``), and not at all from a trunk on the ground. After a tumble,
+or when what is at rest has been taken for something else, the filter begins anew.
 ``kernels.estimation`` and ``kernels.filtering`` are the arithmetic.
 """
 
