@@ -193,7 +193,8 @@ class ControlLoop:
 
     def _guard(self) -> None:
         fault = self.fault
-        is_tipping = fault is not None and self.state.tilt > self._safety.astray_tilt_limit
+        limit = self._safety.greatest_tilt(is_astray=True)
+        is_tipping = fault is not None and self.state.tilt > limit
         if not (self.behaviour.needs_balance or is_tipping):
             return
         may_lie = self.behaviour.may_lie

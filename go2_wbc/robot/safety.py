@@ -80,6 +80,10 @@ class SafetyConfig:
         """Raise ConfigError for a limit that is not positive."""
         require_positive(self, *(field.name for field in fields(self)))
 
+    def greatest_tilt(self, *, is_astray: bool) -> float:
+        """Tilt [rad] beyond which a robot has fallen: of two limits the lower one, if astray."""
+        return min(self.tilt_limit, self.astray_tilt_limit) if is_astray else self.tilt_limit
+
 
 class FallDetector:
     """Says whether a robot that balances has fallen; asked once per tick."""
@@ -116,9 +120,8 @@ class FallDetector:
         self._has_struck = strikes or is_bouncing
         is_touching |= is_bouncing
         leans = lean > config.lean_limit
-        tilt_limit = config.astray_tilt_limit if may_lie or is_aslant else config.tilt_limit
         what = None
-        if state.tilt > tilt_limit:
+        if state.tilt > config.greatest_tilt(is_astray=may_lie or is_aslant):
             roll, pitch, _ = (round(angle) for angle in np.degrees(state.rpy).tolist())
             what = f"roll {roll} deg, pitch {pitch} deg"
         elif not may_lie and height < config.height_limit:

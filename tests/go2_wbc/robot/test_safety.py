@@ -105,6 +105,14 @@ def test_a_tilted_trunk_is_a_fall_at_once(
     assert reason == f"fell at t=0.00 s: roll {degrees} deg, pitch 0 deg"
 
 
+def test_a_tilt_limit_that_was_lowered_holds_for_a_robot_that_is_astray_too(
+    model: RobotModel,
+) -> None:
+    config = SafetyConfig(tilt_limit=0.5)
+    lean, snapshot = 0.6 * config.lean_limit, tilted(model, 0.51)
+    assert FallDetector(config).reason(snapshot, 0.0, lean, may_lie=False)
+
+
 def test_a_trunk_on_the_ground_is_a_fall_after_the_limit(
     falls: FallDetector, model: RobotModel
 ) -> None:
