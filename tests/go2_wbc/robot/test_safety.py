@@ -21,6 +21,8 @@ POINT_TOLERANCE = 0.01
 TICK = 0.01
 # rad; the foot is 89 mm below the hip.
 FOLDED_LEG = (0.0, 1.36, -2.72)
+# rad; 20 mm more below the trunk.
+NEARLY_FOLDED_LEG = (0.0, 1.31, -2.64)
 
 
 @pytest.fixture(scope="module")
@@ -37,10 +39,12 @@ def standing(model: RobotModel, time: float = 0.0) -> Snapshot:
     return model.snapshot(state_of(standing_q(), time=time))
 
 
-def on_the_belly(model: RobotModel, time: float = 0.0) -> Snapshot:
+def on_the_belly(
+    model: RobotModel, time: float = 0.0, leg: tuple[float, float, float] = FOLDED_LEG
+) -> Snapshot:
     """Legs folded so far that the trunk touches, but not below the limit of its height."""
     q = standing_q(0.11)
-    q[7:] = np.tile(FOLDED_LEG, 4)
+    q[7:] = np.tile(leg, 4)
     snapshot = model.snapshot(state_of(q, time=time))
     height = q[2] - snapshot.p_world_feet[:, 2].min()
     assert height > SafetyConfig().height_limit
@@ -122,6 +126,20 @@ def test_a_trunk_on_the_ground_is_a_fall_after_the_limit(
         reason = falls.reason(on_the_belly(model, time), 0.0, 0.0, may_lie=False)
         first = time if reason and first is None else first
     assert first == pytest.approx(1.0 + limit, abs=1.5 * TICK)
+
+
+@pytest.mark.parametrize(("lean", "has_fallen"), [(0.0, False), (0.4, True)])
+def test_a_robot_aslant_touches_the_ground_from_further_above(
+    falls: FallDetector, model: RobotModel, *, lean: float, has_fallen: bool
+) -> None:
+    # Its nose lay on the ground, which feet that press into it and a degree put 1 to 2 cm below.
+    snapshot, reason = standing(model), None
+    for time in (0.0, 0.09, 0.12):
+        snapshot = on_the_belly(model, time, NEARLY_FOLDED_LEG)
+        reason = falls.reason(snapshot, 0.0, lean, may_lie=False)
+    ground = snapshot.p_world_feet[:, 2].min() - model.foot_radius
+    assert 0.015 < trunk_clearance(snapshot, ground) < 0.025
+    assert (reason is not None) is has_fallen
 
 
 def test_touches_that_end_in_between_are_stumbles(falls: FallDetector, model: RobotModel) -> None:
