@@ -2,8 +2,8 @@
 
 Every row twice, with the true state and (``sensed-``) with what the robot's own sensors tell, and
 MuJoCo judges. Motors with their torque-speed line, friction 0.6 to 1.0 (drops: 0.4 to 1.0), masses
-within 10 %, of which the controller is not told; forces planned ahead by the MPC. Numbers were
-chosen on seeds 0 to 9, from 9000 and from 30000 to 63999; those judged begin at ``FIRST_SEED``.
+within 10 %, of which the controller is not told. Numbers were chosen on seeds 0 to 9, from 9000 and
+from 30000 to 63999; those judged begin at ``FIRST_SEED``.
 
 - standing: a push of 0.1 s in each of eight directions, 36 N s aside, 45 ahead and back, on an
   ellipse in between; survived is who stands again within 3 s;
@@ -26,7 +26,7 @@ import numpy as np
 
 from benchmarks import disturbed
 from benchmarks.answers import commanded
-from benchmarks.locomotion import CONFIG, MASS_RANGE
+from benchmarks.locomotion import MASS_RANGE
 from benchmarks.pushes import PUSH_TIME, heading_force
 from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.seeded import add_seeded_options, run_seeded
@@ -82,7 +82,7 @@ def impulse_at(angle: float) -> float:
 def measure_standing(trial: Trial, name: str, sensors: str, direction: int) -> Measurement:
     """Push the standing robot in one direction."""
     angle = 2.0 * math.pi * direction / DIRECTIONS
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors)) as robot:
         robot.require(robot.go2.stand())
         start, since = robot.plant.time, math.inf
         try:
@@ -102,7 +102,7 @@ def measure_trotting(trial: Trial, name: str, sensors: str, push: str) -> Measur
     survived = 0
     for phase in range(PHASES):
         side = 1.0 if phase % 2 or push != "lateral" else -1.0
-        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
+        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors)) as robot:
             survived += trots_on(robot, phase, heading_force(side * angle, impulse))
     return Measurement({name: survived / PHASES})
 
@@ -141,7 +141,7 @@ def dropped(seed: int, sensors: str = "ideal") -> MujocoPlant:
 
 def measure_recovery(trial: Trial, name: str, sensors: str) -> Measurement:
     """Drop the limp robot and let it get up."""
-    with TrialRobot(dropped(FIRST_SEED + trial.seed, sensors), CONFIG) as robot:
+    with TrialRobot(dropped(FIRST_SEED + trial.seed, sensors)) as robot:
         robot.go2.wait(DROP_TIME)
         said = robot.go2.recover()
         is_up = said and robot.truth.fall() is None
@@ -153,7 +153,7 @@ def measure_recovery(trial: Trial, name: str, sensors: str) -> Measurement:
 def measure_gaits(trial: Trial, name: str, sensors: str) -> Measurement:
     """Change the gait, or stop, again and again."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors)) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         try:
@@ -182,7 +182,7 @@ def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
 def measure_commands(trial: Trial, name: str, sensors: str) -> Measurement:
     """Follow random velocities; ticks in which the QP had no answer are counted."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors)) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         counts, why = robot.go2.telemetry, ""

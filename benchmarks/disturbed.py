@@ -18,7 +18,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.locomotion import CONFIG, MASS_RANGE
+from benchmarks.locomotion import MASS_RANGE
 from benchmarks.pushes import PUSH_TIME, heading_force
 from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.steps import plant_of
@@ -156,7 +156,7 @@ class Watch:
 def measure_disturbed(trial: Trial, name: str, sensors: str) -> Measurement:
     """Call at random, push at random, and let the robot recover from every fall."""
     rng = np.random.default_rng(FIRST_SEED + trial.seed)
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors)) as robot:
         watch = Watch(robot, rng)
         robot.truth.on_tick = watch.look
         for _ in range(CALLS):

@@ -16,9 +16,6 @@ from benchmarks.speed_bare import BareWork, timed
 from benchmarks.speed_solves import recorded_ticks, slowness
 from controller.go2_controller import GO2Controller
 from controller.sweeps.trials import Trial, TrialFailed
-from go2_wbc.config import Config
-from go2_wbc.planning.locomotion import LocomotionConfig
-from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.plant import MujocoPlant
 
 PERIOD = 2000.0
@@ -154,12 +151,9 @@ def measure_estimated(trial: Trial) -> Measurement:
 def _estimated(trial: Trial) -> np.ndarray:
     """Time [us] of each tick; a fresh robot, the same each time."""
     ends: list[int] = []
-    config = Config(locomotion=LocomotionConfig(mpc=MpcConfig(enabled=True)))
     with (
         closing(MujocoPlant(sensors="imu", seed=trial.seed)) as plant,
-        GO2Controller(
-            plant=plant, config=config, after_tick=lambda: ends.append(time.thread_time_ns())
-        ) as go2,
+        GO2Controller(plant=plant, after_tick=lambda: ends.append(time.thread_time_ns())) as go2,
     ):
         if not go2.walk():
             raise TrialFailed(go2.last_outcome.reason)

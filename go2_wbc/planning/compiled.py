@@ -26,7 +26,7 @@ from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 
-_TARGET_FRICTION = REFERENCE.start["friction"]
+_TARGET_FRICTION, _FRICTION = REFERENCE.start["friction"], MPC.start["friction"]
 _STATE = PLANNER.start
 _GOAL = PLANNER.slice("goal_offsets")
 _FORM = slice(PLANNER.start["period"], PLANNER.start["width"] + 1)
@@ -91,7 +91,7 @@ class CompiledPlanner(GaitPlanner):
 
     def change_gait(self, gait: Gait) -> None:
         """Walk on with ``gait``; see ``GaitPlanner``."""
-        self._plans_forces, self._forces = self._config.plans_forces(gait), _nothing_planned()
+        self._forces = _nothing_planned()
         self._numbers = _numbers(self._model, gait, self._config)
 
     @property
@@ -129,10 +129,8 @@ class CompiledPlanner(GaitPlanner):
         self._contact[:] = state.feet_in_contact
         own, numbers = self._state, self._numbers
         self._plan(snapshot.row, state.time, self._contact, state.tau, own, numbers, wanted, row)
-        if self._plans_forces:
-            forces = self._forces
-            self._mpc[MPC.start["friction"]] = min(self._mpc_friction, row[_TARGET_FRICTION])
-            self._steer(snapshot.row, state.time, own, numbers, self._mpc, wanted, forces, row)
+        forces, self._mpc[_FRICTION] = self._forces, min(self._mpc_friction, row[_TARGET_FRICTION])
+        self._steer(snapshot.row, state.time, own, numbers, self._mpc, wanted, forces, row)
         return Reference.of_row(row)
 
 
@@ -142,7 +140,6 @@ def _nothing_planned() -> np.ndarray:
 
 def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndarray:
     correction, rest = CorrectionConfig(), resting_gait(gait)
-    stride = gait.stride if config.plans_forces(gait) else None
     return LOCOMOTION.pack(
         [
             gait.period,
@@ -153,7 +150,7 @@ def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndar
             rest.duty,
             rest.offsets,
             rest.width,
-            np.zeros(5) if stride is None else astuple(stride),
+            np.zeros(5) if gait.stride is None else astuple(gait.stride),
             [PERIOD_RATE, DUTY_RATE, OFFSET_RATE, DUTY_FALL, WIDTH_RATE],
             config.stride_margin,
             config.height_on_feet,
@@ -164,7 +161,7 @@ def _numbers(model: RobotModel, gait: Gait, config: LocomotionConfig) -> np.ndar
             config.foothold_reach,
             config.normal_force_min,
             config.normal_force_max,
-            config.ramp(gait),
+            config.mpc.load_ramp,
             config.settle_speed,
             SETTLED_COMMAND,
             config.capture_margin,

@@ -30,7 +30,6 @@ from go2_wbc.contacts import (
     ContactPhase,
     ContactSchedule,
     Gait,
-    Stride,
 )
 
 Phases = tuple[float, float, float, float]
@@ -41,7 +40,7 @@ _DIGITS = 12
 
 def resting_gait(gait: Gait) -> Gait:
     """The gait in which a robot that walks with ``gait`` starts and comes to rest."""
-    is_own = gait.starts_at_once or (gait.lands_on_four and not gait.needs_mpc)
+    is_own = gait.starts_at_once or (gait.lands_on_four and not gait.has_flight)
     return gait if is_own else GAITS["trot"]
 
 
@@ -54,14 +53,14 @@ class GaitClock:
         time: since the stride's start or a whole number of strides before [s].
     """
 
-    def __init__(self, gait: Gait, stride: Stride | None) -> None:
-        """Args: gait: wanted; stride: how it follows the speed, or None."""
-        self.change(gait, stride)
+    def __init__(self, gait: Gait) -> None:
+        """Start for ``gait``."""
+        self.change(gait)
         self.restart()
 
-    def change(self, gait: Gait, stride: Stride | None) -> None:
+    def change(self, gait: Gait) -> None:
         """Move towards another gait from now on."""
-        self._wanted, self.rest, self._stride = gait, resting_gait(gait), stride
+        self._wanted, self.rest = gait, resting_gait(gait)
 
     def restart(self) -> None:
         """Begin the first stride."""
@@ -80,8 +79,8 @@ class GaitClock:
         """
         wanted = self.rest if is_resting else self._wanted
         period, duty, rise, fall = wanted.period, wanted.duty, DUTY_RATE, DUTY_RATE
-        if self._stride is not None and not is_resting:
-            period, duty = self._stride.at(speed)
+        if wanted.stride is not None and not is_resting:
+            period, duty = wanted.stride.at(speed)
             fall = DUTY_FALL if is_thrown else DUTY_RATE
         if wanted.offsets != self._goal:
             self._align(wanted.offsets)

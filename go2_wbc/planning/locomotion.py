@@ -20,7 +20,7 @@ frame (z up, x along the reference's yaw).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import InitVar, dataclass, field, fields
 
 import numpy as np
 from jaxtyping import Float
@@ -44,7 +44,7 @@ from go2_wbc.reference import LegTask, Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import turned, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import require_not_negative, require_positive
+from go2_wbc.validation import require_not_negative, require_positive, warn_retired
 
 LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34
 """CoM heights [m] between which the legs can step."""
@@ -52,6 +52,8 @@ MID_SWING = 0.2
 """Share of a swing before and after its middle in which a foot that has contact stumbles."""
 _TINY = 1e-9
 """Length [m] that stands in for zero where one divides by it."""
+_RETIRED_RAMP = 0.03
+"""Time [s] that ``LocomotionConfig.load_ramp`` was by default."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +75,6 @@ class LocomotionConfig:
         foothold_reach: greatest horizontal distance [m] of a foothold from below its hip.
         normal_force_min: least normal force [N] asked of a stance foot.
         normal_force_max: greatest normal force [N] allowed on a stance foot.
-        load_ramp: time [s] over which a foot takes up that force after touchdown and gives it up
-            before lift-off.
         settle_speed: speed [m/s] below which a robot without command may stop stepping.
         capture_margin: distance [m] of the capture point from the middle of the feet beyond
             which a standing robot starts to step.
@@ -86,6 +86,8 @@ class LocomotionConfig:
         ground: estimate of its slope and roughness.
         mpc: planning of the forces ahead.
         pose: how a new pose of the trunk is approached.
+
+    ``load_ramp`` is retired: ``mpc.load_ramp`` is the one that counts.
     """
 
     height: float = 0.29
@@ -99,7 +101,7 @@ class LocomotionConfig:
     foothold_reach: float = 0.22
     normal_force_min: float = 0.0
     normal_force_max: float = 400.0
-    load_ramp: float = 0.03
+    load_ramp: InitVar[float] = _RETIRED_RAMP
     settle_speed: float = 0.05
     capture_margin: float = 0.09
     square_tolerance: float = 0.02
@@ -110,8 +112,10 @@ class LocomotionConfig:
     mpc: MpcConfig = field(default_factory=MpcConfig)
     pose: PoseConfig = field(default_factory=PoseConfig)
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, load_ramp: float) -> None:
         """Raise ConfigError for a number that is out of range."""
+        if load_ramp != _RETIRED_RAMP:
+            warn_retired("LocomotionConfig.load_ramp", "LocomotionConfig.mpc.load_ramp counts")
         zero_is_valid = {"velocity_feedback", "normal_force_min", "compression"}
         parts = {"swing", "slip", "contact", "ground", "mpc", "pose"}
         positive = {f.name for f in fields(self)} - zero_is_valid - parts
@@ -139,14 +143,6 @@ class LocomotionConfig:
         rate = np.array([self.linear_acceleration] * 2 + [self.angular_acceleration])
         return TrunkLimits(rate, self.position_leash, self.yaw_leash, self.pose)
 
-    def plans_forces(self, gait: Gait) -> bool:
-        """Whether ``gait`` is walked with the forces planned ahead."""
-        return self.mpc.enabled or gait.needs_mpc
-
-    def ramp(self, gait: Gait) -> float:
-        """Time [s] over which a foot of ``gait`` takes up its load."""
-        return self.mpc.load_ramp if self.plans_forces(gait) else self.load_ramp
-
 
 class LocomotionPlanner(GaitPlanner):
     """The planner in its readable form, to which ``compiled.CompiledPlanner`` is held."""
@@ -160,7 +156,8 @@ class LocomotionPlanner(GaitPlanner):
         """Prepare a planner; ``start`` sets it on its way."""
         self._model = model
         self._config = config
-        self._clock = GaitClock(gait, None)
+        self._forces = ForcePlanner(model, config.mpc)
+        self._clock = GaitClock(gait)
         self.change_gait(gait)
         self._is_stepping = False
         self._has_started = False
@@ -172,8 +169,7 @@ class LocomotionPlanner(GaitPlanner):
         self._contacts = FootContacts(self._config.contact)
         self._has_started, self._is_stepping = True, False
         self._clock.restart()
-        if self._forces is not None:
-            self._forces.start()
+        self._forces.start()
         self._last_time = snapshot.state.time
         self._ground = GroundPlane(snapshot, self._model.foot_radius, self._config.ground)
         self._swings = [Swing(foot) for foot in snapshot.p_world_feet]
@@ -182,11 +178,9 @@ class LocomotionPlanner(GaitPlanner):
 
     def change_gait(self, gait: Gait) -> None:
         """Walk on with ``gait``; see ``GaitPlanner``."""
-        config = self._config
-        plans_forces = config.plans_forces(gait)
-        self._clock.change(gait, gait.stride if plans_forces else None)
-        self._ramp, self._swing = config.ramp(gait), config.swing.at_most(gait.apex)
-        self._forces = ForcePlanner(self._model, config.mpc) if plans_forces else None
+        self._clock.change(gait)
+        self._swing = self._config.swing.at_most(gait.apex)
+        self._forces.start()
 
     @property
     def velocity(self) -> Float[np.ndarray, "3"]:
@@ -227,7 +221,7 @@ class LocomotionPlanner(GaitPlanner):
         p, v, a = self._feet(snapshot, phase)
         legs = tuple(LegTask.STANCE if s else LegTask.SWING for s in stance)
         q = snapshot.state.joint_positions
-        load = self._contacts.load_share(phase, self._ramp)
+        load = self._contacts.load_share(phase, self._config.mpc.load_ramp)
         body = self._trunk.target(self._ground, self._config.height_on_feet)
         reference = Reference(
             body=self._trunk.levelled(body, snapshot, dt, is_stepping=self._is_stepping),
@@ -242,7 +236,7 @@ class LocomotionPlanner(GaitPlanner):
             a_joints=np.zeros(12),
             friction=self._friction,
         )
-        if self._forces is None or not self._is_stepping:
+        if not self._is_stepping:
             return reference
         course = self._course(snapshot, command, pose, phase)
         return self._forces.update(snapshot, course, reference)

@@ -19,13 +19,18 @@ This is the readable form, with the nodes' states stacked; ``kernels.mpc`` is th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.kernels.layout import MPC, MPC_NODES
-from go2_wbc.validation import require_not_negative, require_positive, require_share
+from go2_wbc.validation import (
+    require_not_negative,
+    require_positive,
+    require_share,
+    warn_retired,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +38,6 @@ class MpcConfig:
     """Numbers of the MPC, from a search on this robot in simulation.
 
     Attributes:
-        enabled: whether the gaits that can do without it use it too.
         step: length [s] of a node.
         interval: time [s] from one solution to the next.
         angle_weights, position_weights: of the turn [1/rad^2] and the CoM's place [1/m^2].
@@ -43,15 +47,18 @@ class MpcConfig:
         force_max: greatest normal force [N] of a foot, while it stands.
         least_share: part of a node below which a foot counts as in the air.
         prior_weight: by which the whole-body controller keeps to the forces.
-        load_ramp: as ``LocomotionConfig.load_ramp``, in its place: the forces come without a jump.
+        load_ramp: time [s] over which a foot may take up the force after touchdown and give it up
+            before lift-off.
         throw_time: time constant [s] with which a robot that has been thrown is taken to slow down.
         throw_speed: speed [m/s] of such a robot, beyond ``LocomotionConfig.stride_margin``, at
             which the trunk's attitude weighs half as much in the whole-body QP. With all its weight
             and the feet far from below the CoM, the legs in the air are swung to turn the trunk:
             feet that should have come down were 0.16 m high, and the robot fell onto them.
+
+    ``enabled`` is retired: the forces of every gait are planned ahead.
     """
 
-    enabled: bool = False
+    enabled: InitVar[bool] = True
     step: float = 0.03
     interval: float = 0.01
     angle_weights: tuple[float, float, float] = (20.0, 20.0, 20.0)
@@ -67,8 +74,10 @@ class MpcConfig:
     throw_time: float = 0.4
     throw_speed: float = 0.05
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, enabled: bool) -> None:
         """Raise ConfigError for a number that is out of range."""
+        if not enabled:
+            warn_retired("MpcConfig.enabled", "the forces of every gait are planned ahead")
         weights = "angle_weights", "position_weights", "angular_weights", "linear_weights"
         require_not_negative(self, *weights)
         require_positive(self, "step", "interval", "force_weight", "friction", "force_max")

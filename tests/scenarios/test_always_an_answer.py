@@ -6,15 +6,17 @@ A sample of ``python -m benchmarks answers``, one seed of each row.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 
 from benchmarks.answers import SCENARIOS
-from benchmarks.locomotion import CONFIG, MASS_RANGE
+from benchmarks.locomotion import MASS_RANGE
 from benchmarks.pushes import PUSH_TIME, heading_force
 from benchmarks.steps import plant_of
 from controller.sweeps.trials import Trial, TrialRobot
+from go2_wbc.config import Config
+from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.mpc import MpcConfig
 
 SAMPLES = [("boxes", 19), ("pushes", 12), ("stops", 17)]
 """Scenario and seed."""
@@ -45,8 +47,7 @@ def test_a_hip_at_its_stop_for_a_moment_does_not_damp_a_robot_that_is_pushed(
 
     The attitude keeps its weight, or no hip comes to its stop.
     """
-    mpc = replace(CONFIG.locomotion.mpc, throw_speed=1e9)
-    config = replace(CONFIG, locomotion=replace(CONFIG.locomotion, mpc=mpc))
+    config = Config(locomotion=LocomotionConfig(mpc=MpcConfig(throw_speed=1e9)))
     with TrialRobot(plant_of(Trial(seed), 7100, MASS_RANGE, "imu"), config) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())

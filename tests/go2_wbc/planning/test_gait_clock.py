@@ -19,7 +19,8 @@ JUMP = 0.03  # of a swing's progress in one tick; the fastest swing takes 0.132 
 
 @pytest.mark.parametrize("gait", GAITS.values(), ids=lambda gait: gait.name)
 def test_a_gait_is_reached_from_the_one_at_rest_and_left_again(gait: Gait) -> None:
-    clock = GaitClock(gait, None)
+    gait = replace(gait, stride=None)
+    clock = GaitClock(gait)
     assert clock.gait == resting_gait(gait)
     for wanted, is_resting in ((gait, False), (resting_gait(gait), True)):
         run(clock, is_resting=is_resting)
@@ -28,15 +29,15 @@ def test_a_gait_is_reached_from_the_one_at_rest_and_left_again(gait: Gait) -> No
 
 def test_a_gait_that_starts_at_once_is_not_preceded_by_the_trot() -> None:
     flying = Gait("flying", 0.3, 0.4, (0.0, 0.5, 0.5, 0.0))
-    assert GaitClock(flying, None).gait == GAITS["trot"]
+    assert GaitClock(flying).gait == GAITS["trot"]
     at_once = replace(flying, starts_at_once=True)
-    assert GaitClock(at_once, None).gait == at_once
+    assert GaitClock(at_once).gait == at_once
 
 
 @pytest.mark.parametrize("gait", GAITS.values(), ids=lambda gait: gait.name)
 def test_no_foot_is_put_back_in_its_stride_while_the_gait_changes(gait: Gait) -> None:
     rng = np.random.default_rng(5)
-    clock = GaitClock(gait, gait.stride)
+    clock = GaitClock(gait)
     phases = []
     for _ in range(6):
         phases += run(clock, seconds=rng.uniform(0.2, 1.0), is_resting=rng.random() < 0.5)
@@ -52,11 +53,11 @@ def test_no_foot_is_put_back_in_its_stride_while_the_gait_changes(gait: Gait) ->
 @pytest.mark.parametrize("there", ["pace", "bound"])
 def test_between_walk_and_pairs_neither_is_walked_at_the_pace_of_the_other(there: str) -> None:
     """A pace or bound at half a second a stride tipped over a pair; a fast walk's swings missed."""
-    gait, walk = GAITS[there], GAITS["walk"]
-    clock = GaitClock(gait, None)
+    gait, walk = replace(GAITS[there], stride=None), GAITS["walk"]
+    clock = GaitClock(gait)
     run(clock, is_resting=False)
     for wanted in (walk, gait):
-        clock.change(wanted, None)
+        clock.change(wanted)
         whole = longest_way(aligned(clock.gait.offsets, wanted.offsets), wanted.offsets)
         for _ in range(int(SECONDS / TICK)):
             run(clock, seconds=TICK, is_resting=False)
@@ -86,9 +87,9 @@ def test_the_longest_way_of_a_foot_to_another_gait_is_the_shortest_there_is(
 
 def test_a_walk_becomes_a_flying_trot_without_a_pace() -> None:
     """Its front feet went half a stride, and with both feet of a side together it fell."""
-    clock = GaitClock(GAITS["walk"], None)
+    clock = GaitClock(GAITS["walk"])
     run(clock, is_resting=False)
-    clock.change(GAITS["flying_trot"], None)
+    clock.change(GAITS["flying_trot"])
     for _ in range(int(SECONDS / TICK)):
         run(clock, seconds=TICK, is_resting=False)
         fl, fr, rl, rr = clock.gait.offsets
@@ -99,13 +100,13 @@ def test_a_walk_becomes_a_flying_trot_without_a_pace() -> None:
 
 
 def test_no_foot_notices_that_its_phase_is_named_otherwise() -> None:
-    clock = GaitClock(GAITS["walk"], None)
+    clock = GaitClock(GAITS["walk"])
     run(clock, is_resting=False)
     rng = np.random.default_rng(3)
     for wanted in (*GAITS.values(), *GAITS.values()):
         clock.time += rng.uniform(0.0, 1.0)
         before = clock.now()
-        clock.change(wanted, None)
+        clock.change(wanted)
         clock.adapt(1e-9, 1.0, is_resting=False, is_thrown=False)
         after = clock.now()
         np.testing.assert_array_equal(after.stance, before.stance)
@@ -114,7 +115,7 @@ def test_no_foot_notices_that_its_phase_is_named_otherwise() -> None:
 
 
 def test_the_feet_come_together_and_apart_without_a_jump() -> None:
-    clock = GaitClock(GAITS["pace"], None)
+    clock = GaitClock(GAITS["pace"])
     widths = [clock.gait.width]
     for is_resting in (False, True):
         for _ in range(int(SECONDS / TICK)):
@@ -126,9 +127,7 @@ def test_the_feet_come_together_and_apart_without_a_jump() -> None:
 
 def test_a_robot_that_is_thrown_lifts_its_feet_sooner_at_once() -> None:
     """At the usual rate it fell over feet that stood on."""
-    stride = GAITS["trot"].stride
-    assert stride is not None
-    usual, thrown = (GaitClock(GAITS["trot"], stride) for _ in range(2))
+    usual, thrown = (GaitClock(GAITS["trot"]) for _ in range(2))
     run(usual, seconds=0.06, is_resting=False)
     run(thrown, seconds=0.06, is_resting=False, is_thrown=True)
     assert usual.gait.duty > 0.46

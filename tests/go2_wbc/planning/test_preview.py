@@ -7,12 +7,12 @@ import numpy as np
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
-from go2_wbc.planning.mpc import Horizon, MpcConfig
+from go2_wbc.planning.mpc import Horizon
 from go2_wbc.planning.pose import LEVEL
 from go2_wbc.planning.preview import beyond, look_ahead
 from tests.go2_wbc.planning.squared import MODEL, at, moving, resting
 
-CONFIG = LocomotionConfig(mpc=MpcConfig(enabled=True))
+CONFIG = LocomotionConfig()
 COMMAND = VelocityCommand(0.5)
 FARTHEST = 0.65  # m, a foot from the CoM at 3.7 m/s: 0.60
 
