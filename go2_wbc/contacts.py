@@ -14,6 +14,7 @@ from dataclasses import InitVar, dataclass, field
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.compilation import subroutine
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
 from go2_wbc.legs import LEGS
 from go2_wbc.validation import require_not_negative, require_positive, require_share
@@ -150,9 +151,15 @@ class Stride:
 
     def at(self, speed: float) -> tuple[float, float]:
         """Period [s] and duty at a ``speed`` [m/s]."""
-        stance = min(max(self.reach / max(speed, TIE), self.stance_min), self.stance_max)
-        period = stance + self.swing + self.swing_slope * (speed - 1.0)
-        return period, stance / period
+        return stride_at(self, speed)
+
+
+@subroutine
+def stride_at(c: Stride, speed: float) -> tuple[float, float]:
+    """Period [s] and duty at a ``speed`` [m/s]."""
+    stance = min(max(c.reach / max(speed, TIE), c.stance_min), c.stance_max)
+    period = stance + c.swing + c.swing_slope * (speed - 1.0)
+    return period, stance / period
 
 
 @dataclass(frozen=True, slots=True)
@@ -259,14 +266,6 @@ GAITS: dict[str, Gait] = {
     )
 }
 """The gaits by name. The trot is the one in which the robot starts to walk and comes to rest."""
-PERIOD_RATE, DUTY_RATE, OFFSET_RATE = 0.2, 0.5, 0.8
-"""Greatest change of a gait in a second: of its period [s/s], duty and offsets [1/s]. A foot's
-phase passes at 2 per second or more, so that no foot is put back to where it was."""
-WIDTH_RATE = 2.0
-"""Greatest change of a gait's width in a second, so that no swing's goal jumps [1/s]."""
-DUTY_FALL = 4.0
-"""Greatest fall [1/s] of the duty of a robot that has been thrown: a foot that lifts off sooner
-is not put back. At 0.5 a push of 50 N s ahead threw a trot of 0.5 m/s over feet that stood on."""
 
 
 def find_gait(name: str | Gait) -> Gait:
