@@ -57,7 +57,7 @@ from numba.core.imputils import lower_cast
 from numba.core.runtime import _nrt_python  # pyright: ignore[reportAttributeAccessIssue]
 from numba.core.serialize import dumps
 
-from go2_wbc.records import Flag, Record, layout_of
+from go2_wbc.records import Record, layout_of
 
 _log = logging.getLogger(__name__)
 
@@ -224,8 +224,9 @@ def _call_plain(self: _Kernel, *arguments: Any) -> Any:
     given = []
     for value, (_, hint) in zip(arguments, hints, strict=False):
         if isinstance(hint, type) and issubclass(hint, Record) and not isinstance(value, hint):
-            value = hint.of(value.row)
-        given.append(np.float64(value) if hint is float else value)
+            given.append(hint.of(value.row))
+        else:
+            given.append(np.float64(value) if hint is float else value)
     with np.errstate(all="ignore"):
         return self.python(*given)
 
@@ -236,11 +237,8 @@ def _is_record(kind: Any) -> bool:
 
 def _type_of(hint: Any, where: str) -> Any:
     """Numba's type of an annotation."""
-    simple = {None: types.void, type(None): types.void, float: types.float64, int: types.int64}
-    if hint in (bool, Flag):
-        return types.boolean
-    if isinstance(hint, (type, type(None))) and hint in simple:
-        return simple[hint]
+    if hint in _SIMPLE:
+        return _SIMPLE[hint]
     if typing.get_origin(hint) is Annotated and _FOREIGN in hint.__metadata__:
         array = _type_of(hint.__origin__, where)
         return types.Array(array.dtype, array.ndim, "A", readonly=True)
@@ -255,6 +253,8 @@ def _type_of(hint: Any, where: str) -> Any:
     raise TypeError(f"{where} is declared as {hint!r}, which compiled code does not know")
 
 
+_SIMPLE = {None: types.void, type(None): types.void, bool: types.boolean}
+_SIMPLE |= {float: types.float64, int: types.int64}
 _NUMBERS = {"float64": types.float64, "int64": types.int64, "int32": types.int32}
 _NUMBERS |= {"bool": types.boolean, "bool_": types.boolean}
 
@@ -433,7 +433,7 @@ def _ingredients(function: FunctionType, seen: set[int]) -> Iterator[str]:
         constants = [c for c in code.co_consts if c != function.__doc__ and not _is_code(c)]
         yield repr((code.co_code.hex(), constants, code.co_names, code.co_varnames))
         names |= set(code.co_names)
-    known = inspect.getclosurevars(function).nonlocals
+    known = dict(inspect.getclosurevars(function).nonlocals)
     known |= {name: function.__globals__[name] for name in names if name in function.__globals__}
     for name, value in sorted(known.items()):
         if isinstance(value, ModuleType) and value.__name__.partition(".")[0] in _OUR_OWN:

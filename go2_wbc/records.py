@@ -35,8 +35,6 @@ from jaxtyping import AbstractArray, Float
 
 T = TypeVar("T")
 
-Flag = bool | np.bool_
-"""Yes or no, as Python and as numpy say it."""
 V3 = tuple[float, float, float]
 """A vector as three numbers, which compiled code keeps in registers."""
 
@@ -206,7 +204,7 @@ def layout_of(cls: type) -> Layout:
 def _field(hint: Any, start: int, where: str) -> Field:
     if hint in (float, int):
         return Field(start, ())
-    if hint in (bool, Flag):
+    if hint is bool:
         return Field(start, (), is_flag=True)
     if isinstance(hint, type) and issubclass(hint, AbstractArray):
         if "float64" in hint.dtypes:

@@ -265,7 +265,7 @@ def finish(
     q: int,
     side: Int[np.ndarray, " m"],
     x: Float[np.ndarray, " n"],
-    y: Float[np.ndarray, " k+m"],
+    y: Float[np.ndarray, " rows"],
     k: int,
 ) -> int:
     """Put the working set's multipliers in their places in y; an equality's sign waits there."""
@@ -288,7 +288,7 @@ def constrain(
     lower: Float[np.ndarray, " m"],
     upper: Float[np.ndarray, " m"],
     x: Float[np.ndarray, " n"],
-    y: Float[np.ndarray, " k+m"],
+    y: Float[np.ndarray, " rows"],
 ) -> int:
     """The same as ``solve_qp``, from the minimum x without constraints, with H = L L'."""
     n, k, m = len(x), len(e), len(lower)
@@ -337,7 +337,7 @@ def solve_qp(
     lower: Float[np.ndarray, " m"],
     upper: Float[np.ndarray, " m"],
     x: Float[np.ndarray, " n"],
-    y: Float[np.ndarray, " k+m"],
+    y: Float[np.ndarray, " rows"],
 ) -> int:
     """Fill the minimiser x (n,) and the multipliers y (k + m,); returns the outcome.
 

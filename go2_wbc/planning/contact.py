@@ -20,7 +20,7 @@ import numpy as np
 
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
-from go2_wbc.records import Flag, Record
+from go2_wbc.records import Record
 from go2_wbc.validation import require_positive, require_share
 
 
@@ -63,8 +63,8 @@ def follow_contact(
     foot: FootContact,
     c: ContactConfig,
     above: float,
-    touches: Flag,
-    planned: Flag,
+    touches: bool,
+    planned: bool,
     progress: float,
     dt: float,
 ) -> bool:
@@ -86,11 +86,11 @@ def follow_contact(
         if touches and above > c.step and progress >= c.earliest - TIE:
             foot.is_early, foot.since = True, 0.0
     foot.since += dt
-    return bool(planned or foot.is_early)
+    return planned or foot.is_early
 
 
 @subroutine
-def loaded_time(foot: FootContact, planned: Flag, elapsed: float, remaining: float) -> float:
+def loaded_time(foot: FootContact, planned: bool, elapsed: float, remaining: float) -> float:
     """Time [s] to the nearest change of a standing foot's contact, since when it came down."""
     begun = foot.since if foot.since < np.inf else elapsed
     return min(begun, remaining) if planned else begun

@@ -49,6 +49,11 @@ class GaitForm:
     offsets: Phases
     width: float
 
+    @staticmethod
+    def of(gait: Gait) -> GaitForm:
+        """That of a gait as it is written."""
+        return GaitForm(gait.period, gait.duty, gait.offsets, gait.width)
+
 
 @dataclass(frozen=True, slots=True)
 class Cadence:
@@ -69,8 +74,8 @@ class Cadence:
     @staticmethod
     def of(gait: Gait) -> Cadence:
         """That of a robot that walks with ``gait``."""
-        forms = (GaitForm(g.period, g.duty, g.offsets, g.width) for g in (gait, resting_gait(gait)))
-        return Cadence(*forms, gait.stride or Stride(), gait.stride is not None)
+        rest, stride = resting_gait(gait), gait.stride or Stride()
+        return Cadence(GaitForm.of(gait), GaitForm.of(rest), stride, gait.stride is not None)
 
 
 class Clock(Record):

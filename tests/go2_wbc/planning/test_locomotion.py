@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +10,6 @@ import pytest
 
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.compiled import CompiledPlanner
-from go2_wbc.planning.gait_planner import GaitPlanner
 from go2_wbc.planning.ground import GROUND_SHARE
 from go2_wbc.planning.locomotion import LocomotionPlanner
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
@@ -28,29 +25,16 @@ EXACT = 1e-9  # rounding in sums of a few hundred ticks
 SWING_END = TROT.swing_time - TICK
 LAST_TICK = 5e-4  # [m] the swing curve's way in the last tick, with margin
 OUTSIDE = 0.01  # m
-KINDS = [LocomotionPlanner, CompiledPlanner]
 
 
-@pytest.fixture(params=KINDS, ids=lambda kind: kind.__name__, autouse=True)
-def planner_kind(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Every test holds for the readable planner and for the compiled one."""
-    global make_planner
-    make_planner = request.param
-    yield
-    make_planner = LocomotionPlanner
-
-
-make_planner: type[LocomotionPlanner] | type[CompiledPlanner] = LocomotionPlanner
-
-
-def started(snapshot: Snapshot, gait: Gait = TROT) -> GaitPlanner:
-    planner = make_planner(MODEL, gait, CONFIG)
+def started(snapshot: Snapshot, gait: Gait = TROT) -> LocomotionPlanner:
+    planner = LocomotionPlanner(MODEL, gait, CONFIG)
     planner.start(snapshot)
     return planner
 
 
 def hold(
-    planner: GaitPlanner, snapshot: Snapshot, command: VelocityCommand, seconds: float
+    planner: LocomotionPlanner, snapshot: Snapshot, command: VelocityCommand, seconds: float
 ) -> Reference:
     """The last reference of a robot that stays where it is whatever it is asked."""
     start = snapshot.state.time
@@ -87,7 +71,7 @@ class IdealRobot:
 
 def test_before_it_has_started_it_is_not_stepping_and_has_no_heading() -> None:
     # It had no attribute to tell it by.
-    planner = make_planner(MODEL, TROT, CONFIG)
+    planner = LocomotionPlanner(MODEL, TROT, CONFIG)
     assert not planner.is_stepping
     assert planner.heading == 0.0
 
@@ -268,7 +252,7 @@ def test_a_turning_robot_steps_along_the_circle_about_its_middle(ahead: float, l
 def test_feet_of_a_fast_turn_stay_on_their_circle_all_the_way() -> None:
     """They went 5 cm outside of it in mid-swing: motors saturated, and the robot fell."""
     start = resting()
-    planner = make_planner(MODEL, TROT, replace(CONFIG, angular_acceleration=1e4))
+    planner = LocomotionPlanner(MODEL, TROT, replace(CONFIG, angular_acceleration=1e4))
     planner.start(start)
     radius = np.linalg.norm(start.p_world_feet[:, :2], axis=1).max()
     for tick in range(round(SWING_END / TICK)):

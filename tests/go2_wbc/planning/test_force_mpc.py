@@ -6,10 +6,11 @@ import numpy as np
 
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.force_mpc import excess_velocity, look_ahead
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
-from go2_wbc.planning.mpc import Horizon
-from go2_wbc.planning.pose import LEVEL
-from go2_wbc.planning.preview import beyond, look_ahead
+from go2_wbc.planning.mpc import NODES
+from go2_wbc.planning.trunk import Trunk
+from go2_wbc.planning.walk import Planner, Walk
 from tests.go2_wbc.planning.squared import MODEL, at, moving, resting
 
 CONFIG = LocomotionConfig()
@@ -17,31 +18,28 @@ COMMAND = VelocityCommand(0.5)
 FARTHEST = 0.65  # m, a foot from the CoM at 3.7 m/s: 0.60
 
 
-def horizon_at(*velocity: float) -> Horizon:
-    """Of a trot that has just begun, whose CoM has ``velocity`` [m/s]."""
+def test_feet_of_a_thrown_robot_come_down_below_it() -> None:
+    """With the wanted way they were 1.03 m from it; forces planned for these tipped it over."""
     planner, thrown = LocomotionPlanner(MODEL, GAITS["trot"], CONFIG), resting()
     planner.start(thrown)
     for tick in range(30):
-        thrown = at(moving(resting(), np.array(velocity)), 0.01 * tick)
+        thrown = at(moving(resting(), np.array([3.7, 0.0, 0.0])), 0.01 * tick)
         planner.update(thrown, COMMAND)
-    course = planner._course(thrown, COMMAND, LEVEL, planner._clock.now())
-    return look_ahead(thrown, course, CONFIG.mpc, MODEL)
-
-
-def test_feet_of_a_thrown_robot_come_down_below_it() -> None:
-    """With the wanted way they were 1.03 m from it; forces planned for these tipped it over."""
-    horizon = horizon_at(3.7, 0.0, 0.0)
-    presses = horizon.share >= CONFIG.mpc.least_share
+    state, goals, share = np.empty(12), np.empty((NODES, 12)), np.empty((NODES, 4))
+    arms, told = np.empty((NODES, 4, 3)), (planner._state, planner._walk, planner._command)
+    look_ahead(thrown, *told, state, goals, share, arms)
+    presses = share >= CONFIG.mpc.least_share
     assert presses.any(axis=0).all()
-    distance = np.linalg.norm(horizon.arms[presses][:, :2], axis=1)
-    assert distance.max() <= FARTHEST
+    assert np.linalg.norm(arms[presses][:, :2], axis=1).max() <= FARTHEST
 
 
 def test_within_the_margin_the_wanted_way_counts() -> None:
-    margin = CONFIG.stride_margin
-    np.testing.assert_array_equal(beyond(np.array([0.6, -0.8]) * margin, margin), 0.0)
-    np.testing.assert_allclose(beyond(np.array([0.0, 1.4]), 0.4), [0.0, 1.0])
-    np.testing.assert_array_equal(beyond(np.zeros(2), margin), 0.0)
+    walk, wanted = Walk.of(MODEL, GAITS["trot"], CONFIG), np.array([0.3, 0.1])
+    planner, margin = Planner(trunk=Trunk(velocity=np.array([*wanted, 0.0]))), CONFIG.stride_margin
+    for beyond, left in (((0.6, -0.8), 0.0), ((0.0, 1.0 + 1.0 / margin), 1.0), ((0.0, 0.0), 0.0)):
+        velocity = wanted + margin * np.array(beyond)
+        found = excess_velocity(moving(resting(), np.array([*velocity, 0.0])), planner, walk)
+        np.testing.assert_allclose(found, [0.0, left], atol=1e-12)
 
 
 def test_the_attitude_of_a_thrown_robot_weighs_less() -> None:
