@@ -31,7 +31,7 @@ from go2_wbc.errors import CommandError, ConfigError, unknown_name
 EXAMPLES = """
 python -m benchmarks golden record out/golden
 python -m benchmarks golden compare out/golden
-python -m benchmarks golden compare out/golden trot-imu boxes --workers 1
+python -m benchmarks golden compare out/golden --runs trot-imu boxes
 python -m benchmarks golden compare out/golden --tolerance 1e-9
 """
 RECORD, COMPARE = "record", "compare"
@@ -109,7 +109,7 @@ def difference(stored: Stored, ledger: Ledger, tolerance: float) -> str | None:
     if differs.any():
         tick, stage = (int(place[0]) for place in np.nonzero(differs))
         largest, told = _numbers(stored, ledger, -(-tick // KEPT_EVERY), stage)
-        if tolerance > 0.0 and largest <= tolerance:
+        if largest <= tolerance and tolerance > 0.0:
             return None
         return f"differs from tick {tick} on, first in the {list(STAGES)[stage]}: {told}"
     if len(found) != len(stored.digests):
@@ -121,21 +121,28 @@ def difference(stored: Stored, ledger: Ledger, tolerance: float) -> str | None:
 
 
 def _numbers(stored: Stored, ledger: Ledger, kept: int, stage: int) -> tuple[float, str]:
-    """The largest difference in a kept tick, and where it is."""
+    """The largest difference in a kept tick, and what it is in ``stage``, or else in another."""
     if kept >= min(len(stored.sizes), len(ledger.kept)):
         return np.inf, "the run ends before its numbers are kept again"
-    now, before = ledger.kept[kept][stage], stored.row(kept, stage)
+    found = [_off(now, stored.row(kept, i)) for i, now in enumerate(ledger.kept[kept])]
+    order = [found[stage], *found]
+    told = next((told for largest, told in order if largest > 0.0), "equal again")
+    return max(largest for largest, _ in found), f"{told} at tick {kept * KEPT_EVERY}"
+
+
+def _off(now: Values, before: Float[np.ndarray, " n"]) -> tuple[float, str]:
+    """The largest difference of one stage, and which number that is."""
     values = _row(now)
     if len(values) != len(before):
         return np.inf, f"{len(values)} numbers instead of {len(before)}"
-    away = np.abs(values - before)
-    away[(values == before) | (np.isnan(values) & np.isnan(before))] = 0.0
-    if not away.any():
-        return 0.0, f"equal again at tick {kept * KEPT_EVERY}"
-    worst = int(np.argmax(np.where(np.isnan(away), np.inf, away)))
+    is_same = (values == before) | (np.isnan(values) & np.isnan(before))
+    away = np.where(is_same, 0.0, np.nan_to_num(np.abs(values - before), nan=np.inf))
+    if is_same.all():
+        return 0.0, ""
+    worst = int(np.argmax(away))
     names = [f"{name}[{i}]" for name, array in now.items() for i in range(len(array))]
-    at = f"{names[worst]} by {away[worst]:.3g} at tick {kept * KEPT_EVERY}"
-    return float(away[worst]), f"{at}: {values[worst]!r} instead of {before[worst]!r}"
+    told = f"{names[worst]} by {away[worst]:.3g}, {values[worst]:.17g} for {before[worst]:.17g}"
+    return float(away[worst]), told
 
 
 def replay(name: str, folder: Path) -> Ledger:
@@ -182,14 +189,14 @@ def register(subparsers: Subparsers) -> None:
     parser = add_parser(
         subparsers,
         "golden",
-        "Does the robot do what it did, to the last bit? Record runs before a change, and\n"
-        "compare them after it: the first tick and stage that differ are told. Exit code 0\n"
-        "if every run is equal, 1 if one is not. Records hold for this machine alone.",
+        "Does the robot do what it did, to the last bit? Record runs before a change and\n"
+        "compare them after it: the first tick and stage that differ are told. Exit code\n"
+        "0 if every run is equal, 1 if one is not. Records hold for this machine alone.",
         examples=EXAMPLES,
     )
     parser.add_argument("act", choices=(RECORD, COMPARE), help="write the runs, or check them")
     parser.add_argument("folder", metavar="FOLDER", type=Path, help="where the runs are kept")
-    parser.add_argument("names", metavar="NAME", nargs="*", help="of runs, all by default")
+    parser.add_argument("--runs", metavar="NAME", nargs="+", help="some of them only")
     parser.add_argument(
         "--tolerance", metavar="X", type=float, default=0.0, help="accept numbers as near as this"
     )
@@ -205,7 +212,7 @@ def run(args: argparse.Namespace) -> int:
         CommandError: for an unknown run.
         ConfigError: for a folder without records, or where none can be written.
     """
-    folder, names = args.folder, args.names or list(RUNS)
+    folder, names = args.folder, args.runs or list(RUNS)
     for name in names:
         if name not in RUNS:
             raise CommandError(unknown_name("run", name, RUNS))
