@@ -13,6 +13,7 @@ from controller import GO2Controller, Mode, Outcome
 from controller.checks import is_lying, is_sitting, is_standing
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ModeError, MotionInfeasible, StanceMismatch
+from go2_wbc.planning.envelopes import TROT
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
