@@ -58,15 +58,16 @@ class VelocityEnvelope:
     Attributes:
         forward, backward, lateral: speeds [m/s].
         turning: turning rate [rad/s].
-        curve: acceleration aside [m/s^2] in a curve, speed times turning rate: 2 m/s with 1.5 rad/s
-            held on a floor of friction 0.6, with 2 rad/s none of three robots stayed up.
+        curve: acceleration aside [m/s^2] in a curve, speed times turning rate. On a floor of
+            friction 0.6 steady curves of 3 held, of 4 none did; of random commands, a new one every
+            1.5 s for half a minute, 4 of 26 robots fell with 2.5 and none of 16 with this.
     """
 
     forward: float = 1.5
     backward: float = 1.0
     lateral: float = 0.6
     turning: float = 2.0
-    curve: float = 2.5
+    curve: float = 2.0
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a bound that is not positive."""

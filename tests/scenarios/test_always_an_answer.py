@@ -18,7 +18,7 @@ from go2_wbc.config import Config
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.planning.mpc import MpcConfig
 
-SAMPLES = [("boxes", 19), ("pushes", 12), ("stops", 17)]
+SAMPLES = [("boxes", 19), ("pushes", 17), ("stops", 8)]
 """Scenario and seed."""
 CONTRADICTORY = ("pushes", "stops")
 """Where the hard QP has no solution in some ticks; over boxes it had none until feet that stumble
@@ -39,7 +39,7 @@ def test_contradictions_are_answered_and_never_damp_an_upright_robot(name: str, 
     assert values[f"{name}.grave"] <= GRAVE
 
 
-@pytest.mark.parametrize(("seed", "time"), [(2, 2.27), (4, 2.27)])
+@pytest.mark.parametrize(("seed", "time"), [(0, 2.3), (7, 2.3)])
 def test_a_hip_at_its_stop_for_a_moment_does_not_damp_a_robot_that_is_pushed(
     seed: int, time: float
 ) -> None:
