@@ -154,7 +154,7 @@ def test_every_gait_motion_back_end_and_solver_is_there() -> None:
 # --- the configuration ----------------------------------------------------------------------------
 
 
-@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+@pytest.mark.filterwarnings("ignore::FutureWarning")
 def test_a_file_with_every_key_is_read() -> None:
     config = load_config(STORED / "config.toml")
     assert config.backend == "full"
