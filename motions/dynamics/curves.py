@@ -17,7 +17,7 @@ from scipy.interpolate import CubicHermiteSpline, PPoly
 
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics.trajectory import DynamicTrajectory
+from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 
 COM, ATTITUDE, JOINTS, FEET = slice(0, 3), slice(3, 6), slice(6, 18), slice(18, 30)
 """Columns of ``pieces``: CoM [m], roll, pitch, yaw [rad], joints [rad], feet's centres [m]."""

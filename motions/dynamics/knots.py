@@ -18,11 +18,11 @@ from go2_wbc.legs import LEGS
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import rpy_from_rotation
-from motions.dynamics.limits import PlanLimits
+from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
+from motions.batch_kinematics import attitudes, configurations, turned, turned_back
 from motions.dynamics.phases import GRAVITY, KNOT_PERIOD, FullState, Phase, PhaseProblem
-from motions.dynamics.standing import standing, standing_feet
-from motions.placement import attitudes, configurations, turned, turned_back
+from motions.dynamics.plan_limits import PlanLimits
+from motions.postures import STAND_POSE, standing_feet, standing_on
 
 LEAD = 0.2
 """Share of a flight's way by which the trunk is ahead of the feet at take-off, and behind them at
@@ -119,6 +119,15 @@ def knots_of(problem: PhaseProblem, model: RobotModel, limits: PlanLimits) -> Kn
         initial=initial,
         final=final,
     )
+
+
+def standing(model: RobotModel, p_feet: Float[np.ndarray, "4 3"]) -> FullState:
+    """Standing at rest on feet at ``p_feet`` [m]: CoM above their middle, trunk along them."""
+    anchor = Anchor.of_feet(p_feet, model.foot_radius)
+    p_com, R = anchor.p_world + STAND_POSE[:3], yaw_rotation(anchor.yaw)
+    p_base, joints = standing_on(p_feet, p_com, R, model)
+    pose = np.concatenate([p_base, [0.0, 0.0, anchor.yaw]])
+    return FullState(configurations(pose[None], joints[None])[0], np.zeros(18))
 
 
 def _standing(phases: tuple[Phase, ...]) -> Bool[np.ndarray, "n 4"]:

@@ -18,8 +18,8 @@ from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions.feasibility.hulls import LinkHulls
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
-from motions.tracks import home_poses
-from motions.trajectory import Trajectory, runs
+from motions.plan.trajectory import Trajectory, runs
+from motions.postures import home_poses
 
 JOINTS = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 FEET = tuple(leg.name for leg in LEGS)

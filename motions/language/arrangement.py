@@ -9,14 +9,14 @@ from typing import TypeVar
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError
 from motions.arguments import is_number, positive
-from motions.keys import BODY_CHANNELS, Mark
 from motions.language.clock import BeatClock
-from motions.language.written import Written, distinct
+from motions.language.keys import BODY_CHANNELS, Mark
+from motions.language.timeline_data import TimelineData, distinct
 
 _Line = TypeVar("_Line", bound="Arrangement")
 
 
-class Arrangement(Written):
+class Arrangement(TimelineData):
     """When things happen, and what follows what."""
 
     __slots__ = ()
@@ -74,7 +74,7 @@ class Arrangement(Written):
 
     # --- putting motions together ---------------------------------------------------------
 
-    def then(self: _Line, *others: Written) -> _Line:
+    def then(self: _Line, *others: TimelineData) -> _Line:
         """This motion, then the others; each starts in the posture in which the last one ends.
 
         Raises:
@@ -94,7 +94,7 @@ class Arrangement(Written):
             line = replace(line, counted_from=line.end)
         return line
 
-    def together(self: _Line, *others: Written) -> _Line:
+    def together(self: _Line, *others: TimelineData) -> _Line:
         """Do all of ``others`` at the same time, from the cursor on; they may not share a part."""
         line, start = self, self.cursor
         for other in _written("together()", others):
@@ -120,9 +120,9 @@ class Arrangement(Written):
             raise TimelineError(f"{what} needs motions that end at home(); away: {', '.join(away)}")
 
 
-def _written(call: str, others: tuple[Written, ...]) -> tuple[Written, ...]:
+def _written(call: str, others: tuple[TimelineData, ...]) -> tuple[TimelineData, ...]:
     for other in others:
-        if not isinstance(other, Written):
+        if not isinstance(other, TimelineData):
             hint = f"; is it of the library? load_motion({other!r})" if type(other) is str else ""
             raise TimelineError(f"{call} takes timelines, got {other!r}{hint}")
     return others

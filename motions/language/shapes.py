@@ -10,9 +10,9 @@ from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
 from motions.arguments import is_number, positive, quantity, word
-from motions.easing import EaseWord, easing
-from motions.keys import BODY_CHANNELS, BodyPathKey, Frame, JointKey, LegKey, LegTarget
-from motions.language.moves import Moves
+from motions.language.body_and_feet import BodyAndFeet
+from motions.language.easing import EaseWord, easing
+from motions.language.keys import BODY_CHANNELS, BodyPathKey, Frame, JointKey, LegKey, LegTarget
 
 EYES = 0.31
 """Height [m] of the standing trunk's axis, which passes through the head, over the ground."""
@@ -23,7 +23,7 @@ _JOINTS = ("hip", "thigh", "calf")
 _Line = TypeVar("_Line", bound="Shapes")
 
 
-class Shapes(Moves):
+class Shapes(BodyAndFeet):
     """Paths, gaze, single joints."""
 
     __slots__ = ()

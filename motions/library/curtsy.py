@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from motions.authoring import motion
-from motions.timeline import Timeline, deg
+from motions import Timeline, deg, motion
 
 
 @motion

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from go2_wbc.robot.model import FOOT_RADIUS
-from motions.authoring import Choice, Range, motion
-from motions.timeline import Timeline, deg
+from motions import Choice, Range, Timeline, deg, motion
 
 HEIGHT = 0.64
 """Height [m] above the ground at which the paw's centre is held by default."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from motions.authoring import motion
-from motions.timeline import Timeline
+from motions import Timeline, motion
 
 
 @motion

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from motions.authoring import Range, motion
-from motions.timeline import Timeline, deg
+from motions import Range, Timeline, deg, motion
 
 RADIUS = 0.035
 """Radius [m] of the circle."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from motions.authoring import Choice, motion
-from motions.timeline import Timeline
+from motions import Choice, Timeline, motion
 
 
 @motion

@@ -12,7 +12,8 @@ from typing import Any, Final
 from go2_wbc.errors import MotionFileError, TimelineError, unknown_name
 from go2_wbc.files import checked_output, write_atomically
 from motions.authoring import Motion
-from motions.keys import (
+from motions.language.clock import BeatClock
+from motions.language.keys import (
     BODY_CHANNELS,
     BalanceShift,
     BodyKey,
@@ -22,14 +23,13 @@ from motions.keys import (
     Key,
     LegKey,
     Mark,
+    PhaseKey,
     PostureKey,
     StepKey,
 )
-from motions.language.clock import BeatClock
-from motions.phase_key import PhaseKey
+from motions.language.timeline import Timeline
 from motions.saved.envelope import Format, content_of, fields_of
 from motions.saved.values import Decoder, Encoder, required
-from motions.timeline import Timeline
 
 MOTION_FORMAT: Final = Format("go2_wbc.motion", 1, "a saved motion", ".json")
 KINDS: Final[Mapping[str, type[Key]]] = {

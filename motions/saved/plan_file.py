@@ -14,9 +14,9 @@ from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.kernels.layout import PLAN_CURVES
 from go2_wbc.robot.fingerprint import fingerprint
 from go2_wbc.robot.model import RobotModel
-from motions.compiled_plan import CompiledPlan
-from motions.dynamics.trajectory import UNREADABLE
+from motions.dynamics.dynamic_trajectory import UNREADABLE
 from motions.language.clock import SAME
+from motions.plan.compiled_plan import CompiledPlan
 from motions.saved.envelope import Format, content_of, fields_of
 from motions.saved.values import Decoder, Encoder
 

@@ -18,8 +18,8 @@ from motions import (
     motion_names,
 )
 from motions.authoring import Choice
-from motions.compiler import LEAST_RAMP
-from tests.motions.library.plans import library_plan
+from motions.plan.contact_schedule import LEAST_RAMP
+from tests.motions.plans import library_plan
 
 # Between a difference quotient over 2 ms and the derivative; the curves are smooth.
 DIFFERENCE_TOLERANCE = 2e-2

@@ -12,7 +12,7 @@ from go2_wbc.kernels.loads import lag, least_friction, slide
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, deg
-from motions.feasibility.dynamic import numbers_of, scale_of_wrench, state_at
+from motions.feasibility.forces import numbers_of, scale_of_wrench, state_at
 from motions.feasibility.friction import CREEP, HELD, cone, creep, slip
 from motions.feasibility.limits import FeasibilityLimits
 from tests.engine_helpers import standing_q, state_of

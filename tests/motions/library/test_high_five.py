@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from motions import load_motion
-from motions.keys import BODY_CHANNELS, BodyKey
+from motions.language.keys import BODY_CHANNELS, BodyKey
 
 
 @pytest.mark.parametrize("side", ["left", "right"])

@@ -27,7 +27,7 @@ from motions import (
     save_plan,
 )
 from tests.motions.doctored import with_body_aside
-from tests.motions.library.plans import library_plan
+from tests.motions.plans import library_plan
 
 MODEL = RobotModel()
 LEAN = Timeline(name="lean").body(roll=0.05, over=0.4).hold(0.2, name="held").home(over=0.4)
