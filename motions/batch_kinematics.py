@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.interpolate import CubicSpline
 
-from go2_wbc.robot.leg_kinematics import leg_table, link_table
+from go2_wbc.legs import LEGS
+from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_table, link_table
 from go2_wbc.robot.model import RobotModel
 
 LEAST_WEIGHT = 1.0
@@ -129,6 +130,17 @@ def configurations(
     xyzw = np.empty((len(poses), 4))
     quaternions(_own(poses[:, 3:]), xyzw)
     return np.hstack([poses[:, :3], xyzw, joints])
+
+
+def foot_centres(
+    p_base: Float[np.ndarray, "n 3"],
+    R: Float[np.ndarray, "n 3 3"],
+    joints: Float[np.ndarray, "n 12"],
+    model: RobotModel,
+) -> Float[np.ndarray, "n 4 3"]:
+    """Centres of the feet [m] of a trunk at ``p_base`` [m] with attitude ``R``."""
+    seen = [foot_places(LegGeometry.of(model, leg), joints[:, leg.joints]) for leg in LEGS]
+    return np.stack([p_base + turned(R, places) for places in seen], axis=1)
 
 
 def centres_of_mass(

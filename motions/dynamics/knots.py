@@ -16,10 +16,10 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import Anchor
-from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
+from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
-from motions.batch_kinematics import attitudes, configurations, turned, turned_back
+from motions.batch_kinematics import attitudes, configurations, foot_centres, turned_back
 from motions.dynamics.phases import GRAVITY, KNOT_PERIOD, FullState, Phase, PhaseProblem
 from motions.dynamics.plan_limits import PlanLimits
 from motions.postures import STAND_POSE, standing_feet, standing_on
@@ -307,9 +307,4 @@ def guess_velocities(
 def feet_at(model: RobotModel, q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 4 3"]:
     """Centres of the feet [m] at configurations ``q``."""
     poses = np.array([pose_of(row) for row in q])
-    R = attitudes(poses[:, 3:])
-    places = [
-        poses[:, :3] + turned(R, foot_places(LegGeometry.of(model, leg), q[:, 7:][:, leg.joints]))
-        for leg in LEGS
-    ]
-    return np.stack(places, axis=1)
+    return foot_centres(poses[:, :3], attitudes(poses[:, 3:]), q[:, 7:], model)

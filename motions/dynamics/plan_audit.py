@@ -57,46 +57,33 @@ class Reading:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Bounds:
-    """What a plan may reach at most before it counts as none.
-
-    Attributes:
-        defect: of the equations of motion [N, N m].
-        friction: tangential over normal force.
-        torque: share of what the motors give at that speed.
-        speed: share of the joints' speed limits.
-        joint: beyond the joints' limits [rad].
-        penetration: of a foot in the air into the ground [m].
-        slip: of a standing foot, from where it touched down [m].
-        touchdown: speed of a foot [m/s].
-        rotation: difference [rad] between the integrated rate and the change of attitude.
-    """
-
-    defect: float = 1e-3
-    friction: float = 0.55
-    torque: float = 1.0
-    speed: float = 1.0
-    joint: float = 0.0
-    penetration: float = 0.005
-    slip: float = 0.02
-    touchdown: float = 1.0
-    rotation: float = 0.2
+DEFECT = 1e-3
+"""What is left of the equations of motion [N, N m], at most."""
+FRICTION = 0.55
+"""Tangential over normal force."""
+PULL = 1.0
+"""Of the ground [N]."""
+PENETRATION = 0.005
+"""Of a foot in the air into the ground [m]."""
+SLIP = 0.02
+"""Of a standing foot, from where it touched down [m]."""
+TOUCHDOWN = 1.0
+"""Speed of a foot [m/s]."""
+ROTATION = 0.2
+"""Difference [rad] between the integrated rate and the change of attitude."""
 
 
-def audit(
-    trajectory: DynamicTrajectory, model: RobotModel, bounds: Bounds | None = None
-) -> tuple[Reading, ...]:
+def audit(trajectory: DynamicTrajectory, model: RobotModel) -> tuple[Reading, ...]:
     """The worst of everything that a plan must keep."""
-    return _Audit(trajectory, model, bounds or Bounds()).readings()
+    return _Audit(trajectory, model).readings()
 
 
 class _Audit:
-    def __init__(self, trajectory: DynamicTrajectory, model: RobotModel, bounds: Bounds) -> None:
-        self._plan, self._model, self._bounds = trajectory, model, bounds
+    def __init__(self, trajectory: DynamicTrajectory, model: RobotModel) -> None:
+        self._plan, self._model = trajectory, model
 
     def readings(self) -> tuple[Reading, ...]:
-        plan, model, bounds = self._plan, self._model, self._bounds
+        plan, model = self._plan, self._model
         ends = plan.v[:-1, 6:], plan.v[1:, 6:]  # a torque holds through its step
         tau_share = np.max([model.motor.share(plan.tau, v) for v in ends], axis=0)
         speed = np.abs(plan.v[:, 6:]) / model.speed_limits
@@ -107,15 +94,15 @@ class _Audit:
         ratio = np.where(normal > 1.0, tangential / np.maximum(normal, 1.0), 0.0)
         feet, names = FOOT_NAMES, JOINT_NAMES
         return (
-            self._worst("defect", defects(plan, model), bounds.defect, "N or N m", _ROWS),
-            self._worst("friction", ratio, bounds.friction, "", feet),
-            self._worst("pull of the ground", -normal, 1.0, "N", feet),
-            self._worst("torque share", tau_share, bounds.torque, "", names),
-            self._worst("speed share", speed, bounds.speed, "", names),
-            self._worst("angle beyond its limit", beyond, bounds.joint, "rad", names),
-            self._worst("depth under ground", self._depth(), bounds.penetration, "m", feet),
-            self._worst("slip", self._slip(), bounds.slip, "m", feet),
-            self._worst("touchdown speed", self._touchdown(), bounds.touchdown, "m/s", feet),
+            self._worst("defect", defects(plan, model), DEFECT, "N or N m", _ROWS),
+            self._worst("friction", ratio, FRICTION, "", feet),
+            self._worst("pull of the ground", -normal, PULL, "N", feet),
+            self._worst("torque share", tau_share, 1.0, "", names),
+            self._worst("speed share", speed, 1.0, "", names),
+            self._worst("angle beyond its limit", beyond, 0.0, "rad", names),
+            self._worst("depth under ground", self._depth(), PENETRATION, "m", feet),
+            self._worst("slip", self._slip(), SLIP, "m", feet),
+            self._worst("touchdown speed", self._touchdown(), TOUCHDOWN, "m/s", feet),
             self._rotation(),
         )
 
@@ -171,9 +158,7 @@ class _Audit:
             R = R @ pin.exp3(step)
             measured = pin.Quaternion(plan.q[row + 1, 3:7]).toRotationMatrix()
             worst = max(worst, float(np.linalg.norm(pin.log3(R.T @ measured))))
-        return Reading(
-            "integrated rotation", worst, self._bounds.rotation, "rad", "trunk", plan.duration
-        )
+        return Reading("integrated rotation", worst, ROTATION, "rad", "trunk", plan.duration)
 
 
 _ROWS = (*(f"trunk {axis}" for axis in ("x", "y", "z", "roll", "pitch", "yaw")), *JOINT_NAMES)

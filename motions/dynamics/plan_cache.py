@@ -18,9 +18,9 @@ from go2_wbc.files import write_atomically
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 from motions.dynamics.phases import PhaseProblem, Progress, Tolerance
-from motions.dynamics.plan_limits import PlanLimits, Weights
+from motions.dynamics.plan_limits import PlanLimits
 from motions.dynamics.projection import PlanTarget, nearest
-from motions.dynamics.solver import BUDGET, accept, solve
+from motions.dynamics.solver import accept, solve
 
 _log = logging.getLogger(__name__)
 _PACKAGES = ("crocoddyl", "pin")
@@ -33,10 +33,8 @@ def solve_cached(
     problem: PhaseProblem,
     model: RobotModel,
     *,
-    budget: float = BUDGET,
     progress: Progress | None = None,
     limits: PlanLimits | None = None,
-    weights: Weights | None = None,
     folder: Path | None = None,
 ) -> DynamicTrajectory:
     """What ``solve`` finds, read from disk if it was found before, or comes with the package.
@@ -45,7 +43,7 @@ def solve_cached(
     plan returned all the same. What is read is judged like what is solved.
 
     Args:
-        problem, model, budget, progress, limits, weights: see ``solve``.
+        problem, model, progress, limits: see ``solve``.
         folder: where plans are kept; by default beside the compiled kernels, see
             ``CACHE_VARIABLE``.
 
@@ -53,17 +51,13 @@ def solve_cached(
         MissingDependency: if it must be solved and crocoddyl is not installed.
         PlanNotFound: if there is no such plan.
     """
-    limits, weights = limits or PlanLimits(), weights or Weights()
-    shipped = _read(SHIPPED / f"{problem_key(problem, model, limits)}.npz")
-    if shipped is not None:
-        accept(shipped, problem.tolerance, model)
-        return shipped
-    path = (folder or plan_folder()) / f"{_key(problem, model, limits, weights)}.npz"
-    kept = _read(path)
-    if kept is not None:
-        accept(kept, problem.tolerance, model)
-        return kept
-    found = solve(problem, model, budget=budget, progress=progress, limits=limits, weights=weights)
+    limits = limits or PlanLimits()
+    path = (folder or plan_folder()) / f"{_key(problem, model, limits)}.npz"
+    for known in (SHIPPED / f"{problem_key(problem, model, limits)}.npz", path):
+        if (plan := _read(known)) is not None:
+            accept(plan, problem.tolerance, model)
+            return plan
+    found = solve(problem, model, progress=progress, limits=limits)
     _write(path, found)
     return found
 
@@ -73,7 +67,6 @@ def nearest_cached(
     model: RobotModel,
     *,
     tolerance: Tolerance,
-    budget: float = BUDGET,
     progress: Progress | None = None,
 ) -> DynamicTrajectory:
     """What ``nearest`` finds, read from disk if it was found before; see ``solve_cached``.
@@ -86,11 +79,10 @@ def nearest_cached(
     for array in (written.times, written.q, written.stance, *_numbers(model)):
         digest.update(np.ascontiguousarray(array, float).tobytes())
     path = plan_folder() / f"{digest.hexdigest()[:32]}.npz"
-    kept = _read(path)
-    if kept is not None:
-        accept(kept, tolerance, model)
-        return kept
-    found = nearest(written, model, tolerance=tolerance, budget=budget, progress=progress)
+    if (plan := _read(path)) is not None:
+        accept(plan, tolerance, model)
+        return plan
+    found = nearest(written, model, tolerance=tolerance, progress=progress)
     _write(path, found)
     return found
 
@@ -118,7 +110,7 @@ def ship(problem: PhaseProblem, model: RobotModel, folder: Path) -> Path:
 
 def keep(problem: PhaseProblem, model: RobotModel, plan: DynamicTrajectory) -> None:
     """Keep ``plan``, found in another way, as what ``solve_cached`` answers to ``problem``."""
-    _write(plan_folder() / f"{_key(problem, model, PlanLimits(), Weights())}.npz", plan)
+    _write(plan_folder() / f"{_key(problem, model, PlanLimits())}.npz", plan)
 
 
 def _read(path: Path) -> DynamicTrajectory | None:
@@ -141,10 +133,9 @@ def _write(path: Path, trajectory: DynamicTrajectory) -> None:
         _log.warning("the dynamic plan cannot be kept in %s: %s", path.parent, error)
 
 
-def _key(problem: PhaseProblem, model: RobotModel, limits: PlanLimits, weights: Weights) -> str:
+def _key(problem: PhaseProblem, model: RobotModel, limits: PlanLimits) -> str:
     """A hash of all that the plan depends on."""
-    asked = problem_key(problem, model, limits)
-    text = repr((asked, astuple(weights), _versions()))
+    text = repr((problem_key(problem, model, limits), _versions()))
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 

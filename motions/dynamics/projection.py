@@ -80,9 +80,7 @@ def nearest(
     model: RobotModel,
     *,
     tolerance: Tolerance | None = None,
-    budget: float = BUDGET,
     progress: Progress | None = None,
-    limits: PlanLimits | None = None,
 ) -> DynamicTrajectory:
     """The motion that comes nearest to ``written`` within what the robot can do.
 
@@ -93,23 +91,20 @@ def nearest(
         written: what is asked.
         model: the robot.
         tolerance: how far it may be off.
-        budget: processor time [s] after which to give up.
         progress: called after every iteration with their number and the cost.
-        limits: what the plan keeps.
 
     Raises:
         MissingDependency: if crocoddyl is not installed.
         PlanNotFound: if there is none within the tolerance; says what binds, and where.
     """
-    limits = replace(limits or PlanLimits(), clearance=0.0)
+    limits = PlanLimits(clearance=0.0)
     knots = _knots(written, model)
     last: PlanNotFound | None = None
     for weight in TRACKING:
         weights = Weights(track=weight, posture=POSTURE, trunk=0.0)
-        share = budget / len(TRACKING)
         try:
             task = Task(knots, model, limits, weights, tolerance or Tolerance(), _misses)
-            plan = optimum(task, budget=share, progress=progress)
+            plan = optimum(task, budget=BUDGET / len(TRACKING), progress=progress)
         except PlanNotFound as error:  # itself it would hold all that was solved
             last = last or PlanNotFound(str(error).partition("\n")[0], error.reasons)
         else:

@@ -36,7 +36,6 @@ def solve(
     budget: float = BUDGET,
     progress: Progress | None = None,
     limits: PlanLimits | None = None,
-    weights: Weights | None = None,
     start: Solved | None = None,
 ) -> DynamicTrajectory:
     """The motion that does what the phases ask, within what the robot can do.
@@ -50,7 +49,6 @@ def solve(
         budget: processor time [s] after which to give up.
         progress: called after every iteration with their number and the cost.
         limits: what the plan keeps.
-        weights: what being off costs.
         start: a plan of the same phases for something a little easier, from which to begin; jumps
             that are not found from scratch are found in such steps.
 
@@ -62,7 +60,7 @@ def solve(
     """
     limits = limits or PlanLimits()
     knots = knots_of(problem, model, limits)
-    task = Task(knots, model, limits, weights or Weights(), problem.tolerance, _misses)
+    task = Task(knots, model, limits, Weights(), problem.tolerance, _misses)
     first = None if start is None else continued(start, problem, knots.times, model)
     return optimum(task, budget=budget, progress=progress, start=first)
 

@@ -21,7 +21,7 @@ from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.goal_errors import departure_measurements, departures
 from motions.feasibility.hulls import hulls_of
-from motions.feasibility.limits import FeasibilityLimits, FlightLimits
+from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.plan.compiled_plan import CompiledPlan, Problem
 from motions.plan.trajectory import Trajectory, trajectory_of
@@ -30,8 +30,6 @@ BALANCE, WAY = "balance", "way of a foot"
 """Problems of the compiler."""
 SLIDING = 0.17
 """Share of the slip that is allowed, from which on a force that lacks for a moment matters."""
-FLIGHT_SHARE = 1.1
-"""What solved plans may use of the floor's friction: they are solved for 0.5, and reach 0.55."""
 
 
 class FeasibilityChecker:
@@ -146,8 +144,7 @@ class FeasibilityChecker:
         if isinstance(plan, CompiledPlan):
             problems = plan.problems
             forces = dynamic_spans.with_spans(forces, path, plan, model)
-            spans = FlightLimits(friction=FLIGHT_SHARE * floor)
-            in_flight = dynamic_spans.judged(plan, model, heavy.mass, spans)
+            in_flight = dynamic_spans.judged(plan, model, heavy.mass, floor)
         forces = dynamics.resisted(forces, path, self.world.worst)
         lag = dynamics.lagging(path, forces, heavy, limits)
         off = tracking.tracking(path, forces, heavy, self.world.worst, limits)

@@ -10,7 +10,7 @@ from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError
 from motions.arguments import is_number, positive
 from motions.language.clock import BeatClock
-from motions.language.keys import BODY_CHANNELS, Mark
+from motions.language.keys import Mark
 from motions.language.timeline_data import TimelineData, distinct
 
 _Line = TypeVar("_Line", bound="Arrangement")
@@ -112,12 +112,8 @@ class Arrangement(TimelineData):
         return replace(self, keys=tuple(key.mirrored for key in self.keys))
 
     def _require_home(self, what: str) -> None:
-        away = [f"body {name}" for name in BODY_CHANNELS if self.body_value(name) != 0.0]
-        away += [f"foot {leg.name}" for leg in sorted(self.raised)]
-        if self.shifted_for:
-            away.append("balance")
-        if away:
-            raise TimelineError(f"{what} needs motions that end at home(); away: {', '.join(away)}")
+        if away := ", ".join(self.away):
+            raise TimelineError(f"{what} needs motions that end at home(); away: {away}")
 
 
 def _written(call: str, others: tuple[TimelineData, ...]) -> tuple[TimelineData, ...]:

@@ -11,6 +11,7 @@ from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Posture
+from motions import arguments
 from motions.arguments import quantity, word
 from motions.language.easing import EaseWord, easing
 from motions.language.keys import (
@@ -115,7 +116,7 @@ class BodyAndFeet(TimelineData):
         if in_frame is Frame.GROUND and place[2] < 0.0:
             raise TimelineError(f"foot() cannot go below the ground: z is {z}")
         target = LegTarget(in_frame, place)
-        return self._move_leg(word("foot", leg, Leg.__members__), target, over, ease)
+        return self._move_leg(arguments.foot(leg), target, over, ease)
 
     def leg(
         self: _Line,
@@ -130,7 +131,7 @@ class BodyAndFeet(TimelineData):
         """Move the joints of a raised leg to these angles [rad]."""
         angles = (quantity("hip", hip), quantity("thigh", thigh), quantity("calf", calf))
         target = LegTarget(Frame.JOINTS, angles)
-        return self._move_leg(word("foot", leg, Leg.__members__), target, over, ease)
+        return self._move_leg(arguments.foot(leg), target, over, ease)
 
     def unweight(self: _Line, leg: Leg | str, *, over: float) -> _Line:
         """Move the trunk over the other feet, so that this one can be raised.
@@ -138,12 +139,12 @@ class BodyAndFeet(TimelineData):
         ``foot`` and ``leg`` do so by themselves; this is for choosing when, and how fast.
         """
         start, end = self._span(over)
-        raised = self.raised | {word("foot", leg, Leg.__members__)}
+        raised = self.raised | {arguments.foot(leg)}
         return self._longer([BalanceShift(start, end, Ease.MINIMUM_JERK, raised)], end)
 
     def down(self: _Line, leg: Leg | str, *, over: float) -> _Line:
         """Put a raised foot back where it stood."""
-        which = word("foot", leg, Leg.__members__)
+        which = arguments.foot(leg)
         if which not in self.raised:
             raise TimelineError(f"down(): foot {which.name} is not raised")
         return self._move_leg(which, LegTarget.on_ground(), over, Ease.MINIMUM_JERK)

@@ -16,11 +16,12 @@ from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
-from motions.arguments import positive, quantity, word
+from motions import arguments
+from motions.arguments import positive, quantity
 from motions.dynamics import phase_builders as build
 from motions.dynamics.phases import BODY_COORDINATES, Phase
 from motions.language.clock import SAME, BeatClock
-from motions.language.keys import BODY_CHANNELS, PhaseKey, PostureKey
+from motions.language.keys import PhaseKey, PostureKey
 from motions.language.timeline_data import TimelineData
 
 _Line = TypeVar("_Line", bound="DynamicBlocks")
@@ -90,7 +91,7 @@ class DynamicBlocks(TimelineData):
         For one foot at a time, which takes no balance on a line, there is ``foot``.
         """
         given = (legs,) if isinstance(legs, str) else legs
-        feet = sorted({word("foot", leg, Leg.__members__) for leg in given})
+        feet = sorted({arguments.foot(leg) for leg in given})
         if len(feet) != 2:
             raise TimelineError(f"lift() takes two feet, such as ('FL', 'RR'), got {legs!r}")
         return self._to_beats(build.lift(feet, self._seconds("lift(): hold", hold), height))
@@ -142,12 +143,9 @@ class DynamicBlocks(TimelineData):
         """
         phase = Phase(
             self._seconds("phase(): duration", duration),
-            frozenset(word("foot", leg, Leg.__members__) for leg in stance),
+            frozenset(arguments.foot(leg) for leg in stance),
             None if body is None else _pose(body),
-            {
-                word("foot", leg, Leg.__members__): _place(place)
-                for leg, place in (feet or {}).items()
-            },
+            {arguments.foot(leg): _place(place) for leg, place in (feet or {}).items()},
             label,
         )
         last = max(self.in_order(PhaseKey), key=lambda key: key.end, default=None)
@@ -170,14 +168,8 @@ class DynamicBlocks(TimelineData):
 def away_from_home(line: TimelineData, time: float) -> list[str]:
     """What is not at home, standing, when everything that starts before ``time`` [s] is over."""
     before = replace(line, keys=tuple(key for key in line.keys if key.start < time - SAME))
-    away = [f"body {name}" for name in BODY_CHANNELS if before.body_value(name) != 0.0]
-    away += [f"foot {leg.name}" for leg in sorted(before.raised)]
-    if before.shifted_for:
-        away.append("balance")
-    postures = [line.entry, *(key.posture for key in before.in_order(PostureKey))]
-    if postures[-1] is not Posture.STAND:
-        away.append(f"posture {postures[-1].value}")
-    return away
+    *_, last = line.entry, *(key.posture for key in before.in_order(PostureKey))
+    return [*before.away, *([] if last is Posture.STAND else [f"posture {last.value}"])]
 
 
 def _next_beat(clock: BeatClock, time: float) -> float:

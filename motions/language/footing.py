@@ -80,11 +80,6 @@ class Footing:
             if steps:
                 _require_on_ground(timeline, leg)
 
-    @property
-    def is_moving(self) -> bool:
-        """Whether any foot steps."""
-        return any(self._steps.values())
-
     def at(self, times: Times) -> Ground:
         """Where the feet are at increasing ``times``, and the frame from which the trunk counts."""
         p_feet = np.stack([self.place(leg, times) for leg in LEGS], axis=1)

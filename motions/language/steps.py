@@ -10,7 +10,8 @@ import numpy as np
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
-from motions.arguments import positive, quantity, word
+from motions import arguments
+from motions.arguments import positive, quantity
 from motions.language.keys import BalanceShift, Key, StepKey
 from motions.language.step_gaits import (
     STEP_GAITS,
@@ -58,7 +59,7 @@ class Steps(TimelineData):
             over: how long the foot is in the air.
             height: of the foot [m] in the middle of its way.
         """
-        which = word("foot", leg, Leg.__members__)
+        which = arguments.foot(leg)
         if which in self.raised:
             raise TimelineError(f"step(): foot {which.name} is raised: put it down() before")
         place = (quantity("x", x), quantity("y", y), quantity("yaw", yaw))

@@ -16,7 +16,7 @@ from go2_wbc.reference import Posture
 from motions.arguments import positive
 from motions.dynamics.phases import Tolerance
 from motions.language.clock import SAME, BeatClock
-from motions.language.keys import BalanceShift, BodyKey, Key, LegKey
+from motions.language.keys import BODY_CHANNELS, BalanceShift, BodyKey, Key, LegKey
 
 SHIFT_TIME = 0.9
 """Time [s] in which the body moves over the feet that stay, before another one is raised."""
@@ -107,6 +107,13 @@ class TimelineData:
         """Legs for whose absence the trunk has moved over the other feet."""
         shifts = self.in_order(BalanceShift)
         return shifts[-1].raised if shifts else frozenset()
+
+    @property
+    def away(self) -> list[str]:
+        """What its last keys leave elsewhere than at home, in words."""
+        away = [f"body {name}" for name in BODY_CHANNELS if self.body_value(name) != 0.0]
+        away += [f"foot {leg.name}" for leg in sorted(self.raised)]
+        return [*away, "balance"] if self.shifted_for else away
 
     def body_value(self, channel: str) -> float:
         """Where the last key leaves a channel of the body."""

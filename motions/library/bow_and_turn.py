@@ -1,7 +1,5 @@
 """Bow and turn."""
 
-from __future__ import annotations
-
 from motions import Timeline, deg, motion
 from motions.library.bow import bow
 

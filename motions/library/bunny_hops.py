@@ -1,7 +1,5 @@
 """Bunny hops."""
 
-from __future__ import annotations
-
 from motions import Timeline, motion
 
 

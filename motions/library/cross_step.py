@@ -1,7 +1,5 @@
 """Cross step."""
 
-from __future__ import annotations
-
 from motions import Timeline, motion
 
 

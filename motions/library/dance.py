@@ -1,7 +1,5 @@
 """Dance."""
 
-from __future__ import annotations
-
 from motions import Timeline, motion
 from motions.library.bow import bow
 from motions.library.hula import hula

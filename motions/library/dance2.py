@@ -1,7 +1,5 @@
 """A longer dance."""
 
-from __future__ import annotations
-
 from motions import Timeline, motion
 from motions.library.content import content
 from motions.library.curtsy import curtsy

@@ -1,7 +1,5 @@
 """Figure of eight."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

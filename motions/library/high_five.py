@@ -1,7 +1,5 @@
 """High five."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from go2_wbc.robot.model import FOOT_RADIUS

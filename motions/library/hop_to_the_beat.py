@@ -1,7 +1,5 @@
 """Hop to the beat."""
 
-from __future__ import annotations
-
 from motions import Timeline, motion
 
 

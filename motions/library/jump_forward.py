@@ -1,7 +1,5 @@
 """Jump forward."""
 
-from __future__ import annotations
-
 from motions import Timeline, motion
 
 

@@ -1,7 +1,5 @@
 """Jump up."""
 
-from __future__ import annotations
-
 from motions import Timeline, motion
 
 

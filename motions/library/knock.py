@@ -1,7 +1,5 @@
 """Knock."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from motions import Choice, Range, Timeline, motion

@@ -1,7 +1,5 @@
 """Lift a hind leg."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from motions import Choice, Timeline, motion

@@ -1,7 +1,5 @@
 """Look around."""
 
-from __future__ import annotations
-
 from motions import Timeline, deg, motion
 
 

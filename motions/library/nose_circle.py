@@ -1,7 +1,5 @@
 """Nose circle."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Paw pair."""
 
-from __future__ import annotations
-
 from motions import Timeline, motion
 
 

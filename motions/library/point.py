@@ -1,7 +1,5 @@
 """Point."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from motions import Range, Timeline, motion

@@ -1,7 +1,5 @@
 """Pounce."""
 
-from __future__ import annotations
-
 from motions import Timeline, deg, motion
 
 

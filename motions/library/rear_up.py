@@ -1,7 +1,5 @@
 """Rear up."""
 
-from __future__ import annotations
-
 from motions import Timeline, deg, motion
 
 

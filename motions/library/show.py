@@ -1,7 +1,5 @@
 """Show."""
 
-from __future__ import annotations
-
 from motions import Timeline, deg, motion
 from motions.library.bow import bow
 from motions.library.hula import hula

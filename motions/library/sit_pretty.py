@@ -1,7 +1,5 @@
 """Sit pretty."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from go2_wbc.reference import Posture

@@ -1,7 +1,5 @@
 """Sleepy."""
 
-from __future__ import annotations
-
 from motions import Timeline, deg, motion
 
 

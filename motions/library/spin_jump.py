@@ -1,7 +1,5 @@
 """Spin jump."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from motions import Choice, Timeline, deg, motion

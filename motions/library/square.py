@@ -1,7 +1,5 @@
 """Square."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from motions import Choice, Range, Timeline, deg, motion

@@ -1,7 +1,5 @@
 """Wiggle the hips."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Zigzag."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from motions import Range, Timeline, motion

@@ -17,9 +17,9 @@ from scipy.interpolate import CubicSpline
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
-from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, foot_places, leg_angles
+from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
-from motions.batch_kinematics import attitudes, turned, turned_back
+from motions.batch_kinematics import attitudes, foot_centres, turned, turned_back
 from motions.language.footing import Footing, Ground
 from motions.language.keys import (
     BODY_CHANNELS,
@@ -137,6 +137,7 @@ class LegTracks:
         self, timeline: Timeline, footing: Footing, model: RobotModel, home: Float[np.ndarray, "6"]
     ) -> None:
         """``home``: pose of the trunk in the frame of the feet in which the motion starts."""
+        self._model = model
         self._geometry = {leg: LegGeometry.of(model, leg) for leg in LEGS}
         self._keys: dict[Leg, list[LegKey]] = {leg: [] for leg in LEGS}
         for key in timeline.in_order(LegKey):
@@ -184,12 +185,8 @@ class LegTracks:
 
         ``body``, ``joints``: pose of the trunk and joint angles.
         """
-        R, places = attitudes(body[:, 3:]), ground.p_feet.copy()
-        for leg in LEGS:
-            rows = raised[:, leg]
-            seen = foot_places(self._geometry[leg], joints[rows][:, leg.joints])
-            places[rows, leg] = body[rows, :3] + turned(R[rows], seen)
-        return places
+        held = foot_centres(body[:, :3], attitudes(body[:, 3:]), joints, self._model)
+        return np.where(raised[:, :, None], held, ground.p_feet)
 
     def _path(self, leg: Leg, times: Times, body: Poses, ground: Ground) -> LegAngles:
         """From its start until the next one starts, a key alone says where the leg is."""

@@ -27,7 +27,6 @@ from motions.batch_kinematics import (
     configurations,
     place,
     rates,
-    turned,
 )
 from motions.dynamics.projection import PlanTarget
 from motions.plan.compiled_plan import CompiledPlan, PlanSamples
@@ -67,10 +66,6 @@ class Trajectory:
     p_feet: Float[np.ndarray, "n 4 3"]
     miss: Float[np.ndarray, "n 4"]
     is_dynamic: Bool[np.ndarray, " n"]
-
-    def placed(self, p_base: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-        """Points of the base [m], one an instant, in the frame of the motion."""
-        return self.q[:, :3] + turned(attitudes(self.rpy), p_base)
 
 
 def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
