@@ -8,9 +8,11 @@ from typing import TypeVar
 
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError
+from go2_wbc.legs import Leg
+from motions import arguments
 from motions.arguments import is_number, positive
 from motions.language.clock import BeatClock
-from motions.language.keys import Mark
+from motions.language.keys import FootHold, Mark
 from motions.language.timeline_data import TimelineData, distinct
 
 _Line = TypeVar("_Line", bound="Arrangement")
@@ -23,10 +25,27 @@ class Arrangement(TimelineData):
 
     # --- time -----------------------------------------------------------------------------
 
-    def hold(self: _Line, seconds: float, *, name: str = "") -> _Line:
-        """Stay as it is for this long; ``name`` marks the span for who looks at the result."""
+    def hold(
+        self: _Line, seconds: float, *, name: str = "", foot: Leg | str | None = None
+    ) -> _Line:
+        """Stay as it is for this long.
+
+        Args:
+            seconds: how long.
+            name: marks the span for who looks at the result.
+            foot: a raised one that must be measured at its height meanwhile, for the motion to
+                count as done.
+
+        Raises:
+            TimelineError: for a foot on the ground, or in a span without a name.
+        """
         start, end = self._span(seconds)
         marks = [Mark(start, end, Ease.LINEAR, name)] if name else []
+        if foot is not None:
+            leg = arguments.foot(foot)
+            if leg not in self.raised or not name:
+                raise TimelineError(f"hold(): foot {leg.name} must be raised, and the span named")
+            marks = [FootHold(start, end, Ease.LINEAR, name, leg)]
         return self._longer(marks, end)
 
     def also(self: _Line) -> _Line:

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -81,21 +81,26 @@ class Key(ABC):
         ease: how it goes from the last goal to this one.
     """
 
+    instants: ClassVar[tuple[str, ...]] = ("start", "end")
+
     start: float
     end: float
     ease: Easing
 
     def later(self: _KeyType, seconds: float) -> _KeyType:
         """The same key, moved in time."""
-        return replace(self, start=self.start + seconds, end=self.end + seconds)
+        return self._moved(lambda t: t + seconds)
 
     def slower(self: _KeyType, factor: float) -> _KeyType:
         """The same key, all times multiplied."""
-        return replace(self, start=factor * self.start, end=factor * self.end)
+        return self._moved(lambda t: factor * t)
 
     def retimed(self: _KeyType, when: Callable[[float], float]) -> _KeyType:
         """The same key, its instants where ``when`` puts them."""
-        return replace(self, start=when(self.start), end=when(self.end))
+        return self._moved(when)
+
+    def _moved(self: _KeyType, when: Callable[[float], float]) -> _KeyType:
+        return replace(self, **{name: when(getattr(self, name)) for name in self.instants})
 
     @property
     @abstractmethod
@@ -223,6 +228,8 @@ class StepKey(Key):
         is_square: whether ``place`` is the pose of a frame.
     """
 
+    instants: ClassVar[tuple[str, ...]] = ("start", "end", "since")
+
     leg: Leg
     place: tuple[float, float, float]
     height: float
@@ -230,19 +237,9 @@ class StepKey(Key):
     lead: float = 0.0
     is_square: bool = False
 
-    def later(self, seconds: float) -> StepKey:
-        """The same key, moved in time."""
-        start, end, since = (t + seconds for t in (self.start, self.end, self.since))
-        return replace(self, start=start, end=end, since=since)
-
     def slower(self, factor: float) -> StepKey:
         """The same key, all times multiplied."""
-        start, end, since = (factor * t for t in (self.start, self.end, self.since))
-        return replace(self, start=start, end=end, since=since, lead=factor * self.lead)
-
-    def retimed(self, when: Callable[[float], float]) -> StepKey:
-        """The same key, its instants where ``when`` puts them."""
-        return replace(self, start=when(self.start), end=when(self.end), since=when(self.since))
+        return replace(self._moved(lambda t: factor * t), lead=factor * self.lead)
 
     def scaled(self, amplitude: float) -> StepKey:
         """Its way multiplied."""
@@ -271,6 +268,18 @@ class Mark(Key):
     def track(self) -> str:
         """The name."""
         return f"span {self.name!r}"
+
+
+@dataclass(frozen=True, slots=True)
+class FootHold(Mark):
+    """A named span in which a raised foot is held up: only then does the motion count as done."""
+
+    leg: Leg
+
+    @property
+    def mirrored(self) -> FootHold:
+        """Left and right exchanged."""
+        return replace(self, leg=self.leg.mirror)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from scipy.interpolate import PPoly
 from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
 from go2_wbc.errors import MotionError
 from go2_wbc.kernels.layout import REFERENCE
+from go2_wbc.legs import Leg
 from go2_wbc.reference import (
     Anchor,
     Footsteps,
@@ -106,6 +107,24 @@ class PlanSamples:
 
 
 @dataclass(frozen=True, slots=True)
+class HeldFoot:
+    """A foot that must be held up.
+
+    Attributes:
+        name: of the span.
+        leg: whose foot.
+        start, end: when [s].
+        height: planned for its centre above the ground [m].
+    """
+
+    name: str
+    leg: Leg
+    start: float
+    end: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
 class CompiledPlan(MotionPlan):
     """A timeline, ready to be played.
 
@@ -121,6 +140,7 @@ class CompiledPlan(MotionPlan):
         spans: start and end [s] of the named holds.
         beats: instants [s] that it counts in.
         dynamic: its parts that obey the whole robot's dynamics.
+        held: by the names of spans, the foot that must be held up then; see ``held_feet``.
     """
 
     name: str
@@ -134,6 +154,7 @@ class CompiledPlan(MotionPlan):
     spans: Mapping[str, tuple[float, float]]
     beats: tuple[float, ...] = ()
     dynamic: tuple[DynamicSpan, ...] = ()
+    held: Mapping[str, Leg] = field(default_factory=dict)
     _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -182,6 +203,16 @@ class CompiledPlan(MotionPlan):
         anchor = Anchor.of_feet(self.curves(self.duration)[18:].reshape(4, 3), 0.0)
         x, y, _ = anchor.p_world.tolist()
         return x, y, anchor.yaw
+
+    @property
+    def held_feet(self) -> tuple[HeldFoot, ...]:
+        """Its acceptance: feet that must be measured at their heights, for it to count as done."""
+        found = []
+        for name, leg in self.held.items():
+            start, end = self.spans[name]
+            height = float(self.curves(0.5 * (start + end))[18 + 3 * leg + 2])
+            found.append(HeldFoot(name, leg, start, end, height))
+        return tuple(found)
 
     @property
     def is_dynamic(self) -> bool:

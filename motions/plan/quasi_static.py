@@ -18,7 +18,7 @@ from go2_wbc.robot.model import RobotModel
 from motions.batch_kinematics import centres_of_mass
 from motions.language.clock import SAME
 from motions.language.footing import Footing
-from motions.language.keys import BalanceShift, Mark
+from motions.language.keys import BalanceShift, FootHold, Mark
 from motions.language.timeline import Timeline
 from motions.plan.balance import Balancer
 from motions.plan.com_trajectory import Span, swayed
@@ -85,6 +85,7 @@ def compile_quasi_static(
         problems=tuple(problems),
         spans={mark.name: (mark.start, mark.end) for mark in timeline.in_order(Mark)},
         beats=timeline.beats,
+        held={key.name: key.leg for key in timeline.in_order(FootHold)},
     )
 
 

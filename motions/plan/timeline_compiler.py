@@ -26,7 +26,7 @@ from motions.dynamics.plan_cache import nearest_cached, solve_cached
 from motions.dynamics.projection import PlanTarget
 from motions.language.clock import SAME
 from motions.language.dynamic_blocks import away_from_home
-from motions.language.keys import BodyKey, Key, Mark, PhaseKey
+from motions.language.keys import BodyKey, FootHold, Key, Mark, PhaseKey
 from motions.language.timeline import Timeline
 from motions.plan.compiled_plan import CompiledPlan, Problem, event_at
 from motions.plan.contact_schedule import UNLOAD_TIME
@@ -274,6 +274,7 @@ class _Maker:
             spans={mark.name: (mark.start, mark.end) for mark in line.in_order(Mark)},
             dynamic=tuple(self._spans),
             beats=line.beats,
+            held={key.name: key.leg for key in line.in_order(FootHold)},
         )
 
     def _compiled(self, stretch: Timeline, keys: Sequence[Key]) -> CompiledPlan:

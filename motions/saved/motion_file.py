@@ -18,6 +18,7 @@ from motions.language.keys import (
     BalanceShift,
     BodyKey,
     BodyPathKey,
+    FootHold,
     Frame,
     JointKey,
     Key,
@@ -42,6 +43,7 @@ KINDS: Final[Mapping[str, type[Key]]] = {
     "balance": BalanceShift,
     "phases": PhaseKey,
     "mark": Mark,
+    "foot_hold": FootHold,
 }
 """The kinds of keys by the words that files have for them: a new kind needs a line here."""
 _WORDS: Final[Mapping[type[Key], str]] = {kind: word for word, kind in KINDS.items()}

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from go2_wbc.robot.model import RobotModel
-from motions import CompiledPlan, compile_timeline, load_motion
+from motions import CompiledPlan, Timeline, compile_timeline, load_motion
 
 MODEL = RobotModel()
 
@@ -16,6 +16,11 @@ MODEL = RobotModel()
 def library_plan(name: str) -> CompiledPlan:
     """The motion ``name`` with its usual parameters, compiled for ``MODEL``."""
     return compile_timeline(load_motion(name), MODEL)
+
+
+def plan_of(line: Timeline) -> CompiledPlan:
+    """``line`` compiled for ``MODEL``."""
+    return compile_timeline(line, MODEL)
 
 
 def curves_at(plan: CompiledPlan, t: float) -> np.ndarray:

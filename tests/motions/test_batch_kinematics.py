@@ -23,11 +23,6 @@ LEFT = 0.2  # share of the error that a step leaves at most; an eighth is usual
 ROUNDING = 1e-9  # m, rad; where a leg is stretched the rounding of its foot's place is amplified
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
 @pytest.mark.parametrize("steps", [0, 1, 5])
 def test_feet_and_centre_of_mass_are_where_pinocchio_puts_them(
     model: RobotModel, steps: int

@@ -26,16 +26,6 @@ DIFFERENCE_TOLERANCE = 2e-2
 STEP = 1e-3
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
-def checker(model: RobotModel) -> FeasibilityChecker:
-    return FeasibilityChecker(model)
-
-
 def test_there_are_motions_enough_and_each_says_what_it_is() -> None:
     names = motion_names()
     assert list(names) == sorted(set(names))

@@ -30,16 +30,6 @@ EXACT = 1e-6
 
 
 @pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
-def checker(model: RobotModel) -> FeasibilityChecker:
-    return FeasibilityChecker(model)
-
-
-@pytest.fixture(scope="module")
 def good(model: RobotModel) -> CompiledPlan:
     return compile_timeline(load_motion("high_five", hold=1.0), model)
 

@@ -14,11 +14,6 @@ from motions.feasibility.forces import CREEP, DRY, VISCOUS, forces_of, resisted
 SWAY = Timeline().body(y=0.03, over=0.5).home(over=0.5)
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
 def test_the_feet_carry_the_payload_too(model: RobotModel) -> None:
     world = World(payload=3.0, mass_scale=1.05)
     checked = FeasibilityChecker(model, world=world).evaluate(SWAY)

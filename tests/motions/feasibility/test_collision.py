@@ -24,11 +24,6 @@ TOLERANCE = 2e-6  # m; twice what GJK and EPA leave: where they stop depends on 
 
 
 @pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
 def bodies(model: RobotModel) -> SelfCollision:
     return SelfCollision(model)
 

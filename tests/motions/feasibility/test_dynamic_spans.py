@@ -30,11 +30,6 @@ _OWN_ROWS = {"steps", "equations", "curves", "ground pulls", "friction cone", "s
 _OWN_ROWS |= {"touchdown", "off by", "turned off by", "few feet", "mass solved for"}
 
 
-@pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker(RobotModel())
-
-
 def plan_of(name: str, checker: FeasibilityChecker) -> CompiledPlan:
     return compile_timeline(load_motion(name), checker.model)
 

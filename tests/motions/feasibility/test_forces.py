@@ -40,11 +40,6 @@ EXACT = 1e-5  # N; what the QP's solver leaves, and the motion itself
 
 
 @pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
 def resting(model: RobotModel) -> Trajectory:
     line = Timeline().body(z=-0.001, over=0.1).home(over=0.1)
     return trajectory_of(compile_timeline(line, model), model)

@@ -22,16 +22,6 @@ INSIDE = 0.02  # of a cone whose pyramid of 16 facets lies inside of it
 TOLERANCE = 0.05  # N; of the wrench
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
-def checker(model: RobotModel) -> FeasibilityChecker:
-    return FeasibilityChecker(model)
-
-
 def least(model: RobotModel, forces: np.ndarray) -> float:
     """The least friction coefficient for the wrench of ``forces`` on a standing robot."""
     q = standing_q()

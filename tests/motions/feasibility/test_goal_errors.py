@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from go2_wbc.errors import PlanNotFound, TimelineError
-from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, FeasibilityChecker, Timeline, deg
 from motions.dynamics.phases import Tolerance
 from tests.solver import needs_solver
@@ -22,11 +21,6 @@ SWAY = (
     .hold(0.2)
 )
 """Faster than friction allows."""
-
-
-@pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker(RobotModel())
 
 
 def test_as_it_is_written_it_is_refused(checker: FeasibilityChecker) -> None:

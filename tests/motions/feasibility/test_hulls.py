@@ -21,11 +21,6 @@ GJK = 1e-5  # m; where Coal stops
 
 
 @pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
 def bodies(model: RobotModel) -> SelfCollision:
     return SelfCollision(model)
 

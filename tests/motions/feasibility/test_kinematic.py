@@ -19,11 +19,6 @@ from motions.plan.trajectory import Trajectory, trajectory_of
 
 
 @pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
 def hulls(model: RobotModel) -> LinkHulls:
     return LinkHulls(model, SelfCollision(model).geometry)
 

@@ -10,24 +10,18 @@ import pytest
 
 from go2_wbc.errors import TimelineError
 from go2_wbc.reference import Posture
-from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
-from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg, load_motion
+from motions import FeasibilityChecker, Timeline, deg, load_motion
 from motions.language.footing import Footing
 from motions.language.keys import JointKey
 from motions.plan.trajectory import trajectory_of
 from motions.postures import standing_feet
-from tests.motions.plans import curves_at
+from tests.motions.plans import MODEL, curves_at, plan_of
 
-MODEL = RobotModel()
 NEAR = 1e-3
 BALANCE = 0.02  # m, rad; where the trunk balances depends on where it comes from
 NOD = Timeline().body(pitch=deg(8), over=0.6).home(over=0.9)
 WAVE = Timeline().foot("FR", x=0.03, z=0.1, over=0.6).hold(0.3, name="up").home(over=1.0)
-
-
-def plan_of(line: Timeline) -> CompiledPlan:
-    return compile_timeline(line, MODEL)
 
 
 def written(line: Timeline) -> list[str]:

@@ -11,23 +11,18 @@ from controller import GO2Controller
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Anchor
-from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
-from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg
+from motions import CompiledPlan, FeasibilityChecker, Timeline, deg
 from motions.language.keys import StepKey
 from motions.plan.trajectory import trajectory_of
 from motions.postures import standing_feet
+from tests.motions.plans import MODEL, plan_of
 
-MODEL = RobotModel()
 CHECKER = FeasibilityChecker(MODEL)
 NOMINAL = standing_feet(MODEL)
 EXACT = 1e-6  # m, rad; of a spline through samples
 PLACED = 0.015  # m; how near its place a foot lands in simulation
 ENDED, HEADED = 0.05, deg(4)  # m, rad; how near a walk ends to where it was to end
-
-
-def plan_of(line: Timeline) -> CompiledPlan:
-    return compile_timeline(line, MODEL)
 
 
 def last_feet(line: Timeline) -> np.ndarray:

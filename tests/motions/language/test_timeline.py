@@ -16,22 +16,16 @@ from go2_wbc.geometry import support_margin
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
-from go2_wbc.robot.model import RobotModel
-from motions import CompiledPlan, Timeline, compile_timeline, deg
+from motions import Timeline, compile_timeline, deg
 from motions.language.keys import BalanceShift, BodyKey, LegKey
 from motions.language.timeline_data import SHIFT_TIME
 from motions.plan.contact_schedule import contact_schedule
 from motions.postures import home_poses
-from tests.motions.plans import curves_at
+from tests.motions.plans import MODEL, curves_at, plan_of
 
-MODEL = RobotModel()
 HOME = home_poses(MODEL)[Posture.STAND]
 EXACT = 1e-9
 NEAR = 1e-6  # m, rad; of a spline through samples, at a sample
-
-
-def plan_of(line: Timeline) -> CompiledPlan:
-    return compile_timeline(line, MODEL)
 
 
 # --- the cursor -----------------------------------------------------------------------------------

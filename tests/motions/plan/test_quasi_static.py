@@ -35,11 +35,6 @@ SPARE = 1.25
 larger part of a short motion. Work that grows with the square would be at 5 and 10."""
 
 
-@pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker()
-
-
 def long_motion(seconds: float) -> Timeline:
     """Trunk, feet and balance in turn, over and over for about that long."""
     unit = Timeline().body(pitch=0.1, z=-0.02, over=0.5).body(roll=0.05, over=0.5)

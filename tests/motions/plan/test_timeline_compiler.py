@@ -23,11 +23,6 @@ _LANDED = 0.01
 
 
 @pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
 def jumps(model: RobotModel) -> CompiledPlan:
     """A bow, two jumps of the library's with a walk between them, and a raised paw."""
     line = Timeline().body(pitch=0.1, over=0.5).home(over=0.5).spin_jump(deg(90)).hold(0.2)
