@@ -131,7 +131,7 @@ class Arrangement(TimelineData):
         return replace(self, keys=tuple(key.mirrored for key in self.keys))
 
     def _require_home(self, what: str) -> None:
-        if away := ", ".join(self.away):
+        if away := ", ".join(self._away):
             raise TimelineError(f"{what} needs motions that end at home(); away: {away}")
 
 

@@ -169,7 +169,7 @@ def away_from_home(line: TimelineData, time: float) -> list[str]:
     """What is not at home, standing, when everything that starts before ``time`` [s] is over."""
     before = replace(line, keys=tuple(key for key in line.keys if key.start < time - SAME))
     *_, last = line.entry, *(key.posture for key in before.in_order(PostureKey))
-    return [*before.away, *([] if last is Posture.STAND else [f"posture {last.value}"])]
+    return [*before._away, *([] if last is Posture.STAND else [f"posture {last.value}"])]
 
 
 def _next_beat(clock: BeatClock, time: float) -> float:

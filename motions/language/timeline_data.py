@@ -109,7 +109,7 @@ class TimelineData:
         return shifts[-1].raised if shifts else frozenset()
 
     @property
-    def away(self) -> list[str]:
+    def _away(self) -> list[str]:
         """What its last keys leave elsewhere than at home, in words."""
         away = [f"body {name}" for name in BODY_CHANNELS if self.body_value(name) != 0.0]
         away += [f"foot {leg.name}" for leg in sorted(self.raised)]
