@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
+from motions.dynamics.curves import feet_at
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -26,7 +27,7 @@ class Reading:
     Attributes:
         name: of the quantity.
         value: the worst.
-        limit: what it must not exceed; for what must not fall below, both are negative.
+        limit: what it must not exceed, at least 0.
         unit: of both.
         subject: whose it is.
         time: when [s].
@@ -45,15 +46,9 @@ class Reading:
         return self.value <= self.limit
 
     def __str__(self) -> str:
-        sign = "" if self.limit >= 0.0 else "-"
-        value, limit = (abs(number) for number in (self.value, self.limit))
-        if self.limit < 0.0 < self.value:
-            sign, value = "+", self.value
-        word = "at most" if self.limit >= 0.0 else "at least"
-        shown = f"{value:.3g}" if sign != "+" else f"-{value:.3g}"
         return (
-            f"{self.name} of {self.subject} at {self.time:.2f} s: {shown} {self.unit}, "
-            f"{word} {limit:.3g}"
+            f"{self.name} of {self.subject} at {self.time:.2f} s: {abs(self.value):.3g} "
+            f"{self.unit}, at most {self.limit:.3g}"
         )
 
 
@@ -73,102 +68,90 @@ ROTATION = 0.2
 """Difference [rad] between the integrated rate and the change of attitude."""
 
 
-def audit(trajectory: DynamicTrajectory, model: RobotModel) -> tuple[Reading, ...]:
+def audit(plan: DynamicTrajectory, model: RobotModel) -> tuple[Reading, ...]:
     """The worst of everything that a plan must keep."""
-    return _Audit(trajectory, model).readings()
 
-
-class _Audit:
-    def __init__(self, trajectory: DynamicTrajectory, model: RobotModel) -> None:
-        self._plan, self._model = trajectory, model
-
-    def readings(self) -> tuple[Reading, ...]:
-        plan, model = self._plan, self._model
-        ends = plan.v[:-1, 6:], plan.v[1:, 6:]  # a torque holds through its step
-        tau_share = np.max([model.motor.share(plan.tau, v) for v in ends], axis=0)
-        speed = np.abs(plan.v[:, 6:]) / model.speed_limits
-        joints = plan.q[:, 7:]
-        beyond = np.maximum(model.q_lower - joints, joints - model.q_upper)
-        normal = plan.forces[:, :, 2]
-        tangential = np.hypot(plan.forces[:, :, 0], plan.forces[:, :, 1])
-        ratio = np.where(normal > 1.0, tangential / np.maximum(normal, 1.0), 0.0)
-        feet, names = FOOT_NAMES, JOINT_NAMES
-        return (
-            self._worst("defect", defects(plan, model), DEFECT, "N or N m", _ROWS),
-            self._worst("friction", ratio, FRICTION, "", feet),
-            self._worst("pull of the ground", -normal, PULL, "N", feet),
-            self._worst("torque share", tau_share, 1.0, "", names),
-            self._worst("speed share", speed, 1.0, "", names),
-            self._worst("angle beyond its limit", beyond, 0.0, "rad", names),
-            self._worst("depth under ground", self._depth(), PENETRATION, "m", feet),
-            self._worst("slip", self._slip(), SLIP, "m", feet),
-            self._worst("touchdown speed", self._touchdown(), TOUCHDOWN, "m/s", feet),
-            self._rotation(),
-        )
-
-    def _worst(
-        self, name: str, values: Float[np.ndarray, "n k"], limit: float, unit: str,
+    def worst(
+        name: str,
+        values: Float[np.ndarray, "n k"],
+        limit: float,
+        unit: str,
         subjects: tuple[str, ...],
-    ) -> Reading:  # fmt: skip
+    ) -> Reading:
         row, column = np.unravel_index(int(np.argmax(values)), values.shape)
-        time = float(self._plan.times[row])
+        time = float(plan.times[row])
         return Reading(name, float(values[row, column]), limit, unit, subjects[column], time)
 
-    def _depth(self) -> Float[np.ndarray, "n1 4"]:
-        """Of the feet in the air; one that stands in a step does so until the step's end."""
-        stance = self._plan.stance
-        stands = np.vstack([stance, stance[-1:]]) | np.vstack([stance[:1], stance])
-        depth = self._model.foot_radius - self._plan.p_feet[:, :, 2]
-        return np.where(stands, 0.0, depth)
+    ends = plan.v[:-1, 6:], plan.v[1:, 6:]  # a torque holds through its step
+    tau_share = np.max([model.motor.share(plan.tau, v) for v in ends], axis=0)
+    joints = plan.q[:, 7:]
+    beyond = np.maximum(model.q_lower - joints, joints - model.q_upper)
+    normal = plan.forces[:, :, 2]
+    tangential = np.hypot(plan.forces[:, :, 0], plan.forces[:, :, 1])
+    ratio = np.where(normal > 1.0, tangential / np.maximum(normal, 1.0), 0.0)
+    speed = np.abs(plan.v[:, 6:]) / model.speed_limits
+    slip = drift(plan.p_feet, plan.stance)
+    feet, names = FOOT_NAMES, JOINT_NAMES
+    return (
+        worst("defect", defects(plan, model), DEFECT, "N or N m", _ROWS),
+        worst("friction", ratio, FRICTION, "", feet),
+        worst("pull of the ground", -normal, PULL, "N", feet),
+        worst("torque share", tau_share, 1.0, "", names),
+        worst("speed share", speed, 1.0, "", names),
+        worst("angle beyond its limit", beyond, 0.0, "rad", names),
+        worst("depth under ground", _depth(plan, model), PENETRATION, "m", feet),
+        worst("slip", slip, SLIP, "m", feet),
+        worst("touchdown speed", _touchdown(plan, model), TOUCHDOWN, "m/s", feet),
+        Reading("integrated rotation", _lost_turn(plan), ROTATION, "rad", "trunk", plan.duration),
+    )
 
-    def _slip(self) -> Float[np.ndarray, "n1 4"]:
-        """Distance of each standing foot from where it began to stand."""
-        plan = self._plan
-        slip = np.zeros((len(plan.times), 4))
-        for leg in LEGS:
-            place = plan.p_feet[0, leg]
-            for row, stands in enumerate(plan.stance[:, leg]):
-                if not stands:
-                    place = plan.p_feet[row + 1, leg]
-                else:
-                    slip[row + 1, leg] = np.linalg.norm(plan.p_feet[row + 1, leg] - place)
-        return slip
 
-    def _touchdown(self) -> Float[np.ndarray, "n 4"]:
-        plan, model = self._plan, self._model
-        pin_model, data = model.pin_model, model.pin_model.createData()
-        frames = [pin_model.getFrameId(name) for name in FOOT_NAMES]
-        speeds = np.zeros((len(plan.stance), 4))
-        for row in range(1, len(plan.stance)):
-            lands = plan.stance[row] & ~plan.stance[row - 1]
-            if lands.any():
-                pin.forwardKinematics(pin_model, data, plan.q[row], plan.v[row])
-            for leg in np.flatnonzero(lands).tolist():
-                velocity = pin.getFrameVelocity(pin_model, data, frames[leg], _ALIGNED)
-                speeds[row, leg] = np.linalg.norm(velocity.linear)
-        return speeds
+def _depth(plan: DynamicTrajectory, model: RobotModel) -> Float[np.ndarray, "n1 4"]:
+    """Of the feet in the air; one that stands in a step does so until the step's end."""
+    stance = plan.stance
+    stands = np.vstack([stance, stance[-1:]]) | np.vstack([stance[:1], stance])
+    return np.where(stands, 0.0, model.foot_radius - plan.p_feet[:, :, 2])
 
-    def _rotation(self) -> Reading:
-        """A turn by 360 deg looks like none; the integrated yaw and tilt rates tell them apart."""
-        plan = self._plan
-        R = np.eye(3) if not len(plan.q) else pin.Quaternion(plan.q[0, 3:7]).toRotationMatrix()
-        worst = 0.0
-        for row, dt in enumerate(np.diff(plan.times)):
-            step = plan.v[row + 1, 3:6] * dt
-            R = R @ pin.exp3(step)
-            measured = pin.Quaternion(plan.q[row + 1, 3:7]).toRotationMatrix()
-            worst = max(worst, float(np.linalg.norm(pin.log3(R.T @ measured))))
-        return Reading("integrated rotation", worst, ROTATION, "rad", "trunk", plan.duration)
+
+def drift(
+    p_feet: Float[np.ndarray, "n1 4 3"], stance: Bool[np.ndarray, "n 4"]
+) -> Float[np.ndarray, "n1 4"]:
+    """Distance [m] of each standing foot from where it came down; 0 in the air."""
+    off = np.zeros(p_feet.shape[:2])
+    for leg in LEGS:
+        place = p_feet[0, leg]
+        for row, stands in enumerate(stance[:, leg].tolist(), start=1):
+            if stands:
+                off[row, leg] = np.linalg.norm(p_feet[row, leg] - place)
+            else:
+                place = p_feet[row, leg]
+    return off
+
+
+def _touchdown(plan: DynamicTrajectory, model: RobotModel) -> Float[np.ndarray, "n1 4"]:
+    speeds = np.linalg.norm(feet_at(plan.q, plan.v, model)[1], axis=2)
+    lands = np.zeros(speeds.shape, dtype=bool)
+    lands[1:-1] = plan.stance[1:] & ~plan.stance[:-1]
+    return np.where(lands, speeds, 0.0)
+
+
+def _lost_turn(plan: DynamicTrajectory) -> float:
+    """A turn by 360 deg looks like none; the integrated yaw and tilt rates tell them apart."""
+    R, worst = pin.Quaternion(plan.q[0, 3:7]).toRotationMatrix(), 0.0
+    for row, dt in enumerate(np.diff(plan.times)):
+        R = R @ pin.exp3(plan.v[row + 1, 3:6] * dt)
+        measured = pin.Quaternion(plan.q[row + 1, 3:7]).toRotationMatrix()
+        worst = max(worst, float(np.linalg.norm(pin.log3(R.T @ measured))))
+    return worst
 
 
 _ROWS = (*(f"trunk {axis}" for axis in ("x", "y", "z", "roll", "pitch", "yaw")), *JOINT_NAMES)
 
 
-def defects(trajectory: DynamicTrajectory, model: RobotModel) -> Float[np.ndarray, "n 18"]:
+def defects(plan: DynamicTrajectory, model: RobotModel) -> Float[np.ndarray, "n 18"]:
     """|M a + h - S' tau - J' f| of every knot [N, N m], with a from the velocities of its ends."""
     pin_model, data = model.pin_model, model.pin_model.createData()
     frames = [pin_model.getFrameId(name) for name in FOOT_NAMES]
-    plan = trajectory
     found = np.empty((len(plan.tau), 18))
     for row, dt in enumerate(np.diff(plan.times).tolist()):
         q, v = plan.q[row], plan.v[row]

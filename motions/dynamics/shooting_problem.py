@@ -53,7 +53,7 @@ class ShootingProblem:
         self._actuation = crocoddyl.ActuationModelFloatingBase(self._state)
         self._feet = [model.pin_model.getFrameId(name) for name in FOOT_NAMES]
         self._knees = [model.pin_model.getFrameId(name) for name in JOINT_NAMES[2::3]]
-        self.tau_hold = standing_torques(model, knots.initial, np.ones(4, dtype=bool))
+        self.tau_hold = standing_torques(model, knots.initial)
         goals = {goal.knot: goal for goal in knots.goals}
         steps = np.diff(knots.times).tolist()
         self._models = [self._running(k, dt, goals.get(k)) for k, dt in enumerate(steps)]
@@ -100,10 +100,7 @@ class ShootingProblem:
         self._add_heights(costs, knot, stance)
         if goal is not None:
             self._add_goal(costs, goal, dt)
-        dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(
-            self._state, self._actuation, contacts, costs, 0.0, True
-        )
-        return crocoddyl.IntegratedActionModelEuler(dynamics, dt)
+        return self._integrated(contacts, costs, dt)
 
     def _terminal(self, goal: Goal) -> crocoddyl.IntegratedActionModelEuler:
         contacts = crocoddyl.ContactModelMultiple(self._state, 12)
@@ -112,10 +109,15 @@ class ShootingProblem:
         final = self._knots.final
         residual = crocoddyl.ResidualModelState(self._state, np.concatenate([final.q, final.v]), 12)
         self._add(costs, "end", residual, self._weights.end)
+        return self._integrated(contacts, costs, 0.0)
+
+    def _integrated(
+        self, contacts: crocoddyl.ContactModelMultiple, costs: crocoddyl.CostModelSum, dt: float
+    ) -> crocoddyl.IntegratedActionModelEuler:
         dynamics = crocoddyl.DifferentialActionModelContactFwdDynamics(
             self._state, self._actuation, contacts, costs, 0.0, True
         )
-        return crocoddyl.IntegratedActionModelEuler(dynamics, 0.0)
+        return crocoddyl.IntegratedActionModelEuler(dynamics, dt)
 
     def _add_contact(
         self,
@@ -219,14 +221,12 @@ class ShootingProblem:
         costs.addCost(name, cost, weight)
 
 
-def standing_torques(
-    model: RobotModel, state: FullState, stance: Bool[np.ndarray, "4"]
-) -> Float[np.ndarray, "12"]:
-    """Joint torques [N m] that hold the robot on ``stance`` feet, with the least foot forces."""
+def standing_torques(model: RobotModel, state: FullState) -> Float[np.ndarray, "12"]:
+    """Joint torques [N m] that hold the robot on its four feet, with the least foot forces."""
     zeros = np.zeros(4)
     measured = RobotState(0.0, state.q, state.v, np.zeros(12), zeros, zeros.astype(bool))
     snapshot = model.readable_snapshot(measured)
-    J = snapshot.J_feet[stance].reshape(-1, 18)
+    J = snapshot.J_feet.reshape(-1, 18)
     forces = np.linalg.lstsq(J[:, :6].T, snapshot.bias[:6], rcond=None)[0]
     return snapshot.bias[6:] - J[:, 6:].T @ forces
 

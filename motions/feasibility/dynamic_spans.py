@@ -16,20 +16,19 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Bool, Float
 
-from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
-from motions.dynamics.curves import centred
+from motions.dynamics.curves import centred, feet_at
 from motions.dynamics.dynamic_trajectory import BALANCING_FEET
 from motions.dynamics.knots import true_spans
 from motions.dynamics.phases import PhaseProblem
-from motions.dynamics.plan_audit import defects
+from motions.dynamics.plan_audit import defects, drift
 from motions.feasibility.forces import PRESSED, Forces
 from motions.feasibility.goal_errors import Misses, of_phases, of_written
 from motions.feasibility.kinematic import FEET, JOINTS
 from motions.feasibility.report import Series
 from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan
-from motions.plan.dynamic_span import DynamicSpan, feet_at
+from motions.plan.dynamic_span import DynamicSpan
 from motions.plan.trajectory import Trajectory
 
 _ROWS = (*(f"trunk {axis}" for axis in ("x", "y", "z", "roll", "pitch", "yaw")), *JOINTS)
@@ -171,15 +170,9 @@ class _Judge:
         """How far a standing foot is from where it came down, and from the ground: m."""
         plan = self.span.trajectory
         places = feet_at(plan.q, plan.v, self.model)[0]
-        off = np.zeros((len(plan.times), 4))
-        for leg in LEGS:
-            place = places[0, leg]
-            for row, stands in enumerate(plan.stance[:, leg].tolist(), start=1):
-                if not stands:
-                    place = places[row, leg]
-                else:
-                    height = abs(places[row, leg, 2] - self.model.foot_radius)
-                    off[row, leg] = max(float(np.linalg.norm(places[row, leg] - place)), height)
+        height = np.zeros((len(plan.times), 4))
+        height[1:] = plan.stance * np.abs(places[1:, :, 2] - self.model.foot_radius)
+        off = np.maximum(drift(places, plan.stance), height)
         return self._at_knots("standing feet", "m", FEET, off, SLIP)
 
     def balance(self) -> Series:

@@ -11,16 +11,13 @@ from scipy.interpolate import CubicHermiteSpline, PPoly
 from scipy.spatial.transform import Rotation
 
 from go2_wbc.errors import MotionError
-from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.reference import Anchor, PlanFeedback
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
-from motions.dynamics.curves import ATTITUDE, sampled
+from motions.dynamics.curves import sampled
 from motions.dynamics.dynamic_trajectory import BALANCING_FEET, DynamicTrajectory
 from motions.dynamics.phases import PhaseProblem, Tolerance
 from motions.dynamics.projection import PlanTarget
-
-_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,28 +146,11 @@ def curves_of(
     """
     times = trajectory.times
     values, rates = sampled(trajectory, model)
-    values[:, ATTITUDE] = np.unwrap(values[:, ATTITUDE], axis=0)
     moves = ~trajectory.stance.all(axis=1)
     first = int(np.flatnonzero(moves)[-1]) + 1 if moves.any() else 0
     values[:, 5] += 2.0 * np.pi * np.round((end[5] - values[-1, 5]) / (2.0 * np.pi))
     _lead_to(end, times, values, rates, first)
     return CubicHermiteSpline(times, values, rates)
-
-
-def feet_at(
-    q: Float[np.ndarray, "n 19"], v: Float[np.ndarray, "n 18"], model: RobotModel
-) -> tuple[Float[np.ndarray, "n 4 3"], Float[np.ndarray, "n 4 3"]]:
-    """Places [m] and velocities [m/s] of the feet's centres, in the frame in which ``q`` is."""
-    pin_model, data = model.pin_model, model.pin_model.createData()
-    frames = [pin_model.getFrameId(name) for name in FOOT_NAMES]
-    places, velocities = np.empty((len(q), 4, 3)), np.empty((len(q), 4, 3))
-    for row in range(len(q)):
-        pin.forwardKinematics(pin_model, data, q[row], v[row])
-        pin.updateFramePlacements(pin_model, data)
-        for leg, frame in enumerate(frames):
-            velocity = pin.getFrameVelocity(pin_model, data, frame, _ALIGNED)
-            places[row, leg], velocities[row, leg] = data.oMf[frame].translation, velocity.linear
-    return places, velocities
 
 
 def attitude_angles(q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 3"]:
