@@ -13,7 +13,7 @@ import numpy as np
 
 from go2_wbc.errors import MotionError
 from motions import FeasibilityChecker, Timeline
-from motions.language.written import NEAREST
+from motions.language.timeline_data import NEAREST
 
 LARGEST = {"x": 0.05, "y": 0.05, "z": 0.05, "roll": 0.25, "pitch": 0.25, "yaw": 0.35}
 """Greatest offset of the trunk [m, rad] by channel."""

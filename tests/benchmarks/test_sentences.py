@@ -13,7 +13,7 @@ from benchmarks.probability import FITTED
 from benchmarks.probability_runs import DRAWN, runs, seeds, trial
 from go2_wbc.errors import TimelineError
 from motions import Timeline
-from motions.keys import BodyKey
+from motions.language.keys import BodyKey
 
 
 def test_a_sentence_is_the_same_every_time_and_grows() -> None:

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.steps import FRICTION_RANGE, MASS_RANGE, onwards, plant_of, walk_with_paws
 from controller.sweeps.trials import Trial
 from go2_wbc.reference import Anchor
-from motions.keys import LegKey, StepKey
+from motions.language.keys import LegKey, StepKey
 
 
 @pytest.mark.parametrize("gait", ["walk", "trot"])

@@ -24,8 +24,8 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
-from motions.placement import configurations
-from motions.tracks import home_poses
+from motions.batch_kinematics import configurations
+from motions.postures import home_poses
 from tests.engine_helpers import state_of
 
 MODEL = RobotModel()
