@@ -78,6 +78,7 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.swing",
         "go2_wbc.kernels.vectors",
         "go2_wbc.compilation",  # loaded here, as is what it imports
+        "go2_wbc.kept_code",
         "go2_wbc.records",
         "go2_wbc.lazy",  # loaded by the pytest plugin's package
         "go2_wbc.planning.swing",

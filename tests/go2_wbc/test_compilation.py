@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 from jaxtyping import Float
 
-from go2_wbc import compilation
-from go2_wbc.compilation import Foreign, kernel, kernel_folder, subroutine
+from go2_wbc import compilation, kept_code
+from go2_wbc.compilation import Foreign, kernel, subroutine
+from go2_wbc.kept_code import CACHE_VARIABLE, KEPT, kernel_folder
 
 ROOT = str(Path(__file__).resolve().parents[2])
 SCRIPT = """
@@ -57,7 +58,7 @@ def run_script(folder: Path, factor: float = 1.0, doc: str = "") -> list[str]:
     """Lines that a process prints whose kernels are kept in ``folder``."""
     path = folder.parent / "script.py"
     path.write_text(SCRIPT.format(factor=factor, doc=doc))
-    environment = {**os.environ, "PYTHONPATH": ROOT, compilation.CACHE_VARIABLE: str(folder)}
+    environment = {**os.environ, "PYTHONPATH": ROOT, CACHE_VARIABLE: str(folder)}
     environment.pop(compilation.PLAIN_VARIABLE, None)
     command = [sys.executable, str(path)]
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
@@ -80,7 +81,7 @@ def compile_square() -> None:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty cache; the process's own one is used again afterwards."""
-    monkeypatch.setenv(compilation.CACHE_VARIABLE, str(tmp_path / "kept"))
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "kept"))
     forget()
     yield tmp_path / "kept"
     forget()
@@ -88,7 +89,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def forget() -> None:
     kernel_folder.cache_clear()
-    compilation._say_that_it_takes_time.cache_clear()
+    kept_code.say_that_it_takes_time.cache_clear()
 
 
 def test_a_kernel_is_compiled_once_and_says_so(
@@ -138,7 +139,7 @@ def test_a_kernel_that_is_wrong_leaves_what_is_kept_of_others_alone(folder: Path
     def wrong(x: float) -> float:
         return x.nothing  # type: ignore[attr-defined]
 
-    with pytest.raises(compilation.numba.core.errors.NumbaError):
+    with pytest.raises(kept_code.numba.core.errors.NumbaError):
         wrong(1.0)
     assert kept(folder) == before
 
@@ -147,27 +148,27 @@ def test_a_place_that_cannot_be_written_costs_time_only(
     folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     folder.parent.joinpath("a file").touch()
-    monkeypatch.setenv(compilation.CACHE_VARIABLE, str(folder.parent / "a file" / "below"))
+    monkeypatch.setenv(CACHE_VARIABLE, str(folder.parent / "a file" / "below"))
     compile_square()
-    assert compilation.CACHE_VARIABLE in caplog.text
+    assert CACHE_VARIABLE in caplog.text
     assert kernel_folder() is None
 
 
 @pytest.mark.parametrize(
     ("owner", "name", "value"),
     [
-        (compilation.llvmlite.binding, "get_host_cpu_name", lambda: "another"),
-        (compilation.platform, "python_version", lambda: "3.99.0"),
-        (compilation.numba, "__version__", "99.0"),
+        (kept_code.llvmlite.binding, "get_host_cpu_name", lambda: "another"),
+        (kept_code.platform, "python_version", lambda: "3.99.0"),
+        (kept_code.numba, "__version__", "99.0"),
     ],
 )
 def test_another_processor_or_version_gets_files_of_its_own(
     folder: Path, monkeypatch: pytest.MonkeyPatch, owner: object, name: str, value: object
 ) -> None:
     routine = kernel(square)
-    first = compilation._fingerprint(routine)  # type: ignore[arg-type]
+    first = kept_code.fingerprint(routine)  # type: ignore[arg-type]
     monkeypatch.setattr(owner, name, value)
-    assert compilation._fingerprint(routine) != first  # type: ignore[arg-type]
+    assert kept_code.fingerprint(routine) != first  # type: ignore[arg-type]
 
 
 def test_what_changes_compiles_what_depends_on_it_and_nothing_else(tmp_path: Path) -> None:
@@ -193,7 +194,7 @@ def test_loading_takes_the_kernels_alone_and_nothing_of_the_compiler(tmp_path: P
 def test_four_processes_share_a_cold_cache(tmp_path: Path) -> None:
     folder = tmp_path / "kept"
     folder.parent.joinpath("script.py").write_text(SCRIPT.format(factor=1.0, doc=""))
-    environment = {**os.environ, "PYTHONPATH": ROOT, compilation.CACHE_VARIABLE: str(folder)}
+    environment = {**os.environ, "PYTHONPATH": ROOT, CACHE_VARIABLE: str(folder)}
     command = [sys.executable, str(folder.parent / "script.py")]
     running = [
         subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL) for _ in range(4)
@@ -211,7 +212,7 @@ def test_older_versions_of_a_kernel_are_not_kept_for_ever(folder: Path) -> None:
             return x * factor  # noqa: B023 - called before the next one is made
 
         assert scaled(2.0) == 2.0 * factor
-    assert len(kept(folder)) == compilation._KEPT
+    assert len(kept(folder)) == KEPT
 
 
 def test_a_constant_that_cannot_be_told_apart_is_refused() -> None:
@@ -271,9 +272,9 @@ def test_every_module_that_holds_kernels_is_loaded_ahead() -> None:
 
 
 def test_the_users_own_numba_cache_is_left_alone(folder: Path) -> None:
-    before = compilation.numba.config.CACHE_DIR
+    before = kept_code.numba.config.CACHE_DIR
     compile_square()
-    assert before == compilation.numba.config.CACHE_DIR
+    assert before == kept_code.numba.config.CACHE_DIR
     logging.getLogger("numba").setLevel(logging.WARNING)
 
 

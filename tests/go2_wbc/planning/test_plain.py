@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from go2_wbc.compilation import plain
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner, plan
@@ -51,13 +52,13 @@ def test_the_planner_compiled_is_the_planner_as_it_is_written(gait: Gait) -> Non
         command = VelocityCommand(*rng.normal(size=3)) if tick % 100 < 60 else ZERO_COMMAND
         pose = BodyPose(*rng.uniform(-0.3, 0.3, 4)) if tick % 50 < 20 else LEVEL
         now, target, was_stepping = stumbling(model, rng, tick, at), Target(), planner.is_stepping
-        plain = type(planner._state).of(planner._state.row.copy())
+        state = type(planner._state).of(planner._state.row.copy())
         reference = planner.update(now, command, pose)
-        told = now.state.feet_in_contact, now.state.tau, plain, planner._walk, planner._command
+        told = now.state.feet_in_contact, now.state.tau, state, planner._walk, planner._command
         with np.errstate(all="ignore"):
-            plan.python(now, np.float64(now.state.time), *told, target)
+            plain(plan)(now, np.float64(now.state.time), *told, target)
         np.testing.assert_allclose(target.row, reference.row, rtol=0, atol=ROUNDING)
-        np.testing.assert_allclose(plain.row, planner._state.row, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(state.row, planner._state.row, rtol=0, atol=ROUNDING)
         starts += planner.is_stepping and not was_stepping
         frictions.add(reference.friction)
         at = reference.body.p_world[:2]
