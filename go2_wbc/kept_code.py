@@ -21,7 +21,7 @@ import platform
 import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -59,7 +59,7 @@ class Written(ABC):
         """Module and function."""
         return f"{self.written.__module__}.{self.written.__qualname__}"
 
-    @property
+    @cached_property
     @abstractmethod
     def signature(self) -> Any:
         """As Numba has it."""
