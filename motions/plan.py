@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.curves import CurvePoint
-from go2_wbc.kernels.layout import PLAN_CURVES, REFERENCE
 from go2_wbc.reference import BodyTarget, LegTask, Reference, TrackedPoint
 from go2_wbc.robot.rotations import angular_velocity_from_rpy, rotation_from_rpy
+from go2_wbc.tracking.plan_curves import standing_target
 
 NORMAL_FORCE_MIN = 0.0
 """Least normal force [N] asked of a foot: none, so that a pushed robot may tip and come back."""
@@ -65,13 +65,5 @@ def reference(
 
 def reference_row(point: TrackedPoint, body: CurvePoint) -> Float[np.ndarray, " size"]:
     """The row of ``reference`` for four feet that stand, by a kernel."""
-    from go2_wbc.kernels.playing import planned
-
-    row, curves = np.zeros(REFERENCE.size), np.zeros((3, PLAN_CURVES))
-    curves[0, :6], curves[1, :6], curves[2, :6] = body.value, body.rate, body.acceleration
-    is_com = 1.0 if point is TrackedPoint.COM else 0.0
-    planned(is_com, curves, _STANCE, _ALL, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, row)
-    return row
-
-
-_STANCE, _ALL = np.zeros(4), np.ones(4)
+    curves = np.array([body.value, body.rate, body.acceleration])
+    return standing_target(point, curves, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX).row
