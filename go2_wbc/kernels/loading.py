@@ -13,7 +13,6 @@ KERNELS = (
     "loads",
     "motor",
     "payload",
-    "playing",
     "rigid_body",
     "simulation",
     "supervision",
