@@ -51,6 +51,7 @@ MODULES = (
     "go2_wbc.algebra.active_set",
     "go2_wbc.planning.locomotion",
     "go2_wbc.reference",
+    "go2_wbc.robot.safety",
     "go2_wbc.tracking.plan_curves",
     "go2_wbc.tracking.plan_tracking",
 )

@@ -19,9 +19,12 @@ def assert_plain_is_compiled(
     """Both ways, each on copies: what is returned and what is filled must be the same."""
     assert isinstance(kernel, _Kernel)
     ours, theirs = deepcopy(arguments), deepcopy(arguments)
-    compiled, plain = kernel(*ours), _call_plain(kernel, *theirs)
-    if compiled is not None:
-        np.testing.assert_allclose(compiled, plain, tolerance, tolerance)
-    for one, other in zip(ours, theirs, strict=True):
-        if isinstance(row := getattr(one, "row", one), np.ndarray):
-            np.testing.assert_allclose(row, getattr(other, "row", other), tolerance, tolerance)
+    given, expected = kernel(*ours), _call_plain(kernel, *theirs)
+    pairs = [(given, expected)] if given is not None else []
+    pairs += [
+        (getattr(a, "row", a), getattr(b, "row", b)) for a, b in zip(ours, theirs, strict=True)
+    ]
+    for compiled, plain in pairs:
+        np.testing.assert_allclose(
+            np.asarray(compiled, float), np.asarray(plain, float), tolerance, tolerance
+        )

@@ -15,7 +15,6 @@ KERNELS = (
     "payload",
     "rigid_body",
     "simulation",
-    "supervision",
 )
 """Modules of this package whose import compiles, or loads what was compiled."""
 
