@@ -14,7 +14,6 @@ KERNELS = (
     "motor",
     "payload",
     "rigid_body",
-    "simulation",
 )
 """Modules of this package whose import compiles, or loads what was compiled."""
 
