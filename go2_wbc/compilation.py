@@ -52,9 +52,12 @@ MODULES = (
     "go2_wbc.planning.locomotion",
     "go2_wbc.plant.mujoco.layout",
     "go2_wbc.reference",
+    "go2_wbc.robot.leg_kinematics",
+    "go2_wbc.robot.rotations",
     "go2_wbc.robot.safety",
     "go2_wbc.tracking.plan_curves",
     "go2_wbc.tracking.plan_tracking",
+    "go2_wbc.wbc.trajectory_loads",
 )
 """Modules that hold kernels."""
 _FOREIGN = "foreign"
