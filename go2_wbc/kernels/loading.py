@@ -11,7 +11,6 @@ KERNELS = (
     "estimation",
     "motor",
     "payload",
-    "rigid_body",
 )
 """Modules of this package whose import compiles, or loads what was compiled."""
 
