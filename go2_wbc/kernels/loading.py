@@ -10,7 +10,6 @@ KERNELS = (
     "condensed",
     "estimation",
     "motor",
-    "payload",
 )
 """Modules of this package whose import compiles, or loads what was compiled."""
 
