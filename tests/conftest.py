@@ -59,7 +59,6 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.loading",  # loaded here
         "go2_wbc.kernels.motor",
         "go2_wbc.kernels.standing",
-        "go2_wbc.kernels.supervision",
         "go2_wbc.kernels.vectors",
         "go2_wbc.compilation",  # loaded here, as is what it imports
         "go2_wbc.kept_code",

@@ -25,8 +25,8 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
-from motions.batch_kinematics import attitudes
 from go2_wbc.wbc.trajectory_loads import accelerate, least_friction, slide
+from motions.batch_kinematics import attitudes
 from motions.feasibility.forces import (
     ARM,
     PRESSED,

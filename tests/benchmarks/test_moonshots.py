@@ -14,7 +14,7 @@ from benchmarks.jump_climb import BISECTIONS, KINDS, Climber, Jump, Kind
 from benchmarks.jump_physics import best_take_off
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import PlanNotFound
-from go2_wbc.kernels.compilation import CACHE_VARIABLE
+from go2_wbc.kept_code import CACHE_VARIABLE
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline
 from motions.dynamics import PhaseProblem, Solved

@@ -16,9 +16,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.compilation import kernel_folder
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import write_atomically
+from go2_wbc.kept_code import kernel_folder
 from go2_wbc.plant.mujoco.layout import MujocoLayout
 from go2_wbc.plant.mujoco.setup import PlantSetup
 
