@@ -150,7 +150,7 @@ def replay(name: str, folder: Path) -> Ledger:
     ledger = Ledger(folder)
     with (
         TemporaryDirectory() as plans,
-        patch("motions.dynamics.cache.plan_folder", lambda: Path(plans)),
+        patch("motions.dynamics.plan_cache.plan_folder", lambda: Path(plans)),
     ):
         RUNS[name](ledger)
     return ledger

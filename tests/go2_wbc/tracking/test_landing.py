@@ -22,7 +22,7 @@ from go2_wbc.tracking.landing import (
 )
 from go2_wbc.tracking.plan_curves import StanceLoad
 from go2_wbc.tracking.plan_tracking import PlanTracker
-from motions.compiled_plan import CompiledPlan
+from motions.plan.compiled_plan import CompiledPlan
 from tests.engine_helpers import standing_q, state_of
 from tests.stepping_plans import LANDING, LIFT_OFF, TAKE_OFF, TOUCHDOWN, hop_plan, step_plan
 

@@ -14,7 +14,7 @@ from go2_wbc.reference import LegTask, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.tracking.plan_curves import PlanCurves, StanceLoad, sample, stand, standing_target
 from motions import compile_motion
-from motions.compiled_plan import CompiledPlan
+from motions.plan.compiled_plan import CompiledPlan
 from tests.compiled import assert_plain_is_compiled
 
 ROUNDING = 1e-12

@@ -150,7 +150,7 @@ def test_what_is_not_finite_in_the_snapshot_is_refused_by_name(
 ) -> None:
     snapshot, reference = moving(model)
     array, place = spoilt(getattr(snapshot, name), value)
-    broken = snapshot.replaced(**{name: array})
+    broken = snapshot.replaced(**{name: np.asarray(array)})  # pyright: ignore[reportArgumentType]
     expect_refusal(ways, (broken, reference), f"snapshot.{name}{place}")
 
 

@@ -9,8 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from go2_wbc import compilation
-from go2_wbc.kept_code import kernel_folder
+from go2_wbc.kept_code import CACHE_VARIABLE, kernel_folder
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco import settling
 from go2_wbc.robot.state import JointCommand
@@ -21,7 +20,7 @@ STEPS = 200
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """An empty cache; the process's own one is used again afterwards."""
-    monkeypatch.setenv(compilation.CACHE_VARIABLE, str(tmp_path))
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path))
     kernel_folder.cache_clear()
     yield tmp_path
     kernel_folder.cache_clear()
@@ -90,7 +89,7 @@ def test_where_nothing_can_be_kept_every_robot_falls(
 ) -> None:
     kernel_folder().joinpath("lying").touch()  # pyright: ignore[reportOptionalMemberAccess]
     MujocoPlant()
-    monkeypatch.setenv(compilation.CACHE_VARIABLE, str(folder / "a file" / "below"))
+    monkeypatch.setenv(CACHE_VARIABLE, str(folder / "a file" / "below"))
     (folder / "a file").touch()
     kernel_folder.cache_clear()
     MujocoPlant()
