@@ -14,7 +14,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("bridges", "benchmarks.bridges.command", "ROS 2 and Unitree's protocol, by processes"),
     Command("answers", "benchmarks.answers", "the QP where its constraints contradict each other"),
     Command("steps", "benchmarks.steps", "where authored steps and walks end"),
-    Command("locomotion", "benchmarks.locomotion", "gaits at their speeds, planned ahead by MPC"),
+    Command("locomotion", "benchmarks.locomotion", "gaits at their speeds"),
     Command("envelopes", "benchmarks.envelopes", "the greatest speed of each gait, and store it"),
     Command("balance", "benchmarks.balance", "pushes, drops, gait changes; falls noticed"),
     Command("dynamics", "benchmarks.dynamics", "solving dynamic motions, and what comes of it"),

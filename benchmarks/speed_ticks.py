@@ -129,7 +129,7 @@ def _prepared(go2: GO2Controller, mode: str) -> Callable[[], object]:
 
 
 def measure_estimated(trial: Trial) -> Measurement:
-    """Ticks of a trot whose forces are planned ahead, on its own sensors.
+    """Ticks of a trot on its own sensors.
 
     The worst tick is told as in ``measure_commands``.
     """
