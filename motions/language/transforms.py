@@ -13,12 +13,12 @@ from motions.language.arrangement import Arrangement
 from motions.language.clock import SAME, BeatClock
 from motions.language.easing import backwards
 from motions.language.keys import (
+    ON_GROUND,
     BalanceShift,
     BodyKey,
     BodyPathKey,
     Key,
     LegKey,
-    LegTarget,
     Mark,
     PhaseKey,
     PostureKey,
@@ -137,7 +137,7 @@ _GOALS: dict[type[Key], tuple[str, Callable[[Transforms], Any]]] = {
     BodyKey: ("value", lambda line: 0.0),
     BodyPathKey: ("value", lambda line: 0.0),
     PostureKey: ("posture", lambda line: line.entry),
-    LegKey: ("target", lambda line: LegTarget.on_ground()),
+    LegKey: ("target", lambda line: ON_GROUND),
     BalanceShift: ("raised", lambda line: frozenset()),
 }
 """What each key leads to, and where its track is before the first one."""
