@@ -33,7 +33,7 @@ JITTER = 0.004
 SWING = 0.08
 """By which share of a beat the off-beats come late, at most."""
 
-Note = Float[np.ndarray, " m"]
+Note = Float[np.ndarray, " j"]
 
 
 @dataclass(frozen=True, slots=True)
