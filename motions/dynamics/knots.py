@@ -78,7 +78,7 @@ class Knots:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class Solution:
     """A solution at its knots: states, torques, forces, gains, and what it took."""
 
     x: Float[np.ndarray, "n1 37"]

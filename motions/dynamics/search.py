@@ -13,7 +13,7 @@ from jaxtyping import Float
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from motions.dynamics.continuation import Start
-from motions.dynamics.knots import Found, Knots
+from motions.dynamics.knots import Knots, Solution
 from motions.dynamics.phases import Progress
 from motions.dynamics.shooting_problem import ShootingProblem
 
@@ -73,8 +73,8 @@ class Search:
         full: ShootingProblem,
         knots: Knots,
         *,
-        is_good: Callable[[Found], bool],
-        turns: Callable[[Found], bool],
+        is_good: Callable[[Solution], bool],
+        turns: Callable[[Solution], bool],
         budget: float,
         progress: Progress | None,
         start: Start | None = None,
@@ -97,7 +97,7 @@ class Search:
         solver.setCallbacks([self._clock])
         return solver
 
-    def run(self) -> Found:
+    def run(self) -> Solution:
         """A solution.
 
         Raises:
@@ -113,7 +113,7 @@ class Search:
             ) from None
         return self._found()
 
-    def best(self) -> Found | None:
+    def best(self) -> Solution | None:
         """Where the search is, if that obeys the dynamics."""
         solver = self._solver
         is_whole = bool(len(solver.xs)) and solver.isFeasible and np.isfinite(solver.cost)
@@ -175,7 +175,7 @@ class Search:
         converged = solver.solve(xs, us, ITERATIONS, False, regularisation)
         return bool(converged and solver.isFeasible and np.isfinite(solver.cost))
 
-    def _found(self) -> Found:
+    def _found(self) -> Solution:
         solver, problem = self._solver, self._full.problem
         problem.calc(solver.xs, solver.us)
         forces = np.zeros((len(self._knots.stance), 4, 3))
@@ -184,7 +184,7 @@ class Search:
             for leg in LEGS:
                 if self._knots.stance[row, leg]:
                     forces[row, leg] = contacts[FOOT_NAMES[leg]].f.linear
-        return Found(
+        return Solution(
             np.array(solver.xs), np.array(solver.us), forces, np.array(solver.K),
             self._clock.iterations, float(solver.cost),
         )  # fmt: skip

@@ -16,7 +16,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from motions.dynamics.continuation import Solved, Start, continued
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory, Miss
-from motions.dynamics.knots import Found, Knots, feet_at, knots_of, pose_of
+from motions.dynamics.knots import Knots, Solution, feet_at, knots_of, pose_of
 from motions.dynamics.phases import PhaseProblem, Progress, Tolerance
 from motions.dynamics.plan_audit import audit
 from motions.dynamics.plan_limits import PlanLimits, Weights
@@ -85,7 +85,7 @@ class Task:
     tolerance: Tolerance
     misses: Callable[[Knots, DynamicTrajectory], tuple[Miss, ...]]
 
-    def plan(self, found: Found) -> DynamicTrajectory:
+    def plan(self, found: Solution) -> DynamicTrajectory:
         """The plan of what the search found."""
         q = found.x[:, :19]
         plan = DynamicTrajectory(
@@ -116,7 +116,7 @@ def optimum(
     from motions.dynamics.search import Search
     from motions.dynamics.shooting_problem import ShootingProblem
 
-    def objections(found: Found) -> list[str]:
+    def objections(found: Solution) -> list[str]:
         plan = task.plan(found)
         return broken_limits(plan, task.model) + far_misses(plan, task.tolerance)
 

@@ -105,8 +105,7 @@ class FeasibilityChecker:
 
     def _compiled(self, motion: object) -> MotionPlan:
         """The plan of ``motion``, the nearest feasible one where its timeline asks for that."""
-        broken, progress = self._broken, self._progress
-        return compile_motion(motion, self.model, broken=broken, progress=progress)
+        return compile_motion(motion, self.model, mend=self._broken, progress=self._progress)
 
     def _broken(self, plan: CompiledPlan) -> Float[np.ndarray, " k"]:
         """Instants [s] at which ``plan`` breaks a limit."""

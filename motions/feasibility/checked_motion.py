@@ -77,7 +77,7 @@ def compile_motion(
     motion: object,
     model: RobotModel,
     *,
-    broken: Broken | None = None,
+    mend: Broken | None = None,
     progress: Progress | None = None,
 ) -> MotionPlan:
     """The plan of ``motion`` on the robot ``model``; what is compiled already is not done again.
@@ -85,7 +85,7 @@ def compile_motion(
     Args:
         motion: a ``Playable``; anything else is refused.
         model: must not be that of a control loop that runs in another thread.
-        broken, progress: as for ``compile_timeline``; ``broken`` is asked for timelines with
+        mend, progress: as for ``compile_timeline``; ``mend`` is asked for timelines with
             ``physics="nearest"`` only.
 
     Raises:
@@ -105,8 +105,8 @@ def compile_motion(
             "motion must be a name of the library, a function with @motion before it, a Timeline, "
             f"a plan or a CheckedMotion, got {motion!r}"
         )
-    asked = broken if line.physics == NEAREST else None
-    return compile_timeline(line, model, broken=asked, progress=progress)
+    asked = mend if line.physics == NEAREST else None
+    return compile_timeline(line, model, mend=asked, progress=progress)
 
 
 def timeline_of(motion: object) -> Timeline | None:

@@ -16,6 +16,7 @@ from motions.arguments import quantity, word
 from motions.language.easing import EaseWord, easing
 from motions.language.keys import (
     BODY_CHANNELS,
+    ON_GROUND,
     BalanceShift,
     BodyKey,
     Frame,
@@ -147,7 +148,7 @@ class BodyAndFeet(TimelineData):
         which = arguments.foot(leg)
         if which not in self.raised:
             raise TimelineError(f"down(): foot {which.name} is not raised")
-        return self._move_leg(which, LegTarget.on_ground(), over, Ease.MINIMUM_JERK)
+        return self._move_leg(which, ON_GROUND, over, Ease.MINIMUM_JERK)
 
     def home(self: _Line, *, over: float) -> _Line:
         """Put every raised foot down, then bring the trunk back to its posture."""

@@ -46,15 +46,10 @@ class LegTarget:
     frame: Frame
     values: tuple[float, float, float]
 
-    @staticmethod
-    def on_ground() -> LegTarget:
-        """The foot where it stands."""
-        return LegTarget(Frame.GROUND, (0.0, 0.0, 0.0))
-
     @property
     def is_on_ground(self) -> bool:
         """Whether the foot stands on the ground, where it stood."""
-        return self.frame is Frame.GROUND and self.values == (0.0, 0.0, 0.0)
+        return self == ON_GROUND
 
     @property
     def mirrored(self) -> LegTarget:
@@ -70,6 +65,10 @@ class LegTarget:
             return self
         x, y, z = self.values
         return replace(self, values=(amplitude * x, amplitude * y, amplitude * z))
+
+
+ON_GROUND = LegTarget(Frame.GROUND, (0.0, 0.0, 0.0))
+"""The foot where it stands."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,12 +13,12 @@ from motions.language.arrangement import Arrangement
 from motions.language.clock import SAME, BeatClock
 from motions.language.easing import backwards
 from motions.language.keys import (
+    ON_GROUND,
     BalanceShift,
     BodyKey,
     BodyPathKey,
     Key,
     LegKey,
-    LegTarget,
     Mark,
     PhaseKey,
     PostureKey,
@@ -37,14 +37,8 @@ class Transforms(Arrangement):
     def scale_time(self: _Line, factor: float) -> _Line:
         """The same motion, ``factor`` times as long: 2 is half as fast."""
         longer = positive("factor", factor)
-        return replace(
-            self,
-            keys=tuple(key.slower(longer) for key in self.keys),
-            clock=BeatClock(tuple(longer * t for t in self.clock.instants)),
-            shift_time=longer * self.shift_time,
-            counted=tuple(longer * beat for beat in self.counted),
-            **{name: longer * getattr(self, name) for name in _TIMES},
-        )
+        keys = tuple(key.slower(longer) for key in self.keys)
+        return self._retimed(keys, lambda t: longer * t, longer)
 
     def scale(self: _Line, amplitude: float) -> _Line:
         """The same motion with all offsets of trunk and feet multiplied: 0.5 is half as large.
@@ -69,11 +63,18 @@ class Transforms(Arrangement):
         def when(t: float) -> float:
             return t + longer * sum(min(max(t - start, 0.0), end - start) for start, end in shifts)
 
+        keys = tuple(key.retimed(when) for key in self.keys)
+        return self._retimed(keys, when, 1.0 + longer)
+
+    def _retimed(
+        self: _Line, keys: tuple[Key, ...], when: Callable[[float], float], factor: float
+    ) -> _Line:
+        """With ``keys``, its instants where ``when`` puts them, and ``factor`` times its shifts."""
         return replace(
             self,
-            keys=tuple(key.retimed(when) for key in self.keys),
+            keys=keys,
             clock=BeatClock(tuple(map(when, self.clock.instants))),
-            shift_time=(1.0 + longer) * self.shift_time,
+            shift_time=factor * self.shift_time,
             counted=tuple(map(when, self.counted)),
             **{name: when(getattr(self, name)) for name in _TIMES},
         )
@@ -137,7 +138,7 @@ _GOALS: dict[type[Key], tuple[str, Callable[[Transforms], Any]]] = {
     BodyKey: ("value", lambda line: 0.0),
     BodyPathKey: ("value", lambda line: 0.0),
     PostureKey: ("posture", lambda line: line.entry),
-    LegKey: ("target", lambda line: LegTarget.on_ground()),
+    LegKey: ("target", lambda line: ON_GROUND),
     BalanceShift: ("raised", lambda line: frozenset()),
 }
 """What each key leads to, and where its track is before the first one."""

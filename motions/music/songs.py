@@ -16,9 +16,8 @@ from jaxtyping import Float
 
 from go2_wbc.files import checked_output, write_atomically
 from motions.arguments import positive
+from motions.music.sound import RATE, Sound
 
-RATE = 22050
-"""Samples per second: half of a compact disc's, enough for all that is heard here."""
 LEAD_IN = 0.5
 """Silence [s] before the first beat of a click track."""
 CLICK_PITCH, ACCENT_PITCH = 1000.0, 1500.0
@@ -34,8 +33,7 @@ JITTER = 0.004
 SWING = 0.08
 """By which share of a beat the off-beats come late, at most."""
 
-Sound = Float[np.ndarray, " n"]
-Note = Float[np.ndarray, " m"]
+Note = Float[np.ndarray, " j"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,7 +12,7 @@ from go2_wbc.errors import CommandError, MissingDependency
 
 INSTALL_LINE = 'python -m pip install -e ".[music]"'
 RATE = 22050
-"""Samples per second that are kept: librosa's default."""
+"""Samples per second that are kept, or made: librosa's default, half of a compact disc's."""
 LONGEST = 900.0
 """Length [s] of the longest song: a quarter of an hour, so that no file fills the memory."""
 COMPRESSION = 0.7

@@ -22,7 +22,7 @@ from motions.language.clock import SAME
 from motions.language.keys import BalanceShift
 from motions.language.timeline import Timeline
 from motions.plan.compiled_plan import Problem
-from motions.plan.tracks import LegTracks, Poses, Times, followed
+from motions.plan.tracks import Instants, LegTracks, Poses, Times, followed
 
 MARGINS = (0.08, 0.065, 0.05, 0.035, 0.02)
 """Distances [m] of the CoM to the edges of the support polygon that are tried, best first.
@@ -81,9 +81,9 @@ class Balancer:
         pose = self._body[index].copy()
         pose[:2] += guess
         instant = self._times[index : index + 1]
-        ground = self._tracks.footing.at(instant)
-        joints = self._tracks.paths(instant, pose[None], ground).q[0]
-        placed = self._solve(raised, pose, joints, ground.p_feet[0])
+        now = Instants.of(instant, pose[None], self._tracks.footing.at(instant))
+        joints = self._tracks.paths(now).q[0]
+        placed = self._solve(raised, pose, joints, now.ground.p_feet[0])
         return placed[:2] - self._body[index, :2]
 
     def _solve(

@@ -29,14 +29,13 @@ from go2_wbc.geometry import convex_hull
 from go2_wbc.robot.model import RobotModel
 from motions.batch_kinematics import (
     Wanted,
-    attitudes,
     centres_of_mass,
     configurations,
     place,
     rates,
     zero_moment_points,
 )
-from motions.plan.tracks import LegTracks, Poses, Times
+from motions.plan.tracks import Instants, LegTracks, Poses, Times
 
 INSIDE = 0.03
 """Distance [m] that CoM and zero-moment point keep from the edges of three or four feet: twice the
@@ -274,24 +273,24 @@ def swayed(
     span: Span, body: Poses, tracks: LegTracks, model: RobotModel
 ) -> Float[np.ndarray, "n 2"]:
     """Places x, y [m] of the base, near those of ``body``, in which the ground can hold it."""
-    ground = tracks.footing.at(span.times)
-    joints = tracks.paths(span.times, body, ground).q
+    now = Instants.of(span.times, body, tracks.footing.at(span.times))
+    joints, p_feet = tracks.paths(now).q, now.ground.p_feet
     com, rpy = centres_of_mass(body, joints, model), body[:, 3:]
     stepping = Stepping(
         times=span.times,
         p_com=com,
         stance=span.stance,
-        p_feet=ground.p_feet,
+        p_feet=p_feet,
         gravity=model.gravity,
         bias=np.zeros((len(com), 2)),
     )
     wanted = Wanted(
         p=com,
         is_com=np.ones(len(com), dtype=bool),
-        R=attitudes(rpy),
+        R=now.R,
         q_joints=joints,
         raised=span.raised,
-        p_feet=ground.p_feet,
+        p_feet=p_feet,
     )
     problem, p_base = SwayProblem(stepping), body[:, :3]
     for _ in range(PASSES):

@@ -23,7 +23,7 @@ from go2_wbc.reference import (
     TrackedPoint,
 )
 from go2_wbc.tracking.plan_curves import PlanCurves, StanceLoad
-from motions.batch_kinematics import attitudes
+from motions.batch_kinematics import Wanted, attitudes
 from motions.plan.dynamic_span import DynamicSpan
 from motions.postures import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN
 
@@ -57,30 +57,18 @@ class Problem:
     reason: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class PlanSamples:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanSamples(Wanted):
     """The part of many references that says where the robot shall be.
 
     Attributes:
         times: (n,) [s].
-        p_world: (n, 3) position [m] of the CoM, or of the base.
-        is_com: (n,) of which.
-        R_world_base: (n, 3, 3) attitude of the trunk.
-        q_joints: (n, 12) joint angles [rad] of legs that follow their joints.
         stance: (n, 4) feet that stand.
-        raised: (n, 4) legs that follow their joints.
-        p_feet: (n, 4, 3) where the other feet are [m].
         normal_force_max: (n, 4) greatest normal force [N] of each foot.
     """
 
     times: Float[np.ndarray, " n"]
-    p_world: Float[np.ndarray, "n 3"]
-    is_com: Bool[np.ndarray, " n"]
-    R_world_base: Float[np.ndarray, "n 3 3"]
-    q_joints: Float[np.ndarray, "n 12"]
     stance: Bool[np.ndarray, "n 4"]
-    raised: Bool[np.ndarray, "n 4"]
-    p_feet: Float[np.ndarray, "n 4 3"]
     normal_force_max: Float[np.ndarray, "n 4"]
 
     @staticmethod
@@ -93,9 +81,9 @@ class PlanSamples:
         swung = np.array([one.p_world_feet for one in references])
         return PlanSamples(
             times=times,
-            p_world=np.array([one.body.p_world for one in references]),
+            p=np.array([one.body.p_world for one in references]),
             is_com=np.array([one.body.point is TrackedPoint.COM for one in references]),
-            R_world_base=np.array([one.body.R_world_base for one in references]),
+            R=np.array([one.body.R_world_base for one in references]),
             q_joints=np.array([one.q_joints for one in references]),
             stance=np.array([one.stance for one in references]),
             p_feet=np.where(swings[:, :, None], swung, p_feet),
@@ -265,9 +253,9 @@ class CompiledPlan(MotionPlan):
         phase, swings = self._phases(times), self.swings[event_at(self.contacts, times)]
         return PlanSamples(
             times=times,
-            p_world=values[:, :3],
+            p=values[:, :3],
             is_com=np.ones(len(times), dtype=bool),
-            R_world_base=attitudes(values[:, 3:6]),
+            R=attitudes(values[:, 3:6]),
             q_joints=values[:, 6:18],
             stance=phase.stance,
             raised=~(phase.stance | swings),

@@ -1,4 +1,4 @@
-"""Who stands when: lift-offs and touchdowns of a timeline, and over how long feet are unloaded."""
+"""Who stands when: lift-offs and touchdowns of a timeline, and how long feet are unloaded."""
 
 from __future__ import annotations
 
@@ -22,64 +22,64 @@ LEAST_RAMP = 0.03
 """The same [s] where one foot lands as another lifts off: as ``LocomotionConfig.load_ramp``."""
 
 
-def flights(timeline: Timeline, leg: Leg) -> list[tuple[float, float]]:
-    """Spans [s] in which a foot is off the ground; the last one may be endless."""
-    spans = swings(timeline, leg)
-    begin: float | None = None
-    for key in timeline.in_order(LegKey):
-        if key.leg is not leg:
-            continue
-        if begin is None:
-            begin = key.start
-        if key.target.is_on_ground:
-            spans.append((begin, key.end))
-            begin = None
-    return sorted(spans if begin is None else [*spans, (begin, np.inf)])
+class FootContacts:
+    """The feet of a timeline: when they are off the ground, and when they step.
 
-
-def swings(timeline: Timeline, leg: Leg) -> list[tuple[float, float]]:
-    """Spans [s] in which a foot steps."""
-    return [(key.start, key.end) for key in timeline.in_order(StepKey) if key.leg is leg]
-
-
-def stepping_feet(timeline: Timeline, contacts: ContactSchedule) -> Bool[np.ndarray, "m 4"]:
-    """Feet that step, from each event on."""
-    starts = np.array(contacts.times)
-    modes = np.zeros_like(contacts.modes)
-    for leg in LEGS:
-        for start, end in swings(timeline, leg):
-            modes[(starts > start - SAME) & (starts < end - SAME), leg] = True
-    return modes
-
-
-def contact_schedule(timeline: Timeline) -> ContactSchedule:
-    """Who stands when, as events."""
-    spans = {leg: flights(timeline, leg) for leg in LEGS}
-    changes = [t for legs in spans.values() for span in legs for t in span if np.isfinite(t)]
-    times = distinct(*sorted([0.0, *changes]))
-    modes = np.ones((len(times), 4), dtype=bool)
-    for leg, flown in spans.items():
-        for lift_off, touchdown in flown:
-            first, last = (bisect_left(times, t - SAME) for t in (lift_off, touchdown))
-            modes[first:last, leg] = False
-    return ContactSchedule(times, modes)
-
-
-def load_ramp(timeline: Timeline) -> float:
-    """Half of the shortest time on the ground between two flights, at most ``UNLOAD_TIME``.
-
-    Before the first flight the foot may use all the time that there is. Where a foot that has
-    stepped follows another one, it takes over within the time on four feet between them.
+    Attributes:
+        flights: of each leg, spans [s] in which its foot is in the air; the last may be endless.
+        swings: of each leg, spans [s] in which its foot steps.
     """
-    spans = [flights(timeline, leg) for leg in LEGS]
-    before = [flown[0][0] for flown in spans if flown]
-    between = [(up - down) / 2 for flown in spans for (_, down), (up, _) in pairwise(flown)]
-    lift_offs = sorted(up for flown in spans for up, _ in flown)
-    steps = [down for leg in LEGS for _, down in swings(timeline, leg)]
-    following = [bisect_left(lift_offs, down - SAME) for down in steps]
-    handed = [
-        max(lift_offs[index] - down, LEAST_RAMP)
-        for down, index in zip(steps, following, strict=True)
-        if index < len(lift_offs)
-    ]
-    return min([UNLOAD_TIME, *(t for t in (*before, *between, *handed) if t > 0.0)])
+
+    def __init__(self, timeline: Timeline) -> None:
+        """Of the keys of ``timeline``."""
+        self.swings: dict[Leg, list[tuple[float, float]]] = {leg: [] for leg in LEGS}
+        for step in timeline.in_order(StepKey):
+            self.swings[step.leg].append((step.start, step.end))
+        self.flights = {leg: list(spans) for leg, spans in self.swings.items()}
+        begun: dict[Leg, float] = {}
+        for key in timeline.in_order(LegKey):
+            begin = begun.setdefault(key.leg, key.start)
+            if key.target.is_on_ground:
+                self.flights[key.leg].append((begin, key.end))
+                del begun[key.leg]
+        for leg, spans in self.flights.items():
+            spans += [(begun[leg], np.inf)] if leg in begun else []
+            spans.sort()
+
+    def schedule(self) -> ContactSchedule:
+        """Who stands when, as events."""
+        changes = [t for spans in self.flights.values() for span in spans for t in span]
+        times = distinct(*sorted([0.0, *(t for t in changes if np.isfinite(t))]))
+        modes = np.ones((len(times), 4), dtype=bool)
+        for leg, spans in self.flights.items():
+            for lift_off, touchdown in spans:
+                first, last = (bisect_left(times, t - SAME) for t in (lift_off, touchdown))
+                modes[first:last, leg] = False
+        return ContactSchedule(times, modes)
+
+    def stepping(self, contacts: ContactSchedule) -> Bool[np.ndarray, "m 4"]:
+        """Feet that step, from each event on."""
+        starts, modes = np.array(contacts.times), np.zeros_like(contacts.modes)
+        for leg, spans in self.swings.items():
+            for start, end in spans:
+                modes[(starts > start - SAME) & (starts < end - SAME), leg] = True
+        return modes
+
+    def ramp(self) -> float:
+        """Half of the shortest time on the ground between two flights, at most ``UNLOAD_TIME``.
+
+        Before the first flight the foot may use all the time that there is. Where a foot that has
+        stepped follows another one, it takes over within the time on four feet between them.
+        """
+        spans = [flown for flown in self.flights.values() if flown]
+        before = [flown[0][0] for flown in spans]
+        between = [(up - down) / 2 for flown in spans for (_, down), (up, _) in pairwise(flown)]
+        lift_offs = sorted(up for flown in spans for up, _ in flown)
+        steps = [down for swung in self.swings.values() for _, down in swung]
+        following = [bisect_left(lift_offs, down - SAME) for down in steps]
+        handed = [
+            max(lift_offs[index] - down, LEAST_RAMP)
+            for down, index in zip(steps, following, strict=True)
+            if index < len(lift_offs)
+        ]
+        return min([UNLOAD_TIME, *(t for t in (*before, *between, *handed) if t > 0.0)])

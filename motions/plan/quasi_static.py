@@ -23,8 +23,8 @@ from motions.language.timeline import Timeline
 from motions.plan.balance import Balancer
 from motions.plan.com_trajectory import Span, swayed
 from motions.plan.compiled_plan import CompiledPlan, Problem, event_at
-from motions.plan.contact_schedule import contact_schedule, load_ramp, stepping_feet
-from motions.plan.tracks import JointPaths, LegTracks, Times, body_path, sample_times
+from motions.plan.contact_schedule import FootContacts
+from motions.plan.tracks import Instants, JointPaths, LegTracks, Times, body_path, sample_times
 from motions.postures import home_poses, standing_feet
 
 REACH_TOLERANCE = 5e-3
@@ -61,19 +61,21 @@ def compile_quasi_static(
     body = body_path(timeline, home, times, ground)
     offsets, problems = Balancer(timeline, tracks, model, times, body).balance()
     body[:, :2] += offsets
-    contacts = contact_schedule(timeline)
-    steps = stepping_feet(timeline, contacts)
+    feet = FootContacts(timeline)
+    contacts = feet.schedule()
+    steps = feet.stepping(contacts)
     raised = ~(contacts.at_times(times).stance | steps[event_at(contacts, times)])
     for shift in timeline.in_order(BalanceShift):
         if shift.is_swaying:
             rows = slice(*np.searchsorted(times, [shift.start - SAME, shift.end + SAME]).tolist())
             span = Span(times[rows], contacts.at_times(times[rows]).stance, raised[rows])
             body[rows, :2] = swayed(span, body[rows], tracks, model)
-    legs = tracks.paths(times, body, ground)
+    now = Instants.of(times, body, ground)
+    legs = tracks.paths(now)
     com = centres_of_mass(body, legs.q, model)
     problems += _out_of_reach(legs, times)
-    feet = tracks.feet(raised, ground, body, legs.q)
-    samples = np.hstack([com, body[:, 3:], legs.q, feet.reshape(-1, 12)])
+    p_feet = tracks.feet(raised, now, legs.q)
+    samples = np.hstack([com, body[:, 3:], legs.q, p_feet.reshape(-1, 12)])
     return CompiledPlan(
         name=timeline.name,
         entry=timeline.entry,
@@ -81,7 +83,7 @@ def compile_quasi_static(
         curves=CubicSpline(times, samples, bc_type="clamped"),
         contacts=contacts,
         swings=steps,
-        ramp=load_ramp(timeline),
+        ramp=feet.ramp(),
         problems=tuple(problems),
         spans={mark.name: (mark.start, mark.end) for mark in timeline.in_order(Mark)},
         beats=timeline.beats,

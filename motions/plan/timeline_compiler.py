@@ -51,7 +51,7 @@ def compile_timeline(
     model: RobotModel,
     p_feet: Float[np.ndarray, "4 3"] | None = None,
     *,
-    broken: Broken | None = None,
+    mend: Broken | None = None,
     progress: Progress | None = None,
 ) -> CompiledPlan:
     """The plan of ``timeline``, in the frame of the motion.
@@ -62,9 +62,9 @@ def compile_timeline(
             runs in another thread.
         p_feet: where the feet's centres stand at first [m], by default below the hips; the trunk
             starts above them, with their heading.
-        broken: finds what is infeasible between dynamic blocks, for which the nearest motion that
-            is not is solved; without it all is compiled as it is written. ``FeasibilityChecker``
-            gives it where the timeline asks for it.
+        mend: finds what is infeasible between dynamic blocks, for which the nearest motion that is
+            not is solved; without it all is compiled as it is written. ``FeasibilityChecker`` gives
+            it where the timeline asks for it.
         progress: called while something is solved, with the number of iterations and the cost.
 
     Raises:
@@ -73,11 +73,11 @@ def compile_timeline(
         MissingDependency: if a block must be solved and the solver is not installed.
     """
     blocks = timeline.in_order(PhaseKey)
-    if not blocks and broken is None:
+    if not blocks and mend is None:
         return compile_quasi_static(timeline, model, p_feet)
     for block in blocks:
         _require_alone(timeline, block)
-    maker = _Maker(timeline, model, broken, progress)
+    maker = _Maker(timeline, model, mend, progress)
     if p_feet is not None:
         maker.start_on(p_feet)
     for block in blocks:

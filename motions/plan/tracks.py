@@ -23,6 +23,7 @@ from motions.batch_kinematics import attitudes, foot_centres, turned, turned_bac
 from motions.language.footing import Footing, Ground
 from motions.language.keys import (
     BODY_CHANNELS,
+    ON_GROUND,
     BodyKey,
     BodyPathKey,
     Frame,
@@ -126,6 +127,32 @@ class JointPaths:
     miss: Float[np.ndarray, "n 4"]
 
 
+@dataclass(frozen=True, slots=True)
+class Instants:
+    """Where trunk and feet are at n increasing instants.
+
+    Attributes:
+        times: (n,) [s].
+        p_base: (n, 3) place of the base [m].
+        R: (n, 3, 3) its attitude.
+        ground: where the feet stand.
+    """
+
+    times: Times
+    p_base: Float[np.ndarray, "n 3"]
+    R: Float[np.ndarray, "n 3 3"]
+    ground: Ground
+
+    @staticmethod
+    def of(times: Times, body: Poses, ground: Ground) -> Instants:
+        """With the trunk at ``body``."""
+        return Instants(times, body[:, :3], attitudes(body[:, 3:]), ground)
+
+    def part(self, rows: slice) -> Instants:
+        """Some of them."""
+        return Instants(self.times[rows], self.p_base[rows], self.R[rows], self.ground.part(rows))
+
+
 class LegTracks:
     """Evaluates the legs' tracks of a timeline along a path of the trunk.
 
@@ -152,12 +179,13 @@ class LegTracks:
 
         That is in joints or in the frame of the body, so the trunk's pose does not count.
         """
-        done, origin = list[LegKey](), LegTarget.on_ground()
+        done, origin = list[LegKey](), ON_GROUND
         for key in keys:
             whole: LegKey = key
             if isinstance(key, JointKey):
-                ground = self.footing.at(np.array([key.start]))
-                angles = self._at(leg, origin, np.zeros((1, 6)), ground).q[0]
+                start = np.array([key.start])
+                now = Instants.of(start, np.zeros((1, 6)), self.footing.at(start))
+                angles = self._at(leg, origin, now).q[0]
                 angles[key.joint] = key.target.values[key.joint]
                 hip, thigh, calf = angles.tolist()
                 whole = replace(key, target=LegTarget(Frame.JOINTS, (hip, thigh, calf)))
@@ -165,72 +193,59 @@ class LegTracks:
             origin = whole.target
         return done
 
-    def paths(self, times: Times, body: Poses, ground: Ground) -> JointPaths:
-        """Joint angles of all legs at increasing ``times``.
-
-        Args:
-            times: instants [s].
-            body: where the trunk is then.
-            ground: where the feet stand then.
-        """
-        legs = [self._path(leg, times, body, ground) for leg in LEGS]
+    def paths(self, now: Instants) -> JointPaths:
+        """Joint angles of all legs."""
+        legs = [self._path(leg, now) for leg in LEGS]
         return JointPaths(
             np.hstack([leg.q for leg in legs]), np.column_stack([leg.miss for leg in legs])
         )
 
-    def feet(
-        self, raised: Bool[np.ndarray, "n 4"], ground: Ground, body: Poses, joints: Joints
-    ) -> Feet:
-        """Places [m] of the feet's centres: on the ground, and where raised legs hold them.
+    def feet(self, raised: Bool[np.ndarray, "n 4"], now: Instants, joints: Joints) -> Feet:
+        """Places [m] of the feet's centres: on the ground, and where raised legs hold them."""
+        held = foot_centres(now.p_base, now.R, joints, self._model)
+        return np.where(raised[:, :, None], held, now.ground.p_feet)
 
-        ``body``, ``joints``: pose of the trunk and joint angles.
-        """
-        held = foot_centres(body[:, :3], attitudes(body[:, 3:]), joints, self._model)
-        return np.where(raised[:, :, None], held, ground.p_feet)
-
-    def _path(self, leg: Leg, times: Times, body: Poses, ground: Ground) -> LegAngles:
+    def _path(self, leg: Leg, now: Instants) -> LegAngles:
         """From its start until the next one starts, a key alone says where the leg is."""
-        keys, starts = self._keys[leg], self._starts[leg]
+        keys, starts, times = self._keys[leg], self._starts[leg], now.times
         first = max(bisect_right(starts, times[0]) - 1, 0)
-        origin = keys[first - 1].target if first else LegTarget.on_ground()
-        path = self._at(leg, origin, body, ground)
+        origin = keys[first - 1].target if first else ON_GROUND
+        path = self._at(leg, origin, now)
         for index in range(first, bisect_right(starts, times[-1])):
             key = keys[index]
             following = starts[index + 1] if index + 1 < len(keys) else np.inf
             until = max(np.searchsorted(times, following), np.searchsorted(times, key.end, "right"))
             rows = slice(int(np.searchsorted(times, key.start)), int(until))
-            moved = self._move(key, origin, times[rows], body[rows], ground.part(rows))
+            moved = self._move(key, origin, now.part(rows))
             path.q[rows], path.miss[rows] = moved.q, moved.miss
             origin = key.target
         return path
 
-    def _move(
-        self, key: LegKey, origin: LegTarget, times: Times, body: Poses, ground: Ground
-    ) -> LegAngles:
-        share = eased(key, times)[:, None]
+    def _move(self, key: LegKey, origin: LegTarget, now: Instants) -> LegAngles:
+        share = eased(key, now.times)[:, None]
         goals = (origin, key.target)
-        span = times <= key.end
+        span = now.times <= key.end
         if all(goal.frame is not Frame.JOINTS for goal in goals):
-            places = [self._places(key.leg, goal, body, ground) for goal in goals]
+            places = [self._places(key.leg, goal, now) for goal in goals]
             hip = self._geometry[key.leg].p_base_hip[2]
             if all((place[span, 2] < hip - LOW).all() for place in places):
                 between = (1.0 - share) * places[0] + share * places[1]
                 return leg_angles(self._geometry[key.leg], between)
-        first, second = (self._at(key.leg, goal, body, ground) for goal in goals)
+        first, second = (self._at(key.leg, goal, now) for goal in goals)
         q = (1.0 - share) * first.q + share * second.q
         return LegAngles(q, np.where(share[:, 0] < 1.0, first.miss, second.miss))
 
-    def _at(self, leg: Leg, target: LegTarget, body: Poses, ground: Ground) -> LegAngles:
+    def _at(self, leg: Leg, target: LegTarget, now: Instants) -> LegAngles:
         if target.frame is Frame.JOINTS:
-            return LegAngles(np.tile(target.values, (len(body), 1)), np.zeros(len(body)))
-        return leg_angles(self._geometry[leg], self._places(leg, target, body, ground))
+            count = len(now.times)
+            return LegAngles(np.tile(target.values, (count, 1)), np.zeros(count))
+        return leg_angles(self._geometry[leg], self._places(leg, target, now))
 
-    def _places(
-        self, leg: Leg, target: LegTarget, body: Poses, ground: Ground
-    ) -> Float[np.ndarray, "n 3"]:
+    def _places(self, leg: Leg, target: LegTarget, now: Instants) -> Float[np.ndarray, "n 3"]:
         """Places of a foot [m], seen from the base."""
-        offset, p, R = np.array(target.values), ground.p_feet[:, leg], ground.headings
+        offset, ground = np.array(target.values), now.ground
+        p, R = ground.p_feet[:, leg], ground.headings
         if target.frame is Frame.BODY:
             seen = turned_back(R, p - np.pad(ground.frames[:, :2], ((0, 0), (0, 1))))
             return (seen - self._p_home) @ self._R_home + offset
-        return turned_back(attitudes(body[:, 3:]), p + R @ offset - body[:, :3])
+        return turned_back(now.R, p + R @ offset - now.p_base)

@@ -9,7 +9,7 @@ accelerations are those of a cubic spline through the samples. Dynamic spans bri
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -20,7 +20,6 @@ from go2_wbc.errors import MotionError
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.batch_kinematics import (
-    Wanted,
     angles_of,
     attitudes,
     centres_of_mass,
@@ -79,17 +78,8 @@ def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
     p_feet = standing_feet(model)
     asked = plan.samples(times) if is_compiled else PlanSamples.one_by_one(plan, times, p_feet)
     _require_finite(asked)
-    rpy = np.unwrap(angles_of(asked.R_world_base), axis=0)
-    R = attitudes(rpy)
-    wanted = Wanted(
-        p=asked.p_world,
-        is_com=asked.is_com,
-        R=R,
-        q_joints=asked.q_joints,
-        raised=asked.raised,
-        p_feet=asked.p_feet,
-    )
-    placed = place(wanted, CENTRING_STEPS, model)
+    rpy = np.unwrap(angles_of(asked.R), axis=0)
+    placed = place(replace(asked, R=attitudes(rpy)), CENTRING_STEPS, model)
     q = configurations(np.hstack([placed.p_base, rpy]), placed.q_joints)
     spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
     is_dynamic = _are_within(times, spans)
@@ -160,8 +150,8 @@ def _fill(path: Trajectory, span: DynamicSpan, model: RobotModel) -> None:
 
 def _require_finite(asked: PlanSamples) -> None:
     count = len(asked.times)
-    turns, p_feet = asked.R_world_base.reshape(count, 9), asked.p_feet.reshape(count, 12)
-    parts = (asked.p_world, turns, asked.q_joints, p_feet)
+    turns, p_feet = asked.R.reshape(count, 9), asked.p_feet.reshape(count, 12)
+    parts = (asked.p, turns, asked.q_joints, p_feet)
     is_finite = np.isfinite(np.hstack(parts)).all(axis=1)
     if not is_finite.all():
         t = float(asked.times[int(np.argmin(is_finite))])

@@ -19,6 +19,7 @@ from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, load_motion, motion_names
 from motions.language.keys import (
+    ON_GROUND,
     BalanceShift,
     BodyKey,
     Frame,
@@ -125,7 +126,7 @@ def _second_foot(line: Timeline, rng: np.random.Generator) -> Timeline | None:
     middle = key.start + 0.3
     moves = (
         LegKey(key.start, middle, Ease.MINIMUM_JERK, leg, up),
-        LegKey(middle, line.end, Ease.MINIMUM_JERK, leg, LegTarget.on_ground()),
+        LegKey(middle, line.end, Ease.MINIMUM_JERK, leg, ON_GROUND),
     )
     return replace(line, keys=(*line.keys, *moves))
 

@@ -14,7 +14,7 @@ import pytest
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, phase_builders, solve
-from motions.dynamics.knots import Found, Knots, knots_of, pose_of
+from motions.dynamics.knots import Knots, Solution, knots_of, pose_of
 from motions.dynamics.phases import Phase
 from motions.dynamics.plan_limits import PlanLimits, Weights
 from motions.dynamics.solver import _misses
@@ -103,7 +103,7 @@ def test_a_solution_that_does_not_turn_is_left_for_the_next_start(model: RobotMo
     )
 
     def iterations(answers: list[bool]) -> int:
-        def turns(found: Found) -> bool:
+        def turns(found: Solution) -> bool:
             return answers.pop(0)
 
         search = Search(

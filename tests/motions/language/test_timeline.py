@@ -19,7 +19,7 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from motions import Timeline, compile_timeline, deg
 from motions.language.keys import BalanceShift, BodyKey, LegKey
 from motions.language.timeline_data import SHIFT_TIME
-from motions.plan.contact_schedule import contact_schedule
+from motions.plan.contact_schedule import FootContacts
 from motions.postures import home_poses
 from tests.motions.plans import MODEL, curves_at, plan_of
 
@@ -113,7 +113,7 @@ def test_a_raised_foot_is_a_swing_leg_and_the_trunk_moves_first() -> None:
     assert up.start == SHIFT_TIME
     assert back.raised == frozenset()
     assert back.start == down.end
-    schedule = contact_schedule(line)
+    schedule = FootContacts(line).schedule()
     assert schedule.at(up.start - 0.01).stance.all()
     assert schedule.at(up.start).stance.tolist() == [False, True, True, True]
     assert schedule.at(down.end).stance.all()

@@ -98,7 +98,7 @@ def test_what_is_repaired_in_vain_stays_as_it_is_written_with_the_reason(
     model = RobotModel()
     monkeypatch.setattr("motions.plan.timeline_compiler.nearest_cached", refuse)
     written = compile_timeline(LINE, model)
-    plan = compile_timeline(LINE, model, broken=lambda plan: np.array([1.0]))
+    plan = compile_timeline(LINE, model, mend=lambda plan: np.array([1.0]))
     (problem,) = plan.problems
     assert (problem.check, problem.time) == ("nearest motion", pytest.approx(0.5 - LEAD))
     assert "nothing is near" in problem.reason

@@ -8,7 +8,7 @@ from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline
 from motions.language.footing import Footing
-from motions.plan.tracks import LegTracks
+from motions.plan.tracks import Instants, LegTracks
 from motions.postures import STAND_POSE, standing_feet
 
 FAR = 0.6  # m; ahead of where the foot stands, out of its leg's reach
@@ -21,6 +21,6 @@ def test_a_leg_on_its_way_from_a_place_out_of_reach_misses_it_until_it_has_arriv
     body = np.tile(STAND_POSE, (len(times), 1))
     model = RobotModel()
     tracks = LegTracks(line, Footing(line, standing_feet(model)), model, STAND_POSE)
-    miss = tracks.paths(times, body, tracks.footing.at(times)).miss[:, Leg.FR]
+    miss = tracks.paths(Instants.of(times, body, tracks.footing.at(times))).miss[:, Leg.FR]
     assert miss[0] > 0.1
     assert miss.tolist() == [miss[0], miss[0], miss[0], 0.0]
