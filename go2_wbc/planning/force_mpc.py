@@ -27,10 +27,8 @@ from go2_wbc.planning.mpc import NODES, solve_mpc
 from go2_wbc.planning.pose import advance_pose, pose_turn
 from go2_wbc.planning.trunk import Command, ramp
 from go2_wbc.planning.walk import Planner, Walk
-from go2_wbc.reference import LegTask, Target
+from go2_wbc.reference import STANCE, Target
 from go2_wbc.robot.snapshot import Snapshot
-
-_STANCE = float(LegTask.STANCE)
 
 
 @subroutine
@@ -267,7 +265,7 @@ def apply_force_plan(now: Snapshot, s: Planner, c: Walk, command: Command, targe
     system, mass, a = np.zeros((3, 4)), c.mass + now.payload[0], np.zeros(3)
     system[:, :3] = s.robot.inertia
     for leg in range(4):
-        if target.legs[leg] != _STANCE:
+        if target.legs[leg] != STANCE:
             continue
         force, foot = triple(s.planned.f_world_feet[leg]), triple(now.p_world_feet[leg])
         arm = (

@@ -58,7 +58,7 @@ from go2_wbc.planning.walk import (
     Walk,
 )
 from go2_wbc.records import packed
-from go2_wbc.reference import LegTask, Reference, Target
+from go2_wbc.reference import STANCE, SWING, Reference, Target
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -66,7 +66,6 @@ __all__ = ["GREATEST_HEIGHT", "LEAST_HEIGHT", "LocomotionConfig", "LocomotionPla
 
 MID_SWING = 0.2
 """Share of a swing before and after its middle in which a foot that has contact stumbles."""
-_STANCE, _SWING = float(LegTask.STANCE), float(LegTask.SWING)
 
 
 @kernel
@@ -205,7 +204,7 @@ def fill_feet(
     nominal_feet(now, s, c, s.clock.width, nominal)
     for leg in range(4):
         foot = s.feet[leg]
-        target.legs[leg] = _STANCE if stands[leg] else _SWING
+        target.legs[leg] = STANCE if stands[leg] else SWING
         target.p_world_feet[leg] = now.p_world_feet[leg]
         share = 0.0
         if stands[leg]:

@@ -48,7 +48,7 @@ class PlanCurves:
 
     Attributes:
         knots: (n + 1,) instants [s] between which the curves are cubics, from 0.
-        pieces: (4, n, 30) their coefficients, the cube's first, of the time since the knot.
+        pieces: (4, n, ``CURVES``) their coefficients, the cube's first, of the time since the knot.
         events: (m,) instants [s] at which the legs' tasks change.
         tasks: (m, 4) what the legs do from each event on, values of ``LegTask``.
         since, until: (m, 4) when [s] each foot's contact changed last, and changes next, where its
@@ -57,7 +57,7 @@ class PlanCurves:
     """
 
     knots: Float[np.ndarray, " k"]
-    pieces: Float[np.ndarray, "4 n 30"]
+    pieces: Float[np.ndarray, "4 n c"]
     events: Float[np.ndarray, " m"]
     tasks: Float[np.ndarray, "m 4"]
     since: Float[np.ndarray, "m 4"]
@@ -105,7 +105,7 @@ def stand(
 @kernel
 def sample(
     knots: Foreign[Float[np.ndarray, " k"]],
-    pieces: Foreign[Float[np.ndarray, "4 n 30"]],
+    pieces: Foreign[Float[np.ndarray, "4 n c"]],
     events: Foreign[Float[np.ndarray, " m"]],
     tasks: Foreign[Float[np.ndarray, "m 4"]],
     since: Foreign[Float[np.ndarray, "m 4"]],
@@ -138,7 +138,7 @@ def sample(
 @subroutine
 def evaluate(
     knots: Foreign[Float[np.ndarray, " k"]],
-    pieces: Foreign[Float[np.ndarray, "4 n 30"]],
+    pieces: Foreign[Float[np.ndarray, "4 n c"]],
     t: float,
     curves: Float[np.ndarray, "3 30"],
 ) -> None:

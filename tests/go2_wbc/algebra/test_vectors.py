@@ -21,7 +21,10 @@ def test_a_rotation_and_its_vector(angle: float) -> None:
 
 
 def test_a_quaternion_is_that_of_its_rotation_whichever_part_is_largest() -> None:
-    for rotation in (*Rotation.random(200, random_state=7), *Rotation.create_group("O")):
+    for rotation in (
+        *Rotation.random(200, rng=np.random.default_rng(7)),
+        *Rotation.create_group("O"),
+    ):
         q = np.empty(4)
         quaternion_of(rotation.as_matrix(), q)
         truth = rotation.as_quat()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -109,7 +110,7 @@ def test_a_load_is_ramped_to_and_from_the_changes_of_a_foots_contact() -> None:
 
 def test_without_a_ramp_a_foot_is_loaded_at_once() -> None:
     asked = curves(5)
-    jumps = PlanCurves(*(getattr(asked, name) for name in _TABLES), StanceLoad(0.0, 3.0, 300.0))
+    jumps = replace(asked, load=StanceLoad(0.0, 3.0, 300.0))
     assert jumps.at(0.5 + 1e-6).normal_force_max[2] == 300.0
     assert jumps.at(0.9 - 1e-6).normal_force_max[1] == 300.0
 

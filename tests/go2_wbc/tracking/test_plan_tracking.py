@@ -17,7 +17,7 @@ from go2_wbc.robot.rotations import exp_rotation, quaternion_from_rpy, rotation_
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.tracking.landing import Landing
 from go2_wbc.tracking.plan_curves import StanceLoad
-from go2_wbc.tracking.plan_tracking import PlanTracker, Tracking, follow
+from go2_wbc.tracking.plan_tracking import Deviation, PlanTracker, Tracking, follow
 from tests.compiled import assert_plain_is_compiled
 from tests.engine_helpers import holding_reference, random_state, standing_q, state_of
 from tests.stepping_plans import hop_plan
@@ -76,23 +76,23 @@ def test_without_correction_a_plan_is_placed_at_its_anchor_and_stays_what_it_is(
 
 def test_a_deviation_is_the_average_over_the_ticks() -> None:
     rng, tracker = np.random.default_rng(3), PlanTracker(ANCHOR)
-    places, attitudes, joints = [0.0], [0.0], [0.0]
-    assert tracker.deviation.place == 0.0
-    for tick in range(200):
+    places, attitudes, joints = list[float](), list[float](), list[float]()
+    assert tracker.deviation == Deviation(0.0, 0.0, 0.0)
+    for _ in range(200):
         plan = random_plan(rng)
         snapshot, body = near(plan, rng), plan.placed(ANCHOR).body
         tracker.track(target_of(plan), snapshot, 0.0, TICK)
-        places[tick:] = [np.linalg.norm(body.p_world - tracked_position(snapshot, body.point))]
+        off = body.p_world - tracked_position(snapshot, body.point)
+        places.append(float(np.linalg.norm(off)))
         turn = Rotation.from_matrix(body.R_world_base @ snapshot.R_world_base.T)
-        attitudes[tick:] = [turn.magnitude()]
+        attitudes.append(float(turn.magnitude()))
         off = np.abs(plan.q_joints - snapshot.state.joint_positions).reshape(4, 3).max(axis=1)
         raised = [task is LegTask.JOINTS for task in plan.legs]
-        if any(raised):
-            joints += [off[raised].max()]
+        joints += [float(off[raised].max())] if any(raised) else []
         found = tracker.deviation
         assert found.place == pytest.approx(np.mean(places), abs=ROUNDING)
         assert found.attitude == pytest.approx(np.mean(attitudes), abs=1e-7)
-        assert found.joints == pytest.approx(np.mean(joints[1:] or [0.0]), abs=ROUNDING)
+        assert found.joints == pytest.approx(np.mean(joints or [0.0]), abs=ROUNDING)
 
 
 def test_a_trunk_that_a_load_leans_is_judged_by_the_plan_and_not_by_its_correction() -> None:
@@ -151,7 +151,7 @@ def test_compiled_and_plain_are_the_same(touches: bool) -> None:
         state.correction.knows_payload = touches
         for foot in state.landing.feet:
             foot.is_in_air, foot.is_awaited = rng.random(2) < 0.5
-            foot.planned = rng.integers(3)
+            foot.planned = float(rng.integers(3))
         snapshot = near(plan, rng, Payload(2.0, (0.1, 0.05, 0.02)))
         feet = np.full(4, touches)
         numbers = load, config, state, target_of(plan)
