@@ -52,6 +52,7 @@ MODULES = (
     "go2_wbc.planning.locomotion",
     "go2_wbc.plant.mujoco.layout",
     "go2_wbc.reference",
+    "go2_wbc.robot.estimator",
     "go2_wbc.robot.leg_kinematics",
     "go2_wbc.robot.payload_estimation",
     "go2_wbc.robot.rigid_body",

@@ -8,7 +8,6 @@ from go2_wbc import compilation
 
 KERNELS = (
     "condensed",
-    "estimation",
     "motor",
 )
 """Modules of this package whose import compiles, or loads what was compiled."""
