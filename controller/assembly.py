@@ -10,8 +10,8 @@ from controller.loop import ControlLoop
 from controller.pilot import Pilot
 from controller.runner import Runner
 from controller.telemetry import Telemetry
+from go2_wbc.compilation import load_kernels
 from go2_wbc.config import Config
-from go2_wbc.kernels.loading import load_kernels
 from go2_wbc.lazy import without_collecting
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.description import RobotDescription

@@ -10,21 +10,34 @@ from jaxtyping import Bool, Float, Int
 
 from go2_wbc.errors import CommandError
 from go2_wbc.geometry import moving_support_margins
-from go2_wbc.kernels.layout import Layout
 from go2_wbc.recording import Recording
+from go2_wbc.records import Record, layout_of, packed
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.motor import LEAST_SHARE
+from go2_wbc.robot.motor import note_peaks
 from go2_wbc.robot.payload import NO_PAYLOAD
 from go2_wbc.robot.snapshot import Snapshot
 
 BLOCK = 4096
 """Ticks whose memory is asked for at once, 2.4 MB: numpy wants huge pages for 4 MB and more, and
 the first touch of one of these cost 5.6 ms of a tick (seen on a virtual machine)."""
-_TICK = Layout(time=(), q=(19,), v=(18,), tau=(12,), forces=(4,), stance=(4,), com=(3,), feet=(12,))
-_TIME = _TICK.start["time"]
-_Q, _V, _TAU, _FORCES, _STANCE, _COM, _FEET = (
-    _TICK.slice(name) for name in ("q", "v", "tau", "forces", "stance", "com", "feet")
-)
+
+
+class Tick(Record):
+    """What is kept of a tick, as in ``Recording``."""
+
+    time: float
+    q: Float[np.ndarray, "19"]
+    v: Float[np.ndarray, "18"]
+    tau: Float[np.ndarray, "12"]
+    forces: Float[np.ndarray, "4"]
+    stance: Float[np.ndarray, "4"]
+    com: Float[np.ndarray, "3"]
+    feet: Float[np.ndarray, "12"]
+
+
+_TICK = layout_of(Tick)
+_TIME = _TICK.fields["time"].start
+_Q, _V, _TAU, _FORCES, _STANCE, _COM, _FEET = map(_TICK.slice, Tick.part_names()[1:])
 
 
 class Telemetry:
@@ -45,12 +58,7 @@ class Telemetry:
         self._blocks: list[Float[np.ndarray, "k size"]] = []
         self._labels = np.empty(capacity, dtype=object)
         self._count = 0
-        from go2_wbc.kernels.motor import note_peaks  # compiled; importing this module is not
-
-        self._note_peaks, self._peaks = note_peaks, np.zeros((3, 12))
-        motor = model.motor
-        least = LEAST_SHARE * motor.peak
-        self._motor = np.array([motor.peak, motor.knee_speed, motor.no_load_speed, least])
+        self._motor, self._peaks = packed(model.motor), np.zeros((3, 12))
         self._v_before: Float[np.ndarray, "12"] | None = None
         self.payload = NO_PAYLOAD
         self.qp_failures = self.relaxed_ticks = self.grave_ticks = self.missed_deadlines = 0
@@ -69,7 +77,7 @@ class Telemetry:
         self._count += 1
         v = state.joint_velocities
         before = v if self._v_before is None else self._v_before
-        self._note_peaks(state.tau, v, before, self._motor, self._peaks)
+        note_peaks(state.tau, v, before, self._motor, self._peaks)
         self._v_before = v
 
     @property

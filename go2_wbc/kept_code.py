@@ -222,8 +222,6 @@ def _ingredient(name: str, value: Any, seen: set[int]) -> Iterator[str]:
         yield from _ingredients(value.written, seen)
     elif isinstance(value, FunctionType):
         yield from _ingredients(value, seen)
-    elif type(value).__module__ == "go2_wbc.kernels.compilation":  # until none is left
-        yield from _ingredients(value._function, seen)
     elif isinstance(value, type) and issubclass(value, enum.Enum):
         yield f"{name} = {[(member.name, member.value) for member in value]}"
     elif isinstance(value, (bool, int, float, str, tuple, np.generic, np.ndarray)):

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import settings
 from jaxtyping import install_import_hook
 
-from go2_wbc.kernels.loading import load_kernels
+from go2_wbc.compilation import load_kernels
 from tests import typechecker
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -48,16 +48,6 @@ UNCHECKED = frozenset(
         "motions.pytest_plugin",
         "go2_wbc.contacts",
         "go2_wbc.curves",
-        "go2_wbc.kernels.bounds",
-        "go2_wbc.kernels.condensed",
-        "go2_wbc.kernels.elimination",
-        "go2_wbc.kernels.friction",
-        "go2_wbc.kernels.goals",
-        "go2_wbc.kernels.inputs",
-        "go2_wbc.kernels.loading",  # loaded here
-        "go2_wbc.kernels.motor",
-        "go2_wbc.kernels.standing",
-        "go2_wbc.kernels.vectors",
         "go2_wbc.compilation",  # loaded here, as is what it imports
         "go2_wbc.kept_code",
         "go2_wbc.records",

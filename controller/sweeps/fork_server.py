@@ -28,7 +28,7 @@ LENGTH = struct.Struct("<Q")
 """What comes before the pickle of a request: its length, and with it the files of a worker."""
 FILES = 5
 """The files of a worker: its input, output and errors, its folder, and its channel."""
-_KERNELS = "go2_wbc.kernels.loading"
+_KERNELS = "go2_wbc.compilation"
 
 
 @dataclass(frozen=True, slots=True)

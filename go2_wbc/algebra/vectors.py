@@ -118,3 +118,9 @@ def quaternion_of(R: Float[np.ndarray, "3 3"], q: Float[np.ndarray, "4"]) -> Non
         q[j], q[k] = R[i, j] + R[j, i], R[i, k] + R[k, i]
         q[3] = R[k, j] - R[j, k]
     q /= np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+
+
+@subroutine
+def angle_between(a: V3, b: V3) -> float:
+    """Angle [rad] between two vectors of length 1."""
+    return np.arccos(min(max(dot(a, b), -1.0), 1.0))

@@ -53,7 +53,7 @@ from jaxtyping import Float
 
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.legs import LEGS
-from go2_wbc.records import Flag, Record, packed
+from go2_wbc.records import Record, packed
 from go2_wbc.robot.description import BASE_LINK
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.foot_odometry import Foot, Level, follow_foot, see_foot, see_ground, take_in_leg
@@ -198,7 +198,7 @@ def follow_feet(
     c: EstimatorNumbers,
     w: Float[np.ndarray, "3"],
     R: Float[np.ndarray, "3 3"],
-    rests: Flag,
+    rests: bool,
 ) -> bool:
     """Let the legs measure, and move the feet on; returns whether some foot stands."""
     f, told = s.filter, c.config

@@ -20,7 +20,7 @@ from jaxtyping import Float
 
 from go2_wbc.algebra.vectors import put
 from go2_wbc.compilation import subroutine
-from go2_wbc.records import Flag, Record
+from go2_wbc.records import Record
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.leg_kinematics import LegGeometry
 from go2_wbc.robot.state_filter import (
@@ -155,7 +155,7 @@ def follow_foot(
     force: float,
     dt: float,
     vertical: float,
-    rests: Flag,
+    rests: bool,
     c: EstimatorConfig,
 ) -> float:
     """Move a foot on by ``dt``, and fill how far what it tells is believed; returns its last age.

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
-from go2_wbc.records import Flag, Record
+from go2_wbc.records import Record
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.state_filter import GYRO_BIAS, VELOCITY, Estimate, Filter, take_in_one
 
@@ -94,7 +94,7 @@ def is_at_rest(
 
 @subroutine
 def lies(
-    x: Estimate, rest: Rest, reading: Reading, is_carried: Flag, gravity: float, c: EstimatorConfig
+    x: Estimate, rest: Rest, reading: Reading, is_carried: bool, gravity: float, c: EstimatorConfig
 ) -> bool:
     """Whether something else than the feet has carried the robot for long enough."""
     force, turning = 0.0, 0.0
@@ -147,7 +147,7 @@ def begin_anew(
 
 
 @subroutine
-def is_upset(rest: Rest, dt: float, is_lying: Flag, R: Float[np.ndarray, "3 3"]) -> bool:
+def is_upset(rest: Rest, dt: float, is_lying: bool, R: Float[np.ndarray, "3 3"]) -> bool:
     """Whether the robot lies or is tilted far, or has been until a moment ago."""
     is_down = is_lying or R[2, 2] < _OVER
     rest.upset_time = _CALM if is_down else max(rest.upset_time - dt, 0.0)
@@ -155,7 +155,7 @@ def is_upset(rest: Rest, dt: float, is_lying: Flag, R: Float[np.ndarray, "3 3"])
 
 
 @subroutine
-def take_in_rest(f: Filter, reading: Reading, is_carried: Flag, c: EstimatorConfig) -> None:
+def take_in_rest(f: Filter, reading: Reading, is_carried: bool, c: EstimatorConfig) -> None:
     """Take in that nothing moves: no velocity, and a gyro that reads its bias.
 
     Of a robot that its feet carry the gyro's bias is learnt by these: slow turns of its trunk read

@@ -261,7 +261,7 @@ def composite_leg(robot: RigidBodies, now: Snapshot, n: int, base: Axes, leg: Le
 
 @subroutine
 def newton_euler(
-    robot: RigidBodies, now: Snapshot, n: int, base: Axes, acceleration: V3, leg: Leg
+    robot: RigidBodies, now: Snapshot, n: int, base: Axes, acceleration: V3, leg: LegBodies
 ) -> Wrench:
     """Fill bias of joints n to n + 2, velocities and drifts of the foot; returns the leg's wrench.
 

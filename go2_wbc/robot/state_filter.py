@@ -29,7 +29,7 @@ from jaxtyping import Float, Int
 
 from go2_wbc.algebra.vectors import rotation_of
 from go2_wbc.compilation import subroutine
-from go2_wbc.records import V3, Flag, Record, layout_of
+from go2_wbc.records import V3, Record, layout_of
 from go2_wbc.robot.estimator_config import EstimatorConfig
 
 
@@ -89,7 +89,7 @@ class Filter(Record):
 
 
 @subroutine
-def turn(quaternion: Float[np.ndarray, "4"], by: V3, in_world: Flag) -> None:
+def turn(quaternion: Float[np.ndarray, "4"], by: V3, in_world: bool) -> None:
     """Turn a quaternion by a rotation vector [rad] along the world's axes or its own."""
     a, b, c = by
     angle = np.sqrt(a * a + b * b + c * c)

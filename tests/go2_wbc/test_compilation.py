@@ -267,8 +267,7 @@ def test_every_module_that_holds_kernels_is_loaded_ahead() -> None:
         for file in (Path(ROOT) / package).rglob("*.py"):
             if any(line.startswith("@kernel") for line in file.read_text().splitlines()):
                 holders.add(".".join(file.relative_to(ROOT).with_suffix("").parts))
-    old = {name for name in holders if name.startswith("go2_wbc.kernels.")}
-    assert holders - old == set(compilation.MODULES)
+    assert holders == set(compilation.MODULES)
 
 
 def test_the_users_own_numba_cache_is_left_alone(folder: Path) -> None:

@@ -9,13 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from go2_wbc.kernels.layout import LEAST_LOAD, MOST_LOAD
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.reference import Reference
+from go2_wbc.reference import Reference, Target
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.controller import WholeBodyController
-from go2_wbc.wbc.loads import planned_loads, relative_loads
+from go2_wbc.wbc.loads import LEAST_LOAD, MOST_LOAD, plan_loads, relative_loads
 from tests.engine_helpers import JO, ST, holding_reference, standing_q, state_of
 
 MODEL = RobotModel()
@@ -82,5 +81,6 @@ def test_all_feet_use_much_the_same_part_of_their_friction(backend: str, legs: t
 def test_the_planned_loads_are_those_that_the_controller_gives() -> None:
     snapshot, reference = leaning((ST, ST, ST, ST))
     normal = WholeBodyController(MODEL).solve(snapshot, reference).forces[:, 2]
-    loads = planned_loads(snapshot, reference, WEIGHT)
+    loads = np.empty(4)
+    plan_loads(snapshot, Target.of(reference.row), WEIGHT, loads)
     np.testing.assert_allclose(loads, normal / normal.mean(), atol=0.1)

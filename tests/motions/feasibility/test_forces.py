@@ -10,13 +10,12 @@ from jaxtyping import Float
 from scipy.linalg import null_space
 
 from go2_wbc.errors import QpInfeasible
-from go2_wbc.kernels.layout import LEAST_PRESSURE
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.constraints import friction_pyramid
-from go2_wbc.wbc.loads import relative_loads
+from go2_wbc.wbc.loads import LEAST_PRESSURE, relative_loads
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from motions import FeasibilityChecker, Timeline, compile_timeline
 from motions.batch_kinematics import configurations, zero_moment_points
