@@ -7,7 +7,6 @@ pushes; no seed of theirs is judged here.
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -15,10 +14,9 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
+from benchmarks.command import Benchmark
 from benchmarks.pushes import PUSH_TIME
-from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
-from controller.cli.common import Subparsers, add_parser
+from benchmarks.study import Measurement, Metric, Study
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
@@ -185,11 +183,11 @@ def _measure(name: str, robot: TrialRobot, course: Course, seed: int) -> Measure
 
 PUSHES = "trot 0.5 m/s, three pushes of 30 N s"
 STOPS = "calves at their stops, pushes of 20 N s"
-SCENARIOS = (
-    Scenario("boxes", metrics_of("boxes", "8 cm boxes, trot 1.0 m/s, 8 s"), measure_boxes),
-    Scenario("pushes", metrics_of("pushes", PUSHES), measure_pushes),
-    Scenario("commands", metrics_of("commands", "random commands, 60 s"), measure_commands),
-    Scenario(
+STUDIES = (
+    Study("boxes", metrics_of("boxes", "8 cm boxes, trot 1.0 m/s, 8 s"), measure_boxes),
+    Study("pushes", metrics_of("pushes", PUSHES), measure_pushes),
+    Study("commands", metrics_of("commands", "random commands, 60 s"), measure_commands),
+    Study(
         "stops",
         (
             *metrics_of("stops", STOPS),
@@ -201,19 +199,12 @@ SCENARIOS = (
 """In the order of the report."""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``answers``."""
-    parser = add_parser(
-        subparsers,
-        "answers",
-        "Trots on which the QP contradicts itself: is there always an answer, is the\n"
-        "robot never damped while upright, how often do constraints give way too far.\n"
-        "Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser, has_sensors=True)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+BENCHMARK = Benchmark(
+    "answers",
+    "Trots on which the QP contradicts itself: is there always an answer, is the\n"
+    "robot never damped while upright, how often do constraints give way too far.",
+    EXAMPLES,
+    STUDIES,
+    sensors=True,
+)
+register, run = BENCHMARK.register, BENCHMARK.run

@@ -17,7 +17,6 @@ chosen on seeds 0 to 9, from 9000 and from 30000 to 63999; those judged begin at
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Callable
 from functools import partial
@@ -26,13 +25,12 @@ import numpy as np
 
 from benchmarks import disturbed
 from benchmarks.answers import commanded
+from benchmarks.command import Benchmark
 from benchmarks.locomotion import CONFIG, MASS_RANGE
 from benchmarks.pushes import PUSH_TIME, heading_force
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
 from benchmarks.steps import plant_of
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.checks import is_standing
-from controller.cli.common import Subparsers, add_parser
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityEnvelope
@@ -197,7 +195,7 @@ def measure_commands(trial: Trial, name: str, sensors: str) -> Measurement:
     return Measurement(values, notes={name: why} if why else {})
 
 
-def _commands(sensors: str) -> Scenario:
+def _commands(sensors: str) -> Study:
     name, item = "commands", "random commands, 120 s"
     if sensors != "ideal":
         name, item = f"sensed-{name}", f"sensors: {item}"
@@ -206,7 +204,7 @@ def _commands(sensors: str) -> Scenario:
         Metric(f"{name}.failures", item, "ticks without an answer", "", 0.0),
     )
     measured = partial(measure_commands, name=name, sensors=sensors)
-    return Scenario(name, metrics, measured, group="truth" if sensors == "ideal" else "sensors")
+    return Study(name, metrics, measured, group="truth" if sensors == "ideal" else "sensors")
 
 
 def _scenario(
@@ -217,16 +215,16 @@ def _scenario(
     sensors: str,
     least: float = 1.0,
     times: int = 1,
-) -> Scenario:
+) -> Study:
     """A row whose value is a share; ``measure`` takes its name and the sensors, too."""
     if sensors != "ideal":
         name, item = f"sensed-{name}", f"sensors: {item}"
     metric = Metric(name, item, quantity, "", least, Direction.AT_LEAST)
     measured = partial(measure, name=name, sensors=sensors)
-    return Scenario(name, (metric,), measured, times, "truth" if sensors == "ideal" else "sensors")
+    return Study(name, (metric,), measured, times, "truth" if sensors == "ideal" else "sensors")
 
 
-def _scenarios(sensors: str) -> tuple[Scenario, ...]:
+def _scenarios(sensors: str) -> tuple[Study, ...]:
     """All rows with the plant's ``sensors``."""
     standing, trot = "standing, push 0.1 s", f"trot {TROT_SPEED:g} m/s, push 0.1 s, 16 phases"
     return (
@@ -257,22 +255,15 @@ def _scenarios(sensors: str) -> tuple[Scenario, ...]:
     )
 
 
-SCENARIOS = (*_scenarios("ideal"), *_scenarios("imu"))
+STUDIES = (*_scenarios("ideal"), *_scenarios("imu"))
 """In the order of the report."""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``balance``."""
-    parser = add_parser(
-        subparsers,
-        "balance",
-        "Pushes, drops, changes of gait, and whether a fall is noticed.\n"
-        "Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser, "; times 10 for drops, 50 for disturbed runs")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+BENCHMARK = Benchmark(
+    "balance",
+    "Pushes, drops, changes of gait, and whether a fall is noticed.",
+    EXAMPLES,
+    STUDIES,
+    more_seeds="; times 10 for drops, 50 for disturbed runs",
+)
+register, run = BENCHMARK.register, BENCHMARK.run

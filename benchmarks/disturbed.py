@@ -20,8 +20,8 @@ import numpy as np
 
 from benchmarks.locomotion import CONFIG, MASS_RANGE
 from benchmarks.pushes import PUSH_TIME, heading_force
-from benchmarks.scenario import Measurement, Metric, Scenario
 from benchmarks.steps import plant_of
+from benchmarks.study import Measurement, Metric, Study
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.contacts import GAITS
@@ -201,7 +201,7 @@ def _make(robot: TrialRobot, watch: Watch, what: str, rng: np.random.Generator) 
         return
 
 
-def scenario(sensors: str) -> Scenario:
+def scenario(sensors: str) -> Study:
     """The row, with the plant's ``sensors``."""
     name, item, group = "disturbed", "random calls and pushes", "truth"
     if sensors != "ideal":
@@ -211,4 +211,4 @@ def scenario(sensors: str) -> Scenario:
         Metric(f"{name}.falls", item, "falls", "", None),
     )
     measured = partial(measure_disturbed, name=name, sensors=sensors)
-    return Scenario(name, metrics, measured, 50, group)
+    return Study(name, metrics, measured, 50, group)

@@ -6,7 +6,6 @@ seeds that are judged here.
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,9 +15,8 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
-from controller.cli.common import Subparsers, add_parser
+from benchmarks.command import Benchmark
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.motion_measurement import FULL
 from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import Leg
@@ -268,25 +266,17 @@ def _metrics(name: str, item: Item) -> tuple[Metric, ...]:
     return tuple(found)
 
 
-SCENARIOS = tuple(
-    Scenario(name, _metrics(name, item), partial(measure, name=name))
-    for name, item in ITEMS.items()
+STUDIES = tuple(
+    Study(name, _metrics(name, item), partial(measure, name=name)) for name, item in ITEMS.items()
 )
 """In the order of the report."""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``dynamic_motions``."""
-    parser = add_parser(
-        subparsers,
-        "dynamic_motions",
-        "Jumps, hops, rears and lifts in physics: are they done, and where do they land.\n"
-        "Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser, has_sensors=True)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+BENCHMARK = Benchmark(
+    "dynamic_motions",
+    "Jumps, hops, rears and lifts in physics: are they done, and where do they land.",
+    EXAMPLES,
+    STUDIES,
+    sensors=True,
+)
+register, run = BENCHMARK.register, BENCHMARK.run

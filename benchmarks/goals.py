@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.study import Measurement, Metric, Study
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.state import RobotState
@@ -55,4 +55,4 @@ def way_between(before: RobotState, after: RobotState) -> tuple[float, float, fl
     return float(x), float(y), wrap_angle(float(after.rpy[2]) - yaw)
 
 
-SCENARIO = Scenario("goals", METRICS, measure)
+STUDY = Study("goals", METRICS, measure)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.geometry import moving_support_margins
 from go2_wbc.legs import LEGS, SIDES, Leg
@@ -117,4 +117,4 @@ def largest_slip(recorded: TruthRecording, support: list[Leg]) -> float:
     return float(np.linalg.norm(np.cumsum(steps, axis=0), axis=2).max())
 
 
-SCENARIO = Scenario("high-five", METRICS, measure)
+STUDY = Study("high-five", METRICS, measure)

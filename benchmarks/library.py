@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.motion_measurement import measure_motion
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.reference import MotionPlan
@@ -61,4 +61,4 @@ def plan_of(name: str) -> MotionPlan:
     return compile_timeline(load_motion(name), RobotModel())
 
 
-SCENARIO = Scenario("library", METRICS, measure)
+STUDY = Study("library", METRICS, measure)

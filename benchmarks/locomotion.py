@@ -18,7 +18,6 @@ seeds 0 to 9; those judged begin at ``FIRST_SEED``.
 
 from __future__ import annotations
 
-import argparse
 import math
 from dataclasses import dataclass, replace
 from functools import partial
@@ -26,11 +25,10 @@ from functools import partial
 import numpy as np
 
 from benchmarks import other_robots, sensed, sensed_library
-from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
+from benchmarks.command import Benchmark
 from benchmarks.steps import plant_of
-from benchmarks.unknown_world import SCENARIOS as UNKNOWN
-from controller.cli.common import Subparsers, add_parser
+from benchmarks.study import Measurement, Metric, Study
+from benchmarks.unknown_world import STUDIES as UNKNOWN
 from controller.motion_measurement import FULL
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
@@ -175,31 +173,23 @@ SENSED = (
     Run("sensed-3.5", "trot", VelocityCommand(3.5), None, speed=None),
 )
 """The same on its own sensors; at 3 m/s all that is asked for is not to fall, at 3.5 nothing."""
-SCENARIOS = (
+STUDIES = (
     *(
-        Scenario(run.name, run.metrics, partial(measure_run, run=run), group=run.group)
+        Study(run.name, run.metrics, partial(measure_run, run=run), group=run.group)
         for run in (*RUNS, *(replace(run, group="sensors", sensors="imu") for run in SENSED))
     ),
-    *sensed.SCENARIOS,
-    sensed_library.SCENARIO,
+    *sensed.STUDIES,
+    sensed_library.STUDY,
     *UNKNOWN,
-    *other_robots.SCENARIOS,
+    *other_robots.STUDIES,
 )
 """In the order of the report."""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``locomotion``."""
-    parser = add_parser(
-        subparsers,
-        "locomotion",
-        "Every gait at its speeds: how exactly, and within which limits.\n"
-        "Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+BENCHMARK = Benchmark(
+    "locomotion",
+    "Every gait at its speeds: how exactly, and within which limits.",
+    EXAMPLES,
+    STUDIES,
+)
+register, run = BENCHMARK.register, BENCHMARK.run

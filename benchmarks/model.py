@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from benchmarks.agreement import model_agreement
-from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.study import Measurement, Metric, Study
 from controller.assembly import build_pilot
 from controller.pilot import Pilot
 from controller.procedures import Aborted
@@ -171,5 +171,5 @@ def _exercise(pilot: Pilot, plant: MujocoPlant) -> None:
     pilot.sit()
 
 
-AGREEMENT = Scenario("model", AGREEMENT_METRICS, measure_agreement)
-SOLUTIONS = Scenario("solutions", SOLUTION_METRICS, measure_solutions)
+AGREEMENT = Study("model", AGREEMENT_METRICS, measure_agreement, has_sensors=False)
+SOLUTIONS = Study("solutions", SOLUTION_METRICS, measure_solutions, has_sensors=False)

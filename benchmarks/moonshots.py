@@ -15,13 +15,20 @@ from dataclasses import asdict, replace
 from functools import cache, partial
 from textwrap import wrap
 
+from benchmarks.command import (
+    QUICK_SEEDS,
+    SEEDS,
+    add_seeds,
+    measure_all,
+    publish,
+    run_and_report,
+    tasks_of,
+)
 from benchmarks.dynamic_motions import Played, metrics_of, plant_of, play
 from benchmarks.jump_climb import KINDS, Climb, Climber, Jump, compiled
 from benchmarks.jump_physics import PhysicsRow, physics_rows
 from benchmarks.report import WIDTH, render, summarise
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario, chosen_scenarios
-from benchmarks.seeded import QUICK_SEEDS, SEEDS, add_seeded_options
-from benchmarks.session import measure_all, publish, run_and_report, tasks_of
+from benchmarks.study import Direction, Measurement, Metric, Study, chosen_studies
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.cli.progress import ProgressLine
 from controller.sweeps.trials import Trial, TrialFailed
@@ -87,7 +94,7 @@ def _reached(name: str, played: Played) -> float:
     return KINDS[name].scale * sizes[name]
 
 
-def scenario_of(name: str, jump: Jump) -> Scenario:
+def scenario_of(name: str, jump: Jump) -> Study:
     """The trials of the greatest jump of a kind."""
     kind = KINDS[name]
     title = f"{kind.title}, the greatest that is done"
@@ -97,7 +104,7 @@ def scenario_of(name: str, jump: Jump) -> Scenario:
         Metric(f"{name}.stood", title, "stands 1 s later", "", None, Direction.AT_LEAST),
     ]
     common = [replace(metric, threshold=None) for metric in metrics_of(name, title, 1.0)]
-    return Scenario(name, (*planned, *common), partial(measure, name=name, jump=jump))
+    return Study(name, (*planned, *common), partial(measure, name=name, jump=jump))
 
 
 def register(subparsers: Subparsers) -> None:
@@ -109,7 +116,7 @@ def register(subparsers: Subparsers) -> None:
         "permits. Exit code 0.",
         examples=EXAMPLES,
     )
-    add_seeded_options(parser)
+    add_seeds(parser)
     parser.add_argument(
         "--budget", metavar="S", type=float, default=BUDGET,
         help="processor time of one attempt to plan [s], default %(default)g",
@@ -119,7 +126,7 @@ def register(subparsers: Subparsers) -> None:
 def run(args: argparse.Namespace) -> int:
     """Climb, play, and tell."""
     easy = [scenario_of(name, kind.ask(kind.sizes[0])) for name, kind in KINDS.items()]
-    chosen = chosen_scenarios(easy, args.rows)
+    chosen = chosen_studies(easy, args.rows)
     if args.list:
         return run_and_report(args, chosen, [])
     model = RobotModel()

@@ -11,7 +11,6 @@ here was looked at before.
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
 from dataclasses import dataclass
@@ -19,11 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from benchmarks.command import Benchmark
 from benchmarks.dynamic_motions import AFTERWARDS, plant_of
 from benchmarks.refused_motions import refused_motion
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
-from controller.cli.common import Subparsers, add_parser
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.motion_measurement import FULL, during_motion
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import MotionInfeasible
@@ -183,22 +181,16 @@ def spans_of(checked: CheckedMotion) -> tuple[DynamicSpan, ...]:
     return checked.plan.dynamic if isinstance(checked.plan, CompiledPlan) else ()
 
 
-SCENARIOS = (Scenario("nearest", METRICS, measure),)
+STUDIES = (Study("nearest", METRICS, measure),)
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``nearest``."""
-    parser = add_parser(
-        subparsers,
-        "nearest",
-        "Motions that the check refuses: is the nearest one found that it does not, is\n"
-        "it done in physics, and is it as far from what was written as reported? Needs\n"
-        "go2-wbc[dynamics]. Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser, ", each of another motion")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+BENCHMARK = Benchmark(
+    "nearest",
+    "Motions that the check refuses: is the nearest one found that it does not, is\n"
+    "it done in physics, and is it as far from what was written as reported? Needs\n"
+    "go2-wbc[dynamics].",
+    EXAMPLES,
+    STUDIES,
+    more_seeds=", each of another motion",
+)
+register, run = BENCHMARK.register, BENCHMARK.run

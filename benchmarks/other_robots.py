@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.study import Direction, Measurement, Metric, Study
 from benchmarks.unknown_world import FIRST_SEED, FRICTION_RANGE, LEAST_SHARE, com_height
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
 from go2_wbc.config import Config
@@ -145,8 +145,8 @@ ROBOTS = (
     Robot("twice-friction", "joint friction x 2", JointDynamics().scaled(2.0)),
 )
 SENSED = tuple(robot.sensed for robot in ROBOTS)
-SCENARIOS = tuple(
-    Scenario(robot.name, robot.metrics, partial(measure, robot=robot), group="robots")
+STUDIES = tuple(
+    Study(robot.name, robot.metrics, partial(measure, robot=robot), group="robots")
     for robot in (*ROBOTS, *SENSED)
 )
 """In the order of the report."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.pushes import PUSH_TIME, directions_of, force_of, measure_impulses, push_metrics
-from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.study import Measurement, Metric, Study
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.robot.model import RobotModel
@@ -99,5 +99,5 @@ def measure_pushes(trial: Trial) -> Measurement:
     return Measurement({**found.values, MOVED.name: 1000.0 * max(moved)}, found.failures)
 
 
-STAND = Scenario("stand", STAND_METRICS, measure_stand)
-PUSHES = Scenario("stand-pushes", (*PUSHED, MOVED), measure_pushes)
+STAND = Study("stand", STAND_METRICS, measure_stand)
+PUSHES = Study("stand-pushes", (*PUSHED, MOVED), measure_pushes)

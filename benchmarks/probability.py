@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.command import add_sweep, positive, publish, run_sweep
 from benchmarks.exam.drawing import TEST, TRAIN
 from benchmarks.probability_evidence import csv_of, save_reliability
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit
 from benchmarks.probability_runs import DRAWN, seeds, trial
-from benchmarks.session import add_sweep_options, positive, publish, run_sweep
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.sweeps.rows import Row
 from controller.sweeps.summary import rate_interval
@@ -60,7 +60,7 @@ def register(subparsers: Subparsers) -> None:
         "--data", metavar="FILE", type=Path, help="write a .csv with a line for every run"
     )
     parser.add_argument("--plot", metavar="FILE", type=Path, help="draw the reliability: .svg, ...")
-    add_sweep_options(parser, jobs=2)
+    add_sweep(parser, jobs=2)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from benchmarks.scenario import Direction, Measurement, Metric
+from benchmarks.study import Direction, Measurement, Metric
 
 PUSH_TIME = 0.1
 """Duration [s] of a push."""

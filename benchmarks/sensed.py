@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.steps import plant_of
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.rotations import yaw_rotation
@@ -109,8 +109,8 @@ def measure_calls(trial: Trial) -> Measurement:
     return Measurement(values, failures)
 
 
-SCENARIOS = (
-    Scenario("standing", STANDING_METRICS, measure_standing, group="sensors"),
-    Scenario("odometry", WALKING_METRICS, measure_walking, group="sensors"),
-    Scenario("calls", CALL_METRICS, measure_calls, group="sensors"),
+STUDIES = (
+    Study("standing", STANDING_METRICS, measure_standing, group="sensors"),
+    Study("odometry", WALKING_METRICS, measure_walking, group="sensors"),
+    Study("calls", CALL_METRICS, measure_calls, group="sensors"),
 )

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.library import plan_of
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
 from benchmarks.sensed import sensing_plant
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.checks import END_HEADING, END_PLACE
 from controller.motion_measurement import during_motion, measure_motion
 from controller.sweeps.trials import Trial, TrialRobot
@@ -107,4 +107,4 @@ def _listed(reasons: dict[str, str]) -> str:
     return "; ".join(f"{name}: {why}" for name, why in reasons.items())
 
 
-SCENARIO = Scenario("sensed-library", (DONE, TRUE, PLACE, TURN), measure, group="sensors")
+STUDY = Study("sensed-library", (DONE, TRUE, PLACE, TURN), measure, group="sensors")

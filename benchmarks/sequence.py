@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.goals import way_between
 from benchmarks.high_fives import highest_window
 from benchmarks.postures import standing_failure
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.demo.run import DemoProgress, run_demo
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import LEGS, Leg
@@ -155,4 +155,4 @@ CRITERIA: dict[str, Callable[[TrialRobot, RobotState], str | None]] = {
 """What is missing for a step to be true, by the step's name; every step must have one."""
 
 
-SCENARIO = Scenario("sequence", METRICS, measure, seed_factor=5)
+STUDY = Study("sequence", METRICS, measure, seed_factor=5)

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.postures import standing_failure
 from benchmarks.pushes import DIRECTIONS
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import SIDES
 
@@ -141,4 +141,4 @@ def _until(robot: TrialRobot, time: float) -> Iterator[None]:
         yield
 
 
-SCENARIO = Scenario("slaps", tuple(metric for slap in SLAPS for metric in slap.metrics), measure)
+STUDY = Study("slaps", tuple(metric for slap in SLAPS for metric in slap.metrics), measure)

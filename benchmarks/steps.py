@@ -7,16 +7,14 @@ seed of theirs is judged here.
 
 from __future__ import annotations
 
-import argparse
 import math
 from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
-from controller.cli.common import Subparsers, add_parser
+from benchmarks.command import Benchmark
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.motion_measurement import FULL
 from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import LEGS
@@ -202,8 +200,8 @@ def _walk_metrics(gait: str) -> tuple[Metric, ...]:
 
 
 _STEP = "four random steps"
-SCENARIOS = (
-    Scenario(
+STUDIES = (
+    Study(
         "step",
         (
             Metric("step.place", _STEP, "worst foot off its place", "mm", 15.0),
@@ -212,24 +210,17 @@ SCENARIOS = (
         ),
         measure_steps,
     ),
-    Scenario("walk", _walk_metrics("walk"), partial(measure_walk, gait="walk")),
-    Scenario("trot", _walk_metrics("trot"), partial(measure_walk, gait="trot")),
+    Study("walk", _walk_metrics("walk"), partial(measure_walk, gait="walk")),
+    Study("trot", _walk_metrics("trot"), partial(measure_walk, gait="trot")),
 )
 """In the order of the report."""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``steps``."""
-    parser = add_parser(
-        subparsers,
-        "steps",
-        "Authored steps and walks: where do they end, against where they were to end.\n"
-        "Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser, has_sensors=True)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+BENCHMARK = Benchmark(
+    "steps",
+    "Authored steps and walks: where do they end, against where they were to end.",
+    EXAMPLES,
+    STUDIES,
+    sensors=True,
+)
+register, run = BENCHMARK.register, BENCHMARK.run

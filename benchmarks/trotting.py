@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.pushes import PUSH_TIME, force_of, measure_impulses, push_metrics
-from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.study import Measurement, Metric, Study
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
@@ -149,5 +149,5 @@ def _push(robot: TrialRobot, force: np.ndarray, phase: int) -> None:
         raise TrialFailed(f"walks at {speed:.2f} m/s two seconds after the push")
 
 
-TROT = Scenario("trot", TROT_METRICS, measure_trot)
-PUSHES = Scenario("trot-pushes", PUSH_METRICS, measure_pushes)
+TROT = Study("trot", TROT_METRICS, measure_trot)
+PUSHES = Study("trot-pushes", PUSH_METRICS, measure_pushes)

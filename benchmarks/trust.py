@@ -10,8 +10,8 @@ import argparse
 from collections import Counter
 from collections.abc import Sequence
 
+from benchmarks.command import add_sweep, positive, publish, run_sweep
 from benchmarks.probability_runs import NOT_READY
-from benchmarks.session import add_sweep_options, positive, publish, run_sweep
 from benchmarks.trust_runs import passed_play
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.sweeps.rows import Row
@@ -39,7 +39,7 @@ def register(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--plays", metavar="N", type=positive, default=PLAYS, help="default %(default)s"
     )
-    add_sweep_options(parser, jobs=2)
+    add_sweep(parser, jobs=2)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -18,7 +18,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Float
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
@@ -199,8 +199,8 @@ WORLDS = (
     Unknown("late", "commands 10 ms late, 1.0 m/s", speed=1.0, delay=0.01),
     Unknown("slow", "control at 250 Hz, 1.0 m/s", speed=1.0, control_period=0.004),
 )
-SCENARIOS = tuple(
-    Scenario(world.name, world.metrics, partial(measure, unknown=world), group=group)
+STUDIES = tuple(
+    Study(world.name, world.metrics, partial(measure, unknown=world), group=group)
     for group, worlds in (
         ("unknown", WORLDS),
         ("unknown-sensors", [world.sensed for world in WORLDS]),

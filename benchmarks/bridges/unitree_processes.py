@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Final, final
 import numpy as np
 from jaxtyping import Shaped
 
-from benchmarks.bridges.faults import require
-from benchmarks.bridges.processes import PROGRAM, START_LIMIT, Process, wait_until
+from benchmarks.bridges.processes import PROGRAM, START_LIMIT, Process, require, wait_until
 from controller.bridges.unitree.codec import decode_message
 from controller.bridges.unitree.layout import SPORT_STATE
 from controller.bridges.unitree.sport_api import (

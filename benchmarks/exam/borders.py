@@ -6,7 +6,7 @@ import math
 
 from benchmarks.exam.outcome import play
 from benchmarks.exam.questions import Question, draws
-from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.study import Measurement, Metric, Study
 from controller.motion_outcome import outcome_of
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
@@ -53,4 +53,4 @@ def measure_border(trial: Trial) -> Measurement:
     return Measurement({BORDER.name: math.sqrt(done * failed), PLAYS.name: float(plays)})
 
 
-BORDERS = Scenario("borders", (BORDER, PLAYS), measure_border)
+BORDERS = Study("borders", (BORDER, PLAYS), measure_border)

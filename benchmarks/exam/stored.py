@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.results_log import ROOT, settings_header
+from benchmarks.store import ROOT, settings_header
 from controller.motion_outcome import Outcome
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import write_atomically

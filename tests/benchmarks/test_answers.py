@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from benchmarks.answers import SCENARIOS, calf_distance, watch
-from benchmarks.scenario import Measurement
+from benchmarks.answers import STUDIES, calf_distance, watch
+from benchmarks.study import Measurement
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.robot.model import RobotModel
@@ -61,8 +61,8 @@ def test_a_fall_is_counted_as_one_that_was_reported() -> None:
 
 
 def test_every_scenario_has_the_seeds_it_is_judged_by_to_itself() -> None:
-    assert [scenario.name for scenario in SCENARIOS] == ["boxes", "pushes", "commands", "stops"]
-    names = [metric.name for scenario in SCENARIOS for metric in scenario.metrics]
+    assert [scenario.name for scenario in STUDIES] == ["boxes", "pushes", "commands", "stops"]
+    names = [metric.name for scenario in STUDIES for metric in scenario.metrics]
     assert len(set(names)) == len(names)
 
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import COMMANDS, main
-from benchmarks.behaviour import SCENARIOS
+from benchmarks.behaviour import STUDIES
 from benchmarks.report import WIDTH
-from benchmarks.scenario import Measurement, chosen_scenarios
+from benchmarks.study import Measurement, chosen_studies
 from controller.cli.common import ExitCode
 from controller.cli.main import Command
 from controller.sweeps.trials import Trial
@@ -132,12 +132,12 @@ def test_a_file_that_cannot_be_written_is_told_before_anything_runs(
 def test_list_names_every_scenario_and_threshold(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["behaviour", "--list"]) == ExitCode.OK
     out = capsys.readouterr().out
-    assert all(scenario.name in out.splitlines() for scenario in SCENARIOS)
+    assert all(scenario.name in out.splitlines() for scenario in STUDIES)
     assert "<= 0.025 m/s" in out
     assert max(map(len, out.splitlines())) <= WIDTH
 
 
 def test_an_unknown_scenario_is_a_usage_error_that_lists_the_valid_ones() -> None:
     with pytest.raises(CommandError, match=r"unknown scenario 'gallop'.*high-five.*trot"):
-        chosen_scenarios(SCENARIOS, ["gallop"])
+        chosen_studies(STUDIES, ["gallop"])
     assert main(["behaviour", "--rows", "gallop"]) == ExitCode.USAGE

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.command import IDEAL, IMU, on_sensors
 from benchmarks.high_fives import highest_window, largest_slip, longest_run
 from benchmarks.pushes import IMPULSE_STEP, largest_impulse
-from benchmarks.scenario import Measurement, Scenario
-from benchmarks.seeded import IDEAL, IMU, on_sensors
 from benchmarks.sequence import CRITERIA, StepCheck
+from benchmarks.study import Measurement, Study
 from controller.demo.report import StepResult
 from controller.demo.run import DemoProgress
 from controller.demo.steps import DEMO_STEPS
@@ -32,7 +32,7 @@ from tests.go2_wbc.plant.helpers import empty_recording
 
 
 def test_a_trial_on_sensors_is_the_same_trial_with_another_plant() -> None:
-    scenario = Scenario("fake", (), lambda trial: Measurement({}, reason=f"{trial}"))
+    scenario = Study("fake", (), lambda trial: Measurement({}, reason=f"{trial}"))
     assert on_sensors(scenario, IDEAL) is scenario
     sensed = on_sensors(scenario, IMU)
     assert sensed.name != scenario.name  # results of both are kept in one file

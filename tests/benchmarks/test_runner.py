@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from benchmarks.command import tasks_of
 from benchmarks.report import summarise
-from benchmarks.runner import Results, run_tasks
-from benchmarks.scenario import Measurement, Scenario
-from benchmarks.session import tasks_of
+from benchmarks.study import Measurement, Results, Study, run_tasks
 from controller.sweeps.trials import Trial, TrialFailed
 from tests.benchmarks.support import (
     SPEED,
@@ -19,7 +18,7 @@ from tests.benchmarks.support import (
 )
 
 
-def results_of(*scenarios: Scenario, seeds: int, jobs: int = 0) -> Results:
+def results_of(*scenarios: Study, seeds: int, jobs: int = 0) -> Results:
     results: Results = {scenario.name: {} for scenario in scenarios}
     for scenario, seed, measurement in run_tasks(tasks_of(scenarios, seeds), jobs):
         assert seed not in results[scenario.name]
@@ -48,7 +47,7 @@ def test_a_bug_is_raised_and_not_counted() -> None:
 
 
 def test_every_seed_of_every_scenario_is_run_once() -> None:
-    more = Scenario("more", (SPEED,), measure_badly, seed_factor=2)
+    more = Study("more", (SPEED,), measure_badly, seed_factor=2)
     results = results_of(fake(), more, seeds=2)
     assert {name: sorted(trials) for name, trials in results.items()} == {
         "fake": [0, 1],

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from benchmarks import unknown_world
-from benchmarks.scenario import Measurement
+from benchmarks.study import Measurement
 from benchmarks.unknown_world import WORLDS, Unknown, measure
 from controller.sweeps.trials import Trial
 from go2_wbc.plant.terrain import Boxes, Stairs
@@ -54,5 +54,5 @@ def test_on_its_own_sensors_a_robot_is_not_given_the_truth() -> None:
     plant = QUICK.sensed.plant(0)
     assert plant.read().q[2] != plant.truth().q[2]
     assert QUICK.plant(0).read().q[2] == QUICK.plant(0).truth().q[2]
-    names = {scenario.name for scenario in unknown_world.SCENARIOS}
+    names = {scenario.name for scenario in unknown_world.STUDIES}
     assert {world.sensed.name for world in WORLDS} < names

@@ -10,14 +10,14 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.answers import SCENARIOS
+from benchmarks.answers import STUDIES
 from benchmarks.locomotion import CONFIG, MASS_RANGE
 from benchmarks.pushes import PUSH_TIME, heading_force
 from benchmarks.steps import plant_of
 from controller.sweeps.trials import Trial, TrialRobot
 
 SAMPLES = [("boxes", 19), ("pushes", 12), ("stops", 17)]
-"""Scenario and seed."""
+"""Study and seed."""
 CONTRADICTORY = ("pushes", "stops")
 """Where the hard QP has no solution in some ticks; over boxes it had none until feet that stumble
 began another swing."""
@@ -27,7 +27,7 @@ GRAVE = 0.1  # [%] of the ticks
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "seed"), SAMPLES)
 def test_contradictions_are_answered_and_never_damp_an_upright_robot(name: str, seed: int) -> None:
-    scenario = next(scenario for scenario in SCENARIOS if scenario.name == name)
+    scenario = next(scenario for scenario in STUDIES if scenario.name == name)
     values = scenario.measure(Trial(seed)).values
     assert values[f"{name}.failures"] == 0.0
     assert values[f"{name}.damped"] == 0.0

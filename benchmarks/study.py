@@ -1,13 +1,14 @@
-"""The benchmarks' vocabulary: metrics with their thresholds, scenarios, what one trial gave."""
+"""A study: metrics with their bars, and a trial that gives them for a seed; and running them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from controller.sweeps.trials import Trial
-from go2_wbc.errors import CommandError, unknown_name
+from controller.sweeps.local import LocalEngine
+from controller.sweeps.trials import Trial, TrialFailed
+from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 
 
 class Direction(Enum):
@@ -49,7 +50,7 @@ class Metric:
 
 @dataclass(frozen=True, slots=True)
 class Measurement:
-    """What one trial of a scenario gave.
+    """What one trial of a study gave.
 
     Attributes:
         values: by metric. One without a value counts as failed.
@@ -73,7 +74,7 @@ class Measurement:
 
 
 @dataclass(frozen=True, slots=True)
-class Scenario:
+class Study:
     """Metrics that are measured together, in one trial.
 
     Attributes:
@@ -81,7 +82,8 @@ class Scenario:
         metrics: in the order of the report.
         measure: runs one trial; must be a function of a module, so that a process can import it.
         seed_factor: how many times the usual number of seeds it runs.
-        group: what the command line takes for all scenarios of the same kind; may be empty.
+        group: what the command line takes for all studies of the same kind; may be empty.
+        has_sensors: whether its robot can be given other sensors.
     """
 
     name: str
@@ -89,16 +91,59 @@ class Scenario:
     measure: Callable[[Trial], Measurement]
     seed_factor: int = 1
     group: str = ""
+    has_sensors: bool = True
 
 
-def chosen_scenarios(scenarios: Sequence[Scenario], names: Sequence[str]) -> tuple[Scenario, ...]:
-    """The scenarios that are named, by themselves or by their group; all if there is no name.
+Results = dict[str, dict[int, Measurement]]
+"""What every trial gave, by study and seed."""
+Task = tuple[Study, int]
+"""A study and the seed of one trial."""
+
+
+def chosen_studies(studies: Sequence[Study], names: Sequence[str]) -> tuple[Study, ...]:
+    """The studies that are named, by themselves or by their group; all if there is no name.
 
     Raises:
         CommandError: for an unknown name; lists the valid ones.
     """
-    valid = dict.fromkeys(name for s in scenarios for name in (s.group, s.name) if name)
+    valid = dict.fromkeys(name for s in studies for name in (s.group, s.name) if name)
     for name in names:
         if name not in valid:
             raise CommandError(unknown_name("scenario", name, valid))
-    return tuple(s for s in scenarios if not names or s.name in names or s.group in names)
+    return tuple(s for s in studies if not names or s.name in names or s.group in names)
+
+
+def tasks_of(studies: Sequence[Study], seeds: int) -> list[Task]:
+    """Every study on its seeds 0, 1, ...; their number is multiplied by its factor."""
+    return [(s, seed) for s in studies for seed in range(seeds * s.seed_factor)]
+
+
+def run_tasks(tasks: Sequence[Task], jobs: int) -> Iterator[tuple[Study, int, Measurement]]:
+    """Study, seed and measurement of trials as they end, in the workers of a sweep.
+
+    A process that dies costs no other trial its result.
+
+    Args:
+        tasks: what to measure.
+        jobs: processes at a time, from the main thread; 0 runs everything in this process.
+    """
+    if not jobs:
+        yield from ((*task, _run_task(task)) for task in tasks)
+        return
+    for ended in LocalEngine(jobs).run(_run_task, tasks):
+        failure = ended.failure
+        if failure is not None and not failure.has_died:
+            raise RuntimeError(f"{failure.text}\n{failure.details}")
+        yield *ended.item, ended.value or Measurement({}, reason="its process died twice")
+
+
+def _run_task(task: Task) -> Measurement:
+    """One trial; an error of this project is a failed trial, any other is a bug and is raised."""
+    study, seed = task
+    try:
+        return study.measure(Trial(seed))
+    except TrialFailed as failed:
+        return Measurement({}, reason=str(failed))
+    except Go2WbcError as error:
+        reason = f"{type(error).__name__}: {str(error).splitlines()[0]}"
+        return Measurement({}, reason=reason)
