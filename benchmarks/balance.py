@@ -24,11 +24,10 @@ from functools import partial
 import numpy as np
 
 from benchmarks import disturbed
-from benchmarks.answers import commanded
 from benchmarks.command import Benchmark
 from benchmarks.locomotion import CONFIG, MASS_RANGE
-from benchmarks.pushes import PUSH_TIME, heading_force
-from benchmarks.steps import plant_of
+from benchmarks.qp_infeasibility import commanded
+from benchmarks.robots import PUSH_TIME, heading_force, plant_of
 from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.checks import is_standing
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot

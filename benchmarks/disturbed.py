@@ -19,8 +19,7 @@ from functools import partial
 import numpy as np
 
 from benchmarks.locomotion import CONFIG, MASS_RANGE
-from benchmarks.pushes import PUSH_TIME, heading_force
-from benchmarks.steps import plant_of
+from benchmarks.robots import PUSH_TIME, heading_force, plant_of
 from benchmarks.study import Measurement, Metric, Study
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot

@@ -16,22 +16,19 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from benchmarks.command import Benchmark
+from benchmarks.robots import feet_frame, plant_of
 from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.motion_measurement import FULL
-from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
-from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg
 
 FIRST_SEED = 6200
 """Seed of the first trial that is judged."""
-FRICTION_RANGE = (0.6, 1.0)
-MASS_RANGE = (0.95, 1.05)
-"""Factor on every mass and inertia of the robot; the controller is not told."""
 AFTERWARDS = 1.0
 """Time [s] for which the robot must stand when the motion is over."""
 PRESSED = 15.0
@@ -103,21 +100,6 @@ ITEMS: dict[str, Item] = {
 }
 
 
-def plant_of(trial: Trial) -> MujocoPlant:
-    """A simulated robot under the conditions of the trial."""
-    rng = np.random.default_rng(FIRST_SEED + trial.seed)
-    ranges = (FRICTION_RANGE, MASS_RANGE, YAW_RANGE)
-    friction, mass, yaw = (float(rng.uniform(*bounds)) for bounds in ranges)
-    return MujocoPlant(
-        friction=friction,
-        mass_scale=mass,
-        seed=FIRST_SEED + trial.seed,
-        initial_yaw=yaw,
-        initial_joint_noise=JOINT_NOISE,
-        sensors=trial.sensors,
-    )
-
-
 @cache
 def plan_of(name: str) -> tuple[CompiledPlan, bool]:
     """The plan of an item, and whether the check lets it pass; once for all trials of a process."""
@@ -133,7 +115,7 @@ def measure(trial: Trial, name: str) -> Measurement:
         return Measurement({f"{name}.done": 0.0}, reason="the check refuses the plan")
     model = RobotModel()
     try:
-        played = play(plant_of(trial), plan, model)
+        played = play(plant_of(trial, FIRST_SEED), plan, model)
         if played.objection:
             raise TrialFailed(played.objection)
     except TrialFailed as failed:
@@ -187,7 +169,7 @@ def play(plant: MujocoPlant, plan: CompiledPlan, model: RobotModel) -> Played:
     """
     with TrialRobot(plant) as robot:
         robot.require(robot.go2.stand())
-        before = _feet_frame(robot, model)
+        before = feet_frame(robot)
         robot.truth.clear()
         objection = "" if robot.go2.play(plan, check=False) else robot.go2.last_outcome.reason
         recorded = robot.truth.recording()
@@ -195,7 +177,7 @@ def play(plant: MujocoPlant, plan: CompiledPlan, model: RobotModel) -> Played:
             robot.wait(AFTERWARDS)
         except TrialFailed as failed:
             raise TrialFailed(objection or str(failed)) from None
-        after = _feet_frame(robot, model)
+        after = feet_frame(robot)
     moved = yaw_rotation(before.yaw).T @ (after.p_world - before.p_world)
     return Played(recorded, moved, wrap_angle(after.yaw - before.yaw), objection)
 
@@ -234,10 +216,6 @@ def _beat_error(recorded: TruthRecording) -> float:
     beat = 60.0 / TEMPO
     off = [abs(t / beat - round(t / beat)) * beat for t in landings]
     return max(off) if len(landings) == HOPS else 1.0
-
-
-def _feet_frame(robot: TrialRobot, model: RobotModel) -> Anchor:
-    return Anchor.of_feet(model.snapshot(robot.plant.truth()).p_world_feet, model.foot_radius)
 
 
 def metrics_of(name: str, title: str, done: float) -> list[Metric]:

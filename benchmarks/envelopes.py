@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.command import add_sweep, publish, run_sweep
-from benchmarks.steps import plant_of
+from benchmarks.robots import plant_of
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_measurement import FULL
 from controller.sweeps.rows import Row

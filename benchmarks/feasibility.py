@@ -24,13 +24,19 @@ from benchmarks.command import (
     positive,
     publish,
 )
-from benchmarks.exam.borders import BORDER, BORDERS
-from benchmarks.exam.cases import Case
-from benchmarks.exam.causes import CAUSES, examples, render_causes
-from benchmarks.exam.drawing import TEST
-from benchmarks.exam.outcome import play
-from benchmarks.exam.questions import Question, draw_name, draws, dynamic_questions, questions
-from benchmarks.exam.stored import (
+from benchmarks.study import Measurement, Metric, Study
+from benchmarks.validation_set.causes import CAUSES, examples, render_causes
+from benchmarks.validation_set.drawing import TEST
+from benchmarks.validation_set.physics import BORDER, BORDERS, play
+from benchmarks.validation_set.questions import (
+    Question,
+    draw_name,
+    draws,
+    dynamic_questions,
+    questions,
+)
+from benchmarks.validation_set.scores import HALVES, Case, noticed, render, scores, wrong_ones
+from benchmarks.validation_set.stored import (
     BORDERS_FILE,
     borders_version,
     digest,
@@ -39,8 +45,6 @@ from benchmarks.exam.stored import (
     write_borders,
     write_outcomes,
 )
-from benchmarks.exam.table import HALVES, noticed, render, scores, wrong_ones
-from benchmarks.study import Measurement, Metric, Study
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_outcome import FELL, LENIENT, STOPS, STRICT, Outcome, outcome_of
 from controller.sweeps.trials import Trial

@@ -12,8 +12,7 @@ seeds 0 to 9; those judged begin at ``FIRST_SEED``.
 - turning: from the heading (unwrapped) at both ends of the window;
 - saturated ticks: share of ticks in which some motor gives all it has at its speed.
 
-``benchmarks.unknown_world`` has the groups ``unknown`` and ``unknown-sensors``, and
-``benchmarks.other_robots`` the group ``robots``.
+``benchmarks.unknown_world`` has the groups ``unknown``, ``unknown-sensors`` and ``robots``.
 """
 
 from __future__ import annotations
@@ -24,9 +23,9 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks import other_robots, sensed, sensed_library
+from benchmarks import library, sensed
 from benchmarks.command import Benchmark
-from benchmarks.steps import plant_of
+from benchmarks.robots import plant_of
 from benchmarks.study import Measurement, Metric, Study
 from benchmarks.unknown_world import STUDIES as UNKNOWN
 from controller.motion_measurement import FULL
@@ -179,9 +178,8 @@ STUDIES = (
         for run in (*RUNS, *(replace(run, group="sensors", sensors="imu") for run in SENSED))
     ),
     *sensed.STUDIES,
-    sensed_library.STUDY,
+    library.ON_SENSORS,
     *UNKNOWN,
-    *other_robots.STUDIES,
 )
 """In the order of the report."""
 

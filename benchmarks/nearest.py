@@ -19,8 +19,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from benchmarks.command import Benchmark
-from benchmarks.dynamic_motions import AFTERWARDS, plant_of
+from benchmarks.dynamic_motions import AFTERWARDS
+from benchmarks.dynamic_motions import FIRST_SEED as ROBOTS
 from benchmarks.refused_motions import refused_motion
+from benchmarks.robots import plant_of
 from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.motion_measurement import FULL, during_motion
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
@@ -145,7 +147,7 @@ def play(trial: Trial, checked: CheckedMotion, model: RobotModel) -> Played:
     Raises:
         TrialFailed: if the robot falls, or says that it has not done it.
     """
-    with TrialRobot(plant_of(trial)) as robot:
+    with TrialRobot(plant_of(trial, ROBOTS)) as robot:
         robot.require(robot.go2.stand())
         robot.truth.clear()
         robot.require(robot.go2.play(checked))

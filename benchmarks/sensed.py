@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from benchmarks.steps import plant_of
+from benchmarks.robots import plant_of
 from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.plant import MujocoPlant

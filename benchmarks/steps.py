@@ -14,11 +14,11 @@ from functools import cache, partial
 import numpy as np
 
 from benchmarks.command import Benchmark
+from benchmarks.robots import feet_frame, plant_of
 from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.motion_measurement import FULL
-from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import LEGS
-from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
@@ -26,9 +26,6 @@ from motions import CompiledPlan, Timeline, compile_timeline, deg
 
 FIRST_SEED = 4100
 """Seed of the first trial that is judged."""
-FRICTION_RANGE = (0.6, 1.0)
-MASS_RANGE = (0.95, 1.05)
-"""Factor on every mass and inertia of the robot; the controller is not told."""
 STEP_AHEAD, STEP_ASIDE = 0.06, 0.03
 """Greatest way [m] of a random step, in either direction."""
 ROUNDS = 3
@@ -55,25 +52,6 @@ class Played:
     torque: float
     speed: float
     saturated: float
-
-
-def plant_of(
-    trial: Trial,
-    first_seed: int = FIRST_SEED,
-    mass_range: tuple[float, float] = MASS_RANGE,
-    sensors: str | None = None,
-) -> MujocoPlant:
-    """A simulated robot under the conditions of the trial, whose ``sensors`` are the usual ones."""
-    rng = np.random.default_rng(first_seed + trial.seed)
-    friction, mass, yaw = (rng.uniform(*r) for r in (FRICTION_RANGE, mass_range, YAW_RANGE))
-    return MujocoPlant(
-        friction=float(friction),
-        mass_scale=float(mass),
-        sensors=sensors or trial.sensors,
-        seed=first_seed + trial.seed,
-        initial_yaw=float(yaw),
-        initial_joint_noise=JOINT_NOISE,
-    )
 
 
 def random_steps(rng: np.random.Generator) -> Timeline:
@@ -119,12 +97,6 @@ def play(robot: TrialRobot, plan: CompiledPlan) -> Played:
     )
 
 
-def feet_frame(robot: TrialRobot) -> Anchor:
-    """The frame of the feet as they stand, in truth."""
-    model = RobotModel()
-    return Anchor.of_feet(model.snapshot(robot.plant.truth()).p_world_feet, model.foot_radius)
-
-
 def onwards(anchor: Anchor, pose: tuple[float, float, float]) -> Anchor:
     """The frame at ``pose`` (x, y [m], yaw [rad]) in another one."""
     x, y, yaw = pose
@@ -136,7 +108,7 @@ def measure_steps(trial: Trial) -> Measurement:
     """Random steps, twice: of the feet's final places, the one that is farthest off."""
     rng = np.random.default_rng(10 * FIRST_SEED + trial.seed)
     line, model = random_steps(rng), RobotModel()
-    with TrialRobot(plant_of(trial)) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED)) as robot:
         robot.require(robot.go2.stand())
         played = play(robot, compile_timeline(line, model))
     return Measurement(
@@ -153,7 +125,7 @@ def measure_walk(trial: Trial, gait: str) -> Measurement:
     plan = _walk(gait)
     off: list[tuple[float, float]] = []
     runs: list[Played] = []
-    with TrialRobot(plant_of(trial)) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED)) as robot:
         robot.require(robot.go2.stand())
         predicted = feet_frame(robot)
         try:

@@ -11,8 +11,7 @@ import pytest
 from benchmarks import balance, disturbed
 from benchmarks.balance import STUDIES, dropped, heading_force, impulse_at, trots_on
 from benchmarks.locomotion import CONFIG, MASS_RANGE
-from benchmarks.pushes import PUSH_TIME
-from benchmarks.steps import plant_of
+from benchmarks.robots import PUSH_TIME, plant_of
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.__main__ import COMMANDS, main
+from benchmarks.__main__ import ALIASES, COMMANDS, main
 from benchmarks.behaviour import STUDIES
 from benchmarks.report import WIDTH
 from benchmarks.study import Measurement, chosen_studies
@@ -44,6 +44,14 @@ def test_every_benchmark_has_a_help_with_examples(
     assert out.startswith(f"usage: python -m benchmarks {command.name}")
     assert "examples:" in out
     assert max(map(len, out.splitlines())) <= WIDTH
+
+
+@pytest.mark.parametrize(("former", "name"), ALIASES.items())
+def test_a_former_name_still_runs_the_benchmark(
+    former: str, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([former, "--help"]) == ExitCode.OK
+    assert capsys.readouterr().out.startswith(f"usage: python -m benchmarks {name}")
 
 
 @pytest.mark.parametrize("name", PAGES)

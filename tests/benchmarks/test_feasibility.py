@@ -11,10 +11,6 @@ import pytest
 from benchmarks import feasibility
 from benchmarks.__main__ import main
 from benchmarks.command import IDEAL, IMU, on_sensors
-from benchmarks.exam.borders import BORDER, PLAYS
-from benchmarks.exam.cases import Case
-from benchmarks.exam.drawing import TEST, TRAIN
-from benchmarks.exam.questions import draw_name, draws
 from benchmarks.feasibility import (
     EXAM,
     OUTCOMES,
@@ -26,6 +22,10 @@ from benchmarks.feasibility import (
     judged_dynamic,
 )
 from benchmarks.study import Measurement, run_tasks
+from benchmarks.validation_set.drawing import TEST, TRAIN
+from benchmarks.validation_set.physics import BORDER, PLAYS
+from benchmarks.validation_set.questions import draw_name, draws
+from benchmarks.validation_set.scores import Case
 from controller.cli.common import ExitCode
 from controller.go2_controller import GO2Controller
 from controller.motion_outcome import STRICT, Outcome

@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks import robots
 from benchmarks.command import IDEAL, IMU, on_sensors
-from benchmarks.high_fives import highest_window, largest_slip, longest_run
+from benchmarks.demo_sequence import CRITERIA, StepCheck
+from benchmarks.high_five import highest_window, largest_slip, longest_run
 from benchmarks.pushes import IMPULSE_STEP, largest_impulse
-from benchmarks.sequence import CRITERIA, StepCheck
+from benchmarks.robots import plant_of
 from benchmarks.study import Measurement, Study
 from controller.demo.report import StepResult
 from controller.demo.run import DemoProgress
@@ -73,6 +75,12 @@ def test_the_plant_of_a_trial_is_what_the_trial_says() -> None:
     assert plant.total_mass == pytest.approx(nominal_mass * trial.mass_scale, rel=1e-3)
     assert plant.read().rpy[2] == pytest.approx(trial.initial_yaw, abs=0.1)
     plant.close()
+
+
+def test_plants_of_trials_differ_within_their_ranges() -> None:
+    with closing(plant_of(Trial(0), 4100)) as one, closing(plant_of(Trial(1), 4100)) as other:
+        assert one.read().rpy[2] != other.read().rpy[2]
+    assert (robots.FRICTION_RANGE, robots.MASS_RANGE) == ((0.6, 1.0), (0.95, 1.05))
 
 
 # --- measures -----------------------------------------------------------------------------------

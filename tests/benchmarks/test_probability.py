@@ -9,9 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.exam.drawing import TEST, TRAIN
-from benchmarks.probability import judge, passed_that_fell, render, store
-from benchmarks.probability_evidence import COLUMNS, csv_of, save_reliability
+from benchmarks.probability import (
+    COLUMNS,
+    csv_of,
+    judge,
+    passed_that_fell,
+    render,
+    save_reliability,
+    store,
+)
+from benchmarks.validation_set.drawing import TEST, TRAIN
 from controller.sweeps.rows import Row
 from motions.feasibility.probability import ProbabilityModel, Rise
 

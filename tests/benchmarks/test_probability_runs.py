@@ -6,8 +6,8 @@ from collections import Counter
 
 import pytest
 
-from benchmarks.exam.drawing import TEST, TRAIN
 from benchmarks.probability_runs import WORLDS, exam, mixed, runs
+from benchmarks.validation_set.drawing import TEST, TRAIN
 
 
 def test_every_motion_has_the_worlds_of_its_half() -> None:

@@ -96,7 +96,7 @@ def test_the_table_fits_80_columns_and_names_the_fallen_seed() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "answers",
+        "qp_infeasibility",
         "balance",
         "behaviour",
         "dance",

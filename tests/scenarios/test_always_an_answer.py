@@ -1,6 +1,6 @@
 """Where the QP contradicts itself there is an answer, and the robot is not damped for that.
 
-A sample of ``python -m benchmarks answers``, one seed of each row.
+A sample of ``python -m benchmarks qp_infeasibility``, one seed of each row.
 """
 
 from __future__ import annotations
@@ -10,10 +10,9 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.answers import STUDIES
 from benchmarks.locomotion import CONFIG, MASS_RANGE
-from benchmarks.pushes import PUSH_TIME, heading_force
-from benchmarks.steps import plant_of
+from benchmarks.qp_infeasibility import STUDIES
+from benchmarks.robots import PUSH_TIME, heading_force, plant_of
 from controller.sweeps.trials import Trial, TrialRobot
 
 SAMPLES = [("boxes", 19), ("pushes", 12), ("stops", 17)]

@@ -5,16 +5,10 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
-from dataclasses import replace
 from pathlib import Path
-from typing import Final, NoReturn
+from typing import NoReturn
 
-import numpy as np
 import pytest
-
-from controller.bridges.unitree.codec import encode_message
-from controller.bridges.unitree.low_level import low_cmd_message
-from go2_wbc.robot.state import JointCommand
 
 HAS_DDS = importlib.util.find_spec("cyclonedds") is not None
 IS_REQUIRED = "GO2_WBC_REQUIRE_UNITREE" in os.environ
@@ -28,20 +22,6 @@ OLD_STOCK_SDK = "GO2_WBC_OLD_STOCK_SDK_PYTHON"
 """The SDK on CycloneDDS 0.10.2, which is built on a package of the system."""
 OLD_DDS_HEADER = Path("/usr/include/dds/dds.h")
 CPP_SDK = "GO2_WBC_CPP_SDK_PYTHON"
-DAMPED: Final = encode_message(low_cmd_message(JointCommand.damping(3.0)))
-"""A good ``rt/lowcmd``."""
-
-
-def garbage() -> list[bytes]:
-    """``rt/lowcmd`` that must move nothing: not finite, out of limits, damaged."""
-    command = JointCommand.servo(np.zeros(12), np.zeros(12), 400.0, 1.0)
-    damaged = low_cmd_message(JointCommand.torque(np.full(12, 20.0)))
-    damaged["crc"] ^= 1
-    return [
-        encode_message(low_cmd_message(replace(command, tau=np.full(12, np.nan)))),
-        encode_message(low_cmd_message(replace(command, q_des=np.full(12, 9.0)))),
-        encode_message(damaged),
-    ]
 
 
 def peer_python(variable: str) -> str:

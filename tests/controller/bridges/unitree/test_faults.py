@@ -9,10 +9,11 @@ from typing import Final
 import pytest
 
 from benchmarks.bridges.processes import PROGRAM, Process, wait_until
-from benchmarks.bridges.unitree_processes import LIMIT, MOVE, Scene, driver, flood, scene, simulator
+from benchmarks.bridges.unitree_processes import LIMIT, MOVE, driver, simulator
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
 from controller.cli.common import ExitCode
-from tests.controller.bridges.unitree.support import DAMPED, garbage, needs_dds
+from tests.controller.bridges.unitree.scenes import DAMPED, WatchedScene, flood, garbage, watched
+from tests.controller.bridges.unitree.support import needs_dds
 
 BAD_MOVES: Final = ('{"x": NaN, "y": 0, "z": 0}', "rubbish", "[1]", '{"x": "fast"}')
 PATIENT: Final = ("--stale-limit", "1.0")
@@ -38,9 +39,9 @@ lockstep = pytest.mark.parametrize("at", [("--lockstep",)], indirect=True, ids=[
 
 
 @pytest.fixture
-def at(request: pytest.FixtureRequest) -> Iterator[Scene]:
+def at(request: pytest.FixtureRequest) -> Iterator[WatchedScene]:
     """A robot of the test's own, that must not have tipped over."""
-    with scene(*getattr(request, "param", ())) as at:
+    with watched(*getattr(request, "param", ())) as at:
         yield at
         assert at.largest_tilt < TILT_LIMIT
 
@@ -52,7 +53,7 @@ def require_end(peer: Process, code: ExitCode, *texts: str) -> None:
     assert all(text in said for text in texts), f"it does not say {texts}: {said}"
 
 
-def test_garbage_moves_no_standing_robot(at: Scene) -> None:
+def test_garbage_moves_no_standing_robot(at: WatchedScene) -> None:
     """Garbage, then good commands that nobody has asked for, reach a standing robot."""
     at.stand_up()
     at.flood(garbage(), 3.0)
@@ -64,7 +65,7 @@ def test_garbage_moves_no_standing_robot(at: Scene) -> None:
 
 
 @lockstep
-def test_garbage_beside_a_controller_does_not_stop_its_trot(at: Scene) -> None:
+def test_garbage_beside_a_controller_does_not_stop_its_trot(at: WatchedScene) -> None:
     """A controller trots the robot; somebody else sends garbage to the same motors."""
     steps = ("--steps", "stand", "trot", "lie_down", "--seconds", "4")
     with driver(at.domain, *PATIENT, *steps) as peer:
@@ -75,7 +76,7 @@ def test_garbage_beside_a_controller_does_not_stop_its_trot(at: Scene) -> None:
     at.require_lying()
 
 
-def test_a_robot_stands_in_a_flood_of_moves(at: Scene) -> None:
+def test_a_robot_stands_in_a_flood_of_moves(at: WatchedScene) -> None:
     """``Move`` comes 5000 times a second, most of it with broken parameters."""
     at.stand_up()
     flood(lambda count: at.client.send(Api.MOVE, BAD_MOVES[count % 4] if count % 5 else MOVE), 3.0)
@@ -85,7 +86,7 @@ def test_a_robot_stands_in_a_flood_of_moves(at: Scene) -> None:
     at.require_standing()
 
 
-def test_a_robot_stops_whose_move_client_is_killed(at: Scene) -> None:
+def test_a_robot_stops_whose_move_client_is_killed(at: WatchedScene) -> None:
     """The program that asks for ``Move`` is killed with kill -9."""
     at.stand_up()
     with Process([sys.executable, "-c", MOVER, str(at.domain)]) as peer:
@@ -98,7 +99,7 @@ def test_a_robot_stops_whose_move_client_is_killed(at: Scene) -> None:
 
 
 @lockstep
-def test_a_robot_lies_down_and_gets_up_again_whose_controller_is_killed(at: Scene) -> None:
+def test_a_robot_lies_down_and_gets_up_again_whose_controller_is_killed(at: WatchedScene) -> None:
     """The controller behind ``UnitreePlant`` is killed with kill -9 in the middle of a trot."""
     with driver(at.domain, *ENDLESS_TROT) as peer:
         at.require_walking(peer)
@@ -111,7 +112,7 @@ def test_a_robot_lies_down_and_gets_up_again_whose_controller_is_killed(at: Scen
 
 
 @lockstep
-def test_a_controller_that_is_told_to_end_lays_the_robot_down(at: Scene) -> None:
+def test_a_controller_that_is_told_to_end_lays_the_robot_down(at: WatchedScene) -> None:
     """The controller gets SIGTERM in the middle of a trot."""
     with driver(at.domain, *ENDLESS_TROT) as peer:
         at.require_walking(peer)
@@ -120,19 +121,19 @@ def test_a_controller_that_is_told_to_end_lays_the_robot_down(at: Scene) -> None
 
 
 @lockstep
-def test_a_controller_ends_whose_simulator_is_killed(at: Scene) -> None:
+def test_a_controller_ends_whose_simulator_is_killed(at: WatchedScene) -> None:
     """The robot is gone in the middle of a trot; the controller ends, a new one is served."""
     with driver(at.domain, *ENDLESS_TROT) as peer:
         at.require_walking(peer)
         at.process.kill()
         require_end(peer, ExitCode.FAILED, "no rt/lowstate for")
     with simulator(at.domain) as process:
-        second = Scene(process, at.domain)
+        second = WatchedScene(process, at.domain)
         second.stand_up()
         at.largest_tilt = max(at.largest_tilt, second.largest_tilt)
 
 
-def test_no_controller_takes_over_a_robot_that_stands(at: Scene) -> None:
+def test_no_controller_takes_over_a_robot_that_stands(at: WatchedScene) -> None:
     """A controller wants a robot that stands under its sport service."""
     at.stand_up()
     with driver(at.domain) as peer:
@@ -140,7 +141,7 @@ def test_no_controller_takes_over_a_robot_that_stands(at: Scene) -> None:
     at.require_standing()
 
 
-def test_a_second_simulator_is_refused(at: Scene) -> None:
+def test_a_second_simulator_is_refused(at: WatchedScene) -> None:
     """A second simulator is started on the domain of one that serves."""
     at.stand_up()
     with Process([*PROGRAM, "unitree-sim", "--domain", str(at.domain)]) as second:
