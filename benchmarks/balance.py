@@ -62,13 +62,6 @@ GENTLE = VelocityEnvelope(forward=1.2, backward=1.2, lateral=0.5, turning=1.5)
 CHANGES = 10
 COMMANDS = 80
 """Random velocities of a run, two minutes of them."""
-EXAMPLES = """
-python -m benchmarks balance              everything
-python -m benchmarks balance --quick      three seeds
-python -m benchmarks balance --rows sensors
-python -m benchmarks balance --rows recover sensed-recover
-python -m benchmarks balance --list       the metrics and their thresholds
-"""
 
 
 def impulse_at(angle: float) -> float:
@@ -261,8 +254,11 @@ STUDIES = (*_scenarios("ideal"), *_scenarios("imu"))
 BENCHMARK = Benchmark(
     "balance",
     "Pushes, drops, changes of gait, and whether a fall is noticed.",
-    EXAMPLES,
     STUDIES,
+    examples=(
+        "--rows sensors",
+        "--rows recover sensed-recover",
+    ),
     more_seeds="; times 10 for drops, 50 for disturbed runs",
 )
 register, run = BENCHMARK.register, BENCHMARK.run

@@ -60,15 +60,6 @@ GOAL_METRICS = (
     Metric("goal.turn", _TURN, "angle error", "deg", 1.5),
     Metric("goal.drift", _TURN, "base moved by", "mm", None),
 )
-EXAMPLES = """
-python -m benchmarks behaviour            everything; 11 minutes, two cores
-python -m benchmarks behaviour --quick    three seeds
-python -m benchmarks behaviour --resume   go on after an interruption
-python -m benchmarks behaviour --list     the metrics and their thresholds
-python -m benchmarks behaviour --rows stand trot --jobs 4
-python -m benchmarks behaviour --json --out behaviour.json
-python -m benchmarks behaviour --sensors imu --seeds 4
-"""
 
 
 def measure_stand(trial: Trial) -> Measurement:
@@ -180,8 +171,13 @@ BENCHMARK = Benchmark(
     "behaviour",
     "Stand, trot, pushes, goals, high five, slaps, the motions and the whole demo\n"
     "in MuJoCo, with friction, mass, heading and joint angles drawn by each seed.",
-    EXAMPLES,
     STUDIES,
+    takes="11 minutes, two cores",
+    examples=(
+        "--rows stand trot --jobs 4",
+        "--json --out behaviour.json",
+        "--sensors imu --seeds 4",
+    ),
     more_seeds="; the demo takes 5 times N",
     sensors=True,
 )

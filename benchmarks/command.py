@@ -45,8 +45,9 @@ class Benchmark:
     Attributes:
         name: what the command line takes.
         description: of its help; the exit code is told besides.
-        examples: one a line.
         studies: in the order of the report.
+        takes: how long it takes.
+        examples: arguments, for the help, besides those that all have.
         more_seeds: what the help says of the number of seeds, besides the default.
         sensors: whether they can be chosen.
         runs: how often a study that draws nothing is run, one after the other; 0 for seeds.
@@ -55,8 +56,9 @@ class Benchmark:
 
     name: str
     description: str
-    examples: str
     studies: Sequence[Study]
+    takes: str = ""
+    examples: tuple[str, ...] = ()
     more_seeds: str = ""
     sensors: bool = False
     runs: int = 0
@@ -65,8 +67,18 @@ class Benchmark:
     def register(self, subparsers: Subparsers) -> None:
         """Add the command and its options."""
         judged = "Exit code 0 if every threshold is met, 1 if one is not."
-        description = self.description if self.runs else f"{self.description}\n{judged}"
-        parser = add_parser(subparsers, self.name, description, examples=self.examples)
+        lines = [
+            f"          everything{f'; {self.takes}' if self.takes else ''}",
+            *([] if self.runs else [f"--quick   {QUICK_SEEDS} seeds"]),
+            "--list    the metrics and their thresholds",
+            *self.examples,
+        ]
+        parser = add_parser(
+            subparsers,
+            self.name,
+            f"{self.description}\n{judged}",
+            examples="\n".join(f"python -m benchmarks {self.name} {line}" for line in lines),
+        )
         if self.runs:
             add_runs(parser, self.studies, self.runs)
             parser.set_defaults(jobs=self.jobs)

@@ -28,12 +28,6 @@ TEMPI = (62.0, 178.0)
 FIRST_SONG = 5000
 """Seed of the first song that is judged."""
 LEAST_MOVES = 20
-EXAMPLES = """
-python -m benchmarks dance            everything; minutes on two cores
-python -m benchmarks dance --quick    three seeds
-python -m benchmarks dance --rows clicks --json
-python -m benchmarks dance --list     the metrics and their thresholds
-"""
 
 
 def song_of(kind: str, seed: int) -> Song:
@@ -110,7 +104,8 @@ BENCHMARK = Benchmark(
     "dance",
     "Dances to songs whose true beats are known: how many accents of the measured\n"
     "robot are on a beat. Needs the extra [music].",
-    EXAMPLES,
     STUDIES,
+    takes="minutes on two cores",
+    examples=("--rows clicks --json",),
 )
 register, run = BENCHMARK.register, BENCHMARK.run

@@ -36,13 +36,6 @@ PRESSED = 15.0
 FLOWN = 0.06
 """Time [s] without contact after which a contact counts as a touchdown."""
 TEMPO, HOPS = 120.0, 3
-EXAMPLES = """
-python -m benchmarks dynamic_motions            everything; some minutes
-python -m benchmarks dynamic_motions --quick    three seeds
-python -m benchmarks dynamic_motions --rows up turn --json
-python -m benchmarks dynamic_motions --sensors imu
-python -m benchmarks dynamic_motions --list     the metrics, their thresholds
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,8 +246,9 @@ STUDIES = tuple(
 BENCHMARK = Benchmark(
     "dynamic_motions",
     "Jumps, hops, rears and lifts in physics: are they done, and where do they land.",
-    EXAMPLES,
     STUDIES,
+    takes="some minutes",
+    examples=("--rows up turn --json",),
     sensors=True,
 )
 register, run = BENCHMARK.register, BENCHMARK.run

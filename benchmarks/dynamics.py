@@ -34,11 +34,6 @@ PLANNING, SLOW_PLANNING = 4.0, 10.0
 """Processor time [s] that a plan may take."""
 FROM_CACHE = 50.0
 """Processor time [ms] that a kept plan may take."""
-EXAMPLES = """
-python -m benchmarks dynamics             everything; some minutes
-python -m benchmarks dynamics jump rear --json
-python -m benchmarks dynamics --list      the metrics and their thresholds
-"""
 Make = Callable[[], tuple[Phase, ...]]
 
 MOVES: dict[str, tuple[str, Make, float]] = {
@@ -111,8 +106,9 @@ BENCHMARK = Benchmark(
     "dynamics",
     "Solve jumps, hops, rears and lifts from cold: processor time, deviation, torque.\n"
     "Needs go2-wbc[dynamics].",
-    EXAMPLES,
     STUDIES,
+    takes="some minutes",
+    examples=("jump rear --json",),
     runs=1,
 )
 register, run = BENCHMARK.register, BENCHMARK.run

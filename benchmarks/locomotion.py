@@ -47,13 +47,6 @@ CONFIG = Config(
     locomotion=LocomotionConfig(mpc=MpcConfig(enabled=True)),
     envelope=VelocityEnvelope(forward=4.0, backward=2.0, lateral=1.5, turning=8.0),
 )
-EXAMPLES = """
-python -m benchmarks locomotion            everything; an hour on two cores
-python -m benchmarks locomotion --quick    three seeds
-python -m benchmarks locomotion --rows sensors
-python -m benchmarks locomotion --rows ahead-2.5 gaits --json
-python -m benchmarks locomotion --list     the metrics and their thresholds
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +180,11 @@ STUDIES = (
 BENCHMARK = Benchmark(
     "locomotion",
     "Every gait at its speeds: how exactly, and within which limits.",
-    EXAMPLES,
     STUDIES,
+    takes="an hour on two cores",
+    examples=(
+        "--rows sensors",
+        "--rows ahead-2.5 gaits --json",
+    ),
 )
 register, run = BENCHMARK.register, BENCHMARK.run

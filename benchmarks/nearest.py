@@ -43,11 +43,6 @@ AS_REPORTED = 10.0
 """Difference [mm] between the measured and the reported deviation, of every motion."""
 PLANNING = 4.0
 """Processor time [s] of planning, from cold and without imports."""
-EXAMPLES = """
-python -m benchmarks nearest            twenty motions, some minutes
-python -m benchmarks nearest --quick    three of them
-python -m benchmarks nearest --list     the metrics and their thresholds
-"""
 ITEM = "nearest to a refused motion"
 METRICS = (
     Metric("nearest.found", ITEM, "plan found", "%", FOUND, Direction.AT_LEAST),
@@ -191,8 +186,8 @@ BENCHMARK = Benchmark(
     "Motions that the check refuses: is the nearest one found that it does not, is\n"
     "it done in physics, and is it as far from what was written as reported? Needs\n"
     "go2-wbc[dynamics].",
-    EXAMPLES,
     STUDIES,
+    takes="twenty motions, some minutes",
     more_seeds=", each of another motion",
 )
 register, run = BENCHMARK.register, BENCHMARK.run

@@ -45,12 +45,6 @@ AFTERMATH = 1.0
 """Time [s] for which a robot that gave up is watched, to see whether it reports a fall."""
 UPRIGHT = np.radians(30.0)
 """Tilt below which a robot that was damped had no reason to be: the limit of ``SafetyConfig``."""
-EXAMPLES = """
-python -m benchmarks qp_infeasibility            everything; minutes on two cores
-python -m benchmarks qp_infeasibility --quick    three seeds
-python -m benchmarks qp_infeasibility --rows boxes pushes --json
-python -m benchmarks qp_infeasibility --list     the metrics and their thresholds
-"""
 Course = Callable[[TrialRobot, np.random.Generator], Iterator[float]]
 """Commands and pushes of a trial; gives the time [s] until it wants to go on."""
 
@@ -202,8 +196,9 @@ BENCHMARK = Benchmark(
     "qp_infeasibility",
     "Trots on which the QP contradicts itself: is there always an answer, is the\n"
     "robot never damped while upright, how often do constraints give way too far.",
-    EXAMPLES,
     STUDIES,
+    takes="minutes on two cores",
+    examples=("--rows boxes pushes --json",),
     sensors=True,
 )
 register, run = BENCHMARK.register, BENCHMARK.run

@@ -30,12 +30,6 @@ STEP_AHEAD, STEP_ASIDE = 0.06, 0.03
 """Greatest way [m] of a random step, in either direction."""
 ROUNDS = 3
 """Times that a walk is played."""
-EXAMPLES = """
-python -m benchmarks steps            everything; minutes on two cores
-python -m benchmarks steps --quick    three seeds
-python -m benchmarks steps --rows step --json
-python -m benchmarks steps --list     the metrics and their thresholds
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,8 +185,9 @@ STUDIES = (
 BENCHMARK = Benchmark(
     "steps",
     "Authored steps and walks: where do they end, against where they were to end.",
-    EXAMPLES,
     STUDIES,
+    takes="minutes on two cores",
+    examples=("--rows step --json",),
     sensors=True,
 )
 register, run = BENCHMARK.register, BENCHMARK.run

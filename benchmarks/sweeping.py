@@ -35,11 +35,6 @@ LONG, SETTLED, MEAN_OF = 1000, 100, 100
 """Runs of one worker; after how many of them, and over how many, its memory is looked at."""
 SHARE, GROWTH, CERTIFICATE = 0.9, 1.05, 120.0
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-EXAMPLES = """
-python -m benchmarks sweeps           ten minutes, two idle processors
-python -m benchmarks sweeps memory    may run beside other work
-python -m benchmarks sweeps certify
-"""
 SCALING = (
     Metric(
         "sweeps.share",
@@ -144,8 +139,12 @@ BENCHMARK = Benchmark(
     "sweeps",
     "What a second worker brings, beside two processes without a sweep; memory of\n"
     "a worker over 1,000 runs; time of a certificate. Wants an idle machine.",
-    EXAMPLES,
     STUDIES,
+    takes="ten minutes, two idle processors",
+    examples=(
+        "memory  may run beside other work",
+        "certify",
+    ),
     runs=1,
     jobs=0,
 )

@@ -19,18 +19,16 @@ TESTED = {
     "unitree-faults": "tests/controller/bridges/unitree/test_faults.py",
 }
 """What was a benchmark, and the tests that it is now."""
-EXAMPLES = """
-python -m benchmarks bridges              two minutes each; needs the extras
-python -m benchmarks bridges ros2 --runs 5
-python -m benchmarks bridges --list       the metrics and their thresholds
-python -m benchmarks bridges --json --out bridges.json
-"""
 BENCHMARK = Benchmark(
     "bridges",
     "A server in a process of its own, on the loopback: answers, losses, latencies,\n"
     "and the robot driven through them. Needs the extras; wants an idle machine.",
-    EXAMPLES,
     STUDIES,
+    takes="two minutes each; needs the extras",
+    examples=(
+        "ros2 --runs 5",
+        "--json --out bridges.json",
+    ),
     runs=1,
 )
 register = BENCHMARK.register
