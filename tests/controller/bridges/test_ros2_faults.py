@@ -21,11 +21,11 @@ from benchmarks.bridges.processes import Process, wait_until
 from benchmarks.bridges.ros2_processes import (
     ANSWER,
     DISCOVERY,
-    Probe,
     quiet_client,
     serving,
 )
 from tests.controller.bridges.ros2_graph import needs_ros2
+from tests.controller.bridges.ros2_probe import WatchingProbe
 
 if TYPE_CHECKING:
     from controller.bridges.ros2 import GO2ControllerNode
@@ -90,7 +90,7 @@ class Scene:
         exits: what is to be ended.
     """
 
-    probe: Probe
+    probe: WatchingProbe
     exits: ExitStack
 
     def serve(self, says: str = "serving /") -> Process:
@@ -109,7 +109,7 @@ class Scene:
 @pytest.fixture
 def at(graph: None, request: pytest.FixtureRequest) -> Iterator[Scene]:
     """A robot of the test's own, that must not have tipped over."""
-    with closing(Probe(request.node.name)) as probe, ExitStack() as exits:
+    with closing(WatchingProbe(request.node.name)) as probe, ExitStack() as exits:
         yield Scene(probe, exits)
         assert math.degrees(probe.largest_tilt) <= TILT_LIMIT  # nan if no odometry was heard
 
@@ -127,13 +127,13 @@ def require_said(text: str, said: str) -> None:
     assert text in said, f"{text!r} was not said, but: {said}"
 
 
-def require_mode(probe: Probe, mode: str) -> None:
+def require_mode(probe: WatchingProbe, mode: str) -> None:
     """That the robot is standing, walking, ..."""
     found = probe.statistics()["mode"]
     assert found == mode, f"the robot is {found}, not {mode}"
 
 
-def require_rest(probe: Probe) -> None:
+def require_rest(probe: WatchingProbe) -> None:
     """That the robot does not move along."""
     start = probe.place()
     probe.let_pass(REST_TIME)
