@@ -46,7 +46,7 @@ class Benchmark:
         name: what the command line takes.
         description: of its help; the exit code is told besides.
         studies: in the order of the report.
-        takes: how long it takes.
+        takes: how long it takes, for the help.
         examples: arguments, for the help, besides those that all have.
         more_seeds: what the help says of the number of seeds, besides the default.
         sensors: whether they can be chosen.
@@ -68,9 +68,9 @@ class Benchmark:
         """Add the command and its options."""
         judged = "Exit code 0 if every threshold is met, 1 if one is not."
         lines = [
-            f"          everything{f'; {self.takes}' if self.takes else ''}",
+            f"          {self.takes or 'everything'}",
             *([] if self.runs else [f"--quick   {QUICK_SEEDS} seeds"]),
-            "--list    the metrics and their thresholds",
+            "--list    metrics and thresholds",
             *self.examples,
         ]
         parser = add_parser(

@@ -24,11 +24,6 @@ def measured(name: str, seed: int) -> dict[str, float]:
     return dict(scenario.measure(Trial(seed)).values)
 
 
-def test_every_metric_has_a_name_of_its_own() -> None:
-    names = [metric.name for scenario in STUDIES for metric in scenario.metrics]
-    assert len(set(names)) == len(names)
-
-
 @pytest.mark.parametrize(
     ("angle", "impulse"), [(0.0, 45.0), (math.pi, 45.0), (math.pi / 2, 36.0), (-math.pi / 2, 36.0)]
 )

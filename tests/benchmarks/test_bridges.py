@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.bridges.command import STUDIES
+from benchmarks.bridges.command import STUDIES, TESTED
 from benchmarks.study import Study, chosen_studies
 from controller.cli.common import ExitCode
 from go2_wbc.errors import CommandError
@@ -45,11 +45,6 @@ def test_the_metrics_are_listed_without_the_extras(
     assert max(map(len, lines)) <= 80
 
 
-def test_metric_names_are_unique() -> None:
-    names = [metric.name for scenario in STUDIES for metric in scenario.metrics]
-    assert len(names) == len(set(names))
-
-
 def test_without_the_extra_the_line_that_installs_it_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
 ) -> None:
@@ -59,3 +54,15 @@ def test_without_the_extra_the_line_that_installs_it_is_named(
     assert 'pip install -e ".[unitree]"' in complaint
     assert "Traceback" not in complaint
     assert not results_folder.exists()
+
+
+def test_metric_names_are_unique() -> None:
+    names = [metric.name for study in STUDIES for metric in study.metrics]
+    assert len(names) == len(set(names))
+
+
+def test_what_tests_do_now_is_told_with_the_test(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, file in TESTED.items():
+        assert main(["bridges", name]) == ExitCode.USAGE
+        assert f"pytest {file}" in capsys.readouterr().err
+        assert (Path(__file__).resolve().parents[2] / file).is_file()

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.locomotion import CONFIG, RUNS, STUDIES, Run, measured
+from benchmarks.locomotion import CONFIG, RUNS, Run, measured
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant import MujocoPlant
@@ -53,5 +53,3 @@ def test_every_named_gait_has_a_row_and_every_row_is_within_what_is_allowed() ->
     assert {run.gait for run in RUNS} == set(GAITS)
     for run in RUNS:
         assert CONFIG.envelope.clip(run.command) == run.command
-    names = [metric.name for scenario in STUDIES for metric in scenario.metrics]
-    assert len(set(names)) == len(names)

@@ -8,14 +8,17 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from benchmarks.__main__ import ALIASES, COMMANDS, main
 from benchmarks.behaviour import STUDIES
+from benchmarks.command import IDEAL, IMU, on_sensors
 from benchmarks.report import WIDTH
-from benchmarks.study import Measurement, chosen_studies
+from benchmarks.study import Measurement, Study, chosen_studies
 from controller.cli.common import ExitCode
 from controller.cli.main import Command
 from controller.sweeps.trials import Trial
@@ -149,3 +152,15 @@ def test_an_unknown_scenario_is_a_usage_error_that_lists_the_valid_ones() -> Non
     with pytest.raises(CommandError, match=r"unknown scenario 'gallop'.*high-five.*trot"):
         chosen_studies(STUDIES, ["gallop"])
     assert main(["behaviour", "--rows", "gallop"]) == ExitCode.USAGE
+
+
+def test_a_trial_on_sensors_is_the_same_trial_with_another_plant() -> None:
+    study = Study("fake", (), lambda trial: Measurement({}, reason=f"{trial}"))
+    assert on_sensors(study, IDEAL) is study
+    sensed = on_sensors(study, IMU)
+    assert sensed.name != study.name  # results of both are kept in one file
+    assert sensed.measure(Trial(7)).reason == str(Trial(7, sensors=IMU))
+    with closing(Trial(3).plant()) as ideal, closing(Trial(3, sensors=IMU).plant()) as plant:
+        np.testing.assert_array_equal(ideal.truth().q, plant.truth().q)
+        assert plant.read().time == plant.truth().time
+        assert not np.array_equal(plant.read().q, plant.truth().q)

@@ -1,4 +1,4 @@
-"""Trials draw what they say, and the scenarios' measures measure what they say."""
+"""What the rows of ``behaviour`` measure."""
 
 from __future__ import annotations
 
@@ -9,20 +9,14 @@ import numpy as np
 import pytest
 
 from benchmarks import robots
-from benchmarks.command import IDEAL, IMU, on_sensors
 from benchmarks.demo_sequence import CRITERIA, StepCheck
 from benchmarks.high_five import highest_window, largest_slip, longest_run
 from benchmarks.pushes import IMPULSE_STEP, largest_impulse
 from benchmarks.robots import plant_of
-from benchmarks.study import Measurement, Study
 from controller.demo.report import StepResult
 from controller.demo.run import DemoProgress
 from controller.demo.steps import DEMO_STEPS
 from controller.sweeps.trials import (
-    FRICTION_RANGE,
-    MASS_RANGE,
-    NOMINAL_FRICTION,
-    YAW_RANGE,
     Trial,
     TrialFailed,
     TrialRobot,
@@ -30,60 +24,11 @@ from controller.sweeps.trials import (
 from go2_wbc.legs import LEGS, Leg
 from tests.go2_wbc.plant.helpers import empty_recording
 
-# --- trials -------------------------------------------------------------------------------------
-
-
-def test_a_trial_on_sensors_is_the_same_trial_with_another_plant() -> None:
-    scenario = Study("fake", (), lambda trial: Measurement({}, reason=f"{trial}"))
-    assert on_sensors(scenario, IDEAL) is scenario
-    sensed = on_sensors(scenario, IMU)
-    assert sensed.name != scenario.name  # results of both are kept in one file
-    assert sensed.measure(Trial(7)).reason == str(Trial(7, sensors=IMU))
-    with closing(Trial(3).plant()) as ideal, closing(Trial(3, sensors=IMU).plant()) as plant:
-        np.testing.assert_array_equal(ideal.truth().q, plant.truth().q)
-        assert plant.read().time == plant.truth().time
-        assert not np.array_equal(plant.read().q, plant.truth().q)
-
-
-def test_trials_draw_inside_their_ranges_and_fill_them() -> None:
-    trials = [Trial(seed) for seed in range(200)]
-    for values, (low, high) in (
-        ([t.friction for t in trials], FRICTION_RANGE),
-        ([t.mass_scale for t in trials], MASS_RANGE),
-        ([t.initial_yaw for t in trials], YAW_RANGE),
-    ):
-        assert low <= min(values) < low + 0.05 * (high - low)
-        assert high - 0.05 * (high - low) < max(values) <= high
-
-
-def test_a_trial_is_decided_by_its_seed() -> None:
-    a, b, other = Trial(5), Trial(5), Trial(6)
-    assert (a.friction, a.mass_scale, a.initial_yaw) == (b.friction, b.mass_scale, b.initial_yaw)
-    assert a.mass_scale != other.mass_scale
-
-
-def test_nominal_friction_changes_nothing_else() -> None:
-    drawn, nominal = Trial(3), Trial(3, has_nominal_friction=True)
-    assert nominal.friction == NOMINAL_FRICTION
-    assert (nominal.mass_scale, nominal.initial_yaw) == (drawn.mass_scale, drawn.initial_yaw)
-
-
-def test_the_plant_of_a_trial_is_what_the_trial_says() -> None:
-    nominal_mass = 16.085
-    trial = Trial(4)
-    plant = trial.plant()
-    assert plant.total_mass == pytest.approx(nominal_mass * trial.mass_scale, rel=1e-3)
-    assert plant.read().rpy[2] == pytest.approx(trial.initial_yaw, abs=0.1)
-    plant.close()
-
 
 def test_plants_of_trials_differ_within_their_ranges() -> None:
     with closing(plant_of(Trial(0), 4100)) as one, closing(plant_of(Trial(1), 4100)) as other:
         assert one.read().rpy[2] != other.read().rpy[2]
     assert (robots.FRICTION_RANGE, robots.MASS_RANGE) == ((0.6, 1.0), (0.95, 1.05))
-
-
-# --- measures -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
