@@ -28,7 +28,7 @@ from benchmarks.command import Benchmark
 from benchmarks.locomotion import CONFIG, MASS_RANGE
 from benchmarks.qp_infeasibility import commanded
 from benchmarks.robots import PUSH_TIME, heading_force, plant_of
-from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.study import Direction, Measurement, Metric, Study, sensed
 from controller.checks import is_standing
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
@@ -69,10 +69,10 @@ def impulse_at(angle: float) -> float:
     return 1.0 / math.hypot(math.cos(angle) / AHEAD, math.sin(angle) / ASIDE)
 
 
-def measure_standing(trial: Trial, name: str, sensors: str, direction: int) -> Measurement:
+def measure_standing(trial: Trial, direction: int) -> Measurement:
     """Push the standing robot in one direction."""
-    angle = 2.0 * math.pi * direction / DIRECTIONS
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
+    name, angle = f"stand-{45 * direction}", 2.0 * math.pi * direction / DIRECTIONS
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
         robot.require(robot.go2.stand())
         start, since = robot.plant.time, math.inf
         try:
@@ -86,15 +86,15 @@ def measure_standing(trial: Trial, name: str, sensors: str, direction: int) -> M
     return Measurement({name: float(since <= start + STANDING_LIMIT - CALM)})
 
 
-def measure_trotting(trial: Trial, name: str, sensors: str, push: str) -> Measurement:
+def measure_trotting(trial: Trial, push: str) -> Measurement:
     """Push the trotting robot at every phase; the share of phases that it survives."""
     angle, impulse = TROT_PUSHES[push]
     survived = 0
     for phase in range(PHASES):
         side = 1.0 if phase % 2 or push != "lateral" else -1.0
-        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
+        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
             survived += trots_on(robot, phase, heading_force(side * angle, impulse))
-    return Measurement({name: survived / PHASES})
+    return Measurement({f"trot-{push}": survived / PHASES})
 
 
 def trots_on(robot: TrialRobot, phase: int, force: np.ndarray) -> bool:
@@ -129,21 +129,21 @@ def dropped(seed: int, sensors: str = "ideal") -> MujocoPlant:
     return plant
 
 
-def measure_recovery(trial: Trial, name: str, sensors: str) -> Measurement:
+def measure_recovery(trial: Trial) -> Measurement:
     """Drop the limp robot and let it get up."""
-    with TrialRobot(dropped(FIRST_SEED + trial.seed, sensors), CONFIG) as robot:
+    with TrialRobot(dropped(FIRST_SEED + trial.seed, trial.sensors), CONFIG) as robot:
         robot.go2.wait(DROP_TIME)
         said = robot.go2.recover()
         is_up = said and robot.truth.fall() is None
         stands = is_up and is_standing(RobotModel().snapshot(robot.plant.truth()))
-        notes = {} if stands else {name: robot.go2.last_outcome.reason}
-    return Measurement({name: float(stands)}, notes=notes)
+        notes = {} if stands else {"recover": robot.go2.last_outcome.reason}
+    return Measurement({"recover": float(stands)}, notes=notes)
 
 
-def measure_gaits(trial: Trial, name: str, sensors: str) -> Measurement:
+def measure_gaits(trial: Trial) -> Measurement:
     """Change the gait, or stop, again and again."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         try:
@@ -151,8 +151,8 @@ def measure_gaits(trial: Trial, name: str, sensors: str) -> Measurement:
                 _change(robot, rng)
                 done += 1
         except TrialFailed as failed:
-            return Measurement({name: done / CHANGES}, notes={name: str(failed)})
-    return Measurement({name: 1.0})
+            return Measurement({"gaits": done / CHANGES}, notes={"gaits": str(failed)})
+    return Measurement({"gaits": 1.0})
 
 
 def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
@@ -169,10 +169,10 @@ def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
     robot.wait(float(rng.uniform(0.3, 1.5)))
 
 
-def measure_commands(trial: Trial, name: str, sensors: str) -> Measurement:
+def measure_commands(trial: Trial) -> Measurement:
     """Follow random velocities; ticks in which the QP had no answer are counted."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors), CONFIG) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         counts, why = robot.go2.telemetry, ""
@@ -183,71 +183,59 @@ def measure_commands(trial: Trial, name: str, sensors: str) -> Measurement:
                 done += 1
         except TrialFailed as failed:
             why = str(failed)
-        values = {name: done / COMMANDS, f"{name}.failures": float(counts.qp_failures)}
-    return Measurement(values, notes={name: why} if why else {})
+        failures = float(counts.qp_failures)
+    values = {"commands": done / COMMANDS, "commands.failures": failures}
+    return Measurement(values, notes={"commands": why} if why else {})
 
 
-def _commands(sensors: str) -> Study:
-    name, item = "commands", "random commands, 120 s"
-    if sensors != "ideal":
-        name, item = f"sensed-{name}", f"sensors: {item}"
-    metrics = (
-        Metric(name, item, "followed without a fall", "", 1.0, Direction.AT_LEAST),
-        Metric(f"{name}.failures", item, "ticks without an answer", "", 0.0),
-    )
-    measured = partial(measure_commands, name=name, sensors=sensors)
-    return Study(name, metrics, measured, group="truth" if sensors == "ideal" else "sensors")
-
-
-def _scenario(
+def _study(
     name: str,
     item: str,
     quantity: str,
-    measure: Callable[..., Measurement],
-    sensors: str,
+    measure: Callable[[Trial], Measurement],
+    *more: Metric,
     least: float = 1.0,
     times: int = 1,
 ) -> Study:
-    """A row whose value is a share; ``measure`` takes its name and the sensors, too."""
-    if sensors != "ideal":
-        name, item = f"sensed-{name}", f"sensors: {item}"
-    metric = Metric(name, item, quantity, "", least, Direction.AT_LEAST)
-    measured = partial(measure, name=name, sensors=sensors)
-    return Study(name, (metric,), measured, times, "truth" if sensors == "ideal" else "sensors")
+    """A row whose value is a share, and what is told besides."""
+    share = Metric(name, item, quantity, "", least, Direction.AT_LEAST)
+    return Study(name, (share, *more), measure, times, "truth")
 
 
-def _scenarios(sensors: str) -> tuple[Study, ...]:
-    """All rows with the plant's ``sensors``."""
-    standing, trot = "standing, push 0.1 s", f"trot {TROT_SPEED:g} m/s, push 0.1 s, 16 phases"
-    return (
-        *(
-            _scenario(
-                f"stand-{45 * k}",
-                f"{standing}, {ASIDE:g} N s aside, {AHEAD:g} ahead",
-                f"survived at {45 * k} deg",
-                partial(measure_standing, direction=k),
-                sensors,
-            )
-            for k in range(DIRECTIONS)
-        ),
-        *(
-            _scenario(
-                f"trot-{push}",
-                trot,
-                f"{push} {impulse:g} N s survived",
-                partial(measure_trotting, push=push),
-                sensors,
-            )
-            for push, (_, impulse) in TROT_PUSHES.items()
-        ),
-        _scenario("recover", "drops", "stand again", measure_recovery, sensors, 0.98, 10),
-        _scenario("gaits", "ten changes of gait and stops", "done", measure_gaits, sensors),
-        _commands(sensors),
-        disturbed.scenario(sensors),
-    )
-
-
-STUDIES = (*_scenarios("ideal"), *_scenarios("imu"))
+_STANDING = f"standing, push 0.1 s, {ASIDE:g} N s aside, {AHEAD:g} ahead"
+_TROT = f"trot {TROT_SPEED:g} m/s, push 0.1 s, 16 phases"
+_COMMANDS = "random commands, 120 s"
+ON_TRUTH = (
+    *(
+        _study(
+            f"stand-{45 * k}",
+            _STANDING,
+            f"survived at {45 * k} deg",
+            partial(measure_standing, direction=k),
+        )
+        for k in range(DIRECTIONS)
+    ),
+    *(
+        _study(
+            f"trot-{push}",
+            _TROT,
+            f"{push} {impulse:g} N s survived",
+            partial(measure_trotting, push=push),
+        )
+        for push, (_, impulse) in TROT_PUSHES.items()
+    ),
+    _study("recover", "drops", "stand again", measure_recovery, least=0.98, times=10),
+    _study("gaits", "ten changes of gait and stops", "done", measure_gaits),
+    _study(
+        "commands",
+        _COMMANDS,
+        "followed without a fall",
+        measure_commands,
+        Metric("commands.failures", _COMMANDS, "ticks without an answer", "", 0.0),
+    ),
+    disturbed.STUDY,
+)
+STUDIES = (*ON_TRUTH, *(sensed(study, "sensors") for study in ON_TRUTH))
 """In the order of the report."""
 
 

@@ -16,6 +16,8 @@ from benchmarks import store
 from benchmarks.report import render, summarise, threshold_text
 from benchmarks.store import Store
 from benchmarks.study import (
+    IDEAL,
+    IMU,
     Measurement,
     Results,
     Study,
@@ -33,8 +35,6 @@ from controller.sweeps.trials import Trial
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import checked_output, write_atomically
 
-IDEAL, IMU = "ideal", "imu"
-"""The state that the controller is given: the true one, or what its own sensors tell."""
 SEEDS, QUICK_SEEDS = 20, 3
 
 

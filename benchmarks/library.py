@@ -1,7 +1,7 @@
 """Every motion of the library, played over seeds.
 
 On the true state: does the robot stay up, on its feet, and on its plan? On its own sensors, under
-the conditions of ``benchmarks.sensed``: is it done, and is it true when ``play`` says so?
+the conditions of ``truth_vs_estimate``: is it done, and is it true when ``play`` says so?
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.sensed import sensing_plant
 from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.truth_vs_estimate import sensing_plant
 from controller.checks import END_HEADING, END_PLACE
 from controller.motion_measurement import MotionMeasurement, during_motion, measure_motion
 from controller.sweeps.trials import Trial, TrialRobot

@@ -3,7 +3,7 @@
 The forces are planned ahead by the MPC. A run takes ``WINDOW`` seconds, from ``START_TIME`` after
 the command on: motors with their torque-speed line, friction 0.6 to 1.0 and masses within 10 %, of
 which the controller is not told. The state is the true one, or estimated from IMU, encoders and
-feet (the group ``sensors``; ``benchmarks.sensed`` has more of it). Gaits and weights were chosen on
+feet (the group ``sensors``; ``truth_vs_estimate`` has more of it). Gaits and weights were chosen on
 seeds 0 to 9; those judged begin at ``FIRST_SEED``.
 
 - velocity: of MuJoCo's CoM in the heading frame, every tick;
@@ -23,10 +23,10 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks import library, sensed
+from benchmarks import library, truth_vs_estimate
 from benchmarks.command import Benchmark
 from benchmarks.robots import plant_of
-from benchmarks.study import Measurement, Metric, Study
+from benchmarks.study import Measurement, Metric, Study, sensed
 from benchmarks.unknown_world import STUDIES as UNKNOWN
 from controller.motion_measurement import FULL
 from controller.sweeps.trials import Trial, TrialRobot
@@ -61,7 +61,6 @@ class Run:
         mae: greatest mean absolute error [m/s]; None if it only informs.
         saturated: greatest share of saturated ticks [%]; None if it only informs.
         group: of the scenario.
-        sensors: of the plant.
         speed: greatest joint speed, as a share of its limit; None if it only informs.
     """
 
@@ -72,15 +71,13 @@ class Run:
     mae: float | None = None
     saturated: float | None = None
     group: str = "trot"
-    sensors: str = "ideal"
     speed: float | None = 1.0
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
         """The rows of the report."""
         c = self.command
-        on = "" if self.sensors == "ideal" else "sensors: "
-        item = f"{on}{self.gait} ({c.linear_x:g}, {c.linear_y:g}) m/s, {c.angular_z:g} rad/s, 20 s"
+        item = f"{self.gait} ({c.linear_x:g}, {c.linear_y:g}) m/s, {c.angular_z:g} rad/s, 20 s"
         turning = [Metric(f"{self.name}.turn", item, "mean turning error", "%", self.mean)]
         moving = [
             Metric(f"{self.name}.mean", item, "mean velocity error", "%", self.mean),
@@ -101,7 +98,7 @@ def speed_of(command: VelocityCommand) -> float:
 
 def measure_run(trial: Trial, run: Run) -> Measurement:
     """Follow the command; see the module's docstring for what is measured."""
-    command, plant = run.command, plant_of(trial, FIRST_SEED, MASS_RANGE, run.sensors)
+    command, plant = run.command, plant_of(trial, FIRST_SEED, MASS_RANGE)
     with TrialRobot(plant, CONFIG) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk(run.gait))
@@ -152,25 +149,25 @@ RUNS = (
     Run("bound", "bound", VelocityCommand(0.6), 5.0, None, 5.0, "gaits"),
     Run("gallop", "gallop", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
 )
-SENSED = (
+ON_SENSORS = (
     *(
-        Run(f"sensed-{speed:g}", "trot", VelocityCommand(speed), mean)
+        Run(f"{speed:g}", "trot", VelocityCommand(speed), mean)
         for speed, mean in ((0.5, 2.0), (1.0, 2.0), (1.5, 2.0), (2.0, 2.0), (2.5, 3.0), (3.0, None))
     ),
-    *(
-        replace(run, name=f"sensed-{run.name}", mae=None)
-        for run in RUNS
-        if not run.name.startswith("ahead")
-    ),
-    Run("sensed-3.5", "trot", VelocityCommand(3.5), None, speed=None),
+    *(replace(run, mae=None) for run in RUNS if not run.name.startswith("ahead")),
+    Run("3.5", "trot", VelocityCommand(3.5), None, speed=None),
 )
 """The same on its own sensors; at 3 m/s all that is asked for is not to fall, at 3.5 nothing."""
+
+
+def _study(run: Run) -> Study:
+    return Study(run.name, run.metrics, partial(measure_run, run=run), group=run.group)
+
+
 STUDIES = (
-    *(
-        Study(run.name, run.metrics, partial(measure_run, run=run), group=run.group)
-        for run in (*RUNS, *(replace(run, group="sensors", sensors="imu") for run in SENSED))
-    ),
-    *sensed.STUDIES,
+    *map(_study, RUNS),
+    *(sensed(_study(run), "sensors") for run in ON_SENSORS),
+    *truth_vs_estimate.STUDIES,
     library.ON_SENSORS,
     *UNKNOWN,
 )

