@@ -16,23 +16,17 @@ until the motors give less than the weight at that speed, a joint would be faste
 the legs are out of range. Only the legs' own inertia is left out, which costs torque and speed: the
 result is a bound.
 
-**Height.** The CoM rises by v^2 / (2 g) from where it takes off; the feet rise by that and by what
-the legs are drawn up in flight, from where they were to the shortest that they can be.
-
-**Distance.** With the take-off speed v at the best angle, and friction mu, the CoM goes
+**Distance**, with the take-off speed v at the best angle and friction mu, in a push of t seconds:
 
     max over v_z of 2 v_x v_z / g,   v_x^2 + v_z^2 <= v^2,   v_x <= mu (v_z + g t)             (3)
 
-over a push of t seconds; the feet go farther, for they land ahead of the hips and take off behind.
-
 **Turn.** The feet's friction gives a yaw impulse of at most mu r times the vertical one, r being
-the feet's distance from the middle. With the least moment of inertia I about the vertical the trunk
+the feet's distance from the middle; with the least moment of inertia I about the vertical the trunk
 turns in a flight of T = 2 v / g by
 
     psi <= mu r m (v + g t) T / I                                                             (4)
 
-**Backflip.** In the same T the trunk has to turn by 360 deg less what it turns on the ground, at a
-rate that follows.
+What comes of it is in ``docs/explanation/dynamics.md``.
 """
 
 from __future__ import annotations

@@ -10,8 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from benchmarks import nearest
-from benchmarks.nearest import METRICS, measure, off_written
-from benchmarks.refused_motions import KINDS, refused_motion
+from benchmarks.nearest import KINDS, METRICS, measure, off_written, refused_motion
 from controller.sweeps.trials import Trial
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
