@@ -105,9 +105,9 @@ def to_and_fro(line: Timeline, channel: str, size: float, over: float) -> Timeli
     return moved(moved(line, {channel: size}, over), {channel: -size}, over)
 
 
-def writer_name(write: Write) -> str:
-    """The name of the family that a function writes."""
-    return write.__name__.strip("_")
+def named(*writes: Write) -> dict[str, Write]:
+    """Functions by the names of the families that they write."""
+    return {write.__name__.strip("_"): write for write in writes}
 
 
 def _digest(text: str) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from benchmarks.validation_set.drawing import Draw, Family, writer_name
+from benchmarks.validation_set.drawing import Draw, Family, Write, named
 from go2_wbc.legs import LEGS, Leg
 from motions import Timeline, deg
 
@@ -138,7 +138,7 @@ def _nearest_pair(draw: Draw, s: float) -> Timeline:
     return line.down(first, over=over).also().down(second, over=over).home(over=0.5)
 
 
-_BOUNDS = {
+_BOUNDS: dict[Write, tuple[float, float]] = {
     _jump_up: (0.3, 2.4),
     _jump_ahead: (0.2, 2.4),
     _jump_back: (0.2, 3.2),
@@ -165,6 +165,5 @@ _BOUNDS = {
     _nearest_pair: (0.4, 4.0),
 }
 DYNAMIC = tuple(
-    Family(writer_name(write), write, low, high, is_dynamic=True)
-    for write, (low, high) in _BOUNDS.items()
+    Family(name, write, *_BOUNDS[write], is_dynamic=True) for name, write in named(*_BOUNDS).items()
 )

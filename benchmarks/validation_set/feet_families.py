@@ -7,8 +7,8 @@ from benchmarks.validation_set.drawing import (
     Draw,
     Family,
     moved,
+    named,
     to_and_fro,
-    writer_name,
 )
 from go2_wbc.legs import LEGS
 from motions import Timeline, deg, load_motion
@@ -231,9 +231,11 @@ _WRITERS = (
     _paw_circle, _two_feet_at_once,  _paws_to_beats, _bow_sway_paw, _random_paws,
     _random_paws_faster, _library_faster, _library_larger,
 )  # fmt: skip
-_TURNING = {_wave_a_leg: 2.5, _one_joint: 2.0, _high_five: 2.5}
+_TURNING = {"wave_a_leg": 2.5, "one_joint": 2.0, "high_five": 2.5}
 """Amplitudes beyond which an angle or a height would be taken for a mistake in units."""
-FEET = tuple(Family(writer_name(w), w, high=_TURNING.get(w, 4.0)) for w in _WRITERS)
+FEET = tuple(
+    Family(name, write, high=_TURNING.get(name, 4.0)) for name, write in named(*_WRITERS).items()
+)
 
 
 # --- steps, walks, turns and trots, with other tracks beside them ---------------------------------
@@ -331,4 +333,4 @@ _GOING = (
     _long_step, _hasty_step, _four_steps, _high_steps, _step_round, _leaning_walk, _leaning_trot,
     _nodding_side_step, _low_path, _high_walk, _walk_then_paw, _trot_then_bow, _paw_then_walk,
 )  # fmt: skip
-GOING = tuple(Family(writer_name(write), write) for write in _GOING)
+GOING = tuple(Family(name, write) for name, write in named(*_GOING).items())

@@ -7,9 +7,10 @@ from benchmarks.validation_set.drawing import (
     CHANNELS,
     Draw,
     Family,
+    Write,
     moved,
+    named,
     to_and_fro,
-    writer_name,
 )
 from go2_wbc.reference import Posture
 from motions import Timeline, deg
@@ -17,39 +18,14 @@ from motions import Timeline, deg
 EASES = ("cubic", "in", "out", "linear")
 
 
-def _one(channel: str, sign: float, draw: Draw, s: float) -> Timeline:
-    """There, a while, and back."""
+def _there_and_back(
+    draw: Draw, s: float, channel: str, sign: float = 0.0, scale: float = 1.0
+) -> Timeline:
+    """There, a while, and back; a ``sign`` of 0 is drawn."""
+    sign = sign or draw.sign()
     size, over = sign * draw.between(0.8, 1.2) * BODY_SIZES[channel], draw.between(0.7, 1.4)
-    line = moved(Timeline(), {channel: s * size}, over)
+    line = moved(Timeline(), {channel: scale * s * size}, over)
     return line.hold(draw.between(0.1, 0.6)).home(over=over)
-
-
-def _crouch(draw: Draw, s: float) -> Timeline:
-    return _one("z", -1.0, draw, s)
-
-
-def _rise(draw: Draw, s: float) -> Timeline:
-    return _one("z", 1.0, draw, 0.6 * s)
-
-
-def _lean_along(draw: Draw, s: float) -> Timeline:
-    return _one("x", draw.sign(), draw, s)
-
-
-def _lean_aside(draw: Draw, s: float) -> Timeline:
-    return _one("y", draw.sign(), draw, s)
-
-
-def _roll_and_back(draw: Draw, s: float) -> Timeline:
-    return _one("roll", draw.sign(), draw, s)
-
-
-def _nose_down(draw: Draw, s: float) -> Timeline:
-    return _one("pitch", 1.0, draw, s)
-
-
-def _nose_up(draw: Draw, s: float) -> Timeline:
-    return _one("pitch", -1.0, draw, s)
 
 
 def _low_bow(draw: Draw, s: float) -> Timeline:
@@ -82,33 +58,13 @@ def _three_tracks(draw: Draw, s: float) -> Timeline:
     return line.home(over=over)
 
 
-def _tempo(channel: str, draw: Draw, s: float, wide: float = 1.0) -> Timeline:
+def _tempo(draw: Draw, s: float, channel: str, wide: float = 1.0) -> Timeline:
     """To and fro; the amplitude is the tempo."""
     size, over = wide * draw.between(0.3, 0.6) * BODY_SIZES[channel], draw.between(0.25, 0.35) / s
     line = Timeline()
     for _ in range(draw.count(2, 4)):
         line = to_and_fro(line, channel, size, over)
     return line.home(over=0.5)
-
-
-def _fast_sway(draw: Draw, s: float) -> Timeline:
-    return _tempo(draw.one_of(("x", "y")), draw, s)
-
-
-def _fast_bounce(draw: Draw, s: float) -> Timeline:
-    return _tempo("z", draw, s)
-
-
-def _fast_nod(draw: Draw, s: float) -> Timeline:
-    return _tempo("pitch", draw, s)
-
-
-def _fast_twist(draw: Draw, s: float) -> Timeline:
-    return _tempo("yaw", draw, s)
-
-
-def _fast_rock(draw: Draw, s: float) -> Timeline:
-    return _tempo("roll", draw, s, 2.0)
 
 
 def _sway_to_beats(draw: Draw, s: float) -> Timeline:
@@ -204,7 +160,7 @@ def _random_trunk_faster(draw: Draw, s: float) -> Timeline:
 
 
 def _to_and_fro_mirrored(draw: Draw, s: float) -> Timeline:
-    part = _one(draw.one_of(("y", "roll", "yaw")), draw.sign(), draw, 0.8 * s)
+    part = _there_and_back(draw, 0.8 * s, draw.one_of(("y", "roll", "yaw")))
     return part.then(part.mirror()).repeat(draw.count(1, 2))
 
 
@@ -212,15 +168,30 @@ def _backwards(draw: Draw, s: float) -> Timeline:
     return _random_trunk(draw, 0.8 * s).reverse()
 
 
-_FAST = (_fast_sway, _fast_bounce, _fast_nod, _fast_twist, _fast_rock, _random_trunk_faster)
-_WIDE = (
-    _crouch, _rise, _lean_along, _lean_aside, _roll_and_back, _nose_down, _nose_up, _low_bow,
-    _twists, _two_tracks, _three_tracks, _sway_to_beats, _circle, _nose_path, _gaze, _jolts,
-    _jump_cut, _sit_and_rise, _nod_sitting, _sits_and_sways, _lopsided_end, _random_trunk,
-    _to_and_fro_mirrored, _backwards,
-)  # fmt: skip
+_WIDE: dict[str, Write] = {
+    "crouch": lambda draw, s: _there_and_back(draw, s, "z", -1.0),
+    "rise": lambda draw, s: _there_and_back(draw, s, "z", 1.0, scale=0.6),
+    "lean_along": lambda draw, s: _there_and_back(draw, s, "x"),
+    "lean_aside": lambda draw, s: _there_and_back(draw, s, "y"),
+    "roll_and_back": lambda draw, s: _there_and_back(draw, s, "roll"),
+    "nose_down": lambda draw, s: _there_and_back(draw, s, "pitch", 1.0),
+    "nose_up": lambda draw, s: _there_and_back(draw, s, "pitch", -1.0),
+    **named(
+        *(_low_bow, _twists, _two_tracks, _three_tracks, _sway_to_beats, _circle, _nose_path),
+        *(_gaze, _jolts, _jump_cut, _sit_and_rise, _nod_sitting, _sits_and_sways, _lopsided_end),
+        *(_random_trunk, _to_and_fro_mirrored, _backwards),
+    ),
+}
+_FAST: dict[str, Write] = {
+    "fast_sway": lambda draw, s: _tempo(draw, s, draw.one_of(("x", "y"))),
+    "fast_bounce": lambda draw, s: _tempo(draw, s, "z"),
+    "fast_nod": lambda draw, s: _tempo(draw, s, "pitch"),
+    "fast_twist": lambda draw, s: _tempo(draw, s, "yaw"),
+    "fast_rock": lambda draw, s: _tempo(draw, s, "roll", 2.0),
+    **named(_random_trunk_faster),
+}
 TRUNK = (
-    *(Family(writer_name(write), write, high=2.5) for write in _WIDE),
-    *(Family(writer_name(write), write, 0.25, 4.0) for write in _FAST),
+    *(Family(name, write, high=2.5) for name, write in _WIDE.items()),
+    *(Family(name, write, 0.25, 4.0) for name, write in _FAST.items()),
     Family("late_entry", _late_entry, late=1.0),
 )
