@@ -73,17 +73,18 @@ class Benchmark:
             "--list    metrics and thresholds",
             *self.examples,
         ]
-        parser = add_parser(
-            subparsers,
-            self.name,
-            f"{self.description}\n{judged}",
-            examples="\n".join(f"python -m benchmarks {self.name} {line}" for line in lines),
-        )
+        examples = "\n".join(f"python -m benchmarks {self.name} {line}" for line in lines)
+        description = f"{self.description}\n{judged}"
+        parser = add_parser(subparsers, self.name, description, examples=examples)
         if self.runs:
-            add_runs(parser, self.studies, self.runs)
-            parser.set_defaults(jobs=self.jobs)
+            names = dict.fromkeys(n for s in self.studies for n in (s.group, s.name) if n)
+            text = f"{', '.join(names)}; default: all"
+            parser.add_argument("names", metavar="NAME", nargs="*", help=text)
+            add_options(parser, "runs", "list", *RESULTS)
+            parser.set_defaults(runs=self.runs, jobs=self.jobs)
         else:
-            add_seeds(parser, self.more_seeds, has_sensors=self.sensors)
+            sensors = ("sensors",) if self.sensors else ()
+            add_options(parser, *sensors, *SEEDED, more_seeds=self.more_seeds)
 
     def run(self, args: argparse.Namespace) -> int:
         """Run what was asked for, report; the exit code says whether all thresholds are met."""
@@ -99,81 +100,6 @@ class Benchmark:
 # --- options --------------------------------------------------------------------------------------
 
 
-def add_seeds(
-    parser: argparse.ArgumentParser, more: str = "", *, has_sensors: bool = False
-) -> None:
-    """Add how many seeds, which rows, and what every benchmark has; ``more``: of the seeds."""
-    if has_sensors:
-        add_sensors(parser)
-    parser.add_argument("--seeds", metavar="N", type=positive, help=f"default {SEEDS}{more}")
-    parser.add_argument("--quick", action="store_true", help=f"{QUICK_SEEDS} seeds")
-    parser.add_argument(
-        "--rows", metavar="NAME", nargs="+", default=[], help="only these scenarios; see --list"
-    )
-    add_options(parser, has_jobs=True, has_list=True)
-
-
-def add_sensors(parser: argparse.ArgumentParser) -> None:
-    """Add what the controller is given of the robot's state."""
-    parser.add_argument(
-        "--sensors",
-        choices=(IDEAL, IMU),
-        default=IDEAL,
-        help="true state, or the robot's own sensors; default %(default)s",
-    )
-
-
-def add_runs(parser: argparse.ArgumentParser, studies: Sequence[Study], default: int) -> None:
-    """Add which studies are run, and how often."""
-    names = ", ".join(dict.fromkeys(name for s in studies for name in (s.group, s.name) if name))
-    parser.add_argument("names", metavar="NAME", nargs="*", help=f"{names}; default: all")
-    parser.add_argument(
-        "--runs", metavar="N", type=positive, default=default, help="default %(default)s"
-    )
-    add_options(parser, has_list=True)
-
-
-def add_options(
-    parser: argparse.ArgumentParser, *, has_jobs: bool = False, has_list: bool = False
-) -> None:
-    """Add what several benchmarks take."""
-    if has_list:
-        parser.add_argument("--list", action="store_true", help="list the metrics, run nothing")
-    if has_jobs:
-        add_jobs(parser, 2)
-    parser.add_argument(
-        "--resume", action="store_true", help="skip what an interrupted run has finished"
-    )
-    add_output(parser)
-
-
-def add_sweep(parser: argparse.ArgumentParser, *, jobs: int) -> None:
-    """Add what benchmarks take that are one sweep; ``jobs`` is the default."""
-    parser.add_argument(
-        "--rows", metavar="FILE", type=Path, help=f"keep rows here, default in {store.FOLDER}"
-    )
-    add_jobs(parser, jobs)
-    add_output(parser)
-
-
-def add_jobs(parser: argparse.ArgumentParser, default: int) -> None:
-    """Add how many processes run at a time."""
-    parser.add_argument(
-        "--jobs", metavar="N", type=positive, default=default, help="processes, default %(default)s"
-    )
-
-
-def add_output(parser: argparse.ArgumentParser) -> None:
-    """Add where the result goes; a file is checked before the run already."""
-    parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
-    parser.add_argument(
-        "--out",
-        metavar="FILE",
-        type=lambda name: checked_output(name, [".json"]),
-        help="also write the JSON here",
-    )
-
-
 def positive(text: str) -> int:
     """The type of an option that counts from 1."""
     value = int(text)
@@ -182,8 +108,54 @@ def positive(text: str) -> int:
     return value
 
 
+_COUNT: dict[str, Any] = {"metavar": "N", "type": positive}
+_FLAG: dict[str, Any] = {"action": "store_true"}
+OPTIONS: dict[str, dict[str, Any]] = {
+    "sensors": {
+        "choices": (IDEAL, IMU),
+        "default": IDEAL,
+        "help": "true state, or the robot's own sensors; default %(default)s",
+    },
+    "seeds": {**_COUNT, "help": f"default {SEEDS}"},
+    "quick": {**_FLAG, "help": f"{QUICK_SEEDS} seeds"},
+    "rows": {
+        **{"metavar": "NAME", "nargs": "+", "default": []},
+        "help": "only these scenarios; see --list",
+    },
+    "runs": {**_COUNT, "help": "default %(default)s"},
+    "list": {**_FLAG, "help": "list the metrics, run nothing"},
+    "jobs": {**_COUNT, "default": 2, "help": "processes, default %(default)s"},
+    "resume": {**_FLAG, "help": "skip what an interrupted run has finished"},
+    "json": {**_FLAG, "help": "print JSON instead of the table"},
+    "out": {
+        "metavar": "FILE",
+        "type": lambda name: checked_output(name, [".json"]),  # before the run already
+        "help": "also write the JSON here",
+    },
+}
+"""What several benchmarks take, by name."""
+RESULTS = ("resume", "json", "out")
+SEEDED = ("seeds", "quick", "rows", "list", "jobs", *RESULTS)
+
+
+def add_options(parser: argparse.ArgumentParser, *names: str, more_seeds: str = "") -> None:
+    """Add some of ``OPTIONS``; ``more_seeds`` is said of the number of seeds."""
+    for name in names:
+        option = OPTIONS[name]
+        text = option["help"] + (more_seeds if name == "seeds" else "")
+        parser.add_argument(f"--{name}", **{**option, "help": text})
+
+
+def add_sweep(parser: argparse.ArgumentParser, *, jobs: int) -> None:
+    """Add what benchmarks take that are one sweep; ``jobs`` is the default."""
+    text = f"keep rows here, default in {store.FOLDER}"
+    parser.add_argument("--rows", metavar="FILE", type=Path, help=text)
+    add_options(parser, "jobs", "json", "out")
+    parser.set_defaults(jobs=jobs)
+
+
 def seeds_of(args: argparse.Namespace) -> int:
-    """How many seeds were asked for, by the options of ``add_seeds``."""
+    """How many seeds were asked for, by the options ``SEEDED``."""
     return args.seeds or (QUICK_SEEDS if args.quick else SEEDS)
 
 

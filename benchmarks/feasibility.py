@@ -17,8 +17,8 @@ from typing import Any
 
 from benchmarks.command import (
     IDEAL,
+    RESULTS,
     add_options,
-    add_sensors,
     measure_all,
     on_sensors,
     positive,
@@ -106,8 +106,7 @@ def register(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--borders", action="store_true", help="bisect where physics changes its mind"
     )
-    add_sensors(parser)
-    add_options(parser, has_jobs=True)
+    add_options(parser, "sensors", "jobs", *RESULTS)
 
 
 def run(args: argparse.Namespace) -> int:

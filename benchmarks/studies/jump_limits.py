@@ -18,7 +18,7 @@ from functools import cache, partial
 from textwrap import wrap
 from typing import NamedTuple
 
-from benchmarks.command import add_seeds, measure_all, publish, run_and_report, seeds_of
+from benchmarks.command import SEEDED, add_options, measure_all, publish, run_and_report, seeds_of
 from benchmarks.dynamic_motions import FIRST_SEED, Played, metrics_of, play
 from benchmarks.report import WIDTH, render, summarise
 from benchmarks.robots import plant_of
@@ -306,7 +306,7 @@ def register(subparsers: Subparsers) -> None:
         "permits. Exit code 0.",
         examples=EXAMPLES,
     )
-    add_seeds(parser)
+    add_options(parser, *SEEDED)
     parser.add_argument(
         "--budget", metavar="S", type=float, default=BUDGET,
         help="processor time of one attempt to plan [s], default %(default)g",
