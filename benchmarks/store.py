@@ -11,7 +11,6 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
-from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 
@@ -101,5 +100,5 @@ def measurement_of(study: Study, row: Row) -> Measurement:
     """The measurement that a row keeps."""
     values = {m.name: float(row[m.name]) for m in study.metrics}
     words: Mapping[str, dict[str, str]] = {name: json.loads(str(row[name])) for name in _WORDS}
-    measurement = Measurement({n: v for n, v in values.items() if not math.isnan(v)}, **words)
-    return replace(measurement, reason=str(row["reason"]))
+    known = {name: value for name, value in values.items() if not math.isnan(value)}
+    return Measurement(known, reason=str(row["reason"]), **words)

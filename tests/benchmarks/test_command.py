@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib
 import json
-import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -27,7 +25,6 @@ from tests.benchmarks.conftest import Only
 from tests.benchmarks.support import fake, fall_on_seed_1, have_a_bug, measure_badly, measure_well
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = ["README.md", "CONTRIBUTING.md", *(f"docs/{p.name}" for p in (ROOT / "docs").glob("*.md"))]
 
 
 def test_it_runs_from_the_root_of_a_checkout() -> None:
@@ -55,18 +52,6 @@ def test_a_former_name_still_runs_the_benchmark(
 ) -> None:
     assert main([former, "--help"]) == ExitCode.OK
     assert capsys.readouterr().out.startswith(f"usage: python -m benchmarks {name}")
-
-
-@pytest.mark.parametrize("name", PAGES)
-def test_every_command_line_of_the_documents_is_understood(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    text = (ROOT / name).read_text(encoding="utf-8")
-    for line in re.findall(r"^python -m benchmarks ([^#\n]*)", text, re.MULTILINE):
-        words = line.split()
-        module = importlib.import_module({c.name: c.module for c in COMMANDS}[words[0]])
-        monkeypatch.setattr(module, "run", lambda _args: ExitCode.OK)
-        assert main(words) == ExitCode.OK, line
 
 
 @pytest.mark.parametrize("argv", [[], ["gallop"], ["behaviour", "--nonsense"], ["--nonsense"]])
