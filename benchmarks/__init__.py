@@ -1,8 +1,8 @@
 """Benchmarks: what the robot must show, measured over many seeds, against fixed thresholds.
 
-``python -m benchmarks NAME`` runs one; they belong to the checkout and not to the wheel. A benchmark
-is a module that lists its studies: metrics with their thresholds, and a trial that gives them for a
-seed. Judged is what the simulator says (``GroundTruth``), never the controller's own verdict.
+``python -m benchmarks NAME`` runs one; they belong to the checkout and not to the wheel. Each lists
+its studies: metrics with their thresholds, and a trial that gives them for a seed. Judged is what
+the simulator says (``GroundTruth``), never the controller's own verdict.
 
     study           metrics, studies, what one trial gave; running trials in the workers of a sweep
     store           finished trials as the rows of sweeps, so that an interrupted run can be resumed
