@@ -16,9 +16,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from benchmarks.command import Benchmark
-from benchmarks.robots import feet_frame, plant_of
+from benchmarks.robots import feet_frame, loads, plant_of
 from benchmarks.study import Direction, Measurement, Metric, Study
-from controller.motion_measurement import FULL
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
@@ -142,16 +141,14 @@ class Played:
     def values(self, name: str, plan: CompiledPlan, model: RobotModel) -> dict[str, float]:
         """The metrics that every jump has, of the item ``name``."""
         x, y, yaw = plan.end_pose
-        shares = self.recorded.torque_shares(model)
-        return {
-            f"{name}.done": 1.0,
-            f"{name}.place": 1000.0 * math.hypot(self.moved[0] - x, self.moved[1] - y),
-            f"{name}.yaw": abs(math.degrees(wrap_angle(self.turned - yaw))),
-            f"{name}.torque": float(shares.max()),
-            f"{name}.asked": float(self.recorded.asked_shares(model).max()),
-            f"{name}.speed": self.recorded.peak_speed_share(model),
-            f"{name}.saturated": 100.0 * float((shares >= FULL).mean()),
+        values = {
+            "done": 1.0,
+            "place": 1000.0 * math.hypot(self.moved[0] - x, self.moved[1] - y),
+            "yaw": abs(math.degrees(wrap_angle(self.turned - yaw))),
+            "asked": float(self.recorded.asked_shares(model).max()),
+            **loads(self.recorded),
         }
+        return {f"{name}.{quantity}": value for quantity, value in values.items()}
 
 
 def play(plant: MujocoPlant, plan: CompiledPlan, model: RobotModel) -> Played:

@@ -23,9 +23,9 @@ from scipy.spatial.transform import Rotation, Slerp
 from benchmarks.command import Benchmark
 from benchmarks.dynamic_motions import AFTERWARDS
 from benchmarks.dynamic_motions import FIRST_SEED as ROBOTS
-from benchmarks.robots import plant_of
+from benchmarks.robots import loads, plant_of
 from benchmarks.study import Direction, Measurement, Metric, Study
-from controller.motion_measurement import FULL, during_motion
+from controller.motion_measurement import during_motion
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.errors import MotionError, MotionInfeasible
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
@@ -71,23 +71,6 @@ OF_FOUND = tuple(metric.name for metric in METRICS[1:])
 """What is asked only of a motion for which a plan was found."""
 
 
-@dataclass(frozen=True, slots=True)
-class Played:
-    """A motion, played.
-
-    Attributes:
-        place, angle: greatest distance [m] and angle [rad] of the trunk from what was written.
-        torque, speed: largest share of a joint's torque and speed limit.
-        saturated: share of ticks in which some motor gave all it has.
-    """
-
-    place: float
-    angle: float
-    torque: float
-    speed: float
-    saturated: float
-
-
 def measure(trial: Trial) -> Measurement:
     """Plan the nearest to one refused motion, and play it."""
     model, seed = RobotModel(), FIRST_SEED + trial.seed
@@ -106,23 +89,10 @@ def measure(trial: Trial) -> Measurement:
     except TrialFailed as failed:
         values["nearest.done"] = 0.0
         return Measurement(values, {"nearest.done": str(failed)}, str(failed))
-    values |= {"nearest.done": 1.0, **summary(played, values["nearest.reported"])}
-    off = values["nearest.as_reported"]
+    off = abs(played["nearest.measured"] - values["nearest.reported"])
+    values |= {"nearest.done": 1.0, "nearest.as_reported": off, **played}
     failures = {"nearest.as_reported": f"{off:.1f} mm"} if off > AS_REPORTED else {}
     return Measurement(values, failures)
-
-
-def summary(played: Played, reported: float) -> dict[str, float]:
-    """What was measured, by metric; ``reported``: distance [mm] from what was written."""
-    place = 1000.0 * played.place
-    return {
-        "nearest.as_reported": abs(place - reported),
-        "nearest.measured": place,
-        "nearest.angle_measured": math.degrees(played.angle),
-        "nearest.torque": played.torque,
-        "nearest.speed": played.speed,
-        "nearest.saturated": 100.0 * played.saturated,
-    }
 
 
 def planning_time(checked: CheckedMotion, model: RobotModel) -> float:
@@ -145,8 +115,8 @@ def late(checked: CheckedMotion) -> list[float]:
     return [span.trajectory.lag for span in spans_of(checked)]
 
 
-def play(trial: Trial, checked: CheckedMotion, model: RobotModel) -> Played:
-    """Play it from a stand, and stand for a second.
+def play(trial: Trial, checked: CheckedMotion, model: RobotModel) -> dict[str, float]:
+    """Play it from a stand, and stand for a second; what was measured, by metric.
 
     Raises:
         TrialFailed: if the robot falls, or says that it has not done it.
@@ -158,9 +128,8 @@ def play(trial: Trial, checked: CheckedMotion, model: RobotModel) -> Played:
         recorded = during_motion(robot.go2, robot.truth, checked.plan.name)
         robot.wait(AFTERWARDS)
     place, angle = off_written(recorded, checked, model)
-    shares = recorded.torque_shares(model)
-    speed = recorded.peak_speed_share(model)
-    return Played(place, angle, float(shares.max()), speed, float((shares >= FULL).mean()))
+    values = {"measured": 1000.0 * place, "angle_measured": math.degrees(angle), **loads(recorded)}
+    return {f"nearest.{name}": value for name, value in values.items()}
 
 
 def off_written(

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from jaxtyping import Float
 
+from controller.motion_measurement import FULL
 from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialRobot
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
@@ -93,6 +94,17 @@ def standing_failure(robot: TrialRobot) -> str | None:
         return f"tilt {math.degrees(state.tilt):.1f} deg"
     least = float(state.foot_forces.min())
     return f"a foot carries {least:.1f} N only" if least < LOAD else None
+
+
+def loads(recorded: TruthRecording) -> dict[str, float]:
+    """Largest shares of a torque and a speed limit; share [%] of ticks of motors at their limit."""
+    model = RobotModel()
+    shares = recorded.torque_shares(model)
+    return {
+        "torque": float(shares.max()),
+        "speed": recorded.peak_speed_share(model),
+        "saturated": 100.0 * float((shares >= FULL).mean()),
+    }
 
 
 def com_height(window: TruthRecording) -> float:

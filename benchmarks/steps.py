@@ -8,13 +8,12 @@ seed of theirs is judged here.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
 
 from benchmarks.command import Benchmark
-from benchmarks.robots import feet_frame, plant_of
+from benchmarks.robots import feet_frame, loads, plant_of
 from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.motion_measurement import FULL
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
@@ -30,22 +29,6 @@ STEP_AHEAD, STEP_ASIDE = 0.06, 0.03
 """Greatest way [m] of a random step, in either direction."""
 ROUNDS = 3
 """Times that a walk is played."""
-
-
-@dataclass(frozen=True, slots=True)
-class Played:
-    """One motion, played.
-
-    Attributes:
-        feet_off: largest distance [m], on the level, of a foot at the end from its planned place.
-        torque, speed: largest share of a joint's torque and speed limit.
-        saturated: share of ticks in which some motor gave all it has.
-    """
-
-    feet_off: float
-    torque: float
-    speed: float
-    saturated: float
 
 
 def random_steps(rng: np.random.Generator) -> Timeline:
@@ -69,8 +52,10 @@ def _paw(line: Timeline, leg: str) -> Timeline:
     return line.foot(leg, x=0.06, z=0.12, over=0.7).hold(0.3).down(leg, over=0.6).home(over=0.6)
 
 
-def play(robot: TrialRobot, plan: CompiledPlan) -> Played:
-    """Play ``plan``.
+def play(robot: TrialRobot, plan: CompiledPlan) -> dict[str, float]:
+    """Play ``plan``; how far a foot is off its place at the end, at most [mm], and ``loads``.
+
+    Saturated is the share [%] of ticks in which any motor gave all it has.
 
     Raises:
         TrialFailed: if the robot falls, or says that it has not done it.
@@ -83,12 +68,12 @@ def play(robot: TrialRobot, plan: CompiledPlan) -> Played:
     wanted = plan.at(plan.duration).placed(anchor).p_world_feet
     off = recorded.p_world_feet[-1] - wanted
     shares = recorded.torque_shares(model)
-    return Played(
-        feet_off=float(np.linalg.norm(off[:, :2], axis=1).max()),
-        torque=float(shares.max()),
-        speed=recorded.peak_speed_share(model),
-        saturated=float((shares >= FULL).any(axis=tuple(range(1, shares.ndim))).mean()),
-    )
+    full = (shares >= FULL).any(axis=tuple(range(1, shares.ndim)))
+    return {
+        "place": 1000.0 * float(np.linalg.norm(off[:, :2], axis=1).max()),
+        **loads(recorded),
+        "saturated": 100.0 * float(full.mean()),
+    }
 
 
 def onwards(anchor: Anchor, pose: tuple[float, float, float]) -> Anchor:
@@ -105,20 +90,14 @@ def measure_steps(trial: Trial) -> Measurement:
     with TrialRobot(plant_of(trial, FIRST_SEED)) as robot:
         robot.require(robot.go2.stand())
         played = play(robot, compile_timeline(line, model))
-    return Measurement(
-        {
-            "step.place": 1000.0 * played.feet_off,
-            "step.torque": played.torque,
-            "step.saturated": 100.0 * played.saturated,
-        }
-    )
+    return Measurement({f"step.{name}": played[name] for name in ("place", "torque", "saturated")})
 
 
 def measure_walk(trial: Trial, gait: str) -> Measurement:
     """The walk three times in a row: where it ends, against where it was to end."""
     plan = _walk(gait)
     off: list[tuple[float, float]] = []
-    runs: list[Played] = []
+    runs: list[dict[str, float]] = []
     with TrialRobot(plant_of(trial, FIRST_SEED)) as robot:
         robot.require(robot.go2.stand())
         predicted = feet_frame(robot)
@@ -138,9 +117,9 @@ def measure_walk(trial: Trial, gait: str) -> Measurement:
             f"{gait}.yaw1": math.degrees(off[0][1]),
             f"{gait}.place3": 1000.0 * off[-1][0],
             f"{gait}.yaw3": math.degrees(off[-1][1]),
-            f"{gait}.torque": max(run.torque for run in runs),
-            f"{gait}.speed": max(run.speed for run in runs),
-            f"{gait}.saturated": 100.0 * max(run.saturated for run in runs),
+            **{
+                f"{gait}.{n}": max(run[n] for run in runs) for n in ("torque", "speed", "saturated")
+            },
         }
     )
 
