@@ -19,6 +19,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("balance", "benchmarks.balance", "pushes, drops, gait changes; falls noticed"),
     Command("dynamics", "benchmarks.dynamics", "solving dynamic motions, and what comes of it"),
     Command("dance", "benchmarks.dance", "dances against the true beats of their songs"),
+    Command("golden", "benchmarks.golden", "is every tick what it was, to the last bit?"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
     Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
     Command(
@@ -45,6 +46,7 @@ python -m benchmarks behaviour --quick          three seeds
 python -m benchmarks behaviour --resume         go on after an interruption
 python -m benchmarks feasibility --json
 python -m benchmarks bridges ros2 --runs 5
+python -m benchmarks golden record out/golden
 python -m benchmarks NAME --help                the options of one, with examples
 """
 

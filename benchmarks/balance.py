@@ -2,8 +2,8 @@
 
 Every row twice, with the true state and (``sensed-``) with what the robot's own sensors tell, and
 MuJoCo judges. Motors with their torque-speed line, friction 0.6 to 1.0 (drops: 0.4 to 1.0), masses
-within 10 %, of which the controller is not told; forces planned ahead by the MPC. Numbers were
-chosen on seeds 0 to 9, from 9000 and from 30000 to 63999; those judged begin at ``FIRST_SEED``.
+within 10 %, of which the controller is not told. Numbers were chosen on seeds 0 to 9, from 9000 and
+from 30000 to 63999; those judged begin at ``FIRST_SEED``.
 
 - standing: a push of 0.1 s in each of eight directions, 36 N s aside, 45 ahead and back, on an
   ellipse in between; survived is who stands again within 3 s;
@@ -25,7 +25,7 @@ import numpy as np
 
 from benchmarks import disturbed
 from benchmarks.command import Benchmark
-from benchmarks.locomotion import CONFIG, MASS_RANGE
+from benchmarks.locomotion import MASS_RANGE
 from benchmarks.qp_infeasibility import commanded
 from benchmarks.robots import PUSH_TIME, heading_force, plant_of
 from benchmarks.study import Direction, Measurement, Metric, Study, sensed
@@ -72,7 +72,7 @@ def impulse_at(angle: float) -> float:
 def measure_standing(trial: Trial, direction: int) -> Measurement:
     """Push the standing robot in one direction."""
     name, angle = f"stand-{45 * direction}", 2.0 * math.pi * direction / DIRECTIONS
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
         robot.require(robot.go2.stand())
         start, since = robot.plant.time, math.inf
         try:
@@ -92,7 +92,7 @@ def measure_trotting(trial: Trial, push: str) -> Measurement:
     survived = 0
     for phase in range(PHASES):
         side = 1.0 if phase % 2 or push != "lateral" else -1.0
-        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
             survived += trots_on(robot, phase, heading_force(side * angle, impulse))
     return Measurement({f"trot-{push}": survived / PHASES})
 
@@ -131,7 +131,7 @@ def dropped(seed: int, sensors: str = "ideal") -> MujocoPlant:
 
 def measure_recovery(trial: Trial) -> Measurement:
     """Drop the limp robot and let it get up."""
-    with TrialRobot(dropped(FIRST_SEED + trial.seed, trial.sensors), CONFIG) as robot:
+    with TrialRobot(dropped(FIRST_SEED + trial.seed, trial.sensors)) as robot:
         robot.go2.wait(DROP_TIME)
         said = robot.go2.recover()
         is_up = said and robot.truth.fall() is None
@@ -143,7 +143,7 @@ def measure_recovery(trial: Trial) -> Measurement:
 def measure_gaits(trial: Trial) -> Measurement:
     """Change the gait, or stop, again and again."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         try:
@@ -172,7 +172,7 @@ def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
 def measure_commands(trial: Trial) -> Measurement:
     """Follow random velocities; ticks in which the QP had no answer are counted."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         counts, why = robot.go2.telemetry, ""

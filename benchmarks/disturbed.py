@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.locomotion import CONFIG, MASS_RANGE
+from benchmarks.locomotion import MASS_RANGE
 from benchmarks.robots import PUSH_TIME, heading_force, plant_of
 from benchmarks.study import Measurement, Metric, Study
 from controller.modes import Mode
@@ -154,7 +154,7 @@ class Watch:
 def measure_disturbed(trial: Trial) -> Measurement:
     """Call at random, push at random, and let the robot recover from every fall."""
     rng = np.random.default_rng(FIRST_SEED + trial.seed)
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE), CONFIG) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
         watch = Watch(robot, rng)
         robot.truth.on_tick = watch.look
         for _ in range(CALLS):

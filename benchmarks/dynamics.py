@@ -24,9 +24,11 @@ from motions.dynamics import (
     Phase,
     PhaseProblem,
     audit,
-    moves,
     solve,
     solve_cached,
+)
+from motions.dynamics import (
+    phase_builders as moves,
 )
 from motions.dynamics.solver import require_crocoddyl
 

@@ -3,7 +3,7 @@
 A speed is held if under every seed the robot does not fall, follows within ``ERROR`` on the mean of
 the window, keeps every joint's speed limit, and has some motor at its limit (of the torque-speed
 line) in ``SATURATED`` of the ticks at most. The greatest is bisected between 0 and ``MOST``, with
-the planner's default numbers: the trot by the QP alone, gaits that need it by the MPC.
+the planner's default numbers.
 ``--store`` writes what ``go2_wbc.planning.envelopes`` reads: the seeds are those of tuning, not
 those that ``benchmarks.locomotion`` judges by.
 """

@@ -1,6 +1,6 @@
 """``python -m benchmarks locomotion``: how fast, and how exactly, the robot walks in every gait.
 
-The forces are planned ahead by the MPC. A run takes ``WINDOW`` seconds, from ``START_TIME`` after
+A run takes ``WINDOW`` seconds, from ``START_TIME`` after
 the command on: motors with their torque-speed line, friction 0.6 to 1.0 and masses within 10 %, of
 which the controller is not told. The state is the true one, or estimated from IMU, encoders and
 feet (the group ``sensors``; ``truth_vs_estimate`` has more of it). Gaits and weights were chosen on
@@ -32,8 +32,7 @@ from controller.motion_measurement import FULL
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
-from go2_wbc.planning.locomotion import LocomotionConfig
-from go2_wbc.planning.mpc import MpcConfig
+from go2_wbc.planning.envelopes import TROT
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.robot.model import RobotModel
 
@@ -43,10 +42,8 @@ MASS_RANGE = (0.9, 1.1)
 """Factor on every mass and inertia of the robot; the controller is not told."""
 START_TIME, WINDOW = 3.0, 20.0
 """Time [s] after a command that is left out, and that is measured."""
-CONFIG = Config(
-    locomotion=LocomotionConfig(mpc=MpcConfig(enabled=True)),
-    envelope=VelocityEnvelope(forward=4.0, backward=2.0, lateral=1.5, turning=8.0),
-)
+BEYOND = Config(envelope=VelocityEnvelope(forward=4.0))
+"""Of the runs that are beyond the envelope."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +96,7 @@ def speed_of(command: VelocityCommand) -> float:
 def measure_run(trial: Trial, run: Run) -> Measurement:
     """Follow the command; see the module's docstring for what is measured."""
     command, plant = run.command, plant_of(trial, FIRST_SEED, MASS_RANGE)
-    with TrialRobot(plant, CONFIG) as robot:
+    with TrialRobot(plant, BEYOND if speed_of(command) > TROT.forward else None) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk(run.gait))
         robot.go2.move(command.linear_x, command.angular_z, linear_y=command.linear_y)

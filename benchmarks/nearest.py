@@ -32,10 +32,10 @@ from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from motions import CheckedMotion, CompiledPlan, FeasibilityChecker, FeasibilityReport, Timeline
-from motions.dynamic_span import DynamicSpan
-from motions.dynamics.nearest import Written, nearest
-from motions.language.written import NEAREST
-from motions.trajectory import as_written
+from motions.dynamics.projection import PlanTarget, nearest
+from motions.language.timeline_data import NEAREST
+from motions.plan.dynamic_span import DynamicSpan
+from motions.plan.trajectory import as_written
 
 FIRST_SEED = 8600
 """Seed of the first motion that is judged."""
@@ -99,7 +99,7 @@ def planning_time(checked: CheckedMotion, model: RobotModel) -> float:
     """Processor time [s] of solving all that had to be, which was done before: nothing is new."""
     before = time.process_time()
     for span in spans_of(checked):
-        if isinstance(span.asked, Written):
+        if isinstance(span.asked, PlanTarget):
             nearest(span.asked, model, tolerance=span.tolerance)
     return time.process_time() - before
 

@@ -15,10 +15,10 @@ from controller.cli.progress import ProgressLine
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, find_motion, motion_names
 from motions.authoring import Choice
-from motions.dynamics.cache import SHIPPED, problem_key, ship
-from motions.dynamics.limits import PlanLimits
 from motions.dynamics.phases import PhaseProblem
-from motions.phase_key import PhaseKey
+from motions.dynamics.plan_cache import SHIPPED, problem_key, ship
+from motions.dynamics.plan_limits import PlanLimits
+from motions.language.keys import PhaseKey
 
 EXAMPLES = """
 python -m benchmarks solve

@@ -28,8 +28,6 @@ from controller.procedures import Aborted
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.locomotion import LocomotionConfig
-from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.plant import MujocoPlant
 
 PERIOD = 2000.0
@@ -116,16 +114,12 @@ REALTIME_METRICS = (
 
 
 @contextmanager
-def timed_robot(
-    plant: MujocoPlant, config: Config | None = None
-) -> Iterator[tuple[GO2Controller, list[int]]]:
+def timed_robot(plant: MujocoPlant) -> Iterator[tuple[GO2Controller, list[int]]]:
     """A robot, and the thread time [ns] at the end of each of its ticks."""
     ends: list[int] = []
     with (
         closing(plant),
-        GO2Controller(
-            plant=plant, config=config, after_tick=lambda: ends.append(time.thread_time_ns())
-        ) as go2,
+        GO2Controller(plant=plant, after_tick=lambda: ends.append(time.thread_time_ns())) as go2,
     ):
         yield go2, ends
 
@@ -170,7 +164,7 @@ def _prepared(go2: GO2Controller, mode: str) -> Callable[[], object]:
 
 
 def measure_estimated(trial: Trial) -> Measurement:
-    """Ticks of a trot whose forces are planned ahead, on its own sensors.
+    """Ticks of a trot on its own sensors.
 
     The worst tick is told as in ``measure_commands``.
     """
@@ -193,9 +187,8 @@ def _tail(name: str, spent: np.ndarray, least: np.ndarray) -> dict[str, float]:
 
 def _estimated(trial: Trial) -> np.ndarray:
     """Time [us] of each tick; a fresh robot, the same each time."""
-    config = Config(locomotion=LocomotionConfig(mpc=MpcConfig(enabled=True)))
     plant = MujocoPlant(sensors="imu", seed=trial.seed)
-    with timed_robot(plant, config) as (go2, ends):
+    with timed_robot(plant) as (go2, ends):
         _require(go2, go2.walk())
         go2.move(1.0)
         go2.wait(1.0)

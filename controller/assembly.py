@@ -65,7 +65,7 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
 
     Args:
         plant: what to drive; no other pilot may drive it.
-        config: numbers of the engine.
+        config: numbers of the engine; ``beside_hardware`` if the plant moves a real robot.
         settings: by default headless and without realtime.
 
     Raises:
@@ -75,6 +75,8 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
         PlantError: if the plant does not answer, or another pilot drives it.
     """
     settings = settings or PilotSettings()
+    if plant.is_hardware:
+        config = config.beside_hardware
     with without_collecting():
         load_kernels()
     model = RobotModel(settings.description, motor=config.motor)

@@ -11,7 +11,7 @@ from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.reference import Anchor, LegTask, MotionPlan
 from go2_wbc.robot.rotations import yaw_rotation
-from motions.placement import attitudes
+from motions.batch_kinematics import attitudes
 
 
 @dataclass(frozen=True, slots=True)

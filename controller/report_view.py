@@ -16,9 +16,9 @@ from go2_wbc.reference import Anchor, MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import CheckedMotion, CompiledPlan, FeasibilityReport, Finding
 from motions.authoring import Choice, Parameter
-from motions.dynamics.nearest import Written
+from motions.dynamics.projection import PlanTarget
 from motions.feasibility import Series
-from motions.trajectory import as_written
+from motions.plan.trajectory import as_written
 from viz.content import CENTRE_OF_MASS, Annotation, MarginCurve, ReplayContent, Slider, Verdict
 
 _AFTERWARDS = 1.0
@@ -59,7 +59,7 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
 def _is_mended(plan: MotionPlan) -> bool:
     """Whether there are parts that the robot cannot do as they were written."""
     spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
-    return any(isinstance(span.asked, Written) for span in spans)
+    return any(isinstance(span.asked, PlanTarget) for span in spans)
 
 
 def _as_written(checked: CheckedMotion) -> Recording | None:

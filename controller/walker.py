@@ -31,7 +31,7 @@ class Walker:
         self._runner, self._config = runner, config
         self._procedures = ProcedureRunner(runner)
         self.walking = self._make(find_gait("trot"))
-        self._envelope: VelocityEnvelope = config.envelope
+        self._envelope = self._envelope_of(self.walking)
 
     def _make(self, gait: Gait) -> Walking:
         return Walking(self._runner.loop.model, gait, self._config.locomotion)
@@ -77,10 +77,12 @@ class Walker:
         of ten changes, each with a new command at once, 3 fell as the command was followed at once.
         """
         walking = self.walking
-        before = envelope_of(walking.gait, self._config.envelope)
+        before, after = (
+            envelope_of(g, self._config.cautious_envelope) for g in (walking.gait, gait)
+        )
+        middle = before.within(after).scaled(CHANGE_SHARE)
         self._envelope = envelope_of(gait, self._config.envelope)
         asked = self._envelope.clip(walking.command)
-        middle = before.within(self._envelope).scaled(CHANGE_SHARE)
         walking.command = slowed = middle.clip(asked)
         self._procedures.until(lambda: walking.follows_command, STOP_LIMIT, "slow down")
 

@@ -14,10 +14,10 @@ from go2_wbc.plant.mujoco.ground_truth import TruthRecording, true_runs
 from go2_wbc.reference import Anchor, LegTask, MotionPlan
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
-from motions.compiled_plan import CompiledPlan
-from motions.dynamic_span import DynamicSpan
 from motions.dynamics.phases import PhaseProblem
-from motions.feasibility.misses import of_phases, of_written
+from motions.feasibility.goal_errors import of_phases, of_written
+from motions.plan.compiled_plan import CompiledPlan
+from motions.plan.dynamic_span import DynamicSpan
 
 STRIDE = 5
 """Every fifth tick is compared with what was written."""

@@ -40,7 +40,9 @@ class Config:
     Attributes:
         wbc: whole-body controller.
         locomotion: locomotion planner.
-        envelope: velocity commands that are followed.
+        envelope: velocity commands that are followed. None, and so not configured: in simulation
+            ``planning.envelopes.TROT``, which was measured; where a real robot may be moved
+            (``beside_hardware``) the default of ``VelocityEnvelope``.
         pose: poses of the trunk that are taken while walking.
         safety: when to give up.
         payload: estimate of what the robot carries.
@@ -51,7 +53,7 @@ class Config:
 
     wbc: WbcConfig = field(default_factory=WbcConfig)
     locomotion: LocomotionConfig = field(default_factory=LocomotionConfig)
-    envelope: VelocityEnvelope = field(default_factory=VelocityEnvelope)
+    envelope: VelocityEnvelope | None = None
     pose: PoseEnvelope = field(default_factory=PoseEnvelope)
     safety: SafetyConfig = field(default_factory=SafetyConfig)
     payload: PayloadConfig = field(default_factory=PayloadConfig)
@@ -61,6 +63,16 @@ class Config:
     def __post_init__(self) -> None:
         """Raise ConfigError for an unknown motor."""
         require_motor(self.motor)
+
+    @property
+    def cautious_envelope(self) -> VelocityEnvelope:
+        """The envelope that is configured, or one of half the speeds that hold in simulation."""
+        return self.envelope or VelocityEnvelope()
+
+    @property
+    def beside_hardware(self) -> Config:
+        """These numbers where a real robot may be moved, by what was measured in simulation."""
+        return dataclasses.replace(self, envelope=self.cautious_envelope)
 
 
 def load_config(path: Path | str) -> Config:
@@ -89,12 +101,13 @@ def override(part: _Part, values: Mapping[str, Any], where: str) -> _Part:
     Raises:
         ConfigError: for an unknown key, or a value of another type than the field's.
     """
-    fields = {f.name: getattr(part, f.name) for f in dataclasses.fields(part)}  # type: ignore[arg-type]
+    fields = {name: getattr(part, name) for name in part.__dataclass_fields__}  # type: ignore[attr-defined]
     changes = {}
     for key, value in values.items():
         if key not in fields:
             raise ConfigError(f"{where}: {unknown_name('key', key, fields)}")
-        changes[key] = _convert(fields[key], value, f"{where}: {key}")
+        before = VelocityEnvelope() if fields[key] is None else fields[key]  # not configured yet
+        changes[key] = _convert(before, value, f"{where}: {key}")
     return dataclasses.replace(part, **changes)  # type: ignore[type-var]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from numbers import Real
 from typing import TypeGuard
@@ -47,3 +48,9 @@ def _require(config: object, what: str, holds: Callable[[float], bool], *names: 
         for value in field if isinstance(field, tuple) else (field,):
             if not (is_finite_number(value) and holds(float(value))):
                 raise ConfigError(f"{type(config).__name__}.{name} must be {what}, got {field!r}")
+
+
+def warn_retired(name: str, instead: str) -> None:
+    """Warn the caller of a config's constructor that its argument ``name`` has no effect."""
+    message = f"{name} has no effect any more: {instead}"
+    warnings.warn(message, FutureWarning, stacklevel=4)

@@ -8,9 +8,7 @@ from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
     from go2_wbc.reference import Posture
-    from motions.assembly import compile_timeline
     from motions.authoring import Choice, Motion, Range, motion
-    from motions.compiled_plan import CompiledPlan
     from motions.dynamics.phases import Tolerance
     from motions.feasibility import (
         CheckedMotion,
@@ -23,11 +21,13 @@ if TYPE_CHECKING:
         compile_motion,
         suggest,
     )
-    from motions.music.finding import Beats, beats
+    from motions.language.timeline import Timeline, deg
+    from motions.music.beat_tracking import Beats, beats
+    from motions.plan.compiled_plan import CompiledPlan
+    from motions.plan.timeline_compiler import compile_timeline
     from motions.registry import find_motion, load_file, load_motion, motion_names
     from motions.saved.motion_file import save_motion
     from motions.saved.plan_file import load_plan, save_plan
-    from motions.timeline import Timeline, deg
 
 __all__ = [
     "Beats",
@@ -63,9 +63,7 @@ __all__ = [
 __getattr__ = lazy_exports(
     __name__,
     {
-        "assembly": ("compile_timeline",),
         "authoring": ("Choice", "Motion", "Range", "motion"),
-        "compiled_plan": ("CompiledPlan",),
         "dynamics.phases": ("Tolerance",),
         "feasibility": (
             "CheckedMotion",
@@ -78,11 +76,13 @@ __getattr__ = lazy_exports(
             "compile_motion",
             "suggest",
         ),
-        "language.written": ("Posture",),
-        "music.finding": ("Beats", "beats"),
+        "language.timeline": ("Timeline", "deg"),
+        "music.beat_tracking": ("Beats", "beats"),
+        "plan.compiled_plan": ("CompiledPlan",),
+        "plan.timeline_compiler": ("compile_timeline",),
+        "postures": ("Posture",),
         "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
         "saved.motion_file": ("save_motion",),
         "saved.plan_file": ("load_plan", "save_plan"),
-        "timeline": ("Timeline", "deg"),
     },
 )

@@ -9,6 +9,7 @@ from numbers import Real
 from typing import TypeVar
 
 from go2_wbc.errors import TimelineError, unknown_name
+from go2_wbc.legs import Leg
 
 FARTHEST = 1.5
 """A place farther away than this [m] is a mistake in units: a stretched leg is 0.45 m long. What is
@@ -65,6 +66,15 @@ def quantity(name: str, value: float, farthest: float = FARTHEST) -> float:
             f"{value / 1000:g} or {value / 100:g}"
         )
     return float(value)
+
+
+def foot(leg: Leg | str) -> Leg:
+    """Which leg is meant.
+
+    Raises:
+        TimelineError: for an unknown one; lists the valid ones.
+    """
+    return word("foot", leg, Leg.__members__)
 
 
 def word(kind: str, value: _Meaning | str, valid: Mapping[str, _Meaning]) -> _Meaning:

@@ -18,7 +18,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from go2_wbc.errors import CommandError, TimelineError, unknown_name
 from motions.arguments import is_number
-from motions.timeline import Timeline
+from motions.language.timeline import Timeline
 
 Value = float | int | str | bool
 

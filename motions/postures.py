@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.curves import CurvePoint, Segment
-from go2_wbc.reference import LegTask, MotionPlan, Posture, Reference, TrackedPoint
-from motions.plan import reference, reference_row
+from go2_wbc.curves import Segment
+from go2_wbc.kernels.layout import PLAN_CURVES, REFERENCE
+from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
+from go2_wbc.robot.model import RobotModel
+from motions.batch_kinematics import Wanted, attitudes, place
 
+NORMAL_FORCE_MIN = 0.0
+"""Least normal force [N] asked of a foot: none, so that a pushed robot may tip and come back."""
+NORMAL_FORCE_MAX = 400.0
+"""Greatest normal force [N]: 2.5 times the robot's weight, never active in slow motions."""
 STAND_HEIGHT = 0.29
 """Height [m] of the CoM above the ground when standing."""
 STAND_POSE = np.array([0.0, 0.0, STAND_HEIGHT, 0.0, 0.0, 0.0])
@@ -27,8 +35,58 @@ TUCKED_JOINTS = np.tile([0.0, 1.30, -2.66], 4)
 """Joint angles [rad] with the feet under the hips and the belly on the ground."""
 SPLAYED_JOINTS = TUCKED_JOINTS + np.tile([0.3, 0.0, 0.0, -0.3, 0.0, 0.0], 2)
 """Joint angles [rad] with the feet beside the hips, so that the folded legs carry nothing."""
-_STILL = CurvePoint(*(np.zeros(12) for _ in range(3)))
-_STANDING = (LegTask.STANCE,) * 4
+SETTLING_STEPS = 10
+"""Steps that put the CoM of a standing robot in its place; see ``place``."""
+_STANCE, _ALL = np.zeros(4), np.ones(4)
+"""Every leg's ``LegTask.STANCE``, and its share of the load."""
+
+
+def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:
+    """Where the feet's centres stand [m]: below the hips, a foot's radius above the ground."""
+    p_feet = model.p_base_feet_nominal.copy()
+    p_feet[:, 2] = model.foot_radius
+    return p_feet
+
+
+def standing_on(
+    p_feet: Float[np.ndarray, "4 3"],
+    p_com: Float[np.ndarray, "3"],
+    R: Float[np.ndarray, "3 3"],
+    model: RobotModel,
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "12"]]:
+    """Place of the base [m] and joint angles of a robot that stands on ``p_feet`` [m].
+
+    ``p_com``: where its CoM is [m]; ``R``: the trunk's attitude.
+    """
+    wanted = Wanted(
+        p=p_com[None],
+        is_com=np.ones(1, dtype=bool),
+        R=R[None],
+        q_joints=np.zeros((1, 12)),
+        raised=np.zeros((1, 4), dtype=bool),
+        p_feet=p_feet[None],
+    )
+    placed = place(wanted, SETTLING_STEPS, model)
+    return placed.p_base[0], placed.q_joints[0]
+
+
+def home_poses(model: RobotModel) -> Mapping[Posture, Float[np.ndarray, "6"]]:
+    """Pose of the base in every resting posture, on four feet below the hips.
+
+    Standing is given by its CoM. They are found once for each model.
+    """
+    home = _HOMES.get(model)
+    if home is None:
+        R = attitudes(STAND_POSE[None, 3:])[0]
+        p_base, _ = standing_on(standing_feet(model), STAND_POSE[:3], R, model)
+        stand = np.concatenate([p_base, STAND_POSE[3:]])
+        home = {Posture.STAND: stand, Posture.SIT: SIT_POSE, Posture.LIE: LIE_POSE}
+        _HOMES[model] = home
+    return home
+
+
+_HOMES: WeakKeyDictionary[RobotModel, Mapping[Posture, np.ndarray]] = WeakKeyDictionary()
+"""The resting postures of every living model for which they were asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,11 +116,14 @@ class PosturePlan(MotionPlan):
 
     def row_at(self, t: float) -> Float[np.ndarray, " size"]:
         """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
-        return reference_row(self.point, self.body.at(t))
+        from go2_wbc.kernels.playing import planned  # compiled; only who plays waits for it
 
-    def readable_at(self, t: float) -> Reference:
-        """The same as ``at``, step by step: what the kernel is held to."""
-        return reference(self.point, self.body.at(t), _STILL, _STILL, _STANDING, np.ones(4))
+        body = self.body.at(t)
+        row, curves = np.zeros(REFERENCE.size), np.zeros((3, PLAN_CURVES))
+        curves[:, :6] = body.value, body.rate, body.acceleration
+        is_com = 1.0 if self.point is TrackedPoint.COM else 0.0
+        planned(is_com, curves, _STANCE, _ALL, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, row)
+        return row
 
 
 def rise(start: Float[np.ndarray, "6"], entry: Posture, duration: float = 1.2) -> PosturePlan:

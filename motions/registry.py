@@ -12,16 +12,18 @@ from pathlib import Path
 from typing import Any
 
 from go2_wbc.errors import CommandError, TimelineError, unknown_name
-from motions import library
 from motions.authoring import Motion, Value, last_line
+from motions.language.timeline import Timeline
 from motions.saved.motion_file import MOTION_FORMAT, read_motion
-from motions.timeline import Timeline
+
+LIBRARY = Path(__file__).with_name("library")
+"""The folder of the library, whose files are as users write theirs."""
 
 
 @cache
 def motion_names() -> tuple[str, ...]:
     """Names of the motions in the library: one file each."""
-    return tuple(sorted(module.name for module in pkgutil.iter_modules(library.__path__)))
+    return tuple(sorted(module.name for module in pkgutil.iter_modules([str(LIBRARY)])))
 
 
 def find_motion(name: str) -> Motion:

@@ -11,9 +11,8 @@ from go2_wbc.contacts import ContactSchedule
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
-from motions.compiled_plan import CompiledPlan
-from motions.postures import STAND_HEIGHT
-from motions.tracks import standing_feet
+from motions.plan.compiled_plan import CompiledPlan
+from motions.postures import STAND_HEIGHT, standing_feet
 from tests.engine_helpers import STAND_JOINTS
 
 LIFT_OFF, TOUCHDOWN = 0.8, 1.2

@@ -110,7 +110,7 @@ def test_every_contract_catches_an_import_that_breaks_it(tmp_path: Path) -> None
         shutil.copytree(file, tmp_path / file.name, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / ".importlinter", tmp_path)
     broken = {
-        "motions/poses.py": "def f():\n    from controller import GO2Controller",
+        "motions/arguments.py": "def f():\n    from controller import GO2Controller",
         "go2_wbc/contacts.py": "from go2_wbc.planning import swing",
         "go2_wbc/attic.py": "",
         "controller/loop.py": "if TYPE_CHECKING:\n    import controller.cli",
@@ -124,7 +124,7 @@ def test_every_contract_catches_an_import_that_breaks_it(tmp_path: Path) -> None
     assert code == 1
     assert "0 kept" in report, report
     for clue in (
-        "motions.poses -> controller",
+        "motions.arguments -> controller",
         "go2_wbc.contacts -> go2_wbc.planning.swing",
         "go2_wbc.attic",
         "controller.loop -> controller.cli",

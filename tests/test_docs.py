@@ -24,8 +24,8 @@ from go2_wbc.wbc.tasks import Gains
 from go2_wbc.world import World
 from motions import FeasibilityChecker, Timeline, check, compile_timeline, load_motion
 from motions.feasibility import FeasibilityLimits
-from motions.keys import BODY_CHANNELS, Frame
-from motions.poses import POSES
+from motions.language.body_and_feet import POSES
+from motions.language.keys import BODY_CHANNELS, Frame
 from tests.motions.doctored import DoctoredPlan
 from tests.pages import (
     DOCS,

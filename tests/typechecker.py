@@ -1,5 +1,7 @@
 """The check of every argument under pytest: as types say it, a whole number is a number too.
 
+So is what numpy calls true and false a flag.
+
 A check costs many times what most functions do, and a scenario of a minute makes the same calls
 tens of thousands of times. A wrong call is wrong because of the place that makes it. So in each
 phase of a test (setting up, the test itself) the first ``CHECKED_CALLS`` calls that a place in the
@@ -16,7 +18,7 @@ from typing import Any
 
 import jaxtyping
 import numpy as np
-from beartype import BeartypeConf, beartype
+from beartype import BeartypeConf, FrozenDict, beartype
 from jaxtyping import _decorator
 
 CHECKED_CALLS = 10
@@ -25,7 +27,8 @@ STRIDE = 251
 """Prime, so that the calls of a loop come up in turn, whatever their number. A control loop makes
 its calls as often in half a second; at every 61st the checks took a quarter of a tick."""
 _ARRAY: Any = type(jaxtyping.Float[np.ndarray, "1"])
-_check = beartype(conf=BeartypeConf(is_pep484_tower=True))
+_FLAGS = FrozenDict({bool: bool | np.bool_})
+_check = beartype(conf=BeartypeConf(is_pep484_tower=True, hint_overrides=_FLAGS))
 _calls: dict[int, int] = {}
 """By place: how many calls it has made since the last ``renew``."""
 

@@ -44,8 +44,8 @@ from go2_wbc.legs import LEGS
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import MotorModel
-from motions.dynamics.limits import PlanLimits
-from motions.dynamics.moves import PUSH
+from motions.dynamics.phase_builders import PUSH
+from motions.dynamics.plan_limits import PlanLimits
 
 STEPS = 120
 """Heights of the hips at which a push is evaluated: half of them changes the speed by 0.3 %."""

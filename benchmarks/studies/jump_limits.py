@@ -30,10 +30,11 @@ from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline
-from motions.dynamics import PhaseProblem, Solved, moves, solve
-from motions.dynamics.cache import keep
-from motions.dynamics.limits import PlanLimits
+from motions.dynamics import PhaseProblem, Solved, solve
+from motions.dynamics import phase_builders as moves
 from motions.dynamics.phases import GRAVITY, KNOT_PERIOD
+from motions.dynamics.plan_cache import keep
+from motions.dynamics.plan_limits import PlanLimits
 
 BISECTIONS = 2
 """Between the greatest size that is found and the least that is not."""

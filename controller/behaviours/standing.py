@@ -45,7 +45,9 @@ MIRRORED_OFFSETS = (0.0, 0.5, 0.5, 0.0)
 FIRST_PERIOD, FIRST_DUTY = 0.30, 0.40
 """Period [s] and duty of the first stride. Of 24 pushes of 36 to 45 N s 23 were held, and 16 with
 the stride of a slow trot (0.36 s, 0.5): feet that stand for 0.18 s are left 0.4 m behind."""
-STEPS = replace(GAITS["trot"], name="balance", stride=Stride(stance_min=0.12), apex=0.07)
+STEPS = replace(
+    GAITS["trot"], name="balance", stride=Stride(0.20, 0.12, 0.16, 0.18, 0.02), apex=0.07
+)
 """How it steps. With the trot's stances of 0.08 s and swings of 9 cm a robot that was thrown aside
 sank by 4 cm in the flight of each stride, faster and faster: of 32 pushes of 36 to 42 N s aside 20
 made it fall, 5 with the lower swings alone, 1 with the longer stances alone, with both none."""
@@ -82,10 +84,10 @@ class Standing(ChangePosture):
         Args:
             make_plan: as for ``ChangePosture``.
             model: of the robot that steps.
-            config: how it steps; the forces are always planned ahead.
+            config: how it steps.
         """
         super().__init__(make_plan)
-        mpc = replace(config.mpc, enabled=True, least_share=SHARE_OF_NODE)
+        mpc = replace(config.mpc, least_share=SHARE_OF_NODE)
         self._model = model
         self._config = replace(
             config,

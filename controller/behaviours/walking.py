@@ -7,11 +7,9 @@ import numpy as np
 from controller.behaviours.base import Behaviour
 from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
-from go2_wbc.planning.compiled import CompiledPlanner
 from go2_wbc.planning.gait_choice import DWELL, GaitChoice
 from go2_wbc.planning.gait_clock import time_between
-from go2_wbc.planning.gait_planner import GaitPlanner
-from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.planning.trunk import SETTLED_COMMAND
 from go2_wbc.reference import Reference
@@ -35,7 +33,7 @@ class Walking(Behaviour):
         self.pose: BodyPose = LEVEL
         self.choice: GaitChoice | None = None
         self._limit, self._is_limited_until = VelocityEnvelope(), -np.inf
-        self._planner: GaitPlanner = CompiledPlanner(model, gait, config)
+        self._planner = LocomotionPlanner(model, gait, config)
 
     def start(self, snapshot: Snapshot) -> None:
         """Start from the measured state, standing."""

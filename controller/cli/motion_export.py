@@ -16,7 +16,7 @@ from go2_wbc.legs import JOINT_NAMES, LEGS
 
 if TYPE_CHECKING:
     from motions import CompiledPlan, Timeline
-    from motions.trajectory import Trajectory
+    from motions.plan.trajectory import Trajectory
 
 EXAMPLES = """
 go2-wbc export wave --out wave.csv
@@ -79,7 +79,7 @@ def _write_compiled(
     """Write the plan or its trajectory; returns the number of rows of the latter."""
     from go2_wbc.files import write_atomically
     from motions import FeasibilityChecker, save_plan
-    from motions.trajectory import trajectory_of
+    from motions.plan.trajectory import trajectory_of
 
     checker = FeasibilityChecker(progress=line.solving)
     plan, model = checker.plan(motion, check=False), checker.model

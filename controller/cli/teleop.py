@@ -59,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
 
     pad, said = (None, "keys only") if args.keyboard else find_gamepad()
     print(keys_help(), said, *([] if pad is None else [LEGEND]), sep="\n")
-    numbers = config(args.config)
+    numbers = config(args.config).beside_hardware
     with (
         closing(MujocoPlant(args.mjcf, motor=numbers.motor, sensors=args.sensors)) as plant,
         GO2Controller(plant=plant, realtime=True, viewer=args.viewer, config=numbers) as go2,

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from go2_wbc import compilation
+
 KERNELS = (
     "condensed",
     "estimation",
     "kinematics",
     "loads",
-    "locomotion",
     "motor",
-    "mpc",
     "payload",
     "playing",
-    "preview",
     "rigid_body",
     "simulation",
     "supervision",
@@ -24,5 +23,6 @@ KERNELS = (
 
 def load_kernels() -> None:
     """Compile every kernel, or load it: half a second, or about 20 s the first time."""
+    compilation.load_kernels()
     for name in KERNELS:
         import_module(f"go2_wbc.kernels.{name}")

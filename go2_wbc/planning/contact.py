@@ -9,7 +9,7 @@ which puts it down within milliseconds. To let it swing down instead until it is
 1.5 m/s, made the trot fall in 4 of 6 runs over boxes of 12 cm and up stairs of 10 cm, which it
 walked in 6 and 5 without (own simulation).
 
-``kernels.contact`` is the compiled form; ``landing`` does the like for motions.
+``tracking.landing`` does the like for motions.
 """
 
 from __future__ import annotations
@@ -17,11 +17,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
-from go2_wbc.contacts import TIE, ContactPhase
-from go2_wbc.legs import LEGS
-from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.compilation import subroutine
+from go2_wbc.contacts import TIE
+from go2_wbc.records import Record
 from go2_wbc.validation import require_positive, require_share
 
 
@@ -43,45 +42,55 @@ class ContactConfig:
         require_positive(self, "step")
 
 
-class FootContacts:
-    """Follows the four feet.
+class FootContact(Record):
+    """What is known of a foot's contact.
 
     Attributes:
-        stance: feet that stand.
+        is_early: whether it stands ahead of its plan.
+        since: for how long [s] it has done so; infinite if it has come down when it was planned to.
+        was_stance: whether it was planned to stand at the tick before.
+        is_awaited: whether it shall stand and has not met the ground yet.
     """
 
-    def __init__(self, config: ContactConfig) -> None:
-        """All feet stand."""
-        self._config = config
-        self.stance, self._is_early = np.ones(4, dtype=bool), np.zeros(4, dtype=bool)
-        self._since = np.full(4, np.inf)
+    is_early: bool
+    since: float
+    was_stance: bool
+    is_awaited: bool
 
-    def update(
-        self, snapshot: Snapshot, phase: ContactPhase, above: Float[np.ndarray, "4"], dt: float
-    ) -> None:
-        """Bring the feet to this tick, ``dt`` seconds after the last.
 
-        Args:
-            snapshot: of this tick.
-            phase: what is planned.
-            above: height [m] of the feet above the ground as it is known.
-            dt: [s].
-        """
-        config = self._config
-        meets_step = snapshot.state.feet_in_contact & (above > config.step)
-        is_late = phase.progress >= config.earliest - TIE
-        for leg in LEGS:
-            if phase.stance[leg]:
-                self._is_early[leg] = False
-                continue
-            if not self._is_early[leg]:
-                self._is_early[leg] = meets_step[leg] and is_late[leg]
-                self._since[leg] = 0.0 if self._is_early[leg] else np.inf
-        self.stance = phase.stance | self._is_early
-        self._since = self._since + dt
+@subroutine
+def follow_contact(
+    foot: FootContact,
+    c: ContactConfig,
+    above: float,
+    touches: bool,
+    planned: bool,
+    progress: float,
+    dt: float,
+) -> bool:
+    """Bring a foot to this tick, ``dt`` seconds after the last; returns whether it stands.
 
-    def load_share(self, phase: ContactPhase, ramp: float) -> Float[np.ndarray, "4"]:
-        """As ``ContactPhase.load_share``, from when each foot came down."""
-        begun = np.where(np.isfinite(self._since), self._since, phase.elapsed)
-        nearest = np.where(phase.stance, np.minimum(begun, phase.remaining), begun)
-        return np.where(self.stance, np.clip(nearest / max(ramp, TIE), 0.0, 1.0), 0.0)
+    Args:
+        foot: is brought to this tick.
+        c: when contacts count.
+        above: height [m] of the foot above the ground as it is known.
+        touches: whether a contact is measured.
+        planned: whether it shall stand.
+        progress: share of its swing that has passed.
+        dt: [s].
+    """
+    if planned:
+        foot.is_early = False
+    elif not foot.is_early:
+        foot.since = np.inf
+        if touches and above > c.step and progress >= c.earliest - TIE:
+            foot.is_early, foot.since = True, 0.0
+    foot.since += dt
+    return planned or foot.is_early
+
+
+@subroutine
+def loaded_time(foot: FootContact, planned: bool, elapsed: float, remaining: float) -> float:
+    """Time [s] to the nearest change of a standing foot's contact, since when it came down."""
+    begun = foot.since if foot.since < np.inf else elapsed
+    return min(begun, remaining) if planned else begun

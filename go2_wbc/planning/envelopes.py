@@ -22,22 +22,28 @@ def measured_envelopes() -> Mapping[str, VelocityEnvelope]:
     return {name: VelocityEnvelope(**bounds) for name, bounds in gaits.items()}
 
 
-def envelope_of(gait: Gait, trot: VelocityEnvelope) -> VelocityEnvelope:
+TROT = VelocityEnvelope(forward=3.0, backward=2.0, lateral=1.0, turning=6.0)
+"""In which the trot is walked in simulation where nothing is configured: inside what was measured,
+and held on the robot's own sensors."""
+FULL = VelocityEnvelope(forward=1.6875, backward=1.5469, lateral=1.3438, turning=5.9062)
+"""Trot's envelope that gives the other gaits all that was measured of theirs: what a trot held
+whose forces were not planned ahead."""
+
+
+def envelope_of(gait: Gait, trot: VelocityEnvelope | None) -> VelocityEnvelope:
     """The envelope in which ``gait`` is walked.
 
     Args:
         gait: with a name in ``GAITS``, or one of your own, which gets its ``envelope_share``, as
             does one that has not been measured yet.
-        trot: envelope of the trot, and the one that it has itself. Those of the others are in the
-            proportion that was measured, so that all of them keep the same distance to what was
-            measured, and never beyond that.
+        trot: the envelope that is configured, which the trot has itself. Those of the others are
+            in proportion to it, and never beyond what was measured. None, if none is configured:
+            ``TROT`` for the trot, for the others what goes with ``VelocityEnvelope()``.
     """
     if gait == GAITS["trot"]:
-        return trot
-    measured = measured_envelopes()
+        return trot or TROT
+    trot, measured = trot or VelocityEnvelope(), measured_envelopes()
     if GAITS.get(gait.name) != gait or gait.name not in measured:
         return trot.scaled(gait.envelope_share)
-    own, usual = astuple(measured[gait.name]), astuple(measured["trot"])
-    return VelocityEnvelope(
-        *(min(bound / b, 1.0) * a for bound, a, b in zip(astuple(trot), own, usual, strict=True))
-    )
+    bounds = zip(astuple(trot), astuple(measured[gait.name]), astuple(FULL), strict=True)
+    return VelocityEnvelope(*(min(bound / full, 1.0) * own for bound, own, full in bounds))

@@ -29,9 +29,9 @@ DWELL = 0.8
 class GaitChoice:
     """Chooses the gait of a robot that walks."""
 
-    def __init__(self, trot: VelocityEnvelope) -> None:
-        """Choose by the envelopes that go with that of the trot."""
-        self._gaits = [GAITS[name] for name in LADDER]
+    def __init__(self, trot: VelocityEnvelope | None) -> None:
+        """Choose by the envelopes that go with that of the trot, ``VelocityEnvelope()`` if None."""
+        trot, self._gaits = trot or VelocityEnvelope(), [GAITS[name] for name in LADDER]
         self._envelopes = [envelope_of(gait, trot) for gait in self._gaits]
         self._rung: int | None = None
         self._slowest, self._changed = 0, -np.inf

@@ -17,142 +17,212 @@ through a pace.
 
 from __future__ import annotations
 
-from dataclasses import replace
-from itertools import pairwise
+from dataclasses import dataclass
 
-from go2_wbc.contacts import (
-    DUTY_FALL,
-    DUTY_RATE,
-    GAITS,
-    OFFSET_RATE,
-    PERIOD_RATE,
-    WIDTH_RATE,
-    ContactPhase,
-    ContactSchedule,
-    Gait,
-    Stride,
-)
+import numpy as np
+from jaxtyping import Float
 
+from go2_wbc.compilation import subroutine
+from go2_wbc.contacts import GAITS, TIE, Gait, Stride, stride_at
+from go2_wbc.records import Record
+
+PERIOD_RATE, DUTY_RATE, OFFSET_RATE = 0.2, 0.5, 0.8
+"""Greatest change of a gait in a second: of its period [s/s], duty and offsets [1/s]. A foot's
+phase passes at 2 per second or more, so that no foot is put back to where it was."""
+WIDTH_RATE = 2.0
+"""Greatest change of a gait's width in a second, so that no swing's goal jumps [1/s]."""
+DUTY_FALL = 4.0
+"""Greatest fall [1/s] of the duty of a robot that has been thrown: a foot that lifts off sooner
+is not put back. At 0.5 a push of 50 N s ahead threw a trot of 0.5 m/s over feet that stood on."""
 Phases = tuple[float, float, float, float]
 """At which the feet touch down, of FL, FR, RL and RR."""
-_DIGITS = 12
-"""Of a phase: what adding and dividing leaves is none."""
+_RESOLUTION = 1e12
+"""Of phases, that adding and dividing may have blurred, in steps a turn."""
+
+
+@dataclass(frozen=True, slots=True)
+class GaitForm:
+    """What of a gait may change while it is walked; see ``contacts.Gait``."""
+
+    period: float
+    duty: float
+    offsets: Phases
+    width: float
+
+    @staticmethod
+    def of(gait: Gait) -> GaitForm:
+        """That of a gait as it is written."""
+        return GaitForm(gait.period, gait.duty, gait.offsets, gait.width)
+
+
+@dataclass(frozen=True, slots=True)
+class Cadence:
+    """Which gait is wanted.
+
+    Attributes:
+        wanted: its form, where it does not follow the speed.
+        rest: the one in which the robot starts and comes to rest.
+        stride: how period and duty follow the speed.
+        follows_speed: whether they do.
+    """
+
+    wanted: GaitForm
+    rest: GaitForm
+    stride: Stride
+    follows_speed: bool
+
+    @staticmethod
+    def of(gait: Gait) -> Cadence:
+        """That of a robot that walks with ``gait``."""
+        rest, stride = resting_gait(gait), gait.stride or Stride()
+        return Cadence(GaitForm.of(gait), GaitForm.of(rest), stride, gait.stride is not None)
+
+
+class Clock(Record):
+    """Phase and form of the gait.
+
+    Attributes:
+        time: since the stride's start or a whole number of strides before [s].
+        period, duty, offsets, width: form of the gait as it is now.
+        goal: offsets to which those of now were aligned.
+    """
+
+    time: float
+    period: float
+    duty: float
+    offsets: Float[np.ndarray, "4"]
+    width: float
+    goal: Float[np.ndarray, "4"]
 
 
 def resting_gait(gait: Gait) -> Gait:
     """The gait in which a robot that walks with ``gait`` starts and comes to rest."""
-    is_own = gait.starts_at_once or (gait.lands_on_four and not gait.needs_mpc)
+    is_own = gait.starts_at_once or (gait.lands_on_four and not gait.has_flight)
     return gait if is_own else GAITS["trot"]
 
 
-class GaitClock:
-    """Phase and form of the gait.
-
-    Attributes:
-        gait: as it is now.
-        rest: the one in which the robot comes to rest.
-        time: since the stride's start or a whole number of strides before [s].
-    """
-
-    def __init__(self, gait: Gait, stride: Stride | None) -> None:
-        """Args: gait: wanted; stride: how it follows the speed, or None."""
-        self.change(gait, stride)
-        self.restart()
-
-    def change(self, gait: Gait, stride: Stride | None) -> None:
-        """Move towards another gait from now on."""
-        self._wanted, self.rest, self._stride = gait, resting_gait(gait), stride
-
-    def restart(self) -> None:
-        """Begin the first stride."""
-        self.gait, self.time = self.rest, 0.0
-        self._goal = self.gait.offsets
-        self._schedule: ContactSchedule = self.gait.schedule()
-
-    def now(self) -> ContactPhase:
-        """The contacts of this instant."""
-        return self._schedule.at(self.time)
-
-    def adapt(self, dt: float, speed: float, *, is_resting: bool, is_thrown: bool) -> None:
-        """Let ``dt`` [s] of change pass, towards the gait for ``speed`` [m/s] or for resting.
-
-        A robot that ``is_thrown``, faster than it shall be, lifts its feet sooner at once.
-        """
-        wanted = self.rest if is_resting else self._wanted
-        period, duty, rise, fall = wanted.period, wanted.duty, DUTY_RATE, DUTY_RATE
-        if self._stride is not None and not is_resting:
-            period, duty = self._stride.at(speed)
-            fall = DUTY_FALL if is_thrown else DUTY_RATE
-        if wanted.offsets != self._goal:
-            self._align(wanted.offsets)
-        before = self.gait
-        left = abs(period - before.period) / PERIOD_RATE
-        if left > 0.0 and fall == DUTY_RATE and wanted.offsets != before.offsets:
-            rise = fall = min(fall, abs(duty - before.duty) / left)
-        share = dt / left if left > dt else 1.0
-        pairs = zip(before.offsets, wanted.offsets, strict=True)
-        offsets = tuple(_turned(now, goal, OFFSET_RATE * dt, share) for now, goal in pairs)
-        period = _moved(before.period, period, PERIOD_RATE * dt)
-        duty = before.duty + min(max(duty - before.duty, -fall * dt), rise * dt)
-        width = _moved(before.width, wanted.width, WIDTH_RATE * dt)
-        form = (period, duty, offsets, width)
-        if form == (before.period, before.duty, before.offsets, before.width):
-            return
-        if period != before.period:
-            self.time = self.time % before.period * period / before.period
-        self.gait = replace(wanted, period=period, duty=duty, offsets=offsets, width=width)
-        self._schedule = self.gait.schedule()
-
-    def _align(self, goal: Phases) -> None:
-        """Name the phases of now so that they are near to the ``goal``; no foot notices."""
-        offsets = aligned(self.gait.offsets, goal)
-        shift = (offsets[0] - self.gait.offsets[0]) % 1.0
-        self.time = (self.time + shift * self.gait.period) % self.gait.period
-        self.gait = replace(self.gait, offsets=offsets)
-        self._schedule, self._goal = self.gait.schedule(), goal
+@subroutine
+def restart(clock: Clock, c: Cadence) -> None:
+    """Begin the first stride."""
+    clock.time = 0.0
+    clock.period, clock.duty, clock.width = c.rest.period, c.rest.duty, c.rest.width
+    clock.offsets[:] = c.rest.offsets
+    clock.goal[:] = c.rest.offsets
 
 
-def time_between(gait: Gait, other: Gait) -> float:
-    """Time [s] in which one gait becomes the other."""
-    offsets = aligned(gait.offsets, other.offsets)
-    ways = (abs((b - a + 0.5) % 1.0 - 0.5) for a, b in zip(offsets, other.offsets, strict=True))
-    return max(
-        abs(other.period - gait.period) / PERIOD_RATE,
-        abs(other.duty - gait.duty) / DUTY_RATE,
-        max(ways) / OFFSET_RATE,
-        abs(other.width - gait.width) / WIDTH_RATE,
-    )
+@subroutine
+def foot_phase(clock: Clock, leg: int) -> tuple[bool, float, float]:
+    """Whether a foot is in stance now, since when, and for how long yet [s]."""
+    period, duty = clock.period, clock.duty
+    if duty >= 1.0:
+        return True, np.inf, np.inf
+    stance_time = duty * period
+    elapsed = (clock.time - clock.offsets[leg] * period + TIE) % period - TIE
+    if elapsed < stance_time - TIE:
+        return True, max(elapsed, 0.0), stance_time - elapsed
+    return False, max(elapsed - stance_time, 0.0), period - elapsed
 
 
-def aligned(offsets: Phases, goal: Phases) -> Phases:
-    """``offsets``, all shifted by as much, such that the longest way of any to its goal is least.
+@subroutine
+def alignment(offsets: Float[np.ndarray, "4"], goal: Float[np.ndarray, "4"]) -> float:
+    """By how much to shift all ``offsets`` so that the longest way of any to its goal is least.
 
     The ways are points on a circle: the greatest gap between two neighbours is where none is, and
     the middle of the arc that is left comes to lie at no way at all.
     """
-    ways = sorted((b - a) % 1.0 for a, b in zip(offsets, goal, strict=True))
-    gaps = [round(b - a, _DIGITS) for a, b in pairwise(ways)]
-    gaps.append(round(1.0 - (ways[-1] - ways[0]), _DIGITS))
-    last = gaps.index(max(gaps))
-    first, arc = ways[(last + 1) % len(ways)], 1.0 - gaps[last]
-    shift = first + arc / 2.0
-    fl, fr, rl, rr = (_phase(round(offset + shift, _DIGITS)) for offset in offsets)
-    return fl, fr, rl, rr
+    ways = np.empty(4)
+    for leg in range(4):
+        ways[leg] = (goal[leg] - offsets[leg]) % 1.0
+    ways.sort()
+    widest, last = 0.0, 3
+    for k in range(4):
+        gap = ways[k + 1] - ways[k] if k < 3 else 1.0 - (ways[3] - ways[0])
+        gap = np.floor(gap * _RESOLUTION + 0.5)
+        if gap > widest:
+            widest, last = gap, k
+    return ways[(last + 1) % 4] + (1.0 - widest / _RESOLUTION) / 2.0
 
 
-def _phase(turns: float) -> float:
-    """The part of a turn, in [0, 1): less than nothing by rounding is 1.0 after one division."""
-    return turns % 1.0 % 1.0
+@subroutine
+def shifted(phase: float, shift: float) -> float:
+    """A phase later by ``shift``, in [0, 1): rounded, as less than nothing is 1.0 at first."""
+    return np.floor((phase + shift) * _RESOLUTION + 0.5) / _RESOLUTION % 1.0 % 1.0
 
 
-def _moved(value: float, goal: float, most: float) -> float:
-    return value + min(max(goal - value, -most), most)
+@subroutine
+def align(clock: Clock, goal: Float[np.ndarray, "4"]) -> None:
+    """Name the phases of now so that they are near to the ``goal``; no foot notices."""
+    shift = alignment(clock.offsets, goal)
+    for leg in range(4):
+        clock.offsets[leg] = shifted(clock.offsets[leg], shift)
+        clock.goal[leg] = goal[leg]
+    clock.time = (clock.time + shift * clock.period) % clock.period
 
 
-def _turned(phase: float, goal: float, most: float, share: float) -> float:
-    """``phase`` moved the shorter way round to ``goal``, by ``most`` or ``share`` of the way."""
-    way = (goal - phase + 0.5) % 1.0 - 0.5
-    most = min(most, abs(way) * share)
+@subroutine
+def differ(a: Float[np.ndarray, "4"], b: Float[np.ndarray, "4"]) -> bool:
+    """Whether any number does."""
+    return a[0] != b[0] or a[1] != b[1] or a[2] != b[2] or a[3] != b[3]
+
+
+@subroutine
+def adapt(
+    clock: Clock, c: Cadence, dt: float, speed: float, is_resting: bool, is_thrown: bool
+) -> None:
+    """Let ``dt`` [s] of change pass, towards the gait for ``speed`` [m/s] or for resting.
+
+    A robot that ``is_thrown``, faster than it shall be, lifts its feet sooner at once.
+    """
+    period, duty, width, offsets = c.wanted.period, c.wanted.duty, c.wanted.width, np.empty(4)
+    offsets[:] = c.wanted.offsets
+    rise = fall = DUTY_RATE
+    hurries = False
+    if is_resting:
+        period, duty, width = c.rest.period, c.rest.duty, c.rest.width
+        offsets[:] = c.rest.offsets
+    elif c.follows_speed:
+        if is_thrown:
+            fall, hurries = DUTY_FALL, True
+        period, duty = stride_at(c.stride, speed)
+    if differ(offsets, clock.goal):
+        align(clock, offsets)
+    left = abs(clock.period - period) / PERIOD_RATE
+    if left > 0.0 and not hurries and differ(offsets, clock.offsets):
+        rise = fall = min(fall, abs(duty - clock.duty) / left)
+    if period != clock.period:
+        most = PERIOD_RATE * dt
+        moved = clock.period + min(max(period - clock.period, -most), most)
+        clock.time = clock.time % clock.period * moved / clock.period
+        clock.period = moved
+    clock.duty += min(max(duty - clock.duty, -fall * dt), rise * dt)
+    most = WIDTH_RATE * dt
+    clock.width += min(max(width - clock.width, -most), most)
+    share = dt / left if left > dt else 1.0
+    for leg in range(4):
+        turn(clock, leg, offsets[leg], dt, share)
+
+
+@subroutine
+def turn(clock: Clock, leg: int, goal: float, dt: float, share: float) -> None:
+    """Move a foot's phase the shorter way round to its goal, by ``share`` of the way at most."""
+    if goal == clock.offsets[leg]:
+        return
+    way = (goal - clock.offsets[leg] + 0.5) % 1.0 - 0.5
+    most = min(OFFSET_RATE * dt, abs(way) * share)
     if abs(way) <= most:
-        return goal
-    return _phase(phase + (most if way > 0.0 else -most))
+        clock.offsets[leg] = goal
+    else:
+        clock.offsets[leg] = (clock.offsets[leg] + (most if way > 0.0 else -most)) % 1.0 % 1.0
+
+
+def time_between(gait: Gait, other: Gait) -> float:
+    """Time [s] in which one gait becomes the other."""
+    offsets, goal = np.array(gait.offsets), np.array(other.offsets)
+    shift = alignment(offsets, goal)
+    ways = (goal - [shifted(phase, shift) for phase in offsets] + 0.5) % 1.0 - 0.5
+    return max(
+        abs(other.period - gait.period) / PERIOD_RATE,
+        abs(other.duty - gait.duty) / DUTY_RATE,
+        float(np.abs(ways).max()) / OFFSET_RATE,
+        abs(other.width - gait.width) / WIDTH_RATE,
+    )

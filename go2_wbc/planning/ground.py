@@ -4,8 +4,6 @@ The plane z = h + s (p - p_com), in the world, with its height h below the CoM a
 carried along with the CoM. Where feet are met, h takes in a share of how far they are off it, and s
 a share of the slope of the plane that fits, by least squares, where each foot was met last. How far
 they are off it is also what tells rough ground, on which feet are raised higher.
-
-``kernels.ground`` is the compiled form.
 """
 
 from __future__ import annotations
@@ -15,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.robot.rotations import yaw_rotation
+from go2_wbc.compilation import subroutine
+from go2_wbc.records import Record
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import (
     require_between,
@@ -71,105 +70,131 @@ class GroundConfig:
         require_positive(self, "stumble")
 
 
-class GroundPlane:
+class Ground(Record):
     """What is known of the ground.
 
     Attributes:
         height: below the CoM [m].
         slope: ahead and to the left, in the world's axes.
+        p_seen: where the CoM is [m].
+        p_met: where each foot met it last, by its centre [m].
         roughness: distance [m] from the plane at which feet were met lately.
     """
 
-    def __init__(self, snapshot: Snapshot, foot_radius: float, config: GroundConfig) -> None:
-        """The plane through the feet as they stand."""
-        self._config, self._radius = config, foot_radius
-        self._p_met = snapshot.p_world_feet.copy()
-        self._p_com = snapshot.p_world_com[:2].copy()
-        self.slope = self._fitted(np.zeros(2))
-        middle = self._p_met.mean(axis=0)
-        self.height = float(middle[2] + self.slope @ (self._p_com - middle[:2])) - foot_radius
-        self.roughness = 0.0
-
-    @property
-    def tilt(self) -> Float[np.ndarray, "2"]:
-        """Slope that the trunk follows."""
-        return self._config.follow * self.slope
-
-    @property
-    def apex_raise(self) -> float:
-        """Height [m] by which a swing is higher than on smooth ground."""
-        return min(max(self.roughness - self._config.smooth, 0.0), self._config.most_raise)
-
-    @property
-    def delay(self) -> float:
-        """Share of a swing in which the foot only rises: none on smooth ground."""
-        config = self._config
-        return config.delay * self.apex_raise / config.most_raise if config.most_raise else 0.0
-
-    def at(self, place: Float[np.ndarray, "2"]) -> float:
-        """Height [m] at ``place`` [m]."""
-        return self.height + float((place - self._p_com) @ self.slope)
-
-    def above(self, p_feet: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
-        """Height [m] of feet, of which the centres are given, over the ground."""
-        return np.array([p[2] - self._radius - self.at(p[:2]) for p in p_feet])
-
-    def level_friction(self, friction: float, least: float) -> float:
-        """Coefficient of the upright cone that lies within that about the ground's normal.
-
-        A foot on a slope of 15 deg and a coefficient of 0.65 slides when it is pushed ahead with
-        0.6 of what it carries, although that is less: tan(atan(0.65) - 15 deg) is 0.33. Never below
-        ``least``. What feet find of a slope on level ground takes nothing. Rough ground that rises
-        is taken for stairs, whose steps are level: with less friction there one run of twelve up
-        stairs fell, none without.
-        """
-        if self.roughness > self._config.smooth:
-            return friction
-        steep = float(np.hypot(*self.slope))
-        steep *= min(max(steep / LEVEL_SLOPE - 1.0, 0.0), 1.0)
-        return max((friction - steep) / (1.0 + friction * steep), least)
-
-    def carry(self, snapshot: Snapshot) -> None:
-        """Follow the CoM."""
-        p_com = snapshot.p_world_com[:2]
-        self.height = self.at(p_com)
-        self._p_com = p_com.copy()
-
-    def learn(self, p_feet: Float[np.ndarray, "4 3"], met: Bool[np.ndarray, "4"]) -> None:
-        """Take in where feet, of which some are ``met`` at this tick, have met the ground."""
-        off = self.above(p_feet[met])
-        self.roughness = max(self._config.calming * self.roughness, float(np.abs(off).max()))
-        self.height += GROUND_SHARE * float(off.mean())
-        self._p_met[met] = p_feet[met]
-        self.slope = self.slope + self._config.slope_share * (self._fitted(self.slope) - self.slope)
-
-    def stumble(self) -> None:
-        """Take in that a foot was stopped in its swing."""
-        self.roughness = max(self.roughness, self._config.stumble)
-
-    def _fitted(self, otherwise: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
-        """Slope of the plane through where the feet were met; ``otherwise`` if that is a line."""
-        off = self._p_met - self._p_met.mean(axis=0)
-        moments = off[:, :2].T @ off
-        (xx, xy, xz), (_, yy, yz) = moments.tolist()
-        determinant = xx * yy - xy * xy
-        if determinant < LEAST_DETERMINANT:
-            return otherwise
-        slope = np.array([yy * xz - xy * yz, xx * yz - xy * xz]) / determinant
-        return np.clip(slope, -MOST_SLOPE, MOST_SLOPE)
+    height: float
+    slope: Float[np.ndarray, "2"]
+    p_seen: Float[np.ndarray, "2"]
+    p_met: Float[np.ndarray, "4 3"]
+    roughness: float
 
 
-def tilted_rotation(yaw: float, slope: Float[np.ndarray, "2"]) -> Float[np.ndarray, "3 3"]:
-    """Of a trunk with that heading whose z axis is the normal of a plane with that ``slope``."""
-    x = yaw_rotation(yaw)[:, 0]
-    x[2] = slope @ x[:2]
-    z = np.array([-slope[0], -slope[1], 1.0])
-    x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
-    return np.column_stack([x, np.cross(z, x), z])
+def ground_below(now: Snapshot, foot_radius: float) -> Ground:
+    """The plane through the feet as they stand."""
+    ground = Ground(p_seen=now.p_world_com[:2], p_met=now.p_world_feet)
+    ground.slope[:] = fitted_slope(ground)
+    middle = ground.p_met.mean(axis=0)
+    rise = ground.slope @ (ground.p_seen - middle[:2])
+    ground.height = float(middle[2] + rise) - foot_radius
+    return ground
 
 
-def tilt_vector(slope: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
-    """The turn about x and y [rad], in the world, from level to a plane with that ``slope``."""
-    steep = float(np.hypot(*slope))
-    share = np.arctan(steep) / steep if steep > 0.0 else 1.0
-    return share * np.array([slope[1], -slope[0]])
+@subroutine
+def ground_at(g: Ground, x: float, y: float) -> float:
+    """Height of the plane [m]."""
+    return g.height + g.slope[0] * (x - g.p_seen[0]) + g.slope[1] * (y - g.p_seen[1])
+
+
+@subroutine
+def apex_raise(g: Ground, c: GroundConfig) -> float:
+    """Height [m] by which a swing is higher than on smooth ground."""
+    return min(max(g.roughness - c.smooth, 0.0), c.most_raise)
+
+
+@subroutine
+def delay(g: Ground, c: GroundConfig) -> float:
+    """Share of a swing in which the foot only rises: none on smooth ground."""
+    return c.delay * apex_raise(g, c) / c.most_raise if c.most_raise > 0.0 else 0.0
+
+
+@subroutine
+def tilt(g: Ground, c: GroundConfig) -> tuple[float, float]:
+    """Slope that the trunk follows."""
+    return c.follow * g.slope[0], c.follow * g.slope[1]
+
+
+@subroutine
+def level_friction(g: Ground, c: GroundConfig, friction: float, least: float) -> float:
+    """Coefficient of the upright cone that lies within that about the ground's normal.
+
+    A foot on a slope of 15 deg and a coefficient of 0.65 slides when it is pushed ahead with 0.6 of
+    what it carries, although that is less: tan(atan(0.65) - 15 deg) is 0.33. Never below ``least``.
+    What feet find of a slope on level ground takes nothing. Rough ground that rises is taken for
+    stairs, whose steps are level: with less friction there one run of twelve up stairs fell, none
+    without.
+    """
+    steep = np.hypot(g.slope[0], g.slope[1])
+    steep *= min(max(steep / LEVEL_SLOPE - 1.0, 0.0), 1.0)
+    if g.roughness > c.smooth:
+        return friction
+    return max((friction - steep) / (1.0 + friction * steep), least)
+
+
+@subroutine
+def carry_ground(g: Ground, now: Snapshot) -> None:
+    """Follow the CoM."""
+    x, y = now.p_world_com[0], now.p_world_com[1]
+    g.height = ground_at(g, x, y)
+    g.p_seen[0], g.p_seen[1] = x, y
+
+
+@subroutine
+def fitted_slope(g: Ground) -> tuple[float, float]:
+    """Of the plane through where the feet were met, by least squares; as it was if in a line."""
+    middle = np.zeros(3)
+    for leg in range(4):
+        for i in range(3):
+            middle[i] += g.p_met[leg, i] / 4
+    xx = xy = yy = xz = yz = 0.0
+    for leg in range(4):
+        p = g.p_met[leg]
+        x, y, z = p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]
+        xx += x * x
+        xy += x * y
+        yy += y * y
+        xz += x * z
+        yz += y * z
+    determinant = xx * yy - xy * xy
+    if determinant < LEAST_DETERMINANT:
+        return g.slope[0], g.slope[1]
+    a, b = (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
+    return min(max(a, -MOST_SLOPE), MOST_SLOPE), min(max(b, -MOST_SLOPE), MOST_SLOPE)
+
+
+@subroutine
+def learn_ground(
+    g: Ground, c: GroundConfig, now: Snapshot, foot_radius: float, met: Bool[np.ndarray, "4"]
+) -> None:
+    """Take in where feet, of which some are ``met`` at this tick, have met the ground."""
+    count, mean, most = 0, 0.0, 0.0
+    for leg in range(4):
+        if met[leg]:
+            p = now.p_world_feet[leg]
+            off = p[2] - foot_radius - ground_at(g, p[0], p[1])
+            count += 1
+            mean += off
+            most = max(most, abs(off))
+            for i in range(3):
+                g.p_met[leg, i] = p[i]
+    if count == 0:
+        return
+    g.roughness = max(c.calming * g.roughness, most)
+    g.height += GROUND_SHARE * mean / count
+    a, b = fitted_slope(g)
+    g.slope[0] += c.slope_share * (a - g.slope[0])
+    g.slope[1] += c.slope_share * (b - g.slope[1])
+
+
+@subroutine
+def note_stumble(g: Ground, c: GroundConfig) -> None:
+    """Take in that a foot was stopped in its swing."""
+    g.roughness = max(g.roughness, c.stumble)

@@ -5,8 +5,8 @@ Convex Model-Predictive Control, IROS 2018). With the turn phi, the CoM p, both 
 
     p'' = sum f / m - g,    phi'' = I^-1 sum r x f    (without w x I w)
 
-is linear in the forces f once the places of the feet are planned. Over ``MPC_NODES`` nodes the
-forces are constant, and
+is linear in the forces f once the places of the feet are planned. Over ``NODES`` nodes the forces
+are constant, and
 
     minimise    sum_j |x_j - x_j,ref|^2_Q / 2 + rho |f - f_0|^2 / 2
     subject to  |f_x|, |f_y| <= mu f_z,   0 <= f_z <= share f_max
@@ -14,18 +14,34 @@ forces are constant, and
 where ``share`` is the part of a node that a foot stands. A force is the mean over its node, so f_0
 is the share of the weight that a foot bears in the mean over the horizon.
 
-This is the readable form, with the nodes' states stacked; ``kernels.mpc`` is the compiled one.
+Turning and moving are double integrators, x'' = B f with one B (6, 3) for each foot of each node,
+and the cost is diagonal; so the Hessian's block of foot a at node k and foot b at node l is
+
+    B_a' diag(s_kl) B_b,   s_kl = sum_{j > max(k, l)} Qv dt^2 + Qp dt^4 (j - k - 1/2)(j - l - 1/2)
+
+with one s for each of the six axes, and no matrix of the horizon is ever built.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from go2_wbc.kernels.layout import MPC, MPC_NODES
-from go2_wbc.validation import require_not_negative, require_positive, require_share
+from go2_wbc.algebra.active_set import SINGULAR, constrain, factorise, solve_factorised
+from go2_wbc.algebra.linear import solve_linear
+from go2_wbc.compilation import subroutine
+from go2_wbc.records import Record
+from go2_wbc.validation import (
+    require_not_negative,
+    require_positive,
+    require_share,
+    warn_retired,
+)
+
+NODES = 12
+"""Nodes of the horizon."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +49,6 @@ class MpcConfig:
     """Numbers of the MPC, from a search on this robot in simulation.
 
     Attributes:
-        enabled: whether the gaits that can do without it use it too.
         step: length [s] of a node.
         interval: time [s] from one solution to the next.
         angle_weights, position_weights: of the turn [1/rad^2] and the CoM's place [1/m^2].
@@ -43,15 +58,18 @@ class MpcConfig:
         force_max: greatest normal force [N] of a foot, while it stands.
         least_share: part of a node below which a foot counts as in the air.
         prior_weight: by which the whole-body controller keeps to the forces.
-        load_ramp: as ``LocomotionConfig.load_ramp``, in its place: the forces come without a jump.
+        load_ramp: time [s] over which a foot may take up the force after touchdown and give it up
+            before lift-off.
         throw_time: time constant [s] with which a robot that has been thrown is taken to slow down.
         throw_speed: speed [m/s] of such a robot, beyond ``LocomotionConfig.stride_margin``, at
             which the trunk's attitude weighs half as much in the whole-body QP. With all its weight
             and the feet far from below the CoM, the legs in the air are swung to turn the trunk:
             feet that should have come down were 0.16 m high, and the robot fell onto them.
+
+    ``enabled`` is retired: the forces of every gait are planned ahead.
     """
 
-    enabled: bool = False
+    enabled: InitVar[bool] = True
     step: float = 0.03
     interval: float = 0.01
     angle_weights: tuple[float, float, float] = (20.0, 20.0, 20.0)
@@ -67,133 +85,213 @@ class MpcConfig:
     throw_time: float = 0.4
     throw_speed: float = 0.05
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, enabled: bool) -> None:
         """Raise ConfigError for a number that is out of range."""
+        if not enabled:
+            warn_retired("MpcConfig.enabled", "the forces of every gait are planned ahead")
         weights = "angle_weights", "position_weights", "angular_weights", "linear_weights"
         require_not_negative(self, *weights)
         require_positive(self, "step", "interval", "force_weight", "friction", "force_max")
         require_positive(self, "prior_weight", "load_ramp", "throw_time", "throw_speed")
         require_share(self, "least_share")
 
-    def numbers(self, mass: float, gravity: float) -> Float[np.ndarray, " size"]:
-        """These numbers as ``kernels.mpc`` reads them, for a robot [kg] under gravity [m/s^2]."""
-        return MPC.pack(
-            [
-                self.step,
-                mass,
-                gravity,
-                self.angle_weights + self.position_weights,
-                self.angular_weights + self.linear_weights,
-                self.force_weight,
-                self.friction,
-                self.force_max,
-                self.least_share,
-                self.interval,
-                self.prior_weight,
-                self.throw_time,
-                self.throw_speed,
-            ]
-        )
 
+class Robot(Record):
+    """The rigid body: mass [kg], gravity [m/s^2], inertia about the CoM, world axes [kg m^2]."""
 
-@dataclass(frozen=True, slots=True)
-class Horizon:
-    """What the MPC looks at: the trunk now, where it shall go, and the feet that can press.
-
-    Pose is the turn [rad] and the CoM [m], rate are w [rad/s] and v [m/s], both in this order.
-
-    Attributes:
-        state: pose and rate now.
-        goals: pose and rate wanted at the end of each node.
-        share: part of each node that each foot stands.
-        arms: from the CoM to the feet's contact points [m].
-        inertia: about the CoM, world axes [kg m^2].
-    """
-
-    state: Float[np.ndarray, "12"]
-    goals: Float[np.ndarray, "nodes 12"]
-    share: Float[np.ndarray, "nodes 4"]
-    arms: Float[np.ndarray, "nodes 4 3"]
+    mass: float
+    gravity: float
     inertia: Float[np.ndarray, "3 3"]
 
 
-@dataclass(frozen=True, slots=True)
-class ForceProgram:
-    """The QP in the forces of the feet that press: x'Hx/2 + g'x, lower <= C x <= upper.
-
-    Attributes:
-        feet: node and leg of every three unknowns.
-        H, g, C, lower, upper: the QP.
-    """
-
-    feet: tuple[tuple[int, int], ...]
-    H: Float[np.ndarray, "n n"]
-    g: Float[np.ndarray, " n"]
-    C: Float[np.ndarray, "m n"]
-    lower: Float[np.ndarray, " m"]
-    upper: Float[np.ndarray, " m"]
-
-    def forces(self, x: Float[np.ndarray, " n"]) -> Float[np.ndarray, "nodes 4 3"]:
-        """The forces [N] of all feet over each node, from the unknowns."""
-        forces = np.zeros((MPC_NODES, 4, 3))
-        for n, foot in enumerate(self.feet):
-            forces[foot] = x[3 * n : 3 * n + 3]
-        return forces
+@subroutine
+def weights_of(c: MpcConfig, axis: int) -> tuple[float, float]:
+    """Of an axis, those of the turn before those of the way: its pose's weight and its rate's."""
+    if axis < 3:
+        return c.angle_weights[axis], c.angular_weights[axis]
+    return c.position_weights[axis - 3], c.linear_weights[axis - 3]
 
 
-def formulate(horizon: Horizon, config: MpcConfig, mass: float, gravity: float) -> ForceProgram:
-    """The QP of ``horizon`` for a robot of ``mass`` [kg] under ``gravity`` [m/s^2]."""
-    pressing = horizon.share >= config.least_share
-    feet = tuple((k, leg) for k in range(MPC_NODES) for leg in range(4) if pressing[k, leg])
-    free, response = _response(horizon, config, mass, gravity, feet)
-    error = free - horizon.goals
-    weights = np.concatenate(
-        [
-            config.angle_weights,
-            config.position_weights,
-            config.angular_weights,
-            config.linear_weights,
-        ]
-    )
-    S, Q = response.reshape(12 * MPC_NODES, -1), np.tile(weights, MPC_NODES)
-    usual = mass * gravity * MPC_NODES / max(float(horizon.share.sum()), 1.0)
-    prior = np.zeros(3 * len(feet))
-    prior[2::3] = [usual * horizon.share[foot] for foot in feet]
-    mu = config.friction
-    pyramid = np.array([[1, 0, -mu], [-1, 0, -mu], [0, 1, -mu], [0, -1, -mu], [0, 0, 1]])
-    most = [config.force_max * horizon.share[foot] for foot in feet]
-    return ForceProgram(
-        feet=feet,
-        H=S.T @ (Q[:, None] * S) + config.force_weight * np.eye(3 * len(feet)),
-        g=S.T @ (Q * error.ravel()) - config.force_weight * prior,
-        C=np.kron(np.eye(len(feet)), pyramid),
-        lower=np.tile([-np.inf, -np.inf, -np.inf, -np.inf, 0.0], len(feet)),
-        upper=np.concatenate([[0.0, 0.0, 0.0, 0.0, force] for force in most]),
-    )
+@subroutine
+def couplings(c: MpcConfig, s: Float[np.ndarray, "nodes nodes 6"]) -> None:
+    """Fill s_kl of the six axes: of the turn first, then of the way."""
+    dt = c.step
+    for axis in range(6):
+        of_pose, of_rate = weights_of(c, axis)
+        for k in range(NODES):
+            for m in range(k + 1):
+                value = 0.0
+                for j in range(k + 1, NODES + 1):
+                    value += of_rate * dt**2
+                    value += of_pose * dt**4 * (j - k - 0.5) * (j - m - 0.5)
+                s[k, m, axis] = s[m, k, axis] = value
 
 
-def _response(
-    horizon: Horizon,
-    config: MpcConfig,
-    mass: float,
+@subroutine
+def pulls(
+    c: MpcConfig,
     gravity: float,
-    feet: tuple[tuple[int, int], ...],
-) -> tuple[Float[np.ndarray, "nodes 12"], Float[np.ndarray, "nodes 12 n"]]:
-    """State at the end of each node without any force, and how it answers to the unknowns."""
-    dt, eye = config.step, np.eye(6)
-    A = np.block([[eye, dt * eye], [np.zeros((6, 6)), eye]])
-    B = np.concatenate([dt**2 / 2 * eye, dt * eye])
-    inverse = np.linalg.inv(horizon.inertia)
-    fall = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -gravity])
-    x, S = horizon.state, np.zeros((12, 3 * len(feet)))
-    free, response = np.empty((MPC_NODES, 12)), np.empty((MPC_NODES, *S.shape))
-    for k in range(MPC_NODES):
-        accelerations = np.zeros((6, 3 * len(feet)))
-        for n, (node, leg) in enumerate(feet):
-            if node == k:
-                r = horizon.arms[k, leg]
-                turn = inverse @ np.cross(r, np.eye(3)).T
-                accelerations[:, 3 * n : 3 * n + 3] = np.concatenate([turn, np.eye(3) / mass])
-        x, S = A @ x + B @ fall, A @ S + B @ accelerations
-        free[k], response[k] = x, S
-    return free, response
+    state: Float[np.ndarray, "12"],
+    goals: Float[np.ndarray, "nodes 12"],
+    pull: Float[np.ndarray, "nodes 6"],
+) -> None:
+    """Fill the cost's slope by an acceleration at each node, when no foot presses.
+
+    ``state`` holds pose and rate now, ``goals`` those wanted at the end of each node.
+    """
+    dt = c.step
+    pull[:] = 0.0
+    for j in range(1, NODES + 1):
+        t = j * dt
+        for axis in range(6):
+            of_pose, of_rate = weights_of(c, axis)
+            fall = -gravity if axis == 5 else 0.0
+            rate = state[6 + axis] + fall * t
+            pose = state[axis] + state[6 + axis] * t + fall * t * t / 2
+            off = of_pose * (pose - goals[j - 1, axis])
+            fast = of_rate * (rate - goals[j - 1, 6 + axis])
+            for k in range(j):
+                pull[k, axis] += off * dt**2 * (j - k - 0.5) + fast * dt
+
+
+@subroutine
+def count_unknowns(
+    least_share: float, share: Float[np.ndarray, "nodes 4"], feet: Int[np.ndarray, "count 2"]
+) -> int:
+    """List node and leg of every foot that presses; returns how many."""
+    count = 0
+    for k in range(NODES):
+        for leg in range(4):
+            if share[k, leg] >= least_share:
+                feet[count, 0], feet[count, 1] = k, leg
+                count += 1
+    return count
+
+
+@subroutine
+def turning(
+    inverse: Float[np.ndarray, "3 3"],
+    arms: Float[np.ndarray, "nodes 4 3"],
+    feet: Int[np.ndarray, "count 2"],
+    T: Float[np.ndarray, "count 3 3"],
+) -> None:
+    """Fill T = I^-1 [r x] of every foot that presses."""
+    for n in range(len(feet)):
+        r = arms[feet[n, 0], feet[n, 1]]
+        for i in range(3):
+            x, y, z = inverse[i, 0], inverse[i, 1], inverse[i, 2]
+            T[n, i, 0] = y * r[2] - z * r[1]
+            T[n, i, 1] = z * r[0] - x * r[2]
+            T[n, i, 2] = x * r[1] - y * r[0]
+
+
+@subroutine
+def assemble(
+    c: MpcConfig,
+    robot: Robot,
+    T: Float[np.ndarray, "count 3 3"],
+    pull: Float[np.ndarray, "nodes 6"],
+    share: Float[np.ndarray, "nodes 4"],
+    feet: Int[np.ndarray, "count 2"],
+    H: Float[np.ndarray, "n n"],
+    g: Float[np.ndarray, " n"],
+) -> None:
+    """Fill the lower triangle of H, and g."""
+    s, mass = np.empty((NODES, NODES, 6)), robot.mass
+    couplings(c, s)
+    stood = 0.0
+    for k in range(NODES):
+        for leg in range(4):
+            stood += share[k, leg]
+    usual = mass * robot.gravity * NODES / max(stood, 1.0)
+    for a in range(len(feet)):
+        k, leg = feet[a, 0], feet[a, 1]
+        for i in range(3):
+            value = pull[k, 3 + i] / mass
+            for axis in range(3):
+                value += T[a, axis, i] * pull[k, axis]
+            g[3 * a + i] = value
+        g[3 * a + 2] -= c.force_weight * usual * share[k, leg]
+        for b in range(a + 1):
+            w = s[k, feet[b, 0]]
+            for i in range(3):
+                x, y, z = T[a, 0, i] * w[0], T[a, 1, i] * w[1], T[a, 2, i] * w[2]
+                for m in range(3):
+                    H[3 * a + i, 3 * b + m] = x * T[b, 0, m] + y * T[b, 1, m] + z * T[b, 2, m]
+                H[3 * a + i, 3 * b + i] += w[3 + i] / mass**2
+        for i in range(3):
+            H[3 * a + i, 3 * a + i] += c.force_weight
+
+
+@subroutine
+def bound(
+    friction: float,
+    force_max: float,
+    share: Float[np.ndarray, "nodes 4"],
+    feet: Int[np.ndarray, "count 2"],
+    C: Float[np.ndarray, "m n"],
+    lower: Float[np.ndarray, " m"],
+    upper: Float[np.ndarray, " m"],
+) -> None:
+    """Rows of the friction pyramid and of the normal force: five for every foot that presses."""
+    for a in range(len(feet)):
+        for n in range(5):
+            row = 5 * a + n
+            C[row] = 0.0
+            lower[row], upper[row] = -np.inf, 0.0
+            C[row, 3 * a + 2] = -friction
+            if n < 4:
+                C[row, 3 * a + n // 2] = 1.0 - 2.0 * (n % 2)
+        C[5 * a + 4, 3 * a + 2] = 1.0
+        lower[5 * a + 4] = 0.0
+        upper[5 * a + 4] = force_max * share[feet[a, 0], feet[a, 1]]
+
+
+@subroutine
+def solve_mpc(
+    c: MpcConfig,
+    robot: Robot,
+    friction: float,
+    state: Float[np.ndarray, "12"],
+    goals: Float[np.ndarray, "nodes 12"],
+    share: Float[np.ndarray, "nodes 4"],
+    arms: Float[np.ndarray, "nodes 4 3"],
+    forces: Float[np.ndarray, "nodes 4 3"],
+) -> int:
+    """Fill the mean forces [N] of the feet over each node; returns the outcome.
+
+    Args:
+        c: weights and limits.
+        robot: as it is now.
+        friction: mu of the friction pyramid.
+        state: pose and rate: turn [rad], CoM [m], w [rad/s], v [m/s].
+        goals: the same wanted at the end of each node.
+        share: of each node that each foot stands.
+        arms: from the CoM to the feet's contact points [m].
+        forces: [N].
+    """
+    system, places = np.zeros((3, 6)), np.empty((4 * NODES, 2), dtype=np.int64)
+    forces[:] = 0.0
+    for i in range(3):
+        system[i, :3] = robot.inertia[i]
+        system[i, 3 + i] = 1.0
+    if not solve_linear(system, 3):
+        return SINGULAR
+    inverse = system[:, 3:].copy()
+    feet = places[: count_unknowns(c.least_share, share, places)]
+    n, rows = 3 * len(feet), 5 * len(feet)
+    T, pull = np.empty((len(feet), 3, 3)), np.empty((NODES, 6))
+    H, g, L, x = np.empty((n, n)), np.empty(n), np.empty((n, n)), np.empty(n)
+    turning(inverse, arms, feet, T)
+    pulls(c, robot.gravity, state, goals, pull)
+    assemble(c, robot, T, pull, share, feet, H, g)
+    if not factorise(H, L):
+        return SINGULAR
+    solve_factorised(L, g, x)
+    C, lower, upper = np.empty((rows, n)), np.empty(rows), np.empty(rows)
+    bound(friction, c.force_max, share, feet, C, lower, upper)
+    outcome = constrain(L, np.empty((0, n)), np.empty(0), C, lower, upper, x, np.empty(rows))
+    for a in range(len(feet)):
+        for i in range(3):
+            forces[feet[a, 0], feet[a, 1], i] = x[3 * a + i]
+    return outcome

@@ -5,8 +5,6 @@ facing the heading. The heading stays that of the command and of the feet, so th
 looks aside while it walks ahead. A new pose is approached without a jump of its rates: each is
 ``sharpness`` times what is missing, within a greatest rate, and changes by ``sharpness`` times that
 in a second at most, which is as fast as it must fall at the end, so that nothing overshoots.
-
-``kernels.pose`` is the compiled form.
 """
 
 from __future__ import annotations
@@ -16,9 +14,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.compilation import subroutine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.planning.command import finite_number
-from go2_wbc.robot.rotations import angular_velocity_from_rpy, rotation_from_rpy
 from go2_wbc.validation import require_not_negative, require_positive
 
 
@@ -112,66 +110,67 @@ class PoseConfig:
         require_positive(self, "height_rate", "turning_rate", "sharpness")
 
 
-class PosePath:
-    """The pose on its way to the one that is asked for.
+@subroutine
+def advance_pose(
+    pose: Float[np.ndarray, "4"],
+    rate: Float[np.ndarray, "4"],
+    c: PoseConfig,
+    asked: Float[np.ndarray, "4"],
+    dt: float,
+) -> None:
+    """Bring a pose (height [m], roll, pitch, yaw [rad]) and its rate nearer to what is asked for.
 
-    Attributes:
-        pose: height [m], roll, pitch, yaw [rad].
-        rate: of these, per second.
+    ``dt`` [s] is what passes.
     """
-
-    def __init__(self, config: PoseConfig) -> None:
-        """Begin level, at rest."""
-        self._sharpness = config.sharpness
-        self._most = np.array([config.height_rate] + [config.turning_rate] * 3)
-        self.pose, self.rate = np.zeros(4), np.zeros(4)
-
-    def advance(self, target: BodyPose, dt: float) -> None:
-        """Bring the pose nearer to ``target`` in ``dt`` seconds."""
-        self.pose, self.rate = self._after(self.pose, self.rate, target.row, dt)
-
-    def ahead(self, target: BodyPose, step: float, count: int) -> Float[np.ndarray, "count 2 4"]:
-        """Pose and rate at the ends of the next ``count`` steps [s]."""
-        path, pose, rate, wanted = np.empty((count, 2, 4)), self.pose, self.rate, target.row
-        for node in path:
-            pose, rate = self._after(pose, rate, wanted, step)
-            node[:] = pose, rate
-        return path
-
-    def _after(
-        self,
-        pose: Float[np.ndarray, "4"],
-        rate: Float[np.ndarray, "4"],
-        target: Float[np.ndarray, "4"],
-        dt: float,
-    ) -> tuple[Float[np.ndarray, "4"], Float[np.ndarray, "4"]]:
-        wanted = np.clip(self._sharpness * (target - pose), -self._most, self._most)
-        change = self._sharpness * self._most * dt
-        rate = rate + np.clip(wanted - rate, -change, change)
-        return pose + rate * dt, rate
-
-    @property
-    def rotation(self) -> Float[np.ndarray, "3 3"]:
-        """Of the trunk, from that of one that walks level, facing ahead."""
-        return rotation_from_rpy(*self.pose[1:].tolist())
+    for i in range(4):
+        most = c.height_rate if i == 0 else c.turning_rate
+        wanted = min(max(c.sharpness * (asked[i] - pose[i]), -most), most)
+        change = c.sharpness * most * dt
+        rate[i] += min(max(wanted - rate[i], -change), change)
+        pose[i] += rate[i] * dt
 
 
+@subroutine
+def lean_rotation(pose: Float[np.ndarray, "4"], R: Float[np.ndarray, "3 3"]) -> None:
+    """Turn the rotation of a trunk that walks level by that of the pose: R Rz Ry Rx."""
+    sr, cr = np.sin(pose[1]), np.cos(pose[1])
+    sp, cp = np.sin(pose[2]), np.cos(pose[2])
+    sy, cy = np.sin(pose[3]), np.cos(pose[3])
+    for i in range(3):
+        x, y, z = R[i, 0], R[i, 1], R[i, 2]
+        R[i, 0] = (x * cy + y * sy) * cp - z * sp
+        R[i, 1] = (x * cy + y * sy) * sp * sr + (y * cy - x * sy) * cr + z * cp * sr
+        R[i, 2] = (x * cy + y * sy) * sp * cr - (y * cy - x * sy) * sr + z * cp * cr
+
+
+@subroutine
 def pose_turn(
-    yaw: float, pose: Float[np.ndarray, "4"], rate: Float[np.ndarray, "4"]
-) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    yaw: float,
+    pose: Float[np.ndarray, "4"],
+    rate: Float[np.ndarray, "4"],
+    turn: Float[np.ndarray, "3"],
+    w: Float[np.ndarray, "3"],
+) -> None:
     """What roll, pitch and yaw of a pose add to a level trunk of that heading ``yaw`` [rad].
 
-    Returns:
-        The turn [rad] from a level trunk that has the pose's yaw already (the quaternions of pitch
-        and roll, multiplied), and the angular velocity [rad/s]; both are vectors in the world.
+    Fills the turn [rad] from a level trunk that has the pose's yaw already (the quaternions of
+    pitch and roll, multiplied), and the angular velocity [rad/s] (Craig, Introduction to Robotics,
+    3rd ed., eq. 5.44); both are vectors in the world.
     """
-    roll, pitch, aside = pose[1:].tolist()
-    facing = yaw + aside
-    w, _ = angular_velocity_from_rpy(np.array([roll, pitch, facing]), rate[1:].copy(), np.zeros(3))
-    sr, cr, sp, cp = np.sin(roll / 2), np.cos(roll / 2), np.sin(pitch / 2), np.cos(pitch / 2)
+    cosine, sine = np.cos(yaw + pose[3]), np.sin(yaw + pose[3])
+    sp, cp = np.sin(pose[2]), np.cos(pose[2])
+    w[0] = cosine * cp * rate[1] - sine * rate[2]
+    w[1] = sine * cp * rate[1] + cosine * rate[2]
+    w[2] = rate[3] - sp * rate[1]
+    sr, cr, sp, cp = (
+        np.sin(pose[1] / 2),
+        np.cos(pose[1] / 2),
+        np.sin(pose[2] / 2),
+        np.cos(pose[2] / 2),
+    )
     x, y, z = cp * sr, sp * cr, -sp * sr
-    length = float(np.sqrt(x * x + y * y + z * z))
-    share = 2.0 * float(np.arctan2(length, cp * cr)) / length if length > 0.0 else 2.0
-    cosine, sine = np.cos(facing), np.sin(facing)
-    turn = share * np.array([cosine * x - sine * y, sine * x + cosine * y, z])
-    return turn, w
+    length = np.sqrt(x * x + y * y + z * z)
+    share = 2.0 * np.arctan2(length, cp * cr) / length if length > 0.0 else 2.0
+    turn[0] = share * (cosine * x - sine * y)
+    turn[1] = share * (sine * x + cosine * y)
+    turn[2] = share * z

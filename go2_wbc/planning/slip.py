@@ -18,8 +18,6 @@ A foot slides if its contact point has been faster than a speed for some time. J
 it may: there the foot still comes to rest. One that chatters while it slides, which on the robot's
 own sensors made it fall on a friction of 0.2, has not come down anew: what it has stood passes away
 while it does not touch, from twice the time after touchdown on.
-
-``kernels.slip`` is the compiled form.
 """
 
 from __future__ import annotations
@@ -29,8 +27,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.algebra.vectors import cross, dot, plus_scaled, triple
+from go2_wbc.compilation import Foreign, subroutine
 from go2_wbc.errors import ConfigError
-from go2_wbc.legs import LEGS
+from go2_wbc.records import Record
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_not_negative, require_positive
 
@@ -75,53 +75,71 @@ class SlipConfig:
             )
 
 
-class SlipObserver:
-    """Watches the feet.
+class Slip(Record):
+    """What the feet have shown.
 
     Attributes:
         friction: the estimate.
+        loaded: time [s] for which each foot has stood.
+        sliding: time [s] for which it has slid.
     """
 
-    def __init__(self, config: SlipConfig) -> None:
-        """Nothing has slid yet."""
-        self._config = config
-        self.friction = config.most
-        self._loaded, self._sliding = np.zeros(4), np.zeros(4)
-
-    def update(self, snapshot: Snapshot, stance: Bool[np.ndarray, "4"], dt: float) -> None:
-        """Look at the feet that shall stand, ``dt`` seconds after the last look."""
-        config = self._config
-        speed = np.linalg.norm(snapshot.v_world_contacts[:, :2], axis=1)
-        touches = snapshot.state.feet_in_contact
-        lost = np.maximum(np.minimum(self._loaded + dt, 2.0 * config.mask) - 2.0 * dt, 0.0)
-        self._loaded = np.where(touches, self._loaded + dt, lost) * stance
-        slope = np.abs(snapshot.v_world_contacts[:, 2]) <= config.steepness * speed
-        may_slide = self._loaded > config.mask
-        slides = may_slide & touches & (speed > config.speed) & slope
-        counted = np.where(slides, self._sliding + dt, 0.0)
-        self._sliding = np.where(touches | ~may_slide, counted, self._sliding)
-        slips = slides & (self._sliding > config.patience)
-        if slips.any():
-            shown = (exerted_ratios(snapshot) / (1.0 + speed / config.half_speed))[slips].min()
-            fall = min(max(float(shown), config.least) - self.friction, 0.0)
-            self.friction += fall * min(dt / config.time_constant, 1.0)
-        else:
-            self.friction = min(self.friction + config.recovery * dt, config.most)
+    friction: float
+    loaded: Float[np.ndarray, "4"]
+    sliding: Float[np.ndarray, "4"]
 
 
-def exerted_ratios(snapshot: Snapshot) -> Float[np.ndarray, "4"]:
-    """Force of each foot along the ground over that into it, as the torques of its leg make them.
+@subroutine
+def exerted_ratio(now: Snapshot, tau: Foreign[Float[np.ndarray, "12"]], leg: int) -> float:
+    """Force of a foot along the ground over that into it, as the torques of its leg make it.
 
     ``J' f = h - tau`` of the leg's own joints, whose accelerations are left out. Cramer's rule
     gives f up to the determinant, of which a ratio needs only the sign, so that a straight leg does
     no harm. Huge for a foot that does not press on the ground.
     """
-    ratios = np.empty(4)
-    for leg in LEGS:
-        joints = slice(6 + 3 * leg, 9 + 3 * leg)
-        x, y, z = snapshot.J_contacts[leg][:, joints].T
-        a, b, c = snapshot.bias[joints] - snapshot.state.tau[3 * leg : 3 * leg + 3]
-        f = a * np.cross(y, z) + b * np.cross(z, x) + c * np.cross(x, y)
-        pressure = f[2] * np.sign(x @ np.cross(y, z))
-        ratios[leg] = np.hypot(f[0], f[1]) / max(float(pressure), _TINY)
-    return ratios
+    J, first, h = now.J_contacts[leg], 6 + 3 * leg, now.bias
+    x = J[0, first], J[1, first], J[2, first]
+    y = J[0, first + 1], J[1, first + 1], J[2, first + 1]
+    z = J[0, first + 2], J[1, first + 2], J[2, first + 2]
+    f = plus_scaled((0.0, 0.0, 0.0), h[first] - tau[3 * leg], cross(y, z))
+    f = plus_scaled(f, h[first + 1] - tau[3 * leg + 1], cross(z, x))
+    f = plus_scaled(f, h[first + 2] - tau[3 * leg + 2], cross(x, y))
+    return np.hypot(f[0], f[1]) / max(f[2] * np.sign(dot(x, cross(y, z))), _TINY)
+
+
+@subroutine
+def observe_slip(
+    slip: Slip,
+    c: SlipConfig,
+    now: Snapshot,
+    contact: Foreign[Bool[np.ndarray, "4"]],
+    tau: Foreign[Float[np.ndarray, "12"]],
+    stance: Bool[np.ndarray, "4"],
+    dt: float,
+) -> None:
+    """Look at the feet that shall stand, ``dt`` seconds after the last look.
+
+    ``contact`` are the feet in measured contact, ``tau`` [N m] the measured torques.
+    """
+    slips, shown = False, c.most
+    for leg in range(4):
+        v_x, v_y, v_z = triple(now.v_world_contacts[leg])
+        speed = np.hypot(v_x, v_y)
+        is_level = abs(v_z) <= c.steepness * speed
+        loaded = slip.loaded[leg] + dt
+        if not contact[leg]:
+            loaded = max(min(loaded, 2.0 * c.mask) - 2.0 * dt, 0.0)
+        slip.loaded[leg] = loaded if stance[leg] else 0.0
+        may_slide = slip.loaded[leg] > c.mask
+        slides = may_slide and contact[leg] and speed > c.speed and is_level
+        if contact[leg] or not may_slide:
+            slip.sliding[leg] = slip.sliding[leg] + dt if slides else 0.0
+        if slides and slip.sliding[leg] > c.patience:
+            slips = True
+            ratio = exerted_ratio(now, tau, leg)
+            shown = min(shown, ratio / (1.0 + speed / c.half_speed))
+    if slips:
+        fall = min(max(shown, c.least) - slip.friction, 0.0)
+        slip.friction += fall * min(dt / c.time_constant, 1.0)
+    else:
+        slip.friction = min(slip.friction + c.recovery * dt, c.most)

@@ -19,8 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.curves import Ease
-from go2_wbc.planning.ground import GroundPlane
+from go2_wbc.compilation import subroutine
+from go2_wbc.planning.gait_clock import Clock
+from go2_wbc.planning.ground import Ground, GroundConfig, apex_raise, delay
+from go2_wbc.records import Record
 from go2_wbc.validation import require_not_negative, require_positive
 
 TIE = 1e-9
@@ -53,17 +55,12 @@ class SwingConfig:
         require_positive(self, "apex", "full_depth_way")
         require_not_negative(self, "touchdown_depth")
 
-    def depth(self, way: float) -> float:
-        """How far [m] below the ground a swing of length ``way`` [m] is aimed."""
-        return self.touchdown_depth * min(1.0, self.full_depth_way / max(way, TIE)) ** 2
-
     def at_most(self, apex: float) -> SwingConfig:
         """The same with an apex [m] of ``apex`` if that is lower."""
         return replace(self, apex=min(self.apex, apex))
 
 
-@dataclass(frozen=True, slots=True)
-class Swing:
+class Swing(Record):
     """How the swing of one foot has begun.
 
     Attributes:
@@ -74,70 +71,86 @@ class Swing:
     """
 
     start: Float[np.ndarray, "3"]
-    raised: float = 0.0
-    delay: float = 0.0
-    begun: float = 0.0
-
-    @staticmethod
-    def from_ground(start: Float[np.ndarray, "3"], ground: GroundPlane) -> Swing:
-        """That of a foot which leaves the ``ground``."""
-        return Swing(start.copy(), ground.apex_raise, ground.delay)
-
-    def resumed(
-        self, p_foot: Float[np.ndarray, "3"], progress: float, ground: GroundPlane
-    ) -> Swing:
-        """That of a foot which has been stopped at ``progress``; it goes on so once in a swing.
-
-        It is raised as high as the time allows that is left, and not higher for the ground: to lift
-        it by 7 cm within 44 ms took 590 N from the standing feet.
-        """
-        return self if self.begun else Swing(p_foot.copy(), 0.0, ground.delay, progress)
-
-    def at(
-        self, goal: Float[np.ndarray, "3"], progress: float, duration: float, config: SwingConfig
-    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-        """See ``swing_foot``; ``progress`` and ``duration`` are those of the gait's swing."""
-        share = 1.0 - self.begun
-        shape = replace(config, apex=share * (config.apex + self.raised))
-        inside = (progress - self.begun) / share
-        return swing_foot(self.start, goal, inside, share * duration, shape, self.delay)
+    raised: float
+    delay: float
+    begun: float
 
 
+@subroutine
+def begin_swing(
+    swing: Swing, p_foot: Float[np.ndarray, "3"], ground: Ground, c: GroundConfig
+) -> None:
+    """A foot leaves the ground."""
+    swing.start[:] = p_foot
+    swing.raised, swing.delay, swing.begun = apex_raise(ground, c), delay(ground, c), 0.0
+
+
+@subroutine
+def resume_swing(
+    swing: Swing, p_foot: Float[np.ndarray, "3"], ground: Ground, c: GroundConfig, progress: float
+) -> None:
+    """A foot has been stopped at ``progress``; it goes on from there, once in a swing.
+
+    It is raised as high as the time allows that is left, and not higher for the ground: to lift it
+    by 7 cm within 44 ms took 590 N from the standing feet.
+    """
+    if swing.begun == 0.0:
+        swing.start[:] = p_foot
+        swing.raised, swing.delay, swing.begun = 0.0, delay(ground, c), progress
+
+
+@subroutine
+def cubic(x: float) -> tuple[float, float, float]:
+    """s = 3 x^2 - 2 x^3 and its two derivatives."""
+    return x * x * (3 - 2 * x), 6 * x * (1 - x), 6 - 12 * x
+
+
+@subroutine
 def swing_foot(
-    start: Float[np.ndarray, "3"],
-    goal: Float[np.ndarray, "3"],
+    swing: Swing,
+    clock: Clock,
+    c: SwingConfig,
     progress: float,
-    duration: float,
-    config: SwingConfig,
-    delay: float = 0.0,
-) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """Position, velocity, acceleration of the foot centre in the world.
+    goal: Float[np.ndarray, "3"],
+    p: Float[np.ndarray, "3"],
+    v: Float[np.ndarray, "3"],
+    a: Float[np.ndarray, "3"],
+) -> None:
+    """Fill position, velocity and acceleration of the foot centre in the world.
 
     Horizontally one cubic: it follows late changes of the goal better than minimum jerk, whose
     speed is gone sooner. Vertically two that meet, at rest, at the apex.
 
     Args:
-        start: where the foot left the ground [m].
-        goal: where it shall touch down [m]; may change from call to call.
-        progress: share of the swing that has passed, 0 to 1.
-        duration: of the whole swing [s].
-        config: apex and touchdown depth.
-        delay: share of the swing, below 1, in which the foot only rises.
+        swing: how it has begun.
+        clock: of the gait, whose swing it is.
+        c: apex and touchdown depth.
+        progress: share of the gait's swing that has passed, 0 to 1.
+        goal: where the foot shall touch down [m]; may change from call to call.
+        p: [m].
+        v: [m/s].
+        a: [m/s^2].
     """
-    p, v, a = np.empty(3), np.empty(3), np.empty(3)
-    delta, span = goal[:2] - start[:2], duration * (1.0 - delay)
-    p[:2], v[:2], a[:2] = start[:2], 0.0, 0.0
-    if progress >= delay - TIE:
-        s, ds, dds = Ease.CUBIC.progress((progress - delay) / (1.0 - delay))
-        p[:2] += s * delta
-        v[:2] = ds / span * delta
-        a[:2] = dds / span**2 * delta
-    apex = max(start[2], goal[2]) + config.apex
+    share = 1.0 - swing.begun
+    progress = (progress - swing.begun) / share
+    duration = share * (1.0 - clock.duty) * clock.period
+    start, late = swing.start, swing.delay
+    span = duration * (1.0 - late)
+    x, dx, ddx = 0.0, 0.0, 0.0
+    if progress >= late - TIE:
+        x, dx, ddx = cubic((progress - late) / (1.0 - late))
+    for i in range(2):
+        delta = goal[i] - start[i]
+        p[i] = start[i] + x * delta
+        v[i] = dx / span * delta
+        a[i] = ddx / span**2 * delta
+    apex = max(start[2], goal[2]) + share * (c.apex + swing.raised)
     is_rising = progress < 0.5 - TIE
-    ground = goal[2] - config.depth(float(np.hypot(*delta)))
-    begin, end = (start[2], apex) if is_rising else (apex, ground)
-    s, ds, dds = Ease.CUBIC.progress(2.0 * progress - (0.0 if is_rising else 1.0))
-    p[2] = begin + s * (end - begin)
-    v[2] = ds * (end - begin) * 2.0 / duration
-    a[2] = dds * (end - begin) * 4.0 / duration**2
-    return p, v, a
+    way = np.hypot(goal[0] - start[0], goal[1] - start[1])
+    depth = c.touchdown_depth * min(1.0, c.full_depth_way / max(way, TIE)) ** 2
+    begin = start[2] if is_rising else apex
+    delta = (apex if is_rising else goal[2] - depth) - begin
+    x, dx, ddx = cubic(2.0 * progress - (0.0 if is_rising else 1.0))
+    p[2] = begin + x * delta
+    v[2] = dx * delta * 2.0 / duration
+    a[2] = ddx * delta * 4.0 / duration**2

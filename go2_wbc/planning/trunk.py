@@ -1,52 +1,56 @@
 """The trunk's way: the command ramped, integrated to a pose and kept near the robot.
 
 The velocity is in the heading frame (z up, x along the reference's yaw); the heading is integrated
-first and turns it.
+first and turns it. A body that only followed a velocity would keep a steady error of place and
+heading, so the command is integrated to a pose, which is held within reach (a leash) of the
+measured one: a robot that is held does not store up a way to jump afterwards.
+
+What sags under a load, and the lean that the joints' friction leaves, are integrated and taken out:
+``o' = rate * clip(error, -window, window)``, ``|o| <= limit`` (see ``CorrectionConfig``).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.correction import CorrectionConfig, SteadyStateCorrection
-from go2_wbc.planning.ground import GroundPlane, tilted_rotation
-from go2_wbc.planning.pose import BodyPose, PoseConfig, PosePath, pose_turn
-from go2_wbc.reference import BodyTarget, TrackedPoint
-from go2_wbc.robot.rotations import exp_rotation, wrap_angle, yaw_rotation
+from go2_wbc.algebra.vectors import cross, rotation_by
+from go2_wbc.compilation import Foreign, subroutine
+from go2_wbc.planning.correction import CorrectionConfig
+from go2_wbc.planning.ground import Ground, GroundConfig, ground_at, tilt
+from go2_wbc.planning.pose import lean_rotation, pose_turn
+from go2_wbc.records import Record
+from go2_wbc.reference import Target
 from go2_wbc.robot.snapshot import Snapshot
 
 SETTLED_COMMAND = 1e-3
 """Ramped velocity command [m/s, rad/s] below which it counts as arrived at zero."""
-READY = CorrectionConfig(angle_limit=0.15)
-"""How the lean of a robot that stands ready is taken out. The joints' friction leaves 2.5 deg of a
-pose undone, and a payload that reaches farther than is believed leans it by 4 deg."""
-STRIDE = CorrectionConfig(rate=1.0, angle_window=0.05, angle_limit=0.15)
+_SAG = CorrectionConfig()
+SAG_RATE, SAG_WINDOW, SAG_LIMIT = _SAG.rate, _SAG.position_window, _SAG.position_limit
+"""How the sag under a load is taken out [1/s], [m], [m]."""
+READY_RATE, READY_WINDOW = _SAG.rate, _SAG.angle_window
+"""How the lean of a robot that stands ready is taken out [1/s], [rad]. The joints' friction leaves
+2.5 deg of a pose undone, and a payload that reaches farther than is believed leans it by 4 deg."""
+STRIDE_RATE, STRIDE_WINDOW = 1.0, 0.05
 """The same in stride, slowly and whatever a push does: 6 kg that are believed 2 cm beside their
 place, as gravity is known to 1 deg, leaned a trot by 4 deg."""
+LEAN_LIMIT = 0.15
+"""Greatest lean [rad] that is taken out."""
 
 
-@dataclass(frozen=True, slots=True)
-class TrunkLimits:
-    """How fast the reference changes, and how far it may run ahead of the robot.
+class Command(Record):
+    """What the planner is asked for.
 
     Attributes:
-        rate: greatest change of the velocity: ahead, left [m/s^2], turning [rad/s^2].
-        position_leash: [m].
-        yaw_leash: [rad].
-        pose: how a new pose is approached.
+        velocity: ahead, left [m/s], turning [rad/s], in the heading frame.
+        pose: of the trunk: height [m], roll, pitch, yaw [rad]; see ``BodyPose``.
     """
 
-    rate: Float[np.ndarray, "3"]
-    position_leash: float
-    yaw_leash: float
-    pose: PoseConfig
+    velocity: Float[np.ndarray, "3"]
+    pose: Float[np.ndarray, "4"]
 
 
-class TrunkPath:
+class Trunk(Record):
     """Where the trunk shall be.
 
     Attributes:
@@ -54,87 +58,149 @@ class TrunkPath:
         position: of the CoM, on the level [m].
         velocity: ramped command in the heading frame [m/s], [rad/s].
         height_offset: what is added to the wanted height against a load [m].
-        pose: on top of walking level.
+        lean_offset: turn about x and y of the world [rad] that is added against the lean.
+        pose: on top of walking level: height [m], roll, pitch, yaw [rad].
+        pose_rate: of these, per second.
     """
 
-    def __init__(self, snapshot: Snapshot, limits: TrunkLimits) -> None:
-        """Begin where the robot is, at rest."""
-        self._limits = limits
-        self.yaw = snapshot.state.yaw
-        self.position = snapshot.p_world_com[:2].copy()
-        self.velocity = np.zeros(3)
-        self.height_offset = 0.0
-        self.pose = PosePath(limits.pose)
-        self._correction = SteadyStateCorrection()
-        self._lean_offset = np.zeros(2)
+    yaw: float
+    position: Float[np.ndarray, "2"]
+    velocity: Float[np.ndarray, "3"]
+    height_offset: float
+    lean_offset: Float[np.ndarray, "2"]
+    pose: Float[np.ndarray, "4"]
+    pose_rate: Float[np.ndarray, "4"]
 
-    @property
-    def is_settled(self) -> bool:
-        """Whether the ramped command has arrived at zero."""
-        return bool(np.abs(self.velocity).max() < SETTLED_COMMAND)
 
-    @property
-    def world_velocity(self) -> Float[np.ndarray, "3"]:
-        """Wanted velocity of the CoM [m/s]."""
-        return yaw_rotation(self.yaw) @ np.array([self.velocity[0], self.velocity[1], 0.0])
+@subroutine
+def heading(now: Snapshot) -> float:
+    """Measured yaw [rad] of the base."""
+    x, y, z, w = now.q[3], now.q[4], now.q[5], now.q[6]
+    return np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
-    def integrate(
-        self, snapshot: Snapshot, command: VelocityCommand, pose: BodyPose, dt: float
-    ) -> None:
-        """Ramp towards ``command`` and ``pose``, integrate to the place, and apply the leash."""
-        limits = self._limits
-        self.pose.advance(pose, dt)
-        wanted = np.array([command.linear_x, command.linear_y, command.angular_z])
-        most = limits.rate * dt
-        self.velocity += np.clip(wanted - self.velocity, -most, most)
-        self.yaw += self.velocity[2] * dt
-        lead = wrap_angle(self.yaw + self.pose.pose[3] - snapshot.state.yaw)
-        self.yaw += np.clip(lead, -limits.yaw_leash, limits.yaw_leash) - lead
-        self.position = self.position + self.world_velocity[:2] * dt
-        offset = self.position - snapshot.p_world_com[:2]
-        distance = float(np.linalg.norm(offset))
-        if distance > limits.position_leash:
-            self.position = snapshot.p_world_com[:2] + offset * (limits.position_leash / distance)
 
-    def correct_height(self, snapshot: Snapshot, height: float, dt: float) -> None:
-        """Integrate the error from ``height`` [m], the pose's added: a payload makes it sag."""
-        sag = height + self.pose.pose[0] - snapshot.p_world_com[2]
-        error = np.array([0.0, 0.0, sag, 0.0, 0.0, 0.0])
-        self.height_offset = float(self._correction.update(error, dt)[2])
+@subroutine
+def is_zero(command: Command) -> bool:
+    """Whether the robot is asked to stay."""
+    v = command.velocity
+    return v[0] == 0.0 and v[1] == 0.0 and v[2] == 0.0
 
-    def levelled(
-        self, target: BodyTarget, snapshot: Snapshot, dt: float, *, is_stepping: bool
-    ) -> BodyTarget:
-        """``target`` turned against the lean that is left, ``dt`` seconds after the last one.
 
-        That is the integral of the vertical's error. It rests while a foot of a robot that stands
-        ready has no contact.
-        """
-        R, numbers = target.R_world_base, STRIDE if is_stepping else READY
-        if is_stepping or snapshot.state.feet_in_contact.all():
-            error = np.cross(snapshot.R_world_base[:, 2], R[:, 2])[:2]
-            counted = np.clip(error, -numbers.angle_window, numbers.angle_window)
-            offset, limit = self._lean_offset + numbers.rate * dt * counted, numbers.angle_limit
-            self._lean_offset = np.clip(offset, -limit, limit)
-        return replace(target, R_world_base=exp_rotation(np.append(self._lean_offset, 0.0)) @ R)
+@subroutine
+def is_settled(trunk: Trunk) -> bool:
+    """Whether the ramped command has arrived at zero."""
+    x, y, turn = abs(trunk.velocity[0]), abs(trunk.velocity[1]), abs(trunk.velocity[2])
+    return x < SETTLED_COMMAND and y < SETTLED_COMMAND and turn < SETTLED_COMMAND
 
-    def place(self, ground: GroundPlane, height: float) -> Float[np.ndarray, "3"]:
-        """Where the CoM of a level trunk shall be [m]: ``height`` above ground, plus the offset."""
-        top = ground.at(self.position) + height + self.height_offset
-        return np.array([*self.position, top])
 
-    def target(self, ground: GroundPlane, height: float) -> BodyTarget:
-        """The trunk's reference: along the ground, its CoM at ``height`` [m], with the pose."""
-        v_world = self.world_velocity
-        (raised, *_), (rising, *_) = self.pose.pose, self.pose.rate
-        v_world[2] = ground.slope @ v_world[:2] + rising
-        _, w_world = pose_turn(self.yaw, self.pose.pose, self.pose.rate)
-        return BodyTarget(
-            point=TrackedPoint.COM,
-            p_world=self.place(ground, height) + [0.0, 0.0, raised],
-            v_world=v_world,
-            a_world=np.zeros(3),
-            R_world_base=tilted_rotation(self.yaw, ground.tilt) @ self.pose.rotation,
-            w_world=w_world + [0.0, 0.0, self.velocity[2]],
-            dw_world=np.zeros(3),
-        )
+@subroutine
+def world_velocity(trunk: Trunk) -> tuple[float, float]:
+    """Wanted velocity of the CoM [m/s]."""
+    cosine, sine = np.cos(trunk.yaw), np.sin(trunk.yaw)
+    x, y = trunk.velocity[0], trunk.velocity[1]
+    return cosine * x - sine * y, sine * x + cosine * y
+
+
+@subroutine
+def ramp(
+    velocity: Float[np.ndarray, "3"],
+    command: Command,
+    linear: float,
+    angular: float,
+    dt: float,
+) -> None:
+    """Bring a velocity nearer to the commanded one, by these accelerations [m/s^2], [rad/s^2]."""
+    for i in range(3):
+        most = (angular if i == 2 else linear) * dt
+        velocity[i] += min(max(command.velocity[i] - velocity[i], -most), most)
+
+
+@subroutine
+def follow_heading(trunk: Trunk, now: Snapshot, leash: float, dt: float) -> None:
+    """Integrate the heading, at most ``leash`` [rad] ahead of the measured one."""
+    trunk.yaw += trunk.velocity[2] * dt
+    difference = trunk.yaw + trunk.pose[3] - heading(now)
+    lead = np.arctan2(np.sin(difference), np.cos(difference))
+    trunk.yaw += min(max(lead, -leash), leash) - lead
+
+
+@subroutine
+def follow_position(trunk: Trunk, now: Snapshot, leash: float, dt: float) -> None:
+    """Integrate the position, at most ``leash`` [m] ahead of the measured one."""
+    v_x, v_y = world_velocity(trunk)
+    trunk.position[0] += v_x * dt
+    trunk.position[1] += v_y * dt
+    p = now.p_world_com
+    x, y = trunk.position[0] - p[0], trunk.position[1] - p[1]
+    distance = np.hypot(x, y)
+    if distance > leash:
+        trunk.position[0] = p[0] + x * leash / distance
+        trunk.position[1] = p[1] + y * leash / distance
+
+
+@subroutine
+def correct_height(trunk: Trunk, now: Snapshot, height: float, dt: float) -> None:
+    """Integrate the error from ``height`` [m], the pose's added: a payload makes it sag."""
+    sag = height + trunk.pose[0] - now.p_world_com[2]
+    counted = min(max(sag, -SAG_WINDOW), SAG_WINDOW)
+    offset = trunk.height_offset + SAG_RATE * dt * counted
+    trunk.height_offset = min(max(offset, -SAG_LIMIT), SAG_LIMIT)
+
+
+@subroutine
+def fill_body(trunk: Trunk, ground: Ground, c: GroundConfig, height: float, target: Target) -> None:
+    """The trunk's reference: along the ground, its CoM at ``height`` [m], with the pose."""
+    target.is_com = True
+    p, v, R = target.p_world, target.v_world, target.R_world_base
+    p[0], p[1] = trunk.position[0], trunk.position[1]
+    p[2] = ground_at(ground, trunk.position[0], trunk.position[1])
+    p[2] += height + trunk.height_offset + trunk.pose[0]
+    v[0], v[1] = world_velocity(trunk)
+    v[2] = ground.slope[0] * v[0] + ground.slope[1] * v[1] + trunk.pose_rate[0]
+    cosine, sine = np.cos(trunk.yaw), np.sin(trunk.yaw)
+    a, b = tilt(ground, c)
+    rise = a * cosine + b * sine
+    length, steep = np.sqrt(1.0 + rise * rise), np.sqrt(1.0 + a * a + b * b)
+    x = cosine / length, sine / length, rise / length
+    z = -a / steep, -b / steep, 1.0 / steep
+    y = cross(z, x)
+    for i in range(3):
+        R[i, 0] = x[i]
+        R[i, 1] = y[i]
+        R[i, 2] = z[i]
+    lean_rotation(trunk.pose, R)
+    turn = np.empty(3)
+    pose_turn(trunk.yaw, trunk.pose, trunk.pose_rate, turn, target.w_world)
+    target.w_world[2] += trunk.velocity[2]
+
+
+@subroutine
+def level(
+    trunk: Trunk,
+    now: Snapshot,
+    contact: Foreign[Bool[np.ndarray, "4"]],
+    is_stepping: bool,
+    dt: float,
+    target: Target,
+) -> None:
+    """Integrate what is left of the lean, and turn the trunk's reference by that.
+
+    That is the integral of the vertical's error. It rests while a foot of a robot that stands ready
+    has no contact.
+    """
+    wanted, offset, R = target.R_world_base, trunk.lean_offset, now.R_world_base
+    if is_stepping or (contact[0] and contact[1] and contact[2] and contact[3]):
+        rate = STRIDE_RATE if is_stepping else READY_RATE
+        window = STRIDE_WINDOW if is_stepping else READY_WINDOW
+        measured = R[0, 2], R[1, 2], R[2, 2]
+        error = cross(measured, (wanted[0, 2], wanted[1, 2], wanted[2, 2]))
+        for i in range(2):
+            counted = min(max(error[i], -window), window)
+            offset[i] = min(max(offset[i] + rate * dt * counted, -LEAN_LIMIT), LEAN_LIMIT)
+    turn, before = np.empty((3, 3)), wanted.copy()
+    rotation_by((offset[0], offset[1], 0.0), turn)
+    for i in range(3):
+        for k in range(3):
+            wanted[i, k] = (
+                turn[i, 0] * before[0, k] + turn[i, 1] * before[1, k] + turn[i, 2] * before[2, k]
+            )

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from motions.dynamics.cache import solve_cached
     from motions.dynamics.continuation import Solved
     from motions.dynamics.curves import pieces
-    from motions.dynamics.limits import PlanLimits
+    from motions.dynamics.dynamic_trajectory import DynamicTrajectory, Miss
     from motions.dynamics.phases import FullState, Phase, PhaseProblem, Tolerance
+    from motions.dynamics.plan_audit import Reading, audit
+    from motions.dynamics.plan_cache import solve_cached
+    from motions.dynamics.plan_limits import PlanLimits
     from motions.dynamics.solver import solve
-    from motions.dynamics.trajectory import DynamicTrajectory, Miss
-    from motions.dynamics.verdict import Reading, audit
 
 __all__ = [
     "DynamicTrajectory",
@@ -39,13 +39,13 @@ __all__ = [
 __getattr__ = lazy_exports(
     __name__,
     {
-        "cache": ("solve_cached",),
-        "limits": ("PlanLimits",),
+        "plan_cache": ("solve_cached",),
+        "plan_limits": ("PlanLimits",),
         "phases": ("FullState", "Phase", "PhaseProblem", "Tolerance"),
         "continuation": ("Solved",),
         "curves": ("pieces",),
         "solver": ("solve",),
-        "trajectory": ("DynamicTrajectory", "Miss"),
-        "verdict": ("Reading", "audit"),
+        "dynamic_trajectory": ("DynamicTrajectory", "Miss"),
+        "plan_audit": ("Reading", "audit"),
     },
 )

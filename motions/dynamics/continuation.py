@@ -10,8 +10,8 @@ from jaxtyping import Float
 
 from go2_wbc.errors import TimelineError
 from go2_wbc.robot.model import RobotModel
+from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 from motions.dynamics.phases import PhaseProblem
-from motions.dynamics.trajectory import DynamicTrajectory
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from scipy.interpolate import CubicHermiteSpline, PPoly
 
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics.trajectory import DynamicTrajectory
+from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 
 COM, ATTITUDE, JOINTS, FEET = slice(0, 3), slice(3, 6), slice(6, 18), slice(18, 30)
 """Columns of ``pieces``: CoM [m], roll, pitch, yaw [rad], joints [rad], feet's centres [m]."""
@@ -30,35 +30,44 @@ def pieces(trajectory: DynamicTrajectory, model: RobotModel) -> PPoly:
     Positions and rates are continuous, accelerations change at knots only. Roll, pitch and yaw
     pass through all angles; they are not to be used within a few degrees of a vertical trunk.
     """
-    values, rates = sampled(trajectory, model)
-    values[:, ATTITUDE] = np.unwrap(values[:, ATTITUDE], axis=0)
-    cubics = CubicHermiteSpline(trajectory.times, values, rates)
+    cubics = CubicHermiteSpline(trajectory.times, *sampled(trajectory, model))
     return PPoly(cubics.c, cubics.x)
 
 
 def sampled(
     trajectory: DynamicTrajectory, model: RobotModel
 ) -> tuple[Float[np.ndarray, "n1 30"], Float[np.ndarray, "n1 30"]]:
-    """Values and rates of what ``pieces`` gives, at the knots."""
+    """Values and rates of what ``pieces`` gives, at the knots; whole turns add up."""
+    pin_model, data = model.pin_model, model.pin_model.createData()
+    q, v = centred(trajectory, model), trajectory.v
+    values, rates = np.empty((len(q), 30)), np.empty((len(q), 30))
+    for row in range(len(q)):
+        pin.centerOfMass(pin_model, data, q[row], v[row])
+        values[row, COM], rates[row, COM] = data.com[0], data.vcom[0]
+        R = pin.Quaternion(q[row, 3:7]).toRotationMatrix()
+        values[row, ATTITUDE] = rpy = pin.rpy.matrixToRpy(R)
+        rates[row, ATTITUDE] = pin.rpy.computeRpyJacobianInverse(rpy) @ v[row, 3:6]
+    values[:, ATTITUDE] = np.unwrap(values[:, ATTITUDE], axis=0)
+    values[:, JOINTS], rates[:, JOINTS] = q[:, 7:], v[:, 6:]
+    places, velocities = feet_at(q, v, model)
+    values[:, FEET], rates[:, FEET] = places.reshape(-1, 12), velocities.reshape(-1, 12)
+    return values, rates
+
+
+def feet_at(
+    q: Float[np.ndarray, "n 19"], v: Float[np.ndarray, "n 18"], model: RobotModel
+) -> tuple[Float[np.ndarray, "n 4 3"], Float[np.ndarray, "n 4 3"]]:
+    """Places [m] and velocities [m/s] of the feet's centres, in the frame in which ``q`` is."""
     pin_model, data = model.pin_model, model.pin_model.createData()
     frames = [pin_model.getFrameId(name) for name in FOOT_NAMES]
-    knots = len(trajectory.times)
-    values, rates = np.empty((knots, 30)), np.empty((knots, 30))
-    for row, q in enumerate(centred(trajectory, model)):
-        v = trajectory.v[row]
-        pin.centerOfMass(pin_model, data, q, v)
-        values[row, COM], rates[row, COM] = data.com[0], data.vcom[0]
-        R = pin.Quaternion(q[3:7]).toRotationMatrix()
-        values[row, ATTITUDE] = rpy = pin.rpy.matrixToRpy(R)
-        rates[row, ATTITUDE] = pin.rpy.computeRpyJacobianInverse(rpy) @ v[3:6]
-        values[row, JOINTS], rates[row, JOINTS] = q[7:], v[6:]
+    places, velocities = np.empty((len(q), 4, 3)), np.empty((len(q), 4, 3))
+    for row in range(len(q)):
+        pin.forwardKinematics(pin_model, data, q[row], v[row])
         pin.updateFramePlacements(pin_model, data)
         for leg, frame in enumerate(frames):
-            columns = slice(18 + 3 * leg, 21 + 3 * leg)
-            values[row, columns] = data.oMf[frame].translation
             velocity = pin.getFrameVelocity(pin_model, data, frame, _ALIGNED)
-            rates[row, columns] = velocity.linear
-    return values, rates
+            places[row, leg], velocities[row, leg] = data.oMf[frame].translation, velocity.linear
+    return places, velocities
 
 
 def centred(trajectory: DynamicTrajectory, model: RobotModel) -> Float[np.ndarray, "n1 19"]:

@@ -16,13 +16,13 @@ from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import Anchor
-from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
+from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import rpy_from_rotation
-from motions.dynamics.limits import PlanLimits
+from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
+from motions.batch_kinematics import attitudes, configurations, foot_centres, turned_back
 from motions.dynamics.phases import GRAVITY, KNOT_PERIOD, FullState, Phase, PhaseProblem
-from motions.dynamics.standing import standing, standing_feet
-from motions.placement import attitudes, configurations, turned, turned_back
+from motions.dynamics.plan_limits import PlanLimits
+from motions.postures import STAND_POSE, standing_feet, standing_on
 
 LEAD = 0.2
 """Share of a flight's way by which the trunk is ahead of the feet at take-off, and behind them at
@@ -119,6 +119,15 @@ def knots_of(problem: PhaseProblem, model: RobotModel, limits: PlanLimits) -> Kn
         initial=initial,
         final=final,
     )
+
+
+def standing(model: RobotModel, p_feet: Float[np.ndarray, "4 3"]) -> FullState:
+    """Standing at rest on feet at ``p_feet`` [m]: CoM above their middle, trunk along them."""
+    anchor = Anchor.of_feet(p_feet, model.foot_radius)
+    p_com, R = anchor.p_world + STAND_POSE[:3], yaw_rotation(anchor.yaw)
+    p_base, joints = standing_on(p_feet, p_com, R, model)
+    pose = np.concatenate([p_base, [0.0, 0.0, anchor.yaw]])
+    return FullState(configurations(pose[None], joints[None])[0], np.zeros(18))
 
 
 def _standing(phases: tuple[Phase, ...]) -> Bool[np.ndarray, "n 4"]:
@@ -298,9 +307,4 @@ def guess_velocities(
 def feet_at(model: RobotModel, q: Float[np.ndarray, "n 19"]) -> Float[np.ndarray, "n 4 3"]:
     """Centres of the feet [m] at configurations ``q``."""
     poses = np.array([pose_of(row) for row in q])
-    R = attitudes(poses[:, 3:])
-    places = [
-        poses[:, :3] + turned(R, foot_places(LegGeometry.of(model, leg), q[:, 7:][:, leg.joints]))
-        for leg in LEGS
-    ]
-    return np.stack(places, axis=1)
+    return foot_centres(poses[:, :3], attitudes(poses[:, 3:]), q[:, 7:], model)

@@ -9,7 +9,7 @@ stood. A later phase counts from the same pose, whatever has moved in between.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -33,6 +33,9 @@ choice."""
 FARTHEST_FOOT = 4.0
 """Distance [m] from the start beyond which a foot's place is taken for a mistake: own choice, more
 than eight of the longest jumps that the robot can do in one problem."""
+
+Progress = Callable[[int, float], None]
+"""Called after every iteration of a solver, with their number and the cost."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,8 @@ from go2_wbc.errors import PlanNotFound
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from motions.dynamics.continuation import Start
 from motions.dynamics.knots import Found, Knots
-from motions.dynamics.program import Program
+from motions.dynamics.phases import Progress
+from motions.dynamics.shooting_problem import ShootingProblem
 
 ITERATIONS = 120
 """Of one start; what converges does so in fewer (own experiments)."""
@@ -30,7 +31,6 @@ give in the middle of a step, all of it at its end (``PlanLimits``). Exact agree
 rounds."""
 _JOINT_RATES = slice(19 + 6, None)
 
-Progress = Callable[[int, float], None]
 _Rows = list[Float[np.ndarray, " n"]]
 
 
@@ -69,8 +69,8 @@ class Search:
 
     def __init__(
         self,
-        soft: Program,
-        full: Program,
+        soft: ShootingProblem,
+        full: ShootingProblem,
         knots: Knots,
         *,
         is_good: Callable[[Found], bool],
@@ -92,7 +92,7 @@ class Search:
         self._clock = Clock(budget, progress)
         self._soft_solver, self._solver = self._solver_of(soft), self._solver_of(full)
 
-    def _solver_of(self, program: Program) -> crocoddyl.SolverBoxFDDP:
+    def _solver_of(self, program: ShootingProblem) -> crocoddyl.SolverBoxFDDP:
         solver = crocoddyl.SolverBoxFDDP(program.problem)
         solver.setCallbacks([self._clock])
         return solver

@@ -15,11 +15,11 @@ from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from motions.dynamics.continuation import Solved, Start, continued
+from motions.dynamics.dynamic_trajectory import DynamicTrajectory, Miss
 from motions.dynamics.knots import Found, Knots, feet_at, knots_of, pose_of
-from motions.dynamics.limits import PlanLimits, Weights
-from motions.dynamics.phases import PhaseProblem, Tolerance
-from motions.dynamics.trajectory import DynamicTrajectory, Miss
-from motions.dynamics.verdict import audit
+from motions.dynamics.phases import PhaseProblem, Progress, Tolerance
+from motions.dynamics.plan_audit import audit
+from motions.dynamics.plan_limits import PlanLimits, Weights
 
 INSTALL_LINE = "pip install go2-wbc[dynamics]"
 BUDGET = 20.0
@@ -34,9 +34,8 @@ def solve(
     model: RobotModel,
     *,
     budget: float = BUDGET,
-    progress: Callable[[int, float], None] | None = None,
+    progress: Progress | None = None,
     limits: PlanLimits | None = None,
-    weights: Weights | None = None,
     start: Solved | None = None,
 ) -> DynamicTrajectory:
     """The motion that does what the phases ask, within what the robot can do.
@@ -50,7 +49,6 @@ def solve(
         budget: processor time [s] after which to give up.
         progress: called after every iteration with their number and the cost.
         limits: what the plan keeps.
-        weights: what being off costs.
         start: a plan of the same phases for something a little easier, from which to begin; jumps
             that are not found from scratch are found in such steps.
 
@@ -62,7 +60,7 @@ def solve(
     """
     limits = limits or PlanLimits()
     knots = knots_of(problem, model, limits)
-    task = Task(knots, model, limits, weights or Weights(), problem.tolerance, _misses)
+    task = Task(knots, model, limits, Weights(), problem.tolerance, _misses)
     first = None if start is None else continued(start, problem, knots.times, model)
     return optimum(task, budget=budget, progress=progress, start=first)
 
@@ -110,21 +108,21 @@ def optimum(
     task: Task,
     *,
     budget: float,
-    progress: Callable[[int, float], None] | None,
+    progress: Progress | None,
     start: Start | None = None,
 ) -> DynamicTrajectory:
     """The best plan for ``task``; raises what ``solve`` does."""
     require_crocoddyl()
-    from motions.dynamics.program import Program
     from motions.dynamics.search import Search
+    from motions.dynamics.shooting_problem import ShootingProblem
 
     def objections(found: Found) -> list[str]:
         plan = task.plan(found)
         return broken_limits(plan, task.model) + far_misses(plan, task.tolerance)
 
     knots, model, limits, weights = task.knots, task.model, task.limits, task.weights
-    soft = Program(knots, model, limits, weights.softened())
-    full = Program(knots, model, limits, weights)
+    soft = ShootingProblem(knots, model, limits, weights.softened())
+    full = ShootingProblem(knots, model, limits, weights)
     search = Search(
         soft, full, knots,
         is_good=lambda found: not objections(found),

@@ -2,7 +2,7 @@
 
 from motions.feasibility.check import FeasibilityChecker, check
 from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion
-from motions.feasibility.departure import Departure
+from motions.feasibility.goal_errors import Departure
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import FeasibilityReport, Finding, Series
 from motions.feasibility.suggestions import Suggestion, suggest

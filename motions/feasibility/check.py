@@ -6,33 +6,30 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from go2_wbc.errors import MotionError
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
-from motions.assembly import compile_timeline
-from motions.compiled_plan import CompiledPlan
-from motions.feasibility import dynamic, flight, friction, kinematic, tracking
-from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion, timeline_of
+from motions.batch_kinematics import centres_of_mass
+from motions.dynamics.phases import Progress
+from motions.feasibility import dynamic_spans, friction, kinematic, tracking
+from motions.feasibility import forces as dynamics
+from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion
 from motions.feasibility.collision import SelfCollision, self_distance
-from motions.feasibility.departure import departure_measurements, departures
+from motions.feasibility.goal_errors import departure_measurements, departures
 from motions.feasibility.hulls import hulls_of
-from motions.feasibility.limits import FeasibilityLimits, FlightLimits
-from motions.feasibility.load import loaded, with_load
-from motions.feasibility.nearest import Progress, mending
+from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import FeasibilityReport, Series
-from motions.language.written import NEAREST
-from motions.problem import Problem
-from motions.trajectory import trajectory_of
+from motions.plan.compiled_plan import CompiledPlan, Problem
+from motions.plan.trajectory import Trajectory, trajectory_of
 
 BALANCE, WAY = "balance", "way of a foot"
 """Problems of the compiler."""
 SLIDING = 0.17
 """Share of the slip that is allowed, from which on a force that lacks for a moment matters."""
-FLIGHT_SHARE = 1.1
-"""What solved plans may use of the floor's friction: they are solved for 0.5, and reach 0.55."""
 
 
 class FeasibilityChecker:
@@ -64,7 +61,7 @@ class FeasibilityChecker:
         self.world = world or World()
         self._progress = progress
         self._limits = limits or FeasibilityLimits()
-        self._loaded = loaded(self.model, self.world.worst)
+        self._loaded = _loaded(self.model, self.world.worst)
         self._collision = SelfCollision(self.model)
         self._hulls = hulls_of(self.model.description)
 
@@ -108,16 +105,12 @@ class FeasibilityChecker:
 
     def _compiled(self, motion: object) -> MotionPlan:
         """The plan of ``motion``, the nearest feasible one where its timeline asks for that."""
-        line = timeline_of(motion)
-        if line is None:
-            return compile_motion(motion, self.model)
-        mend = None
-        if line.physics == NEAREST:
-            mend = mending(self._judged, self.model, line.tolerance, self._progress)
-        return compile_timeline(line, self.model, mend=mend, progress=self._progress)
+        broken, progress = self._broken, self._progress
+        return compile_motion(motion, self.model, broken=broken, progress=progress)
 
-    def _judged(self, plan: CompiledPlan) -> FeasibilityReport:
-        return self.evaluate(plan).report
+    def _broken(self, plan: CompiledPlan) -> Float[np.ndarray, " k"]:
+        """Instants [s] at which ``plan`` breaks a limit."""
+        return np.concatenate([[], *(one.broken_at for one in self.evaluate(plan).report.series)])
 
     def departure(self, plan: MotionPlan) -> dict[str, float]:
         """How far ``plan`` is from what was written, at most, by name with unit.
@@ -145,26 +138,25 @@ class FeasibilityChecker:
         plan, model, limits = self._compiled(motion), self.model, self._limits
         path = trajectory_of(plan, model)
         heavy, floor = self._loaded, self.world.worst.friction
-        carried = path if heavy is model else with_load(path, heavy)
-        forces = dynamic.forces_of(path, heavy)
+        carried = path if heavy is model else _with_load(path, heavy)
+        forces = dynamics.forces_of(path, heavy)
         problems, in_flight = (), []
         if isinstance(plan, CompiledPlan):
             problems = plan.problems
-            forces = flight.with_spans(forces, path, plan, model)
-            spans = FlightLimits(friction=FLIGHT_SHARE * floor)
-            in_flight = flight.flight(plan, model, heavy.mass, spans)
-        forces = dynamic.resisted(forces, path, self.world.worst)
-        lag = dynamic.lagging(path, forces, heavy, limits)
+            forces = dynamic_spans.with_spans(forces, path, plan, model)
+            in_flight = dynamic_spans.judged(plan, model, heavy.mass, floor)
+        forces = dynamics.resisted(forces, path, self.world.worst)
+        lag = dynamics.lagging(path, forces, heavy, limits)
         off = tracking.tracking(path, forces, heavy, self.world.worst, limits)
-        com, zero_moment_point = dynamic.support(carried, forces, limits)
+        com, zero_moment_point = dynamics.support(carried, forces, limits)
         if carried is not path:  # the controller feels the load, and shifts the CoM back
-            com = _lesser(com, dynamic.support(path, forces, limits)[0])
+            com = _lesser(com, dynamics.support(path, forces, limits)[0])
         tips = tracking.tipping(carried, forces, zero_moment_point.values[:, 0], heavy, limits)
         slip = friction.slip(path, forces, heavy, limits, floor)
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
-        wrench, load = dynamic.contacts(path, forces, limits)
+        wrench, load = dynamics.contacts(path, forces, limits)
         slides = max(map(slip.worst, LEGS)) > SLIDING * limits.slip
-        lacks = wrench.worst(0, begin=dynamic.SPREAD) > limits.jolt
+        lacks = wrench.worst(0, begin=dynamics.SPREAD) > limits.jolt
         is_lacking = lag.is_broken or (slides and lacks)
         grip = friction.friction(path, forces, heavy, limits, floor)
         landing_place, landing_speed = kinematic.landing(path, model, limits)
@@ -182,15 +174,15 @@ class FeasibilityChecker:
             kinematic.joint_speed(path, model),
             landing_speed,
             kinematic.smoothness(path, limits),
-            zero_moment_point if lag.is_broken else zero_moment_point.excused(),
-            wrench if is_lacking else wrench.excused(),
-            load if slips else load.excused(),
+            zero_moment_point if lag.is_broken else zero_moment_point.downgraded(),
+            wrench if is_lacking else wrench.downgraded(),
+            load if slips else load.downgraded(),
             lag,
             tips,
             off,
-            grip if slips else grip.excused(),
+            grip if slips else grip.downgraded(),
             slip,
-            *dynamic.torque(path, forces, model, limits),
+            *dynamics.torque(path, forces, model, limits),
             *in_flight,
         ]
         end_pose = plan.end_pose if isinstance(plan, CompiledPlan) else None
@@ -247,3 +239,23 @@ def _failed(problem: Problem) -> Series:
     one, times, subjects = np.ones((1, 1)), np.array([problem.time]), (problem.subject,)
     values = problem.miss * one
     return Series(problem.check, "m", subjects, times, values, 0 * one, -one, note=problem.reason)
+
+
+def _loaded(model: RobotModel, world: World) -> RobotModel:
+    """``model`` with the masses of ``world``; the same one if there is nothing to change."""
+    if world.payload == 0.0 and world.mass_scale == 1.0:
+        return model
+    heavy = RobotModel(
+        model.description,
+        armature=np.array(model.pin_model.armature[6:]),
+        foot_radius=model.foot_radius,
+        world=world,
+    )
+    heavy.motor, heavy.torque_limits = model.motor, model.torque_limits
+    return heavy
+
+
+def _with_load(motion: Trajectory, heavy: RobotModel) -> Trajectory:
+    """The same movement with the CoM that the load gives it."""
+    poses = np.hstack([motion.q[:, :3], motion.rpy])
+    return replace(motion, p_com=centres_of_mass(poses, motion.q[:, 7:], heavy))

@@ -14,15 +14,17 @@ from go2_wbc.legs import LEGS
 from go2_wbc.recording import Recording
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
-from motions.assembly import compile_timeline
 from motions.authoring import Motion
-from motions.compiled_plan import LEAST_FEET, CompiledPlan
-from motions.feasibility.dynamic import Forces
+from motions.dynamics.phases import Progress
+from motions.feasibility.forces import Forces
 from motions.feasibility.report import FeasibilityReport
+from motions.language.timeline import Timeline
+from motions.language.timeline_data import NEAREST
+from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan
+from motions.plan.timeline_compiler import Broken, compile_timeline
+from motions.plan.trajectory import Trajectory
 from motions.registry import load_motion
 from motions.saved.plan_file import is_saved_plan, load_plan
-from motions.timeline import Timeline
-from motions.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,12 +73,20 @@ Playable = str | Path | Motion | Timeline | MotionPlan | CheckedMotion
 (with its default parameters), a timeline, a plan, or a motion that was checked before."""
 
 
-def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
+def compile_motion(
+    motion: object,
+    model: RobotModel,
+    *,
+    broken: Broken | None = None,
+    progress: Progress | None = None,
+) -> MotionPlan:
     """The plan of ``motion`` on the robot ``model``; what is compiled already is not done again.
 
     Args:
         motion: a ``Playable``; anything else is refused.
         model: must not be that of a control loop that runs in another thread.
+        broken, progress: as for ``compile_timeline``; ``broken`` is asked for timelines with
+            ``physics="nearest"`` only.
 
     Raises:
         CommandError: for an unknown name, or for what stands for no motion.
@@ -95,7 +105,8 @@ def compile_motion(motion: object, model: RobotModel) -> MotionPlan:
             "motion must be a name of the library, a function with @motion before it, a Timeline, "
             f"a plan or a CheckedMotion, got {motion!r}"
         )
-    return compile_timeline(line, model)
+    asked = broken if line.physics == NEAREST else None
+    return compile_timeline(line, model, broken=asked, progress=progress)
 
 
 def timeline_of(motion: object) -> Timeline | None:

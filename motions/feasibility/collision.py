@@ -34,7 +34,7 @@ from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
-from motions.trajectory import Trajectory
+from motions.plan.trajectory import Trajectory
 
 STRIDE = 4
 """Every fourth sample is looked at, 25 a second: at 1 m/s a link moves 4 cm between two of them."""

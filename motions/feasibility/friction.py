@@ -25,7 +25,8 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
-from motions.feasibility.dynamic import (
+from motions.batch_kinematics import attitudes
+from motions.feasibility.forces import (
     ARM,
     PRESSED,
     TIGHT_FRICTION,
@@ -36,8 +37,7 @@ from motions.feasibility.dynamic import (
 from motions.feasibility.kinematic import FEET
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
-from motions.placement import attitudes
-from motions.trajectory import Trajectory
+from motions.plan.trajectory import Trajectory
 
 FACETS = 16
 """Of the cone."""

@@ -20,9 +20,9 @@ from scipy.spatial import ConvexHull
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
+from motions.batch_kinematics import attitudes
 from motions.feasibility.collision import geometry_of, written
-from motions.placement import attitudes
-from motions.trajectory import Trajectory
+from motions.plan.trajectory import Trajectory
 
 TRUNK_JOINT = 1
 """Pinocchio's number of the base; those of hip, thigh and calf of every leg follow."""

@@ -15,11 +15,12 @@ from go2_wbc.reference import Anchor, MotionPlan, Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from motions.batch_kinematics import attitudes, foot_centres
 from motions.feasibility.hulls import LinkHulls
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
-from motions.tracks import home_poses
-from motions.trajectory import Trajectory, runs
+from motions.plan.trajectory import Trajectory, runs
+from motions.postures import home_poses
 
 JOINTS = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
 FEET = tuple(leg.name for leg in LEGS)
@@ -232,8 +233,4 @@ def ends(
 
 def _feet(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "n 4 3"]:
     """Places [m] of the feet's centres in the frame of the motion."""
-    places = []
-    for leg in LEGS:
-        geometry = LegGeometry.of(model, leg)
-        places.append(motion.placed(foot_places(geometry, motion.q[:, 7:][:, leg.joints])))
-    return np.stack(places, axis=1)
+    return foot_centres(motion.q[:, :3], attitudes(motion.rpy), motion.q[:, 7:], model)

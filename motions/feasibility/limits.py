@@ -1,4 +1,4 @@
-"""Numbers of the feasibility check."""
+"""Limits of the feasibility check; those of solved parts stand in ``dynamic_spans``."""
 
 from __future__ import annotations
 
@@ -117,44 +117,6 @@ class FeasibilityLimits:
     stance_position: float = 0.02
     stance_angle: float = 0.05
     end_speed: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a limit that is not positive."""
-        require_positive(self, *(f.name for f in fields(self)))
-
-
-@dataclass(frozen=True, slots=True)
-class FlightLimits:
-    """What dynamic spans must keep.
-
-    Attributes:
-        step: greatest difference [m, rad] of a state from where the speeds lead.
-        defect: greatest remainder [N, N m] of the equations of motion: 0.3 % of the weight.
-        curve: greatest distance [m, rad] of the curves that are played from the states.
-        pull: greatest force [N] that a foot would need without ground.
-        friction: ratio of tangential and normal force, less than the 0.6 of the controller and of
-            the slipperiest ground that dynamic motions are made for.
-        slip: distance [m] that a standing foot may move, and be off the ground.
-        touchdown: greatest speed [m/s] of a foot that comes down.
-        settling: time [s] on three feet or four in which the trunk comes to its plan, before there
-            are two.
-        balance: longest time [s] on two feet without that: of pairs lifted at once, 0.86 s were
-            done, 40 mm off, and 0.96 s were not.
-        unlike: greatest share by which the mass may differ from that it was solved for: with 2 kg,
-            0.13, a rear is still done, with 4 kg it falls. Of 14 jumps and lifts of the train half
-            that differ by 0.15 to 0.23 all were done, from 0.24 on half of six.
-    """
-
-    step: float = 1e-3
-    defect: float = 0.5
-    curve: float = 0.03
-    pull: float = 1.0
-    friction: float = 0.55
-    slip: float = 0.02
-    touchdown: float = 1.0
-    settling: float = 0.3
-    balance: float = 0.7
-    unlike: float = 0.22
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a limit that is not positive."""

@@ -12,13 +12,17 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.errors import MotionInfeasible
 from go2_wbc.world import World
-from motions.feasibility.departure import Departure
+from motions.feasibility.goal_errors import Departure
 from motions.feasibility.probability import fitted
 
 NOISE = 1e-6
 """A value below this is nothing but rounding, and is shown as 0."""
 SURE = 0.99
 """A chance above this, or below 1 - this, is not told more exactly."""
+SUMS = ("slip",)
+"""Checks whose values add up: what was too much stays so, but is wrong only while it grows."""
+GROWTH = 5e-5
+"""By how much [m] at least from one sample to the next: less is the creep of any movement."""
 STAYS = 1e-3
 """m, rad; a motion that ends nearer than this to where it starts does not go anywhere."""
 
@@ -102,13 +106,22 @@ class Series:
         """Whether any margin is negative."""
         return bool((self.margins < 0.0).any())
 
+    @property
+    def broken_at(self) -> Float[np.ndarray, " k"]:
+        """Instants [s] at which a limit is broken; nan, nothing to check, breaks none."""
+        is_below = self.margins < 0.0
+        if self.check in SUMS:
+            before = np.vstack([np.full((1, self.margins.shape[1]), np.inf), self.margins[:-1]])
+            is_below &= ~(self.margins >= before - GROWTH)
+        return self.times[is_below.any(axis=1)]
+
     def worst(self, column: int, begin: int = 0) -> float:
         """The greatest value of a subject where it was checked, from row ``begin`` on, or 0."""
         is_checked = ~np.isnan(self.margins[:, column])
         is_checked[:begin] = False
         return float(self.values[is_checked, column].max(initial=0.0))
 
-    def excused(self) -> Series:
+    def downgraded(self) -> Series:
         """The same with 0 for negative margins: broken for so short that it does no harm."""
         return replace(self, margins=np.maximum(self.margins, 0.0))
 

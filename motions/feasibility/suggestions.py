@@ -15,8 +15,8 @@ from go2_wbc.errors import CommandError, MotionError, TimelineError
 from motions.feasibility.check import FeasibilityChecker
 from motions.feasibility.checked_motion import Playable, timeline_of
 from motions.feasibility.report import FeasibilityReport
-from motions.keys import BalanceShift
-from motions.timeline import Timeline
+from motions.language.keys import BalanceShift
+from motions.language.timeline import Timeline
 
 
 @dataclass(frozen=True, slots=True)

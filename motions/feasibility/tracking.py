@@ -29,7 +29,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.world import World
-from motions.feasibility.dynamic import (
+from motions.feasibility.forces import (
     VISCOUS,
     Forces,
     errors_of,
@@ -40,7 +40,7 @@ from motions.feasibility.dynamic import (
 )
 from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
-from motions.trajectory import Trajectory
+from motions.plan.trajectory import Trajectory
 
 TRIPOD = 3
 """Standing feet, with one raised."""

@@ -8,25 +8,44 @@ from typing import TypeVar
 
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError
+from go2_wbc.legs import Leg
+from motions import arguments
 from motions.arguments import is_number, positive
-from motions.keys import BODY_CHANNELS, Mark
 from motions.language.clock import BeatClock
-from motions.language.written import Written, distinct
+from motions.language.keys import FootHold, Mark
+from motions.language.timeline_data import TimelineData, distinct
 
 _Line = TypeVar("_Line", bound="Arrangement")
 
 
-class Arrangement(Written):
+class Arrangement(TimelineData):
     """When things happen, and what follows what."""
 
     __slots__ = ()
 
     # --- time -----------------------------------------------------------------------------
 
-    def hold(self: _Line, seconds: float, *, name: str = "") -> _Line:
-        """Stay as it is for this long; ``name`` marks the span for who looks at the result."""
+    def hold(
+        self: _Line, seconds: float, *, name: str = "", foot: Leg | str | None = None
+    ) -> _Line:
+        """Stay as it is for this long.
+
+        Args:
+            seconds: how long.
+            name: marks the span for who looks at the result.
+            foot: a raised one that must be measured at its height meanwhile, for the motion to
+                count as done.
+
+        Raises:
+            TimelineError: for a foot on the ground, or in a span without a name.
+        """
         start, end = self._span(seconds)
         marks = [Mark(start, end, Ease.LINEAR, name)] if name else []
+        if foot is not None:
+            leg = arguments.foot(foot)
+            if leg not in self.raised or not name:
+                raise TimelineError(f"hold(): foot {leg.name} must be raised, and the span named")
+            marks = [FootHold(start, end, Ease.LINEAR, name, leg)]
         return self._longer(marks, end)
 
     def also(self: _Line) -> _Line:
@@ -74,7 +93,7 @@ class Arrangement(Written):
 
     # --- putting motions together ---------------------------------------------------------
 
-    def then(self: _Line, *others: Written) -> _Line:
+    def then(self: _Line, *others: TimelineData) -> _Line:
         """This motion, then the others; each starts in the posture in which the last one ends.
 
         Raises:
@@ -94,7 +113,7 @@ class Arrangement(Written):
             line = replace(line, counted_from=line.end)
         return line
 
-    def together(self: _Line, *others: Written) -> _Line:
+    def together(self: _Line, *others: TimelineData) -> _Line:
         """Do all of ``others`` at the same time, from the cursor on; they may not share a part."""
         line, start = self, self.cursor
         for other in _written("together()", others):
@@ -112,17 +131,13 @@ class Arrangement(Written):
         return replace(self, keys=tuple(key.mirrored for key in self.keys))
 
     def _require_home(self, what: str) -> None:
-        away = [f"body {name}" for name in BODY_CHANNELS if self.body_value(name) != 0.0]
-        away += [f"foot {leg.name}" for leg in sorted(self.raised)]
-        if self.shifted_for:
-            away.append("balance")
-        if away:
-            raise TimelineError(f"{what} needs motions that end at home(); away: {', '.join(away)}")
+        if away := ", ".join(self._away):
+            raise TimelineError(f"{what} needs motions that end at home(); away: {away}")
 
 
-def _written(call: str, others: tuple[Written, ...]) -> tuple[Written, ...]:
+def _written(call: str, others: tuple[TimelineData, ...]) -> tuple[TimelineData, ...]:
     for other in others:
-        if not isinstance(other, Written):
+        if not isinstance(other, TimelineData):
             hint = f"; is it of the library? load_motion({other!r})" if type(other) is str else ""
             raise TimelineError(f"{call} takes timelines, got {other!r}{hint}")
     return others

@@ -9,10 +9,11 @@ from typing import TypeVar
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
-from motions.arguments import is_number, positive, quantity, word
-from motions.easing import EaseWord, easing
-from motions.keys import BODY_CHANNELS, BodyPathKey, Frame, JointKey, LegKey, LegTarget
-from motions.language.moves import Moves
+from motions import arguments
+from motions.arguments import is_number, positive, quantity
+from motions.language.body_and_feet import BodyAndFeet
+from motions.language.easing import EaseWord, easing
+from motions.language.keys import BODY_CHANNELS, BodyPathKey, Frame, JointKey, LegKey, LegTarget
 
 EYES = 0.31
 """Height [m] of the standing trunk's axis, which passes through the head, over the ground."""
@@ -23,7 +24,7 @@ _JOINTS = ("hip", "thigh", "calf")
 _Line = TypeVar("_Line", bound="Shapes")
 
 
-class Shapes(Moves):
+class Shapes(BodyAndFeet):
     """Paths, gaze, single joints."""
 
     __slots__ = ()
@@ -106,7 +107,7 @@ class Shapes(Moves):
         ``leg``, or by ``foot`` in the frame of the body: on its way with the ground it has no
         angles of its own.
         """
-        which = word("foot", leg, Leg.__members__)
+        which = arguments.foot(leg)
         if joint not in _JOINTS:
             raise TimelineError(unknown_name("joint", str(joint), _JOINTS))
         before = [key.target for key in self.in_order(LegKey) if key.leg is which]

@@ -10,10 +10,10 @@ import numpy as np
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
-from motions.arguments import positive, quantity, word
-from motions.keys import BalanceShift, Key, StepKey
-from motions.language.written import SAME, Written
-from motions.step_gaits import (
+from motions import arguments
+from motions.arguments import positive, quantity
+from motions.language.keys import BalanceShift, Key, StepKey
+from motions.language.step_gaits import (
     STEP_GAITS,
     Rhythm,
     StepGait,
@@ -23,6 +23,7 @@ from motions.step_gaits import (
     rhythm_within,
     steps_of,
 )
+from motions.language.timeline_data import SAME, TimelineData
 
 STEP_HEIGHT = 0.05
 """Height [m] of a foot above the ground in the middle of a step: own choice."""
@@ -34,7 +35,7 @@ POINTS = 65
 _Line = TypeVar("_Line", bound="Steps")
 
 
-class Steps(Written):
+class Steps(TimelineData):
     """Where the robot goes."""
 
     __slots__ = ()
@@ -58,7 +59,7 @@ class Steps(Written):
             over: how long the foot is in the air.
             height: of the foot [m] in the middle of its way.
         """
-        which = word("foot", leg, Leg.__members__)
+        which = arguments.foot(leg)
         if which in self.raised:
             raise TimelineError(f"step(): foot {which.name} is raised: put it down() before")
         place = (quantity("x", x), quantity("y", y), quantity("yaw", yaw))

@@ -9,8 +9,10 @@ from typing import Any, TypeVar
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError
 from motions.arguments import positive, quantity
-from motions.easing import backwards
-from motions.keys import (
+from motions.language.arrangement import Arrangement
+from motions.language.clock import SAME, BeatClock
+from motions.language.easing import backwards
+from motions.language.keys import (
     BalanceShift,
     BodyKey,
     BodyPathKey,
@@ -18,12 +20,10 @@ from motions.keys import (
     LegKey,
     LegTarget,
     Mark,
+    PhaseKey,
     PostureKey,
     StepKey,
 )
-from motions.language.arrangement import Arrangement
-from motions.language.clock import SAME, BeatClock
-from motions.phase_key import PhaseKey
 
 _Line = TypeVar("_Line", bound="Transforms")
 _TIMES = ("cursor", "last_start", "floor", "counted_from")

@@ -1,10 +1,7 @@
 """Bow and turn."""
 
-from __future__ import annotations
-
-from motions.authoring import motion
+from motions import Timeline, deg, motion
 from motions.library.bow import bow
-from motions.timeline import Timeline, deg
 
 
 @motion

@@ -1,8 +1,6 @@
 """Dance."""
 
-from __future__ import annotations
-
-from motions.authoring import motion
+from motions import Timeline, motion
 from motions.library.bow import bow
 from motions.library.hula import hula
 from motions.library.push_ups import push_ups
@@ -10,7 +8,6 @@ from motions.library.tap_dance import tap_dance
 from motions.library.twist import twist
 from motions.library.wave import wave
 from motions.library.wiggle import wiggle
-from motions.timeline import Timeline
 
 
 @motion

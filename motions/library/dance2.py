@@ -1,8 +1,6 @@
 """A longer dance."""
 
-from __future__ import annotations
-
-from motions.authoring import motion
+from motions import Timeline, motion
 from motions.library.content import content
 from motions.library.curtsy import curtsy
 from motions.library.hula import hula
@@ -12,7 +10,6 @@ from motions.library.shake_paw import shake_paw
 from motions.library.tap_dance import tap_dance
 from motions.library.wave import wave
 from motions.library.wiggle_hips import wiggle_hips
-from motions.timeline import Timeline
 
 
 @motion

@@ -1,12 +1,9 @@
 """Figure of eight."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 
-from motions.authoring import Range, motion
-from motions.timeline import Timeline, deg
+from motions import Range, Timeline, deg, motion
 
 POINTS = 16
 """Points of the figure that the curve passes."""

@@ -1,12 +1,9 @@
 """Heart."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 
-from motions.authoring import Range, motion
-from motions.timeline import Timeline, deg
+from motions import Range, Timeline, deg, motion
 
 POINTS = 24
 """Points of the heart that the nose passes."""

@@ -1,12 +1,9 @@
 """High five."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from go2_wbc.robot.model import FOOT_RADIUS
-from motions.authoring import Choice, Range, motion
-from motions.timeline import Timeline, deg
+from motions import Choice, Range, Timeline, deg, motion
 
 HEIGHT = 0.64
 """Height [m] above the ground at which the paw's centre is held by default."""
@@ -40,7 +37,7 @@ def high_five(
         .foot("FR", x=0.177, y=0.082, z=up, over=0.6)
         .also()
         .body(roll=deg(-4.0), pitch=deg(-17.2), yaw=deg(-2.9), z=0.026, over=0.6)
-        .hold(hold, name="held")
+        .hold(hold, name="held", foot="FR")
     )
     for _ in range(2):
         right = right.foot("FR", x=0.211, y=0.082, z=up - 0.026, over=0.35)

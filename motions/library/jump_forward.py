@@ -1,9 +1,6 @@
 """Jump forward."""
 
-from __future__ import annotations
-
-from motions.authoring import motion
-from motions.timeline import Timeline
+from motions import Timeline, motion
 
 
 @motion

@@ -1,11 +1,8 @@
 """Knock."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-from motions.authoring import Choice, Range, motion
-from motions.timeline import Timeline
+from motions import Choice, Range, Timeline, motion
 
 
 @motion

@@ -1,11 +1,8 @@
 """Lift a hind leg."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-from motions.authoring import Choice, motion
-from motions.timeline import Timeline
+from motions import Choice, Timeline, motion
 
 
 @motion

@@ -1,11 +1,8 @@
 """Nod."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-from motions.authoring import Range, motion
-from motions.timeline import Timeline, deg
+from motions import Range, Timeline, deg, motion
 
 
 @motion

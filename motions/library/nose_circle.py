@@ -1,12 +1,9 @@
 """Nose circle."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 
-from motions.authoring import Range, motion
-from motions.timeline import Timeline
+from motions import Range, Timeline, motion
 
 POINTS = 12
 """Points of the circle that the curve passes."""

@@ -1,12 +1,9 @@
 """Patrol."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-from motions.authoring import Range, motion
+from motions import Range, Timeline, deg, motion
 from motions.library.look_around import look_around
-from motions.timeline import Timeline, deg
 
 
 @motion

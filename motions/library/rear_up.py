@@ -1,9 +1,6 @@
 """Rear up."""
 
-from __future__ import annotations
-
-from motions.authoring import motion
-from motions.timeline import Timeline, deg
+from motions import Timeline, deg, motion
 
 
 @motion

@@ -1,11 +1,8 @@
 """Salute."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-from motions.authoring import Choice, Range, motion
-from motions.timeline import Timeline, deg
+from motions import Choice, Range, Timeline, deg, motion
 
 
 @motion

@@ -1,8 +1,6 @@
 """Show."""
 
-from __future__ import annotations
-
-from motions.authoring import motion
+from motions import Timeline, deg, motion
 from motions.library.bow import bow
 from motions.library.hula import hula
 from motions.library.moonwalk import moonwalk
@@ -10,7 +8,6 @@ from motions.library.pirouette import pirouette
 from motions.library.salute import salute
 from motions.library.step_dance import step_dance
 from motions.library.wave import wave
-from motions.timeline import Timeline, deg
 
 
 @motion

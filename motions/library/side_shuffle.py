@@ -1,11 +1,8 @@
 """Side shuffle."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-from motions.authoring import Range, motion
-from motions.timeline import Timeline
+from motions import Range, Timeline, motion
 
 
 @motion

@@ -1,12 +1,9 @@
 """Sit pretty."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 from go2_wbc.reference import Posture
-from motions.authoring import Choice, motion
-from motions.timeline import Timeline, deg
+from motions import Choice, Timeline, deg, motion
 
 
 @motion

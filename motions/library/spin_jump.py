@@ -1,11 +1,8 @@
 """Spin jump."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
-from motions.authoring import Choice, motion
-from motions.timeline import Timeline, deg
+from motions import Choice, Timeline, deg, motion
 
 
 @motion

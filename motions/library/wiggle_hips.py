@@ -1,12 +1,9 @@
 """Wiggle the hips."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 
-from motions.authoring import Range, motion
-from motions.timeline import Timeline, deg
+from motions import Range, Timeline, deg, motion
 
 HEAD = 0.25
 """Distance [m] from the middle of the trunk to the point ahead that stays where it is."""

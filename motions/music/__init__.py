@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
+    from motions.music.beat_tracking import Beats, beats
     from motions.music.choreography import Dance, compose, feasible_dance
-    from motions.music.finding import Beats, beats
-    from motions.music.measuring import DancedAccents, danced
-    from motions.music.moves import MOVES, Accent, Move
+    from motions.music.dance_moves import MOVES, Accent, Move
+    from motions.music.dance_timing import DancedAccents, danced
     from motions.music.songs import Song, click_track, made_song
 
 __all__ = [
@@ -33,9 +33,9 @@ __getattr__ = lazy_exports(
     __name__,
     {
         "choreography": ("Dance", "compose", "feasible_dance"),
-        "finding": ("Beats", "beats"),
-        "measuring": ("DancedAccents", "danced"),
-        "moves": ("MOVES", "Accent", "Move"),
+        "beat_tracking": ("Beats", "beats"),
+        "dance_timing": ("DancedAccents", "danced"),
+        "dance_moves": ("MOVES", "Accent", "Move"),
         "songs": ("Song", "click_track", "made_song"),
     },
 )

@@ -15,9 +15,9 @@ from jaxtyping import Float
 from go2_wbc.errors import CommandError, MotionInfeasible, unknown_name
 from motions.feasibility.check import FeasibilityChecker
 from motions.feasibility.checked_motion import CheckedMotion
-from motions.music.finding import Beats
-from motions.music.moves import MOVES, Accent, Move
-from motions.timeline import Timeline
+from motions.language.timeline import Timeline
+from motions.music.beat_tracking import Beats
+from motions.music.dance_moves import MOVES, Accent, Move
 
 LEAD = 0.006
 """How far [s] a dance is written ahead of the song. On the tuning seeds 0 to 9 the trunk turned

@@ -21,8 +21,6 @@ RATE = 22050
 """Samples per second: half of a compact disc's, enough for all that is heard here."""
 LEAD_IN = 0.5
 """Silence [s] before the first beat of a click track."""
-LEAST_BPM, GREATEST_BPM = 40.0, 240.0
-"""Tempi [beats/min] that people count."""
 CLICK_PITCH, ACCENT_PITCH = 1000.0, 1500.0
 """Pitch [Hz] of a click, and of the first one of a bar."""
 BAR = 4

@@ -12,24 +12,25 @@ from typing import Any, Final
 from go2_wbc.errors import MotionFileError, TimelineError, unknown_name
 from go2_wbc.files import checked_output, write_atomically
 from motions.authoring import Motion
-from motions.keys import (
+from motions.language.clock import BeatClock
+from motions.language.keys import (
     BODY_CHANNELS,
     BalanceShift,
     BodyKey,
     BodyPathKey,
+    FootHold,
     Frame,
     JointKey,
     Key,
     LegKey,
     Mark,
+    PhaseKey,
     PostureKey,
     StepKey,
 )
-from motions.language.clock import BeatClock
-from motions.phase_key import PhaseKey
+from motions.language.timeline import Timeline
 from motions.saved.envelope import Format, content_of, fields_of
 from motions.saved.values import Decoder, Encoder, required
-from motions.timeline import Timeline
 
 MOTION_FORMAT: Final = Format("go2_wbc.motion", 1, "a saved motion", ".json")
 KINDS: Final[Mapping[str, type[Key]]] = {
@@ -42,6 +43,7 @@ KINDS: Final[Mapping[str, type[Key]]] = {
     "balance": BalanceShift,
     "phases": PhaseKey,
     "mark": Mark,
+    "foot_hold": FootHold,
 }
 """The kinds of keys by the words that files have for them: a new kind needs a line here."""
 _WORDS: Final[Mapping[type[Key], str]] = {kind: word for word, kind in KINDS.items()}

@@ -14,13 +14,13 @@ from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.kernels.layout import PLAN_CURVES
 from go2_wbc.robot.fingerprint import fingerprint
 from go2_wbc.robot.model import RobotModel
-from motions.compiled_plan import CompiledPlan
-from motions.dynamics.trajectory import UNREADABLE
+from motions.dynamics.dynamic_trajectory import UNREADABLE
 from motions.language.clock import SAME
+from motions.plan.compiled_plan import CompiledPlan
 from motions.saved.envelope import Format, content_of, fields_of
 from motions.saved.values import Decoder, Encoder
 
-PLAN_FORMAT: Final = Format("go2_wbc.plan", 1, "a saved plan", ".plan")
+PLAN_FORMAT: Final = Format("go2_wbc.plan", 2, "a saved plan", ".plan")
 _DESCRIPTION: Final = "description"
 """Name of the JSON text in the archive."""
 _ROBOT, _PLAN = "robot", "plan"
@@ -120,5 +120,7 @@ def _require_sane(plan: CompiledPlan) -> None:
     ends = (0.0, *plan.beats, curves.x[-1])
     if not (np.diff(ends) > -SAME).all():
         raise MotionFileError(f"plan.beats must rise from 0 s to {curves.x[-1]:g} s")
+    if unknown := plan.held.keys() - plan.spans.keys():
+        raise MotionFileError(f"plan.held names {min(unknown)!r:.60}, which is none of its spans")
     if not plan.ramp > 0.0:
         raise MotionFileError(f"plan.ramp must be above 0 s, got {plan.ramp}")

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks import balance, disturbed
 from benchmarks.balance import STUDIES, dropped, heading_force, impulse_at, trots_on
-from benchmarks.locomotion import CONFIG, MASS_RANGE
+from benchmarks.locomotion import MASS_RANGE
 from benchmarks.robots import PUSH_TIME, plant_of
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
@@ -56,7 +56,7 @@ def test_a_trot_holds_a_push_by_a_fifth_harder_than_is_asked(
 ) -> None:
     # With all the weight on the attitude the legs in the air were swung aside, and it fell here.
     angle, impulse = balance.TROT_PUSHES["lateral"]
-    with TrialRobot(plant_of(Trial(seed), 41000, MASS_RANGE), CONFIG) as robot:
+    with TrialRobot(plant_of(Trial(seed), 41000, MASS_RANGE)) as robot:
         assert trots_on(robot, phase, heading_force(side * angle, 1.2 * impulse))
 
 

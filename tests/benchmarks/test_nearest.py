@@ -16,7 +16,7 @@ from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions import FeasibilityChecker, Timeline
-from motions.footing import standing_feet
+from motions.postures import standing_feet
 from tests.go2_wbc.plant.helpers import empty_recording
 from tests.solver import needs_solver
 

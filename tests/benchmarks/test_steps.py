@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.steps import onwards, walk_with_paws
 from go2_wbc.reference import Anchor
-from motions.keys import LegKey, StepKey
+from motions.language.keys import LegKey, StepKey
 
 
 @pytest.mark.parametrize("gait", ["walk", "trot"])

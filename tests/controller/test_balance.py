@@ -15,10 +15,7 @@ from controller.behaviours.standing import (
     trot_against,
 )
 from controller.checks import is_standing
-from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS
-from go2_wbc.planning.locomotion import LocomotionConfig
-from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from tests.controller.plants import PERIOD
@@ -33,7 +30,6 @@ HARDEST_TROTTING = 50.0
 SOFT = 6.0
 # s; in which it stands again.
 LIMIT = 3.0
-BY_MPC = Config(locomotion=LocomotionConfig(mpc=MpcConfig(enabled=True)))
 SNAPSHOT = RobotModel().snapshot(state_of(standing_q()))
 
 
@@ -76,7 +72,7 @@ def test_a_push_that_feet_in_place_cannot_hold_starts_steps(impulse: float, angl
 def test_a_trot_withstands_a_hard_push_ahead(phase: int) -> None:
     # It stood on its feet for as long as at 0.5 m/s, and swung them too late: 4 of 16 phases.
     plant = MujocoPlant(control_period=PERIOD)
-    with GO2Controller(plant=plant, config=BY_MPC) as go2:
+    with GO2Controller(plant=plant) as go2:
         assert go2.stand()
         assert go2.walk()
         go2.move(0.5)

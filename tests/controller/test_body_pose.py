@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 
 from controller import GO2Controller
-from go2_wbc.config import Config
 from go2_wbc.errors import CommandError, ModeError
-from go2_wbc.planning.locomotion import LocomotionConfig
-from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
@@ -27,7 +24,6 @@ JUMP = 1.2
 """Rate of the trunk's attitude [rad/s] that a jump of the reference would exceed."""
 WINDOW = 1.44
 """Time [s] of whole strides."""
-BY_MPC = Config(locomotion=LocomotionConfig(mpc=MpcConfig(enabled=True)))
 
 
 def watch(go2: GO2Controller, seconds: float) -> np.ndarray:
@@ -39,10 +35,9 @@ def watch(go2: GO2Controller, seconds: float) -> np.ndarray:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("config", [Config(), BY_MPC], ids=["QP alone", "MPC"])
-def test_a_trotting_robot_takes_the_pose_and_keeps_its_speed_and_its_way(config: Config) -> None:
+def test_a_trotting_robot_takes_the_pose_and_keeps_its_speed_and_its_way() -> None:
     truth = GroundTruth(MujocoPlant(friction=0.7, seed=17))
-    with GO2Controller(plant=truth, config=config) as go2:
+    with GO2Controller(plant=truth) as go2:
         assert go2.stand()
         assert go2.walk()
         go2.move(SPEED)

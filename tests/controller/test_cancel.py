@@ -15,7 +15,7 @@ from go2_wbc.contacts import ContactSchedule
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
-from motions.compiled_plan import CompiledPlan
+from motions.plan.compiled_plan import CompiledPlan
 from tests.controller.plants import WatchedPlant
 from tests.stepping_plans import LANDING, LIFT_OFF, TAKE_OFF, TOUCHDOWN, hop_plan, step_plan
 

@@ -24,8 +24,8 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
-from motions.placement import configurations
-from motions.tracks import home_poses
+from motions.batch_kinematics import configurations
+from motions.postures import home_poses
 from tests.engine_helpers import state_of
 
 MODEL = RobotModel()
@@ -74,7 +74,7 @@ def test_a_robot_that_still_moves_is_in_no_posture(posture: Posture) -> None:
 def test_a_foot_in_the_air_is_no_posture_on_four_feet(posture: Posture) -> None:
     snapshot = at_rest(posture)
     touching = np.array([True, True, False, True])
-    raised = replace(snapshot, state=replace(snapshot.state, feet_in_contact=touching))
+    raised = snapshot.replaced(state=replace(snapshot.state, feet_in_contact=touching))
     assert not CHECKS[posture](raised)
 
 

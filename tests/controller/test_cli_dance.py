@@ -23,7 +23,7 @@ def song(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A song whose beats are known, not found: what follows needs no extra."""
     clicks = click_track(BPM, SECONDS)
     found = Beats(BPM, clicks.beats, np.ones(len(clicks.beats)), SECONDS, 1.0)
-    monkeypatch.setattr("motions.music.finding.beats", lambda _: found)
+    monkeypatch.setattr("motions.music.beat_tracking.beats", lambda _: found)
     return clicks.save(tmp_path / "song.wav")
 
 

@@ -52,7 +52,7 @@ def quick() -> Timeline:
 def quick(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A motion whose nearest is not known from before."""
     pytest.importorskip("crocoddyl", reason="needs crocoddyl: pip install go2-wbc[dynamics]")
-    monkeypatch.setattr("motions.dynamics.cache.plan_folder", lambda: tmp_path / "plans")
+    monkeypatch.setattr("motions.dynamics.plan_cache.plan_folder", lambda: tmp_path / "plans")
     path = tmp_path / "quick.py"
     path.write_text(QUICK, encoding="utf-8")
     return path

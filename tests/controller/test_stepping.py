@@ -13,7 +13,7 @@ from controller.modes import Mode
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
-from motions.compiled_plan import CompiledPlan
+from motions.plan.compiled_plan import CompiledPlan
 from tests.controller.plants import WatchedPlant
 from tests.stepping_plans import LANDING, TAKE_OFF, hop_plan, step_plan
 

@@ -14,7 +14,7 @@ from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation
 from motions import CompiledPlan, Timeline, compile_timeline
-from motions.dynamics.moves import FOOTPRINT
+from motions.dynamics.phase_builders import FOOTPRINT
 from motions.dynamics.phases import PhaseProblem
 from tests.go2_wbc.plant.helpers import empty_recording
 

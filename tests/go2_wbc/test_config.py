@@ -10,6 +10,9 @@ import pytest
 from controller import GO2Controller
 from go2_wbc.config import Config, load_config, override
 from go2_wbc.errors import ConfigError
+from go2_wbc.planning.command import VelocityEnvelope
+from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.mpc import MpcConfig
 from tests.controller.plants import StillPlant
 
 
@@ -43,9 +46,46 @@ def test_a_file_overrides_what_it_names_and_nothing_else(tmp_path: Path) -> None
     assert config.wbc.swing_foot.kp == (400.0, 401.0, 402.5)
     assert all(type(gain) is float for gain in config.wbc.swing_foot.kp)
     assert config.safety.qp_patience == 3
-    assert config.envelope == default.envelope
+    assert config.envelope is default.envelope is None
     assert config.wbc.body_position == default.wbc.body_position
     assert config.locomotion.swing == default.locomotion.swing
+
+
+def test_an_envelope_that_is_not_configured_is_the_careful_one_beside_hardware(
+    tmp_path: Path,
+) -> None:
+    none = load_config(written(tmp_path, ""))
+    assert none.beside_hardware.envelope == VelocityEnvelope()
+    some = load_config(written(tmp_path, "[envelope]\nforward = 2"))
+    assert some.envelope == VelocityEnvelope(forward=2.0)
+    assert some.beside_hardware == some
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[locomotion.mpc]\nenabled = false", r"MpcConfig.enabled .*every gait are planned ahead"),
+        ("[locomotion]\nload_ramp = 0.02", r"load_ramp .*LocomotionConfig\.mpc\.load_ramp counts"),
+    ],
+)
+def test_a_retired_key_warns_and_changes_nothing(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.warns(FutureWarning, match=message):
+        assert load_config(written(tmp_path, text)) == Config()
+
+
+def test_a_retired_key_that_asks_for_what_there_is_is_taken(tmp_path: Path) -> None:
+    text = "[locomotion]\nload_ramp = 0.03\nmpc = { enabled = true }"
+    assert load_config(written(tmp_path, text)) == Config()
+    assert MpcConfig(enabled=True) == MpcConfig()
+    with pytest.raises(ConfigError, match=r"mpc: enabled must be of type bool, got 1"):
+        load_config(written(tmp_path, "[locomotion.mpc]\nenabled = 1"))
+
+
+def test_who_constructs_with_what_is_retired_is_warned() -> None:
+    with pytest.warns(FutureWarning, match="MpcConfig.enabled"):
+        assert MpcConfig(enabled=False) == MpcConfig()
+    with pytest.warns(FutureWarning, match="LocomotionConfig.load_ramp"):
+        assert LocomotionConfig(load_ramp=0.05) == LocomotionConfig()
 
 
 def test_one_half_of_a_nested_table_may_be_left_out(tmp_path: Path) -> None:
@@ -116,7 +156,8 @@ def test_every_part_is_a_table_that_can_be_overridden() -> None:
     for part in fields(Config):
         value = getattr(Config(), part.name)
         if not isinstance(value, str):
-            assert override(Config(), {part.name: {}}, where="a test") == Config()
+            usual = Config().beside_hardware if value is None else Config()
+            assert override(Config(), {part.name: {}}, where="a test") == usual
 
 
 def test_a_controller_takes_a_file_a_path_or_a_config(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from go2_wbc.legs import LEGS
 ROUNDING = 1e-9  # [s] times of order 10 s in sums of a few terms
 BESIDE = 1e-6  # [s] clearly not the event, and far shorter than any interval here
 TICK = 0.002  # [s] control period of the robot
+TROT = GAITS["trot"]
 
 GRID = 40
 """Phases on a grid, so that two events either coincide or are far apart."""
@@ -231,24 +232,28 @@ def test_a_gait_out_of_range_is_refused(changes: dict[str, Any], message: str) -
 
 
 @pytest.mark.parametrize("gait", GAITS.values(), ids=lambda gait: gait.name)
-def test_a_gait_that_has_a_name_lands_on_four_feet_or_plans_its_forces(gait: Gait) -> None:
+def test_a_gait_knows_whether_it_lands_on_four_feet_and_whether_it_flies(gait: Gait) -> None:
     times = np.arange(0.0, gait.period, 0.001)
     stance = gait.schedule().at_times(times).stance
-    assert gait.needs_mpc or gait.lands_on_four
-    if (~stance).all(axis=1).any():
-        assert gait.needs_mpc
+    assert gait.has_flight == (~stance).all(axis=1).any()
     assert gait.lands_on_four == (gait.name in ("trot", "pronk"))
+
+
+def test_whether_a_gait_needs_its_forces_planned_means_nothing_any_more() -> None:
+    for needs_mpc in (False, True):
+        assert Gait("trot", 0.36, 0.5, (0.5, 0.0, 0.0, 0.5), Stride(), needs_mpc=needs_mpc) == TROT
+    assert replace(replace(TROT, apex=0.05), apex=TROT.apex) == TROT
 
 
 def test_a_stride_gets_shorter_with_the_speed_until_the_foot_cannot() -> None:
     stride = Stride()
-    assert stride.at(0.0) == pytest.approx((0.32, 0.5))
-    assert stride.at(2.0) == pytest.approx((0.30, 1 / 3))
-    assert stride.at(4.0) == pytest.approx((0.32, 0.25))
+    assert stride.at(0.0) == pytest.approx((0.39, 20 / 39))
+    assert stride.at(2.0) == pytest.approx((0.31, 10 / 31))
+    assert stride.at(4.0) == pytest.approx((0.31, 8 / 31))
 
 
 @pytest.mark.parametrize(
-    "changes", [{"stance_min": 0.2}, {"swing_slope": 0.2}, {"reach": 0.0}, {"swing_slope": -0.1}]
+    "changes", [{"stance_min": 0.3}, {"swing_slope": 0.2}, {"reach": 0.0}, {"swing_slope": -0.1}]
 )
 def test_a_stride_without_a_stance_or_a_swing_is_refused(changes: dict[str, float]) -> None:
     with pytest.raises(ConfigError, match="Stride"):

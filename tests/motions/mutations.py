@@ -18,8 +18,16 @@ from go2_wbc.legs import LEGS
 from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline, load_motion, motion_names
-from motions.keys import BalanceShift, BodyKey, Frame, Key, LegKey, LegTarget, StepKey
-from motions.phase_key import PhaseKey
+from motions.language.keys import (
+    BalanceShift,
+    BodyKey,
+    Frame,
+    Key,
+    LegKey,
+    LegTarget,
+    PhaseKey,
+    StepKey,
+)
 
 Mutator = Callable[[Timeline, np.random.Generator], Timeline | None]
 _KeyType = TypeVar("_KeyType", BodyKey, LegKey, BalanceShift)

@@ -18,22 +18,12 @@ from motions import (
     motion_names,
 )
 from motions.authoring import Choice
-from motions.compiler import LEAST_RAMP
-from tests.motions.library.plans import library_plan
+from motions.plan.contact_schedule import LEAST_RAMP
+from tests.motions.plans import library_plan
 
 # Between a difference quotient over 2 ms and the derivative; the curves are smooth.
 DIFFERENCE_TOLERANCE = 2e-2
 STEP = 1e-3
-
-
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
-def checker(model: RobotModel) -> FeasibilityChecker:
-    return FeasibilityChecker(model)
 
 
 def test_there_are_motions_enough_and_each_says_what_it_is() -> None:

@@ -6,14 +6,26 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from go2_wbc.reference import MotionPlan, Posture
+from go2_wbc.curves import Ease, Segment
+from go2_wbc.reference import LegTask, MotionPlan, Posture, TrackedPoint
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import rotation_from_rpy
-from motions.postures import LIE_POSE, SIT_POSE, STAND_POSE, lie_down, rise, sit_down
+from go2_wbc.robot.rotations import angular_velocity_from_rpy, rotation_from_rpy
+from motions.postures import (
+    LIE_POSE,
+    NORMAL_FORCE_MAX,
+    SIT_POSE,
+    STAND_POSE,
+    PosturePlan,
+    lie_down,
+    rise,
+    sit_down,
+)
 
 # m; with 3 cm the leg's determinant is a third of that of a leg that still moves smoothly.
 LEAST_DROP = 0.03
+ROUNDING = 1e-10
 START = np.array([0.02, -0.01, 0.25, 0.05, -0.1, 0.2])
 WAYS: list[tuple[Callable[[np.ndarray], MotionPlan], np.ndarray, Posture]] = [
     (lambda pose: rise(pose, Posture.LIE), STAND_POSE, Posture.STAND),
@@ -62,3 +74,25 @@ def test_a_sitting_robot_keeps_its_rear_feet_below_their_hips_axes() -> None:
 def test_the_stance_in_which_a_rise_starts_is_the_one_that_was_given() -> None:
     for stance in Posture:
         assert rise(START, stance).entry is stance
+
+
+@pytest.mark.parametrize("point", TrackedPoint)
+def test_a_posture_asks_for_its_way_on_four_feet(point: TrackedPoint) -> None:
+    rng = np.random.default_rng(4)
+    start, end = rng.normal(size=(2, 6))
+    way = Segment(start, end, 0.7, Ease.CUBIC)
+    plan = PosturePlan("odd", Posture.LIE, Posture.SIT, point, way)
+    for t in rng.uniform(-0.2, 0.9, size=200).tolist():
+        asked, now = plan.at(t), way.at(t)
+        assert asked.body.point is point
+        assert asked.body.p_world == pytest.approx(now.value[:3], abs=ROUNDING)
+        assert asked.body.v_world == pytest.approx(now.rate[:3], abs=ROUNDING)
+        assert asked.body.a_world == pytest.approx(now.acceleration[:3], abs=ROUNDING)
+        R = Rotation.from_euler("xyz", now.value[3:]).as_matrix()
+        assert asked.body.R_world_base == pytest.approx(R, abs=ROUNDING)
+        w, dw = angular_velocity_from_rpy(now.value[3:], now.rate[3:], now.acceleration[3:])
+        assert asked.body.w_world == pytest.approx(w, abs=ROUNDING)
+        assert asked.body.dw_world == pytest.approx(dw, abs=ROUNDING)
+        assert set(asked.legs) == {LegTask.STANCE}
+        assert (asked.normal_force_max == NORMAL_FORCE_MAX).all()
+        assert not np.concatenate([asked.q_joints, asked.p_world_feet.ravel()]).any()

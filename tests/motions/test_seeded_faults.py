@@ -12,11 +12,6 @@ COUNT, CAUGHT = 60, 58
 
 
 @pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
 def broken(model: RobotModel) -> list[Fault]:
     return faults(model, COUNT)
 

@@ -6,16 +6,18 @@ A sample of ``python -m benchmarks qp_infeasibility``, one seed of each row.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import pytest
 
-from benchmarks.locomotion import CONFIG, MASS_RANGE
+from benchmarks.locomotion import MASS_RANGE
 from benchmarks.qp_infeasibility import STUDIES
 from benchmarks.robots import PUSH_TIME, heading_force, plant_of
 from controller.sweeps.trials import Trial, TrialRobot
+from go2_wbc.config import Config
+from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.mpc import MpcConfig
 
-SAMPLES = [("boxes", 19), ("pushes", 12), ("stops", 17)]
+SAMPLES = [("boxes", 19), ("pushes", 17), ("stops", 8)]
 """Study and seed."""
 CONTRADICTORY = ("pushes", "stops")
 """Where the hard QP has no solution in some ticks; over boxes it had none until feet that stumble
@@ -36,7 +38,7 @@ def test_contradictions_are_answered_and_never_damp_an_upright_robot(name: str, 
     assert values[f"{name}.grave"] <= GRAVE
 
 
-@pytest.mark.parametrize(("seed", "time"), [(2, 2.27), (4, 2.27)])
+@pytest.mark.parametrize(("seed", "time"), [(0, 2.3), (7, 2.3)])
 def test_a_hip_at_its_stop_for_a_moment_does_not_damp_a_robot_that_is_pushed(
     seed: int, time: float
 ) -> None:
@@ -44,8 +46,7 @@ def test_a_hip_at_its_stop_for_a_moment_does_not_damp_a_robot_that_is_pushed(
 
     The attitude keeps its weight, or no hip comes to its stop.
     """
-    mpc = replace(CONFIG.locomotion.mpc, throw_speed=1e9)
-    config = replace(CONFIG, locomotion=replace(CONFIG.locomotion, mpc=mpc))
+    config = Config(locomotion=LocomotionConfig(mpc=MpcConfig(throw_speed=1e9)))
     with TrialRobot(plant_of(Trial(seed), 7100, MASS_RANGE, "imu"), config) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())

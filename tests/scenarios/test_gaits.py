@@ -157,7 +157,7 @@ def test_auto_goes_from_walk_to_flying_trot_and_back_to_rest() -> None:
             assert mean == pytest.approx(speed, rel=SLOW)
         assert go2.walk("trot")
         assert walking.choice is None
-        assert go2.command.linear_x <= VelocityEnvelope().forward * (1.0 + 1e-9)
+        assert go2.command.linear_x <= envelope_of(GAITS["trot"], None).forward * (1.0 + 1e-9)
         assert go2.walk("auto")
         go2.stop()
         go2.wait(1.0)

@@ -16,7 +16,7 @@ from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline
-from motions.timeline import deg
+from motions.language.timeline import deg
 
 ROLL_ERROR = np.radians(1.5)
 HEIGHT_ERROR = 0.010  # [m]

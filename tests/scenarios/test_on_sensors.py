@@ -19,10 +19,6 @@ from benchmarks.unknown_world import (
 )
 from controller import GO2Controller
 from controller.sweeps.trials import Trial
-from go2_wbc.config import Config
-from go2_wbc.planning.command import VelocityEnvelope
-from go2_wbc.planning.locomotion import LocomotionConfig
-from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.plant.sensors import SensorErrors
@@ -34,17 +30,13 @@ SPEED_BAR = 0.03
 """Share of the speed by which its mean may be off."""
 PITCH_BAR = np.radians(0.8)
 """Of the mean error of the pitch, of which the accelerometer's bias makes 0.3 deg."""
-CONFIG = Config(
-    locomotion=LocomotionConfig(mpc=MpcConfig(enabled=True)),
-    envelope=VelocityEnvelope(forward=4.0),
-)
 
 
 @pytest.mark.slow
 def test_a_robot_trots_at_3_metres_a_second_on_its_own_sensors() -> None:
     plant = MujocoPlant(sensors="imu", friction=0.7, seed=7012)
     truth, errors = GroundTruth(plant), list[np.ndarray]()
-    with GO2Controller(plant=truth, config=CONFIG) as go2:
+    with GO2Controller(plant=truth) as go2:
         assert go2.stand()
         assert go2.walk("trot")
         go2.move(SPEED)

@@ -88,7 +88,7 @@ def serve(
         PlantError: if the simulation fails.
     """
     namespace, stop = arguments.namespace(settings.namespace), stop or threading.Event()
-    config = arguments.config(settings.config)
+    config = arguments.config(settings.config).beside_hardware
     switch_interval = sys.getswitchinterval()
     with ExitStack() as stack:
         sys.setswitchinterval(SWITCH_INTERVAL)
@@ -153,7 +153,7 @@ class RobotNode:
             SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
         self._jobs = JobServer(go2)
-        self._velocity = VelocityInput(go2, config.envelope, config.pose)
+        self._velocity = VelocityInput(go2, config.cautious_envelope, config.pose)
         self._poses = PolledSubscription(node, ros.Pose, BODY_POSE, self._take_pose)
         self._twists = PolledSubscription(node, ros.Twist, CMD_VEL, self._take_twist)
         self._commands = (

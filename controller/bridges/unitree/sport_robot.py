@@ -82,7 +82,7 @@ class SportRobot:
 
     def __init__(self, plant: Plant, config: Config) -> None:
         """Take over a robot that lies on the ground."""
-        self._config = config
+        self._config = config = config.beside_hardware
         self._checker = FeasibilityChecker()  # with a model of its own: the loop is another thread
         plans = playable_plans(self._checker.model)
         walks = {api: name for api, name in WALKS.items() if name in GAITS}
@@ -186,7 +186,9 @@ class SportRobot:
         Only in walking mode.
         """
         x, y, turn = command.linear_x, command.linear_y, command.angular_z
-        inside = self._config.envelope.clip(VelocityCommand(x / share, y / share, turn / share))
+        inside = self._config.cautious_envelope.clip(
+            VelocityCommand(x / share, y / share, turn / share)
+        )
         x, y, turn = inside.linear_x, inside.linear_y, inside.angular_z
         followed = VelocityCommand(share * x, share * y, share * turn)
         self.pilot.set_command(followed, self.pose)

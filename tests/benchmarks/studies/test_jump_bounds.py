@@ -19,7 +19,7 @@ from benchmarks.studies.jump_bounds import (
     turn_bound,
 )
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics.limits import PlanLimits
+from motions.dynamics.plan_limits import PlanLimits
 
 MODEL, LIMITS = RobotModel(), PlanLimits()
 MOTOR = MODEL.motor.scaled(LIMITS.torque_share)

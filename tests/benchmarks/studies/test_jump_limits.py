@@ -18,7 +18,7 @@ from go2_wbc.kernels.compilation import CACHE_VARIABLE
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline
 from motions.dynamics import PhaseProblem, Solved
-from motions.dynamics.limits import PlanLimits
+from motions.dynamics.plan_limits import PlanLimits
 from tests.go2_wbc.plant.helpers import empty_recording
 from tests.solver import needs_solver
 
@@ -155,7 +155,7 @@ def test_a_small_climb_is_planned_and_played(
     small = Kind(kind.title, kind.unit, kind.scale, kind.sizes[:2], kind.ask)
     found = climb(small, [])
     assert found.size == 0.2
-    monkeypatch.setattr("motions.dynamics.cache.solve", None)  # what is kept is played
+    monkeypatch.setattr("motions.dynamics.plan_cache.solve", None)  # what is kept is played
     values = jump_limits.measure(Trial(0), "high", found.jump).values
     assert values["high.done"] == 1.0
     assert values["high.reached"] == pytest.approx(values["high.planned"], abs=0.02)

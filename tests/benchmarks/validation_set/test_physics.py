@@ -16,7 +16,7 @@ from controller.sweeps.trials import Trial
 from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
-from motions.problem import Problem
+from motions.plan.compiled_plan import Problem
 
 CLEAN = MotionMeasurement(
     fall=None,

@@ -18,7 +18,7 @@ from benchmarks.validation_set.random_timelines import (
 )
 from go2_wbc.errors import TimelineError
 from motions import Timeline
-from motions.keys import BodyKey
+from motions.language.keys import BodyKey
 
 
 def test_a_sentence_is_the_same_every_time_and_grows() -> None:

@@ -23,9 +23,9 @@ from go2_wbc.errors import CommandError, ModeError
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.robot.rotations import quaternion_from_rpy
-from motions.assembly import compile_timeline
 from motions.authoring import parse_values
 from motions.feasibility.report import FeasibilityReport
+from motions.plan.timeline_compiler import compile_timeline
 from tests.controller.fake_go2 import FakeGo2
 from tests.controller.plants import PERIOD, WatchedPlant
 

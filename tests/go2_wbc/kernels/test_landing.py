@@ -13,7 +13,7 @@ from go2_wbc.planning.playback import Playback, ReadablePlayback
 from go2_wbc.reference import Anchor
 from go2_wbc.robot import rotations
 from go2_wbc.robot.model import RobotModel
-from motions.compiled_plan import CompiledPlan
+from motions.plan.compiled_plan import CompiledPlan
 from tests.engine_helpers import random_state
 from tests.stepping_plans import hop_plan, step_plan
 

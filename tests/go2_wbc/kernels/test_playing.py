@@ -1,4 +1,4 @@
-"""The kernels of play are held to the readable plans and the readable playback."""
+"""The kernels of play are held to the readable playback."""
 
 from __future__ import annotations
 
@@ -8,17 +8,13 @@ import numpy as np
 import pytest
 
 from go2_wbc.contacts import ContactSchedule
-from go2_wbc.curves import Ease, Segment
 from go2_wbc.kernels.playing import exp_rotation, log_rotation
 from go2_wbc.planning.correction import CorrectionConfig
 from go2_wbc.planning.playback import Playback, ReadablePlayback
-from go2_wbc.reference import Anchor, BodyTarget, LegTask, Posture, Reference, TrackedPoint
+from go2_wbc.reference import Anchor, BodyTarget, LegTask, Reference, TrackedPoint
 from go2_wbc.robot import rotations
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
-from motions import compile_motion
-from motions.compiled_plan import CompiledPlan
-from motions.postures import PosturePlan
 from tests.engine_helpers import holding_reference, random_state, standing_q, state_of
 
 MODEL = RobotModel()
@@ -35,28 +31,6 @@ ODD = CorrectionConfig(
     pitch_per_moment=0.019,
 )
 """No two numbers alike, so that one in another's place is seen."""
-
-
-@pytest.mark.parametrize("name", ["high_five", "dance", "wave", "sit_pretty", "tap_dance"])
-def test_a_plan_is_the_readable_one_at_every_instant(name: str) -> None:
-    plan, rng = compile_motion(name, MODEL), np.random.default_rng(3)
-    assert isinstance(plan, CompiledPlan)
-    instants = rng.uniform(-0.3, plan.duration + 0.3, size=400)
-    events = np.add.outer(plan.contacts.times, [-2e-9, -5e-10, 0.0, 5e-10, 2e-9]).ravel()
-    for t in (*instants.tolist(), *events.tolist(), *plan.curves.x[:50].tolist(), plan.duration):
-        ours, theirs = plan.row_at(t), plan.readable_at(t).row
-        np.testing.assert_allclose(ours, theirs, atol=1e-9, rtol=0, err_msg=f"t={t}")
-
-
-@pytest.mark.parametrize("point", TrackedPoint)
-def test_a_posture_is_the_readable_one_at_every_instant(point: TrackedPoint) -> None:
-    rng = np.random.default_rng(4)
-    start, end = rng.normal(size=(2, 6))
-    plan = PosturePlan("odd", Posture.LIE, Posture.SIT, point, Segment(start, end, 0.7, Ease.CUBIC))
-    for t in rng.uniform(-0.2, 0.9, size=200).tolist():
-        theirs = plan.readable_at(t)
-        np.testing.assert_allclose(plan.row_at(t), theirs.row, atol=ROUNDING, rtol=0)
-        assert plan.at(t).legs == theirs.legs
 
 
 def random_reference(rng: np.random.Generator, near: np.ndarray | None) -> Reference:

@@ -23,7 +23,7 @@ NAMES = ("linear_x", "linear_y", "angular_z")
 speeds = st.floats(-1e6, 1e6)
 commands = st.builds(VelocityCommand, speeds, speeds, speeds)
 bounds = st.floats(0.1, 5.0)
-envelopes = st.builds(VelocityEnvelope, bounds, bounds, bounds, bounds)
+envelopes = st.builds(VelocityEnvelope, bounds, bounds, bounds, bounds, bounds)
 
 
 def components(command: VelocityCommand) -> np.ndarray:
@@ -32,7 +32,9 @@ def components(command: VelocityCommand) -> np.ndarray:
 
 def load(envelope: VelocityEnvelope, command: VelocityCommand) -> float:
     x = command.linear_x / (envelope.forward if command.linear_x >= 0 else envelope.backward)
-    return math.hypot(x, command.linear_y / envelope.lateral, command.angular_z / envelope.turning)
+    y, turn = command.linear_y / envelope.lateral, command.angular_z / envelope.turning
+    curve = math.hypot(command.linear_x, command.linear_y) * abs(command.angular_z)
+    return max(math.hypot(x, y, turn), math.sqrt(curve / envelope.curve))
 
 
 @pytest.fixture(scope="module")
@@ -133,5 +135,16 @@ def test_a_share_of_the_envelope_scales_every_bound() -> None:
     half = VelocityEnvelope().scaled(0.5)
     whole = VelocityEnvelope()
     assert half == VelocityEnvelope(
-        whole.forward / 2, whole.backward / 2, whole.lateral / 2, whole.turning / 2
+        whole.forward / 2,
+        whole.backward / 2,
+        whole.lateral / 2,
+        whole.turning / 2,
+        whole.curve / 4,
     )
+
+
+def test_a_fast_curve_is_clipped_to_what_the_floor_holds() -> None:
+    # Inside the ellipsoid, and three of three robots fell at (2, 0.5) m/s and 3 rad/s.
+    envelope = VelocityEnvelope(3.0, 2.0, 1.0, 6.0)
+    x, y, turn = components(envelope.clip(VelocityCommand(2.0, 0.5, 3.0)))
+    assert math.hypot(x, y) * turn == pytest.approx(envelope.curve)

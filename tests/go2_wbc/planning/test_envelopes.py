@@ -9,7 +9,7 @@ import pytest
 
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
-from go2_wbc.planning.envelopes import envelope_of, measured_envelopes
+from go2_wbc.planning.envelopes import FULL, TROT, envelope_of, measured_envelopes
 from go2_wbc.planning.gait_choice import DOWN, DWELL, LADDER, UP, GaitChoice
 
 TICK = 0.02
@@ -22,17 +22,24 @@ def test_every_named_gait_has_a_measured_envelope() -> None:
 
 
 def test_the_default_envelope_of_the_trot_is_inside_what_was_measured() -> None:
-    own, measured = astuple(USUAL), astuple(measured_envelopes()["trot"])
+    own, measured = astuple(TROT), astuple(measured_envelopes()["trot"])
     assert all(a <= b for a, b in zip(own, measured, strict=True))
 
 
-@pytest.mark.parametrize("name", sorted(GAITS))
-def test_an_envelope_keeps_the_trots_distance_to_what_was_measured(name: str) -> None:
+@pytest.mark.parametrize("name", sorted(GAITS.keys() - {"trot"}))
+def test_an_envelope_that_is_configured_scales_those_of_the_other_gaits(name: str) -> None:
     measured = measured_envelopes()
     for trot in (USUAL, VelocityEnvelope(0.5, 0.3, 0.2, 4.0)):
-        shares = np.array(astuple(trot)) / astuple(measured["trot"])
-        expected = shares * astuple(measured[name])
+        expected = np.array(astuple(trot)) / astuple(FULL) * astuple(measured[name])
         assert astuple(envelope_of(GAITS[name], trot)) == pytest.approx(tuple(expected))
+
+
+def test_where_nothing_is_configured_only_the_trot_is_taken_to_what_was_measured_of_it() -> None:
+    # Of the others the edge was measured in one direction at a time, on the true state.
+    own = Gait("mine", 0.4, 0.6, (0.0, 0.5, 0.5, 0.0), envelope_share=0.4)
+    assert envelope_of(GAITS["trot"], None) == TROT
+    for gait in (own, *(gait for gait in GAITS.values() if gait.name != "trot")):
+        assert envelope_of(gait, None) == envelope_of(gait, USUAL)
 
 
 def test_however_fast_the_trot_may_be_the_other_gaits_stay_inside_what_was_measured() -> None:

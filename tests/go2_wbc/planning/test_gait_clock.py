@@ -9,34 +9,76 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from go2_wbc.contacts import GAITS, WIDTH_RATE, Gait
-from go2_wbc.planning.gait_clock import GaitClock, aligned, resting_gait
+from go2_wbc.contacts import GAITS, ContactPhase, Gait
+from go2_wbc.planning.gait_clock import (
+    WIDTH_RATE,
+    Cadence,
+    Clock,
+    GaitForm,
+    adapt,
+    alignment,
+    foot_phase,
+    restart,
+    resting_gait,
+    shifted,
+    time_between,
+)
 
 TICK = 0.002
 SECONDS = 2.0
 JUMP = 0.03  # of a swing's progress in one tick; the fastest swing takes 0.132 s
 
 
+class GaitClock:
+    """A clock and what it is told."""
+
+    def __init__(self, gait: Gait) -> None:
+        self.clock = Clock()
+        self.change(gait)
+        restart(self.clock, self.cadence)
+
+    def change(self, gait: Gait) -> None:
+        self.cadence = Cadence.of(gait)
+
+    @property
+    def gait(self) -> GaitForm:
+        c = self.clock
+        return GaitForm(c.period, c.duty, tuple(c.offsets.tolist()), c.width)
+
+    def adapt(self, dt: float, speed: float, *, is_resting: bool, is_thrown: bool) -> None:
+        adapt(self.clock, self.cadence, dt, speed, is_resting, is_thrown)
+
+    def now(self) -> ContactPhase:
+        phases = [foot_phase(self.clock, leg) for leg in range(4)]
+        return ContactPhase(*map(np.array, zip(*phases, strict=True)))
+
+
+def aligned(offsets: Sequence[float], goal: Sequence[float]) -> tuple[float, ...]:
+    shift = alignment(np.array(offsets), np.array(goal))
+    return tuple(shifted(phase, shift) for phase in offsets)
+
+
 @pytest.mark.parametrize("gait", GAITS.values(), ids=lambda gait: gait.name)
 def test_a_gait_is_reached_from_the_one_at_rest_and_left_again(gait: Gait) -> None:
-    clock = GaitClock(gait, None)
-    assert clock.gait == resting_gait(gait)
+    gait = replace(gait, stride=None)
+    clock = GaitClock(gait)
+    assert clock.gait == GaitForm.of(resting_gait(gait))
     for wanted, is_resting in ((gait, False), (resting_gait(gait), True)):
         run(clock, is_resting=is_resting)
-        assert clock.gait == wanted
+        assert clock.gait == GaitForm.of(wanted)
 
 
 def test_a_gait_that_starts_at_once_is_not_preceded_by_the_trot() -> None:
     flying = Gait("flying", 0.3, 0.4, (0.0, 0.5, 0.5, 0.0))
-    assert GaitClock(flying, None).gait == GAITS["trot"]
+    assert GaitClock(flying).gait == GaitForm.of(GAITS["trot"])
     at_once = replace(flying, starts_at_once=True)
-    assert GaitClock(at_once, None).gait == at_once
+    assert GaitClock(at_once).gait == GaitForm.of(at_once)
 
 
 @pytest.mark.parametrize("gait", GAITS.values(), ids=lambda gait: gait.name)
 def test_no_foot_is_put_back_in_its_stride_while_the_gait_changes(gait: Gait) -> None:
     rng = np.random.default_rng(5)
-    clock = GaitClock(gait, gait.stride)
+    clock = GaitClock(gait)
     phases = []
     for _ in range(6):
         phases += run(clock, seconds=rng.uniform(0.2, 1.0), is_resting=rng.random() < 0.5)
@@ -52,11 +94,11 @@ def test_no_foot_is_put_back_in_its_stride_while_the_gait_changes(gait: Gait) ->
 @pytest.mark.parametrize("there", ["pace", "bound"])
 def test_between_walk_and_pairs_neither_is_walked_at_the_pace_of_the_other(there: str) -> None:
     """A pace or bound at half a second a stride tipped over a pair; a fast walk's swings missed."""
-    gait, walk = GAITS[there], GAITS["walk"]
-    clock = GaitClock(gait, None)
+    gait, walk = replace(GAITS[there], stride=None), GAITS["walk"]
+    clock = GaitClock(gait)
     run(clock, is_resting=False)
     for wanted in (walk, gait):
-        clock.change(wanted, None)
+        clock.change(wanted)
         whole = longest_way(aligned(clock.gait.offsets, wanted.offsets), wanted.offsets)
         for _ in range(int(SECONDS / TICK)):
             run(clock, seconds=TICK, is_resting=False)
@@ -66,7 +108,7 @@ def test_between_walk_and_pairs_neither_is_walked_at_the_pace_of_the_other(there
             left = share if wanted is gait else 1.0 - share
             way = longest_way(now.offsets, wanted.offsets)
             assert way == pytest.approx(left * whole, abs=1e-9)
-        assert clock.gait == wanted
+        assert clock.gait == GaitForm.of(wanted)
 
 
 @pytest.mark.parametrize("there", GAITS.values(), ids=lambda gait: gait.name)
@@ -75,20 +117,20 @@ def test_the_longest_way_of_a_foot_to_another_gait_is_the_shortest_there_is(
     here: Gait, there: Gait
 ) -> None:
     found = longest_way(aligned(here.offsets, there.offsets), there.offsets)
-    shifted = [
-        longest_way(tuple((o + shift) % 1.0 for o in here.offsets), there.offsets)
+    others = [
+        longest_way([(o + shift) % 1.0 for o in here.offsets], there.offsets)
         for shift in np.linspace(0.0, 1.0, 201)
     ]
-    assert found <= min(shifted) + 1e-9
+    assert found <= min(others) + 1e-9
     back = aligned(aligned(here.offsets, there.offsets), here.offsets)
     assert back == pytest.approx(here.offsets)  # the same gait, named otherwise
 
 
 def test_a_walk_becomes_a_flying_trot_without_a_pace() -> None:
     """Its front feet went half a stride, and with both feet of a side together it fell."""
-    clock = GaitClock(GAITS["walk"], None)
+    clock = GaitClock(GAITS["walk"])
     run(clock, is_resting=False)
-    clock.change(GAITS["flying_trot"], None)
+    clock.change(GAITS["flying_trot"])
     for _ in range(int(SECONDS / TICK)):
         run(clock, seconds=TICK, is_resting=False)
         fl, fr, rl, rr = clock.gait.offsets
@@ -99,13 +141,13 @@ def test_a_walk_becomes_a_flying_trot_without_a_pace() -> None:
 
 
 def test_no_foot_notices_that_its_phase_is_named_otherwise() -> None:
-    clock = GaitClock(GAITS["walk"], None)
+    clock = GaitClock(GAITS["walk"])
     run(clock, is_resting=False)
     rng = np.random.default_rng(3)
     for wanted in (*GAITS.values(), *GAITS.values()):
-        clock.time += rng.uniform(0.0, 1.0)
+        clock.clock.time += rng.uniform(0.0, 1.0)
         before = clock.now()
-        clock.change(wanted, None)
+        clock.change(wanted)
         clock.adapt(1e-9, 1.0, is_resting=False, is_thrown=False)
         after = clock.now()
         np.testing.assert_array_equal(after.stance, before.stance)
@@ -114,7 +156,7 @@ def test_no_foot_notices_that_its_phase_is_named_otherwise() -> None:
 
 
 def test_the_feet_come_together_and_apart_without_a_jump() -> None:
-    clock = GaitClock(GAITS["pace"], None)
+    clock = GaitClock(GAITS["pace"])
     widths = [clock.gait.width]
     for is_resting in (False, True):
         for _ in range(int(SECONDS / TICK)):
@@ -126,9 +168,7 @@ def test_the_feet_come_together_and_apart_without_a_jump() -> None:
 
 def test_a_robot_that_is_thrown_lifts_its_feet_sooner_at_once() -> None:
     """At the usual rate it fell over feet that stood on."""
-    stride = GAITS["trot"].stride
-    assert stride is not None
-    usual, thrown = (GaitClock(GAITS["trot"], stride) for _ in range(2))
+    usual, thrown = (GaitClock(GAITS["trot"]) for _ in range(2))
     run(usual, seconds=0.06, is_resting=False)
     run(thrown, seconds=0.06, is_resting=False, is_thrown=True)
     assert usual.gait.duty > 0.46
@@ -145,7 +185,46 @@ def run(
 ) -> list:
     phases = []
     for _ in range(int(seconds / TICK)):
-        clock.time += TICK
+        clock.clock.time += TICK
         clock.adapt(TICK, 2.0, is_resting=is_resting, is_thrown=is_thrown)
         phases.append(clock.now())
     return phases
+
+
+@pytest.mark.parametrize(
+    "gait",
+    [
+        GAITS["trot"],
+        Gait("odd", period=0.37, duty=0.61, offsets=(0.13, 0.58, 0.0, 0.83)),
+        Gait("walk", 0.5, 0.75, (0.0, 0.5, 0.75, 0.25)),
+        Gait("all", 0.4, 1.0, (0.0, 0.0, 0.0, 0.0)),
+    ],
+    ids=lambda gait: gait.name,
+)
+def test_the_gait_is_that_of_the_contact_schedule(gait: Gait) -> None:
+    schedule, clock = gait.schedule(), Clock(period=gait.period, duty=gait.duty)
+    clock.offsets[:] = gait.offsets
+    events = [event + shift for event in schedule.times for shift in (-2e-9, 0.0, 1e-10)]
+    for t in (*np.arange(0.0, 3 * gait.period, 0.0007), *events, *np.add(events, gait.period)):
+        time = max(float(t), 0.0)
+        clock.time, phase = time, schedule.at(time)
+        for leg in range(4):
+            stance, elapsed, remaining = foot_phase(clock, leg)
+            assert stance == phase.stance[leg], (t, leg)
+            assert elapsed == pytest.approx(phase.elapsed[leg], abs=2e-9)
+            assert remaining == pytest.approx(phase.remaining[leg], abs=2e-9)
+
+
+@pytest.mark.parametrize("there", GAITS.values(), ids=lambda gait: gait.name)
+@pytest.mark.parametrize("here", GAITS.values(), ids=lambda gait: gait.name)
+def test_the_time_between_two_gaits_is_that_in_which_one_becomes_the_other(
+    here: Gait, there: Gait
+) -> None:
+    here, there = replace(here, stride=None), replace(there, stride=None)
+    clock, ticks = GaitClock(here), 0
+    run(clock, is_resting=False)
+    clock.change(there)
+    while clock.gait != GaitForm.of(there):
+        run(clock, seconds=1.01 * TICK, is_resting=False)
+        ticks += 1
+    assert ticks * TICK <= time_between(here, there) + 1.5 * TICK

@@ -18,7 +18,7 @@ from go2_wbc.planning.landing import (
 from go2_wbc.planning.playback import Playback, ReadablePlayback
 from go2_wbc.reference import Anchor, LegTask, Reference
 from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
-from motions.compiled_plan import CompiledPlan
+from motions.plan.compiled_plan import CompiledPlan
 from tests.engine_helpers import standing_q, state_of
 from tests.stepping_plans import LANDING, LIFT_OFF, TAKE_OFF, TOUCHDOWN, hop_plan, step_plan
 

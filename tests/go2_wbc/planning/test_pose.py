@@ -13,14 +13,13 @@ from hypothesis import strategies as st
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
-from go2_wbc.planning.compiled import CompiledPlanner
-from go2_wbc.planning.locomotion import LocomotionConfig
+from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.pose import (
     LEVEL,
     BodyPose,
     PoseConfig,
     PoseEnvelope,
-    PosePath,
+    advance_pose,
     pose_turn,
 )
 from go2_wbc.reference import Reference
@@ -74,27 +73,24 @@ def test_a_pose_is_approached_without_a_jump_and_not_overshot(seed: int) -> None
     first, last = (BodyPose(*rng.uniform(-1.0, 1.0, 4) * [0.1, 0.6, 0.6, 0.6]) for _ in range(2))
     config = PoseConfig()
     most = np.array([config.height_rate] + [config.turning_rate] * 3)
-    path = PosePath(config)
+    pose, rate = np.zeros(4), np.zeros(4)
     for target in (first, last):
-        start = path.pose
+        start = pose.copy()
         low, high = np.minimum(start, target.row), np.maximum(start, target.row)
         for _ in range(round(5.0 / TICK)):
-            before = path.rate
-            path.advance(target, TICK)
-            assert (np.abs(path.rate) <= most + EXACT).all()
-            assert (np.abs(path.rate - before) <= config.sharpness * most * TICK + EXACT).all()
-            assert (path.pose >= low - EXACT).all()
-            assert (path.pose <= high + EXACT).all()
-        np.testing.assert_allclose(path.pose, target.row, atol=ARRIVED)
+            before = rate.copy()
+            advance_pose(pose, rate, config, target.row, TICK)
+            assert (np.abs(rate) <= most + EXACT).all()
+            assert (np.abs(rate - before) <= config.sharpness * most * TICK + EXACT).all()
+            assert (pose >= low - EXACT).all()
+            assert (pose <= high + EXACT).all()
+        np.testing.assert_allclose(pose, target.row, atol=ARRIVED)
 
 
-def test_what_comes_is_what_will_be() -> None:
-    path, target = PosePath(PoseConfig()), BodyPose(-0.05, 0.1, -0.1, 0.2)
-    ahead = path.ahead(target, TICK, 40)
-    for pose, rate in ahead:
-        path.advance(target, TICK)
-        np.testing.assert_array_equal(path.pose, pose)
-        np.testing.assert_array_equal(path.rate, rate)
+def turn_of(yaw: float, pose: BodyPose, rate: BodyPose = LEVEL) -> tuple[np.ndarray, np.ndarray]:
+    turn, w = np.empty((2, 3))
+    pose_turn(yaw, pose.row, rate.row, turn, w)
+    return turn, w
 
 
 @given(st.floats(-3.0, 3.0), poses)
@@ -103,7 +99,7 @@ def test_the_turn_of_a_pose_is_that_from_a_level_trunk_with_its_yaw(
 ) -> None:
     level = yaw_rotation(yaw + pose.yaw)
     R = yaw_rotation(yaw) @ rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
-    turn, _ = pose_turn(yaw, pose.row, np.zeros(4))
+    turn, _ = turn_of(yaw, pose)
     np.testing.assert_allclose(turn, log_rotation(R @ level.T), atol=1e-9)
 
 
@@ -117,20 +113,22 @@ def test_the_angular_velocity_of_a_pose_is_the_derivative_of_its_rotation(
         _, roll, pitch, aside = pose.row + t * rate.row
         return yaw_rotation(yaw) @ rotation_from_rpy(roll, pitch, aside)
 
-    _, w = pose_turn(yaw, pose.row, rate.row)
+    _, w = turn_of(yaw, pose, rate)
     derived = log_rotation(rotation(step) @ rotation(-step).T) / (2 * step)
     np.testing.assert_allclose(w, derived, atol=DERIVED)
 
 
 def test_the_reference_of_a_walking_robot_arrives_at_the_pose_and_the_feet_stay() -> None:
     model, asked = RobotModel(), BodyPose(-0.04, 0.1, 0.12, 0.2)
-    planners = [CompiledPlanner(model, GAITS["trot"], LocomotionConfig()) for _ in range(2)]
+    planners = [LocomotionPlanner(model, GAITS["trot"], LocomotionConfig()) for _ in range(2)]
     start = model.snapshot(state_of(standing_q()))
     for planner in planners:
         planner.start(start)
     command = VelocityCommand(0.0, 0.0, 1e-9)
 
-    def reference(planner: CompiledPlanner, pose: BodyPose, tick: int, q: np.ndarray) -> Reference:
+    def reference(
+        planner: LocomotionPlanner, pose: BodyPose, tick: int, q: np.ndarray
+    ) -> Reference:
         return planner.update(model.snapshot(state_of(q, time=tick * TICK)), command, pose)
 
     qs, asks = [standing_q(), standing_q()], (LEVEL, asked)
@@ -146,7 +144,7 @@ def test_the_reference_of_a_walking_robot_arrives_at_the_pose_and_the_feet_stay(
 
 def test_without_a_pose_the_trunk_is_level() -> None:
     model = RobotModel()
-    planner = CompiledPlanner(model, GAITS["trot"], LocomotionConfig())
+    planner = LocomotionPlanner(model, GAITS["trot"], LocomotionConfig())
     start = model.snapshot(state_of(standing_q()))
     planner.start(start)
     reference = planner.update(model.snapshot(state_of(standing_q(), time=TICK)), ZERO_COMMAND)

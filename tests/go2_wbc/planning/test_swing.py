@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.planning.compiled import CompiledPlanner
+from go2_wbc.planning.gait_clock import Clock
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
-from go2_wbc.planning.swing import SwingConfig, swing_foot
+from go2_wbc.planning.swing import Swing, SwingConfig, swing_foot
 from go2_wbc.reference import Reference
 from tests import engine_helpers as helpers
 
@@ -29,8 +29,17 @@ coordinates = st.floats(-0.5, 0.5)
 points = st.tuples(coordinates, coordinates, st.floats(-0.1, 0.1)).map(np.array)
 
 
-def swing(start: np.ndarray, goal: np.ndarray, progress: float) -> tuple[np.ndarray, ...]:
-    return swing_foot(start, goal, progress, DURATION, CONFIG)
+def swing(
+    start: np.ndarray,
+    goal: np.ndarray,
+    progress: float,
+    duration: float = DURATION,
+    delay: float = 0.0,
+) -> tuple[np.ndarray, ...]:
+    begun, clock = Swing(start=start, delay=delay), Clock(period=2.0 * duration, duty=0.5)
+    p, v, a = np.empty((3, 3))
+    swing_foot(begun, clock, CONFIG, progress, goal, p, v, a)
+    return p, v, a
 
 
 @given(points, points)
@@ -93,13 +102,13 @@ def test_a_foot_that_waits_rises_first_and_then_moves_as_any_other(delay: float)
     start, goal = np.random.default_rng(3).uniform(-0.2, 0.2, size=(2, 3))
     span = (1.0 - delay) * DURATION
     for progress in np.linspace(0.0, LAST, 24):
-        p, v, a = swing_foot(start, goal, progress, DURATION, CONFIG, delay)
+        p, v, a = swing(start, goal, progress, delay=delay)
         at_once = swing(start, goal, progress)
         np.testing.assert_allclose([p[2], v[2], a[2]], [part[2] for part in at_once])
         if progress < delay:
             np.testing.assert_array_equal([*p[:2], *v[:2], *a[:2]], [*start[:2], 0, 0, 0, 0])
             continue
-        later = swing_foot(start, goal, (progress - delay) / (1.0 - delay), span, CONFIG)
+        later = swing(start, goal, (progress - delay) / (1.0 - delay), span)
         for found, expected in zip((p, v, a), later, strict=True):
             np.testing.assert_allclose(found[:2], expected[:2], atol=1e-9)
 
@@ -111,18 +120,17 @@ def test_a_goal_that_moves_late_is_still_reached() -> None:
     np.testing.assert_allclose(p[:2], late[:2], atol=1e-9)
 
 
-@pytest.mark.parametrize("kind", [LocomotionPlanner, CompiledPlanner])
 @pytest.mark.parametrize(("apex", "expected"), [(0.04, 0.04), (0.5, SwingConfig().apex)])
 def test_a_gait_may_swing_lower_than_the_others_but_not_higher(
-    kind: type[LocomotionPlanner] | type[CompiledPlanner], apex: float, expected: float
+    apex: float, expected: float
 ) -> None:
     model, tick, trot = helpers.symmetric_model(), 0.002, GAITS["trot"]
     start = model.snapshot(helpers.state_of(helpers.standing_q()))
-    planner = kind(model, replace(trot, apex=apex), LocomotionConfig())
+    planner = LocomotionPlanner(model, replace(trot, apex=apex), LocomotionConfig())
     planner.start(start)
     heights = []
     for n in range(round(trot.period / tick)):
-        now = replace(start, state=replace(start.state, time=n * tick))
+        now = start.replaced(state=replace(start.state, time=n * tick))
         heights.append(planner.update(now, VelocityCommand(0.5)).p_world_feet[:, 2])
     rise = np.max(heights) - start.p_world_feet[:, 2].max()
     assert rise == pytest.approx(expected, abs=2e-3)
@@ -131,28 +139,23 @@ def test_a_gait_may_swing_lower_than_the_others_but_not_higher(
 STUMBLE = 44  # tick at 0.49 of the first swing, whose middle is far from both of its ends
 
 
-def references(
-    kind: type[LocomotionPlanner] | type[CompiledPlanner], *, stumbles: bool
-) -> list[Reference]:
+def references(*, stumbles: bool) -> list[Reference]:
     """Those of a first swing of front left and rear right, in which one may meet something."""
     model, tick, trot = helpers.symmetric_model(), 0.002, GAITS["trot"]
     start = model.snapshot(helpers.state_of(helpers.standing_q()))
-    planner, found = kind(model, trot, LocomotionConfig()), []
+    planner, found = LocomotionPlanner(model, trot, LocomotionConfig()), []
     planner.start(start)
     for n in range(round(trot.swing_time / tick)):
         contact = np.array([stumbles and n == STUMBLE, True, True, False])
         state = replace(start.state, time=n * tick, feet_in_contact=contact)
-        found.append(planner.update(replace(start, state=state), VelocityCommand(0.5)))
+        found.append(planner.update(start.replaced(state=state), VelocityCommand(0.5)))
     return found
 
 
-@pytest.mark.parametrize("kind", [LocomotionPlanner, CompiledPlanner])
-def test_a_foot_that_stumbles_begins_anew_where_it_is_and_leaves_the_other_swing_alone(
-    kind: type[LocomotionPlanner] | type[CompiledPlanner],
-) -> None:
+def test_a_foot_that_stumbles_begins_anew_where_it_is_and_leaves_the_other_swing_alone() -> None:
     # The ground that it tells is rough, for which swings rise higher and go ahead later. The curve
     # of its partner jumped back by 5 cm on the way, and 35 of 60 robots fell over a step of 12 cm.
-    calm, stumbling = references(kind, stumbles=False), references(kind, stumbles=True)
+    calm, stumbling = references(stumbles=False), references(stumbles=True)
     start = helpers.symmetric_model().snapshot(helpers.state_of(helpers.standing_q()))
     for before, after in zip(calm, stumbling, strict=True):
         np.testing.assert_allclose(after.p_world_feet[3], before.p_world_feet[3], atol=EXACT)

@@ -6,14 +6,14 @@ import pytest
 
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics import DynamicTrajectory, PhaseProblem, moves, solve
+from motions.dynamics import DynamicTrajectory, PhaseProblem, phase_builders, solve
 from tests.solver import HAS_SOLVER, IS_REQUIRED
 
 PROBLEMS = {
-    "jump": PhaseProblem(moves.jump(x=-0.3, yaw=0.5)),
-    "hop": PhaseProblem(moves.hop(times=1)),
-    "rear": PhaseProblem(moves.rear()),
-    "lift": PhaseProblem(moves.lift((Leg.FR, Leg.RL))),
+    "jump": PhaseProblem(phase_builders.jump(x=-0.3, yaw=0.5)),
+    "hop": PhaseProblem(phase_builders.hop(times=1)),
+    "rear": PhaseProblem(phase_builders.rear()),
+    "lift": PhaseProblem(phase_builders.lift((Leg.FR, Leg.RL))),
 }
 
 

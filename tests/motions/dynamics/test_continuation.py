@@ -9,12 +9,12 @@ import pytest
 
 from go2_wbc.errors import TimelineError
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics import DynamicTrajectory, PhaseProblem, Solved, audit, moves, solve
+from motions.dynamics import DynamicTrajectory, PhaseProblem, Solved, audit, phase_builders, solve
 from motions.dynamics.continuation import continued
 from tests.motions.dynamics.conftest import PROBLEMS
 
 EXACT = 1e-9
-FARTHER = PhaseProblem(moves.jump(x=-0.33, yaw=0.55))
+FARTHER = PhaseProblem(phase_builders.jump(x=-0.33, yaw=0.55))
 
 
 @pytest.fixture

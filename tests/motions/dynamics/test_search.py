@@ -13,10 +13,10 @@ import pytest
 
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, moves, solve
+from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, phase_builders, solve
 from motions.dynamics.knots import Found, Knots, knots_of, pose_of
-from motions.dynamics.limits import PlanLimits, Weights
 from motions.dynamics.phases import Phase
+from motions.dynamics.plan_limits import PlanLimits, Weights
 from motions.dynamics.solver import _misses
 from tests.motions.dynamics.conftest import PROBLEMS
 from tests.solver import needs_solver
@@ -39,7 +39,7 @@ def hops_round(times: int) -> PhaseProblem:
     for hop in range(times):
         before, after = (ROUND * (hop + step) / times for step in (0, 1))
         up, down = (
-            moves._moved(moves.FOOTPRINT, share, (0.0, 0.0, yaw), z)
+            phase_builders._moved(phase_builders.FOOTPRINT, share, (0.0, 0.0, yaw), z)
             for share, yaw, z in ((1.0, 0.5 * (before + after), 0.12), (1.0, after, 0.0))
         )
         phases += [
@@ -73,10 +73,10 @@ def test_solving_leaves_nothing_behind_whether_or_not_there_is_a_plan(
     tolerance: Tolerance,
 ) -> None:
     """The solver held its callback, and that the search with its solvers: 114 MB a question."""
-    from motions.dynamics import program, search
+    from motions.dynamics import search, shooting_problem
 
     made: list[weakref.ref[object]] = []
-    for module, name in ((program, "Program"), (search, "Search")):
+    for module, name in ((shooting_problem, "ShootingProblem"), (search, "Search")):
 
         class Noted(getattr(module, name)):
             def __init__(self, *args: object, **kwargs: object) -> None:
@@ -93,12 +93,12 @@ def test_solving_leaves_nothing_behind_whether_or_not_there_is_a_plan(
 
 
 def test_a_solution_that_does_not_turn_is_left_for_the_next_start(model: RobotModel) -> None:
-    from motions.dynamics.program import Program
     from motions.dynamics.search import Search
+    from motions.dynamics.shooting_problem import ShootingProblem
 
     knots = knots_of(LIFT, model, PlanLimits())
     soft, full = (
-        Program(knots, model, PlanLimits(), weights)
+        ShootingProblem(knots, model, PlanLimits(), weights)
         for weights in (Weights().softened(), Weights())
     )
 
@@ -131,7 +131,7 @@ def test_the_first_guess_turns_in_the_air_as_far_as_was_asked(
     model: RobotModel, yaw: float
 ) -> None:
     """Headings were taken for the shorter way round: a turn by 360 deg for none."""
-    jump = PhaseProblem(moves.jump(yaw=math.remainder(yaw, ROUND), height=0.3))
+    jump = PhaseProblem(phase_builders.jump(yaw=math.remainder(yaw, ROUND), height=0.3))
     knots = knots_of(with_yaw(jump, yaw), model, PlanLimits())
     turned, flight = headings(knots), ~knots.stance.any(axis=1)
     assert turned[-1] - turned[0] == pytest.approx(yaw)

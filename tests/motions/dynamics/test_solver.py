@@ -13,9 +13,9 @@ from go2_wbc.errors import MissingDependency, PlanNotFound
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
-from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, moves, solve
-from motions.dynamics.limits import PlanLimits
-from motions.dynamics.standing import standing_feet
+from motions.dynamics import DynamicTrajectory, PhaseProblem, Tolerance, phase_builders, solve
+from motions.dynamics.plan_limits import PlanLimits
+from motions.postures import standing_feet
 from tests.motions.dynamics.conftest import PROBLEMS
 
 DEFECT = 1e-6  # N, N m: rounding of sums of forces of 1e3 N
@@ -65,7 +65,7 @@ def test_torques_stay_below_the_motors_line(plan: DynamicTrajectory, model: Robo
 
 def test_torques_meet_the_motors_line_until_the_end_of_a_step(model: RobotModel) -> None:
     """A torque holds through its step; bounded by the speed in its middle it asked 2.05 there."""
-    plan = solve(PhaseProblem(moves.jump(yaw=math.radians(90.0), height=0.12)), model)
+    plan = solve(PhaseProblem(phase_builders.jump(yaw=math.radians(90.0), height=0.12)), model)
     limits = PlanLimits()
     middle = 0.5 * (plan.v[:-1, 6:] + plan.v[1:, 6:])
     assert 0.9 < model.motor.share(plan.tau, plan.v[1:, 6:]).max() <= AGREED * limits.end_share
@@ -136,7 +136,7 @@ def test_progress_is_told_and_a_budget_kept(
 
 
 def test_a_near_miss_is_no_plan(plans: dict[str, DynamicTrajectory], model: RobotModel) -> None:
-    problem = PhaseProblem(moves.lift(), tolerance=Tolerance(position=1e-6))
+    problem = PhaseProblem(phase_builders.lift(), tolerance=Tolerance(position=1e-6))
     with pytest.raises(PlanNotFound, match=r"nearest one is off") as caught:
         solve(problem, model)
     assert any("trunk at" in reason or "foot at" in reason for reason in caught.value.reasons)

@@ -16,11 +16,6 @@ _UNLOADED = 1e-3
 
 
 @pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker()
-
-
-@pytest.fixture(scope="module")
 def high_five(checker: FeasibilityChecker) -> CheckedMotion:
     return checker.evaluate(load_motion("high_five"))
 

@@ -17,15 +17,10 @@ from motions.feasibility import collision
 from motions.feasibility.collision import SLACK, STRIDE, SelfCollision, self_distance
 from motions.feasibility.hulls import hulls_of
 from motions.feasibility.limits import FeasibilityLimits
-from motions.trajectory import trajectory_of
+from motions.plan.trajectory import trajectory_of
 from tests.engine_helpers import standing_q
 
 TOLERANCE = 2e-6  # m; twice what GJK and EPA leave: where they stop depends on where they start
-
-
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
 
 
 @pytest.fixture(scope="module")

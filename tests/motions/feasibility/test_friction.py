@@ -12,7 +12,7 @@ from go2_wbc.kernels.loads import lag, least_friction, slide
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, deg
-from motions.feasibility.dynamic import numbers_of, scale_of_wrench, state_at
+from motions.feasibility.forces import numbers_of, scale_of_wrench, state_at
 from motions.feasibility.friction import CREEP, HELD, cone, creep, slip
 from motions.feasibility.limits import FeasibilityLimits
 from tests.engine_helpers import standing_q, state_of
@@ -20,16 +20,6 @@ from tests.engine_helpers import standing_q, state_of
 BISECTION = 1.5 / 2**7  # what is left of the interval
 INSIDE = 0.02  # of a cone whose pyramid of 16 facets lies inside of it
 TOLERANCE = 0.05  # N; of the wrench
-
-
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
-def checker(model: RobotModel) -> FeasibilityChecker:
-    return FeasibilityChecker(model)
 
 
 def least(model: RobotModel, forces: np.ndarray) -> float:

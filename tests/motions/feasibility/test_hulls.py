@@ -11,18 +11,13 @@ import pytest
 
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, compile_timeline, deg
+from motions.batch_kinematics import configurations
 from motions.feasibility.collision import SelfCollision
 from motions.feasibility.hulls import FAR, LinkHulls
-from motions.placement import configurations
-from motions.trajectory import Trajectory, trajectory_of
+from motions.plan.trajectory import Trajectory, trajectory_of
 
 EXACT = 1e-9  # m; rounding of sums
 GJK = 1e-5  # m; where Coal stops
-
-
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
 
 
 @pytest.fixture(scope="module")

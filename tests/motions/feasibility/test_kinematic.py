@@ -15,12 +15,7 @@ from motions.feasibility.collision import SelfCollision
 from motions.feasibility.hulls import LinkHulls
 from motions.feasibility.kinematic import clearance, ends, joint_position
 from motions.feasibility.limits import FeasibilityLimits
-from motions.trajectory import Trajectory, trajectory_of
-
-
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
+from motions.plan.trajectory import Trajectory, trajectory_of
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,6 @@ from motions import FeasibilityChecker, FeasibilityReport, Timeline, deg
 from motions.feasibility.tracking import resistance
 
 
-@pytest.fixture(scope="module")
-def checker() -> FeasibilityChecker:
-    return FeasibilityChecker()
-
-
 def to_and_fro(channel: str, size: float, over: float, times: int = 1) -> Timeline:
     line = Timeline()
     for _ in range(times):

@@ -11,10 +11,10 @@ import pytest
 from go2_wbc.curves import Ease
 from go2_wbc.errors import CommandError, MotionInfeasible
 from motions import FeasibilityChecker
-from motions.keys import BodyKey, LegKey
+from motions.language.keys import BodyKey, LegKey
 from motions.music import MOVES, Beats, compose, feasible_dance
 from motions.music.choreography import LEAD, pulses_of
-from motions.music.moves import Strokes
+from motions.music.dance_moves import Strokes
 
 CHECKER = FeasibilityChecker()
 TEMPI = (55.0, 83.0, 110.0, 139.0, 176.0)

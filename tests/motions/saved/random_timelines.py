@@ -12,7 +12,7 @@ from go2_wbc.errors import TimelineError
 from go2_wbc.legs import Leg
 from go2_wbc.reference import Posture
 from motions import Timeline
-from motions.keys import BODY_CHANNELS
+from motions.language.keys import BODY_CHANNELS
 
 MANY = 60  # keys; repeating a repetition makes more and more of them
 Call = Callable[[Timeline], Timeline]

@@ -27,7 +27,7 @@ from motions import (
     save_plan,
 )
 from tests.motions.doctored import with_body_aside
-from tests.motions.library.plans import library_plan
+from tests.motions.plans import library_plan
 
 MODEL = RobotModel()
 LEAN = Timeline(name="lean").body(roll=0.05, over=0.4).hold(0.2, name="held").home(over=0.4)
@@ -71,6 +71,21 @@ def test_every_motion_of_the_library_plays_the_same_row_for_row(tmp_path: Path, 
     require_same(load_plan(save_plan(plan, tmp_path / "a.plan", model=MODEL), model=MODEL), plan)
 
 
+def test_a_foot_that_must_be_held_up_is_still_known(tmp_path: Path) -> None:
+    plan = library_plan("high_five")
+    again = load_plan(save_plan(plan, tmp_path / "a.plan", model=MODEL), model=MODEL)
+    assert again.held_feet == plan.held_feet
+    assert len(again.held_feet) == 1
+
+
+def test_a_plan_of_version_1_which_says_nothing_of_feet_held_up_is_read(file: Path) -> None:
+    def older(description: dict[str, Any]) -> None:
+        description["version"] = 1
+        del description["plan"]["held"]
+
+    assert load_plan(changed(file, older)).held_feet == ()
+
+
 def test_what_could_not_be_done_as_written_is_still_known(tmp_path: Path) -> None:
     far = Timeline().foot("FR", x=0.6, z=0.3, over=1.0).home(over=1.0)
     plan = compile_timeline(far, MODEL)
@@ -94,11 +109,12 @@ def test_a_plan_for_another_robot_is_refused(file: Path) -> None:
     ("change", "message"),
     [
         (lambda d: d.update(format="go2_wbc.motion"), "is not a saved plan: .* not 'go2_wbc.mot"),
-        (lambda d: d.update(version=9, go2_wbc="3.0"), "version 9 .* by go2_wbc 3.0; .* version 1"),
+        (lambda d: d.update(version=9, go2_wbc="3.0"), "version 9 .* by go2_wbc 3.0; .* version 2"),
         (lambda d: d.pop("robot"), r"another robot \(None"),
         (lambda d: d.pop("plan"), "plan must be an object, got None"),
         (lambda d: d["plan"].pop("ramp"), "plan lacks ramp"),
         (lambda d: d["plan"].update(ramp=0.0), "plan.ramp must be above 0 s"),
+        (lambda d: d["plan"].update(held={"up": "FL"}), "plan.held names 'up', which is none of"),
         (lambda d: d["plan"].update(wings=4), "plan: unknown field 'wings'; valid: beats"),
         (lambda d: d["plan"]["curves"]["c"].update(array="b"), "the array 'b', which is not there"),
         (lambda d: d["plan"]["contacts"].update(times=[0.0, 0.0]), "need increasing times"),

@@ -1,0 +1,73 @@
+"""Where feet are put down: below the hips, ahead by half of what the trunk travels meanwhile.
+
+Raibert (Legged Robots That Balance, 1986, ch. 2): a foot that is put down ``v T / 2`` ahead of its
+hip is below it in the middle of the stance time ``T``, so it neither speeds the trunk up nor slows
+it down; ``k (v - v_ref)`` more takes out the velocity error.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.compilation import subroutine
+from go2_wbc.planning.ground import ground_at
+from go2_wbc.planning.trunk import heading, world_velocity
+from go2_wbc.planning.walk import Planner, Walk
+from go2_wbc.robot.snapshot import Snapshot
+
+_TINY = 1e-9
+"""Length [m] that stands in for zero where one divides by it."""
+
+
+@subroutine
+def nominal_feet(
+    now: Snapshot, s: Planner, c: Walk, width: float, feet: Float[np.ndarray, "4 2"]
+) -> None:
+    """Fill the points [m] on the ground below the hips of a level trunk with the measured heading.
+
+    A payload moves them as it does the CoM, which so stays above the feet's middle.
+    """
+    yaw = heading(now) - s.trunk.pose[3]
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    for leg in range(4):
+        x, y = c.p_base_feet_nominal[leg, 0], width * c.p_base_feet_nominal[leg, 1]
+        feet[leg, 0] = now.q[0] + cosine * x - sine * y + now.com_shift[0]
+        feet[leg, 1] = now.q[1] + sine * x + cosine * y + now.com_shift[1]
+
+
+@subroutine
+def foothold(
+    leg: int,
+    now: Snapshot,
+    s: Planner,
+    c: Walk,
+    nominal: Float[np.ndarray, "4 2"],
+    remaining: float,
+    goal: Float[np.ndarray, "3"],
+) -> None:
+    """Fill the touchdown point [m]: ``p_hip + v t + v T / 2 + k (v - v_ref) - (h / g) w x v_ref``.
+
+    ``t`` is the ``remaining`` time [s] of the swing, in which the hip moves on, ``T`` the stance
+    time. Besides with ``v``, that of the CoM, the hips move on circles about the base, by ``w t``
+    and ``w T / 2``: along their tangents the feet of a turn at 6 rad/s went 5 cm outside of them in
+    mid-swing. In a curve a trunk of height ``h`` needs the force ``m w x v_ref``, whose moment
+    about the CoM the feet balance that much farther outside. The last three terms together are
+    clipped to ``foothold_reach``.
+    """
+    ref_x, ref_y = world_velocity(s.trunk)
+    rate, gain = s.trunk.velocity[2], c.config.velocity_feedback
+    arm_x, arm_y = nominal[leg, 0] - now.q[0], nominal[leg, 1] - now.q[1]
+    v_x, v_y, half = now.v_world_com[0], now.v_world_com[1], s.clock.duty * s.clock.period / 2
+    cosine, sine = np.cos(rate * remaining), np.sin(rate * remaining)
+    hip_x, hip_y = cosine * arm_x - sine * arm_y, sine * arm_x + cosine * arm_y
+    cosine, sine = np.cos(rate * half), np.sin(rate * half)
+    lean = rate * c.height / c.gravity
+    x = cosine * hip_x - sine * hip_y - hip_x + v_x * half
+    y = sine * hip_x + cosine * hip_y - hip_y + v_y * half
+    x += gain * (v_x - ref_x) + lean * ref_y
+    y += gain * (v_y - ref_y) - lean * ref_x
+    share = min(1.0, c.config.foothold_reach / max(np.hypot(x, y), _TINY))
+    goal[0] = now.q[0] + hip_x + x * share + v_x * remaining
+    goal[1] = now.q[1] + hip_y + y * share + v_y * remaining
+    goal[2] = ground_at(s.ground, goal[0], goal[1]) + c.foot_radius

@@ -1,0 +1,289 @@
+"""The forces of a gait, planned ahead: from where the trunk and the feet shall go to a reference.
+
+The MPC (``planning.mpc``) looks at the command as it will be ramped, at the feet that stand where
+they are, and at those that come down where their footholds are planned. Lever arms are taken from
+the measured CoM on its wanted way: taken from the reference, which may run ahead of the robot, they
+make it drift aside. One that a push throws goes on as it is thrown, and slows down: thrown to 3.7
+m/s and taken for one that trots at 0.5, it would have its next feet 0.4 m too far ahead, and be
+tipped by forces planned for these. Between two solutions the forces of the first node are kept, and
+the trunk's acceleration that the whole-body controller is given is what they make of the feet that
+stand now.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.algebra.active_set import SOLVED
+from go2_wbc.algebra.linear import solve_linear
+from go2_wbc.algebra.vectors import cross, plus, triple
+from go2_wbc.compilation import subroutine
+from go2_wbc.contacts import TIE
+from go2_wbc.planning.footholds import foothold, nominal_feet
+from go2_wbc.planning.gait_clock import Clock
+from go2_wbc.planning.ground import ground_at, tilt
+from go2_wbc.planning.mpc import NODES, solve_mpc
+from go2_wbc.planning.pose import advance_pose, pose_turn
+from go2_wbc.planning.trunk import Command, ramp
+from go2_wbc.planning.walk import Planner, Walk
+from go2_wbc.reference import LegTask, Target
+from go2_wbc.robot.snapshot import Snapshot
+
+_STANCE = float(LegTask.STANCE)
+
+
+@subroutine
+def inertia_about_com(now: Snapshot, inertia: Float[np.ndarray, "3 3"]) -> None:
+    """Fill the inertia [kg m^2] of the robot as it is, about its CoM, world axes."""
+    R, M = now.R_world_base, now.mass_matrix
+    c, about = np.empty(3), np.empty((3, 3))
+    for i in range(3):
+        c[i] = 0.0
+        for k in range(3):
+            c[i] += R[k, i] * (now.p_world_com[k] - now.q[k])
+    square = c[0] * c[0] + c[1] * c[1] + c[2] * c[2]
+    for i in range(3):
+        for k in range(3):
+            moved = -c[i] * c[k]
+            if i == k:
+                moved += square
+            about[i, k] = M[3 + i, 3 + k] - M[0, 0] * moved
+    for i in range(3):
+        for k in range(3):
+            inertia[i, k] = 0.0
+            for a in range(3):
+                for b in range(3):
+                    inertia[i, k] += R[i, a] * about[a, b] * R[k, b]
+
+
+@subroutine
+def turn_from(now: Snapshot, yaw: float, turn: Float[np.ndarray, "3"]) -> None:
+    """Fill log(R R_ref') for the reference that is level and has the heading ``yaw``."""
+    R, E = now.R_world_base, np.empty((3, 3))
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    for i in range(3):
+        E[i, 0] = R[i, 0] * cosine - R[i, 1] * sine
+        E[i, 1] = R[i, 0] * sine + R[i, 1] * cosine
+        E[i, 2] = R[i, 2]
+    turn[0] = (E[2, 1] - E[1, 2]) / 2
+    turn[1] = (E[0, 2] - E[2, 0]) / 2
+    turn[2] = (E[1, 0] - E[0, 1]) / 2
+    length = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    angle = np.arctan2(length, (E[0, 0] + E[1, 1] + E[2, 2] - 1) / 2)
+    # x / sin x = 1 + x^2 / 6 + ...
+    turn *= angle / length if length > 1e-6 else 1.0 + angle * angle / 6
+
+
+@subroutine
+def fill_goals(s: Planner, c: Walk, command: Command, goals: Float[np.ndarray, "nodes 12"]) -> None:
+    """Pose and rate wanted at the end of each node: the command ramped and integrated."""
+    config, step, velocity = c.config, c.config.mpc.step, s.trunk.velocity.copy()
+    yaw, x, y = s.trunk.yaw, s.trunk.position[0], s.trunk.position[1]
+    a, b = tilt(s.ground, config.ground)
+    steep = np.hypot(a, b)
+    share = np.arctan(steep) / steep if steep > 0.0 else 1.0
+    goals[:] = 0.0
+    for k in range(NODES):
+        ramp(velocity, command, config.linear_acceleration, config.angular_acceleration, step)
+        yaw += velocity[2] * step
+        cosine, sine = np.cos(yaw), np.sin(yaw)
+        goals[k, 9] = cosine * velocity[0] - sine * velocity[1]
+        goals[k, 10] = sine * velocity[0] + cosine * velocity[1]
+        x += goals[k, 9] * step
+        y += goals[k, 10] * step
+        goals[k, 2], goals[k, 8] = yaw - s.trunk.yaw, velocity[2]
+        goals[k, 3], goals[k, 4] = x, y
+        goals[k, 0], goals[k, 1] = share * b, -share * a
+        goals[k, 5] = ground_at(s.ground, x, y) + c.height + s.trunk.height_offset
+        goals[k, 11] = s.ground.slope[0] * goals[k, 9] + s.ground.slope[1] * goals[k, 10]
+
+
+@subroutine
+def lean_goals(s: Planner, c: Walk, command: Command, goals: Float[np.ndarray, "nodes 12"]) -> None:
+    """Add to the goals of a level trunk the pose on its way."""
+    pose, rate = s.trunk.pose.copy(), s.trunk.pose_rate.copy()
+    turn, w = np.empty(3), np.empty(3)
+    for k in range(NODES):
+        advance_pose(pose, rate, c.config.pose, command.pose, c.config.mpc.step)
+        pose_turn(s.trunk.yaw + goals[k, 2], pose, rate, turn, w)
+        goals[k, 2] += pose[3] - s.trunk.pose[3]
+        goals[k, 5] += pose[0]
+        goals[k, 11] += rate[0]
+        for i in range(3):
+            goals[k, i] += turn[i]
+            goals[k, 6 + i] += w[i]
+
+
+@subroutine
+def fill_contacts(
+    clock: Clock,
+    step: float,
+    share: Float[np.ndarray, "nodes 4"],
+    landings: Float[np.ndarray, "nodes 4"],
+) -> None:
+    """Share of each node that each foot stands, and in how many strides it will have landed for it.
+
+    The latter is at most 0 for a foot that stands there now.
+    """
+    period, duty = clock.period, clock.duty
+    span = step / period
+    for leg in range(4):
+        first = (clock.time / period - clock.offsets[leg] + TIE) % 1.0 - TIE
+        for k in range(NODES):
+            phase = first + k * span
+            stride = np.floor(phase + TIE)
+            inside = phase - stride
+            standing = max(min(inside + span, duty) - inside, 0.0)
+            again = max(min(inside + span - 1.0, duty), 0.0)
+            share[k, leg] = min((standing + again) / span, 1.0)
+            if not (inside < duty - TIE or duty >= 1.0):
+                landings[k, leg] = stride + 1.0 - first
+            elif stride == 0.0 or duty >= 1.0:
+                landings[k, leg] = 0.0
+            else:
+                landings[k, leg] = stride - first
+
+
+@subroutine
+def excess_velocity(now: Snapshot, s: Planner, c: Walk) -> tuple[float, float]:
+    """What the CoM has beyond the wanted velocity and the margin [m/s]."""
+    cosine, sine, v = np.cos(s.trunk.yaw), np.sin(s.trunk.yaw), s.trunk.velocity
+    x = now.v_world_com[0] - cosine * v[0] + sine * v[1]
+    y = now.v_world_com[1] - sine * v[0] - cosine * v[1]
+    speed = np.hypot(x, y)
+    share = max(0.0, 1.0 - c.config.stride_margin / max(speed, TIE))
+    return share * x, share * y
+
+
+@subroutine
+def fill_arms(
+    now: Snapshot,
+    s: Planner,
+    c: Walk,
+    goals: Float[np.ndarray, "nodes 12"],
+    landings: Float[np.ndarray, "nodes 4"],
+    arms: Float[np.ndarray, "nodes 4 3"],
+) -> None:
+    """From the CoM in the middle of each node to the contact points [m].
+
+    A foot that comes down once more is then below its hip in the middle of its stance.
+    """
+    period, duty, step = s.clock.period, s.clock.duty, c.config.mpc.step
+    fading, com = c.config.mpc.throw_time, triple(now.p_world_com)
+    base = plus((now.q[0], now.q[1], now.q[2]), triple(now.com_shift))
+    nominal, goal, footholds = np.empty((4, 2)), np.empty(3), np.empty((4, 2))
+    nominal_feet(now, s, c, s.clock.width, nominal)
+    for leg in range(4):
+        remaining = max(landings[0, leg], 0.0) * period
+        foothold(leg, now, s, c, nominal, remaining, goal)
+        footholds[leg] = goal[:2]
+    here_x, here_y = s.trunk.position[0], s.trunk.position[1]
+    before_x, before_y = here_x, here_y
+    excess_x, excess_y = excess_velocity(now, s, c)
+    for k in range(NODES):
+        left = np.exp(-(k + 0.5) * step / fading)
+        thrown = fading * (1.0 - left)
+        way_x = (before_x + goals[k, 3]) / 2 - here_x + excess_x * thrown
+        way_y = (before_y + goals[k, 4]) / 2 - here_y + excess_y * thrown
+        before_x, before_y = goals[k, 3], goals[k, 4]
+        rate = goals[k, 8]
+        for leg in range(4):
+            wait = landings[k, leg] * period
+            arm = arms[k, leg]
+            if landings[k, leg] == 0.0:
+                foot = now.p_world_feet[leg]
+                arm[0] = foot[0] - com[0] - way_x
+                arm[1] = foot[1] - com[1] - way_y
+                arm[2] = foot[2] - com[2] - c.foot_radius
+            elif landings[k, leg] < 1.0 - duty + TIE:
+                arm[0] = footholds[leg, 0] - com[0] - way_x
+                arm[1] = footholds[leg, 1] - com[1] - way_y
+                arm[2] = ground_at(s.ground, footholds[leg, 0], footholds[leg, 1]) - com[2]
+            else:
+                yaw = s.trunk.yaw + rate * wait
+                cosine, sine = np.cos(yaw), np.sin(yaw)
+                x = c.p_base_feet_nominal[leg, 0]
+                y = s.clock.width * c.p_base_feet_nominal[leg, 1]
+                hip_x, hip_y = cosine * x - sine * y, sine * x + cosine * y
+                early = duty * period / 2 + wait - (k + 0.5) * step
+                v_x, v_y = goals[k, 9] + excess_x * left, goals[k, 10] + excess_y * left
+                arm[0] = base[0] - com[0] + hip_x + (v_x - rate * hip_y) * early
+                arm[1] = base[1] - com[1] + hip_y + (v_y + rate * hip_x) * early
+                arm[2] = ground_at(s.ground, com[0] + arm[0], com[1] + arm[1]) - com[2]
+
+
+@subroutine
+def look_ahead(
+    now: Snapshot,
+    s: Planner,
+    c: Walk,
+    command: Command,
+    state: Float[np.ndarray, "12"],
+    goals: Float[np.ndarray, "nodes 12"],
+    share: Float[np.ndarray, "nodes 4"],
+    arms: Float[np.ndarray, "nodes 4 3"],
+) -> None:
+    """Fill what the MPC looks at; see ``solve_mpc``."""
+    turn, w = np.empty(3), now.v[3:6]
+    turn_from(now, s.trunk.yaw + s.trunk.pose[3], turn)
+    for i in range(3):
+        state[i], state[3 + i] = turn[i], now.p_world_com[i]
+        state[6 + i], state[9 + i] = 0.0, now.v_world_com[i]
+        for k in range(3):
+            state[6 + i] += now.R_world_base[i, k] * w[k]
+    landings = np.empty((NODES, 4))
+    fill_goals(s, c, command, goals)
+    fill_contacts(s.clock, c.config.mpc.step, share, landings)
+    fill_arms(now, s, c, goals, landings, arms)
+    lean_goals(s, c, command, goals)
+
+
+@subroutine
+def plan_forces(now: Snapshot, s: Planner, c: Walk, command: Command, friction: float) -> bool:
+    """Solve for the forces of the first node, while its feet stand; False without solution."""
+    state, goals, share = np.empty(12), np.empty((NODES, 12)), np.empty((NODES, 4))
+    arms, forces = np.empty((NODES, 4, 3)), np.empty((NODES, 4, 3))
+    look_ahead(now, s, c, command, state, goals, share, arms)
+    s.robot.mass, s.robot.gravity = c.mass + now.payload[0], c.gravity
+    mpc = c.config.mpc
+    outcome = solve_mpc(mpc, s.robot, friction, state, goals, share, arms, forces)
+    for leg in range(4):
+        for i in range(3):
+            stood = max(share[0, leg], mpc.least_share)
+            s.planned.f_world_feet[leg, i] = forces[0, leg, i] / stood
+    return outcome == SOLVED
+
+
+@subroutine
+def apply_force_plan(now: Snapshot, s: Planner, c: Walk, command: Command, target: Target) -> None:
+    """Put the planned forces into a reference, with the accelerations that they make."""
+    mpc = c.config.mpc
+    inertia_about_com(now, s.robot.inertia)
+    if s.time >= s.planned.next - TIE:
+        if not plan_forces(now, s, c, command, min(mpc.friction, target.friction)):
+            return
+        s.planned.next = s.time + mpc.interval
+    system, mass, a = np.zeros((3, 4)), c.mass + now.payload[0], np.zeros(3)
+    system[:, :3] = s.robot.inertia
+    for leg in range(4):
+        if target.legs[leg] != _STANCE:
+            continue
+        force, foot = triple(s.planned.f_world_feet[leg]), triple(now.p_world_feet[leg])
+        arm = (
+            foot[0] - now.p_world_com[0],
+            foot[1] - now.p_world_com[1],
+            foot[2] - c.foot_radius - now.p_world_com[2],
+        )
+        moment = cross(arm, force)
+        for i in range(3):
+            target.f_world_feet[leg, i] = force[i]
+            a[i] += force[i] / mass
+            system[i, 3] += moment[i]
+    solve_linear(system, 3)
+    for i in range(3):
+        target.a_world[i], target.dw_world[i] = a[i], system[i, 3]
+    target.a_world[2] -= c.gravity
+    target.force_weight = mpc.prior_weight
+    x, y = excess_velocity(now, s, c)
+    target.orientation_discount = np.hypot(x, y) / mpc.throw_speed

@@ -1,0 +1,184 @@
+"""What a walk is told, its configuration, and what it remembers from tick to tick."""
+
+from __future__ import annotations
+
+from dataclasses import InitVar, dataclass, field, fields, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.contacts import Gait
+from go2_wbc.errors import ConfigError
+from go2_wbc.planning.contact import ContactConfig, FootContact
+from go2_wbc.planning.gait_clock import Cadence, Clock
+from go2_wbc.planning.ground import Ground, GroundConfig
+from go2_wbc.planning.mpc import MpcConfig, Robot
+from go2_wbc.planning.pose import PoseConfig
+from go2_wbc.planning.slip import Slip, SlipConfig
+from go2_wbc.planning.swing import Swing, SwingConfig
+from go2_wbc.planning.trunk import Trunk
+from go2_wbc.records import Record
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.validation import require_not_negative, require_positive, warn_retired
+
+LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34
+"""CoM heights [m] between which the legs can step."""
+_RETIRED_RAMP = 0.03
+"""Time [s] that ``LocomotionConfig.load_ramp`` was by default."""
+
+
+@dataclass(frozen=True, slots=True)
+class LocomotionConfig:
+    """Numbers of the locomotion planner, from a search on this robot in simulation.
+
+    Attributes:
+        height: CoM height [m] above the ground.
+        compression: by which feet under the trunk's weight are pressed flat, or into the ground,
+            [m]: in MuJoCo 1 to 6 mm, by the friction of the joints.
+        linear_acceleration: greatest change of the commanded velocity [m/s^2].
+        angular_acceleration: greatest change of the commanded turning rate [rad/s^2].
+        velocity_feedback: foothold offset [s] per velocity error.
+        stride_margin: speed [m/s] that the robot may have beyond the commanded one before the
+            stride follows it. A push of 50 N s throws it to 3.4 m/s: on a foot that stands as long
+            as at 0.5 m/s the trunk then travels half a metre, and falls.
+        position_leash: distance [m] that the reference may run ahead of the robot.
+        yaw_leash: angle [rad] that the heading reference may run ahead.
+        foothold_reach: greatest horizontal distance [m] of a foothold from below its hip.
+        normal_force_min: least normal force [N] asked of a stance foot.
+        normal_force_max: greatest normal force [N] allowed on a stance foot.
+        settle_speed: speed [m/s] below which a robot without command may stop stepping.
+        capture_margin: distance [m] of the capture point from the middle of the feet beyond
+            which a standing robot starts to step.
+        square_tolerance: distance [m] of a foot from below its hip at which the robot stands
+            squarely enough to stop stepping.
+        swing: shape of the swing.
+        slip: estimate of the friction.
+        contact: when measured contacts count.
+        ground: estimate of its slope and roughness.
+        mpc: planning of the forces ahead.
+        pose: how a new pose of the trunk is approached.
+
+    ``load_ramp`` is retired: ``mpc.load_ramp`` is the one that counts.
+    """
+
+    height: float = 0.29
+    compression: float = 0.004
+    linear_acceleration: float = 1.5
+    angular_acceleration: float = 4.0
+    velocity_feedback: float = 0.12
+    stride_margin: float = 0.4
+    position_leash: float = 0.08
+    yaw_leash: float = 0.3
+    foothold_reach: float = 0.22
+    normal_force_min: float = 0.0
+    normal_force_max: float = 400.0
+    load_ramp: InitVar[float] = _RETIRED_RAMP
+    settle_speed: float = 0.05
+    capture_margin: float = 0.09
+    square_tolerance: float = 0.02
+    swing: SwingConfig = field(default_factory=SwingConfig)
+    slip: SlipConfig = field(default_factory=SlipConfig)
+    contact: ContactConfig = field(default_factory=ContactConfig)
+    ground: GroundConfig = field(default_factory=GroundConfig)
+    mpc: MpcConfig = field(default_factory=MpcConfig)
+    pose: PoseConfig = field(default_factory=PoseConfig)
+
+    def __post_init__(self, load_ramp: float) -> None:
+        """Raise ConfigError for a number that is out of range."""
+        if load_ramp != _RETIRED_RAMP:
+            warn_retired("LocomotionConfig.load_ramp", "LocomotionConfig.mpc.load_ramp counts")
+        zero_is_valid = {"velocity_feedback", "normal_force_min", "compression"}
+        parts = {"swing", "slip", "contact", "ground", "mpc", "pose"}
+        positive = {f.name for f in fields(self)} - zero_is_valid - parts
+        require_positive(self, *sorted(positive))
+        require_not_negative(self, *sorted(zero_is_valid))
+        if not LEAST_HEIGHT <= self.height <= GREATEST_HEIGHT:
+            raise ConfigError(
+                f"LocomotionConfig.height must be {LEAST_HEIGHT} to {GREATEST_HEIGHT} m, "
+                f"got {self.height!r}"
+            )
+        if self.normal_force_min >= self.normal_force_max:
+            raise ConfigError(
+                f"normal_force_min must be below normal_force_max, got {self.normal_force_min} "
+                f"and {self.normal_force_max} N"
+            )
+
+    @property
+    def height_on_feet(self) -> float:
+        """CoM height [m] above where feet that stayed round would end."""
+        return self.height + self.compression
+
+
+@dataclass(frozen=True, slots=True)
+class Walk:
+    """The numbers of a walk.
+
+    Attributes:
+        config: of the planner, with the apex of the gait's swing.
+        cadence: the gait.
+        height: of the CoM above where feet that stayed round would end [m].
+        mass: of the robot [kg].
+        gravity: [m/s^2].
+        foot_radius: [m].
+        p_base_feet_nominal: places of the feet below the hips, from the base [m].
+    """
+
+    config: LocomotionConfig
+    cadence: Cadence
+    height: float
+    mass: float
+    gravity: float
+    foot_radius: float
+    p_base_feet_nominal: Float[np.ndarray, "4 3"]
+
+    @staticmethod
+    def of(model: RobotModel, gait: Gait, config: LocomotionConfig) -> Walk:
+        """Those of a robot that walks with ``gait``."""
+        return Walk(
+            replace(config, swing=config.swing.at_most(gait.apex)),
+            Cadence.of(gait),
+            config.height_on_feet,
+            model.mass,
+            model.gravity,
+            model.foot_radius,
+            model.p_base_feet_nominal,
+        )
+
+
+class Foot(Record):
+    """What the planner remembers of a foot: its contact and its swing."""
+
+    contact: FootContact
+    swing: Swing
+
+
+class PlannedForces(Record):
+    """What the MPC has planned last.
+
+    Attributes:
+        next: when [s] it plans again.
+        f_world_feet: force [N] of each foot while it stands.
+    """
+
+    next: float
+    f_world_feet: Float[np.ndarray, "4 3"]
+
+
+class Planner(Record):
+    """State of the locomotion planner.
+
+    Attributes:
+        time: of the last tick [s].
+        is_stepping: whether the gait is running.
+        robot: as the MPC sees it now.
+    """
+
+    time: float
+    is_stepping: bool
+    clock: Clock
+    trunk: Trunk
+    ground: Ground
+    slip: Slip
+    feet: tuple[Foot, Foot, Foot, Foot]
+    planned: PlannedForces
+    robot: Robot

@@ -1,0 +1,212 @@
+"""Kinematics of many instants at once, in compiled kernels.
+
+The heart is ``place``: where trunk and joints are when the feet stand in their places and the CoM
+is where it is wanted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.interpolate import CubicSpline
+
+from go2_wbc.legs import LEGS
+from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_table, link_table
+from go2_wbc.robot.model import RobotModel
+
+LEAST_WEIGHT = 1.0
+"""Least vertical force [N] by which moments are divided: the zero-moment point stays finite."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wanted:
+    """What is asked of trunk and legs at every instant.
+
+    Attributes:
+        p: (n, 3) place [m] of the CoM, or of the base.
+        is_com: (n,) of which.
+        R: (n, 3, 3) attitude of the trunk.
+        q_joints: (n, 12) angles [rad] of the raised legs; those of the others do not count.
+        raised: (n, 4) legs that follow their joints; the others, their feet.
+        p_feet: (n, 4, 3) where the feet of the other legs are [m].
+    """
+
+    p: Float[np.ndarray, "n 3"]
+    is_com: Bool[np.ndarray, " n"]
+    R: Float[np.ndarray, "n 3 3"]
+    q_joints: Float[np.ndarray, "n 12"]
+    raised: Bool[np.ndarray, "n 4"]
+    p_feet: Float[np.ndarray, "n 4 3"]
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """What comes of it.
+
+    Attributes:
+        p_base: (n, 3) origin of the base [m].
+        q_joints: (n, 12) joint angles [rad].
+        p_com: (n, 3) CoM [m].
+        miss: (n, 4) distance [m] by which such a foot is out of its leg's reach.
+    """
+
+    p_base: Float[np.ndarray, "n 3"]
+    q_joints: Float[np.ndarray, "n 12"]
+    p_com: Float[np.ndarray, "n 3"]
+    miss: Float[np.ndarray, "n 4"]
+
+
+def place(wanted: Wanted, steps: int, model: RobotModel) -> Placed:
+    """Trunk and joints that give what is wanted; ``steps`` put the CoM in its place.
+
+    With the feet in their places and the attitude given, the CoM c is a function of the base's
+    place p alone; p <- p + (c* - c(p)) converges, since the legs follow the base only in part: each
+    step leaves an eighth of the error (measured). The legs are solved once more after the last one,
+    so that the feet are exactly in their places.
+    """
+    from go2_wbc.kernels.kinematics import settle  # compiled; only who needs it waits for it
+
+    p, joints = _own(wanted.p), _own(wanted.q_joints)
+    miss, com = np.empty((len(p), 4)), np.empty((len(p), 3))
+    settle(
+        _own(wanted.p),
+        _own(wanted.is_com),
+        _own(wanted.raised),
+        _own(wanted.R),
+        _own(wanted.p_feet),
+        leg_table(model),
+        link_table(model),
+        steps,
+        p,
+        joints,
+        miss,
+        com,
+    )
+    return Placed(p, joints, com, miss)
+
+
+def attitudes(rpy: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
+    """R_world_base = Rz(yaw) Ry(pitch) Rx(roll) of every row [rad]."""
+    from go2_wbc.kernels.kinematics import rotations  # compiled, as above
+
+    R = np.empty((len(rpy), 3, 3))
+    rotations(_own(rpy), R)
+    return R
+
+
+def angles_of(R: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "n 3"]:
+    """Roll, pitch, yaw [rad] of every rotation, the pitch within a quarter turn.
+
+    The roll is that of Rz(-yaw) R, which is well defined where the trunk stands on its end and yaw
+    and roll are not told apart.
+    """
+    yaw = np.arctan2(R[:, 1, 0], R[:, 0, 0])
+    pitch = np.arctan2(-R[:, 2, 0], np.hypot(R[:, 0, 0], R[:, 1, 0]))
+    s, c = np.sin(yaw), np.cos(yaw)
+    roll = np.arctan2(s * R[:, 0, 2] - c * R[:, 1, 2], c * R[:, 1, 1] - s * R[:, 0, 1])
+    return np.column_stack([roll, pitch, yaw])
+
+
+def turned(R: Float[np.ndarray, "n 3 3"], p: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+    """R p of every row."""
+    return (R @ p[:, :, None])[:, :, 0]
+
+
+def turned_back(
+    R: Float[np.ndarray, "n 3 3"], p: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "n 3"]:
+    """R' p of every row."""
+    return (p[:, None] @ R)[:, 0]
+
+
+def configurations(
+    poses: Float[np.ndarray, "n 6"], joints: Float[np.ndarray, "n 12"]
+) -> Float[np.ndarray, "n 19"]:
+    """q of a trunk at ``poses`` (position, then roll, pitch, yaw) with these joint angles."""
+    from go2_wbc.kernels.kinematics import quaternions  # compiled, as above
+
+    xyzw = np.empty((len(poses), 4))
+    quaternions(_own(poses[:, 3:]), xyzw)
+    return np.hstack([poses[:, :3], xyzw, joints])
+
+
+def foot_centres(
+    p_base: Float[np.ndarray, "n 3"],
+    R: Float[np.ndarray, "n 3 3"],
+    joints: Float[np.ndarray, "n 12"],
+    model: RobotModel,
+) -> Float[np.ndarray, "n 4 3"]:
+    """Centres of the feet [m] of a trunk at ``p_base`` [m] with attitude ``R``."""
+    seen = [foot_places(LegGeometry.of(model, leg), joints[:, leg.joints]) for leg in LEGS]
+    return np.stack([p_base + turned(R, places) for places in seen], axis=1)
+
+
+def centres_of_mass(
+    poses: Float[np.ndarray, "n 6"], joints: Float[np.ndarray, "n 12"], model: RobotModel
+) -> Float[np.ndarray, "n 3"]:
+    """CoM [m] of a trunk at ``poses`` with these joint angles."""
+    from go2_wbc.kernels import kinematics  # compiled, as above
+
+    com, R = np.empty((len(poses), 3)), attitudes(poses[:, 3:])
+    kinematics.centres_of_mass(link_table(model), _own(poses[:, :3]), R, _own(joints), com)
+    return com
+
+
+def rates(
+    times: Float[np.ndarray, " n"], q: Float[np.ndarray, "n 19"], rpy: Float[np.ndarray, "n 3"]
+) -> tuple[Float[np.ndarray, "n 18"], Float[np.ndarray, "n 18"]]:
+    """Velocity and acceleration (n, 18) as Pinocchio counts them: the base's in its own frame.
+
+    With v_b = R' v_w, the acceleration is the derivative of these very components,
+    dv_b/dt = R' a_w - w_b x v_b (Featherstone 2008, ch. 2: spatial, not classical); so that of
+    w_b = R' w_w is R' dw_w.
+    """
+    R = attitudes(rpy)
+    spline = CubicSpline(times, np.hstack([q[:, :3], rpy, q[:, 7:]]), bc_type="clamped")
+    rate, acceleration = spline(times, 1), spline(times, 2)
+    turning = _angular_rates(rpy, rate[:, 3:6], acceleration[:, 3:6])
+    v, a = turned_back(R, rate[:, :3]), turned_back(R, acceleration[:, :3])
+    w, dw = (turned_back(R, vectors) for vectors in turning)
+    return np.hstack([v, w, rate[:, 6:]]), np.hstack([a - np.cross(w, v), dw, acceleration[:, 6:]])
+
+
+def zero_moment_points(
+    q: Float[np.ndarray, "n 19"], rpy: Float[np.ndarray, "n 3"], wrench: Float[np.ndarray, "n 6"]
+) -> Float[np.ndarray, "n 2"]:
+    """Where the ground's forces act together (Vukobratovic & Borovac 2004, eq. 3).
+
+    ``wrench``: what the trunk needs, about the base in its frame. Moved to the origin on the
+    ground, F = R F_b and N = R N_b + p x F; there is no moment about the level axes at the point
+    x = -N_y / F_z, y = N_x / F_z. Where the feet hardly press, F_z counts as ``LEAST_WEIGHT``.
+    """
+    R = attitudes(rpy)
+    force = turned(R, wrench[:, :3])
+    moment = turned(R, wrench[:, 3:]) + np.cross(q[:, :3], force)
+    vertical = np.maximum(force[:, 2], LEAST_WEIGHT)
+    return np.column_stack([-moment[:, 1], moment[:, 0]]) / vertical[:, None]
+
+
+def _angular_rates(
+    rpy: Float[np.ndarray, "n 3"],
+    rate: Float[np.ndarray, "n 3"],
+    acceleration: Float[np.ndarray, "n 3"],
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+    """World-frame w [rad/s] and dw [rad/s^2] of every row; see ``angular_velocity_from_rpy``."""
+    _, p, y = rpy.T
+    cp, sp, cy, sy = np.cos(p), np.sin(p), np.cos(y), np.sin(y)
+    ahead, aside = np.column_stack([cy, sy, 0.0 * y]), np.column_stack([-sy, cy, 0.0 * y])
+    up, (dr, dp, dy) = np.array([0.0, 0.0, 1.0]), rate.T[:, :, None]
+    cp, sp = cp[:, None], sp[:, None]
+    # w = dr e_roll + dp e_pitch + dy e_yaw; the first two axes turn
+    roll_axis, d_roll_axis = cp * ahead - sp * up, cp * dy * aside - sp * dp * ahead - cp * dp * up
+    w = roll_axis * dr + aside * dp + up * dy
+    ddr, ddp, ddy = acceleration.T[:, :, None]
+    dw = roll_axis * ddr + aside * ddp + up * ddy + d_roll_axis * dr - ahead * dy * dp
+    return w, dw
+
+
+def _own(array: np.ndarray) -> np.ndarray:
+    """A copy in the one layout that kernels take."""
+    return np.array(array, order="C")

@@ -1,0 +1,165 @@
+"""What a dynamic plan keeps and what it breaks, measured on the plan itself.
+
+Nothing here trusts the solver: the defects are those of the equations of motion at every knot, by
+Pinocchio's inverse dynamics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Bool, Float
+
+from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
+from go2_wbc.robot.model import RobotModel
+from motions.dynamics.curves import feet_at
+from motions.dynamics.dynamic_trajectory import DynamicTrajectory
+
+_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """The worst of one quantity over a plan.
+
+    Attributes:
+        name: of the quantity.
+        value: the worst.
+        limit: what it must not exceed, at least 0.
+        unit: of both.
+        subject: whose it is.
+        time: when [s].
+    """
+
+    name: str
+    value: float
+    limit: float
+    unit: str
+    subject: str
+    time: float
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the limit is kept."""
+        return self.value <= self.limit
+
+    def __str__(self) -> str:
+        return (
+            f"{self.name} of {self.subject} at {self.time:.2f} s: {abs(self.value):.3g} "
+            f"{self.unit}, at most {self.limit:.3g}"
+        )
+
+
+DEFECT = 1e-3
+"""What is left of the equations of motion [N, N m], at most."""
+FRICTION = 0.55
+"""Tangential over normal force."""
+PULL = 1.0
+"""Of the ground [N]."""
+PENETRATION = 0.005
+"""Of a foot in the air into the ground [m]."""
+SLIP = 0.02
+"""Of a standing foot, from where it touched down [m]."""
+TOUCHDOWN = 1.0
+"""Speed of a foot [m/s]."""
+ROTATION = 0.2
+"""Difference [rad] between the integrated rate and the change of attitude."""
+
+
+def audit(plan: DynamicTrajectory, model: RobotModel) -> tuple[Reading, ...]:
+    """The worst of everything that a plan must keep."""
+
+    def worst(
+        name: str,
+        values: Float[np.ndarray, "n k"],
+        limit: float,
+        unit: str,
+        subjects: tuple[str, ...],
+    ) -> Reading:
+        row, column = np.unravel_index(int(np.argmax(values)), values.shape)
+        time = float(plan.times[row])
+        return Reading(name, float(values[row, column]), limit, unit, subjects[column], time)
+
+    ends = plan.v[:-1, 6:], plan.v[1:, 6:]  # a torque holds through its step
+    tau_share = np.max([model.motor.share(plan.tau, v) for v in ends], axis=0)
+    joints = plan.q[:, 7:]
+    beyond = np.maximum(model.q_lower - joints, joints - model.q_upper)
+    normal = plan.forces[:, :, 2]
+    tangential = np.hypot(plan.forces[:, :, 0], plan.forces[:, :, 1])
+    ratio = np.where(normal > 1.0, tangential / np.maximum(normal, 1.0), 0.0)
+    speed = np.abs(plan.v[:, 6:]) / model.speed_limits
+    slip = drift(plan.p_feet, plan.stance)
+    feet, names = FOOT_NAMES, JOINT_NAMES
+    return (
+        worst("defect", defects(plan, model), DEFECT, "N or N m", _ROWS),
+        worst("friction", ratio, FRICTION, "", feet),
+        worst("pull of the ground", -normal, PULL, "N", feet),
+        worst("torque share", tau_share, 1.0, "", names),
+        worst("speed share", speed, 1.0, "", names),
+        worst("angle beyond its limit", beyond, 0.0, "rad", names),
+        worst("depth under ground", _depth(plan, model), PENETRATION, "m", feet),
+        worst("slip", slip, SLIP, "m", feet),
+        worst("touchdown speed", _touchdown(plan, model), TOUCHDOWN, "m/s", feet),
+        Reading("integrated rotation", _lost_turn(plan), ROTATION, "rad", "trunk", plan.duration),
+    )
+
+
+def _depth(plan: DynamicTrajectory, model: RobotModel) -> Float[np.ndarray, "n1 4"]:
+    """Of the feet in the air; one that stands in a step does so until the step's end."""
+    stance = plan.stance
+    stands = np.vstack([stance, stance[-1:]]) | np.vstack([stance[:1], stance])
+    return np.where(stands, 0.0, model.foot_radius - plan.p_feet[:, :, 2])
+
+
+def drift(
+    p_feet: Float[np.ndarray, "n1 4 3"], stance: Bool[np.ndarray, "n 4"]
+) -> Float[np.ndarray, "n1 4"]:
+    """Distance [m] of each standing foot from where it came down; 0 in the air."""
+    off = np.zeros(p_feet.shape[:2])
+    for leg in LEGS:
+        place = p_feet[0, leg]
+        for row, stands in enumerate(stance[:, leg].tolist(), start=1):
+            if stands:
+                off[row, leg] = np.linalg.norm(p_feet[row, leg] - place)
+            else:
+                place = p_feet[row, leg]
+    return off
+
+
+def _touchdown(plan: DynamicTrajectory, model: RobotModel) -> Float[np.ndarray, "n1 4"]:
+    speeds = np.linalg.norm(feet_at(plan.q, plan.v, model)[1], axis=2)
+    lands = np.zeros(speeds.shape, dtype=bool)
+    lands[1:-1] = plan.stance[1:] & ~plan.stance[:-1]
+    return np.where(lands, speeds, 0.0)
+
+
+def _lost_turn(plan: DynamicTrajectory) -> float:
+    """A turn by 360 deg looks like none; the integrated yaw and tilt rates tell them apart."""
+    R, worst = pin.Quaternion(plan.q[0, 3:7]).toRotationMatrix(), 0.0
+    for row, dt in enumerate(np.diff(plan.times)):
+        R = R @ pin.exp3(plan.v[row + 1, 3:6] * dt)
+        measured = pin.Quaternion(plan.q[row + 1, 3:7]).toRotationMatrix()
+        worst = max(worst, float(np.linalg.norm(pin.log3(R.T @ measured))))
+    return worst
+
+
+_ROWS = (*(f"trunk {axis}" for axis in ("x", "y", "z", "roll", "pitch", "yaw")), *JOINT_NAMES)
+
+
+def defects(plan: DynamicTrajectory, model: RobotModel) -> Float[np.ndarray, "n 18"]:
+    """|M a + h - S' tau - J' f| of every knot [N, N m], with a from the velocities of its ends."""
+    pin_model, data = model.pin_model, model.pin_model.createData()
+    frames = [pin_model.getFrameId(name) for name in FOOT_NAMES]
+    found = np.empty((len(plan.tau), 18))
+    for row, dt in enumerate(np.diff(plan.times).tolist()):
+        q, v = plan.q[row], plan.v[row]
+        wanted = pin.rnea(pin_model, data, q, v, (plan.v[row + 1] - v) / dt)
+        wanted[6:] -= plan.tau[row]
+        pin.computeJointJacobians(pin_model, data, q)
+        for leg, frame in enumerate(frames):
+            J = pin.getFrameJacobian(pin_model, data, frame, _ALIGNED)[:3]
+            wanted -= J.T @ plan.forces[row, leg]
+        found[row] = np.abs(wanted)
+    return found

@@ -1,0 +1,212 @@
+"""Where the feet stand while a motion steps, and the frame from which its trunk is counted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.errors import TimelineError
+from go2_wbc.legs import LEGS, Leg
+from go2_wbc.reference import Anchor
+from go2_wbc.robot.rotations import yaw_rotation
+from motions.batch_kinematics import attitudes
+from motions.language.keys import Key, LegKey, StepKey
+from motions.language.timeline_data import SAME, TimelineData
+
+Times = Float[np.ndarray, " n"]
+
+SQUARE = 1e-3
+"""Distance [m] from its place below the hip within which a foot is in it."""
+_ROUND = 64.0
+"""1 / (u^3 (1 - u)^3) at u = 1/2: makes the height of a swing 1 in its middle."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """Where the feet stand, or are on their way, at n instants.
+
+    Attributes:
+        p_feet: (n, 4, 3) their centres [m].
+        frames: (n, 3) x, y [m] and yaw [rad] of the frame of the four feet.
+        headings: (n, 3, 3) its attitude.
+    """
+
+    p_feet: Float[np.ndarray, "n 4 3"]
+    frames: Float[np.ndarray, "n 3"]
+    headings: Float[np.ndarray, "n 3 3"]
+
+    def part(self, rows: slice) -> Ground:
+        """Some of its instants."""
+        return Ground(self.p_feet[rows], self.frames[rows], self.headings[rows])
+
+
+class Footing:
+    """The places of the feet of a timeline, in the frame of the motion.
+
+    A foot that steps swings along a straight line by minimum jerk, and up and down by the curve
+    h 64 u^3 (1 - u)^3 of the share u of the time, which begins and ends without speed and
+    acceleration.
+
+    Attributes:
+        start: (4, 3) where the feet's centres are at first [m].
+    """
+
+    def __init__(
+        self,
+        timeline: TimelineData,
+        nominal: Float[np.ndarray, "4 3"],
+        start: Float[np.ndarray, "4 3"] | None = None,
+    ) -> None:
+        """Work out where every step lands.
+
+        Args:
+            timeline: that steps.
+            nominal: where the feet's centres stand below their hips [m].
+            start: where they are at first [m], by default there.
+
+        Raises:
+            TimelineError: if a raised foot steps.
+        """
+        self.start = nominal if start is None else start
+        self._nominal = nominal
+        self._steps: dict[Leg, list[tuple[StepKey, Float[np.ndarray, "3"]]]] = {
+            leg: [] for leg in LEGS
+        }
+        for key in timeline.in_order(StepKey):
+            self._steps[key.leg].append((key, self._goal(key)))
+        for leg, steps in self._steps.items():
+            if steps:
+                _require_on_ground(timeline, leg)
+
+    def at(self, times: Times) -> Ground:
+        """Where the feet are at increasing ``times``, and the frame from which the trunk counts."""
+        p_feet = np.stack([self.place(leg, times) for leg in LEGS], axis=1)
+        frames = self.frames(times)
+        turns = np.column_stack([np.zeros((len(frames), 2)), frames[:, 2]])
+        return Ground(p_feet, frames, attitudes(turns))
+
+    def place(self, leg: Leg, times: Times) -> Float[np.ndarray, "n 3"]:
+        """The centre [m] of one foot."""
+        p_foot = np.tile(self.start[leg], (len(times), 1))
+        for key, goal in self._steps[leg]:
+            after = times >= key.start
+            u = _shares(key, times[after], 0.0)
+            here = p_foot[after]
+            here += _minimum_jerk(u)[:, None] * (goal - here)
+            here[:, 2] += key.height * _ROUND * (u * (1.0 - u)) ** 3
+            p_foot[after] = here
+        return p_foot
+
+    def frames(self, times: Times) -> Float[np.ndarray, "n 3"]:
+        """x, y [m] and yaw [rad] of the frame of the feet, as the trunk follows it.
+
+        Every step moves it by minimum jerk; the yaw is continuous over increasing ``times``.
+        """
+        p_feet = np.tile(self.start[:, :2], (len(times), 1, 1))
+        for leg, steps in self._steps.items():
+            last = self.start[leg, :2]
+            for key, goal in steps:
+                share = _minimum_jerk(_shares(key, times, key.lead))
+                p_feet[:, leg] += share[:, None] * (goal[:2] - last)
+                last = goal[:2]
+        ahead = p_feet[:, :2].mean(axis=1) - p_feet[:, 2:].mean(axis=1)
+        yaw = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+        return np.column_stack([p_feet.mean(axis=1), yaw])
+
+    @property
+    def end(self) -> Float[np.ndarray, "4 3"]:
+        """Where the feet's centres are when all steps are done [m]."""
+        return self._feet_at(np.inf)
+
+    @property
+    def end_pose(self) -> tuple[float, float, float]:
+        """x, y [m] and yaw [rad] of the frame of the feet when all steps are done."""
+        p_feet = self._feet_at(np.inf)
+        frame = Anchor.of_feet(p_feet, 0.0)
+        x, y, _ = frame.p_world.tolist()
+        return x, y, frame.yaw
+
+    def steps_back(self, end: float) -> dict[StepKey, StepKey]:
+        """For every step the one back, of the motion that is this one backwards.
+
+        Args:
+            end: when the motion ends [s].
+
+        Raises:
+            TimelineError: if the feet do not end below their hips, where every motion starts.
+        """
+        last, frame = self.end, Anchor.of_feet(self.end, 0.0)
+        off = last - frame.p_world - self._nominal @ yaw_rotation(frame.yaw).T
+        if (far := np.abs(off[:, :2]).max(axis=1)).max() > SQUARE:
+            leg = Leg(int(np.argmax(far)))
+            raise TimelineError(
+                f"reverse(): foot {leg.name} ends {1e3 * far[leg]:.0f} mm from its place below the "
+                "hip, where no motion starts: end on walk() or turn()"
+            )
+        places = [(key, goal) for steps in self._steps.values() for key, goal in steps]
+        origins = {key: self._before(key) for key, _ in places}
+        found = dict[StepKey, StepKey]()
+        for key, goal in places:
+            p_feet = last.copy()
+            for other, _ in sorted(places, key=lambda place: -place[0].end):
+                if other.end > key.end + SAME:
+                    p_feet[other.leg] = origins[other]
+            R = yaw_rotation(Anchor.of_feet(p_feet, 0.0).yaw)
+            x, y, _ = ((origins[key] - goal) @ R).tolist()
+            start = end - key.end
+            found[key] = replace(
+                key, start=start, end=end - key.start, place=(x, y, 0.0), since=start,
+                is_square=False,
+            )  # fmt: skip
+        return found
+
+    def _before(self, key: StepKey) -> Float[np.ndarray, "3"]:
+        """Where the foot of a step stood before it [m]."""
+        places = [self.start[key.leg], *(goal for _, goal in self._steps[key.leg])]
+        keys = [other for other, _ in self._steps[key.leg]]
+        return places[keys.index(key)]
+
+    def _goal(self, key: StepKey) -> Float[np.ndarray, "3"]:
+        p_feet = self._feet_at(key.since)
+        frame = Anchor.of_feet(p_feet, 0.0)
+        x, y, yaw = key.place
+        way, R = np.array([x, y, 0.0]), yaw_rotation(frame.yaw)
+        turned = R @ yaw_rotation(yaw)
+        if key.is_square:
+            foot = self._nominal[key.leg]
+            place = frame.p_world + R @ way + turned @ foot
+        else:
+            place = frame.p_world + turned @ R.T @ (p_feet[key.leg] - frame.p_world) + R @ way
+        return np.array([*place[:2], p_feet[key.leg, 2]])
+
+    def _feet_at(self, t: float) -> Float[np.ndarray, "4 3"]:
+        """Where the feet stand [m], or will land, of those steps that have begun before ``t``."""
+        p_feet = self.start.copy()
+        for leg, steps in self._steps.items():
+            for key, goal in steps:
+                if key.start < t - SAME:
+                    p_feet[leg] = goal
+        return p_feet
+
+
+def _require_on_ground(timeline: TimelineData, leg: Leg) -> None:
+    is_raised = False
+    keys: list[Key] = [*timeline.in_order(LegKey), *timeline.in_order(StepKey)]
+    for key in sorted(keys, key=lambda key: key.start):
+        if isinstance(key, LegKey) and key.leg is leg:
+            is_raised = not key.target.is_on_ground
+        if isinstance(key, StepKey) and key.leg is leg and is_raised:
+            raise TimelineError(
+                f"foot {leg.name} is raised when it shall step at {key.start:.2f} s: put it down "
+                "before"
+            )
+
+
+def _shares(key: StepKey, times: Times, lead: float) -> Times:
+    return np.clip((times - key.start + lead) / (key.end - key.start + 2.0 * lead), 0.0, 1.0)
+
+
+def _minimum_jerk(u: Times) -> Times:
+    return u**3 * (10.0 + u * (6.0 * u - 15.0))

@@ -1,0 +1,361 @@
+"""What a timeline is made of: keys, each a goal for one track within a span of time."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import ClassVar, TypeVar
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.errors import TimelineError
+from go2_wbc.legs import Leg
+from go2_wbc.reference import Posture
+from motions.dynamics.phases import Phase, PhaseProblem
+from motions.language.easing import Easing
+
+BODY_CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw")
+"""What of the trunk can move: places [m] and angles [rad], as offsets from the posture."""
+_FLIPPED = frozenset({"y", "roll", "yaw"})
+
+_KeyType = TypeVar("_KeyType", bound="Key")
+_BodyKeyType = TypeVar("_BodyKeyType", bound="BodyKey")
+
+
+class Frame(Enum):
+    """What a leg's goal is given in."""
+
+    GROUND = "ground"
+    BODY = "body"
+    JOINTS = "joints"
+
+
+@dataclass(frozen=True, slots=True)
+class LegTarget:
+    """Where a leg goes.
+
+    Attributes:
+        frame: what ``values`` mean.
+        values: offset x, y, z [m] of the foot from where it stands, fixed to the ground or to the
+            trunk; or hip, thigh and calf angle [rad].
+    """
+
+    frame: Frame
+    values: tuple[float, float, float]
+
+    @staticmethod
+    def on_ground() -> LegTarget:
+        """The foot where it stands."""
+        return LegTarget(Frame.GROUND, (0.0, 0.0, 0.0))
+
+    @property
+    def is_on_ground(self) -> bool:
+        """Whether the foot stands on the ground, where it stood."""
+        return self.frame is Frame.GROUND and self.values == (0.0, 0.0, 0.0)
+
+    @property
+    def mirrored(self) -> LegTarget:
+        """The same goal of the leg across."""
+        first, second, third = self.values
+        is_angle = self.frame is Frame.JOINTS
+        values = (-first, second, third) if is_angle else (first, -second, third)
+        return replace(self, values=values)
+
+    def scaled(self, amplitude: float) -> LegTarget:
+        """Its offset multiplied; angles stay."""
+        if self.frame is Frame.JOINTS:
+            return self
+        x, y, z = self.values
+        return replace(self, values=(amplitude * x, amplitude * y, amplitude * z))
+
+
+@dataclass(frozen=True, slots=True)
+class Key(ABC):
+    """One move of one track.
+
+    Attributes:
+        start, end: when [s].
+        ease: how it goes from the last goal to this one.
+    """
+
+    instants: ClassVar[tuple[str, ...]] = ("start", "end")
+
+    start: float
+    end: float
+    ease: Easing
+
+    def later(self: _KeyType, seconds: float) -> _KeyType:
+        """The same key, moved in time."""
+        return self._moved(lambda t: t + seconds)
+
+    def slower(self: _KeyType, factor: float) -> _KeyType:
+        """The same key, all times multiplied."""
+        return self._moved(lambda t: factor * t)
+
+    def retimed(self: _KeyType, when: Callable[[float], float]) -> _KeyType:
+        """The same key, its instants where ``when`` puts them."""
+        return self._moved(when)
+
+    def _moved(self: _KeyType, when: Callable[[float], float]) -> _KeyType:
+        return replace(self, **{name: when(getattr(self, name)) for name in self.instants})
+
+    @property
+    @abstractmethod
+    def track(self) -> str:
+        """What moves, in words."""
+
+    @property
+    def mirrored(self) -> Key:
+        """Left and right exchanged."""
+        return self
+
+    def scaled(self, amplitude: float) -> Key:
+        """Its offsets multiplied; what is no offset stays."""
+        del amplitude
+        return self
+
+
+@dataclass(frozen=True, slots=True)
+class BodyKey(Key):
+    """The trunk moves along one channel to an offset [m or rad]."""
+
+    channel: str
+    value: float
+
+    @property
+    def track(self) -> str:
+        """The channel."""
+        return f"body {self.channel}"
+
+    @property
+    def mirrored(self) -> BodyKey:
+        """Left and right exchanged."""
+        return self.scaled(-1.0) if self.channel in _FLIPPED else self
+
+    def scaled(self, amplitude: float) -> BodyKey:
+        """Its offset multiplied."""
+        return replace(self, value=amplitude * self.value)
+
+    def moved(self: _BodyKeyType, offset: float) -> _BodyKeyType:
+        """Its goal ``offset`` farther."""
+        return replace(self, value=self.value + offset)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyPathKey(BodyKey):
+    """The trunk moves along one channel through several offsets [m or rad], without a stop.
+
+    Attributes:
+        through: offsets on the way to ``value``.
+        shares: shares of the time, between 0 and 1, at which they are passed.
+    """
+
+    through: tuple[float, ...]
+    shares: tuple[float, ...]
+
+    def scaled(self, amplitude: float) -> BodyPathKey:
+        """Its offsets multiplied."""
+        through = tuple(amplitude * value for value in self.through)
+        return replace(self, value=amplitude * self.value, through=through)
+
+    def moved(self, offset: float) -> BodyPathKey:
+        """All that it goes through ``offset`` farther."""
+        through = tuple(value + offset for value in self.through)
+        return replace(self, value=self.value + offset, through=through)
+
+
+@dataclass(frozen=True, slots=True)
+class PostureKey(Key):
+    """The trunk moves to another resting posture, from which offsets count from then on."""
+
+    posture: Posture
+
+    @property
+    def track(self) -> str:
+        """The posture."""
+        return "posture"
+
+
+@dataclass(frozen=True, slots=True)
+class LegKey(Key):
+    """A leg moves to a target."""
+
+    leg: Leg
+    target: LegTarget
+
+    @property
+    def track(self) -> str:
+        """The leg."""
+        return f"foot {self.leg.name}"
+
+    @property
+    def mirrored(self) -> LegKey:
+        """Left and right exchanged."""
+        return replace(self, leg=self.leg.mirror, target=self.target.mirrored)
+
+    def scaled(self, amplitude: float) -> LegKey:
+        """Its offset multiplied; angles stay."""
+        return replace(self, target=self.target.scaled(amplitude))
+
+
+@dataclass(frozen=True, slots=True)
+class JointKey(LegKey):
+    """One joint of a leg moves to its angle in ``target``; the others stay as they are.
+
+    Attributes:
+        joint: which of the three.
+    """
+
+    joint: int
+
+
+@dataclass(frozen=True, slots=True)
+class StepKey(Key):
+    """A foot swings to a new place and stands there.
+
+    Attributes:
+        leg: whose foot.
+        place: x, y [m] and yaw [rad], in the frame of the four feet: its origin in their middle, x
+            along their heading. Of a single step, the way of the foot, after the frame has turned
+            by yaw with the foot on it; of a square one, the pose of the frame in which the foot
+            then stands below its hip.
+        height: of the foot [m] above its way, at most.
+        since: instant [s] whose frame of the feet it is; a foot in the air counts where it lands.
+        lead: the trunk follows from so long [s] before the swing until so long after it.
+        is_square: whether ``place`` is the pose of a frame.
+    """
+
+    instants: ClassVar[tuple[str, ...]] = ("start", "end", "since")
+
+    leg: Leg
+    place: tuple[float, float, float]
+    height: float
+    since: float
+    lead: float = 0.0
+    is_square: bool = False
+
+    def slower(self, factor: float) -> StepKey:
+        """The same key, all times multiplied."""
+        return replace(self._moved(lambda t: factor * t), lead=factor * self.lead)
+
+    def scaled(self, amplitude: float) -> StepKey:
+        """Its way multiplied."""
+        x, y, yaw = self.place
+        return replace(self, place=(amplitude * x, amplitude * y, amplitude * yaw))
+
+    @property
+    def track(self) -> str:
+        """The leg."""
+        return f"foot {self.leg.name}"
+
+    @property
+    def mirrored(self) -> StepKey:
+        """Left and right exchanged."""
+        x, y, yaw = self.place
+        return replace(self, leg=self.leg.mirror, place=(x, -y, -yaw))
+
+
+@dataclass(frozen=True, slots=True)
+class Mark(Key):
+    """A named span of time: something is worth looking at."""
+
+    name: str
+
+    @property
+    def track(self) -> str:
+        """The name."""
+        return f"span {self.name!r}"
+
+
+@dataclass(frozen=True, slots=True)
+class FootHold(Mark):
+    """A named span in which a raised foot is held up: only then does the motion count as done."""
+
+    leg: Leg
+
+    @property
+    def mirrored(self) -> FootHold:
+        """Left and right exchanged."""
+        return replace(self, leg=self.leg.mirror)
+
+
+@dataclass(frozen=True, slots=True)
+class BalanceShift(Key):
+    """The trunk moves over the feet that stay when ``raised`` legs are in the air.
+
+    Attributes:
+        raised: these legs.
+        is_swaying: whether it is instead over those of the feet that stand while others step.
+    """
+
+    raised: frozenset[Leg]
+    is_swaying: bool = False
+
+    @property
+    def track(self) -> str:
+        """The balance."""
+        return "balance"
+
+    @property
+    def mirrored(self) -> BalanceShift:
+        """Left and right exchanged."""
+        return replace(self, raised=frozenset(leg.mirror for leg in self.raised))
+
+
+@dataclass(frozen=True, slots=True)
+class PhaseKey(Key):
+    """The whole robot goes through phases, from standing at home to standing at home.
+
+    Attributes:
+        phases: one after the other; together they last from ``start`` to ``end``.
+        is_open: whether ``Timeline.phase`` may still add one.
+    """
+
+    phases: tuple[Phase, ...]
+    is_open: bool
+
+    @property
+    def track(self) -> str:
+        """The whole robot."""
+        return "the whole robot"
+
+    @property
+    def shift(self) -> Float[np.ndarray, "4 3"]:
+        """Where each foot comes to stand [m], in the frame of the feet at the start."""
+        return PhaseProblem(self.phases).shift
+
+    def slower(self, factor: float) -> PhaseKey:
+        """Gravity does not wait."""
+        raise TimelineError(
+            f"scale_time({factor:g}) does not work with a dynamic block, whose pace gravity sets; "
+            "give its calls other numbers"
+        )
+
+    def retimed(self, when: Callable[[float], float]) -> PhaseKey:
+        """The same block, started when ``when`` says; it lasts what it lasts."""
+        return self.later(when(self.start) - self.start)
+
+    def scaled(self, amplitude: float) -> PhaseKey:
+        """Nor do heights scale without times."""
+        raise TimelineError(
+            f"scale({amplitude:g}) does not work with a dynamic block, whose heights and times go "
+            "together; give its calls other numbers"
+        )
+
+    @property
+    def mirrored(self) -> PhaseKey:
+        """Left and right exchanged."""
+        return replace(self, phases=tuple(map(_mirrored, self.phases)))
+
+
+def _mirrored(phase: Phase) -> Phase:
+    body = phase.body
+    if body is not None:
+        x, y, z, roll, pitch, yaw = body
+        body = (x, -y, z, -roll, pitch, -yaw)
+    feet = {leg.mirror: (x, -y, z) for leg, (x, y, z) in phase.feet.items()}
+    stance = frozenset(leg.mirror for leg in phase.stance)
+    return replace(phase, stance=stance, body=body, feet=feet)

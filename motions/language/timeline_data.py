@@ -1,0 +1,176 @@
+"""What a timeline is made of, and how calls add to it: keys, a cursor, a tempo.
+
+The classes beside this one hold the calls that authors make; ``Timeline`` has them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
+
+from go2_wbc.curves import Ease
+from go2_wbc.errors import TimelineError, unknown_name
+from go2_wbc.legs import Leg
+from go2_wbc.reference import Posture
+from motions.arguments import positive
+from motions.dynamics.phases import Tolerance
+from motions.language.clock import SAME, BeatClock
+from motions.language.keys import BODY_CHANNELS, BalanceShift, BodyKey, Key, LegKey
+
+SHIFT_TIME = 0.9
+"""Time [s] in which the body moves over the feet that stay, before another one is raised."""
+AS_WRITTEN, NEAREST = PHYSICS = ("as_written", "nearest")
+"""What may be made of a motion that the robot cannot do: nothing, or the nearest that it can."""
+
+_KeyType = TypeVar("_KeyType", bound=Key)
+_Line = TypeVar("_Line", bound="TimelineData")
+
+
+@dataclass(frozen=True, slots=True)
+class TimelineData:
+    """An authored motion.
+
+    Attributes:
+        entry: posture in which it starts.
+        exit: posture in which it ends.
+        name: what to call it.
+        balance: whether the body moves over the standing feet before one is raised.
+        shift_time: how long [s] that takes, before a tempo is set.
+        shift_beats: how many beats it takes with a tempo; 0 without one.
+        counted: beats [s] of what was written before the present tempo.
+        counted_from: since when [s] the present tempo counts.
+        physics: "as_written", or "nearest": what the robot cannot do as written is solved as the
+            nearest motion that it can.
+        tolerance: how far what is solved may be from what is asked.
+        keys: what was written so far.
+        cursor: when [s] the next call starts.
+        clock: what one unit of ``over`` lasts, here and later.
+        last_start: when [s] the last call's move starts.
+        floor: the cursor does not fall behind this time [s] after ``also``.
+    """
+
+    entry: Posture = Posture.STAND
+    exit: Posture = Posture.STAND
+    name: str = field(default="motion", kw_only=True)
+    balance: bool = field(default=True, kw_only=True)
+    shift_time: float = field(default=SHIFT_TIME, kw_only=True)
+    physics: str = field(default=AS_WRITTEN, kw_only=True)
+    tolerance: Tolerance = field(default=Tolerance(), kw_only=True)
+    keys: tuple[Key, ...] = field(default=(), kw_only=True)
+    cursor: float = field(default=0.0, kw_only=True)
+    clock: BeatClock = field(default=BeatClock(), kw_only=True)
+    shift_beats: float = field(default=0.0, kw_only=True)
+    counted: tuple[float, ...] = field(default=(), kw_only=True)
+    counted_from: float = field(default=0.0, kw_only=True)
+    last_start: float = field(default=0.0, kw_only=True)
+    floor: float = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Raise TimelineError for postures that are none, or a track that moves twice at once."""
+        for name in ("entry", "exit"):
+            if not isinstance(getattr(self, name), Posture):
+                valid = ", ".join(f"Posture.{posture.name}" for posture in Posture)
+                raise TimelineError(
+                    f"{name} must be one of {valid} (from motions import Posture), got "
+                    f"{getattr(self, name)!r}"
+                )
+        positive("shift_time", self.shift_time)
+        if self.physics not in PHYSICS:
+            raise TimelineError(unknown_name("physics", str(self.physics), PHYSICS))
+        if not isinstance(self.tolerance, Tolerance):
+            raise TimelineError(
+                f"tolerance must be a Tolerance(position [m], angle [rad]), got {self.tolerance!r}"
+            )
+        _require_no_overlap(self.keys)
+
+    # --- what is written ------------------------------------------------------------------
+
+    @property
+    def end(self) -> float:
+        """When [s] the last part ends."""
+        return max([self.cursor, *(key.end for key in self.keys)])
+
+    @property
+    def beats(self) -> tuple[float, ...]:
+        """When [s] the beats are that it counts in; none without a tempo."""
+        return self._beats_until(self.end)
+
+    @property
+    def raised(self) -> frozenset[Leg]:
+        """Legs whose last key leaves them in the air."""
+        last = {key.leg: key.target for key in self.in_order(LegKey)}
+        return frozenset(leg for leg, target in last.items() if not target.is_on_ground)
+
+    @property
+    def shifted_for(self) -> frozenset[Leg]:
+        """Legs for whose absence the trunk has moved over the other feet."""
+        shifts = self.in_order(BalanceShift)
+        return shifts[-1].raised if shifts else frozenset()
+
+    @property
+    def _away(self) -> list[str]:
+        """What its last keys leave elsewhere than at home, in words."""
+        away = [f"body {name}" for name in BODY_CHANNELS if self.body_value(name) != 0.0]
+        away += [f"foot {leg.name}" for leg in sorted(self.raised)]
+        return [*away, "balance"] if self.shifted_for else away
+
+    def body_value(self, channel: str) -> float:
+        """Where the last key leaves a channel of the body."""
+        values = [key.value for key in self.in_order(BodyKey) if key.channel == channel]
+        return values[-1] if values else 0.0
+
+    def in_order(self, kind: type[_KeyType]) -> list[_KeyType]:
+        """Its keys of one kind, by their starts."""
+        keys = [key for key in self.keys if isinstance(key, kind)]
+        return sorted(keys, key=lambda key: key.start)
+
+    # --- how it is written ----------------------------------------------------------------
+
+    def _shifted(self: _Line, raised: frozenset[Leg]) -> _Line:
+        if not self.balance or self.shifted_for == raised:
+            return self
+        end = self.cursor + self.shift_time
+        if self.shift_beats:
+            end = self.clock.after(self.cursor, self.shift_beats)
+        return self._longer([BalanceShift(self.cursor, end, Ease.MINIMUM_JERK, raised)], end)
+
+    def _longer(self: _Line, keys: Sequence[Key], cursor: float) -> _Line:
+        return replace(
+            self,
+            keys=(*self.keys, *keys),
+            cursor=max(cursor, self.floor),
+            last_start=min((key.start for key in keys), default=self.cursor),
+            floor=0.0,
+        )
+
+    def _joined(self: _Line, other: TimelineData, start: float) -> _Line:
+        return self._longer([key.later(start) for key in other.keys], start + other.end)
+
+    def _beats_until(self, end: float) -> tuple[float, ...]:
+        now = self.clock.between(self.counted_from, end) if self.shift_beats else ()
+        return distinct(*self.counted, *now)
+
+    def _span(self, over: float) -> tuple[float, float]:
+        return self.cursor, self.clock.after(self.cursor, positive("over", over))
+
+
+def distinct(*instants: float) -> tuple[float, ...]:
+    """The increasing ``instants`` [s], each once."""
+    kept = list[float]()
+    for instant in instants:
+        if not kept or instant > kept[-1] + SAME:
+            kept.append(instant)
+    return tuple(kept)
+
+
+def _require_no_overlap(keys: Sequence[Key]) -> None:
+    last: dict[str, Key] = {}
+    for key in sorted(keys, key=lambda key: key.start):
+        before = last.get(key.track)
+        if before is not None and key.start < before.end - SAME:
+            raise TimelineError(
+                f"{key.track} moves twice at once: {before.start:.2f} to {before.end:.2f} s and "
+                f"{key.start:.2f} to {key.end:.2f} s"
+            )
+        last[key.track] = key

@@ -1,0 +1,1 @@
+"""From a timeline to a plan: tracks, balance, solved spans, and the curves that are played."""

@@ -1,0 +1,291 @@
+"""A motion as cubics and contacts, ready to be played; and what could not be done as written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.interpolate import PPoly
+
+from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
+from go2_wbc.errors import MotionError
+from go2_wbc.kernels.layout import REFERENCE
+from go2_wbc.legs import Leg
+from go2_wbc.reference import (
+    Anchor,
+    Footsteps,
+    LegTask,
+    MotionPlan,
+    PlanFeedback,
+    Posture,
+    Reference,
+    TrackedPoint,
+)
+from motions.batch_kinematics import attitudes
+from motions.plan.dynamic_span import DynamicSpan
+from motions.postures import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN
+
+LANDING_RAMP = 0.01
+"""Time [s] over which a foot takes up its load after a flight: own choice, a few ticks. Landing
+takes 0.1 s, and the forces that it needs are planned."""
+FORCE_WEIGHT = 1e-2
+"""Weight [1/N^2] by which the forces of a solved part are kept to: they lie in the friction cone
+that it was solved with, an even share of the load may not. From 0.001 to 0.1 it makes no difference
+to slips (own experiments)."""
+LEAST_FEET = 3
+"""Standing feet that span an area, so that a robot that stops there can keep standing."""
+_FORCES, _FORCE_WEIGHT = REFERENCE.slice("f_world_feet"), REFERENCE.start["force_weight"]
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What cannot be done as it is written.
+
+    Attributes:
+        check: what the feasibility check calls it.
+        subject: the leg, or the trunk.
+        time: when [s] it is worst.
+        miss: distance [m] by which the leg is too short; nan if that is not what is wrong.
+        reason: why no pose is balanced.
+    """
+
+    check: str
+    subject: str
+    time: float
+    miss: float = np.nan
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PlanSamples:
+    """The part of many references that says where the robot shall be.
+
+    Attributes:
+        times: (n,) [s].
+        p_world: (n, 3) position [m] of the CoM, or of the base.
+        is_com: (n,) of which.
+        R_world_base: (n, 3, 3) attitude of the trunk.
+        q_joints: (n, 12) joint angles [rad] of legs that follow their joints.
+        stance: (n, 4) feet that stand.
+        raised: (n, 4) legs that follow their joints.
+        p_feet: (n, 4, 3) where the other feet are [m].
+        normal_force_max: (n, 4) greatest normal force [N] of each foot.
+    """
+
+    times: Float[np.ndarray, " n"]
+    p_world: Float[np.ndarray, "n 3"]
+    is_com: Bool[np.ndarray, " n"]
+    R_world_base: Float[np.ndarray, "n 3 3"]
+    q_joints: Float[np.ndarray, "n 12"]
+    stance: Bool[np.ndarray, "n 4"]
+    raised: Bool[np.ndarray, "n 4"]
+    p_feet: Float[np.ndarray, "n 4 3"]
+    normal_force_max: Float[np.ndarray, "n 4"]
+
+    @staticmethod
+    def one_by_one(
+        plan: MotionPlan, times: Float[np.ndarray, " n"], p_feet: Float[np.ndarray, "*n 4 3"]
+    ) -> PlanSamples:
+        """The samples of any plan, by its ``at``; its feet stand at ``p_feet``."""
+        references = [plan.at(float(t)) for t in times]
+        swings = np.array([[t is LegTask.SWING for t in one.legs] for one in references])
+        swung = np.array([one.p_world_feet for one in references])
+        return PlanSamples(
+            times=times,
+            p_world=np.array([one.body.p_world for one in references]),
+            is_com=np.array([one.body.point is TrackedPoint.COM for one in references]),
+            R_world_base=np.array([one.body.R_world_base for one in references]),
+            q_joints=np.array([one.q_joints for one in references]),
+            stance=np.array([one.stance for one in references]),
+            p_feet=np.where(swings[:, :, None], swung, p_feet),
+            raised=np.array([[t is LegTask.JOINTS for t in one.legs] for one in references]),
+            normal_force_max=np.array([one.normal_force_max for one in references]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class HeldFoot:
+    """A foot that must be held up.
+
+    Attributes:
+        name: of the span.
+        leg: whose foot.
+        start, end: when [s].
+        height: planned for its centre above the ground [m].
+    """
+
+    name: str
+    leg: Leg
+    start: float
+    end: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
+class CompiledPlan(MotionPlan):
+    """A timeline, ready to be played.
+
+    Attributes:
+        name, entry, exit: see ``MotionPlan``.
+        curves: cubics of CoM [m], roll, pitch, yaw [rad], the twelve joints [rad] and the places of
+            the four feet's centres [m]: (30,).
+        contacts: who stands when.
+        swings: (m, 4) at each event of ``contacts``, the feet in the air that follow their places;
+            the others in the air follow their joints.
+        ramp: time [s] over which a foot is unloaded before lift-off and loaded after touchdown.
+        problems: what could not be done as written.
+        spans: start and end [s] of the named holds.
+        beats: instants [s] that it counts in.
+        dynamic: its parts that obey the whole robot's dynamics.
+        held: by the names of spans, the foot that must be held up then; see ``held_feet``.
+    """
+
+    name: str
+    entry: Posture
+    exit: Posture
+    curves: PPoly
+    contacts: ContactSchedule
+    swings: Bool[np.ndarray, "m 4"]
+    ramp: float
+    problems: tuple[Problem, ...]
+    spans: Mapping[str, tuple[float, float]]
+    beats: tuple[float, ...] = ()
+    dynamic: tuple[DynamicSpan, ...] = ()
+    held: Mapping[str, Leg] = field(default_factory=dict)
+    _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Bind what the kernel reads; raise MotionError for tables of different lengths."""
+        contacts, curves = self.contacts, self.curves
+        if self.swings.shape != contacts.modes.shape:
+            raise MotionError(
+                f"plan {self.name!r}: swings must have a row for each of {len(contacts.times)} "
+                f"contact events, got {list(self.swings.shape)}"
+            )
+        tasks, events = _tasks(contacts.modes, self.swings), np.array(contacts.times)
+        since, until = self._gradual(contacts.since, -np.inf), self._gradual(contacts.until, np.inf)
+        tables = (curves.x, curves.c, events, tasks, since, until)
+        object.__setattr__(self, "_tables", tables)
+
+    @property
+    def has_dynamic_spans(self) -> bool:
+        """Whether some of it is solved; see ``MotionPlan.has_dynamic_spans``."""
+        return bool(self.dynamic)
+
+    @property
+    def duration(self) -> float:  # type: ignore[override]
+        """Length of the motion [s]."""
+        return float(self.curves.x[-1])
+
+    @property
+    def footsteps(self) -> Footsteps | None:
+        """How its feet step, if any does; see ``MotionPlan.footsteps``."""
+        if not self.swings.any():
+            return None
+        ramp = min(self.ramp, LANDING_RAMP) if self.dynamic else self.ramp
+        return Footsteps(
+            contacts=self.contacts,
+            swings=self.swings,
+            unloads=np.where(
+                self.contacts.modes, self._gradual(self.contacts.until, np.inf), np.inf
+            ),
+            ramp=ramp,
+            normal_force_min=NORMAL_FORCE_MIN,
+            normal_force_max=NORMAL_FORCE_MAX,
+        )
+
+    @property
+    def end_pose(self) -> tuple[float, float, float]:
+        """Where it ends: x, y [m] and yaw [rad] of the frame of the feet, in that of the motion."""
+        anchor = Anchor.of_feet(self.curves(self.duration)[18:].reshape(4, 3), 0.0)
+        x, y, _ = anchor.p_world.tolist()
+        return x, y, anchor.yaw
+
+    @property
+    def held_feet(self) -> tuple[HeldFoot, ...]:
+        """Its acceptance: feet that must be measured at their heights, for it to count as done."""
+        found = []
+        for name, leg in self.held.items():
+            start, end = self.spans[name]
+            height = float(self.curves(0.5 * (start + end))[18 + 3 * leg + 2])
+            found.append(HeldFoot(name, leg, start, end, height))
+        return tuple(found)
+
+    @property
+    def is_dynamic(self) -> bool:
+        """Whether fewer than three feet stand at any time; see ``MotionPlan.is_dynamic``."""
+        return bool((self.contacts.modes.sum(axis=1) < LEAST_FEET).any())
+
+    def at(self, t: float) -> Reference:
+        """The reference at ``t``; see ``MotionPlan.at``."""
+        return Reference.of_row(self.row_at(t))
+
+    def row_at(self, t: float) -> Float[np.ndarray, " size"]:
+        """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
+        from go2_wbc.kernels.playing import planned_at
+
+        row = np.zeros(REFERENCE.size)
+        planned_at(*self._tables, self.ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, t, row)
+        forces = self._forces_at(t)
+        if forces is not None:
+            row[_FORCES], row[_FORCE_WEIGHT] = forces.ravel(), FORCE_WEIGHT
+        return row
+
+    def feedback_at(self, t: float) -> PlanFeedback | None:
+        """Of the span at ``t``, on two feet or one; see ``MotionPlan.feedback_at``."""
+        for span in self.dynamic:
+            if span.start <= t < span.end:
+                return span.feedback_at(t)
+        return None
+
+    def _forces_at(self, t: float) -> Float[np.ndarray, "4 3"] | None:
+        """Forces [N] on the feet that the span at ``t`` was solved with; elsewhere none."""
+        for span in self.dynamic:
+            if span.start <= t < span.end:
+                plan = span.trajectory
+                step = int(np.searchsorted(plan.times, t - span.start, side="right")) - 1
+                return plan.forces[min(step, len(plan.forces) - 1)]
+        return None
+
+    def _phases(self, times: Float[np.ndarray, " n"]) -> ContactPhase:
+        """The contacts at ``times``, with the changes to which load is ramped."""
+        rows, (*_, since, until) = event_at(self.contacts, times), self._tables
+        elapsed = np.maximum(times[:, None] - since[rows], 0.0)
+        return ContactPhase(self.contacts.modes[rows], elapsed, until[rows] - times[:, None])
+
+    def _gradual(self, changes: Float[np.ndarray, "m 4"], never: float) -> Float[np.ndarray, "m 4"]:
+        """``changes`` of contacts [s] but those in dynamic spans: there forces jump as planned."""
+        table = changes.copy()
+        for span in self.dynamic:
+            table[(changes > span.start - TIE) & (changes < span.end + TIE)] = never
+        return table
+
+    def samples(self, times: Float[np.ndarray, " n"]) -> PlanSamples:
+        """What the references at ``times`` ask for; ``at`` gives the same one by one."""
+        values = self.curves(np.clip(times, 0.0, self.duration))
+        phase, swings = self._phases(times), self.swings[event_at(self.contacts, times)]
+        return PlanSamples(
+            times=times,
+            p_world=values[:, :3],
+            is_com=np.ones(len(times), dtype=bool),
+            R_world_base=attitudes(values[:, 3:6]),
+            q_joints=values[:, 6:18],
+            stance=phase.stance,
+            raised=~(phase.stance | swings),
+            p_feet=values[:, 18:].reshape(-1, 4, 3),
+            normal_force_max=NORMAL_FORCE_MAX * phase.load_share(self.ramp),
+        )
+
+
+def event_at(contacts: ContactSchedule, times: Float[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
+    """Index of the last event at or before each of ``times`` [s], of a schedule that ends."""
+    event = np.searchsorted(contacts.times, times + TIE, side="right") - 1
+    return np.maximum(event, 0)
+
+
+def _tasks(stance: Bool[np.ndarray, "*n 4"], swings: Bool[np.ndarray, "*n 4"]) -> np.ndarray:
+    in_air = np.where(swings, float(LegTask.SWING), float(LegTask.JOINTS))
+    return np.where(stance, float(LegTask.STANCE), in_air)

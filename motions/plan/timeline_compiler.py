@@ -1,0 +1,316 @@
+"""Timeline -> plan: what is written is compiled, dynamic blocks are solved, and both are joined.
+
+Each part is made in a frame of its own, on the ground below the feet where it starts; so what
+follows a jump counts from where it lands. All of them rest standing where they meet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.interpolate import PPoly
+
+from go2_wbc.contacts import ContactSchedule
+from go2_wbc.curves import Ease
+from go2_wbc.errors import PlanNotFound, TimelineError
+from go2_wbc.reference import Anchor, Posture
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import yaw_rotation
+from motions.dynamics.dynamic_trajectory import DynamicTrajectory
+from motions.dynamics.knots import standing
+from motions.dynamics.phases import PhaseProblem, Progress
+from motions.dynamics.plan_cache import nearest_cached, solve_cached
+from motions.dynamics.projection import PlanTarget
+from motions.language.clock import SAME
+from motions.language.dynamic_blocks import away_from_home
+from motions.language.keys import BodyKey, FootHold, Key, Mark, PhaseKey
+from motions.language.timeline import Timeline
+from motions.plan.compiled_plan import CompiledPlan, Problem, event_at
+from motions.plan.contact_schedule import UNLOAD_TIME
+from motions.plan.dynamic_span import DynamicSpan, attitude_angles, curves_of, placed
+from motions.plan.quasi_static import compile_quasi_static
+from motions.plan.repair import pieces_to_repair, without_vain_shifts
+from motions.plan.trajectory import trajectory_of
+from motions.postures import standing_feet
+
+SHORTEST = 1e-6
+"""Time [s] between dynamic blocks below which there is none: absorbs rounding of sums."""
+SAME_PLACE = 1e-3
+"""Distance [m] below which feet count as standing below the hips: less than what tracking adds."""
+_RESTING = BodyKey(0.0, 0.0, Ease.LINEAR, "z", 0.0)
+
+Broken = Callable[[CompiledPlan], Float[np.ndarray, " k"]]
+"""Instants [s] at which a plan breaks a limit."""
+
+
+def compile_timeline(
+    timeline: Timeline,
+    model: RobotModel,
+    p_feet: Float[np.ndarray, "4 3"] | None = None,
+    *,
+    broken: Broken | None = None,
+    progress: Progress | None = None,
+) -> CompiledPlan:
+    """The plan of ``timeline``, in the frame of the motion.
+
+    Args:
+        timeline: what to compile.
+        model: of the robot; compiling uses its data, so it must not be that of a control loop that
+            runs in another thread.
+        p_feet: where the feet's centres stand at first [m], by default below the hips; the trunk
+            starts above them, with their heading.
+        broken: finds what is infeasible between dynamic blocks, for which the nearest motion that
+            is not is solved; without it all is compiled as it is written. ``FeasibilityChecker``
+            gives it where the timeline asks for it.
+        progress: called while something is solved, with the number of iterations and the cost.
+
+    Raises:
+        TimelineError: if it is empty, a dynamic block does not start standing at home, something
+            else moves meanwhile, or its phases do not fit each other.
+        MissingDependency: if a block must be solved and the solver is not installed.
+    """
+    blocks = timeline.in_order(PhaseKey)
+    if not blocks and broken is None:
+        return compile_quasi_static(timeline, model, p_feet)
+    for block in blocks:
+        _require_alone(timeline, block)
+    maker = _Maker(timeline, model, broken, progress)
+    if p_feet is not None:
+        maker.start_on(p_feet)
+    for block in blocks:
+        maker.add_stretch(block.start, Posture.STAND)
+        maker.add_block(block)
+    maker.add_stretch(timeline.end, timeline.exit)
+    return maker.joined()
+
+
+def _require_alone(timeline: Timeline, block: PhaseKey) -> None:
+    for key in timeline.keys:
+        is_apart = key.end <= block.start + SAME or key.start >= block.end - SAME
+        if not (is_apart or key is block or isinstance(key, Mark)):
+            raise TimelineError(
+                f"{key.track} moves from {key.start:.2f} to {key.end:.2f} s, within a dynamic "
+                f"block from {block.start:.2f} to {block.end:.2f} s, which takes the whole robot"
+            )
+    away = away_from_home(timeline, block.start)
+    if away:
+        raise TimelineError(
+            f"the dynamic block at {block.start:.2f} s starts standing at home(); away: "
+            f"{', '.join(away)}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """Curves and contacts from ``start`` [s] on, in the frame of the motion."""
+
+    start: float
+    curves: PPoly
+    times: Float[np.ndarray, " m"]
+    stance: Bool[np.ndarray, "m 4"]
+    swings: Bool[np.ndarray, "m 4"]
+
+
+class _Maker:
+    """Makes the parts of a plan, one after the other.
+
+    Between them the robot stands at rest over ``feet``, which are in the frame of the next part.
+    """
+
+    def __init__(
+        self,
+        timeline: Timeline,
+        model: RobotModel,
+        broken: Broken | None,
+        progress: Progress | None,
+    ) -> None:
+        self._timeline, self._model = timeline, model
+        self._broken, self._progress = broken, progress
+        self._time, self._frame = 0.0, Anchor(np.zeros(3), 0.0)
+        self._home = standing_feet(model)
+        self._feet = self._home
+        self._parts: list[_Part] = []
+        self._spans: list[DynamicSpan] = []
+        self._problems: list[Problem] = []
+        self._ramps: list[float] = []
+
+    def start_on(self, p_feet: Float[np.ndarray, "4 3"]) -> None:
+        """Start with the feet there [m], in the frame of the motion."""
+        self._move_on(0.0, p_feet, 0.0)
+
+    def add_stretch(self, end: float, exit: Posture) -> None:
+        """What is written from here to ``end`` [s]."""
+        start, line = self._time, self._timeline
+        if end - start < SHORTEST:
+            return
+        keys = [
+            key.later(-start)
+            for key in line.keys
+            if not isinstance(key, PhaseKey | Mark) and start - SAME <= key.start < end - SAME
+        ]
+        entry = line.entry if start == 0.0 else Posture.STAND
+        stretch = replace(line, cursor=end - start, entry=entry, exit=exit)
+        plan = self._compiled(stretch, keys or [replace(_RESTING, end=end - start)])
+        done = 0.0
+        if self._broken is not None and keys:
+            done = self._add_repaired(self._broken(plan), plan, replace(stretch, keys=tuple(keys)))
+        self._add_written(plan, done, plan.duration)
+        last = plan.curves(plan.duration)
+        self._move_on(end, last[18:].reshape(4, 3), last[5])
+
+    def _add_repaired(
+        self, broken: Float[np.ndarray, " k"], plan: CompiledPlan, line: Timeline
+    ) -> float:
+        """``plan``, which ``line`` was compiled to, up to the last part that is repaired.
+
+        ``broken``: when it breaks a limit [s]. Returns how far that goes [s]; a part to which
+        nothing is near stays as it is written.
+        """
+        done = 0.0
+        if not len(broken):
+            return done
+        path = as_checked = trajectory_of(plan, self._model)
+        asked = without_vain_shifts(line)
+        if len(asked.keys) < len(line.keys):
+            path = trajectory_of(self._compiled(asked, asked.keys), self._model)
+        for piece in pieces_to_repair(path, as_checked, broken):
+            try:
+                written = piece.written(path)
+                found = nearest_cached(
+                    written, self._model, tolerance=line.tolerance, progress=self._progress
+                )
+            except PlanNotFound as error:
+                self._fail("nearest motion", error, self._time + piece.start)
+                continue
+            self._add_written(plan, done, piece.start)
+            rest = _moved(plan.curves, self._frame)(piece.end)
+            self._solved(found, written, rest, self._time + piece.start, self._frame)
+            done = piece.end
+        return done
+
+    def _add_written(self, plan: CompiledPlan, start: float, end: float) -> None:
+        """What ``plan``, from here on, does from ``start`` to ``end`` [s] of it."""
+        if end - start < SHORTEST:
+            return
+        first, last = np.searchsorted(plan.curves.x, [start - SHORTEST, end - SHORTEST]).tolist()
+        knots = plan.curves.x[first : last + 1]
+        curves = PPoly(plan.curves.c[:, first:last], knots - knots[0])
+        times = np.array(plan.contacts.times)
+        during = times[(times > start) & (times < end)]
+        rows = event_at(plan.contacts, np.array([start, *during]))
+        times, modes = np.maximum(times[rows] - start, 0.0), plan.contacts.modes[rows]
+        curves, swings = _moved(curves, self._frame), plan.swings[rows]
+        self._parts.append(_Part(self._time + start, curves, times, modes, swings))
+        self._problems += [
+            replace(one, time=one.time + self._time)
+            for one in plan.problems
+            if start <= one.time <= end
+        ]
+        self._ramps.append(plan.ramp)
+
+    def _fail(self, check: str, error: PlanNotFound, time: float) -> None:
+        reason = "; ".join([str(error).split("\n")[0], *error.reasons])
+        self._problems.append(Problem(check, "trunk", time, reason=reason))
+
+    def add_block(self, block: PhaseKey) -> None:
+        """A dynamic block, solved; one that cannot be is rest and a problem."""
+        is_home = self._feet is self._home
+        initial = None if is_home else standing(self._model, self._feet)
+        problem = PhaseProblem(block.phases, initial, tolerance=self._timeline.tolerance)
+        try:
+            found = solve_cached(problem, self._model, progress=self._progress)
+        except PlanNotFound as error:
+            self._fail("dynamic plan", error, self._time)
+            self.add_stretch(block.end, Posture.STAND)
+            return
+        start, frame = self._time, self._frame
+        yaw = float(attitude_angles(found.q)[-1, 2])
+        asked = self._feet + problem.shift
+        self._move_on(start + found.duration, asked, yaw, landed=found.p_feet[-1])
+        rest = replace(self._timeline, entry=Posture.STAND, exit=Posture.STAND, cursor=1.0)
+        home = self._compiled(rest, [replace(_RESTING, end=1.0)]).curves
+        self._solved(found, problem, _moved(home, self._frame)(0.0), start, frame)
+
+    def _solved(
+        self,
+        found: DynamicTrajectory,
+        asked: PhaseProblem | PlanTarget,
+        end: Float[np.ndarray, "30"],
+        start: float,
+        frame: Anchor,
+    ) -> None:
+        """A part that ends at rest at ``end`` (see ``CompiledPlan.curves``)."""
+        span = DynamicSpan(start, frame, asked, placed(found, frame), self._timeline.tolerance)
+        curves, stance = curves_of(span.trajectory, self._model, end), found.stance
+        changes = np.flatnonzero(np.any(stance[1:] != stance[:-1], axis=1)) + 1
+        rows = np.concatenate([[0], changes])
+        times = found.times[rows]
+        self._parts.append(_Part(start, curves, times, stance[rows], ~stance[rows]))
+        self._spans.append(span)
+
+    def joined(self) -> CompiledPlan:
+        """All parts as one plan."""
+        line, parts = self._timeline, self._parts
+        knots = [part.start + part.curves.x[:-1] for part in parts]
+        curves = PPoly(
+            np.concatenate([part.curves.c for part in parts], axis=1),
+            np.concatenate([*knots, [self._time]]),
+        )
+        times = np.concatenate([part.start + part.times for part in parts])
+        return CompiledPlan(
+            name=line.name,
+            entry=line.entry,
+            exit=line.exit,
+            curves=curves,
+            contacts=ContactSchedule(
+                tuple(times.tolist()), np.concatenate([part.stance for part in parts])
+            ),
+            swings=np.concatenate([part.swings for part in parts]),
+            ramp=min(self._ramps, default=UNLOAD_TIME),
+            problems=tuple(self._problems),
+            spans={mark.name: (mark.start, mark.end) for mark in line.in_order(Mark)},
+            dynamic=tuple(self._spans),
+            beats=line.beats,
+            held={key.name: key.leg for key in line.in_order(FootHold)},
+        )
+
+    def _compiled(self, stretch: Timeline, keys: Sequence[Key]) -> CompiledPlan:
+        feet = None if self._feet is self._home else self._feet
+        return compile_quasi_static(replace(stretch, keys=tuple(keys)), self._model, feet)
+
+    def _move_on(
+        self,
+        time: float,
+        feet: Float[np.ndarray, "4 3"],
+        yaw: float,
+        landed: Float[np.ndarray, "4 3"] | None = None,
+    ) -> None:
+        """Go on at ``time`` [s], standing on ``feet``; all of them in the frame of before.
+
+        ``yaw``: of the trunk [rad], whole turns counted. ``landed``: where the feet have come to,
+        a little beside: the next frame is there.
+        """
+        asked = Anchor.of_feet(feet, self._model.foot_radius)
+        own = (feet - asked.p_world) @ yaw_rotation(asked.yaw)
+        own[:, 2] = self._home[:, 2]
+        is_home = np.abs(own - self._home).max() < SAME_PLACE
+        self._feet = self._home if is_home else own
+        here = asked if landed is None else Anchor.of_feet(landed, 0.0)
+        turns = 2.0 * np.pi * round((yaw - here.yaw) / (2.0 * np.pi))
+        p = np.array([*here.p_world[:2], 0.0])
+        frame = self._frame
+        to = frame.p_world + yaw_rotation(frame.yaw) @ p
+        self._time, self._frame = time, Anchor(to, frame.yaw + here.yaw + turns)
+
+
+def _moved(curves: PPoly, frame: Anchor) -> PPoly:
+    """``curves`` of a part, in the frame of the motion: its coefficients turn as places do."""
+    R, c = yaw_rotation(frame.yaw), curves.c.copy()
+    for column in (0, *range(18, 30, 3)):
+        c[:, :, column : column + 3] = curves.c[:, :, column : column + 3] @ R.T
+        c[3, :, column : column + 3] += frame.p_world
+    c[3, :, 5] += frame.yaw
+    return PPoly(c, curves.x)

@@ -1,0 +1,236 @@
+"""Tracks of a timeline as functions of many instants at once: where trunk and legs shall be.
+
+Everything is in the frame of the motion: z up, x ahead, its origin on the ground in the middle of
+the four feet as they stand at first. Offsets count in the frame of the feet as they stand by then.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, starmap
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.interpolate import CubicSpline
+
+from go2_wbc.legs import LEGS, Leg
+from go2_wbc.reference import Posture
+from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, leg_angles
+from go2_wbc.robot.model import RobotModel
+from motions.batch_kinematics import attitudes, foot_centres, turned, turned_back
+from motions.language.footing import Footing, Ground
+from motions.language.keys import (
+    BODY_CHANNELS,
+    BodyKey,
+    BodyPathKey,
+    Frame,
+    JointKey,
+    Key,
+    LegKey,
+    LegTarget,
+    PostureKey,
+)
+from motions.language.timeline import Timeline
+
+SAMPLE_PERIOD = 0.01
+"""Time [s] between the instants that are looked at. A cubic spline through samples of f misses it
+by 5/384 h^4 max|d4f/dt4| at most (Hall & Meyer 1976): 0.2 um for a way L of 0.1 m by minimum jerk
+in T = 0.4 s, where the derivative is 360 L / T^4 at most."""
+LOW = 0.08
+"""A foot that stays this far [m] below its hip's axis moves along straight lines; a higher one in
+joint space, since the way of a foot past its hip crosses a singularity of the leg."""
+
+Times = Float[np.ndarray, " n"]
+Poses = Float[np.ndarray, "n 6"]
+Joints = Float[np.ndarray, "n 12"]
+Feet = Float[np.ndarray, "n 4 3"]
+Move = tuple[Key, Float[np.ndarray, " k"]]
+
+
+def sample_times(duration: float) -> Times:
+    """Instants [s] from the start of a motion to its end."""
+    return np.linspace(0.0, duration, max(round(duration / SAMPLE_PERIOD), 2) + 1)
+
+
+def followed(
+    times: Times, first: Float[np.ndarray, " k"], moves: Sequence[Move]
+) -> Float[np.ndarray, "n k"]:
+    """Values (n, k) at ``times`` of what goes from ``first`` to one goal after the other.
+
+    Args:
+        times: increasing instants [s].
+        first: where it is before the first move.
+        moves: keys by their starts, each with its goal (k,); none starts before the one before it
+            has ended.
+    """
+    path = np.tile(first, (len(times), 1))
+    last = first
+    edges = np.searchsorted(times, [*(key.start for key, _ in moves), np.inf]).tolist()
+    for (key, goal), rows in zip(moves, starmap(slice, pairwise(edges)), strict=True):
+        path[rows] = last + _way(key, times[rows], last, goal)
+        last = goal
+    return path
+
+
+def body_path(
+    timeline: Timeline,
+    home: Mapping[Posture, Float[np.ndarray, "6"]],
+    times: Times,
+    ground: Ground,
+) -> Poses:
+    """Base position [m] and roll, pitch, yaw [rad] at ``times``, without the shift for balance."""
+    moves: dict[str, list[Move]] = {channel: [] for channel in BODY_CHANNELS}
+    for key in timeline.in_order(BodyKey):
+        moves[key.channel].append((key, np.array([key.value])))
+    postures = [(key, home[key.posture]) for key in timeline.in_order(PostureKey)]
+    offsets = [followed(times, np.zeros(1), moves[channel]) for channel in BODY_CHANNELS]
+    path = followed(times, home[timeline.entry], postures) + np.hstack(offsets)
+    path[:, :2] = ground.frames[:, :2] + turned(ground.headings, path[:, :3])[:, :2]
+    path[:, 5] += ground.frames[:, 2]
+    return path
+
+
+def _way(
+    key: Key, times: Times, last: Float[np.ndarray, " k"], goal: Float[np.ndarray, " k"]
+) -> Float[np.ndarray, "n k"]:
+    """How far (n, k) a key has gone from ``last``; a path through points by a clamped spline."""
+    if not isinstance(key, BodyPathKey):
+        return eased(key, times)[:, None] * (goal - last)
+    shares = np.array([0.0, *key.shares, 1.0])
+    places = np.array([float(last[0]), *key.through, key.value]) - last[0]
+    passed = np.clip((times - key.start) / (key.end - key.start), 0.0, 1.0)
+    return CubicSpline(shares, places, bc_type="clamped")(passed)[:, None]
+
+
+def eased(key: Key, times: Times) -> Float[np.ndarray, " n"]:
+    """0 before ``key`` starts, 1 after it has ended, eased between them."""
+    s = np.clip((times - key.start) / (key.end - key.start), 0.0, 1.0)
+    shares = np.where(s < 1.0, 0.0, 1.0)
+    during = (s > 0.0) & (s < 1.0)
+    shares[during] = [key.ease.progress(float(value))[0] for value in s[during]]
+    return shares
+
+
+@dataclass(frozen=True, slots=True)
+class JointPaths:
+    """What all legs do at n instants.
+
+    Attributes:
+        q: (n, 12) joint angles [rad].
+        miss: (n, 4) distance [m] by which each foot is asked for more than its leg reaches.
+    """
+
+    q: Joints
+    miss: Float[np.ndarray, "n 4"]
+
+
+class LegTracks:
+    """Evaluates the legs' tracks of a timeline along a path of the trunk.
+
+    Attributes:
+        footing: where the feet stand.
+    """
+
+    def __init__(
+        self, timeline: Timeline, footing: Footing, model: RobotModel, home: Float[np.ndarray, "6"]
+    ) -> None:
+        """``home``: pose of the trunk in the frame of the feet in which the motion starts."""
+        self._model = model
+        self._geometry = {leg: LegGeometry.of(model, leg) for leg in LEGS}
+        self._keys: dict[Leg, list[LegKey]] = {leg: [] for leg in LEGS}
+        for key in timeline.in_order(LegKey):
+            self._keys[key.leg].append(key)
+        self._starts = {leg: [key.start for key in keys] for leg, keys in self._keys.items()}
+        self.footing = footing
+        self._p_home, self._R_home = home[:3], attitudes(home[None, 3:])[0]
+        self._keys = {leg: self._completed(leg, keys) for leg, keys in self._keys.items()}
+
+    def _completed(self, leg: Leg, keys: Sequence[LegKey]) -> list[LegKey]:
+        """The keys with the angles of joints that stay as they are, from the goal before.
+
+        That is in joints or in the frame of the body, so the trunk's pose does not count.
+        """
+        done, origin = list[LegKey](), LegTarget.on_ground()
+        for key in keys:
+            whole: LegKey = key
+            if isinstance(key, JointKey):
+                ground = self.footing.at(np.array([key.start]))
+                angles = self._at(leg, origin, np.zeros((1, 6)), ground).q[0]
+                angles[key.joint] = key.target.values[key.joint]
+                hip, thigh, calf = angles.tolist()
+                whole = replace(key, target=LegTarget(Frame.JOINTS, (hip, thigh, calf)))
+            done.append(whole)
+            origin = whole.target
+        return done
+
+    def paths(self, times: Times, body: Poses, ground: Ground) -> JointPaths:
+        """Joint angles of all legs at increasing ``times``.
+
+        Args:
+            times: instants [s].
+            body: where the trunk is then.
+            ground: where the feet stand then.
+        """
+        legs = [self._path(leg, times, body, ground) for leg in LEGS]
+        return JointPaths(
+            np.hstack([leg.q for leg in legs]), np.column_stack([leg.miss for leg in legs])
+        )
+
+    def feet(
+        self, raised: Bool[np.ndarray, "n 4"], ground: Ground, body: Poses, joints: Joints
+    ) -> Feet:
+        """Places [m] of the feet's centres: on the ground, and where raised legs hold them.
+
+        ``body``, ``joints``: pose of the trunk and joint angles.
+        """
+        held = foot_centres(body[:, :3], attitudes(body[:, 3:]), joints, self._model)
+        return np.where(raised[:, :, None], held, ground.p_feet)
+
+    def _path(self, leg: Leg, times: Times, body: Poses, ground: Ground) -> LegAngles:
+        """From its start until the next one starts, a key alone says where the leg is."""
+        keys, starts = self._keys[leg], self._starts[leg]
+        first = max(bisect_right(starts, times[0]) - 1, 0)
+        origin = keys[first - 1].target if first else LegTarget.on_ground()
+        path = self._at(leg, origin, body, ground)
+        for index in range(first, bisect_right(starts, times[-1])):
+            key = keys[index]
+            following = starts[index + 1] if index + 1 < len(keys) else np.inf
+            until = max(np.searchsorted(times, following), np.searchsorted(times, key.end, "right"))
+            rows = slice(int(np.searchsorted(times, key.start)), int(until))
+            moved = self._move(key, origin, times[rows], body[rows], ground.part(rows))
+            path.q[rows], path.miss[rows] = moved.q, moved.miss
+            origin = key.target
+        return path
+
+    def _move(
+        self, key: LegKey, origin: LegTarget, times: Times, body: Poses, ground: Ground
+    ) -> LegAngles:
+        share = eased(key, times)[:, None]
+        goals = (origin, key.target)
+        span = times <= key.end
+        if all(goal.frame is not Frame.JOINTS for goal in goals):
+            places = [self._places(key.leg, goal, body, ground) for goal in goals]
+            hip = self._geometry[key.leg].p_base_hip[2]
+            if all((place[span, 2] < hip - LOW).all() for place in places):
+                between = (1.0 - share) * places[0] + share * places[1]
+                return leg_angles(self._geometry[key.leg], between)
+        first, second = (self._at(key.leg, goal, body, ground) for goal in goals)
+        q = (1.0 - share) * first.q + share * second.q
+        return LegAngles(q, np.where(share[:, 0] < 1.0, first.miss, second.miss))
+
+    def _at(self, leg: Leg, target: LegTarget, body: Poses, ground: Ground) -> LegAngles:
+        if target.frame is Frame.JOINTS:
+            return LegAngles(np.tile(target.values, (len(body), 1)), np.zeros(len(body)))
+        return leg_angles(self._geometry[leg], self._places(leg, target, body, ground))
+
+    def _places(
+        self, leg: Leg, target: LegTarget, body: Poses, ground: Ground
+    ) -> Float[np.ndarray, "n 3"]:
+        """Places of a foot [m], seen from the base."""
+        offset, p, R = np.array(target.values), ground.p_feet[:, leg], ground.headings
+        if target.frame is Frame.BODY:
+            seen = turned_back(R, p - np.pad(ground.frames[:, :2], ((0, 0), (0, 1))))
+            return (seen - self._p_home) @ self._R_home + offset
+        return turned_back(attitudes(body[:, 3:]), p + R @ offset - body[:, :3])

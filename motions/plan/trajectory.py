@@ -1,0 +1,168 @@
+"""A plan as a trajectory of the whole robot: what every joint would do if all went as planned.
+
+The references say where the CoM, the trunk's attitude and the raised legs shall be. The rest
+follows: standing feet stay in their places, so the trunk's place is the one that puts the CoM where
+it is wanted, and the standing legs' angles come from closed-form inverse kinematics. Velocities and
+accelerations are those of a cubic spline through the samples. Dynamic spans bring their own states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from jaxtyping import Bool, Float
+
+from go2_wbc.errors import MotionError
+from go2_wbc.reference import MotionPlan
+from go2_wbc.robot.model import RobotModel
+from motions.batch_kinematics import (
+    Wanted,
+    angles_of,
+    attitudes,
+    centres_of_mass,
+    configurations,
+    place,
+    rates,
+)
+from motions.dynamics.projection import PlanTarget
+from motions.plan.compiled_plan import CompiledPlan, PlanSamples
+from motions.plan.dynamic_span import DynamicSpan
+from motions.plan.tracks import sample_times
+from motions.postures import standing_feet
+
+CENTRING_STEPS = 5
+"""Steps that put the CoM in its place; see ``place``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """A motion of the whole robot, in the frame of the motion.
+
+    Attributes:
+        times: (n,) [s].
+        q: (n, 19) position, quaternion, joints. v, a: (n, 18) its velocity and acceleration, both
+            of the base in its own frame.
+        rpy: (n, 3) roll, pitch, yaw [rad] of the trunk.
+        p_com: (n, 3) CoM [m].
+        stance: (n, 4) feet that stand.
+        load_share: (n, 4) share of its load that a foot may bear.
+        p_feet: (n, 4, 3) where the feet are [m] of legs that do not follow their joints.
+        miss: (n, 4) distance [m] by which such a foot is out of its leg's reach.
+        is_dynamic: (n,) instants in spans that obey the whole robot's dynamics, of which they are.
+    """
+
+    times: Float[np.ndarray, " n"]
+    q: Float[np.ndarray, "n 19"]
+    v: Float[np.ndarray, "n 18"]
+    a: Float[np.ndarray, "n 18"]
+    rpy: Float[np.ndarray, "n 3"]
+    p_com: Float[np.ndarray, "n 3"]
+    stance: Bool[np.ndarray, "n 4"]
+    load_share: Float[np.ndarray, "n 4"]
+    p_feet: Float[np.ndarray, "n 4 3"]
+    miss: Float[np.ndarray, "n 4"]
+    is_dynamic: Bool[np.ndarray, " n"]
+
+
+def trajectory_of(plan: MotionPlan, model: RobotModel) -> Trajectory:
+    """The trajectory of ``plan``; of one that does not say where, the feet stand below the hips.
+
+    Raises:
+        MotionError: if the plan is not finite.
+    """
+    times = sample_times(plan.duration)
+    is_compiled = isinstance(plan, CompiledPlan)
+    p_feet = standing_feet(model)
+    asked = plan.samples(times) if is_compiled else PlanSamples.one_by_one(plan, times, p_feet)
+    _require_finite(asked)
+    rpy = np.unwrap(angles_of(asked.R_world_base), axis=0)
+    R = attitudes(rpy)
+    wanted = Wanted(
+        p=asked.p_world,
+        is_com=asked.is_com,
+        R=R,
+        q_joints=asked.q_joints,
+        raised=asked.raised,
+        p_feet=asked.p_feet,
+    )
+    placed = place(wanted, CENTRING_STEPS, model)
+    q = configurations(np.hstack([placed.p_base, rpy]), placed.q_joints)
+    spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
+    is_dynamic = _are_within(times, spans)
+    v, a = np.zeros((len(times), 18)), np.zeros((len(times), 18))
+    for rows in runs(is_dynamic):
+        if not is_dynamic[rows.start] and rows.stop - rows.start > 1:
+            v[rows], a[rows] = rates(times[rows], q[rows], rpy[rows])
+    greatest = asked.normal_force_max
+    path = Trajectory(
+        times=times,
+        q=q,
+        v=v,
+        a=a,
+        rpy=rpy,
+        p_com=placed.p_com,
+        stance=asked.stance,
+        load_share=greatest / max(float(greatest.max()), 1e-9),
+        p_feet=asked.p_feet,
+        miss=placed.miss,
+        is_dynamic=is_dynamic,
+    )
+    for span in spans:
+        _fill(path, span, model)
+    return path
+
+
+def as_written(plan: MotionPlan, path: Trajectory) -> Float[np.ndarray, "n 19"]:
+    """Configurations along ``path``, the trajectory of ``plan``, as they were written.
+
+    They differ where the robot could not do what was written, and the nearest motion that it can do
+    was planned.
+    """
+    q = path.q.copy()
+    for span in plan.dynamic if isinstance(plan, CompiledPlan) else ():
+        if isinstance(span.asked, PlanTarget):
+            inside = (path.times >= span.start) & (path.times <= span.end)
+            q[inside] = span.written(path.times[inside])
+    return q
+
+
+def _are_within(
+    times: Float[np.ndarray, " n"], spans: Sequence[DynamicSpan]
+) -> Bool[np.ndarray, " n"]:
+    within = np.zeros(len(times), dtype=bool)
+    for span in spans:
+        within |= (times >= span.start) & (times < span.end)
+    return within
+
+
+def runs(mask: Bool[np.ndarray, " n"]) -> list[slice]:
+    """Rows between changes of ``mask``."""
+    edges = [0, *(np.flatnonzero(np.diff(mask)) + 1).tolist(), len(mask)]
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def _fill(path: Trajectory, span: DynamicSpan, model: RobotModel) -> None:
+    """Put the span's own states into its rows of ``path``."""
+    rows = _are_within(path.times, [span])
+    found = span.at(path.times[rows], model)
+    path.q[rows], path.v[rows], path.a[rows] = found.q, found.v, found.a
+    turns = np.array([pin.Quaternion(q[3:7]).toRotationMatrix() for q in found.q])
+    own = np.unwrap(angles_of(turns), axis=0)
+    path.rpy[rows] = own + 2.0 * np.pi * np.round((path.rpy[rows][:1] - own[:1]) / (2.0 * np.pi))
+    poses = np.hstack([found.q[:, :3], path.rpy[rows]])
+    path.p_com[rows] = centres_of_mass(poses, found.q[:, 7:], model)
+    path.miss[rows] = 0.0
+
+
+def _require_finite(asked: PlanSamples) -> None:
+    count = len(asked.times)
+    turns, p_feet = asked.R_world_base.reshape(count, 9), asked.p_feet.reshape(count, 12)
+    parts = (asked.p_world, turns, asked.q_joints, p_feet)
+    is_finite = np.isfinite(np.hstack(parts)).all(axis=1)
+    if not is_finite.all():
+        t = float(asked.times[int(np.argmin(is_finite))])
+        raise MotionError(f"the plan is not finite at t={t:.2f} s")

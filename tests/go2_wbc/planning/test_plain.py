@@ -1,0 +1,66 @@
+"""What runs compiled is the Python that is written: one planner each way, tick by tick."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from go2_wbc.compilation import plain
+from go2_wbc.contacts import GAITS, Gait
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner, plan
+from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.reference import Target
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.payload import NO_PAYLOAD, Payload
+from go2_wbc.robot.snapshot import Snapshot
+from tests.engine_helpers import random_state, standing_q, state_of
+
+TICK = 0.002
+TICKS = 240
+ROUNDING = 1e-8  # of accelerations up to 100 m/s^2, where numpy's sine is not libm's
+SWIFT = LocomotionConfig(settle_speed=0.3, square_tolerance=0.05, capture_margin=0.07)
+AT_ONCE = Gait("at once", 0.31, 0.42, (0.0, 0.5, 0.5, 0.0), starts_at_once=True)
+
+
+def stumbling(model: RobotModel, rng: np.random.Generator, tick: int, at: np.ndarray) -> Snapshot:
+    """A measured state near ``at``, calm for a while, then wild, now and then with a payload."""
+    state = random_state(rng, tilt=0.3 if tick % 80 >= 40 else 0.02)
+    q, pace = state.q.copy(), 0.02 if tick % 120 >= 60 else 1.0
+    q[:3] = [*(at + rng.normal(scale=0.02, size=2)), 0.3 + 0.02 * rng.normal()]
+    if tick % 60 >= 30:
+        q[3:] = standing_q()[3:]
+    contact = np.random.default_rng(tick // 20).random(4) < 0.5
+    tau = rng.normal(scale=10.0, size=12)
+    state = replace(
+        state, time=tick * TICK, q=q, v=pace * state.v, tau=tau, feet_in_contact=contact
+    )
+    return model.snapshot(
+        state, Payload(5.0, (0.06, -0.08, 0.03)) if tick % 90 > 60 else NO_PAYLOAD
+    )
+
+
+@pytest.mark.parametrize("gait", [GAITS["trot"], GAITS["walk"], AT_ONCE], ids=lambda g: g.name)
+def test_the_planner_compiled_is_the_planner_as_it_is_written(gait: Gait) -> None:
+    model, rng = RobotModel(), np.random.default_rng(8)
+    planner = LocomotionPlanner(model, gait, SWIFT)
+    planner.start(model.snapshot(state_of(standing_q())))
+    at, starts, frictions = np.zeros(2), 0, set[float]()
+    for tick in range(1, TICKS + 1):
+        command = VelocityCommand(*rng.normal(size=3)) if tick % 100 < 60 else ZERO_COMMAND
+        pose = BodyPose(*rng.uniform(-0.3, 0.3, 4)) if tick % 50 < 20 else LEVEL
+        now, target, was_stepping = stumbling(model, rng, tick, at), Target(), planner.is_stepping
+        state = type(planner._state).of(planner._state.row.copy())
+        reference = planner.update(now, command, pose)
+        told = now.state.feet_in_contact, now.state.tau, state, planner._walk, planner._command
+        with np.errstate(all="ignore"):
+            plain(plan)(now, np.float64(now.state.time), *told, target)
+        np.testing.assert_allclose(target.row, reference.row, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(state.row, planner._state.row, rtol=0, atol=ROUNDING)
+        starts += planner.is_stepping and not was_stepping
+        frictions.add(reference.friction)
+        at = reference.body.p_world[:2]
+    assert starts >= 1
+    assert len(frictions) > 3

@@ -1,0 +1,323 @@
+"""A plan that breaks a limit is refused, with the limit, the part, the time and the amount."""
+
+from __future__ import annotations
+
+import inspect
+
+import numpy as np
+import pytest
+
+from go2_wbc.errors import CommandError, MotionInfeasible
+from go2_wbc.legs import Leg
+from go2_wbc.reference import Posture
+from go2_wbc.robot.model import RobotModel
+from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg, load_motion
+from motions.feasibility import FeasibilityReport
+from motions.feasibility.forces import forces_of
+from motions.plan.trajectory import trajectory_of
+from motions.postures import STAND_HEIGHT
+from tests.motions.doctored import (
+    STRETCHED,
+    DoctoredPlan,
+    middle,
+    with_body_aside,
+    with_joint_beyond_its_limit,
+    with_joint_too_fast,
+)
+
+# m, N, N m; of quantities that two ways of calculating give, one of them by a spline.
+EXACT = 1e-6
+
+
+@pytest.fixture(scope="module")
+def good(model: RobotModel) -> CompiledPlan:
+    return compile_timeline(load_motion("high_five", hold=1.0), model)
+
+
+def failed(report: FeasibilityReport) -> set[str]:
+    return {finding.check for finding in report.failures}
+
+
+# --- plans broken on purpose ----------------------------------------------------------------------
+
+
+def test_a_good_plan_passes(good: CompiledPlan, checker: FeasibilityChecker) -> None:
+    report = checker.check(good)
+    assert report.ok, report.table()
+    report.raise_if_infeasible()
+    assert all(finding.margin >= 0.0 for finding in report.margins.values())
+
+
+def test_a_joint_beyond_its_limit_is_found_at_its_worst_instant(
+    good: CompiledPlan, checker: FeasibilityChecker, model: RobotModel
+) -> None:
+    report = checker.check(with_joint_beyond_its_limit(good))
+    (finding,) = [f for f in report.failures if f.check == "joint position"]
+    limit = model.q_upper[Leg.FR.joints.stop - 1]
+    assert finding.subject == "FR_calf"
+    assert finding.unit == "rad"
+    assert finding.limit == pytest.approx(limit)
+    assert finding.value == pytest.approx(STRETCHED, abs=0.03)
+    assert finding.margin == pytest.approx(limit - STRETCHED, abs=0.03)
+    assert finding.time == pytest.approx(middle(good), abs=0.02)
+    with pytest.raises(MotionInfeasible, match="'high_five' is infeasible") as caught:
+        report.raise_if_infeasible()
+    assert str(finding) in str(caught.value)
+    assert caught.value.findings == report.failures
+
+
+def test_a_joint_that_is_too_fast_is_found(good: CompiledPlan, checker: FeasibilityChecker) -> None:
+    report = checker.check(with_joint_too_fast(good))
+    (finding,) = [f for f in report.failures if f.check == "joint speed"]
+    assert finding.subject == "FR_thigh"
+    assert finding.unit == "rad/s"
+    assert finding.value > finding.limit == pytest.approx(30.1)
+    assert "continuity" in failed(report)
+
+
+@pytest.mark.parametrize("aside", [0.3, -0.3])
+def test_a_com_outside_the_support_is_found(
+    good: CompiledPlan, checker: FeasibilityChecker, aside: float
+) -> None:
+    report = checker.check(with_body_aside(good, aside))
+    (finding,) = [f for f in report.failures if f.check == "support"]
+    assert finding.subject == "CoM"
+    assert finding.margin < -0.05
+    assert finding.value < finding.limit
+
+
+def test_a_com_off_the_triangle_is_found_only_while_a_paw_is_up(
+    good: CompiledPlan, checker: FeasibilityChecker
+) -> None:
+    report = checker.check(with_body_aside(good, -0.095))
+    (finding,) = [f for f in report.failures if f.check == "support"]
+    assert not good.at(finding.time).stance.all()
+    assert "foot load" in failed(report) or "contact wrench" in failed(report)
+
+
+CAUSES = (
+    ("numbers", "way of a foot", "reach"),
+    (
+        "joint position",
+        "self-collision",
+        "clearance",
+        "dragging",
+        "landing place",
+        "entry and exit",
+    ),
+    ("balance", "support"),
+    ("joint speed", "landing speed", "continuity"),
+    (
+        "support of ZMP",
+        "contact wrench",
+        "foot load",
+        "lag",
+        "tipping",
+        "tracking",
+        "friction",
+        "slip",
+        "torque",
+        "torque at speed",
+    ),
+)
+"""Out of reach; postures the robot cannot take; places; balance; speed; forces."""
+
+
+def rank(check: str) -> int:
+    return next(place for place, checks in enumerate(CAUSES) if check in checks)
+
+
+def test_causes_come_before_what_follows_from_them(
+    good: CompiledPlan, checker: FeasibilityChecker
+) -> None:
+    late = Timeline().body(z=-0.02, over=0.1, ease="hold").home(over=1.0).hold(1.0)
+    late = late.body(z=0.18, over=1.0).home(over=1.0)
+    for motion in (with_body_aside(good, 0.3), with_joint_too_fast(good), late):
+        report = checker.check(motion)
+        ranks = [rank(finding.check) for finding in report.failures]
+        assert len(set(ranks)) >= 2
+        assert ranks == sorted(ranks)
+        assert [rank(name) for name in report.margins] == sorted(map(rank, report.margins))
+        broken = [line[:16].strip() for line in report.table().splitlines() if line[70:72] == " x"]
+        assert broken == list(dict.fromkeys(finding.check for finding in report.failures))
+        with pytest.raises(MotionInfeasible) as caught:
+            report.raise_if_infeasible()
+        assert str(report.failures[0]) == str(caught.value).splitlines()[1].strip()
+        for check in set(broken):
+            times = [f.time for f in report.failures if f.check == check]
+            assert times == sorted(times)
+    # The jump of the trunk comes first, what is out of reach is the cause that is named first.
+    assert report.failures[0].check == "way of a foot"
+    assert report.failures[0].time > 1.0 > min(finding.time for finding in report.failures)
+
+
+def test_a_plan_that_is_not_a_number_is_infeasible(
+    good: CompiledPlan, checker: FeasibilityChecker
+) -> None:
+    report = checker.check(DoctoredPlan(good, aside=float("nan")))
+    assert not report.ok
+
+
+# --- timelines that the robot cannot do -----------------------------------------------------------
+
+AWAY = {
+    "reach": Timeline().body(z=0.18, over=1.0).home(over=1.0),
+    "joint position": Timeline().body(z=-0.24, over=1.0).home(over=1.0),
+    "continuity": Timeline().body(pitch=deg(18), over=0.03).home(over=0.03),
+    "friction": Timeline().body(y=0.07, over=0.15).body(y=-0.07, over=0.15).home(over=0.2),
+    "slip": Timeline().body(yaw=0.25, over=0.2).body(yaw=-0.25, over=0.2).home(over=0.3),
+    "lag": Timeline().body(z=-0.1, over=0.6).body(z=0.02, over=0.11).home(over=0.6),
+    "tracking": Timeline()
+    .body(roll=deg(35), over=0.5)
+    .body(roll=-deg(35), over=0.5)
+    .home(over=0.5),
+    "tipping": Timeline()
+    .foot("RL", z=0.09, over=0.7)
+    .body(z=-0.097, over=0.56)
+    .body(z=0.097, over=0.56)
+    .foot("RL", z=0.0, over=0.8)
+    .home(over=0.9),
+    "support": Timeline(balance=False).foot("FR", z=0.1, over=0.8).home(over=0.8),
+    "landing speed": Timeline().foot("FR", z=0.15, over=0.6).foot("FR", over=0.1, ease="linear"),
+    "dragging": Timeline()
+    .foot("FR", x=0.1, z=0.0, over=0.6)
+    .foot("FR", x=-0.1, z=0.0, over=0.6)
+    .home(over=0.6),
+    "clearance": Timeline().body(pitch=deg(35), z=-0.2, over=1.0).home(over=1.0),
+    "entry and exit": Timeline().body(z=-0.08, over=1.0),
+    "balance": Timeline().foot("FR", z=0.1, over=0.8).foot("RL", z=0.1, over=0.8),
+}
+
+
+@pytest.mark.parametrize("check", AWAY)
+def test_what_the_robot_cannot_do_is_found_under_its_name(
+    checker: FeasibilityChecker, check: str
+) -> None:
+    report = checker.check(AWAY[check])
+    assert check in failed(report), report.table()
+
+
+def test_a_foot_that_moves_along_the_ground_is_found_and_one_that_rises_on_its_way_is_not(
+    checker: FeasibilityChecker,
+) -> None:
+    line = Timeline().foot("FR", x=0.05, z=0.0, over=0.6).home(over=0.6)
+    (finding,) = checker.check(line).warnings
+    assert (finding.check, finding.subject, finding.unit) == ("dragging", "FR", "m")
+    assert finding.value == pytest.approx(0.1, abs=1e-3)  # there, and back with home()
+    for line in (
+        Timeline().foot("FR", z=0.03, over=0.3).foot("FR", x=0.05, z=0.0, over=0.6),
+        Timeline().foot("FR", x=0.1, z=0.03, over=0.6).foot("FR", x=0.1, z=0.05, over=0.6),
+    ):
+        report = checker.check(line)
+        assert "dragging" not in failed(report) | {f.check for f in report.warnings}
+    back = Timeline().foot("FR", z=0.03, over=0.3).foot("FR", x=0.05, over=0.6).home(over=0.6)
+    (finding,) = checker.check(back).warnings
+    assert finding.check == "dragging"
+    assert finding.value == pytest.approx(0.05, abs=3e-3)  # and the last bit of the way down
+
+
+def test_legs_that_cross_are_found(checker: FeasibilityChecker) -> None:
+    crossing = (
+        Timeline().foot("FR", z=0.10, over=0.8).foot("FR", y=0.26, z=0.04, over=0.8).home(over=1.0)
+    )
+    (finding,) = [f for f in checker.check(crossing).failures if f.check == "self-collision"]
+    assert "FL" in finding.subject
+    assert "FR" in finding.subject
+
+
+def test_a_name_of_the_library_may_be_checked_and_nothing_else(checker: FeasibilityChecker) -> None:
+    assert checker.check("bow").motion == "bow"
+    with pytest.raises(CommandError, match="unknown motion 'bows'; valid: beckon, bow"):
+        checker.check("bows")
+    for ask in (FeasibilityChecker.check, FeasibilityChecker.evaluate, FeasibilityChecker.plan):
+        with pytest.raises(CommandError, match=r"motion must be a name of the library.* got 3"):
+            inspect.unwrap(ask)(checker, 3)  # past the checks of types
+
+
+def test_a_moment_without_balance_is_told_without_a_number(checker: FeasibilityChecker) -> None:
+    report = checker.check(AWAY["balance"])
+    (finding,) = [f for f in report.failures if f.check == "balance"]
+    assert "nan" not in str(finding)
+    assert "two feet cannot balance the trunk" in str(finding)
+    assert "nan" not in report.table()
+
+
+def test_a_motion_that_starts_lying_or_ends_elsewhere_is_refused(
+    checker: FeasibilityChecker,
+) -> None:
+    for line in (
+        Timeline(entry=Posture.LIE).body(z=0.0, roll=0.01, over=1.0),
+        Timeline(exit=Posture.SIT).body(z=-0.05, over=1.0).home(over=1.0),
+    ):
+        assert "entry and exit" in failed(checker.check(line))
+
+
+@pytest.mark.parametrize(("exit", "way"), [(Posture.STAND, "home()"), (Posture.SIT, "'sit')")])
+def test_a_motion_that_ends_elsewhere_is_told_what_ends_it(
+    checker: FeasibilityChecker, exit: Posture, way: str
+) -> None:
+    (finding,) = checker.check(Timeline(exit=exit).body(z=-0.03, over=0.5)).failures[:1]
+    assert str(finding).endswith(f"{way})")
+    home = checker.check(Timeline().body(z=-0.03, over=0.5).home(over=0.5))
+    assert "home()" not in home.table()
+
+
+# --- what the numbers mean ------------------------------------------------------------------------
+
+
+def test_the_feet_of_a_resting_robot_carry_its_weight_with_the_torques_of_statics(
+    model: RobotModel,
+) -> None:
+    plan = compile_timeline(Timeline().body(z=-0.001, over=5.0).home(over=5.0), model)
+    path = trajectory_of(plan, model)
+    forces = forces_of(path, model)
+    weight = model.mass * model.gravity
+    assert forces.contact[0, :, 2].sum() == pytest.approx(weight, abs=1e-2)
+    assert forces.missing.max() < 1e-2
+    assert forces.zmp[0] == pytest.approx(path.p_com[0, :2], abs=1e-4)
+    assert path.p_com[0, 2] == pytest.approx(STAND_HEIGHT, abs=EXACT)
+
+
+def test_the_trajectory_puts_the_com_and_the_feet_where_the_plan_wants_them(
+    good: CompiledPlan, model: RobotModel
+) -> None:
+    path = trajectory_of(good, model)
+    for row in range(0, len(path.times), 25):
+        reference = good.at(float(path.times[row]))
+        com, feet = model.forward_kinematics(path.q[row])
+        assert com == pytest.approx(reference.body.p_world, abs=EXACT)
+        stands = reference.stance
+        assert feet[stands] == pytest.approx(path.p_feet[0, stands], abs=EXACT)
+        raised = ~np.repeat(stands, 3)
+        assert path.q[row, 7:][raised] == pytest.approx(reference.q_joints[raised], abs=EXACT)
+
+
+def test_equations_of_motion_hold_along_a_trajectory(good: CompiledPlan, model: RobotModel) -> None:
+    path = trajectory_of(good, model)
+    forces, last = forces_of(path, model), len(path.times) - 1
+    for row in range(0, len(path.times), 40):
+        near = [min(max(k, 0), last) for k in (row - 1, row, row + 1)]
+        needed = [model.inverse_dynamics(path.q[k], path.v[k], path.a[k]) for k in near]
+        generalised = np.mean(needed, axis=0)  # what the ground gives over 30 ms
+        snapshot = model.snapshot(_state_at(path, row))
+        applied = snapshot.J_contacts.reshape(12, 18).T @ forces.contact[row].ravel()
+        residual = generalised - applied
+        assert np.abs(residual[:6]).max() < 0.01  # N; the evenness of the load takes its share
+        assert residual[6:] == pytest.approx(forces.tau[row], abs=EXACT)
+
+
+def test_a_table_fits_80_columns_and_names_every_check(
+    good: CompiledPlan, checker: FeasibilityChecker
+) -> None:
+    report = checker.check(good)
+    lines = report.table().splitlines()
+    assert max(map(len, lines)) <= 80
+    assert all(any(line.startswith(check) for line in lines) for check in report.margins)
+    assert "can do it" in lines[-2]
+    assert lines[-1].startswith("Chance that it is done so: ")
+
+
+def _state_at(path, row: int):  # noqa: ANN001, ANN202
+    from motions.feasibility.forces import state_at
+
+    return state_at(path, row)

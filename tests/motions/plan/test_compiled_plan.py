@@ -1,0 +1,117 @@
+"""What a plan asks for at every instant: of its curves, its contacts, and many samples at once."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from go2_wbc.contacts import GAITS, TIE, ContactSchedule
+from go2_wbc.reference import LegTask, MotionPlan, TrackedPoint
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import log_rotation
+from motions import Timeline, compile_timeline, deg, load_motion
+from motions.plan.compiled_plan import PlanSamples
+from motions.postures import NORMAL_FORCE_MAX, sit_down
+from tests.motions.plans import curves_at, library_plan
+
+ROUNDING = 1e-12  # m, rad; N of 400
+STEP = 1e-5  # s; of the differences
+EXACT: dict[str, Any] = {"rtol": 1e-5, "atol": 1e-5}
+START = np.array([0.02, -0.01, 0.25, 0.15, -0.2, 0.4])
+
+
+@pytest.mark.parametrize("name", ["high_five", "tap_dance", "sit_pretty"])
+def test_samples_are_the_references(name: str) -> None:
+    plan = compile_timeline(load_motion(name), RobotModel())
+    times = np.array([-1.0, *np.arange(0.0, plan.duration, 0.017), plan.duration, 99.0])
+    places = np.array([plan.at(float(t)).p_world_feet for t in times])
+    found, expected = plan.samples(times), PlanSamples.one_by_one(plan, times, places)
+    for field in fields(PlanSamples):
+        one, other = getattr(found, field.name), getattr(expected, field.name)
+        assert one.dtype == other.dtype
+        difference = np.abs(one.astype(float) - other.astype(float))
+        scale = 400.0 if field.name == "normal_force_max" else 1.0
+        assert difference.max() <= scale * ROUNDING, field.name
+
+
+@pytest.mark.parametrize("name", ["high_five", "dance", "wave", "sit_pretty", "jump_up"])
+def test_a_reference_says_what_curves_and_contacts_say(name: str) -> None:
+    plan, rng = library_plan(name), np.random.default_rng(3)
+    instants = rng.uniform(-0.3, plan.duration + 0.3, size=200)
+    events = np.add.outer(plan.contacts.times, [-2e-9, -5e-10, 0.0, 5e-10, 2e-9]).ravel()
+    for t in (*instants.tolist(), *events.tolist(), *plan.curves.x[:20].tolist(), plan.duration):
+        asked, curves = plan.at(t), curves_at(plan, t)
+        body, joints, feet = np.split(curves, [6, 18], axis=1)
+        told = (asked.body.p_world, asked.body.v_world, asked.body.a_world)
+        assert np.array(told) == pytest.approx(body[:, :3], abs=1e-9)
+        R = Rotation.from_euler("xyz", body[0, 3:]).as_matrix()
+        assert asked.body.R_world_base == pytest.approx(R, abs=1e-9)
+        told = (asked.q_joints, asked.v_joints, asked.a_joints)
+        assert np.array(told) == pytest.approx(joints, abs=1e-9)
+        told = (asked.p_world_feet, asked.v_world_feet, asked.a_world_feet)
+        assert np.array(told) == pytest.approx(feet.reshape(3, 4, 3), abs=1e-9)
+        assert asked.body.point is TrackedPoint.COM
+        event = np.flatnonzero(np.array(plan.contacts.times) <= t + TIE)
+        row = event[-1] if len(event) else 0
+        in_air = np.where(plan.swings[row], LegTask.SWING, LegTask.JOINTS)
+        tasks = np.where(plan.contacts.modes[row], LegTask.STANCE, in_air)
+        assert list(asked.legs) == tasks.tolist()
+
+
+def test_a_foot_is_unloaded_evenly_before_it_lifts_and_loaded_after_it_lands() -> None:
+    plan = library_plan("wave")
+    (lift_off, landing) = (t for t in plan.contacts.times if t > 0.0)
+    (leg,) = np.flatnonzero(~plan.contacts.at(0.5 * (lift_off + landing)).stance)
+    for t in np.linspace(0.0, plan.duration, 500):
+        share = np.clip(max(lift_off - t, t - landing) / plan.ramp, 0.0, 1.0)
+        asked = plan.at(float(t))
+        assert asked.normal_force_max[leg] == pytest.approx(NORMAL_FORCE_MAX * share, abs=1e-6)
+        assert (np.delete(asked.normal_force_max, leg) == NORMAL_FORCE_MAX).all()
+        assert not asked.normal_force_min.any()
+
+
+def lively() -> MotionPlan:
+    line = Timeline().body(x=0.02, z=-0.03, roll=deg(6), pitch=deg(-7), yaw=deg(10), over=0.8)
+    return compile_timeline(line.foot("FR", z=0.05, over=0.8).home(over=1.0), RobotModel())
+
+
+@pytest.mark.parametrize("make", [lively, lambda: sit_down(START)])
+def test_velocities_and_accelerations_of_a_plan_are_derivatives(make) -> None:  # noqa: ANN001
+    plan = make()
+    for t in np.linspace(0.0, plan.duration, 23)[1:-1] + 0.0123:
+        if t > plan.duration - 0.01:
+            continue
+        before, now, after = (plan.at(float(t + d)) for d in (-STEP, 0.0, STEP))
+        b0, b, b1 = before.body, now.body, after.body
+        two = 2.0 * STEP
+        assert b.p_world.shape == (3,)
+        np.testing.assert_allclose(b.v_world, (b1.p_world - b0.p_world) / two, **EXACT)
+        np.testing.assert_allclose(b.a_world, (b1.v_world - b0.v_world) / two, **EXACT)
+        turned = log_rotation(b1.R_world_base @ b0.R_world_base.T) / two
+        np.testing.assert_allclose(b.w_world, turned, **EXACT)
+        np.testing.assert_allclose(b.dw_world, (b1.w_world - b0.w_world) / two, **EXACT)
+        np.testing.assert_allclose(now.v_joints, (after.q_joints - before.q_joints) / two, **EXACT)
+        np.testing.assert_allclose(now.a_joints, (after.v_joints - before.v_joints) / two, **EXACT)
+
+
+@pytest.mark.parametrize(
+    "schedule",
+    [
+        GAITS["trot"].schedule(),
+        ContactSchedule((0.5,), np.ones((1, 4), dtype=bool)),
+        ContactSchedule((0.0, 1.0, 1.5), np.array([[1, 1, 1, 1], [0, 1, 1, 1], [1, 1, 0, 1]]) > 0),
+    ],
+    ids=["trot", "standing", "steps"],
+)
+def test_contacts_at_many_times_are_those_of_each(schedule: ContactSchedule) -> None:
+    times = np.concatenate([np.random.default_rng(1).uniform(-1.0, 4.0, 200), [0.0, 1.0, 0.18]])
+    many = schedule.at_times(times)
+    for row, t in enumerate(times.tolist()):
+        one = schedule.at(t)
+        for name in ("stance", "elapsed", "remaining"):
+            assert getattr(many, name)[row] == pytest.approx(getattr(one, name), abs=ROUNDING), name
+        assert many.load_share(0.1)[row] == pytest.approx(one.load_share(0.1), abs=1e-9)

@@ -1,0 +1,26 @@
+"""Tracks of the legs: where a foot is between two keys, and by how much it misses its place."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from go2_wbc.legs import Leg
+from go2_wbc.robot.model import RobotModel
+from motions import Timeline
+from motions.language.footing import Footing
+from motions.plan.tracks import LegTracks
+from motions.postures import STAND_POSE, standing_feet
+
+FAR = 0.6  # m; ahead of where the foot stands, out of its leg's reach
+
+
+def test_a_leg_on_its_way_from_a_place_out_of_reach_misses_it_until_it_has_arrived() -> None:
+    line = Timeline(balance=False).foot("FR", x=FAR, z=0.1, over=1.0)
+    line = line.leg("FR", hip=0.0, thigh=0.8, calf=-1.6, over=1.0)
+    times = np.array([1.0, 1.5, 1.999, 2.0])
+    body = np.tile(STAND_POSE, (len(times), 1))
+    model = RobotModel()
+    tracks = LegTracks(line, Footing(line, standing_feet(model)), model, STAND_POSE)
+    miss = tracks.paths(times, body, tracks.footing.at(times)).miss[:, Leg.FR]
+    assert miss[0] > 0.1
+    assert miss.tolist() == [miss[0], miss[0], miss[0], 0.0]
