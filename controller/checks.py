@@ -7,10 +7,10 @@ import math
 import numpy as np
 
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.planning.landing import Landings
-from go2_wbc.planning.playback import Deviation
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.tracking.landing import Landings
+from go2_wbc.tracking.plan_tracking import Deviation
 from motions.postures import SIT_POSE, STAND_HEIGHT, TUCKED_JOINTS
 
 STILL_SPEED = 0.05

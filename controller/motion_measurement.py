@@ -10,10 +10,9 @@ from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from controller.placed_plan import PlacedPlan
 from controller.written_motion import off_written
-from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.mujoco.ground_truth import TOUCH, GroundTruth, TruthRecording, true_runs
-from go2_wbc.reference import Anchor, LegTask, MotionPlan
+from go2_wbc.reference import STANCE, Anchor, LegTask, MotionPlan, Target
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
 
@@ -149,8 +148,8 @@ def during_motion(go2: GO2Controller, truth: GroundTruth, name: str) -> TruthRec
 def _slip(recorded: TruthRecording, plan: MotionPlan, dt: float) -> float:
     """Largest distance [m] slid in a stance phase, less its edges inside of the motion."""
     start, n = float(recorded.time[0]), len(recorded.time)
-    stance = np.array([plan.row_at(t)[_LEGS] for t in (recorded.time - start).tolist()])
-    stance = stance == LegTask.STANCE
+    rows = [plan.row_at(t) for t in (recorded.time - start).tolist()]
+    stance = np.array([Target.of(row).legs for row in rows]) == STANCE
     margin, worst = round(SETTLED_CONTACT / dt), 0.0
     for leg in LEGS:
         for phase in true_runs(stance[:, leg]):
@@ -175,6 +174,3 @@ def _off_plan(
         off = foot_places(geometry, real) - foot_places(geometry, planned)
         feet = max(feet, float(np.linalg.norm(off, axis=1).max(initial=0.0)))
     return float(asked.trunk_off(truth).max()), float(asked.turned_off(truth).max()), feet
-
-
-_LEGS = REFERENCE.slice("legs")

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
-from go2_wbc.reference import Anchor, LegTask, MotionPlan
+from go2_wbc.records import layout_of
+from go2_wbc.reference import Anchor, LegTask, MotionPlan, Target
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.batch_kinematics import attitudes
 
@@ -37,18 +37,18 @@ class PlacedPlan:
     @staticmethod
     def of(plan: MotionPlan, times: Float[np.ndarray, " m"], anchor: Anchor) -> PlacedPlan:
         """The references ``times`` [s] after the start of a motion that began at ``anchor``."""
-        rows = np.empty((len(times), REFERENCE.size))
+        R, layout = yaw_rotation(anchor.yaw), layout_of(Target)
+        rows = np.empty((len(times), layout.size))
         for k, t in enumerate(times.tolist()):
             rows[k] = plan.row_at(t)
-        parts = {name: rows[:, REFERENCE.slice(name)] for name in _USED}
-        R, feet = yaw_rotation(anchor.yaw), parts["p_world_feet"].reshape(-1, 4, 3)
+        targets = rows.view(layout.dtype)[:, 0]
         return PlacedPlan(
-            is_com=parts["is_com"][:, 0] != 0.0,
-            p_world_body=anchor.p_world + parts["p_world"] @ R.T,
-            R_world_base=R @ parts["R_world_base"].reshape(-1, 3, 3),
-            tasks=parts["legs"].copy(),
-            p_world_feet=anchor.p_world + feet @ R.T,
-            q_joints=parts["q_joints"].copy(),
+            is_com=targets["is_com"] != 0.0,
+            p_world_body=anchor.p_world + targets["p_world"] @ R.T,
+            R_world_base=R @ targets["R_world_base"],
+            tasks=targets["legs"].copy(),
+            p_world_feet=anchor.p_world + targets["p_world_feet"] @ R.T,
+            q_joints=targets["q_joints"].copy(),
         )
 
     def does(self, task: LegTask) -> Bool[np.ndarray, "m 4"]:
@@ -67,5 +67,4 @@ class PlacedPlan:
         return np.arctan2(twice_sine, turn.trace(axis1=1, axis2=2) - 1.0)
 
 
-_USED = ("is_com", "p_world", "R_world_base", "legs", "p_world_feet", "q_joints")
 _PAIRS = ((2, 1), (0, 2), (1, 0))

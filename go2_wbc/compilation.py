@@ -47,7 +47,20 @@ T = TypeVar("T")
 PLAIN_VARIABLE = "GO2_WBC_PLAIN"
 """Environment variable; 1 runs every kernel as the Python that it is written in."""
 _IS_PLAIN = os.environ.get(PLAIN_VARIABLE, "0") not in ("", "0")
-MODULES = ("go2_wbc.algebra.active_set", "go2_wbc.planning.locomotion")
+MODULES = (
+    "go2_wbc.algebra.active_set",
+    "go2_wbc.planning.locomotion",
+    "go2_wbc.plant.mujoco.layout",
+    "go2_wbc.reference",
+    "go2_wbc.robot.leg_kinematics",
+    "go2_wbc.robot.payload_estimation",
+    "go2_wbc.robot.rigid_body",
+    "go2_wbc.robot.rotations",
+    "go2_wbc.robot.safety",
+    "go2_wbc.tracking.plan_curves",
+    "go2_wbc.tracking.plan_tracking",
+    "go2_wbc.wbc.trajectory_loads",
+)
 """Modules that hold kernels."""
 _FOREIGN = "foreign"
 Foreign = Annotated[T, _FOREIGN]

@@ -21,7 +21,7 @@ import platform
 import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -59,7 +59,7 @@ class Written(ABC):
         """Module and function."""
         return f"{self.written.__module__}.{self.written.__qualname__}"
 
-    @property
+    @cached_property
     @abstractmethod
     def signature(self) -> Any:
         """As Numba has it."""
@@ -222,6 +222,8 @@ def _ingredient(name: str, value: Any, seen: set[int]) -> Iterator[str]:
         yield from _ingredients(value.written, seen)
     elif isinstance(value, FunctionType):
         yield from _ingredients(value, seen)
+    elif type(value).__module__ == "go2_wbc.kernels.compilation":  # until none is left
+        yield from _ingredients(value._function, seen)
     elif isinstance(value, type) and issubclass(value, enum.Enum):
         yield f"{name} = {[(member.name, member.value) for member in value]}"
     elif isinstance(value, (bool, int, float, str, tuple, np.generic, np.ndarray)):

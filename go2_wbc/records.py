@@ -169,11 +169,12 @@ def _view_of(cls: type) -> type:
     """A subclass of a dataclass whose values lie in a row."""
     parts = {name: _property(field) for name, field in layout_of(cls).fields.items()}
     layout = layout_of(cls)
-    return type(
-        cls.__name__,
-        (cls,),
-        {"__slots__": ("row",), "__repr__": lambda self: _described(self, layout), **parts},
-    )
+    own = {
+        "__slots__": ("row",),
+        "__repr__": lambda self: _described(self, layout),
+        "__reduce__": lambda self: (_looking_at, (cls, self.row)),
+    }
+    return type(cls.__name__, (cls,), own | parts)
 
 
 @cache

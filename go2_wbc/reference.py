@@ -16,10 +16,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.compilation import kernel
 from go2_wbc.contacts import ContactSchedule
 from go2_wbc.errors import CommandError
 from go2_wbc.records import Record
 from go2_wbc.robot.rotations import yaw_rotation
+from go2_wbc.robot.snapshot import Snapshot
 
 LEAST_WEIGHT, MOST_WEIGHT = 1e-6, 1e2
 """Of the force regularisation: beyond them accuracy is lost."""
@@ -44,6 +46,10 @@ class LegTask(IntEnum):
     STANCE = 0
     SWING = 1
     JOINTS = 2
+
+
+STANCE, SWING, JOINTS = (int(task) for task in LegTask)
+"""The same as numbers, for compiled code; and looking an enumeration's members up takes longer."""
 
 
 class Target(Record):
@@ -78,8 +84,17 @@ class Target(Record):
     orientation_discount: float
 
 
+@kernel
+def sag_and_lean(target: Target, now: Snapshot) -> tuple[float, float]:
+    """Depth [m] of the tracked point below where it shall be, and angle [rad] of the verticals."""
+    measured = now.p_world_com[2] if target.is_com else now.q[2]
+    cosine = 0.0
+    for i in range(3):
+        cosine += target.R_world_base[2, i] * now.R_world_base[2, i]
+    return target.p_world[2] - measured, np.arccos(min(max(cosine, -1.0), 1.0))
+
+
 _LEG_TASKS = tuple(LegTask)
-_STANCE = int(LegTask.STANCE)  # a number: looking an enumeration's members up takes longer
 _BODY_PARTS = ("p_world", "v_world", "a_world", "R_world_base", "w_world", "dw_world")
 _ARRAYS = (
     *("normal_force_min", "normal_force_max", "p_world_feet", "v_world_feet", "a_world_feet"),
@@ -194,7 +209,7 @@ class Reference:
             point = _COM if target.is_com else _BASE
             return BodyTarget(point, *(getattr(target, part) for part in _BODY_PARTS))
         if name == "stance":
-            return target.legs == _STANCE
+            return target.legs == STANCE
         if name == "legs":
             return tuple(_LEG_TASKS[int(task)] for task in target.legs.tolist())
         value = getattr(target, name)

@@ -13,8 +13,16 @@ from jaxtyping import Bool, Float
 from scipy.interpolate import CubicSpline
 
 from go2_wbc.legs import LEGS
-from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_table, link_table
+from go2_wbc.robot import leg_kinematics
+from go2_wbc.robot.leg_kinematics import (
+    LegGeometry,
+    foot_places,
+    leg_table,
+    link_table,
+    settle,
+)
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import quaternions_from_rpy, rotations_from_rpy
 
 LEAST_WEIGHT = 1.0
 """Least vertical force [N] by which moments are divided: the zero-moment point stays finite."""
@@ -66,8 +74,6 @@ def place(wanted: Wanted, steps: int, model: RobotModel) -> Placed:
     step leaves an eighth of the error (measured). The legs are solved once more after the last one,
     so that the feet are exactly in their places.
     """
-    from go2_wbc.kernels.kinematics import settle  # compiled; only who needs it waits for it
-
     p, joints = _own(wanted.p), _own(wanted.q_joints)
     miss, com = np.empty((len(p), 4)), np.empty((len(p), 3))
     settle(
@@ -89,10 +95,8 @@ def place(wanted: Wanted, steps: int, model: RobotModel) -> Placed:
 
 def attitudes(rpy: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
     """R_world_base = Rz(yaw) Ry(pitch) Rx(roll) of every row [rad]."""
-    from go2_wbc.kernels.kinematics import rotations  # compiled, as above
-
     R = np.empty((len(rpy), 3, 3))
-    rotations(_own(rpy), R)
+    rotations_from_rpy(_own(rpy), R)
     return R
 
 
@@ -125,10 +129,8 @@ def configurations(
     poses: Float[np.ndarray, "n 6"], joints: Float[np.ndarray, "n 12"]
 ) -> Float[np.ndarray, "n 19"]:
     """q of a trunk at ``poses`` (position, then roll, pitch, yaw) with these joint angles."""
-    from go2_wbc.kernels.kinematics import quaternions  # compiled, as above
-
     xyzw = np.empty((len(poses), 4))
-    quaternions(_own(poses[:, 3:]), xyzw)
+    quaternions_from_rpy(_own(poses[:, 3:]), xyzw)
     return np.hstack([poses[:, :3], xyzw, joints])
 
 
@@ -147,10 +149,8 @@ def centres_of_mass(
     poses: Float[np.ndarray, "n 6"], joints: Float[np.ndarray, "n 12"], model: RobotModel
 ) -> Float[np.ndarray, "n 3"]:
     """CoM [m] of a trunk at ``poses`` with these joint angles."""
-    from go2_wbc.kernels import kinematics  # compiled, as above
-
     com, R = np.empty((len(poses), 3)), attitudes(poses[:, 3:])
-    kinematics.centres_of_mass(link_table(model), _own(poses[:, :3]), R, _own(joints), com)
+    leg_kinematics.centres_of_mass(link_table(model), _own(poses[:, :3]), R, _own(joints), com)
     return com
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.curves import Segment
-from go2_wbc.kernels.layout import PLAN_CURVES, REFERENCE
 from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.tracking.plan_curves import standing_target
 from motions.batch_kinematics import Wanted, attitudes, place
 
 NORMAL_FORCE_MIN = 0.0
@@ -37,7 +37,6 @@ SPLAYED_JOINTS = TUCKED_JOINTS + np.tile([0.3, 0.0, 0.0, -0.3, 0.0, 0.0], 2)
 """Joint angles [rad] with the feet beside the hips, so that the folded legs carry nothing."""
 SETTLING_STEPS = 10
 """Steps that put the CoM of a standing robot in its place; see ``place``."""
-_STANCE, _ALL = np.zeros(4), np.ones(4)
 """Every leg's ``LegTask.STANCE``, and its share of the load."""
 
 
@@ -116,14 +115,9 @@ class PosturePlan(MotionPlan):
 
     def row_at(self, t: float) -> Float[np.ndarray, " size"]:
         """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
-        from go2_wbc.kernels.playing import planned  # compiled; only who plays waits for it
-
         body = self.body.at(t)
-        row, curves = np.zeros(REFERENCE.size), np.zeros((3, PLAN_CURVES))
-        curves[:, :6] = body.value, body.rate, body.acceleration
-        is_com = 1.0 if self.point is TrackedPoint.COM else 0.0
-        planned(is_com, curves, _STANCE, _ALL, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, row)
-        return row
+        curves = np.array([body.value, body.rate, body.acceleration])
+        return standing_target(self.point, curves, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX).row
 
 
 def rise(start: Float[np.ndarray, "6"], entry: Posture, duration: float = 1.2) -> PosturePlan:

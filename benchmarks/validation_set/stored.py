@@ -15,8 +15,7 @@ from benchmarks.store import ROOT, settings_header
 from controller.motion_outcome import Outcome
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import write_atomically
-from go2_wbc.kernels.layout import REFERENCE
-from go2_wbc.reference import MotionPlan
+from go2_wbc.reference import MotionPlan, Target
 
 FOLDER = Path(__file__).parent
 BORDERS_FILE, OUTCOMES_FILE = FOLDER / "borders.json", FOLDER / "outcomes.json"
@@ -41,9 +40,10 @@ def physics_header() -> dict[str, str]:
 
 def digest(plan: MotionPlan) -> str:
     """A short hash of where trunk, joints and feet shall be: of plans that are played alike."""
-    rows = [plan.row_at(float(t)) for t in np.linspace(0.0, plan.duration, INSTANTS)]
+    instants = np.linspace(0.0, plan.duration, INSTANTS).tolist()
+    targets = [Target.of(plan.row_at(t)) for t in instants]
     names = ("p_world", "R_world_base", "q_joints", "p_world_feet", "legs")
-    values = [np.ravel(REFERENCE.view(row, name)) for row in rows for name in names]
+    values = [np.ravel(getattr(target, name)) for target in targets for name in names]
     rounded = np.round(np.concatenate([*values, [plan.duration]]), 4) + 0.0  # no negative zeros
     return hashlib.sha256(rounded.tobytes()).hexdigest()[:12]
 

@@ -8,10 +8,9 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.curves import Ease
-from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.legs import Leg
 from go2_wbc.planning.correction import tracked_position
-from go2_wbc.reference import Anchor, MotionPlan
+from go2_wbc.reference import Anchor, MotionPlan, Target
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
@@ -74,15 +73,16 @@ class Approach:
         )
         return Approach(seen - body.p_world)
 
-    def add_to(self, row: Float[np.ndarray, " size"], t: float) -> None:
-        """Add what is left of the way ``t`` seconds into the plan to its row of that instant."""
+    def add_to(self, target: Target, t: float) -> None:
+        """Add what is left of the way ``t`` seconds into the plan to its target of that instant."""
         if t >= APPROACH or not self.p_start.any():
             return
         values = Ease.MINIMUM_JERK.progress(t / APPROACH)
-        for power, name in enumerate(("p_world", "v_world", "a_world")):
+        derivatives = target.p_world, target.v_world, target.a_world
+        for power, derivative in enumerate(derivatives):
             share = values[power] / APPROACH**power
             left = 1.0 - share if power == 0 else -share
-            REFERENCE.view(row, name)[:] += left * self.p_start
+            derivative += left * self.p_start
 
 
 def _pairs(plan: MotionPlan) -> list[list[Leg]]:

@@ -12,14 +12,14 @@ from controller.behaviours.base import Behaviour
 from controller.behaviours.safe_return import SafeReturn
 from controller.behaviours.weight import FeltWeight
 from go2_wbc.planning.correction import tracked_position
-from go2_wbc.planning.feedback import fed_back
-from go2_wbc.planning.landing import Landings
-from go2_wbc.planning.playback import Deviation, PlanFollower, Playback
-from go2_wbc.reference import Anchor, MotionPlan, Posture, Reference
+from go2_wbc.reference import Anchor, MotionPlan, Posture, Reference, Target
 from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.tracking.landing import Landings
+from go2_wbc.tracking.plan_feedback import fed_back
+from go2_wbc.tracking.plan_tracking import Deviation, PlanTracker
 
 LOW = 0.15
 """Height [m] of the trunk over the ground below which a posture may begin on the belly."""
@@ -34,7 +34,7 @@ class PlayPlan(Behaviour):
     """Play a plan where the robot stands."""
 
     _anchor: Anchor
-    _follower: PlanFollower
+    _tracker: PlanTracker
     _approach: Approach
     _weight: FeltWeight
 
@@ -52,7 +52,7 @@ class PlayPlan(Behaviour):
         super().start(snapshot)
         self._last = self._start
         self._anchor = anchor_of(self.plan, snapshot.p_world_feet)
-        self._follower = Playback(self._anchor, self.plan.footsteps)
+        self._tracker = PlanTracker(self._anchor, self.plan.footsteps)
         self._approach = Approach.of(self.plan, self._anchor, snapshot)
         self._weight = FeltWeight(self._friction)
 
@@ -68,12 +68,12 @@ class PlayPlan(Behaviour):
     @property
     def deviation(self) -> Deviation:
         """How far the robot has been off the plan since ``start``."""
-        return self._follower.deviation
+        return self._tracker.deviation
 
     @property
     def landings(self) -> Landings:
         """What came of the landings of feet that step."""
-        return self._follower.landings
+        return self._tracker.landings
 
     def end_error(self, snapshot: Snapshot) -> tuple[float, float]:
         """Distance [m], on the level, and angle [rad] of the feet's middle from its planned end.
@@ -89,35 +89,35 @@ class PlayPlan(Behaviour):
     @property
     def sag_and_lean(self) -> tuple[float, float]:
         """From the plan: a correction that pulls against a load is no wanted lean."""
-        return self._follower.sag_and_lean
+        return self._tracker.sag_and_lean
 
     def update(self, snapshot: Snapshot) -> Reference:
         """The plan's reference of this instant, in the world."""
         now = snapshot.state.time
-        row, t = self._planned(snapshot)
-        reference = self._follower.follow(row, snapshot, t, now - self._last)
+        target, t = self._planned(snapshot)
+        reference = self._tracker.track(target, snapshot, t, now - self._last)
         self._last = now
         if not self.is_dynamic or self._return is not None:
             return reference
         feedback = self.plan.feedback_at(t)
         if feedback is None:
             return reference
-        return fed_back(reference, feedback, self._follower.anchor, snapshot)
+        return fed_back(reference, feedback, self._tracker.anchor, snapshot)
 
-    def _planned(self, snapshot: Snapshot) -> tuple[Float[np.ndarray, " size"], float]:
-        """The plan's row of this tick, and how far into the plan it is [s]."""
+    def _planned(self, snapshot: Snapshot) -> tuple[Target, float]:
+        """What the plan asks for in this tick, and how far into the plan it is [s]."""
         now = snapshot.state.time
         if self._must_return and self._return is None:
             self._return = SafeReturn(self.plan, self._last - self._start)
         if self._return is not None:
-            row = self._return.advance(now - self._last).row
-            return row, self._return.t
+            target = Target.of(self._return.advance(now - self._last).row)
+            return target, self._return.t
         t = now - self._start
-        row = self.plan.row_at(t)
-        self._approach.add_to(row, t)
+        target = Target.of(self.plan.row_at(t))
+        self._approach.add_to(target, t)
         if self.is_dynamic:
-            self._weight.add_to(row, snapshot, now - self._last)
-        return row, t
+            self._weight.add_to(target, snapshot, now - self._last)
+        return target, t
 
     def is_finished(self, snapshot: Snapshot) -> bool:
         """Whether the plan is over, or the way back from it."""

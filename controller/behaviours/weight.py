@@ -11,11 +11,9 @@ from __future__ import annotations
 from typing import final
 
 import numpy as np
-from jaxtyping import Float
 
-from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.legs import LEGS
-from go2_wbc.reference import LegTask
+from go2_wbc.reference import STANCE, Target
 from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.snapshot import Snapshot
 from motions.dynamics.phases import GRAVITY
@@ -46,15 +44,15 @@ class FeltWeight:
         self._felt = self._planned = DOUBT * GRAVITY
         self._is_over = False
 
-    def add_to(self, row: Float[np.ndarray, " size"], snapshot: Snapshot, dt: float) -> None:
-        """Feel for ``dt`` seconds, and let the row of a plan's reference ask for more or less.
+    def add_to(self, target: Target, snapshot: Snapshot, dt: float) -> None:
+        """Feel for ``dt`` seconds, and let a plan's target ask for more or less.
 
         The model's mass times the new acceleration and gravity is the felt mass times the planned
         ones: so much force does the plan take.
         """
-        a_world = REFERENCE.view(row, "a_world")
+        a_world = target.a_world
         if not self._is_over:
-            self._is_over = bool((REFERENCE.view(row, "legs") != LegTask.STANCE).any())
+            self._is_over = bool((target.legs != STANCE).any())
         if not self._is_over:
             mass = float(snapshot.mass_matrix[0, 0])
             self._felt += dt * vertical_force(snapshot, self._friction) / mass

@@ -86,3 +86,35 @@ def rotation_by(vector: V3, R: Float[np.ndarray, "3 3"]) -> None:
     factor = np.sin(angle / 2) / angle if angle > 1e-6 else 0.5 - angle * angle / 48
     x, y, z = factor * vector[0], factor * vector[1], factor * vector[2]
     rotation_of(x, y, z, np.cos(angle / 2), R)
+
+
+@subroutine
+def rotation_vector(R: Float[np.ndarray, "3 3"]) -> V3:
+    """The rotation vector [rad] of a rotation matrix, of length 0 to pi."""
+    q = np.empty(4)
+    quaternion_of(R, q)
+    if q[3] < 0.0:
+        q *= -1.0
+    sine = np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2)
+    # 2 arcsin(x) / x = 2 + x^2 / 3 + ...
+    factor = 2.0 * np.arctan2(sine, q[3]) / sine if sine > 1e-6 else 2.0 + sine * sine / 3.0
+    return factor * q[0], factor * q[1], factor * q[2]
+
+
+@subroutine
+def quaternion_of(R: Float[np.ndarray, "3 3"], q: Float[np.ndarray, "4"]) -> None:
+    """Fill the quaternion x y z w of ``R``, from its largest component (Shepperd 1978)."""
+    trace = R[0, 0] + R[1, 1] + R[2, 2]
+    largest, i = trace, 3
+    for k in range(3):
+        if R[k, k] > largest:
+            largest, i = R[k, k], k
+    if i == 3:
+        q[0], q[1], q[2] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+        q[3] = 1.0 + trace
+    else:
+        j, k = (i + 1) % 3, (i + 2) % 3
+        q[i] = 1.0 + 2.0 * R[i, i] - trace
+        q[j], q[k] = R[i, j] + R[j, i], R[i, k] + R[k, i]
+        q[3] = R[k, j] - R[j, k]
+    q /= np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)

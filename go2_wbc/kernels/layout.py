@@ -88,32 +88,6 @@ SNAPSHOT = Layout(
 )
 """Of ``robot.snapshot.Snapshot``, the state's q and v first."""
 
-ROBOT = Layout(
-    mass=(),
-    gravity=(),
-    foot_radius=(),
-    links=(13, 10),
-    p_joints=(12, 3),
-    p_calf_feet=(4, 3),
-    armature=(12,),
-    payload=(4,),
-)
-"""Numbers of the robot for its snapshot: of each link mass, first moment and inertia. The trunk and
-the robot's mass have the payload in them, whose own mass and place come last."""
-
-FEELING = Layout(
-    gravity=(),
-    memory=(),
-    least_height=(),
-    most_rise=(),
-    most_speed=(2,),
-)
-"""Numbers by which a payload is felt: of ``robot.payload_estimation.PayloadConfig``."""
-
-FELT = Layout(force=(3,), moment=(3,), gravity=(3,))
-"""What a payload takes of the standing feet, in the mean: force, and moment about the base's
-origin, and what a unit of mass weighs, all in the base frame."""
-
 REFERENCE = Layout(
     is_com=(),
     p_world=(3,),
@@ -278,50 +252,6 @@ MPC = Layout(
 
 FORCES = Layout(next=(), forces=(4, 3))
 """What the MPC has planned: when it plans again, and the force of each foot while it stands."""
-
-PLAN_CURVES = 30
-"""Curves of a plan: CoM, roll pitch yaw, twelve joints, and the places of the four feet."""
-
-CORRECTION = Layout(rate=(), window=(6,), limit=(6,), handed_over=(3,))
-"""Numbers of the steady-state correction."""
-
-PLAYBACK = Layout(
-    offset=(6,),
-    place=(),
-    attitude=(),
-    joints=(),
-    ticks=(),
-    raised_ticks=(),
-    sag=(),
-    lean=(),
-    anchor=(4,),
-    origin=(4,),
-    planned=(4,),
-    is_in_air=(4,),
-    is_awaited=(4,),
-    touchdown=(4,),
-    missed=(),
-    landing_error=(),
-    carried=(3,),
-)
-"""State of a playback: the correction, how far the robot has been off its plan, and is now; where
-the plan is (x, y, z, yaw), now and at first; and of each foot that steps what the plan asks of it,
-whether it is in the air, whether its landing is still to be judged, and when it came down; last
-what the correction would have to do against the payload that is known."""
-
-LANDING = Layout(
-    earliest=(),
-    press_speed=(),
-    press_depth=(),
-    time_out=(),
-    ground_share=(),
-    foot_radius=(),
-    near=(),
-    ramp=(),
-    normal_force_min=(),
-    normal_force_max=(),
-)
-"""Numbers by which the feet of a plan land: of ``planning.landing`` and of the plan."""
 
 FRICTION = Layout(
     dry=(12,),

@@ -9,14 +9,7 @@ from go2_wbc import compilation
 KERNELS = (
     "condensed",
     "estimation",
-    "kinematics",
-    "loads",
     "motor",
-    "payload",
-    "playing",
-    "rigid_body",
-    "simulation",
-    "supervision",
 )
 """Modules of this package whose import compiles, or loads what was compiled."""
 

@@ -19,13 +19,16 @@ second, in which a robot that had just stood up with 4 kg 8 cm aside leaned by 6
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.reference import BodyTarget, TrackedPoint
-from go2_wbc.robot.rotations import exp_rotation, log_rotation, yaw_rotation
+from go2_wbc.algebra.vectors import rotation_by
+from go2_wbc.compilation import subroutine
+from go2_wbc.contacts import TIE
+from go2_wbc.records import Record
+from go2_wbc.reference import Target, TrackedPoint
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_not_negative
 
@@ -63,72 +66,86 @@ class CorrectionConfig:
         """Raise ConfigError for a negative number."""
         require_not_negative(self, *(f.name for f in fields(self)))
 
-    @property
-    def window(self) -> Float[np.ndarray, "6"]:
-        """Of position, three times, and angle."""
-        return np.repeat([self.position_window, self.angle_window], 3)
 
-    @property
-    def handed_over(self) -> Float[np.ndarray, "3"]:
-        """Upward, about the axis ahead, and about the one aside."""
-        return np.array([self.height_per_weight, self.roll_per_moment, self.pitch_per_moment])
+class Correction(Record):
+    """What has been integrated.
 
-    @property
-    def limit(self) -> Float[np.ndarray, "6"]:
-        """Of position, three times, and angle."""
-        return np.repeat([self.position_limit, self.angle_limit], 3)
+    Attributes:
+        offset: of the reference: position [m] and rotation vector [rad], in the world.
+        carried: what the offset would have to do against the payload that is known, in the heading
+            frame: upward [m], about the axis ahead and the one aside [rad].
+        knows_payload: whether ``carried`` has been found yet.
+    """
+
+    offset: Float[np.ndarray, "6"]
+    carried: Float[np.ndarray, "3"]
+    knows_payload: bool
 
 
-class SteadyStateCorrection:
-    """Integrates the body's pose error."""
+@subroutine
+def correct(
+    now: Snapshot,
+    error: Float[np.ndarray, "6"],
+    dt: float,
+    c: CorrectionConfig,
+    s: Correction,
+    target: Target,
+) -> None:
+    """Put the correction into the body's target, after ``dt`` seconds of ``error``.
 
-    def __init__(self, config: CorrectionConfig | None = None) -> None:
-        """Start without correction."""
-        self._config = config or CorrectionConfig()
-        self._offset = np.zeros(6)
-        self._window, self._limit = self._config.window, self._config.limit
-        self._carried: Float[np.ndarray, "3"] | None = None
+    ``error``: of the target less what is measured: position [m] and rotation vector [rad].
+    """
+    hand_over(now, c, s)
+    for i in range(3):
+        at, by = s.offset[i], c.position_window
+        s.offset[i] = integrated(at, error[i], dt, c.rate, by, c.position_limit)
+        at, by = s.offset[3 + i], c.angle_window
+        s.offset[3 + i] = integrated(at, error[3 + i], dt, c.rate, by, c.angle_limit)
+        target.p_world[i] += s.offset[i]
+    turn, planned, R = np.empty((3, 3)), target.R_world_base.copy(), target.R_world_base
+    rotation_by((s.offset[3], s.offset[4], s.offset[5]), turn)
+    for i in range(3):
+        for k in range(3):
+            R[i, k] = (
+                turn[i, 0] * planned[0, k] + turn[i, 1] * planned[1, k] + turn[i, 2] * planned[2, k]
+            )
 
-    def update(self, error: Float[np.ndarray, "6"], dt: float) -> Float[np.ndarray, "6"]:
-        """The offset to add to the reference, after ``dt`` seconds of ``error``.
 
-        Args:
-            error: reference minus measured: position [m], rotation vector [rad], in the world.
-            dt: [s].
-        """
-        counted = np.clip(error, -self._window, self._window)
-        self._offset = np.clip(
-            self._offset + self._config.rate * dt * counted, -self._limit, self._limit
-        )
-        return self._offset
+@subroutine
+def integrated(
+    offset: float, error: float, dt: float, rate: float, window: float, limit: float
+) -> float:
+    """One axis' offset after ``dt`` seconds of ``error``."""
+    counted = min(max(error, -window), window)
+    return min(max(offset + rate * dt * counted, -limit), limit)
 
-    def corrected(self, target: BodyTarget, snapshot: Snapshot, dt: float) -> BodyTarget:
-        """``target`` with the correction put in, after ``dt`` seconds of its present error."""
-        rotation_error = log_rotation(target.R_world_base @ snapshot.R_world_base.T)
-        position_error = target.p_world - tracked_position(snapshot, target.point)
-        self._hand_over(snapshot)
-        offset = self.update(np.concatenate([position_error, rotation_error]), dt)
-        return replace(
-            target,
-            p_world=target.p_world + offset[:3],
-            R_world_base=exp_rotation(offset[3:]) @ target.R_world_base,
-        )
 
-    def _hand_over(self, snapshot: Snapshot) -> None:
-        """Take out of the offset what is known of the payload since the last tick."""
-        mass, weight = snapshot.payload.tolist()
-        gravity = weight / mass if mass else 0.0
-        x_axis = snapshot.R_world_base[:2, 0]
-        heading = yaw_rotation(float(np.arctan2(x_axis[1], x_axis[0])))
-        lever = snapshot.mass_matrix[0, 0] * gravity * (heading.T @ snapshot.com_shift)
-        load = self._config.handed_over * [weight, lever[1], -lever[0]]
-        before = load if self._carried is None else self._carried
-        self._carried = load
-        upward, *turn = load - before
-        change = np.array([upward, *(heading @ [*turn, 0.0])[:2]])
-        held = self._offset[2:5]
-        taken = np.clip(change, np.minimum(held, 0.0), np.maximum(held, 0.0))
-        self._offset = self._offset - np.array([0.0, 0.0, *taken, 0.0])
+@subroutine
+def hand_over(now: Snapshot, c: CorrectionConfig, s: Correction) -> None:
+    """Take out of the offset what is known of the payload since the last tick."""
+    mass, weight = now.payload[0], now.payload[1]
+    gravity = weight / mass if mass > 0.0 else 0.0
+    x, y = now.R_world_base[0, 0], now.R_world_base[1, 0]
+    length = max(np.hypot(x, y), TIE)
+    cosine, sine = x / length, y / length
+    moment = now.mass_matrix[0, 0] * gravity
+    x, y = moment * now.com_shift[0], moment * now.com_shift[1]
+    load = (
+        c.height_per_weight * weight,
+        c.roll_per_moment * (cosine * y - sine * x),
+        -c.pitch_per_moment * (cosine * x + sine * y),
+    )
+    change = np.zeros(3)
+    for i in range(3):
+        if s.knows_payload:
+            change[i] = load[i] - s.carried[i]
+        s.carried[i] = load[i]
+    s.knows_payload = True
+    about_x, about_y = change[1], change[2]
+    change[1], change[2] = cosine * about_x - sine * about_y, sine * about_x + cosine * about_y
+    for i in range(3):
+        held = s.offset[2 + i]
+        s.offset[2 + i] -= max(min(change[i], max(held, 0.0)), min(held, 0.0))
 
 
 def tracked_position(snapshot: Snapshot, point: TrackedPoint) -> Float[np.ndarray, "3"]:

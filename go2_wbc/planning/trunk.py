@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.algebra.vectors import cross, rotation_by
 from go2_wbc.compilation import Foreign, subroutine
-from go2_wbc.planning.correction import CorrectionConfig
+from go2_wbc.planning.correction import CorrectionConfig, integrated
 from go2_wbc.planning.ground import Ground, GroundConfig, ground_at, tilt
 from go2_wbc.planning.pose import lean_rotation, pose_turn
 from go2_wbc.records import Record
@@ -142,9 +142,8 @@ def follow_position(trunk: Trunk, now: Snapshot, leash: float, dt: float) -> Non
 def correct_height(trunk: Trunk, now: Snapshot, height: float, dt: float) -> None:
     """Integrate the error from ``height`` [m], the pose's added: a payload makes it sag."""
     sag = height + trunk.pose[0] - now.p_world_com[2]
-    counted = min(max(sag, -SAG_WINDOW), SAG_WINDOW)
-    offset = trunk.height_offset + SAG_RATE * dt * counted
-    trunk.height_offset = min(max(offset, -SAG_LIMIT), SAG_LIMIT)
+    offset = trunk.height_offset
+    trunk.height_offset = integrated(offset, sag, dt, SAG_RATE, SAG_WINDOW, SAG_LIMIT)
 
 
 @subroutine
@@ -195,8 +194,7 @@ def level(
         measured = R[0, 2], R[1, 2], R[2, 2]
         error = cross(measured, (wanted[0, 2], wanted[1, 2], wanted[2, 2]))
         for i in range(2):
-            counted = min(max(error[i], -window), window)
-            offset[i] = min(max(offset[i] + rate * dt * counted, -LEAN_LIMIT), LEAN_LIMIT)
+            offset[i] = integrated(offset[i], error[i], dt, rate, window, LEAN_LIMIT)
     turn, before = np.empty((3, 3)), wanted.copy()
     rotation_by((offset[0], offset[1], 0.0), turn)
     for i in range(3):

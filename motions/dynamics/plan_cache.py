@@ -89,7 +89,7 @@ def nearest_cached(
 
 def plan_folder() -> Path:
     """Where solved plans are kept."""
-    from go2_wbc.kernels.compilation import cache_root
+    from go2_wbc.kept_code import cache_root
 
     return cache_root() / "plans"
 

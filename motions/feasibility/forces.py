@@ -10,14 +10,8 @@ M and h are Pinocchio's, with rotor inertia, v and a as in ``Trajectory`` (the b
 frame, so w too), f the forces of the ground on the rolling contact points in the frame of the
 motion. Of the f that give the trunk its wrench within the friction pyramid, the one that deviates
 least from an even share of the weight is taken, and along the ground from none, the less the less a
-foot bears, as the whole-body controller does it: the f that minimise
-
-    |S (A f - w)|^2 + e |D (f - f_even)|^2
-
-with A the base columns of the feet's Jacobians, transposed, S = diag(``weights_of``), e =
-``EVENNESS``, D^2 = 1 for the normal forces and the mean load over the foot's for those along the
-ground, subject to |f_x|, |f_y| <= mu f_z and 0 <= f_z <= f_max s, where s is a foot's share of its
-load.
+foot bears, as the whole-body controller does it; see
+``wbc.trajectory_loads``.
 
 The ground gives no force at once: MuJoCo's contacts need 20 ms (their ``solref``), as rubber and a
 leg's gears do. M a + h is therefore averaged over ``SPREAD`` samples before it is shared. Where a
@@ -32,11 +26,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from go2_wbc.geometry import support_margins
+from go2_wbc.records import packed
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import friction_pyramid
+from go2_wbc.wbc.trajectory_loads import LoadNumbers, lag, share_loads
 from go2_wbc.world import World
 from motions.batch_kinematics import attitudes, turned, zero_moment_points
 from motions.feasibility.kinematic import FEET, JOINTS
@@ -67,6 +63,7 @@ STILL = 1e-6
 """Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15."""
 NO_SUPPORT = 1.0
 """How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
+_FEW = (2, 3)
 TIGHT_TORQUE, TIGHT_LOAD, TIGHT_FRICTION, TIGHT_SUPPORT = 0.1, 10.0, 0.05, 0.01
 """Margins below which a warning is due: share of the smallest torque limit, N, 1 and m; own choice,
 about what separates a plan from its run in simulation."""
@@ -96,8 +93,6 @@ class Forces:
 
 def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     """Contact forces and torques along ``motion``."""
-    from go2_wbc.kernels.loads import share_loads  # compiled; only who needs it waits for it
-
     rows = zip(motion.q, motion.v, motion.a, strict=True)
     needed = _spread(np.array([model.inverse_dynamics(*row) for row in rows]), motion)
     contact, tau = np.zeros((len(needed), 4, 3)), needed[:, 6:].copy()
@@ -123,9 +118,10 @@ def _spread(needed: Float[np.ndarray, "n 18"], motion: Trajectory) -> Float[np.n
     return np.where(motion.is_dynamic[:, None], needed, total / np.maximum(count, 1.0))
 
 
-def numbers_of(model: RobotModel) -> Float[np.ndarray, "4"]:
-    """Evenness, weight [N], greatest normal force [N] and foot radius [m], for the kernels."""
-    return np.array([EVENNESS, model.mass * model.gravity, NORMAL_FORCE_MAX, model.foot_radius])
+def numbers_of(model: RobotModel) -> LoadNumbers:
+    """What the shares of the load depend on."""
+    weight = model.mass * model.gravity
+    return packed(LoadNumbers(EVENNESS, weight, NORMAL_FORCE_MAX, model.foot_radius))
 
 
 def weights_of(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "6"]:
@@ -224,8 +220,6 @@ def errors_of(
     Solved parts, in which they are followed otherwise, take none. ``damping`` [1/s] is what damps
     the errors besides the gains.
     """
-    from go2_wbc.kernels.loads import lag  # compiled; only who needs it waits for it
-
     config = WbcConfig()
     gains = (config.body_position.arrays, config.body_orientation.arrays)
     kp, kd = (np.concatenate(pair) for pair in zip(*gains, strict=True))
@@ -309,6 +303,3 @@ def state_at(motion: Trajectory, row: int) -> RobotState:
         foot_forces=np.zeros(4),
         feet_in_contact=motion.stance[row],
     )
-
-
-_FEW = (2, 3)

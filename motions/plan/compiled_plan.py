@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -12,7 +11,6 @@ from scipy.interpolate import PPoly
 
 from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
 from go2_wbc.errors import MotionError
-from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.legs import Leg
 from go2_wbc.reference import (
     Anchor,
@@ -24,6 +22,7 @@ from go2_wbc.reference import (
     Reference,
     TrackedPoint,
 )
+from go2_wbc.tracking.plan_curves import PlanCurves, StanceLoad
 from motions.batch_kinematics import attitudes
 from motions.plan.dynamic_span import DynamicSpan
 from motions.postures import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN
@@ -37,7 +36,6 @@ that it was solved with, an even share of the load may not. From 0.001 to 0.1 it
 to slips (own experiments)."""
 LEAST_FEET = 3
 """Standing feet that span an area, so that a robot that stops there can keep standing."""
-_FORCES, _FORCE_WEIGHT = REFERENCE.slice("f_world_feet"), REFERENCE.start["force_weight"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +153,7 @@ class CompiledPlan(MotionPlan):
     beats: tuple[float, ...] = ()
     dynamic: tuple[DynamicSpan, ...] = ()
     held: Mapping[str, Leg] = field(default_factory=dict)
-    _tables: tuple[Any, Any, Any, Any, Any, Any] = field(init=False, repr=False)
+    _asked: PlanCurves = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Bind what the kernel reads; raise MotionError for tables of different lengths."""
@@ -167,8 +165,9 @@ class CompiledPlan(MotionPlan):
             )
         tasks, events = _tasks(contacts.modes, self.swings), np.array(contacts.times)
         since, until = self._gradual(contacts.since, -np.inf), self._gradual(contacts.until, np.inf)
-        tables = (curves.x, curves.c, events, tasks, since, until)
-        object.__setattr__(self, "_tables", tables)
+        load = StanceLoad(self.ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX)
+        asked = PlanCurves(curves.x, curves.c, events, tasks, since, until, load)
+        object.__setattr__(self, "_asked", asked)
 
     @property
     def has_dynamic_spans(self) -> bool:
@@ -225,14 +224,10 @@ class CompiledPlan(MotionPlan):
 
     def row_at(self, t: float) -> Float[np.ndarray, " size"]:
         """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
-        from go2_wbc.kernels.playing import planned_at
-
-        row = np.zeros(REFERENCE.size)
-        planned_at(*self._tables, self.ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, t, row)
-        forces = self._forces_at(t)
+        target, forces = self._asked.at(t), self._forces_at(t)
         if forces is not None:
-            row[_FORCES], row[_FORCE_WEIGHT] = forces.ravel(), FORCE_WEIGHT
-        return row
+            target.f_world_feet[:], target.force_weight = forces, FORCE_WEIGHT
+        return target.row
 
     def feedback_at(self, t: float) -> PlanFeedback | None:
         """Of the span at ``t``, on two feet or one; see ``MotionPlan.feedback_at``."""
@@ -252,9 +247,10 @@ class CompiledPlan(MotionPlan):
 
     def _phases(self, times: Float[np.ndarray, " n"]) -> ContactPhase:
         """The contacts at ``times``, with the changes to which load is ramped."""
-        rows, (*_, since, until) = event_at(self.contacts, times), self._tables
-        elapsed = np.maximum(times[:, None] - since[rows], 0.0)
-        return ContactPhase(self.contacts.modes[rows], elapsed, until[rows] - times[:, None])
+        rows, asked = event_at(self.contacts, times), self._asked
+        elapsed = np.maximum(times[:, None] - asked.since[rows], 0.0)
+        left = asked.until[rows] - times[:, None]
+        return ContactPhase(self.contacts.modes[rows], elapsed, left)
 
     def _gradual(self, changes: Float[np.ndarray, "m 4"], never: float) -> Float[np.ndarray, "m 4"]:
         """``changes`` of contacts [s] but those in dynamic spans: there forces jump as planned."""

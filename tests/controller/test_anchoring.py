@@ -7,9 +7,8 @@ import pytest
 from jaxtyping import Float
 
 from controller.behaviours.anchoring import APPROACH, FARTHEST, Approach, anchor_of
-from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Anchor, MotionPlan
+from go2_wbc.reference import Anchor, MotionPlan, Target
 from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import RobotState
@@ -91,9 +90,9 @@ def test_the_approach_leads_from_the_robot_to_the_plan(model: RobotModel, pair: 
     approach, away = approach_from(model, pair)
 
     def added(t: float) -> list[Float[np.ndarray, "3"]]:
-        row = np.zeros(REFERENCE.size)
-        approach.add_to(row, t)
-        return [REFERENCE.view(row, name).copy() for name in ("p_world", "v_world", "a_world")]
+        target = Target()
+        approach.add_to(target, t)
+        return [target.p_world, target.v_world, target.a_world]
 
     np.testing.assert_allclose(added(0.0)[0], away, atol=1e-12)
     assert not np.any(added(APPROACH))

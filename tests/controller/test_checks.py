@@ -17,13 +17,13 @@ from controller.checks import (
     posture_measurements,
 )
 from go2_wbc.legs import LEGS
-from go2_wbc.planning.landing import Landings
-from go2_wbc.planning.playback import Deviation
 from go2_wbc.reference import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.tracking.landing import Landings
+from go2_wbc.tracking.plan_tracking import Deviation
 from motions.batch_kinematics import configurations
 from motions.postures import home_poses
 from tests.engine_helpers import state_of

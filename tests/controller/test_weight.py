@@ -9,10 +9,9 @@ import pytest
 
 from controller import GO2Controller
 from controller.behaviours.weight import LEAST, FeltWeight, vertical_force
-from go2_wbc.kernels.layout import REFERENCE
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.reference import LegTask
+from go2_wbc.reference import LegTask, Target
 from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -47,12 +46,9 @@ def at_rest(seed: int) -> RobotState:
     return replace(state, v=np.zeros(18))
 
 
-def planned(a_z: float = 0.0, legs: tuple[LegTask, ...] = (LegTask.STANCE,) * 4) -> np.ndarray:
-    """The row of a reference that is accelerated upwards."""
-    row = np.zeros(REFERENCE.size)
-    REFERENCE.view(row, "a_world")[:] = 0.3, -0.2, a_z
-    REFERENCE.view(row, "legs")[:] = legs
-    return row
+def planned(a_z: float = 0.0, legs: tuple[LegTask, ...] = (LegTask.STANCE,) * 4) -> Target:
+    """A target that is accelerated upwards."""
+    return Target(a_world=[0.3, -0.2, a_z], legs=legs)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -77,21 +73,21 @@ def test_a_plan_asks_for_the_force_that_the_felt_mass_takes(
 ) -> None:
     a_z = 2.0
     snapshot, _ = pressed(model, at_rest(1), share * (1.0 + a_z / GRAVITY))
-    weight, row = FeltWeight(NO_FRICTION), planned(a_z)
+    weight, target = FeltWeight(NO_FRICTION), planned(a_z)
     for _ in range(1000):
         weight.add_to(planned(a_z), snapshot, DT)
-    weight.add_to(row, snapshot, DT)
+    weight.add_to(target, snapshot, DT)
     assert weight.ratio == pytest.approx(share, abs=2e-3)
-    asked = REFERENCE.view(row, "a_world") + [0.0, 0.0, GRAVITY]
+    asked = target.a_world + [0.0, 0.0, GRAVITY]
     assert asked == pytest.approx(share * np.array([0.3, -0.2, a_z + GRAVITY]), rel=3e-3)
 
 
 def test_in_flight_nothing_is_added_to_gravity(model: RobotModel) -> None:
     weight = FeltWeight(NO_FRICTION)
     weight.ratio = 1.3
-    row = planned(-GRAVITY, (LegTask.SWING,) * 4)
-    weight.add_to(row, model.snapshot(at_rest(2)), DT)
-    assert REFERENCE.view(row, "a_world")[2] == pytest.approx(-GRAVITY)
+    target = planned(-GRAVITY, (LegTask.SWING,) * 4)
+    weight.add_to(target, model.snapshot(at_rest(2)), DT)
+    assert target.a_world[2] == pytest.approx(-GRAVITY)
 
 
 def test_what_was_felt_before_the_first_foot_left_the_ground_stays(model: RobotModel) -> None:
@@ -103,8 +99,8 @@ def test_what_was_felt_before_the_first_foot_left_the_ground_stays(model: RobotM
         weight.add_to(planned(), snapshot, DT)
     felt = weight.ratio
     heavier, _ = pressed(model, at_rest(1), 1.3)
-    for row in (planned(0.0, tuple(legs)), planned()):
-        weight.add_to(row, heavier, DT)
+    for target in (planned(0.0, tuple(legs)), planned()):
+        weight.add_to(target, heavier, DT)
         assert weight.ratio == felt
 
 

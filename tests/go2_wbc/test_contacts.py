@@ -291,3 +291,10 @@ def test_a_gait_is_found_by_its_name_or_is_itself() -> None:
     mine = replace(GAITS["trot"], name="mine")
     assert find_gait("trot") is GAITS["trot"]
     assert find_gait(mine) is mine
+
+
+def test_a_schedule_that_ends_has_changed_never_before_and_changes_never_after() -> None:
+    schedule = ContactSchedule((0.0, 1.0), np.array([[1, 1, 1, 1], [1, 0, 1, 1]], dtype=bool))
+    assert np.isneginf(schedule.since[0]).all()
+    np.testing.assert_array_equal(schedule.until[0], [np.inf, 1.0, np.inf, np.inf])
+    np.testing.assert_array_equal(schedule.since[1], [-np.inf, 1.0, -np.inf, -np.inf])

@@ -14,7 +14,7 @@ from benchmarks.studies.jump_bounds import best_take_off
 from benchmarks.studies.jump_limits import BISECTIONS, KINDS, Climber, Jump, Kind
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.errors import PlanNotFound
-from go2_wbc.kernels.compilation import CACHE_VARIABLE
+from go2_wbc.kept_code import CACHE_VARIABLE
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline
 from motions.dynamics import PhaseProblem, Solved

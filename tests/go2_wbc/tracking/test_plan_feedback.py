@@ -8,11 +8,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from go2_wbc.planning.feedback import acceleration_of, fed_back, state_error
 from go2_wbc.reference import Anchor, LegTask, PlanFeedback, Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import exp_rotation, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.tracking.plan_feedback import acceleration_of, fed_back, state_error
 from tests.engine_helpers import holding_reference, random_state
 
 MODEL = RobotModel()

@@ -1,0 +1,226 @@
+"""A plan followed where the robot stands, tick by tick.
+
+The plan's reference is placed in the world; feet that step land when they meet the ground
+(``landing``); how far the robot is off it is noted; and the trunk's target is corrected for what
+stays of the error (``planning.correction``), except in flight, where nothing can be corrected.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from go2_wbc.algebra.vectors import rotation_vector
+from go2_wbc.compilation import Foreign, kernel, subroutine
+from go2_wbc.planning.correction import Correction, CorrectionConfig, correct
+from go2_wbc.records import Record, packed
+from go2_wbc.reference import (
+    JOINTS,
+    STANCE,
+    Anchor,
+    Footsteps,
+    Reference,
+    Target,
+    sag_and_lean,
+)
+from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.tracking.landing import Landing, Landings, land
+from go2_wbc.tracking.plan_curves import StanceLoad
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """How far a robot has been off its plan, on the average over the ticks so far.
+
+    Attributes:
+        place: of the tracked point [m].
+        attitude: angle of the trunk [rad].
+        joints: angle [rad] of the worst joint of a raised leg, over the ticks that had one.
+    """
+
+    place: float
+    attitude: float
+    joints: float
+
+
+class Tracking(Record):
+    """State of a plan that is followed.
+
+    Attributes:
+        landing: where the plan is, and its feet.
+        correction: of the trunk's target.
+        place, attitude, joints: see ``Deviation``.
+        ticks, raised_ticks: how many there have been, and of those with a raised leg.
+        sag: depth [m] of the tracked point below the plan, now.
+        lean: angle [rad] between the measured vertical of the trunk and the plan's, now.
+    """
+
+    landing: Landing
+    correction: Correction
+    place: float
+    attitude: float
+    joints: float
+    ticks: float
+    raised_ticks: float
+    sag: float
+    lean: float
+
+
+class PlanTracker:
+    """Turns a plan's references, one a tick, into what is tracked in the world."""
+
+    def __init__(
+        self,
+        anchor: Anchor,
+        footsteps: Footsteps | None = None,
+        config: CorrectionConfig | None = None,
+    ) -> None:
+        """Follow a plan at ``anchor``, without correction at first."""
+        self._config = packed(config or CorrectionConfig())
+        self._state = Tracking(landing=Landing.at(anchor))
+        self._events, self._changes, self._load = np.zeros(0), np.zeros((0, 4, 3)), _NO_LOAD
+        if footsteps is not None:
+            contacts, steps = footsteps.contacts, footsteps
+            self._events = np.array(contacts.times)
+            self._changes = np.stack([contacts.since, contacts.until, steps.unloads], axis=-1)
+            self._load = StanceLoad(steps.ramp, steps.normal_force_min, steps.normal_force_max)
+        self._load = packed(self._load)
+
+    def track(self, plan: Target, snapshot: Snapshot, t: float, dt: float) -> Reference:
+        """The reference in the world.
+
+        Args:
+            plan: what it asks for, in the motion's frame (``MotionPlan.row_at``).
+            snapshot: of this tick.
+            t: seconds from the plan's start at which it stands there.
+            dt: seconds since the last tick.
+        """
+        target, contact = Target.of(plan.row.copy()), snapshot.state.feet_in_contact
+        steps = contact, self._events, self._changes, self._load
+        follow(snapshot, t, dt, *steps, self._config, self._state, target)
+        return Reference.of_row(target.row)
+
+    @property
+    def anchor(self) -> Anchor:
+        """Where the plan is now: landings move it."""
+        anchor = self._state.landing.anchor
+        return Anchor(anchor.p_world.copy(), float(anchor.yaw))
+
+    @property
+    def landings(self) -> Landings:
+        """What came of the landings of feet that step."""
+        landing = self._state.landing
+        return Landings(int(landing.missed), float(landing.error))
+
+    @property
+    def deviation(self) -> Deviation:
+        """How far the robot has been off the plan, the correction left out."""
+        s = self._state
+        return Deviation(float(s.place), float(s.attitude), float(s.joints))
+
+    @property
+    def sag_and_lean(self) -> tuple[float, float]:
+        """Now: depth [m] of the tracked point below the plan, and angle [rad] of the verticals."""
+        return float(self._state.sag), float(self._state.lean)
+
+
+_NO_LOAD = StanceLoad(0.0, 0.0, 0.0)
+
+
+@kernel
+def follow(
+    now: Snapshot,
+    t: float,
+    dt: float,
+    contact: Foreign[Bool[np.ndarray, "4"]],
+    events: Foreign[Float[np.ndarray, " m"]],
+    changes: Foreign[Float[np.ndarray, "m 4 3"]],
+    load: StanceLoad,
+    c: CorrectionConfig,
+    s: Tracking,
+    target: Target,
+) -> None:
+    """Change ``target``, a plan's in its frame, to what is tracked in the world.
+
+    ``t``: how far into the plan; ``dt``: since the last tick; ``contact``: feet with a measured
+    contact. ``events``, ``changes``: those of ``land``, none for a plan whose feet do not step.
+    """
+    place(s.landing.anchor, target)
+    if len(events) > 0:
+        land(t, contact, events, changes, load, now, s.landing, target)
+    error = np.empty(6)
+    compare(now, target, error)
+    note(now, error, s, target)
+    correct(now, error, dt if is_standing(target) else 0.0, c, s.correction, target)
+
+
+@subroutine
+def place(anchor: Anchor, target: Target) -> None:
+    """Turn a plan's target by the anchor's yaw, and move it to its place in the world."""
+    c, s = np.cos(anchor.yaw), np.sin(anchor.yaw)
+    R = target.R_world_base
+    for k in range(3):  # columns of the attitude
+        x, y = R[0, k], R[1, k]
+        R[0, k], R[1, k] = c * x - s * y, s * x + c * y
+    turn(c, s, target.p_world)
+    turn(c, s, target.v_world)
+    turn(c, s, target.a_world)
+    turn(c, s, target.w_world)
+    turn(c, s, target.dw_world)
+    for leg in range(4):
+        turn(c, s, target.p_world_feet[leg])
+        turn(c, s, target.v_world_feet[leg])
+        turn(c, s, target.a_world_feet[leg])
+        turn(c, s, target.f_world_feet[leg])
+    for i in range(3):
+        target.p_world[i] += anchor.p_world[i]
+        for leg in range(4):
+            target.p_world_feet[leg, i] += anchor.p_world[i]
+
+
+@subroutine
+def turn(c: float, s: float, a: Float[np.ndarray, "3"]) -> None:
+    """Turn a vector about z by the angle of this cosine and sine."""
+    a[0], a[1] = c * a[0] - s * a[1], s * a[0] + c * a[1]
+
+
+@subroutine
+def compare(now: Snapshot, target: Target, error: Float[np.ndarray, "6"]) -> None:
+    """Fill position [m] and rotation vector [rad] from where the trunk is to where it shall be."""
+    R, wanted, left = now.R_world_base, target.R_world_base, np.empty((3, 3))
+    for i in range(3):
+        error[i] = target.p_world[i] - (now.p_world_com[i] if target.is_com else now.q[i])
+        for k in range(3):
+            left[i, k] = wanted[i, 0] * R[k, 0] + wanted[i, 1] * R[k, 1] + wanted[i, 2] * R[k, 2]
+    error[3], error[4], error[5] = rotation_vector(left)
+
+
+@subroutine
+def note(now: Snapshot, error: Float[np.ndarray, "6"], s: Tracking, target: Target) -> None:
+    """Bring what is told of how far the robot is off its plan up to this tick."""
+    s.sag, s.lean = sag_and_lean(target, now)
+    s.ticks += 1.0
+    off = np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2)
+    s.place += (off - s.place) / s.ticks
+    off = np.sqrt(error[3] ** 2 + error[4] ** 2 + error[5] ** 2)
+    s.attitude += (off - s.attitude) / s.ticks
+    worst, is_raised = 0.0, False
+    for leg in range(4):
+        if target.legs[leg] == JOINTS:
+            is_raised = True
+            for n in range(3 * leg, 3 * leg + 3):
+                worst = max(worst, abs(target.q_joints[n] - now.q[7 + n]))
+    if is_raised:
+        s.raised_ticks += 1.0
+        s.joints += (worst - s.joints) / s.raised_ticks
+
+
+@subroutine
+def is_standing(target: Target) -> bool:
+    """Whether any foot stands."""
+    stands = False
+    for leg in range(4):
+        stands = stands or target.legs[leg] == STANCE
+    return stands

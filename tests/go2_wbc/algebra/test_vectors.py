@@ -1,0 +1,28 @@
+"""Rotation vectors and quaternions are scipy's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from go2_wbc.algebra.vectors import quaternion_of, rotation_by, rotation_vector
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 0.3, 2.0, 3.1, np.pi - 1e-7])
+def test_a_rotation_and_its_vector(angle: float) -> None:
+    rng = np.random.default_rng(6)
+    for axis in (*np.eye(3), *-np.eye(3), *rng.normal(size=(20, 3))):
+        x, y, z = angle * axis / np.linalg.norm(axis)
+        R, truth = np.empty((3, 3)), Rotation.from_rotvec([x, y, z])
+        rotation_by((x, y, z), R)
+        np.testing.assert_allclose(R, truth.as_matrix(), atol=1e-14)
+        np.testing.assert_allclose(rotation_vector(R), (x, y, z), atol=1e-8)
+
+
+def test_a_quaternion_is_that_of_its_rotation_whichever_part_is_largest() -> None:
+    for rotation in (*Rotation.random(200, random_state=7), *Rotation.create_group("O")):
+        q = np.empty(4)
+        quaternion_of(rotation.as_matrix(), q)
+        truth = rotation.as_quat()
+        np.testing.assert_allclose(q * np.sign(q @ truth), truth, atol=1e-14)
