@@ -1,13 +1,15 @@
 """Benchmarks: what the robot must show, measured over many seeds, against fixed thresholds.
 
-``python -m benchmarks NAME`` runs one; they belong to the checkout and not to the wheel. Every
-scenario is a module that lists its metrics. Judged is what the simulator says (``GroundTruth``),
-never the controller's own verdict.
+``python -m benchmarks NAME`` runs one; they belong to the checkout and not to the wheel. Each lists
+its studies: metrics with their thresholds, and a trial that gives them for a seed. Judged is what
+the simulator says (``GroundTruth``), never the controller's own verdict.
 
-    scenario     metrics, scenarios, and what one trial gave
-    trials       what a seed varies, and a robot under these conditions
-    runner       many trials in parallel processes
-    results_log  finished trials on disk, so that an interrupted run can be resumed
-    report       means, worst seeds and verdicts; table and JSON
-    session      what the commands share: options, progress, output
+    study           metrics, studies, what one trial gave; running trials in the workers of a sweep
+    store           finished trials as the rows of sweeps, so that an interrupted run can be resumed
+    report          means, deviations, worst seeds and verdicts; table and JSON
+    command         what the commands share: options, progress, output
+    robots          robots on trial, what pushes them, and what is true of them
+    validation_set  motions by which the feasibility check is judged, and what physics makes of them
+    bridges         ROS 2 and Unitree's protocol between processes
+    studies         what is behind single pages of the documentation
 """

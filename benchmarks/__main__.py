@@ -12,7 +12,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("behaviour", "benchmarks.behaviour", "what the robot does in MuJoCo, over many seeds"),
     Command("feasibility", "benchmarks.feasibility", "the feasibility check against physics"),
     Command("bridges", "benchmarks.bridges.command", "ROS 2 and Unitree's protocol, by processes"),
-    Command("answers", "benchmarks.answers", "the QP where its constraints contradict each other"),
+    Command("qp_infeasibility", "benchmarks.qp_infeasibility", "the QP that contradicts itself"),
     Command("steps", "benchmarks.steps", "where authored steps and walks end"),
     Command("locomotion", "benchmarks.locomotion", "gaits at their speeds"),
     Command("envelopes", "benchmarks.envelopes", "the greatest speed of each gait, and store it"),
@@ -22,15 +22,23 @@ COMMANDS: tuple[Command, ...] = (
     Command("golden", "benchmarks.golden", "is every tick what it was, to the last bit?"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
     Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
-    Command("moonshots", "benchmarks.moonshots", "the greatest jumps, and what forbids more"),
+    Command(
+        "jump_limits", "benchmarks.studies.jump_limits", "the greatest jumps, what forbids more"
+    ),
     Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),
-    Command("trust", "benchmarks.trust", "do motions fall that the check has passed?"),
+    Command("false_negatives", "benchmarks.false_negatives", "do motions that passed fall?"),
     Command("sweeps", "benchmarks.sweeping", "a second worker, memory, the time of a certificate"),
     Command("nearest", "benchmarks.nearest", "the nearest to motions that the check refuses"),
     Command("solve", "benchmarks.solved_plans", "solve the library's dynamic plans, to ship them"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
     Command("evidence", "benchmarks.evidence", "fill the table of docs/evidence.md"),
 )
+ALIASES = {
+    "answers": "qp_infeasibility",
+    "moonshots": "jump_limits",
+    "trust": "false_negatives",
+}
+"""Former names of commands."""
 EXAMPLES = """
 python -m benchmarks --list                     these benchmarks
 python -m benchmarks behaviour --list           the metrics of one, and their thresholds
@@ -46,9 +54,11 @@ python -m benchmarks NAME --help                the options of one, with example
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the benchmark that the arguments name; see ``run_program`` for the exit codes."""
     arguments = list(sys.argv[1:] if argv is None else argv)
+    if arguments[:1] and arguments[0] in ALIASES:
+        arguments[0] = ALIASES[arguments[0]]
     if arguments == ["--list"]:
         for command in COMMANDS:
-            print(f"{command.name:<17}{command.summary}")
+            print(f"{command.name:<18}{command.summary}")
         return ExitCode.OK
     description = "Measure over many seeds, against fixed thresholds. --list names the benchmarks."
     program = Program("python -m benchmarks", description, COMMANDS, EXAMPLES)

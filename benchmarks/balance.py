@@ -17,7 +17,6 @@ from 30000 to 63999; those judged begin at ``FIRST_SEED``.
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Callable
 from functools import partial
@@ -25,14 +24,12 @@ from functools import partial
 import numpy as np
 
 from benchmarks import disturbed
-from benchmarks.answers import commanded
+from benchmarks.command import Benchmark
 from benchmarks.locomotion import MASS_RANGE
-from benchmarks.pushes import PUSH_TIME, heading_force
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
-from benchmarks.steps import plant_of
+from benchmarks.qp_infeasibility import commanded
+from benchmarks.robots import PUSH_TIME, heading_force, plant_of
+from benchmarks.study import Direction, Measurement, Metric, Study, sensed
 from controller.checks import is_standing
-from controller.cli.common import Subparsers, add_parser
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityEnvelope
@@ -65,13 +62,6 @@ GENTLE = VelocityEnvelope(forward=1.2, backward=1.2, lateral=0.5, turning=1.5)
 CHANGES = 10
 COMMANDS = 80
 """Random velocities of a run, two minutes of them."""
-EXAMPLES = """
-python -m benchmarks balance              everything
-python -m benchmarks balance --quick      three seeds
-python -m benchmarks balance --rows sensors
-python -m benchmarks balance --rows recover sensed-recover
-python -m benchmarks balance --list       the metrics and their thresholds
-"""
 
 
 def impulse_at(angle: float) -> float:
@@ -79,10 +69,10 @@ def impulse_at(angle: float) -> float:
     return 1.0 / math.hypot(math.cos(angle) / AHEAD, math.sin(angle) / ASIDE)
 
 
-def measure_standing(trial: Trial, name: str, sensors: str, direction: int) -> Measurement:
+def measure_standing(trial: Trial, direction: int) -> Measurement:
     """Push the standing robot in one direction."""
-    angle = 2.0 * math.pi * direction / DIRECTIONS
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors)) as robot:
+    name, angle = f"stand-{45 * direction}", 2.0 * math.pi * direction / DIRECTIONS
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
         robot.require(robot.go2.stand())
         start, since = robot.plant.time, math.inf
         try:
@@ -96,15 +86,15 @@ def measure_standing(trial: Trial, name: str, sensors: str, direction: int) -> M
     return Measurement({name: float(since <= start + STANDING_LIMIT - CALM)})
 
 
-def measure_trotting(trial: Trial, name: str, sensors: str, push: str) -> Measurement:
+def measure_trotting(trial: Trial, push: str) -> Measurement:
     """Push the trotting robot at every phase; the share of phases that it survives."""
     angle, impulse = TROT_PUSHES[push]
     survived = 0
     for phase in range(PHASES):
         side = 1.0 if phase % 2 or push != "lateral" else -1.0
-        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors)) as robot:
+        with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
             survived += trots_on(robot, phase, heading_force(side * angle, impulse))
-    return Measurement({name: survived / PHASES})
+    return Measurement({f"trot-{push}": survived / PHASES})
 
 
 def trots_on(robot: TrialRobot, phase: int, force: np.ndarray) -> bool:
@@ -139,21 +129,21 @@ def dropped(seed: int, sensors: str = "ideal") -> MujocoPlant:
     return plant
 
 
-def measure_recovery(trial: Trial, name: str, sensors: str) -> Measurement:
+def measure_recovery(trial: Trial) -> Measurement:
     """Drop the limp robot and let it get up."""
-    with TrialRobot(dropped(FIRST_SEED + trial.seed, sensors)) as robot:
+    with TrialRobot(dropped(FIRST_SEED + trial.seed, trial.sensors)) as robot:
         robot.go2.wait(DROP_TIME)
         said = robot.go2.recover()
         is_up = said and robot.truth.fall() is None
         stands = is_up and is_standing(RobotModel().snapshot(robot.plant.truth()))
-        notes = {} if stands else {name: robot.go2.last_outcome.reason}
-    return Measurement({name: float(stands)}, notes=notes)
+        notes = {} if stands else {"recover": robot.go2.last_outcome.reason}
+    return Measurement({"recover": float(stands)}, notes=notes)
 
 
-def measure_gaits(trial: Trial, name: str, sensors: str) -> Measurement:
+def measure_gaits(trial: Trial) -> Measurement:
     """Change the gait, or stop, again and again."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors)) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         try:
@@ -161,8 +151,8 @@ def measure_gaits(trial: Trial, name: str, sensors: str) -> Measurement:
                 _change(robot, rng)
                 done += 1
         except TrialFailed as failed:
-            return Measurement({name: done / CHANGES}, notes={name: str(failed)})
-    return Measurement({name: 1.0})
+            return Measurement({"gaits": done / CHANGES}, notes={"gaits": str(failed)})
+    return Measurement({"gaits": 1.0})
 
 
 def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
@@ -179,10 +169,10 @@ def _change(robot: TrialRobot, rng: np.random.Generator) -> None:
     robot.wait(float(rng.uniform(0.3, 1.5)))
 
 
-def measure_commands(trial: Trial, name: str, sensors: str) -> Measurement:
+def measure_commands(trial: Trial) -> Measurement:
     """Follow random velocities; ticks in which the QP had no answer are counted."""
     rng, done = np.random.default_rng(FIRST_SEED + trial.seed), 0
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors)) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         counts, why = robot.go2.telemetry, ""
@@ -193,86 +183,70 @@ def measure_commands(trial: Trial, name: str, sensors: str) -> Measurement:
                 done += 1
         except TrialFailed as failed:
             why = str(failed)
-        values = {name: done / COMMANDS, f"{name}.failures": float(counts.qp_failures)}
-    return Measurement(values, notes={name: why} if why else {})
+        failures = float(counts.qp_failures)
+    values = {"commands": done / COMMANDS, "commands.failures": failures}
+    return Measurement(values, notes={"commands": why} if why else {})
 
 
-def _commands(sensors: str) -> Scenario:
-    name, item = "commands", "random commands, 120 s"
-    if sensors != "ideal":
-        name, item = f"sensed-{name}", f"sensors: {item}"
-    metrics = (
-        Metric(name, item, "followed without a fall", "", 1.0, Direction.AT_LEAST),
-        Metric(f"{name}.failures", item, "ticks without an answer", "", 0.0),
-    )
-    measured = partial(measure_commands, name=name, sensors=sensors)
-    return Scenario(name, metrics, measured, group="truth" if sensors == "ideal" else "sensors")
-
-
-def _scenario(
+def _study(
     name: str,
     item: str,
     quantity: str,
-    measure: Callable[..., Measurement],
-    sensors: str,
+    measure: Callable[[Trial], Measurement],
+    *more: Metric,
     least: float = 1.0,
     times: int = 1,
-) -> Scenario:
-    """A row whose value is a share; ``measure`` takes its name and the sensors, too."""
-    if sensors != "ideal":
-        name, item = f"sensed-{name}", f"sensors: {item}"
-    metric = Metric(name, item, quantity, "", least, Direction.AT_LEAST)
-    measured = partial(measure, name=name, sensors=sensors)
-    return Scenario(name, (metric,), measured, times, "truth" if sensors == "ideal" else "sensors")
+) -> Study:
+    """A row whose value is a share, and what is told besides."""
+    share = Metric(name, item, quantity, "", least, Direction.AT_LEAST)
+    return Study(name, (share, *more), measure, times, "truth")
 
 
-def _scenarios(sensors: str) -> tuple[Scenario, ...]:
-    """All rows with the plant's ``sensors``."""
-    standing, trot = "standing, push 0.1 s", f"trot {TROT_SPEED:g} m/s, push 0.1 s, 16 phases"
-    return (
-        *(
-            _scenario(
-                f"stand-{45 * k}",
-                f"{standing}, {ASIDE:g} N s aside, {AHEAD:g} ahead",
-                f"survived at {45 * k} deg",
-                partial(measure_standing, direction=k),
-                sensors,
-            )
-            for k in range(DIRECTIONS)
-        ),
-        *(
-            _scenario(
-                f"trot-{push}",
-                trot,
-                f"{push} {impulse:g} N s survived",
-                partial(measure_trotting, push=push),
-                sensors,
-            )
-            for push, (_, impulse) in TROT_PUSHES.items()
-        ),
-        _scenario("recover", "drops", "stand again", measure_recovery, sensors, 0.98, 10),
-        _scenario("gaits", "ten changes of gait and stops", "done", measure_gaits, sensors),
-        _commands(sensors),
-        disturbed.scenario(sensors),
-    )
-
-
-SCENARIOS = (*_scenarios("ideal"), *_scenarios("imu"))
+_STANDING = f"standing, push 0.1 s, {ASIDE:g} N s aside, {AHEAD:g} ahead"
+_TROT = f"trot {TROT_SPEED:g} m/s, push 0.1 s, 16 phases"
+_COMMANDS = "random commands, 120 s"
+ON_TRUTH = (
+    *(
+        _study(
+            f"stand-{45 * k}",
+            _STANDING,
+            f"survived at {45 * k} deg",
+            partial(measure_standing, direction=k),
+        )
+        for k in range(DIRECTIONS)
+    ),
+    *(
+        _study(
+            f"trot-{push}",
+            _TROT,
+            f"{push} {impulse:g} N s survived",
+            partial(measure_trotting, push=push),
+        )
+        for push, (_, impulse) in TROT_PUSHES.items()
+    ),
+    _study("recover", "drops", "stand again", measure_recovery, least=0.98, times=10),
+    _study("gaits", "ten changes of gait and stops", "done", measure_gaits),
+    _study(
+        "commands",
+        _COMMANDS,
+        "followed without a fall",
+        measure_commands,
+        Metric("commands.failures", _COMMANDS, "ticks without an answer", "", 0.0),
+    ),
+    disturbed.STUDY,
+)
+STUDIES = (*ON_TRUTH, *(sensed(study, "sensors") for study in ON_TRUTH))
 """In the order of the report."""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``balance``."""
-    parser = add_parser(
-        subparsers,
-        "balance",
-        "Pushes, drops, changes of gait, and whether a fall is noticed.\n"
-        "Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser, "; times 10 for drops, 50 for disturbed runs")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+BENCHMARK = Benchmark(
+    "balance",
+    "Pushes, drops, changes of gait, and whether a fall is noticed.",
+    STUDIES,
+    examples=(
+        "--rows sensors",
+        "--rows recover sensed-recover",
+    ),
+    more_seeds="; times 10 for drops, 50 for disturbed runs",
+)
+register, run = BENCHMARK.register, BENCHMARK.run

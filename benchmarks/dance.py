@@ -7,7 +7,6 @@ finder and the lead of the choreography were tuned on songs with seeds below 100
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
@@ -15,9 +14,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
-from controller.cli.common import Subparsers, add_parser
+from benchmarks.command import Benchmark
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.motion_measurement import during_motion
 from controller.sweeps.trials import Trial, TrialRobot
 from motions import FeasibilityChecker
@@ -30,12 +28,6 @@ TEMPI = (62.0, 178.0)
 FIRST_SONG = 5000
 """Seed of the first song that is judged."""
 LEAST_MOVES = 20
-EXAMPLES = """
-python -m benchmarks dance            everything; minutes on two cores
-python -m benchmarks dance --quick    three seeds
-python -m benchmarks dance --rows clicks --json
-python -m benchmarks dance --list     the metrics and their thresholds
-"""
 
 
 def song_of(kind: str, seed: int) -> Song:
@@ -96,31 +88,24 @@ def _checker() -> FeasibilityChecker:
     return FeasibilityChecker()
 
 
-def _scenario(kind: str, item: str) -> Scenario:
+def _scenario(kind: str, item: str) -> Study:
     measured: Callable[[Trial], Measurement] = partial(measure, kind=kind)
-    return Scenario(kind, metrics_of(kind, item), measured)
+    return Study(kind, metrics_of(kind, item), measured)
 
 
-SCENARIOS = (
+STUDIES = (
     _scenario("clicks", "dance to a click track, 30 s"),
     _scenario("song", "dance to a made song, 30 s"),
 )
 """In the order of the report."""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``dance``."""
-    parser = add_parser(
-        subparsers,
-        "dance",
-        "Dances to songs whose true beats are known: how many accents of the measured\n"
-        "robot are on a beat. Needs the extra [music].\n"
-        "Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+BENCHMARK = Benchmark(
+    "dance",
+    "Dances to songs whose true beats are known: how many accents of the measured\n"
+    "robot are on a beat. Needs the extra [music].",
+    STUDIES,
+    takes="minutes on two cores",
+    examples=("--rows clicks --json",),
+)
+register, run = BENCHMARK.register, BENCHMARK.run

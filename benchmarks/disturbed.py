@@ -14,14 +14,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from benchmarks.locomotion import MASS_RANGE
-from benchmarks.pushes import PUSH_TIME, heading_force
-from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.steps import plant_of
+from benchmarks.robots import PUSH_TIME, heading_force, plant_of
+from benchmarks.study import Measurement, Metric, Study
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.contacts import GAITS
@@ -153,10 +151,10 @@ class Watch:
             self._fell, self._fell_as = (self._touches_since if lies else now), mode
 
 
-def measure_disturbed(trial: Trial, name: str, sensors: str) -> Measurement:
+def measure_disturbed(trial: Trial) -> Measurement:
     """Call at random, push at random, and let the robot recover from every fall."""
     rng = np.random.default_rng(FIRST_SEED + trial.seed)
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE, sensors)) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
         watch = Watch(robot, rng)
         robot.truth.on_tick = watch.look
         for _ in range(CALLS):
@@ -171,9 +169,9 @@ def measure_disturbed(trial: Trial, name: str, sensors: str) -> Measurement:
         falls, longest = watch.all_falls, watch.delay  # what comes now is the end
     late = [str(fall) for fall in falls if not fall.delay <= NOTICED]
     return Measurement(
-        {f"{name}.delay": longest, f"{name}.falls": float(len(falls))},
-        {f"{name}.delay": "; ".join(late)} if late else {},
-        notes={f"{name}.falls": "; ".join(map(str, falls))},
+        {"disturbed.delay": longest, "disturbed.falls": float(len(falls))},
+        {"disturbed.delay": "; ".join(late)} if late else {},
+        notes={"disturbed.falls": "; ".join(map(str, falls))},
     )
 
 
@@ -201,14 +199,9 @@ def _make(robot: TrialRobot, watch: Watch, what: str, rng: np.random.Generator) 
         return
 
 
-def scenario(sensors: str) -> Scenario:
-    """The row, with the plant's ``sensors``."""
-    name, item, group = "disturbed", "random calls and pushes", "truth"
-    if sensors != "ideal":
-        name, item, group = f"sensed-{name}", f"sensors: {item}", "sensors"
-    metrics = (
-        Metric(f"{name}.delay", item, "longest delay of notice", "s", NOTICED),
-        Metric(f"{name}.falls", item, "falls", "", None),
-    )
-    measured = partial(measure_disturbed, name=name, sensors=sensors)
-    return Scenario(name, metrics, measured, 50, group)
+_ITEM = "random calls and pushes"
+METRICS = (
+    Metric("disturbed.delay", _ITEM, "longest delay of notice", "s", NOTICED),
+    Metric("disturbed.falls", _ITEM, "falls", "", None),
+)
+STUDY = Study("disturbed", METRICS, measure_disturbed, 50, "truth")

@@ -6,7 +6,6 @@ seeds that are judged here.
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,24 +15,19 @@ from itertools import pairwise
 import numpy as np
 from jaxtyping import Bool, Float
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
-from controller.cli.common import Subparsers, add_parser
-from controller.motion_measurement import FULL
-from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
+from benchmarks.command import Benchmark
+from benchmarks.robots import feet_frame, loads, plant_of
+from benchmarks.study import Direction, Measurement, Metric, Study
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
-from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg
 
 FIRST_SEED = 6200
 """Seed of the first trial that is judged."""
-FRICTION_RANGE = (0.6, 1.0)
-MASS_RANGE = (0.95, 1.05)
-"""Factor on every mass and inertia of the robot; the controller is not told."""
 AFTERWARDS = 1.0
 """Time [s] for which the robot must stand when the motion is over."""
 PRESSED = 15.0
@@ -41,13 +35,6 @@ PRESSED = 15.0
 FLOWN = 0.06
 """Time [s] without contact after which a contact counts as a touchdown."""
 TEMPO, HOPS = 120.0, 3
-EXAMPLES = """
-python -m benchmarks dynamic_motions            everything; some minutes
-python -m benchmarks dynamic_motions --quick    three seeds
-python -m benchmarks dynamic_motions --rows up turn --json
-python -m benchmarks dynamic_motions --sensors imu
-python -m benchmarks dynamic_motions --list     the metrics, their thresholds
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,21 +92,6 @@ ITEMS: dict[str, Item] = {
 }
 
 
-def plant_of(trial: Trial) -> MujocoPlant:
-    """A simulated robot under the conditions of the trial."""
-    rng = np.random.default_rng(FIRST_SEED + trial.seed)
-    ranges = (FRICTION_RANGE, MASS_RANGE, YAW_RANGE)
-    friction, mass, yaw = (float(rng.uniform(*bounds)) for bounds in ranges)
-    return MujocoPlant(
-        friction=friction,
-        mass_scale=mass,
-        seed=FIRST_SEED + trial.seed,
-        initial_yaw=yaw,
-        initial_joint_noise=JOINT_NOISE,
-        sensors=trial.sensors,
-    )
-
-
 @cache
 def plan_of(name: str) -> tuple[CompiledPlan, bool]:
     """The plan of an item, and whether the check lets it pass; once for all trials of a process."""
@@ -135,7 +107,7 @@ def measure(trial: Trial, name: str) -> Measurement:
         return Measurement({f"{name}.done": 0.0}, reason="the check refuses the plan")
     model = RobotModel()
     try:
-        played = play(plant_of(trial), plan, model)
+        played = play(plant_of(trial, FIRST_SEED), plan, model)
         if played.objection:
             raise TrialFailed(played.objection)
     except TrialFailed as failed:
@@ -169,16 +141,14 @@ class Played:
     def values(self, name: str, plan: CompiledPlan, model: RobotModel) -> dict[str, float]:
         """The metrics that every jump has, of the item ``name``."""
         x, y, yaw = plan.end_pose
-        shares = self.recorded.torque_shares(model)
-        return {
-            f"{name}.done": 1.0,
-            f"{name}.place": 1000.0 * math.hypot(self.moved[0] - x, self.moved[1] - y),
-            f"{name}.yaw": abs(math.degrees(wrap_angle(self.turned - yaw))),
-            f"{name}.torque": float(shares.max()),
-            f"{name}.asked": float(self.recorded.asked_shares(model).max()),
-            f"{name}.speed": self.recorded.peak_speed_share(model),
-            f"{name}.saturated": 100.0 * float((shares >= FULL).mean()),
+        values = {
+            "done": 1.0,
+            "place": 1000.0 * math.hypot(self.moved[0] - x, self.moved[1] - y),
+            "yaw": abs(math.degrees(wrap_angle(self.turned - yaw))),
+            "asked": float(self.recorded.asked_shares(model).max()),
+            **loads(self.recorded),
         }
+        return {f"{name}.{quantity}": value for quantity, value in values.items()}
 
 
 def play(plant: MujocoPlant, plan: CompiledPlan, model: RobotModel) -> Played:
@@ -189,7 +159,7 @@ def play(plant: MujocoPlant, plan: CompiledPlan, model: RobotModel) -> Played:
     """
     with TrialRobot(plant) as robot:
         robot.require(robot.go2.stand())
-        before = _feet_frame(robot, model)
+        before = feet_frame(robot)
         robot.truth.clear()
         objection = "" if robot.go2.play(plan, check=False) else robot.go2.last_outcome.reason
         recorded = robot.truth.recording()
@@ -197,7 +167,7 @@ def play(plant: MujocoPlant, plan: CompiledPlan, model: RobotModel) -> Played:
             robot.wait(AFTERWARDS)
         except TrialFailed as failed:
             raise TrialFailed(objection or str(failed)) from None
-        after = _feet_frame(robot, model)
+        after = feet_frame(robot)
     moved = yaw_rotation(before.yaw).T @ (after.p_world - before.p_world)
     return Played(recorded, moved, wrap_angle(after.yaw - before.yaw), objection)
 
@@ -238,10 +208,6 @@ def _beat_error(recorded: TruthRecording) -> float:
     return max(off) if len(landings) == HOPS else 1.0
 
 
-def _feet_frame(robot: TrialRobot, model: RobotModel) -> Anchor:
-    return Anchor.of_feet(model.snapshot(robot.plant.truth()).p_world_feet, model.foot_radius)
-
-
 def metrics_of(name: str, title: str, done: float) -> list[Metric]:
     """The metrics that every jump has; ``done`` is the threshold of the trials that are done."""
     return [
@@ -268,25 +234,18 @@ def _metrics(name: str, item: Item) -> tuple[Metric, ...]:
     return tuple(found)
 
 
-SCENARIOS = tuple(
-    Scenario(name, _metrics(name, item), partial(measure, name=name))
-    for name, item in ITEMS.items()
+STUDIES = tuple(
+    Study(name, _metrics(name, item), partial(measure, name=name)) for name, item in ITEMS.items()
 )
 """In the order of the report."""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``dynamic_motions``."""
-    parser = add_parser(
-        subparsers,
-        "dynamic_motions",
-        "Jumps, hops, rears and lifts in physics: are they done, and where do they land.\n"
-        "Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser, has_sensors=True)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+BENCHMARK = Benchmark(
+    "dynamic_motions",
+    "Jumps, hops, rears and lifts in physics: are they done, and where do they land.",
+    STUDIES,
+    takes="some minutes",
+    examples=("--rows up turn --json",),
+    sensors=True,
+)
+register, run = BENCHMARK.register, BENCHMARK.run

@@ -7,7 +7,6 @@ for ``python -m benchmarks nearest``.
 
 from __future__ import annotations
 
-import argparse
 import math
 import tempfile
 import time
@@ -15,9 +14,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from benchmarks.scenario import Measurement, Metric, Scenario, chosen_scenarios
-from benchmarks.session import add_options, positive, run_and_report, tasks_of
-from controller.cli.common import Subparsers, add_parser
+from benchmarks.command import Benchmark
+from benchmarks.study import Measurement, Metric, Study
 from controller.sweeps.trials import Trial
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.robot.model import RobotModel
@@ -38,11 +36,6 @@ PLANNING, SLOW_PLANNING = 4.0, 10.0
 """Processor time [s] that a plan may take."""
 FROM_CACHE = 50.0
 """Processor time [ms] that a kept plan may take."""
-EXAMPLES = """
-python -m benchmarks dynamics             everything; some minutes
-python -m benchmarks dynamics jump rear --json
-python -m benchmarks dynamics --list      the metrics and their thresholds
-"""
 Make = Callable[[], tuple[Phase, ...]]
 
 MOVES: dict[str, tuple[str, Make, float]] = {
@@ -105,28 +98,19 @@ def _readings(name: str, plan: DynamicTrajectory, model: RobotModel) -> dict[str
     }
 
 
-SCENARIOS = tuple(
-    Scenario(name, metrics_of(name, item, limit), partial(measure_move, name))
+STUDIES = tuple(
+    Study(name, metrics_of(name, item, limit), partial(measure_move, name))
     for name, (item, _, limit) in MOVES.items()
 )
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``dynamics``."""
-    parser = add_parser(
-        subparsers,
-        "dynamics",
-        "Solve jumps, hops, rears and lifts from cold: processor time, deviation, torque.\n"
-        "Needs go2-wbc[dynamics].",
-        examples=EXAMPLES,
-    )
-    names = ", ".join(scenario.name for scenario in SCENARIOS)
-    parser.add_argument("names", metavar="NAME", nargs="*", help=f"{names}; default: all")
-    parser.add_argument("--runs", metavar="N", type=positive, default=1, help="default %(default)s")
-    add_options(parser, has_list=True)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Measure what was asked for, and report."""
-    scenarios = chosen_scenarios(SCENARIOS, args.names)
-    return run_and_report(args, scenarios, tasks_of(scenarios, args.runs))
+BENCHMARK = Benchmark(
+    "dynamics",
+    "Solve jumps, hops, rears and lifts from cold: processor time, deviation, torque.\n"
+    "Needs go2-wbc[dynamics].",
+    STUDIES,
+    takes="some minutes",
+    examples=("jump rear --json",),
+    runs=1,
+)
+register, run = BENCHMARK.register, BENCHMARK.run

@@ -19,8 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.session import add_sweep_options, publish, run_sweep
-from benchmarks.steps import plant_of
+from benchmarks.command import add_sweep, publish, run_sweep
+from benchmarks.robots import plant_of
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_measurement import FULL
 from controller.sweeps.rows import Row
@@ -65,7 +65,7 @@ def register(subparsers: Subparsers) -> None:
         examples=EXAMPLES,
     )
     parser.add_argument("--store", action="store_true", help="store them in the package")
-    add_sweep_options(parser, jobs=1)
+    add_sweep(parser, jobs=1)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -15,13 +15,28 @@ from dataclasses import replace
 from functools import cache, partial
 from typing import Any
 
-from benchmarks.exam.borders import BORDER, BORDERS
-from benchmarks.exam.cases import Case
-from benchmarks.exam.causes import CAUSES, examples, render_causes
-from benchmarks.exam.drawing import TEST
-from benchmarks.exam.outcome import play
-from benchmarks.exam.questions import Question, draw_name, draws, dynamic_questions, questions
-from benchmarks.exam.stored import (
+from benchmarks.command import (
+    IDEAL,
+    RESULTS,
+    add_options,
+    measure_all,
+    on_sensors,
+    positive,
+    publish,
+)
+from benchmarks.study import Measurement, Metric, Study
+from benchmarks.validation_set.causes import CAUSES, examples, render_causes
+from benchmarks.validation_set.drawing import TEST
+from benchmarks.validation_set.physics import BORDER, BORDERS, play
+from benchmarks.validation_set.questions import (
+    Question,
+    draw_name,
+    draws,
+    dynamic_questions,
+    questions,
+)
+from benchmarks.validation_set.scores import HALVES, Case, noticed, render, scores, wrong_ones
+from benchmarks.validation_set.stored import (
     BORDERS_FILE,
     borders_version,
     digest,
@@ -30,10 +45,6 @@ from benchmarks.exam.stored import (
     write_borders,
     write_outcomes,
 )
-from benchmarks.exam.table import HALVES, noticed, render, scores, wrong_ones
-from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.seeded import IDEAL, add_sensors_option, on_sensors
-from benchmarks.session import add_options, measure_all, positive, publish
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_outcome import FELL, LENIENT, STOPS, STRICT, Outcome, outcome_of
 from controller.sweeps.trials import Trial
@@ -95,8 +106,7 @@ def register(subparsers: Subparsers) -> None:
     parser.add_argument(
         "--borders", action="store_true", help="bisect where physics changes its mind"
     )
-    add_sensors_option(parser)
-    add_options(parser, has_jobs=True)
+    add_options(parser, "sensors", "jobs", *RESULTS)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -113,7 +123,7 @@ def run(args: argparse.Namespace) -> int:
     if args.borders:
         return _bisect(args)
     if args.rows == CAUSES_ROW:
-        cases = _measured(args, on_sensors(CAUSE_SCENARIO, args.sensors), examples())
+        cases = _measured(args, on_sensors(CAUSE_STUDY, args.sensors), examples())
         wrong = sum(bool(case.refusal) is not bool(case.outcome.strict) for case in cases)
         publish(args, {"wrong": wrong, "cases": _plain(cases)}, render_causes(cases))
         return ExitCode.OK if not wrong else ExitCode.FAILED
@@ -182,17 +192,15 @@ def ask(trial: Trial, *, of: str, is_played: bool) -> Measurement:
 
 
 _QUESTIONS = {EXAM: lambda: exam(), DYNAMIC: lambda: dynamic(), CAUSES: examples}
-STORED = {of: Scenario(of, METRICS, partial(ask, of=of, is_played=False)) for of in (EXAM, DYNAMIC)}
+STORED = {of: Study(of, METRICS, partial(ask, of=of, is_played=False)) for of in (EXAM, DYNAMIC)}
 REMADE = {
-    of: Scenario(f"{of}, played", METRICS, partial(ask, of=of, is_played=True))
+    of: Study(f"{of}, played", METRICS, partial(ask, of=of, is_played=True))
     for of in (EXAM, DYNAMIC)
 }
-CAUSE_SCENARIO = Scenario("causes", METRICS, partial(ask, of=CAUSES, is_played=True))
+CAUSE_STUDY = Study("causes", METRICS, partial(ask, of=CAUSES, is_played=True))
 
 
-def _measured(
-    args: argparse.Namespace, scenario: Scenario, asked: Sequence[Question]
-) -> list[Case]:
+def _measured(args: argparse.Namespace, scenario: Study, asked: Sequence[Question]) -> list[Case]:
     """The cases of the motions asked for; outcomes are stored if that is asked for."""
     found = measure_all(args, [(scenario, seed) for seed in _seeds(args, asked)])[scenario.name]
     lost = {seed: one.reason for seed, one in found.items() if not one.values}

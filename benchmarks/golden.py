@@ -22,8 +22,8 @@ from unittest.mock import patch
 import numpy as np
 from jaxtyping import Float, Int, UInt64
 
+from benchmarks.command import positive
 from benchmarks.golden_runs import KEPT_EVERY, RUNS, STAGES, Ledger, Values
-from benchmarks.session import positive
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.cli.progress import ProgressLine
 from go2_wbc.errors import CommandError, ConfigError, unknown_name

@@ -3,7 +3,7 @@
 A run takes ``WINDOW`` seconds, from ``START_TIME`` after
 the command on: motors with their torque-speed line, friction 0.6 to 1.0 and masses within 10 %, of
 which the controller is not told. The state is the true one, or estimated from IMU, encoders and
-feet (the group ``sensors``; ``benchmarks.sensed`` has more of it). Gaits and weights were chosen on
+feet (the group ``sensors``; ``truth_vs_estimate`` has more of it). Gaits and weights were chosen on
 seeds 0 to 9; those judged begin at ``FIRST_SEED``.
 
 - velocity: of MuJoCo's CoM in the heading frame, every tick;
@@ -12,25 +12,22 @@ seeds 0 to 9; those judged begin at ``FIRST_SEED``.
 - turning: from the heading (unwrapped) at both ends of the window;
 - saturated ticks: share of ticks in which some motor gives all it has at its speed.
 
-``benchmarks.unknown_world`` has the groups ``unknown`` and ``unknown-sensors``, and
-``benchmarks.other_robots`` the group ``robots``.
+``benchmarks.unknown_world`` has the groups ``unknown``, ``unknown-sensors`` and ``robots``.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from benchmarks import other_robots, sensed, sensed_library
-from benchmarks.scenario import Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
-from benchmarks.steps import plant_of
-from benchmarks.unknown_world import SCENARIOS as UNKNOWN
-from controller.cli.common import Subparsers, add_parser
+from benchmarks import library, truth_vs_estimate
+from benchmarks.command import Benchmark
+from benchmarks.robots import plant_of
+from benchmarks.study import Measurement, Metric, Study, sensed
+from benchmarks.unknown_world import STUDIES as UNKNOWN
 from controller.motion_measurement import FULL
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
@@ -47,13 +44,6 @@ START_TIME, WINDOW = 3.0, 20.0
 """Time [s] after a command that is left out, and that is measured."""
 BEYOND = Config(envelope=VelocityEnvelope(forward=4.0))
 """Of the runs that are beyond the envelope."""
-EXAMPLES = """
-python -m benchmarks locomotion            everything; an hour on two cores
-python -m benchmarks locomotion --quick    three seeds
-python -m benchmarks locomotion --rows sensors
-python -m benchmarks locomotion --rows ahead-2.5 gaits --json
-python -m benchmarks locomotion --list     the metrics and their thresholds
-"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +58,6 @@ class Run:
         mae: greatest mean absolute error [m/s]; None if it only informs.
         saturated: greatest share of saturated ticks [%]; None if it only informs.
         group: of the scenario.
-        sensors: of the plant.
         speed: greatest joint speed, as a share of its limit; None if it only informs.
     """
 
@@ -79,15 +68,13 @@ class Run:
     mae: float | None = None
     saturated: float | None = None
     group: str = "trot"
-    sensors: str = "ideal"
     speed: float | None = 1.0
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
         """The rows of the report."""
         c = self.command
-        on = "" if self.sensors == "ideal" else "sensors: "
-        item = f"{on}{self.gait} ({c.linear_x:g}, {c.linear_y:g}) m/s, {c.angular_z:g} rad/s, 20 s"
+        item = f"{self.gait} ({c.linear_x:g}, {c.linear_y:g}) m/s, {c.angular_z:g} rad/s, 20 s"
         turning = [Metric(f"{self.name}.turn", item, "mean turning error", "%", self.mean)]
         moving = [
             Metric(f"{self.name}.mean", item, "mean velocity error", "%", self.mean),
@@ -108,7 +95,7 @@ def speed_of(command: VelocityCommand) -> float:
 
 def measure_run(trial: Trial, run: Run) -> Measurement:
     """Follow the command; see the module's docstring for what is measured."""
-    command, plant = run.command, plant_of(trial, FIRST_SEED, MASS_RANGE, run.sensors)
+    command, plant = run.command, plant_of(trial, FIRST_SEED, MASS_RANGE)
     with TrialRobot(plant, BEYOND if speed_of(command) > TROT.forward else None) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk(run.gait))
@@ -159,44 +146,39 @@ RUNS = (
     Run("bound", "bound", VelocityCommand(0.6), 5.0, None, 5.0, "gaits"),
     Run("gallop", "gallop", VelocityCommand(0.8), 5.0, None, 5.0, "gaits"),
 )
-SENSED = (
+ON_SENSORS = (
     *(
-        Run(f"sensed-{speed:g}", "trot", VelocityCommand(speed), mean)
+        Run(f"{speed:g}", "trot", VelocityCommand(speed), mean)
         for speed, mean in ((0.5, 2.0), (1.0, 2.0), (1.5, 2.0), (2.0, 2.0), (2.5, 3.0), (3.0, None))
     ),
-    *(
-        replace(run, name=f"sensed-{run.name}", mae=None)
-        for run in RUNS
-        if not run.name.startswith("ahead")
-    ),
-    Run("sensed-3.5", "trot", VelocityCommand(3.5), None, speed=None),
+    *(replace(run, mae=None) for run in RUNS if not run.name.startswith("ahead")),
+    Run("3.5", "trot", VelocityCommand(3.5), None, speed=None),
 )
 """The same on its own sensors; at 3 m/s all that is asked for is not to fall, at 3.5 nothing."""
-SCENARIOS = (
-    *(
-        Scenario(run.name, run.metrics, partial(measure_run, run=run), group=run.group)
-        for run in (*RUNS, *(replace(run, group="sensors", sensors="imu") for run in SENSED))
-    ),
-    *sensed.SCENARIOS,
-    sensed_library.SCENARIO,
+
+
+def _study(run: Run) -> Study:
+    return Study(run.name, run.metrics, partial(measure_run, run=run), group=run.group)
+
+
+STUDIES = (
+    *map(_study, RUNS),
+    *(sensed(_study(run), "sensors") for run in ON_SENSORS),
+    *truth_vs_estimate.STUDIES,
+    library.ON_SENSORS,
     *UNKNOWN,
-    *other_robots.SCENARIOS,
 )
 """In the order of the report."""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``locomotion``."""
-    parser = add_parser(
-        subparsers,
-        "locomotion",
-        "Every gait at its speeds: how exactly, and within which limits.\n"
-        "Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+BENCHMARK = Benchmark(
+    "locomotion",
+    "Every gait at its speeds: how exactly, and within which limits.",
+    STUDIES,
+    takes="an hour on two cores",
+    examples=(
+        "--rows sensors",
+        "--rows ahead-2.5 gaits --json",
+    ),
+)
+register, run = BENCHMARK.register, BENCHMARK.run

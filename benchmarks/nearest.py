@@ -1,8 +1,9 @@
 """``python -m benchmarks nearest``: of motions that the check refuses, the nearest that is not.
 
-Each seed gives one motion that is refused as it is written (``refused_motions``). The nearest one
-is planned, and played in physics, by torques alone, on a robot and a floor of the seed's. How far
-the trunk was from what was written, at most, is measured and compared with the check's report.
+Each seed gives one motion that is refused as it is written, for it asks for something that no
+quasi-static motion can do, within what a person might write. The nearest one is planned, and played
+in physics, by torques alone, on a robot and a floor of the seed's. How far the trunk was from what
+was written, at most, is measured and compared with the check's report.
 
 The planner, and how plans are met, were worked on with the motions of seeds 1000 to 1039, and those
 of 7300 to 7319 had been seen before the last settings were chosen; none of those that are judged
@@ -11,27 +12,28 @@ here was looked at before.
 
 from __future__ import annotations
 
-import argparse
 import math
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from benchmarks.dynamic_motions import AFTERWARDS, plant_of
-from benchmarks.refused_motions import refused_motion
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
-from controller.cli.common import Subparsers, add_parser
-from controller.motion_measurement import FULL, during_motion
+from benchmarks.command import Benchmark
+from benchmarks.dynamic_motions import AFTERWARDS
+from benchmarks.dynamic_motions import FIRST_SEED as ROBOTS
+from benchmarks.robots import loads, plant_of
+from benchmarks.study import Direction, Measurement, Metric, Study
+from controller.motion_measurement import during_motion
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
-from go2_wbc.errors import MotionInfeasible
+from go2_wbc.errors import MotionError, MotionInfeasible
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
-from motions import CheckedMotion, CompiledPlan, FeasibilityChecker, FeasibilityReport
+from motions import CheckedMotion, CompiledPlan, FeasibilityChecker, FeasibilityReport, Timeline
 from motions.dynamics.projection import PlanTarget, nearest
+from motions.language.timeline_data import NEAREST
 from motions.plan.dynamic_span import DynamicSpan
 from motions.plan.trajectory import as_written
 
@@ -43,11 +45,13 @@ AS_REPORTED = 10.0
 """Difference [mm] between the measured and the reported deviation, of every motion."""
 PLANNING = 4.0
 """Processor time [s] of planning, from cold and without imports."""
-EXAMPLES = """
-python -m benchmarks nearest            twenty motions, some minutes
-python -m benchmarks nearest --quick    three of them
-python -m benchmarks nearest --list     the metrics and their thresholds
-"""
+LARGEST = {"x": 0.05, "y": 0.05, "z": 0.05, "roll": 0.25, "pitch": 0.25, "yaw": 0.35}
+"""Greatest offset of the trunk [m, rad] by channel."""
+DIAGONALS = (("FL", "RR"), ("FR", "RL"))
+FRONT = ("FL", "FR")
+ATTEMPTS = 40
+"""Draws after which a kind that the check never refuses is a mistake of ours."""
+Maker = Callable[[np.random.Generator], Timeline]
 ITEM = "nearest to a refused motion"
 METRICS = (
     Metric("nearest.found", ITEM, "plan found", "%", FOUND, Direction.AT_LEAST),
@@ -65,23 +69,6 @@ METRICS = (
 )
 OF_FOUND = tuple(metric.name for metric in METRICS[1:])
 """What is asked only of a motion for which a plan was found."""
-
-
-@dataclass(frozen=True, slots=True)
-class Played:
-    """A motion, played.
-
-    Attributes:
-        place, angle: greatest distance [m] and angle [rad] of the trunk from what was written.
-        torque, speed: largest share of a joint's torque and speed limit.
-        saturated: share of ticks in which some motor gave all it has.
-    """
-
-    place: float
-    angle: float
-    torque: float
-    speed: float
-    saturated: float
 
 
 def measure(trial: Trial) -> Measurement:
@@ -102,23 +89,10 @@ def measure(trial: Trial) -> Measurement:
     except TrialFailed as failed:
         values["nearest.done"] = 0.0
         return Measurement(values, {"nearest.done": str(failed)}, str(failed))
-    values |= {"nearest.done": 1.0, **summary(played, values["nearest.reported"])}
-    off = values["nearest.as_reported"]
+    off = abs(played["nearest.measured"] - values["nearest.reported"])
+    values |= {"nearest.done": 1.0, "nearest.as_reported": off, **played}
     failures = {"nearest.as_reported": f"{off:.1f} mm"} if off > AS_REPORTED else {}
     return Measurement(values, failures)
-
-
-def summary(played: Played, reported: float) -> dict[str, float]:
-    """What was measured, by metric; ``reported``: distance [mm] from what was written."""
-    place = 1000.0 * played.place
-    return {
-        "nearest.as_reported": abs(place - reported),
-        "nearest.measured": place,
-        "nearest.angle_measured": math.degrees(played.angle),
-        "nearest.torque": played.torque,
-        "nearest.speed": played.speed,
-        "nearest.saturated": 100.0 * played.saturated,
-    }
 
 
 def planning_time(checked: CheckedMotion, model: RobotModel) -> float:
@@ -141,22 +115,21 @@ def late(checked: CheckedMotion) -> list[float]:
     return [span.trajectory.lag for span in spans_of(checked)]
 
 
-def play(trial: Trial, checked: CheckedMotion, model: RobotModel) -> Played:
-    """Play it from a stand, and stand for a second.
+def play(trial: Trial, checked: CheckedMotion, model: RobotModel) -> dict[str, float]:
+    """Play it from a stand, and stand for a second; what was measured, by metric.
 
     Raises:
         TrialFailed: if the robot falls, or says that it has not done it.
     """
-    with TrialRobot(plant_of(trial)) as robot:
+    with TrialRobot(plant_of(trial, ROBOTS)) as robot:
         robot.require(robot.go2.stand())
         robot.truth.clear()
         robot.require(robot.go2.play(checked))
         recorded = during_motion(robot.go2, robot.truth, checked.plan.name)
         robot.wait(AFTERWARDS)
     place, angle = off_written(recorded, checked, model)
-    shares = recorded.torque_shares(model)
-    speed = recorded.peak_speed_share(model)
-    return Played(place, angle, float(shares.max()), speed, float((shares >= FULL).mean()))
+    values = {"measured": 1000.0 * place, "angle_measured": math.degrees(angle), **loads(recorded)}
+    return {f"nearest.{name}": value for name, value in values.items()}
 
 
 def off_written(
@@ -183,22 +156,121 @@ def spans_of(checked: CheckedMotion) -> tuple[DynamicSpan, ...]:
     return checked.plan.dynamic if isinstance(checked.plan, CompiledPlan) else ()
 
 
-SCENARIOS = (Scenario("nearest", METRICS, measure),)
+# --- motions that are refused ---------------------------------------------------------------------
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``nearest``."""
-    parser = add_parser(
-        subparsers,
-        "nearest",
-        "Motions that the check refuses: is the nearest one found that it does not, is\n"
-        "it done in physics, and is it as far from what was written as reported? Needs\n"
-        "go2-wbc[dynamics]. Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser, ", each of another motion")
+@dataclass(frozen=True, slots=True)
+class RefusedMotion:
+    """A motion with its origin.
+
+    Attributes:
+        kind: the maker's name.
+        line: as it is written, with ``physics="as_written"``.
+    """
+
+    kind: str
+    line: Timeline
+
+    @property
+    def nearest(self) -> Timeline:
+        """The same, of which the nearest feasible motion is asked."""
+        return replace(self.line, physics=NEAREST)
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+def refused_motion(seed: int, checker: FeasibilityChecker) -> RefusedMotion:
+    """The motion of ``seed``: kinds take turns, numbers are drawn until the check refuses it.
+
+    Raises:
+        MotionError: if ``ATTEMPTS`` draws of the kind are all feasible.
+    """
+    kind, make = list(KINDS.items())[seed % len(KINDS)]
+    rng = np.random.default_rng([seed, 11])
+    for _ in range(ATTEMPTS):
+        line = replace(make(rng), name=f"refused {seed}")
+        if not checker.check(line).ok:
+            return RefusedMotion(kind, line)
+    raise MotionError(f"{ATTEMPTS} motions of the kind {kind!r} are feasible")
+
+
+def _poses(rng: np.random.Generator, over: float) -> Timeline:
+    """Two or three quick poses of the trunk on four feet."""
+    line = Timeline()
+    for _ in range(int(rng.integers(2, 4))):
+        line = _moved(line, rng, over)
+    return line.home(over=1.5 * over)
+
+
+def _moved(line: Timeline, rng: np.random.Generator, over: float) -> Timeline:
+    """To a pose that differs in two channels."""
+    chosen = rng.choice(list(LARGEST), size=2, replace=False).tolist()
+    pose = {name: float(rng.uniform(-1.0, 1.0)) * LARGEST[name] for name in chosen}
+    x, y, z, roll, pitch, yaw = (pose.get(channel) for channel in LARGEST)
+    return line.body(x=x, y=y, z=z, roll=roll, pitch=pitch, yaw=yaw, over=over)
+
+
+def _quick_trunk(rng: np.random.Generator) -> Timeline:
+    return Timeline().hold(0.2).then(_poses(rng, float(rng.uniform(0.12, 0.24)))).hold(0.2)
+
+
+def _pair(rng: np.random.Generator) -> Timeline:
+    """Two diagonal feet up and down; half of the authors let the trunk be balanced."""
+    first, second = DIAGONALS[int(rng.integers(2))]
+    up, down, z = float(rng.uniform(0.15, 0.25)), float(rng.uniform(0.15, 0.25)), rng.uniform
+    line = Timeline(balance=bool(rng.random() < 0.5), shift_time=0.3).hold(0.3)
+    line = line.foot(first, z=float(z(0.03, 0.07)), over=up).also()
+    line = line.foot(second, z=float(z(0.03, 0.07)), over=up).hold(float(rng.uniform(0.02, 0.2)))
+    line = line.down(first, over=down).also().down(second, over=down)
+    return line.home(over=0.4).hold(0.3)
+
+
+def _pair_while_moving(rng: np.random.Generator) -> Timeline:
+    """Two diagonal feet up and down while the trunk goes to a pose and back."""
+    first, second = DIAGONALS[int(rng.integers(2))]
+    z, over = float(rng.uniform(0.03, 0.06)), float(rng.uniform(0.2, 0.3))
+    feet = Timeline(balance=False).foot(first, z=z, over=over).also().foot(second, z=z, over=over)
+    feet = feet.down(first, over=over).also().down(second, over=over)
+    trunk = _moved(Timeline(), rng, 2.0 * over)
+    return Timeline(balance=False).hold(0.2).together(feet, trunk).home(over=0.5).hold(0.3)
+
+
+def _early_paw(rng: np.random.Generator) -> Timeline:
+    """A front paw that is raised before the trunk is over the other feet."""
+    leg, over = FRONT[int(rng.integers(2))], float(rng.uniform(0.2, 0.35))
+    line = Timeline(balance=bool(rng.random() < 0.5), shift_time=float(rng.uniform(0.1, 0.2)))
+    line = line.hold(0.2).foot(leg, x=float(rng.uniform(0.0, 0.06)), z=0.08, over=over)
+    return line.hold(float(rng.uniform(0.1, 0.4))).down(leg, over=over).home(over=0.3).hold(0.3)
+
+
+def _chain(rng: np.random.Generator) -> Timeline:
+    """One of the others between stretches that can be done as they are written."""
+    others = (_quick_trunk, _pair, _pair_while_moving, _early_paw)
+    inner = others[int(rng.integers(len(others)))](rng)
+    paw = FRONT[int(rng.integers(2))]
+    before = Timeline().foot(paw, z=float(rng.uniform(0.05, 0.1)), over=0.7).home(over=0.8)
+    after = _moved(Timeline(), rng, 0.9).home(over=0.9)
+    return before.then(inner, after)
+
+
+KINDS: dict[str, Maker] = {
+    "quick trunk": _quick_trunk,
+    "diagonal pair": _pair,
+    "pair while moving": _pair_while_moving,
+    "early paw": _early_paw,
+    "chain": _chain,
+}
+"""In turns, by the seed."""
+
+
+STUDIES = (Study("nearest", METRICS, measure),)
+
+
+BENCHMARK = Benchmark(
+    "nearest",
+    "Motions that the check refuses: is the nearest one found that it does not, is\n"
+    "it done in physics, and is it as far from what was written as reported? Needs\n"
+    "go2-wbc[dynamics].",
+    STUDIES,
+    takes="twenty motions, some minutes",
+    more_seeds=", each of another motion",
+)
+register, run = BENCHMARK.register, BENCHMARK.run

@@ -8,28 +8,33 @@ stores it; what is reported is of the test half, whose families no threshold and
 from __future__ import annotations
 
 import argparse
+import csv
+import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.exam.drawing import TEST, TRAIN
-from benchmarks.probability_evidence import csv_of, save_reliability
+from benchmarks.command import add_sweep, positive, publish, run_sweep
 from benchmarks.probability_fit import Calibration, Sample, calibration, fit
 from benchmarks.probability_runs import DRAWN, seeds, trial
-from benchmarks.session import add_sweep_options, positive, publish, run_sweep
+from benchmarks.validation_set.drawing import TEST, TRAIN
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.sweeps.rows import Row
 from controller.sweeps.summary import rate_interval
 from go2_wbc.files import checked_output, write_atomically
 from motions.feasibility.probability import FILE, ProbabilityModel, fitted
-from viz.render.figure_style import PLOT_SUFFIXES
+from viz.render.figure_style import PLOT_SUFFIXES, save_figure
+from viz.render.reliability_plot import reliability_figure
 
 FITTED = (TRAIN, DRAWN)
 """What the model may be fitted to."""
 ERROR, BRIER_SHARE = 0.05, 0.5
 """Greatest expected calibration error, and Brier score over that of the base rate."""
+COLUMNS = ("seed", "motion", "half", "stratum", "friction", "payload", "refused", "done", "fell")
+"""Of a run, besides the chance that was stated."""
+DIGITS = 3
 EXAMPLES = """
 python -m benchmarks probability         two worlds to fit, five to judge,
                                          3,000 sentences to fit
@@ -60,7 +65,7 @@ def register(subparsers: Subparsers) -> None:
         "--data", metavar="FILE", type=Path, help="write a .csv with a line for every run"
     )
     parser.add_argument("--plot", metavar="FILE", type=Path, help="draw the reliability: .svg, ...")
-    add_sweep_options(parser, jobs=2)
+    add_sweep(parser, jobs=2)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -164,3 +169,36 @@ def render(judged: Calibration, rows: Sequence[Row], lost: dict[int, str]) -> st
     ]
     lines += [f"seed {seed} gave no row: {why:.55}" for seed, why in lost.items()]
     return "\n".join(lines)
+
+
+def csv_of(model: ProbabilityModel, rows: Sequence[Row]) -> bytes:
+    """A line for every run: world, verdict, stated chance and outcome."""
+    text = io.StringIO(newline="")
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow((*COLUMNS, "chance"))
+    for row in rows:
+        chance = model.probability(json.loads(str(row["margins"])))
+        values = [row[name] for name in COLUMNS]
+        values = [int(v) if isinstance(v, bool) else v for v in values]
+        values = [round(v, DIGITS) if isinstance(v, float) else v for v in values]
+        table.writerow([*values, round(chance, DIGITS)])
+    return text.getvalue().encode()
+
+
+def save_reliability(judged: Calibration, path: Path) -> Path:
+    """Draw the share of the runs that were done over the chance stated, in bins.
+
+    The intervals (Clopper-Pearson, 95 %) take runs for independent, which those of one motion
+    are not.
+    """
+    stated, done, counts = (np.array(column) for column in zip(*judged.bins, strict=True))
+    intervals = np.array(
+        [rate_interval(round(s * n), int(n)) for s, n in zip(done, counts, strict=True)]
+    )
+    low, high = judged.error_interval
+    title = (
+        f"{int(counts.sum())} runs of the test half; expected error {judged.error:.3f} "
+        f"({low:.3f} to {high:.3f})"
+    )
+    figure = reliability_figure(stated, done, counts.astype(float), intervals, title=title)
+    return save_figure(figure, path)

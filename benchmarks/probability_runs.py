@@ -15,11 +15,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.exam.drawing import TEST, TRAIN
-from benchmarks.exam.outcome import play
-from benchmarks.exam.questions import IMPOSSIBLE, Question, questions
-from benchmarks.exam.sentences import Sentence, sentences
-from benchmarks.exam.stored import read_borders
+from benchmarks.validation_set.drawing import TEST, TRAIN
+from benchmarks.validation_set.physics import play
+from benchmarks.validation_set.questions import IMPOSSIBLE, Question, questions
+from benchmarks.validation_set.random_timelines import RandomTimeline, random_timelines
+from benchmarks.validation_set.stored import read_borders
 from controller.motion_measurement import measure_motion
 from controller.motion_outcome import outcome_of
 from controller.sweeps.trials import TrialFailed, TrialRobot
@@ -56,7 +56,7 @@ def trial(seed: int) -> dict[str, object]:
     return _row(question.name, kind, world, report, played(plan, world, seed))
 
 
-def _drawn(sentence: Sentence) -> dict[str, object]:
+def _drawn(sentence: RandomTimeline) -> dict[str, object]:
     """The row of a sentence."""
     checker = FeasibilityChecker(model())
     plan = checker.plan(sentence.line, check=False)
@@ -150,9 +150,9 @@ def seeds(motions: int | None = None) -> int:
 
 
 @lru_cache(maxsize=1)
-def drawn() -> list[Sentence]:
+def drawn() -> list[RandomTimeline]:
     """The random sentences, in the order of their seeds."""
-    return sentences(SENTENCES)
+    return random_timelines(SENTENCES)
 
 
 def mixed(asked: Sequence[Question]) -> list[Question]:

@@ -1,34 +1,33 @@
-"""Pushes of the base, and how large an impulse a robot survives."""
+"""Pushes of a robot that stands or trots, and how large an impulse it survives."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.scenario import Direction, Measurement, Metric
+from benchmarks.robots import PUSH_TIME, force_of, standing_failure
+from benchmarks.study import Direction, Measurement, Metric, Study
+from controller.modes import Mode
+from controller.sweeps.studies import set_off
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
+from go2_wbc.contacts import GAITS
+from go2_wbc.planning.command import VelocityCommand
 
-PUSH_TIME = 0.1
-"""Duration [s] of a push."""
 IMPULSE_STEP = 2.0
 """N s between the impulses that are tried."""
-DIRECTIONS: dict[str, tuple[float, float, float]] = {
-    "forward": (1.0, 0.0, 0.0),
-    "backward": (-1.0, 0.0, 0.0),
-    "left": (0.0, 1.0, 0.0),
-    "right": (0.0, -1.0, 0.0),
-    "up": (0.0, 0.0, 1.0),
-    "down": (0.0, 0.0, -1.0),
-}
-"""Unit vectors ahead, left, up of the robot."""
+STANDS_AFTER, TROTS_AFTER = 3.0, 2.0
+"""Time [s] after a push within which the robot must stand, or trot, again."""
+START_TIME = 1.5
+"""Time [s] from the command to trot to the first push."""
+PHASES = 8
+"""Instants of the stride, evenly spread, at which the trotting robot is pushed."""
+PUSHED_SPEED, SPEED_TOLERANCE = 0.5, 0.15
+"""Speed [m/s], and error of its mean over the last two strides that counts as trotting again."""
 FailureOf = Callable[[float, str], str | None]
 """Pushes a robot with an impulse [N s] in a direction; says what went wrong, or None."""
-
-
-def heading_force(angle: float, impulse: float) -> np.ndarray:
-    """Force (3,) [N] that gives ``impulse`` [N s] at ``angle`` [rad] from ahead to the left."""
-    return impulse / PUSH_TIME * np.array([math.cos(angle), math.sin(angle), 0.0])
 
 
 def push_metrics(prefix: str, item: str, lateral: float, forward: float) -> tuple[Metric, ...]:
@@ -44,11 +43,6 @@ def directions_of(metric: Metric) -> tuple[str, ...]:
     """The directions in which an impulse must be survived."""
     name = metric.quantity.split()[0]
     return ("left", "right") if name == "lateral" else (name,)
-
-
-def force_of(impulse: float, direction: str) -> np.ndarray:
-    """Force (3,) [N] that gives ``impulse`` [N s] in ``PUSH_TIME``."""
-    return np.array(DIRECTIONS[direction]) * impulse / PUSH_TIME
 
 
 def measure_impulses(metrics: Sequence[Metric], failure_of: FailureOf) -> Measurement:
@@ -96,3 +90,93 @@ def largest_impulse(survives: Callable[[float], bool], first: float) -> float:
     if impulse == first and survives(first + IMPULSE_STEP):
         return first + IMPULSE_STEP
     return max(impulse, 0.0)
+
+
+STANDING = push_metrics(
+    "stand.push", "standing, push 0.1 s without a step", lateral=14.0, forward=18.0
+)
+TROTTING = push_metrics(
+    "trot.push", "trot 0.5 m/s, push 0.1 s, 8 phases", lateral=18.0, forward=24.0
+)
+MOVED = Metric("stand.push_moved", STANDING[0].item, "a foot moved, to threshold", "mm", None)
+
+
+def measure_standing(trial: Trial) -> Measurement:
+    """Largest impulse on the base, in the worst of a metric's directions, that is survived.
+
+    Survived is: 3 s later the robot stands (see ``standing_failure``), and never left standing
+    mode, in which no foot is ever swung. A pushed robot may rock onto two feet, and the other two
+    come down elsewhere: ``MOVED`` says how far, for impulses up to the thresholds.
+    """
+    trial = replace(trial, has_nominal_friction=True)
+    moved = [0.0]
+
+    def failure_of(impulse: float, direction: str) -> str | None:
+        with TrialRobot(trial) as robot:
+            try:
+                robot.require(robot.go2.stand())
+                feet = robot.plant.p_world_feet
+                robot.push(force_of(impulse, direction), PUSH_TIME)
+                robot.wait(STANDS_AFTER)
+            except TrialFailed as failed:
+                return str(failed)
+            steps = (robot.plant.p_world_feet - feet)[:, :2]
+            if impulse <= max(
+                m.threshold or 0.0 for m in STANDING if direction in directions_of(m)
+            ):
+                moved.append(float(np.linalg.norm(steps, axis=1).max()))
+            if robot.go2.mode is not Mode.STANDING:
+                return f"the robot is {robot.go2.mode.value}"
+            return standing_failure(robot)
+
+    found = measure_impulses(STANDING, failure_of)
+    return Measurement({**found.values, MOVED.name: 1000.0 * max(moved)}, found.failures)
+
+
+def measure_trotting(trial: Trial) -> Measurement:
+    """Largest impulse on the base that is survived at every phase, in a metric's directions.
+
+    The phases are eight instants of the stride, evenly spread. Survived is: 2 s later the robot is
+    upright, and its mean velocity over the last two strides is within 0.15 m/s of the command.
+    """
+    trial = replace(trial, has_nominal_friction=True)
+    trotting: list[TrialRobot] = []  # one for many pushes; after a failure a new one
+
+    def failure_of(impulse: float, direction: str) -> str | None:
+        lost: list[str] = []
+        for phase in range(PHASES):
+            try:
+                if not trotting:
+                    trotting.append(TrialRobot(trial))
+                    set_off(trotting[0], "trot", VelocityCommand(PUSHED_SPEED))
+                    trotting[0].wait(START_TIME)
+                _push(trotting[0], force_of(impulse, direction), phase)
+            except TrialFailed as failed:
+                trotting.pop().close()
+                lost.append(f"phase {phase}: {failed}")
+        return "; ".join(lost) or None
+
+    try:
+        return measure_impulses(TROTTING, failure_of)
+    finally:
+        for robot in trotting:
+            robot.close()
+
+
+def _push(robot: TrialRobot, force: np.ndarray, phase: int) -> None:
+    period = GAITS["trot"].period
+    # The gait's clock started with the command, when the truth was cleared.
+    elapsed = robot.plant.time - robot.truth.start
+    phase_time = phase * period / PHASES
+    target = phase_time + math.ceil((elapsed - phase_time) / period) * period
+    robot.wait(max(target - elapsed, 0.0))
+    robot.push(force, PUSH_TIME)
+    robot.wait(TROTS_AFTER)
+    strides = robot.truth.recording(since=robot.plant.time - 2.0 * period)
+    speed = float(strides.com_velocity[:, 0].mean())
+    if abs(speed - PUSHED_SPEED) > SPEED_TOLERANCE:
+        raise TrialFailed(f"walks at {speed:.2f} m/s two seconds after the push")
+
+
+STAND_PUSHES = Study("stand-pushes", (*STANDING, MOVED), measure_standing)
+TROT_PUSHES = Study("trot-pushes", TROTTING, measure_trotting)

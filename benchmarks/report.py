@@ -9,8 +9,7 @@ from dataclasses import asdict, dataclass
 from itertools import groupby
 from statistics import fmean, stdev
 
-from benchmarks.runner import Results
-from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.study import Measurement, Metric, Results, Study
 
 WIDTH = 80
 _LINE = " {quantity:<26}{threshold:>12}{n:>4}{mean:>8}{sd:>8}{worst:>8}{seed:>5}{falls:>5}{verdict}"
@@ -91,7 +90,7 @@ class Report:
         return {"passed": self.ok, "rows": [row.as_dict() for row in self.rows]}
 
 
-def summarise(scenarios: Sequence[Scenario], results: Results) -> Report:
+def summarise(scenarios: Sequence[Study], results: Results) -> Report:
     """The report of ``results``."""
     return Report(
         tuple(summarise_metric(m, results.get(s.name, {})) for s in scenarios for m in s.metrics)

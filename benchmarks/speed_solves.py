@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from benchmarks.scenario import Direction, Measurement, Metric
 from benchmarks.speed_placo import BarePlaco
+from benchmarks.study import Direction, Measurement, Metric
 from controller.assembly import build_pilot
 from controller.procedures import Aborted
 from controller.sweeps.trials import Trial, TrialFailed

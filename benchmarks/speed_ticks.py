@@ -1,21 +1,33 @@
-"""What whole control ticks cost, 2 ms of physics included: by mode, at worst, and in memory."""
+"""What whole control ticks cost, 2 ms of physics included: by mode and part, at worst, in memory.
+
+A tick that is late, or ten times longer than the others, may be ours or the machine's; where a bare
+loop beside it, whose work allocates nothing, has as many of them, it is the machine's.
+"""
 
 from __future__ import annotations
 
 import gc
+import hashlib
 import sys
 import time
 import tracemalloc
-from collections.abc import Callable
-from contextlib import closing
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from functools import partial
+from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from benchmarks.scenario import Direction, Measurement, Metric
-from benchmarks.speed_bare import BareWork, timed
 from benchmarks.speed_solves import recorded_ticks, slowness
+from benchmarks.study import Direction, Measurement, Metric
+from controller.assembly import build_pilot
 from controller.go2_controller import GO2Controller
+from controller.pacing import Pacer
+from controller.procedures import Aborted
 from controller.sweeps.trials import Trial, TrialFailed
+from go2_wbc.config import Config
+from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant import MujocoPlant
 
 PERIOD = 2000.0
@@ -29,25 +41,38 @@ COMMAND_TIME = 60.0
 """Robot time [s] of random velocity commands, a new one each second."""
 FASTEST = (1.0, 0.4, 1.5)
 """Ahead and sideways [m/s], turning [rad/s]: the greatest of these commands."""
-ESTIMATED_TIME = 10.0
-"""Robot time [s] of the trot on sensors."""
+ESTIMATED_TIME, PARTS_TIME = 10.0, 4.0
+"""Robot time [s] of the trot on sensors, and of the one whose parts are timed."""
+REAL_TIME = 60.0
+"""Time [s] of the trot at the wall clock's pace."""
 REPEATS = 3
 """How often the same walk is done."""
 TRACED_TICKS = 500
 """Ticks whose memory is traced."""
+CALIBRATION_CALLS = 200
+"""Calls by which a piece of bare work is measured."""
+GIVEN_UP = 1.0
+"""Lag [s] from which on the pace is given up: never in a run that means anything."""
+PARTS = {
+    "read": "read the plant",
+    "snapshot": "dynamics of the state",
+    "update": "planner",
+    "solve": "QP",
+    "write": "write, with 2 ms of physics",
+    "record": "telemetry",
+}
+"""Methods of a tick, and what they do."""
 
-_ITEM = "whole tick, 2 ms of physics: {}"
-_SCALED = "as on a machine where PlaCo's takes 43 us"
+_ITEM, _LEAST = "whole tick, 2 ms of physics: {}", Direction.AT_LEAST
 
 
 def _tick_metrics(mode: str) -> tuple[Metric, ...]:
-    item, least = _ITEM.format(mode), Direction.AT_LEAST
-    most = TROT_TIME if mode == "trot" else None
+    item, most = _ITEM.format(mode), TROT_TIME if mode == "trot" else None
     return (
         Metric(f"tick.{mode}.median", item, "median", "us", None),
         Metric(f"tick.{mode}.p99", item, "99 of 100", "us", None),
         Metric(f"tick.{mode}.scaled", item, "median, scaled", "us", most),
-        Metric(f"tick.{mode}.factor", item, "real-time factor, scaled", "", FACTORS[mode], least),
+        Metric(f"tick.{mode}.factor", item, "real-time factor, scaled", "", FACTORS[mode], _LEAST),
     )
 
 
@@ -72,31 +97,48 @@ ESTIMATED_METRICS = (
     Metric("estimated.p99", _ESTIMATED, "99 of 100, by median", "", None),
     Metric("estimated.worst", _ESTIMATED, "worst by median", "", None),
     Metric("estimated.least", _ESTIMATED, "worst of the least of three runs", "", 10.0),
-    Metric(
-        "estimated.factor",
-        _ESTIMATED,
-        "real-time factor, scaled",
-        "",
-        10.0,
-        Direction.AT_LEAST,
-    ),
+    Metric("estimated.factor", _ESTIMATED, "real-time factor, scaled", "", 10.0, _LEAST),
 )
+_PARTS = "parts of a tick, trot at 0.5 m/s"
+PART_METRICS = (
+    *(Metric(f"part.{name}", _PARTS, what, "us", None) for name, what in PARTS.items()),
+    Metric("part.rest", _PARTS, "the rest: checks, glue", "us", None),
+)
+_REALTIME = "500 Hz at the wall clock's pace, 60 s of trot"
+REALTIME_METRICS = (
+    Metric("realtime.missed", _REALTIME, "ticks that ended late", "%", 0.1),
+    Metric("realtime.bare", _REALTIME, "a bare loop after it, late", "%", None),
+    Metric("realtime.ticks", _REALTIME, "ticks", "", None),
+    Metric("realtime.load", _REALTIME, "processor time", "%", None),
+)
+
+
+@contextmanager
+def timed_robot(plant: MujocoPlant) -> Iterator[tuple[GO2Controller, list[int]]]:
+    """A robot, and the thread time [ns] at the end of each of its ticks."""
+    ends: list[int] = []
+    with (
+        closing(plant),
+        GO2Controller(plant=plant, after_tick=lambda: ends.append(time.thread_time_ns())) as go2,
+    ):
+        yield go2, ends
+
+
+def _require(go2: GO2Controller, ok: bool | None = None) -> None:
+    """Raise ``TrialFailed`` unless a call, or the last one, was done."""
+    if not (go2.last_outcome.ok if ok is None else ok):
+        raise TrialFailed(go2.last_outcome.reason)
 
 
 def measure_ticks(trial: Trial) -> Measurement:
     """From the end of one tick to the end of the next, everything included."""
     slow = slowness(recorded_ticks(trial)[2])
     values = {"tick.slowness": slow}
-    ends: list[int] = []
-    with (
-        closing(trial.plant()) as plant,
-        GO2Controller(plant=plant, after_tick=lambda: ends.append(time.thread_time_ns())) as go2,
-    ):
+    with timed_robot(trial.plant()) as (go2, ends):
         for mode in MODES:
             act = _prepared(go2, mode)
             ends.clear()
-            if act() is False:
-                raise TrialFailed(go2.last_outcome.reason)
+            _require(go2, act() is not False)
             spent = np.diff(ends) / 1e3
             median = float(np.median(spent))
             values |= {
@@ -115,17 +157,10 @@ def _prepared(go2: GO2Controller, mode: str) -> Callable[[], object]:
     if mode == "trot":
         go2.walk()
         go2.move(0.5)
-        return lambda: go2.wait(4.0)
+        return partial(go2.wait, 4.0)
     if mode in ("high five", "bow"):
         go2.stand()
-    acts: dict[str, Callable[[], object]] = {
-        "stand": go2.stand,
-        "high five": go2.high_five,
-        "bow": lambda: go2.play("bow"),
-        "sit": go2.sit,
-        "lie down": go2.lie_down,
-    }
-    return acts[mode]
+    return partial(go2.play, "bow") if mode == "bow" else getattr(go2, mode.replace(" ", "_"))
 
 
 def measure_estimated(trial: Trial) -> Measurement:
@@ -135,34 +170,31 @@ def measure_estimated(trial: Trial) -> Measurement:
     """
     slow = slowness(recorded_ticks(trial)[2])
     walks = np.array([_estimated(trial) for _ in range(REPEATS)])
-    spent, least = walks[0], walks.min(axis=0)
+    values = _tail("estimated", walks[0], walks.min(axis=0))
+    return Measurement(values | {"estimated.factor": PERIOD / float(walks[0].mean()) * slow})
+
+
+def _tail(name: str, spent: np.ndarray, least: np.ndarray) -> dict[str, float]:
+    """Median, and how far the longest ticks of the first run, and of the least, are above it."""
     median = float(np.median(spent))
-    return Measurement(
-        {
-            "estimated.median": median,
-            "estimated.p99": float(np.quantile(spent, 0.99)) / median,
-            "estimated.worst": float(spent.max()) / median,
-            "estimated.least": float(least.max() / np.median(least)),
-            "estimated.factor": PERIOD / float(spent.mean()) * slow,
-        }
-    )
+    return {
+        f"{name}.median": median,
+        f"{name}.p99": float(np.quantile(spent, 0.99)) / median,
+        f"{name}.worst": float(spent.max()) / median,
+        f"{name}.least": float(least.max() / np.median(least)),
+    }
 
 
 def _estimated(trial: Trial) -> np.ndarray:
     """Time [us] of each tick; a fresh robot, the same each time."""
-    ends: list[int] = []
-    with (
-        closing(MujocoPlant(sensors="imu", seed=trial.seed)) as plant,
-        GO2Controller(plant=plant, after_tick=lambda: ends.append(time.thread_time_ns())) as go2,
-    ):
-        if not go2.walk():
-            raise TrialFailed(go2.last_outcome.reason)
+    plant = MujocoPlant(sensors="imu", seed=trial.seed)
+    with timed_robot(plant) as (go2, ends):
+        _require(go2, go2.walk())
         go2.move(1.0)
         go2.wait(1.0)
         ends.clear()
         go2.wait(ESTIMATED_TIME)
-        if not go2.last_outcome.ok:
-            raise TrialFailed(go2.last_outcome.reason)
+        _require(go2)
         return np.diff(ends) / 1e3
 
 
@@ -175,15 +207,11 @@ def measure_commands(trial: Trial) -> Measurement:
     collections: list[str] = []
     walks = [_walked(trial, collections) for _ in range(REPEATS)]
     spent, bare, (peak, kept) = walks[0]
-    median = float(np.median(spent))
     ticks = min(len(walk[0]) for walk in walks)
-    least = np.min([walk[0][:ticks] for walk in walks], axis=0)
+    values = _tail("commands", spent, np.min([walk[0][:ticks] for walk in walks], axis=0))
     return Measurement(
         {
-            "commands.median": median,
-            "commands.p99": float(np.quantile(spent, 0.99)) / median,
-            "commands.worst": float(spent.max()) / median,
-            "commands.least": float(least.max()) / float(np.median(least)),
+            **values,
             "commands.bare": float(bare.max()) / float(np.median(bare)),
             "commands.collections": float(len(collections)),
             "commands.peak": peak / 1e3,
@@ -196,17 +224,13 @@ def _walked(
     trial: Trial, collections: list[str]
 ) -> tuple[np.ndarray, np.ndarray, tuple[float, float]]:
     """Time [us] of ticks and of bare work, and what ``_memory`` says; a fresh robot."""
-    ends: list[int] = []
 
     def note(phase: str, info: dict[str, int]) -> None:
         if phase == "start":
             collections.append(str(info["generation"]))
 
     plant, random = trial.plant(), np.random.default_rng(trial.seed)
-    with (
-        closing(plant),
-        GO2Controller(plant=plant, after_tick=lambda: ends.append(time.thread_time_ns())) as go2,
-    ):
+    with timed_robot(plant) as (go2, ends):
         go2.walk()
         gc.callbacks.append(note)
         spent, bare = _walk(go2, random, ends)
@@ -227,11 +251,9 @@ def _walk(
         go2.move(float(ahead), float(turn), linear_y=float(aside))
         ends.clear()
         go2.wait(1.0)
-        if not go2.last_outcome.ok:
-            raise TrialFailed(go2.last_outcome.reason)
+        _require(go2)
         spent.append(np.diff(ends) / 1e3)
-        work = BareWork(float(np.median(spent[-1])))
-        bare.append(timed(work, len(spent[-1])))
+        bare.append(timed(bare_work(float(np.median(spent[-1]))), len(spent[-1])))
     return np.concatenate(spent), np.concatenate(bare)
 
 
@@ -256,3 +278,91 @@ def _memory(plant: MujocoPlant, go2: GO2Controller, ends: list[int]) -> tuple[fl
     finally:
         tracemalloc.stop()
     return float(np.median(peaks)), kept
+
+
+def measure_parts(trial: Trial) -> Measurement:
+    """Median of each part of a tick of the trot, and of what a tick takes beyond them."""
+    with closing(trial.plant()) as plant, closing(build_pilot(plant, Config())) as robot:
+        pilot, loop = robot.pilot, robot.runner.loop
+        try:
+            pilot.stand()
+            pilot.walk("trot")
+            pilot.set_command(VelocityCommand(0.5))
+            pilot.wait(1.0)
+            owners = (plant, loop.model, loop.behaviour, loop.wbc, plant, loop.telemetry, loop)
+            spent: dict[str, list[float]] = {name: [] for name in (*PARTS, "tick")}
+            owner: Any
+            for name, owner in zip(spent, owners, strict=True):
+                setattr(owner, name, partial(_note_time, getattr(owner, name), spent[name]))
+            pilot.wait(PARTS_TIME)
+        except Aborted as aborted:
+            raise TrialFailed(str(aborted)) from aborted
+    medians = {name: float(np.median(times)) if times else 0.0 for name, times in spent.items()}
+    whole = medians.pop("tick")
+    values = {f"part.{name}": value for name, value in medians.items()}
+    return Measurement(values | {"part.rest": whole - sum(medians.values())})
+
+
+def _note_time(
+    function: Callable[..., object], spent: list[float], *args: object, **options: object
+) -> object:
+    start = time.thread_time_ns()
+    try:
+        return function(*args, **options)
+    finally:
+        spent.append((time.thread_time_ns() - start) / 1e3)
+
+
+def measure_realtime(trial: Trial) -> Measurement:
+    """Trot for a minute at the wall clock's pace; ticks that were not done when the next was due.
+
+    Wants a core of its own.
+    """
+    with closing(trial.plant()) as plant, GO2Controller(plant=plant, realtime=True) as go2:
+        _require(go2, go2.walk())
+        go2.move(0.5)
+        start, used = go2.state.time, time.process_time()
+        missed = go2.telemetry.missed_deadlines
+        time.sleep(REAL_TIME)
+        ticks = (go2.state.time - start) / plant.control_period
+        missed = go2.telemetry.missed_deadlines - missed
+        used = time.process_time() - used
+        _require(go2, go2.stand())
+    return Measurement(
+        {
+            "realtime.bare": share_late(bare_work(1e6 * used / ticks), plant.control_period),
+            "realtime.missed": 100.0 * missed / ticks,
+            "realtime.ticks": ticks,
+            "realtime.load": 100.0 * used / REAL_TIME,
+        }
+    )
+
+
+# --- a bare loop ----------------------------------------------------------------------------------
+
+
+def bare_work(duration: float) -> Callable[[], object]:
+    """Hashes as many bytes as take ``duration`` [us], the median, and allocates nothing."""
+    sample = bytes(4096)
+    durations = timed(partial(hashlib.sha256, sample), CALIBRATION_CALLS)
+    size = max(1, round(len(sample) * duration / float(np.median(durations))))
+    return partial(hashlib.sha256, bytes(size))
+
+
+def timed(work: Callable[[], object], times: int) -> Float[np.ndarray, " n"]:
+    """Processor time [us] from the end of each call to the end of the next."""
+    ends = [time.thread_time_ns()]
+    for _ in range(times):
+        work()
+        ends.append(time.thread_time_ns())
+    return np.diff(ends) / 1e3
+
+
+def share_late(work: Callable[[], object], period: float) -> float:
+    """Share [%] of calls, one in each ``period`` [s], that were not done when the next was due."""
+    pacer = Pacer(period, GIVEN_UP)
+    count = round(REAL_TIME / period)
+    for _ in range(count):
+        work()
+        pacer.wait()
+    return 100.0 * pacer.missed / count

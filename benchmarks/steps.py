@@ -7,20 +7,17 @@ seed of theirs is judged here.
 
 from __future__ import annotations
 
-import argparse
 import math
-from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
-from benchmarks.seeded import add_seeded_options, run_seeded
-from controller.cli.common import Subparsers, add_parser
+from benchmarks.command import Benchmark
+from benchmarks.robots import feet_frame, loads, plant_of
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.motion_measurement import FULL
-from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialFailed, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import LEGS
-from go2_wbc.plant import MujocoPlant
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
@@ -28,54 +25,10 @@ from motions import CompiledPlan, Timeline, compile_timeline, deg
 
 FIRST_SEED = 4100
 """Seed of the first trial that is judged."""
-FRICTION_RANGE = (0.6, 1.0)
-MASS_RANGE = (0.95, 1.05)
-"""Factor on every mass and inertia of the robot; the controller is not told."""
 STEP_AHEAD, STEP_ASIDE = 0.06, 0.03
 """Greatest way [m] of a random step, in either direction."""
 ROUNDS = 3
 """Times that a walk is played."""
-EXAMPLES = """
-python -m benchmarks steps            everything; minutes on two cores
-python -m benchmarks steps --quick    three seeds
-python -m benchmarks steps --rows step --json
-python -m benchmarks steps --list     the metrics and their thresholds
-"""
-
-
-@dataclass(frozen=True, slots=True)
-class Played:
-    """One motion, played.
-
-    Attributes:
-        feet_off: largest distance [m], on the level, of a foot at the end from its planned place.
-        torque, speed: largest share of a joint's torque and speed limit.
-        saturated: share of ticks in which some motor gave all it has.
-    """
-
-    feet_off: float
-    torque: float
-    speed: float
-    saturated: float
-
-
-def plant_of(
-    trial: Trial,
-    first_seed: int = FIRST_SEED,
-    mass_range: tuple[float, float] = MASS_RANGE,
-    sensors: str | None = None,
-) -> MujocoPlant:
-    """A simulated robot under the conditions of the trial, whose ``sensors`` are the usual ones."""
-    rng = np.random.default_rng(first_seed + trial.seed)
-    friction, mass, yaw = (rng.uniform(*r) for r in (FRICTION_RANGE, mass_range, YAW_RANGE))
-    return MujocoPlant(
-        friction=float(friction),
-        mass_scale=float(mass),
-        sensors=sensors or trial.sensors,
-        seed=first_seed + trial.seed,
-        initial_yaw=float(yaw),
-        initial_joint_noise=JOINT_NOISE,
-    )
 
 
 def random_steps(rng: np.random.Generator) -> Timeline:
@@ -99,8 +52,10 @@ def _paw(line: Timeline, leg: str) -> Timeline:
     return line.foot(leg, x=0.06, z=0.12, over=0.7).hold(0.3).down(leg, over=0.6).home(over=0.6)
 
 
-def play(robot: TrialRobot, plan: CompiledPlan) -> Played:
-    """Play ``plan``.
+def play(robot: TrialRobot, plan: CompiledPlan) -> dict[str, float]:
+    """Play ``plan``; how far a foot is off its place at the end, at most [mm], and ``loads``.
+
+    Saturated is the share [%] of ticks in which any motor gave all it has.
 
     Raises:
         TrialFailed: if the robot falls, or says that it has not done it.
@@ -113,18 +68,12 @@ def play(robot: TrialRobot, plan: CompiledPlan) -> Played:
     wanted = plan.at(plan.duration).placed(anchor).p_world_feet
     off = recorded.p_world_feet[-1] - wanted
     shares = recorded.torque_shares(model)
-    return Played(
-        feet_off=float(np.linalg.norm(off[:, :2], axis=1).max()),
-        torque=float(shares.max()),
-        speed=recorded.peak_speed_share(model),
-        saturated=float((shares >= FULL).any(axis=tuple(range(1, shares.ndim))).mean()),
-    )
-
-
-def feet_frame(robot: TrialRobot) -> Anchor:
-    """The frame of the feet as they stand, in truth."""
-    model = RobotModel()
-    return Anchor.of_feet(model.snapshot(robot.plant.truth()).p_world_feet, model.foot_radius)
+    full = (shares >= FULL).any(axis=tuple(range(1, shares.ndim)))
+    return {
+        "place": 1000.0 * float(np.linalg.norm(off[:, :2], axis=1).max()),
+        **loads(recorded),
+        "saturated": 100.0 * float(full.mean()),
+    }
 
 
 def onwards(anchor: Anchor, pose: tuple[float, float, float]) -> Anchor:
@@ -138,24 +87,18 @@ def measure_steps(trial: Trial) -> Measurement:
     """Random steps, twice: of the feet's final places, the one that is farthest off."""
     rng = np.random.default_rng(10 * FIRST_SEED + trial.seed)
     line, model = random_steps(rng), RobotModel()
-    with TrialRobot(plant_of(trial)) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED)) as robot:
         robot.require(robot.go2.stand())
         played = play(robot, compile_timeline(line, model))
-    return Measurement(
-        {
-            "step.place": 1000.0 * played.feet_off,
-            "step.torque": played.torque,
-            "step.saturated": 100.0 * played.saturated,
-        }
-    )
+    return Measurement({f"step.{name}": played[name] for name in ("place", "torque", "saturated")})
 
 
 def measure_walk(trial: Trial, gait: str) -> Measurement:
     """The walk three times in a row: where it ends, against where it was to end."""
     plan = _walk(gait)
     off: list[tuple[float, float]] = []
-    runs: list[Played] = []
-    with TrialRobot(plant_of(trial)) as robot:
+    runs: list[dict[str, float]] = []
+    with TrialRobot(plant_of(trial, FIRST_SEED)) as robot:
         robot.require(robot.go2.stand())
         predicted = feet_frame(robot)
         try:
@@ -174,9 +117,9 @@ def measure_walk(trial: Trial, gait: str) -> Measurement:
             f"{gait}.yaw1": math.degrees(off[0][1]),
             f"{gait}.place3": 1000.0 * off[-1][0],
             f"{gait}.yaw3": math.degrees(off[-1][1]),
-            f"{gait}.torque": max(run.torque for run in runs),
-            f"{gait}.speed": max(run.speed for run in runs),
-            f"{gait}.saturated": 100.0 * max(run.saturated for run in runs),
+            **{
+                f"{gait}.{n}": max(run[n] for run in runs) for n in ("torque", "speed", "saturated")
+            },
         }
     )
 
@@ -202,8 +145,8 @@ def _walk_metrics(gait: str) -> tuple[Metric, ...]:
 
 
 _STEP = "four random steps"
-SCENARIOS = (
-    Scenario(
+STUDIES = (
+    Study(
         "step",
         (
             Metric("step.place", _STEP, "worst foot off its place", "mm", 15.0),
@@ -212,24 +155,18 @@ SCENARIOS = (
         ),
         measure_steps,
     ),
-    Scenario("walk", _walk_metrics("walk"), partial(measure_walk, gait="walk")),
-    Scenario("trot", _walk_metrics("trot"), partial(measure_walk, gait="trot")),
+    Study("walk", _walk_metrics("walk"), partial(measure_walk, gait="walk")),
+    Study("trot", _walk_metrics("trot"), partial(measure_walk, gait="trot")),
 )
 """In the order of the report."""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``steps``."""
-    parser = add_parser(
-        subparsers,
-        "steps",
-        "Authored steps and walks: where do they end, against where they were to end.\n"
-        "Exit code 0 if every threshold is met, 1 if one is not.",
-        examples=EXAMPLES,
-    )
-    add_seeded_options(parser, has_sensors=True)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Run what was asked for; see ``run_seeded``."""
-    return run_seeded(args, SCENARIOS)
+BENCHMARK = Benchmark(
+    "steps",
+    "Authored steps and walks: where do they end, against where they were to end.",
+    STUDIES,
+    takes="minutes on two cores",
+    examples=("--rows step --json",),
+    sensors=True,
+)
+register, run = BENCHMARK.register, BENCHMARK.run

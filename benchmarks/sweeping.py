@@ -6,7 +6,6 @@ their caches two are not twice as fast as one, whatever hands out the work.
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import subprocess
@@ -18,10 +17,9 @@ from functools import cache
 from pathlib import Path
 from statistics import fmean
 
-from benchmarks.results_log import ROOT
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario, chosen_scenarios
-from benchmarks.session import add_options, positive, run_and_report, tasks_of
-from controller.cli.common import Subparsers, add_parser
+from benchmarks.command import Benchmark
+from benchmarks.store import ROOT
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.sweeps.certify import RUNS, certify
 from controller.sweeps.motion_study import MotionStudy, archive_of
 from controller.sweeps.run import sweep
@@ -37,11 +35,6 @@ LONG, SETTLED, MEAN_OF = 1000, 100, 100
 """Runs of one worker; after how many of them, and over how many, its memory is looked at."""
 SHARE, GROWTH, CERTIFICATE = 0.9, 1.05, 120.0
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-EXAMPLES = """
-python -m benchmarks sweeps           ten minutes, two idle processors
-python -m benchmarks sweeps memory    may run beside other work
-python -m benchmarks sweeps certify
-"""
 SCALING = (
     Metric(
         "sweeps.share",
@@ -62,28 +55,6 @@ CERTIFY = (
     Metric("sweeps.certify", "200 runs of the high five", "time, two workers", "s", CERTIFICATE),
     Metric("sweeps.done", "200 runs of the high five", "share done", "", None, Direction.AT_LEAST),
 )
-
-
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``sweeps``."""
-    parser = add_parser(
-        subparsers,
-        "sweeps",
-        "What a second worker brings, beside two processes without a sweep; memory of\n"
-        "a worker over 1,000 runs; time of a certificate. Wants an idle machine.",
-        examples=EXAMPLES,
-    )
-    names = ", ".join(scenario.name for scenario in SCENARIOS)
-    parser.add_argument("names", metavar="NAME", nargs="*", help=f"{names}; default: all")
-    parser.add_argument("--runs", metavar="N", type=positive, default=1, help="default %(default)s")
-    parser.set_defaults(jobs=0)  # it has workers of its own
-    add_options(parser, has_list=True)
-
-
-def run(args: argparse.Namespace) -> int:
-    """Measure what was asked for, and report."""
-    scenarios = chosen_scenarios(SCENARIOS, args.names)
-    return run_and_report(args, scenarios, tasks_of(scenarios, args.runs))
 
 
 def trial(seed: int) -> dict[str, object]:
@@ -158,8 +129,23 @@ def measure_certify(_trial: Trial) -> Measurement:
     return Measurement({"sweeps.certify": spent, "sweeps.done": found.rate})
 
 
-SCENARIOS = (
-    Scenario("scaling", SCALING, measure_scaling),
-    Scenario("memory", MEMORY, measure_memory),
-    Scenario("certify", CERTIFY, measure_certify),
+STUDIES = (
+    Study("scaling", SCALING, measure_scaling),
+    Study("memory", MEMORY, measure_memory),
+    Study("certify", CERTIFY, measure_certify),
 )
+
+BENCHMARK = Benchmark(
+    "sweeps",
+    "What a second worker brings, beside two processes without a sweep; memory of\n"
+    "a worker over 1,000 runs; time of a certificate. Wants an idle machine.",
+    STUDIES,
+    takes="ten minutes, two idle processors",
+    examples=(
+        "memory  may run beside other work",
+        "certify",
+    ),
+    runs=1,
+    jobs=0,
+)
+register, run = BENCHMARK.register, BENCHMARK.run

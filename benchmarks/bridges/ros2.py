@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from benchmarks.bridges.ros2_processes import Probe, joined, quiet_client, serving
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.sweeps.trials import Trial
 from go2_wbc.errors import BridgeError, MissingDependency
 
@@ -114,4 +114,4 @@ def require() -> None:
         raise MissingDependency(f"{', '.join(missing)} not installed: {imports.BUILD}")
 
 
-SCENARIO: Final = Scenario("ros2-calls", METRICS, measure, group="ros2")
+STUDY: Final = Study("ros2-calls", METRICS, measure, group="ros2")

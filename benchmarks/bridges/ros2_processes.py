@@ -6,29 +6,22 @@ Importing this module needs no ROS; what it offers does.
 from __future__ import annotations
 
 import json
-import math
 import os
 import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, final
+from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-
-from benchmarks.bridges.processes import PROGRAM, Process, wait_until
+from benchmarks.bridges.processes import PROGRAM, Process
 from controller.bridges.ros2.names import (
     BEHAVIOR_SERVICE,
     CMD_VEL,
     COMMAND_PERIOD,
-    ODOM,
     STATISTICS_SERVICE,
     topic,
 )
 from go2_wbc.errors import BridgeError
-from go2_wbc.robot.state import RobotState
 
 if TYPE_CHECKING:
     from controller.bridges.ros2 import GO2ControllerNode
@@ -37,8 +30,6 @@ DISCOVERY: Final = 20.0
 """Time [s] in which processes must find each other; half a second on an idle machine."""
 ANSWER: Final = 60.0
 """Time [s] in which a call must be answered; four on an idle machine."""
-ODOM_QUEUE: Final = 5
-"""Messages of odometry that wait for a probe: more of them would be stale on a busy machine."""
 
 
 @contextmanager
@@ -81,33 +72,12 @@ def serving(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Position [m] and heading [rad] in the world, and the robot's own time [s]."""
-
-    xy: tuple[float, float]
-    yaw: float
-    time: float
-
-    def way_from(self, start: Place) -> float:
-        """Distance [m] from ``start`` on the ground."""
-        return math.dist(start.xy, self.xy)
-
-    def speed_from(self, start: Place) -> float:
-        """Mean speed [m/s] on the straight way from ``start``."""
-        return self.way_from(start) / (self.time - start.time)
-
-
-@final
 class Probe:
     """A node of plain rclpy, with nothing of the client's, which spins in a thread of its own.
-
-    It watches odometry all the time, whatever the others do.
 
     Attributes:
         node: to add subscriptions and clients to.
         namespace: of the robot.
-        largest_tilt: of the base so far [rad]; nan without odometry.
     """
 
     def __init__(self, namespace: str = "robot1") -> None:
@@ -115,14 +85,11 @@ class Probe:
         from controller.bridges.ros2 import imports as ros
 
         self._ros, self.namespace = ros, namespace
-        self.largest_tilt = math.nan
-        self._newest: RobotState | None = None
         self.node = ros.Node(
             f"probe_{namespace}", start_parameter_services=False, enable_rosout=False
         )
         self._clients: dict[str, Any] = {}
         self._publisher = self.node.create_publisher(ros.Twist, topic(namespace, CMD_VEL), 10)
-        self.node.create_subscription(ros.Odometry, topic(namespace, ODOM), self._note, ODOM_QUEUE)
         self._executor = ros.SingleThreadedExecutor()
         self._executor.add_node(self.node)
         self._is_closing = threading.Event()
@@ -132,12 +99,6 @@ class Probe:
     def _spin(self) -> None:
         while not self._is_closing.is_set():
             self._executor.spin_once(timeout_sec=0.1)
-
-    def _note(self, message: Any) -> None:
-        from controller.bridges.ros2.states import state_of
-
-        self._newest = state = state_of(message)
-        self.largest_tilt = float(np.fmax(self.largest_tilt, state.tilt))
 
     # --- calls ----------------------------------------------------------------------------
 
@@ -199,35 +160,6 @@ class Probe:
             time.sleep(max(began + (sent + 1) * COMMAND_PERIOD - time.monotonic(), 0.0))
         return count
 
-    # --- looking --------------------------------------------------------------------------
-
-    def state(self) -> RobotState:
-        """The next base pose and velocity of odometry.
-
-        Raises:
-            BridgeError: if there is none.
-        """
-        self._newest = None
-        if not wait_until(lambda: self._newest is not None, DISCOVERY) or self._newest is None:
-            raise BridgeError(f"no odometry of /{self.namespace}")
-        return self._newest
-
-    def height(self) -> float:
-        """Of the base [m]; see ``state``."""
-        return float(self.state().q[2])
-
-    def place(self) -> Place:
-        """Where the robot is, and its own time: on a busy machine less passes than on the wall."""
-        figures = self.statistics()
-        x, y, _ = figures["position"]
-        return Place((x, y), figures["heading"], figures["robot_time"])
-
-    def let_pass(self, seconds: float) -> None:
-        """Let this much of the robot's own time pass."""
-        end = self.place().time + seconds
-        while (left := end - self.place().time) > 0.0:
-            time.sleep(min(left, 0.05))
-
     def close(self) -> None:
         """Leave the graph."""
         self._is_closing.set()
@@ -248,16 +180,3 @@ def quiet_client(namespace: str) -> Iterator[GO2ControllerNode]:
         yield client
     finally:
         client.destroy_node()
-
-
-def without(folder: Path, *packages: str) -> dict[str, str]:
-    """The variables of a process to which ``packages`` are as if they were not installed.
-
-    Args:
-        folder: an empty one, in which hollow packages are made.
-        packages: Python packages of interfaces.
-    """
-    for package in packages:
-        (folder / package).mkdir()
-        (folder / package / "__init__.py").touch()
-    return {"PYTHONPATH": os.pathsep.join([str(folder), os.environ.get("PYTHONPATH", "")])}

@@ -10,10 +10,9 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.bridges.faults import require
-from benchmarks.bridges.processes import wait_until
+from benchmarks.bridges.processes import require, wait_until
 from benchmarks.bridges.unitree_processes import MOVE, SPEED, Scene, driver, good_commands, scene
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.bridges.unitree import layout
 from controller.bridges.unitree.codec import decode_message, encode_message
 from controller.bridges.unitree.low_level import intact_message, low_cmd_message
@@ -176,8 +175,8 @@ def _true_speeds(at: Scene, lines: list[str]) -> list[float]:
     return [speed for moment, speed in samples if start <= moment <= end]
 
 
-SCENARIOS: Final = (
-    Scenario("unitree-sport", SPORT_METRICS, measure_sport, group="unitree"),
-    Scenario("unitree-stream", STREAM_METRICS, measure_stream, group="unitree"),
-    Scenario("unitree-drive", DRIVE_METRICS, measure_drive, group="unitree"),
+STUDIES: Final = (
+    Study("unitree-sport", SPORT_METRICS, measure_sport, group="unitree"),
+    Study("unitree-stream", STREAM_METRICS, measure_stream, group="unitree"),
+    Study("unitree-drive", DRIVE_METRICS, measure_drive, group="unitree"),
 )

@@ -8,23 +8,20 @@ import os
 import re
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Final, final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from jaxtyping import Shaped
 
-from benchmarks.bridges.faults import require
 from benchmarks.bridges.processes import PROGRAM, START_LIMIT, Process, wait_until
 from controller.bridges.unitree.codec import decode_message
 from controller.bridges.unitree.layout import SPORT_STATE
 from controller.bridges.unitree.sport_api import (
     SPORT_SERVICE,
-    SWITCHER_SERVICE,
     Api,
     Code,
-    SwitcherApi,
 )
 from go2_wbc.errors import BridgeError, PlantTimeout
 
@@ -35,15 +32,9 @@ if TYPE_CHECKING:
 LOOPBACK: Final = "lo"
 LIMIT: Final = 60.0
 """Time [s] that only ends what hangs."""
-UPRIGHT: Final = 0.35
-"""Tilt [rad] below which a robot that stands or lies is upright."""
-STANDS, LIES = 0.25, 0.13
-"""Height [m] of the base above which the robot stands, below which it lies."""
 SPEED: Final = 0.5
 """Of ``Move`` and of the trot [m/s]."""
 MOVE: Final = json.dumps({"x": SPEED, "y": 0.0, "z": 0.0})
-FLOOD: Final = 5000.0
-"""Samples per second."""
 DOMAINS: Final = range(100, 230)
 """DDS domains of which each scene takes one."""
 DISCOVERY_PORTS: Final = (7400, 7401)
@@ -100,17 +91,6 @@ def client_of(bus: Bus, service: str) -> Client:
     return client
 
 
-def flood(write: Callable[[int], None], seconds: float) -> None:
-    """Call ``write`` with 0, 1, ..., 5000 times a second."""
-    start, count = time.monotonic(), 0
-    while (now := time.monotonic() - start) < seconds:
-        while count < now * FLOOD:
-            write(count)
-            count += 1
-        time.sleep(0.0005)
-
-
-@final
 class Scene:
     """A simulator, what it says of itself (the truth), and a client of its sport service.
 
@@ -132,14 +112,13 @@ class Scene:
         self._reader = self.bus.reader("rt/sportmodestate", depth=1000)
         self._newest: Shaped[np.ndarray, "1"] | None = None
         self.client = client_of(self.bus, SPORT_SERVICE)
-        self._commands = self.bus.writer("rt/lowcmd")
 
     def take(self) -> list[Shaped[np.ndarray, "1"]]:
         """All ``rt/sportmodestate`` since the last call, oldest first."""
         messages = [decode_message(SPORT_STATE, data) for data in self._reader.take()]
         for message in messages:
             self._newest = message
-            self.largest_tilt = max(self.largest_tilt, float(np.degrees(_tilt_of(message))))
+            self.largest_tilt = max(self.largest_tilt, float(np.degrees(tilt_of(message))))
         return messages
 
     def now(self) -> Shaped[np.ndarray, "1"]:
@@ -168,55 +147,10 @@ class Scene:
         """The code that a call of the sport service is answered with."""
         return self.client.call(api, parameter, timeout=10.0).code
 
-    def stand_up(self) -> None:
-        """Make the robot stand."""
-        self.require_code(Api.RECOVERY_STAND)
-        self.wait_for_rest()
-        self.require_standing()
-
-    def take_back(self) -> None:
-        """Give the robot back to the sport service after low-level control."""
-        switcher = client_of(self.bus, SWITCHER_SERVICE)
-        code = switcher.call(SwitcherApi.SELECT_MODE, '{"name": "normal"}').code
-        require(code == Code.OK, f"SelectMode was answered {code}")
-        self.require_said("low-level control has ended")
-
-    def flood(self, samples: list[bytes], seconds: float) -> None:
-        """Write ``rt/lowcmd`` samples in turn, 5000 a second."""
-        flood(lambda count: self._commands.write(samples[count % len(samples)]), seconds)
-
     def wait_for_rest(self) -> bool:
         """Wait until no action runs."""
         time.sleep(0.1)
         return wait_until(lambda: not self.now()["progress"][0], LIMIT)
-
-    def require_code(self, api: Api, code: Code = Code.OK) -> None:
-        """Make sure that a call of the sport service is answered with ``code``."""
-        answered = self.call(api)
-        require(answered == code, f"{api.name} was answered {answered}")
-
-    def require_standing(self) -> None:
-        """Make sure that the robot stands."""
-        height, tilt = self.height, _tilt_of(self.now())
-        stands = height > STANDS and tilt < UPRIGHT
-        require(stands, f"the robot does not stand: {height:.2f} m, {np.degrees(tilt):.0f} deg")
-
-    def require_lying(self) -> None:
-        """Make sure that the robot comes to lie on its belly."""
-        require(wait_until(lambda: self.height < LIES, LIMIT), "the robot is not limp")
-        tilt = _tilt_of(self.now())
-        require(tilt < UPRIGHT, f"the robot lies tilted by {np.degrees(tilt):.0f} deg")
-
-    def require_said(self, *texts: str) -> None:
-        """Make sure that the simulator reports these."""
-        for text in texts:
-            is_said = wait_until(lambda text=text: text in self.process.text, LIMIT)
-            require(is_said, f"the simulator did not say {text!r}")
-
-    def require_walking(self, peer: Process) -> None:
-        """Make sure that ``peer`` gets the robot to walk."""
-        walks = wait_until(lambda: self.speed > 0.4 or peer.code is not None, LIMIT)
-        require(walks and peer.code is None, f"the robot does not walk: {peer.text}")
 
 
 @contextmanager
@@ -226,6 +160,6 @@ def scene(*options: str) -> Iterator[Scene]:
         yield Scene(process, domain)
 
 
-def _tilt_of(message: Shaped[np.ndarray, "1"]) -> float:
+def tilt_of(message: Shaped[np.ndarray, "1"]) -> float:
     """Larger of roll and pitch [rad] in a ``rt/sportmodestate``."""
     return float(np.abs(message["imu_state"]["rpy"][0, :2]).max())

@@ -3,33 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from benchmarks import behaviour, session
-from benchmarks.scenario import Scenario
+from benchmarks import behaviour, command, store
+from benchmarks.study import Study
 from controller.sweeps.trials import Trial
 
-Only = Callable[[Scenario], None]
+Only = Callable[[Study], None]
 
 
 @pytest.fixture
 def results_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Where the finished trials are kept during a test."""
     folder = tmp_path / "benchmarks"
-    monkeypatch.setattr(session, "LOG_FOLDER", folder)
+    monkeypatch.setattr(store, "FOLDER", folder)
     return folder
 
 
 @pytest.fixture
 def only(monkeypatch: pytest.MonkeyPatch, results_folder: Path) -> Only:
-    """Makes a scenario the only one of ``behaviour``, and runs it in this process."""
+    """Makes a study the only one of ``behaviour``, and runs it in this process."""
 
-    def install(scenario: Scenario) -> None:
-        monkeypatch.setattr(behaviour, "SCENARIOS", (scenario,))
+    def install(study: Study) -> None:
+        monkeypatch.setattr(behaviour, "run", replace(behaviour.BENCHMARK, studies=(study,)).run)
         monkeypatch.setattr(
-            session,
+            command,
             "run_tasks",
             lambda tasks, _jobs: ((s, seed, s.measure(Trial(seed))) for s, seed in tasks),
         )

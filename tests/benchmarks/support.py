@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 
-from benchmarks.scenario import Direction, Measurement, Metric, Scenario
+from benchmarks.study import Direction, Measurement, Metric, Study
 from controller.sweeps.trials import Trial
 from go2_wbc.errors import PlantError
 
@@ -42,8 +42,8 @@ def die_on_seed_1(trial: Trial) -> Measurement:
     return measure_well(trial)
 
 
-def fake(measure: Callable[[Trial], Measurement] = measure_well, factor: int = 1) -> Scenario:
-    return Scenario("fake", (SPEED, ERROR, NOTE), measure, factor)
+def fake(measure: Callable[[Trial], Measurement] = measure_well, factor: int = 1) -> Study:
+    return Study("fake", (SPEED, ERROR, NOTE), measure, factor)
 
 
 def measured(*values: float, metric: str = "fake.speed") -> dict[int, Measurement]:

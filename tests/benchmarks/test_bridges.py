@@ -8,30 +8,30 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.bridges.command import SCENARIOS
-from benchmarks.scenario import Scenario, chosen_scenarios
+from benchmarks.bridges.command import STUDIES, TESTED
+from benchmarks.study import Study, chosen_studies
 from controller.cli.common import ExitCode
 from go2_wbc.errors import CommandError
 
 
 def test_no_name_stands_for_everything() -> None:
-    assert chosen_scenarios(SCENARIOS, []) == SCENARIOS
+    assert chosen_studies(STUDIES, []) == STUDIES
 
 
 @pytest.mark.parametrize("group", ["ros2", "unitree"])
 def test_a_group_stands_for_its_scenarios(group: str) -> None:
-    expected = tuple(scenario for scenario in SCENARIOS if scenario.name.startswith(group))
-    assert chosen_scenarios(SCENARIOS, [group]) == expected
+    expected = tuple(scenario for scenario in STUDIES if scenario.name.startswith(group))
+    assert chosen_studies(STUDIES, [group]) == expected
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.name)
-def test_a_scenario_stands_for_itself(scenario: Scenario) -> None:
-    assert chosen_scenarios(SCENARIOS, [scenario.name]) == (scenario,)
+@pytest.mark.parametrize("scenario", STUDIES, ids=lambda scenario: scenario.name)
+def test_a_scenario_stands_for_itself(scenario: Study) -> None:
+    assert chosen_studies(STUDIES, [scenario.name]) == (scenario,)
 
 
 def test_an_unknown_name_is_answered_with_the_valid_ones() -> None:
     with pytest.raises(CommandError, match=r"ros3.*ros2.*unitree-drive"):
-        chosen_scenarios(SCENARIOS, ["ros3"])
+        chosen_studies(STUDIES, ["ros3"])
 
 
 def test_the_metrics_are_listed_without_the_extras(
@@ -41,13 +41,8 @@ def test_the_metrics_are_listed_without_the_extras(
     monkeypatch.setitem(sys.modules, "rclpy", None)
     assert main(["bridges", "--list"]) == ExitCode.OK
     lines = capsys.readouterr().out.splitlines()
-    assert {scenario.name for scenario in SCENARIOS} <= set(lines)
+    assert {scenario.name for scenario in STUDIES} <= set(lines)
     assert max(map(len, lines)) <= 80
-
-
-def test_metric_names_are_unique() -> None:
-    names = [metric.name for scenario in SCENARIOS for metric in scenario.metrics]
-    assert len(names) == len(set(names))
 
 
 def test_without_the_extra_the_line_that_installs_it_is_named(
@@ -59,3 +54,15 @@ def test_without_the_extra_the_line_that_installs_it_is_named(
     assert 'pip install -e ".[unitree]"' in complaint
     assert "Traceback" not in complaint
     assert not results_folder.exists()
+
+
+def test_metric_names_are_unique() -> None:
+    names = [metric.name for study in STUDIES for metric in study.metrics]
+    assert len(names) == len(set(names))
+
+
+def test_what_tests_do_now_is_told_with_the_test(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, file in TESTED.items():
+        assert main(["bridges", name]) == ExitCode.USAGE
+        assert f"pytest {file}" in capsys.readouterr().err
+        assert (Path(__file__).resolve().parents[2] / file).is_file()

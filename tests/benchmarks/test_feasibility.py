@@ -10,10 +10,7 @@ import pytest
 
 from benchmarks import feasibility
 from benchmarks.__main__ import main
-from benchmarks.exam.borders import BORDER, PLAYS
-from benchmarks.exam.cases import Case
-from benchmarks.exam.drawing import TEST, TRAIN
-from benchmarks.exam.questions import draw_name, draws
+from benchmarks.command import IDEAL, IMU, on_sensors
 from benchmarks.feasibility import (
     EXAM,
     OUTCOMES,
@@ -24,9 +21,11 @@ from benchmarks.feasibility import (
     judged,
     judged_dynamic,
 )
-from benchmarks.runner import run_trial
-from benchmarks.scenario import Measurement
-from benchmarks.seeded import IDEAL, IMU, on_sensors
+from benchmarks.study import Measurement, run_tasks
+from benchmarks.validation_set.drawing import TEST, TRAIN
+from benchmarks.validation_set.physics import BORDER, PLAYS
+from benchmarks.validation_set.questions import draw_name, draws
+from benchmarks.validation_set.scores import Case
 from controller.cli.common import ExitCode
 from controller.go2_controller import GO2Controller
 from controller.motion_outcome import STRICT, Outcome
@@ -195,5 +194,5 @@ def test_a_robot_that_does_not_get_ready_is_a_lost_run_and_not_a_bug(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(GO2Controller, "stand", lambda _go2: False)
-    measured = run_trial(feasibility.REMADE[EXAM].measure, 0)
+    ((_, _, measured),) = run_tasks([(feasibility.REMADE[EXAM], 0)], jobs=0)
     assert (measured.values, measured.reason) == ({}, "lying, nothing asked yet")

@@ -1,4 +1,4 @@
-"""The gallery shows every motion of the library, as it is."""
+"""The gallery shows every motion of the library as it is; the README's film is small and loops."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from PIL import Image
 from benchmarks import gallery
 from go2_wbc.recording import Recording
 from motions import motion_names
+from tests.viz.synthetic import synthetic_recording
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
+DEMO = DOCS / "images/demo.webp"
 PICTURES = DOCS / "images" / "gallery"
 MOST_BYTES = 2_000_000
 LEAST_CONTRAST = 20.0  # of 255; a blank page has 0
@@ -71,3 +73,20 @@ def test_a_picture_is_drawn_and_kept_small() -> None:
     assert len(content) <= gallery.SIZE_LIMIT
     with Image.open(io.BytesIO(content)) as image:
         assert np.asarray(image.convert("L"), dtype=float).std() > LEAST_CONTRAST
+
+
+def test_a_run_becomes_a_looping_film_that_starts_just_before_the_first_step() -> None:
+    run = gallery.from_first_step(synthetic_recording(script=(("stand", 1.5), ("walk", 1.4))))
+    assert run.labels[0] == "stand"
+    assert run.spans()[1].start == pytest.approx(gallery.LEAD, abs=0.02)
+    with Image.open(io.BytesIO(gallery.film(run))) as image:
+        assert image.info["loop"] == 0
+        assert getattr(image, "n_frames", 1) == 1 + round(20.0 / gallery.FILM_SPEED)
+
+
+def test_the_film_of_the_readme_is_small_and_has_moving_pictures() -> None:
+    assert DEMO.stat().st_size <= gallery.FILM_SIZE_LIMIT
+    with Image.open(DEMO) as image:
+        assert image.size == gallery.FILM_STYLE.size
+        assert image.info["loop"] == 0
+        assert getattr(image, "n_frames", 1) > 50

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.locomotion import BEYOND, RUNS, SCENARIOS, Run, measured
+from benchmarks.locomotion import BEYOND, RUNS, Run, measured
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.envelopes import envelope_of
@@ -58,5 +58,3 @@ def test_every_named_gait_has_a_row_and_every_row_is_within_what_is_allowed() ->
         )
         assert envelope is not None
         assert envelope.clip(run.command) == run.command
-    names = [metric.name for scenario in SCENARIOS for metric in scenario.metrics]
-    assert len(set(names)) == len(names)

@@ -9,7 +9,7 @@ import math
 import pytest
 
 from benchmarks.report import WIDTH, render, summarise, summarise_metric
-from benchmarks.scenario import Measurement, Metric, Scenario
+from benchmarks.study import Measurement, Metric, Study
 from controller.sweeps.trials import Trial
 from tests.benchmarks.support import ERROR, NOTE, SPEED, fake, measure_well, measured
 
@@ -76,7 +76,7 @@ def test_a_metric_without_a_threshold_is_not_judged() -> None:
     result = summarise_metric(NOTE, measured(5.0, metric="fake.note"))
     assert result.passed is None
     assert summarise(
-        [Scenario("fake", (NOTE,), measure_well)], {"fake": {0: measure_well(Trial(0))}}
+        [Study("fake", (NOTE,), measure_well)], {"fake": {0: measure_well(Trial(0))}}
     ).ok
 
 
@@ -96,18 +96,12 @@ def test_the_table_fits_80_columns_and_names_the_fallen_seed() -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        "answers",
-        "balance",
-        "behaviour",
-        "dance",
-        "dynamic_motions",
-        "locomotion",
-        "nearest",
-        "steps",
+        *("balance", "behaviour", "dance", "dynamic_motions", "dynamics", "locomotion"),
+        *("nearest", "qp_infeasibility", "steps", "sweeping"),
     ],
 )
 def test_every_real_metric_fits_the_table_and_has_its_own_name(name: str) -> None:
-    scenarios = importlib.import_module(f"benchmarks.{name}").SCENARIOS
+    scenarios = importlib.import_module(f"benchmarks.{name}").STUDIES
     rows = [row for scenario in scenarios for row in scenario.metrics]
     assert len({row.name for row in rows}) == len(rows)
     assert [row.quantity for row in rows if len(row.quantity) > 26] == []

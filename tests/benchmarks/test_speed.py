@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from benchmarks import speed_parts, speed_realtime, speed_solves, speed_startup, speed_ticks
-from benchmarks.scenario import Measurement, Metric
+from benchmarks import speed, speed_solves, speed_ticks
 from benchmarks.speed_placo import BarePlaco
+from benchmarks.study import Measurement, Metric
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
@@ -65,9 +65,9 @@ def test_a_tick_is_timed_in_every_mode() -> None:
 
 
 def test_the_parts_make_up_a_tick(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(speed_parts, "DURATION", 0.1)
-    measured = speed_parts.measure_parts(Trial(0))
-    assert_complete(measured, speed_parts.METRICS)
+    monkeypatch.setattr(speed_ticks, "PARTS_TIME", 0.1)
+    measured = speed_ticks.measure_parts(Trial(0))
+    assert_complete(measured, speed_ticks.PART_METRICS)
     assert min(measured.values.values()) > 0.0
 
 
@@ -89,21 +89,30 @@ def test_ticks_on_sensors_with_planned_forces_are_timed(monkeypatch: pytest.Monk
 
 
 def test_a_start_is_measured_in_a_process_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(speed_startup, "PROCESSES", 1)
-    starts = {
-        name: (what, "sum(range(10**6))", 1.0)
-        for name, (what, _, _) in speed_startup.STARTS.items()
-    }
-    monkeypatch.setattr(speed_startup, "STARTS", starts)
-    measured = speed_startup.measure_startup(Trial(0))
-    assert_complete(measured, speed_startup.METRICS)
+    monkeypatch.setattr(speed, "PROCESSES", 1)
+    starts = {name: (what, "sum(range(10**6))", 1.0) for name, (what, _, _) in speed.STARTS.items()}
+    monkeypatch.setattr(speed, "STARTS", starts)
+    measured = speed.measure_startup(Trial(0))
+    assert_complete(measured, speed.START_METRICS)
     assert min(measured.values.values()) > 0.0
 
 
 def test_late_ticks_are_counted_at_the_pace_of_the_wall_clock(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(speed_realtime, "DURATION", 0.2)
-    measured = speed_realtime.measure_realtime(Trial(0))
-    assert_complete(measured, speed_realtime.METRICS)
+    monkeypatch.setattr(speed_ticks, "REAL_TIME", 0.2)
+    measured = speed_ticks.measure_realtime(Trial(0))
+    assert_complete(measured, speed_ticks.REALTIME_METRICS)
     assert measured.values["realtime.ticks"] > 0.0
+
+
+def test_checking_and_compiling_are_timed_for_every_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(speed, "ROUNDS", 1)
+    measured = speed.measure_checks(Trial(0))
+    assert set(measured.values) == {metric.name for metric in speed.CHECK_METRICS}
+    assert min(measured.values.values()) > 0.0
+
+
+@pytest.mark.parametrize("seconds", speed.LENGTHS)
+def test_the_motions_are_as_long_as_they_say(seconds: int) -> None:
+    assert speed.lively_motion(seconds).end == pytest.approx(seconds, rel=0.2)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.steps import FRICTION_RANGE, MASS_RANGE, onwards, plant_of, walk_with_paws
-from controller.sweeps.trials import Trial
+from benchmarks.steps import onwards, walk_with_paws
 from go2_wbc.reference import Anchor
 from motions.language.keys import LegKey, StepKey
 
@@ -24,13 +23,3 @@ def test_a_frame_goes_on_in_its_own_heading() -> None:
     there = onwards(start, (0.5, 0.1, 0.2))
     assert there.p_world == pytest.approx([0.9, 2.5, 0.0])
     assert there.yaw == pytest.approx(np.pi / 2 + 0.2)
-
-
-def test_trials_differ_within_their_ranges() -> None:
-    plants = [plant_of(Trial(seed)) for seed in range(2)]
-    yaws = [plant.read().rpy[2] for plant in plants]
-    assert yaws[0] != yaws[1]
-    assert FRICTION_RANGE == (0.6, 1.0)
-    assert MASS_RANGE == (0.95, 1.05)
-    for plant in plants:
-        plant.close()

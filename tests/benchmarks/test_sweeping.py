@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from benchmarks import sweeping
-from benchmarks.scenario import Direction
+from benchmarks.study import Direction
 from benchmarks.sweeping import LONG, MEMORY, SCALING, growth_of, measure_scaling, trial
 from controller.sweeps.rows import row_of
 from controller.sweeps.trials import Trial

@@ -1,4 +1,4 @@
-"""The benchmark of what the robot is not told of: what a run counts."""
+"""What the robot is not told of, and other people's robots: what a run counts."""
 
 from __future__ import annotations
 
@@ -7,17 +7,27 @@ from dataclasses import replace
 import pytest
 
 from benchmarks import unknown_world
-from benchmarks.scenario import Measurement
-from benchmarks.unknown_world import WORLDS, Unknown, measure
+from benchmarks.study import IMU, Measurement
+from benchmarks.unknown_world import (
+    CALLS,
+    ROBOTS,
+    WORLDS,
+    Robot,
+    Unknown,
+    measure_robot,
+    measure_world,
+)
 from controller.sweeps.trials import Trial
+from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.plant.terrain import Boxes, Stairs
 
+TUNING_SEED = 7500
 QUICK = Unknown("any", "level ground", time=0.6)
 
 
 def measured(world: Unknown) -> Measurement:
     """Of one trial of the seeds for tuning."""
-    return measure(Trial(0), world, first_seed=0)
+    return measure_world(Trial(0), world, first_seed=0)
 
 
 def test_a_run_is_done_by_a_robot_that_walks_and_stands_again() -> None:
@@ -51,8 +61,32 @@ def test_every_trial_has_a_plant_of_its_own(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_on_its_own_sensors_a_robot_is_not_given_the_truth() -> None:
-    plant = QUICK.sensed.plant(0)
+    plant = QUICK.plant(0, IMU)
     assert plant.read().q[2] != plant.truth().q[2]
     assert QUICK.plant(0).read().q[2] == QUICK.plant(0).truth().q[2]
-    names = {scenario.name for scenario in unknown_world.SCENARIOS}
-    assert {world.sensed.name for world in WORLDS} < names
+    names = {scenario.name for scenario in unknown_world.STUDIES}
+    assert {f"sensed-{one.name}" for one in (*WORLDS, *ROBOTS)} < names
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trots of a second."""
+    monkeypatch.setattr(unknown_world, "ROBOT_RAMP_UP", 0.6)
+    monkeypatch.setattr(unknown_world, "ROBOT_TROT", 0.5)
+
+
+@pytest.mark.usefixtures("short")
+def test_a_robot_that_does_it_all_has_every_value() -> None:
+    robot = Robot("any", "as the controller knows it", JointDynamics())
+    measured = measure_robot(Trial(0, sensors=IMU), robot, TUNING_SEED)
+    assert measured.reason == ""
+    assert set(measured.values) == {metric.name for metric in robot.metrics}
+    assert all(measured.values[f"any.{call}"] == 1.0 for call in CALLS)
+
+
+@pytest.mark.usefixtures("short")
+def test_what_comes_after_a_call_that_fails_is_not_done() -> None:
+    stuck = Robot("any", "joints that hardly move", JointDynamics(friction_loss=(12.0, 12.0, 12.0)))
+    measured = measure_robot(Trial(0), stuck, TUNING_SEED)
+    assert measured.reason != ""
+    assert measured.values["any.high-five"] == 0.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from benchmarks.exam.outcome import play
+from benchmarks.validation_set.physics import play
 from controller import GO2Controller
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline

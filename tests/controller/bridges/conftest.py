@@ -9,8 +9,9 @@ from contextlib import closing
 import pytest
 
 from benchmarks.bridges.processes import Process
-from benchmarks.bridges.ros2_processes import Probe, joined, serving
+from benchmarks.bridges.ros2_processes import joined, serving
 from tests.controller.bridges.ros2_graph import HAS_ROS2, isolate
+from tests.controller.bridges.ros2_probe import WatchingProbe
 
 PACED_ATTEMPTS = 3
 """How often a busy machine gets the chance to keep real time for a demo."""
@@ -34,13 +35,13 @@ def server(graph: None) -> Iterator[Process]:
 
 
 @pytest.fixture
-def probe(graph: None) -> Iterator[Probe]:
-    with closing(Probe()) as node:
+def probe(graph: None) -> Iterator[WatchingProbe]:
+    with closing(WatchingProbe()) as node:
         yield node
 
 
 @pytest.fixture
-def paced(server: Process, probe: Probe) -> Callable[[Callable[[], Done]], Done]:
+def paced(server: Process, probe: WatchingProbe) -> Callable[[Callable[[], Done]], Done]:
     """Runs a program whose limits count on real time, again if the server has lost it."""
 
     def run(act: Callable[[], Done]) -> Done:

@@ -13,9 +13,9 @@ from unittest.mock import patch
 import pytest
 
 from benchmarks.bridges.processes import Process, wait_until
-from benchmarks.bridges.ros2_processes import Probe
 from go2_wbc.errors import BridgeError, CommandError, ConfigError
 from tests.controller.bridges.ros2_graph import ROOT, needs_ros2
+from tests.controller.bridges.ros2_probe import WatchingProbe
 
 pytestmark = needs_ros2
 
@@ -156,7 +156,7 @@ def test_a_motion_tells_its_progress_and_can_be_cancelled(go2: Any) -> None:
     assert go2.state().q[2] > 0.27
 
 
-def test_a_class_from_the_course_runs_unmodified(server: Process, probe: Probe) -> None:
+def test_a_class_from_the_course_runs_unmodified(server: Process, probe: WatchingProbe) -> None:
     from tests.controller.bridges.student import StudentController
 
     student = StudentController()

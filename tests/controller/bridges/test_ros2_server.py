@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 
 from benchmarks.bridges.processes import Process, wait_until
-from benchmarks.bridges.ros2_processes import ANSWER, DISCOVERY, Place, Probe, serving, without
+from benchmarks.bridges.ros2_processes import ANSWER, DISCOVERY, serving
 from go2_wbc.plant.sensors import EXACT
 from tests.controller.bridges.ros2_graph import needs_ros2
+from tests.controller.bridges.ros2_probe import Place, WatchingProbe, without
 
 pytestmark = needs_ros2
 
@@ -30,7 +31,9 @@ RATE_TOLERANCE = 0.05
 """Share of a rate: a few messages are on their way when the counting begins and ends."""
 
 
-def test_a_behaviour_is_answered_when_odometry_bears_it_out(server: Process, probe: Probe) -> None:
+def test_a_behaviour_is_answered_when_odometry_bears_it_out(
+    server: Process, probe: WatchingProbe
+) -> None:
     low = probe.height()
     answer = probe.call("UP")
     assert answer.success, answer.message
@@ -42,14 +45,14 @@ def test_a_behaviour_is_answered_when_odometry_bears_it_out(server: Process, pro
 
 
 def test_an_unknown_behaviour_is_refused_with_the_valid_names(
-    server: Process, probe: Probe
+    server: Process, probe: WatchingProbe
 ) -> None:
     answer = probe.call("levitate")
     assert not answer.success
     assert "valid: damp, high_five, lie_down, recover, sit, stand, stop, up, walk" in answer.message
 
 
-def test_a_second_call_during_one_is_refused_at_once(server: Process, probe: Probe) -> None:
+def test_a_second_call_during_one_is_refused_at_once(server: Process, probe: WatchingProbe) -> None:
     probe.call("up")
     began = time.monotonic()
     first = probe.send("sit")
@@ -62,7 +65,9 @@ def test_a_second_call_during_one_is_refused_at_once(server: Process, probe: Pro
     assert probe.result(first).success
 
 
-def test_velocities_are_real_ones_and_end_with_silence(server: Process, probe: Probe) -> None:
+def test_velocities_are_real_ones_and_end_with_silence(
+    server: Process, probe: WatchingProbe
+) -> None:
     assert probe.call("walk").success
     start, end = driven(probe, 5.0, 0.3)
     assert end.speed_from(start) == pytest.approx(0.3, rel=SPEED_TOLERANCE)
@@ -77,7 +82,7 @@ def test_velocities_are_real_ones_and_end_with_silence(server: Process, probe: P
 
 
 def driven(
-    probe: Probe, seconds: float, x: float, turn: float = 0.0, *, y: float = 0.0
+    probe: WatchingProbe, seconds: float, x: float, turn: float = 0.0, *, y: float = 0.0
 ) -> tuple[Place, Place]:
     """Start and end of a drive without a gap; if the machine made one, of another drive."""
     for left in reversed(range(DRIVES)):
@@ -90,7 +95,9 @@ def driven(
     raise AssertionError("no drive")
 
 
-def test_an_order_ends_the_velocity_that_came_before_it(server: Process, probe: Probe) -> None:
+def test_an_order_ends_the_velocity_that_came_before_it(
+    server: Process, probe: WatchingProbe
+) -> None:
     # A robot that was told to walk while it walked forgot to stop when the commands ceased.
     assert probe.call("walk").success
     probe.drive(1.0, 0.3)
@@ -101,7 +108,9 @@ def test_an_order_ends_the_velocity_that_came_before_it(server: Process, probe: 
     assert probe.place().way_from(resting) < 0.005
 
 
-def test_sideways_and_turning_velocities_are_followed_too(server: Process, probe: Probe) -> None:
+def test_sideways_and_turning_velocities_are_followed_too(
+    server: Process, probe: WatchingProbe
+) -> None:
     assert probe.call("walk").success
     start, end = driven(probe, 3.0, 0.0, 0.5)
     turned = math.remainder(end.yaw - start.yaw, math.tau)
@@ -113,7 +122,7 @@ def test_sideways_and_turning_velocities_are_followed_too(server: Process, probe
 
 
 def test_a_velocity_that_is_not_finite_or_out_of_mode_moves_nothing(
-    server: Process, probe: Probe
+    server: Process, probe: WatchingProbe
 ) -> None:
     assert probe.call("walk").success
     assert probe.trigger("stop").success
@@ -126,7 +135,7 @@ def test_a_velocity_that_is_not_finite_or_out_of_mode_moves_nothing(
     assert "not finite" in server.text
 
 
-def drive_until_counted(probe: Probe, x: float, kind: str) -> None:
+def drive_until_counted(probe: WatchingProbe, x: float, kind: str) -> None:
     before = probe.statistics()["cmd_vel"][kind]
 
     def is_counted() -> bool:
@@ -136,13 +145,13 @@ def drive_until_counted(probe: Probe, x: float, kind: str) -> None:
     assert wait_until(is_counted, ANSWER), kind
 
 
-def test_the_triggers_do_the_same_as_the_command(server: Process, probe: Probe) -> None:
+def test_the_triggers_do_the_same_as_the_command(server: Process, probe: WatchingProbe) -> None:
     assert probe.trigger("up").success
     assert probe.trigger("stop").success
     assert probe.statistics()["mode"] == "standing"
 
 
-def test_every_topic_comes_at_its_rate(server: Process, probe: Probe) -> None:
+def test_every_topic_comes_at_its_rate(server: Process, probe: WatchingProbe) -> None:
     first = probe.statistics()
     probe.let_pass(3.0)
     second = probe.statistics()
@@ -158,7 +167,9 @@ def test_every_topic_comes_at_its_rate(server: Process, probe: Probe) -> None:
     assert second["errors"] == 0
 
 
-def test_the_messages_say_what_a_standing_robot_measures(server: Process, probe: Probe) -> None:
+def test_the_messages_say_what_a_standing_robot_measures(
+    server: Process, probe: WatchingProbe
+) -> None:
     from quadropted_msgs.msg import RobotFootContact
     from sensor_msgs.msg import Imu, JointState
     from tf2_msgs.msg import TFMessage
@@ -187,7 +198,7 @@ def test_the_messages_say_what_a_standing_robot_measures(server: Process, probe:
 
 
 def test_odometry_says_how_sure_it_is_and_a_pose_is_taken_while_walking(
-    server: Process, probe: Probe
+    server: Process, probe: WatchingProbe
 ) -> None:
     from geometry_msgs.msg import Pose
     from nav_msgs.msg import Odometry
@@ -211,7 +222,7 @@ def test_odometry_says_how_sure_it_is_and_a_pose_is_taken_while_walking(
     probe.let_pass(1.0)
 
 
-def listen(probe: Probe, topics: dict[str, tuple[Any, str]]) -> dict[str, Any]:
+def listen(probe: WatchingProbe, topics: dict[str, tuple[Any, str]]) -> dict[str, Any]:
     heard: dict[str, Any] = {}
     for key, (kind, name) in topics.items():
         note = lambda message, key=key: heard.setdefault(key, message)  # noqa: E731
@@ -224,7 +235,7 @@ def listen(probe: Probe, topics: dict[str, tuple[Any, str]]) -> dict[str, Any]:
 # --- the action ---------------------------------------------------------------------------------
 
 
-def goal_of(probe: Probe, motion: str, *settings: str) -> tuple[Any, list[Any]]:
+def goal_of(probe: WatchingProbe, motion: str, *settings: str) -> tuple[Any, list[Any]]:
     """The goal's handle and the list that its feedback goes to."""
     from quadropted_msgs.action import PlayMotion
     from rclpy.action import ActionClient
@@ -236,7 +247,9 @@ def goal_of(probe: Probe, motion: str, *settings: str) -> tuple[Any, list[Any]]:
     return probe.result(client.send_goal_async(goal, feedback_callback=note)), feedback
 
 
-def test_a_motion_has_feedback_with_progress_and_a_result(server: Process, probe: Probe) -> None:
+def test_a_motion_has_feedback_with_progress_and_a_result(
+    server: Process, probe: WatchingProbe
+) -> None:
     handle, feedback = goal_of(probe, "nod", "times=1")
     assert handle.accepted
     answer = probe.result(handle.get_result_async())
@@ -249,7 +262,7 @@ def test_a_motion_has_feedback_with_progress_and_a_result(server: Process, probe
     assert {message.phase for message in feedback} >= {"playing"}
 
 
-def test_a_high_five_that_is_cancelled_ends_standing(server: Process, probe: Probe) -> None:
+def test_a_high_five_that_is_cancelled_ends_standing(server: Process, probe: WatchingProbe) -> None:
     assert probe.call("up").success
     handle, feedback = goal_of(probe, "high_five", "hold=5.0")
     assert wait_until(lambda: bool(feedback) and feedback[-1].progress >= 0.4, ANSWER)
@@ -264,7 +277,7 @@ def test_a_high_five_that_is_cancelled_ends_standing(server: Process, probe: Pro
 
 
 def test_a_motion_that_does_not_exist_is_aborted_with_the_names(
-    server: Process, probe: Probe
+    server: Process, probe: WatchingProbe
 ) -> None:
     handle, _ = goal_of(probe, "levitate")
     answer = probe.result(handle.get_result_async())
@@ -292,7 +305,7 @@ def free_runners(
 def test_free_running_time_is_the_clock(free_runners: tuple[Process, Process]) -> None:
     from rosgraph_msgs.msg import Clock
 
-    with closing(Probe("robot3")) as probe:
+    with closing(WatchingProbe("robot3")) as probe:
         assert probe.call("up").success
         first = listen(probe, {"clock": (Clock, "/clock")})["clock"].clock
         probe.let_pass(0.5)
@@ -306,7 +319,7 @@ def test_the_clock_is_left_to_the_first_of_two_servers(
     free_runners: tuple[Process, Process],
 ) -> None:
     first, second = free_runners
-    with closing(Probe("robot3")) as one, closing(Probe("robot4")) as other:
+    with closing(WatchingProbe("robot3")) as one, closing(WatchingProbe("robot4")) as other:
         assert one.trigger("up").success
         assert other.trigger("up").success
         assert "another process publishes /clock" in second.text
@@ -330,7 +343,7 @@ def test_without_the_interfaces_the_triggers_remain_and_the_server_says_so(
     free_runners: tuple[Process, Process],
 ) -> None:
     _, second = free_runners
-    with closing(Probe("robot4")) as probe:
+    with closing(WatchingProbe("robot4")) as probe:
         assert probe.trigger("up").success
         assert "without quadropted_msgs and tf2_msgs" in second.text
         assert "ros2/build_interfaces.sh" in second.text
@@ -346,8 +359,8 @@ def test_a_free_running_server_ends_well_too(free_runners: tuple[Process, Proces
         assert server.code == 0
 
 
-def test_two_robots_live_side_by_side(server: Process, probe: Probe) -> None:
-    with serving(namespace="robot2") as second, closing(Probe("robot2")) as other:
+def test_two_robots_live_side_by_side(server: Process, probe: WatchingProbe) -> None:
+    with serving(namespace="robot2") as second, closing(WatchingProbe("robot2")) as other:
         assert other.call("up").success
         assert probe.call("sit").success
         assert other.height() > 0.29

@@ -13,12 +13,12 @@ import pytest
 from benchmarks.bridges import unitree_processes
 from benchmarks.bridges.processes import wait_until
 from benchmarks.bridges.unitree import measure_drive
-from benchmarks.bridges.unitree_faults import DAMPED, garbage
-from benchmarks.bridges.unitree_processes import own_domain, scene, simulator
+from benchmarks.bridges.unitree_processes import own_domain, simulator
 from controller.bridges.unitree.guards import GuardConfig
 from controller.sweeps.trials import Trial
 from go2_wbc.errors import CommandError, PlantTimeout
 from go2_wbc.plant.base import Plant
+from tests.controller.bridges.unitree.scenes import DAMPED, garbage, watched
 from tests.controller.bridges.unitree.support import needs_dds
 from tests.go2_wbc.plant.contract import PlantContract
 
@@ -67,7 +67,7 @@ class TestUnitreePlant(PlantContract):
 @needs_dds
 @pytest.mark.slow
 def test_in_lockstep_garbage_lets_no_time_pass() -> None:
-    with scene("--lockstep") as at:
+    with watched("--lockstep") as at:
 
         def time_stands_still() -> bool:
             at.flood([DAMPED], 0.2)

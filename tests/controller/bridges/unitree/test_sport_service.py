@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from benchmarks.bridges.processes import wait_until
-from benchmarks.bridges.unitree_processes import Scene, client_of, scene
+from benchmarks.bridges.unitree_processes import client_of
 from controller.bridges.unitree.sport_api import (
     LEASE_TERM,
     PATH_FIELDS,
@@ -24,6 +24,7 @@ from controller.bridges.unitree.sport_api import (
 )
 from controller.bridges.unitree.sport_robot import POSE
 from controller.bridges.unitree.sport_service import PATIENCE
+from tests.controller.bridges.unitree.scenes import WatchedScene, watched
 from tests.controller.bridges.unitree.support import needs_dds
 
 pytestmark = [needs_dds, pytest.mark.slow]
@@ -33,23 +34,23 @@ LIMIT = 60.0  # s; only ends a test that hangs
 
 
 @pytest.fixture(scope="module")
-def simulated() -> Iterator[Scene]:
-    with scene() as at:
+def simulated() -> Iterator[WatchedScene]:
+    with watched() as at:
         yield at
 
 
 @pytest.fixture
-def at(simulated: Scene) -> Scene:
+def at(simulated: WatchedScene) -> WatchedScene:
     """A robot that stands, ready for anything."""
     simulated.stand_up()
     return simulated
 
 
-def progress(at: Scene) -> float:
+def progress(at: WatchedScene) -> float:
     return float(at.now()["progress"][0])
 
 
-def while_acting(at: Scene) -> Iterator[None]:
+def while_acting(at: WatchedScene) -> Iterator[None]:
     """As long as the action goes on; one that never ends fails."""
     deadline = time.monotonic() + LIMIT
     while progress(at):
@@ -57,7 +58,7 @@ def while_acting(at: Scene) -> Iterator[None]:
         yield
 
 
-def passing(at: Scene, seconds: float) -> Iterator[None]:
+def passing(at: WatchedScene, seconds: float) -> Iterator[None]:
     """Again and again until so much of the robot's own time has passed."""
     deadline, end = time.monotonic() + LIMIT, robot_time(at) + seconds
     while robot_time(at) < end:
@@ -65,22 +66,22 @@ def passing(at: Scene, seconds: float) -> Iterator[None]:
         yield
 
 
-def robot_time(at: Scene) -> float:
+def robot_time(at: WatchedScene) -> float:
     stamp = at.now()["stamp"][0]
     return float(stamp["sec"]) + 1e-9 * float(stamp["nanosec"])
 
 
-def rpy(at: Scene) -> np.ndarray:
+def rpy(at: WatchedScene) -> np.ndarray:
     return np.array(at.now()["imu_state"]["rpy"][0])
 
 
-def begin(at: Scene, api: Api) -> None:
+def begin(at: WatchedScene, api: Api) -> None:
     """Start an action that takes longer than its answer."""
     assert at.call(api) == Code.OK
     assert progress(at) == 1
 
 
-def test_after_stand_up_it_does_not_walk_until_balance_stand(simulated: Scene) -> None:
+def test_after_stand_up_it_does_not_walk_until_balance_stand(simulated: WatchedScene) -> None:
     at = simulated
     assert at.call(Api.STAND_UP) == Code.OK
     at.wait_for_rest()
@@ -93,7 +94,7 @@ def test_after_stand_up_it_does_not_walk_until_balance_stand(simulated: Scene) -
     assert at.mode == SportMode.BALANCE_STAND
 
 
-def test_sit_and_rise(at: Scene) -> None:
+def test_sit_and_rise(at: WatchedScene) -> None:
     assert at.call(Api.RISE_SIT) == Code.NOT_READY  # it does not sit
     assert at.call(Api.SIT) == Code.OK
     at.wait_for_rest()
@@ -107,7 +108,7 @@ def test_sit_and_rise(at: Scene) -> None:
 
 
 @pytest.mark.parametrize("api", [Api.HELLO, Api.SCRAPE])
-def test_a_front_paw_is_raised_and_put_back(at: Scene, api: Api) -> None:
+def test_a_front_paw_is_raised_and_put_back(at: WatchedScene, api: Api) -> None:
     begin(at, api)
     least = np.inf
     for _ in while_acting(at):
@@ -118,7 +119,7 @@ def test_a_front_paw_is_raised_and_put_back(at: Scene, api: Api) -> None:
 
 
 @pytest.mark.parametrize("api", [Api.CONTENT, Api.WIGGLE_HIPS, Api.HEART])
-def test_it_shows_how_it_feels_and_stands_again(at: Scene, api: Api) -> None:
+def test_it_shows_how_it_feels_and_stands_again(at: WatchedScene, api: Api) -> None:
     begin(at, api)
     most = np.zeros(3)
     for _ in while_acting(at):
@@ -128,7 +129,7 @@ def test_it_shows_how_it_feels_and_stands_again(at: Scene, api: Api) -> None:
     assert at.now()["error_code"][0] == Code.OK
 
 
-def test_a_path_is_followed_in_the_frame_of_the_state(at: Scene) -> None:
+def test_a_path_is_followed_in_the_frame_of_the_state(at: WatchedScene) -> None:
     x0, y0, _ = at.now()["position"][0]
     yaw0 = rpy(at)[2]
     c, s = np.cos(yaw0), np.sin(yaw0)
@@ -155,7 +156,7 @@ def test_a_path_is_followed_in_the_frame_of_the_state(at: Scene) -> None:
     assert at.speed < 0.1
 
 
-def test_trot_run_walks_and_the_speed_level_can_be_asked_for(at: Scene) -> None:
+def test_trot_run_walks_and_the_speed_level_can_be_asked_for(at: WatchedScene) -> None:
     assert at.call(Api.TROT_RUN) == Code.OK
     at.wait_for_rest()
     assert at.mode == SportMode.LOCOMOTION
@@ -164,7 +165,7 @@ def test_trot_run_walks_and_the_speed_level_can_be_asked_for(at: Scene) -> None:
     assert at.call(Api.SPEED_LEVEL, '{"data": 0}') == Code.OK
 
 
-def test_stretch_bows_and_comes_back(at: Scene) -> None:
+def test_stretch_bows_and_comes_back(at: WatchedScene) -> None:
     begin(at, Api.STRETCH)
     most = 0.0
     for _ in while_acting(at):
@@ -173,7 +174,7 @@ def test_stretch_bows_and_comes_back(at: Scene) -> None:
     at.require_standing()
 
 
-def test_pose_is_held_until_it_is_taken_back(at: Scene) -> None:
+def test_pose_is_held_until_it_is_taken_back(at: WatchedScene) -> None:
     assert at.call(Api.POSE, '{"data": true}') == Code.OK
     at.wait_for_rest()
     assert at.mode == SportMode.POSE
@@ -193,7 +194,7 @@ def test_pose_is_held_until_it_is_taken_back(at: Scene) -> None:
     ],
 )
 def test_an_attitude_is_taken_or_refused(
-    at: Scene, angles: tuple[float, float, float], code: Code
+    at: WatchedScene, angles: tuple[float, float, float], code: Code
 ) -> None:
     before = rpy(at)
     assert at.call(Api.EULER, json.dumps(dict(zip("xyz", angles, strict=True)))) == code
@@ -203,7 +204,7 @@ def test_an_attitude_is_taken_or_refused(
 
 
 @pytest.mark.parametrize(("level", "speed"), [(-1, 0.6), (0, 1.05)])
-def test_the_speed_level_bounds_move(at: Scene, level: int, speed: float) -> None:
+def test_the_speed_level_bounds_move(at: WatchedScene, level: int, speed: float) -> None:
     assert at.call(Api.SPEED_LEVEL, json.dumps({"data": level})) == Code.OK
     for _ in passing(at, 3.0):
         at.client.send(Api.MOVE, FAST)
@@ -212,7 +213,7 @@ def test_the_speed_level_bounds_move(at: Scene, level: int, speed: float) -> Non
     assert at.call(Api.SPEED_LEVEL, '{"data": 0}') == Code.OK
 
 
-def test_an_action_that_meets_a_long_one_waits_a_while_then_is_refused(at: Scene) -> None:
+def test_an_action_that_meets_a_long_one_waits_a_while_then_is_refused(at: WatchedScene) -> None:
     begin(at, Api.DANCE1)
     start = time.monotonic()
     assert at.call(Api.HELLO) == Code.NOT_READY
@@ -223,7 +224,7 @@ def test_an_action_that_meets_a_long_one_waits_a_while_then_is_refused(at: Scene
     assert at.now()["error_code"][0] == Code.ACTION_TIMEOUT
 
 
-def test_damp_ends_an_action_whose_caller_hears_that_it_was_not_done(at: Scene) -> None:
+def test_damp_ends_an_action_whose_caller_hears_that_it_was_not_done(at: WatchedScene) -> None:
     caller = client_of(at.bus, "sport")
     codes: list[int] = []
     call = threading.Thread(target=lambda: codes.append(caller.call(Api.HELLO, timeout=5.0).code))
@@ -235,7 +236,7 @@ def test_damp_ends_an_action_whose_caller_hears_that_it_was_not_done(at: Scene) 
     at.require_lying()
 
 
-def test_damp_wins_against_an_attitude_that_is_still_being_checked(at: Scene) -> None:
+def test_damp_wins_against_an_attitude_that_is_still_being_checked(at: WatchedScene) -> None:
     at.client.send(Api.EULER, '{"x": 0.1, "y": 0.1, "z": 0.0}')
     assert wait_until(lambda: progress(at) == 1, LIMIT)
     assert at.call(Api.DAMP) == Code.OK
@@ -245,7 +246,7 @@ def test_damp_wins_against_an_attitude_that_is_still_being_checked(at: Scene) ->
     assert at.mode == SportMode.DAMPING
 
 
-def test_who_has_the_lease_has_the_robot_until_it_ends(at: Scene) -> None:
+def test_who_has_the_lease_has_the_robot_until_it_ends(at: WatchedScene) -> None:
     lease = client_of(at.bus, "sport_lease")
 
     def codes_during_a_lease() -> list[int]:
@@ -262,7 +263,7 @@ def test_who_has_the_lease_has_the_robot_until_it_ends(at: Scene) -> None:
     assert codes == [Code.LEASE_DENIED, Code.LEASE_EXIST]
 
 
-def test_the_switcher_releases_a_robot_that_lies_only(at: Scene) -> None:
+def test_the_switcher_releases_a_robot_that_lies_only(at: WatchedScene) -> None:
     switcher = client_of(at.bus, SWITCHER_SERVICE)
     assert json.loads(switcher.call(SwitcherApi.CHECK_MODE).data)["name"] == "normal"
     assert switcher.call(SwitcherApi.RELEASE_MODE).code == Code.NOT_READY
@@ -276,7 +277,7 @@ def test_the_switcher_releases_a_robot_that_lies_only(at: Scene) -> None:
 
 
 @pytest.mark.parametrize("api", [1011, 1021, 1030, 1042, 2044, 2049])
-def test_what_the_library_lacks_is_not_supported(simulated: Scene, api: int) -> None:
+def test_what_the_library_lacks_is_not_supported(simulated: WatchedScene, api: int) -> None:
     assert simulated.call(api) == Code.NOT_SUPPORTED
 
 
@@ -292,5 +293,7 @@ def test_what_the_library_lacks_is_not_supported(simulated: Scene, api: int) -> 
         (Api.AUTO_RECOVERY_SET, '{"data": 0.5}'),
     ],
 )
-def test_a_parameter_that_is_wrong_is_refused(simulated: Scene, api: Api, parameter: str) -> None:
+def test_a_parameter_that_is_wrong_is_refused(
+    simulated: WatchedScene, api: Api, parameter: str
+) -> None:
     assert simulated.call(api, parameter) == Code.BAD_PARAMETER

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from benchmarks.agreement import (
+from benchmarks.model import (
     ideal_mujoco_model,
     model_agreement,
     mujoco_dynamics,

@@ -1,0 +1,157 @@
+"""The whole demo: does it work on every seed, and does every True hold in the simulator?"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from benchmarks.high_five import highest_window
+from benchmarks.robots import standing_failure, way_between
+from benchmarks.study import Direction, Measurement, Metric, Study
+from controller.demo.run import DemoProgress, run_demo
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
+from go2_wbc.legs import LEGS, Leg
+from go2_wbc.robot.rotations import wrap_angle
+from go2_wbc.robot.state import RobotState
+
+SIT_PITCH = math.radians(-25.0)
+"""Pitch of the trunk of a sitting robot: at least this much nose up."""
+SIT_REAR_HEIGHT = 0.16
+"""Height [m] below which the rear end of the trunk is down; it is at 0.29 m when standing."""
+REAR_END = -0.1934
+"""m; the rear hips in the base frame, by the URDF."""
+FORWARD_WAY = (0.30, 0.44)
+"""Way [m] of two seconds at 0.2 m/s, from rest."""
+FORWARD_ASIDE = 0.05
+STOP_SPEED = 0.05
+"""m/s"""
+TURN = (math.pi / 2, math.radians(2.0))
+PAW_HEIGHT, PAW_TIME = 0.60, 1.9
+"""Height [m] that the paw keeps, and for how long [s]: the hold without its edges."""
+PAW_SUPPORT = 5.0
+"""N on every other foot meanwhile."""
+
+_ITEM = "whole demo sequence"
+METRICS = (
+    Metric("demo.done", _ITEM, "share of seeds done", "", 1.0, Direction.AT_LEAST),
+    Metric("demo.untrue", _ITEM, "True that does not hold", "", 0.0),
+    Metric("demo.pace", "whole run headless", "real-time factor, CPU", "", 2.5, Direction.AT_LEAST),
+)
+
+
+def measure(trial: Trial) -> Measurement:
+    """Run the demo and check every step that it calls done against the simulator.
+
+    - share of seeds done: 1 for a trial in which every step was done, 0 for any other;
+    - True that does not hold: steps called done for which this module's own criteria, on MuJoCo's
+      state, are not met;
+    - real-time factor: robot time over processor time of the process, from building the plant to
+      closing it, imports and recording the truth excluded.
+    """
+    cpu_start = time.process_time()
+    with TrialRobot(trial) as robot:
+        check = StepCheck(robot)
+        report = run_demo(robot.go2, check)
+        robot_time, recording_time = robot.plant.time, robot.truth.cpu_time
+    cpu_time = time.process_time() - cpu_start - recording_time
+    values = {
+        "demo.done": float(report.ok),
+        "demo.untrue": float(len(check.untrue)),
+        "demo.pace": robot_time / cpu_time,
+    }
+    undone = [f"{step.name}: {step.reason}" for step in report.steps if not step.ok]
+    failures = {"demo.done": "; ".join(undone), "demo.untrue": "; ".join(check.untrue)}
+    return Measurement(values, {name: why for name, why in failures.items() if why})
+
+
+class StepCheck:
+    """Reads the robot's state when a step begins and ends, and what was recorded in between.
+
+    Attributes:
+        untrue: steps that were called done although they were not, with the reason.
+    """
+
+    def __init__(self, robot: TrialRobot) -> None:
+        """Check ``robot``'s demo."""
+        self._robot = robot
+        self._before = robot.plant.truth()
+        self.untrue: list[str] = []
+
+    def __call__(self, progress: DemoProgress) -> None:
+        """Take note of a step's begin, or check its end."""
+        if progress.result is None:
+            self._before = self._robot.plant.truth()
+            self._robot.truth.clear()
+        elif progress.result.ok:
+            name = progress.result.name
+            failure = self._robot.truth.fall() if "sit" not in name else None
+            failure = failure or CRITERIA[name](self._robot, self._before)
+            if failure is not None:
+                self.untrue.append(f"{name}: {failure}")
+
+
+def _stand(robot: TrialRobot, _before: RobotState) -> str | None:
+    return standing_failure(robot)
+
+
+def _sit(robot: TrialRobot, _before: RobotState) -> str | None:
+    state = robot.plant.truth()
+    pitch, rear = float(state.rpy[1]), float(state.q[2] + REAR_END * state.R_world_base[2, 0])
+    if pitch > SIT_PITCH:
+        return f"pitch {math.degrees(pitch):.0f} deg"
+    return f"rear end at {rear:.2f} m" if rear > SIT_REAR_HEIGHT else None
+
+
+def _forward(robot: TrialRobot, before: RobotState) -> str | None:
+    ahead, left, _ = way_between(before, robot.plant.truth())
+    if not FORWARD_WAY[0] <= ahead <= FORWARD_WAY[1] or abs(left) > FORWARD_ASIDE:
+        return f"went {ahead:.3f} m ahead and {left:.3f} m aside"
+    return None
+
+
+def _stop(robot: TrialRobot, _before: RobotState) -> str | None:
+    speed = float(np.linalg.norm(robot.truth.recording().com_velocity[-1, :2]))
+    return f"moves at {speed:.2f} m/s" if speed > STOP_SPEED else standing_failure(robot)
+
+
+def _turn(robot: TrialRobot, before: RobotState) -> str | None:
+    asked, tolerance = TURN
+    *_, turned = way_between(before, robot.plant.truth())
+    if abs(wrap_angle(turned - asked)) > tolerance:
+        return f"turned {math.degrees(turned):.1f} deg"
+    return None
+
+
+def _high_five(robot: TrialRobot, _before: RobotState) -> str | None:
+    recorded, leg = robot.truth.recording(), Leg.FR
+    ticks = round(PAW_TIME / robot.plant.control_period)
+    try:
+        held = recorded.part(highest_window(recorded.p_world_feet[:, leg, 2], ticks))
+    except TrialFailed as failed:
+        return str(failed)
+    height = float(held.p_world_feet[:, leg, 2].min())
+    if height < PAW_HEIGHT:
+        return f"paw held at {height:.3f} m"
+    load = float(held.foot_forces[:, [other for other in LEGS if other is not leg]].min())
+    if load < PAW_SUPPORT:
+        return f"a supporting foot carried {load:.1f} N only"
+    return standing_failure(robot)
+
+
+CRITERIA: dict[str, Callable[[TrialRobot, RobotState], str | None]] = {
+    "stand": _stand,
+    "sit": _sit,
+    "walk": _stand,
+    "forward": _forward,
+    "stop": _stop,
+    "turn": _turn,
+    "high_five": _high_five,
+    "sit_again": _sit,
+}
+"""What is missing for a step to be true, by the step's name; every step must have one."""
+
+
+STUDY = Study("sequence", METRICS, measure, seed_factor=5)

@@ -1,1 +1,0 @@
-"""The exam of the feasibility check: motions that authors write, and what physics made of them."""

@@ -1,0 +1,252 @@
+"""The high five: how high, how steady, how far from every limit; and what hits the held paw."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from benchmarks.robots import DIRECTIONS, standing_failure
+from benchmarks.study import Direction, Measurement, Metric, Study
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
+from go2_wbc.geometry import moving_support_margins
+from go2_wbc.legs import LEGS, SIDES, Leg
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording, true_runs
+from go2_wbc.robot.model import RobotModel
+
+HOLD = 2.0
+"""Time [s] for which the paw is asked to be held."""
+HELD_TIME = 1.9
+"""Length [s] of the window in which the paw's height is measured: the hold without its edges."""
+_ITEM = "high five, either side"
+HELD_METRICS = (
+    Metric("five.height", _ITEM, "paw height held 2 s", "m", 0.60, Direction.AT_LEAST),
+    Metric("five.margin", _ITEM, "least CoM margin, held", "cm", 6.0, Direction.AT_LEAST),
+    Metric("five.margin_phase", _ITEM, "the same, on three legs", "cm", None, Direction.AT_LEAST),
+    Metric("five.load", _ITEM, "least foot load, held", "N", 25.0, Direction.AT_LEAST),
+    Metric("five.load_phase", _ITEM, "the same, on three legs", "N", None, Direction.AT_LEAST),
+    Metric("five.slip", _ITEM, "support slip at contact", "mm", 2.0),
+    Metric("five.torque", _ITEM, "peak torque / limit", "", 0.4),
+    Metric("five.joints", _ITEM, "least joint distance, held", "rad", 0.03, Direction.AT_LEAST),
+    Metric("five.joints_phase", _ITEM, "the same, on three legs", "rad", None, Direction.AT_LEAST),
+)
+RAISED = 0.5
+"""Height [m] of the paw from which on it counts as raised; it is held at 0.6 m."""
+SETTLE_TIME = 1.5
+"""Time [s] from then to the first slap; the rest of the lift takes 0.3 s."""
+RETURN_TIME = 2.0
+"""Time [s] after a slap within which the paw must be back in its place."""
+PAUSE = 0.3
+"""Time [s] from there to the next slap."""
+PLACE_TOLERANCE = 30.0
+"""mm; a paw this near to its place is back in the pose. Dry friction in the joints keeps a part."""
+
+
+def measure_held(trial: Trial) -> Measurement:
+    """Give a high five with either paw; every value is the worse of both sides.
+
+    - on three legs: the longest time in which the raised foot touches nothing;
+    - held: the ticks of the 1.9 s in which the paw's lowest point in time is highest;
+    - paw height held 2 s: the least height of the foot's centre over the floor while held;
+    - CoM margin: least distance of MuJoCo's CoM, on the ground, to the edges of the triangle of
+      the contact points of the other three feet;
+    - least foot load: least normal force on any of these three;
+    - support slip: largest distance, at any time on three legs, that the material of a supporting
+      foot has slid at its contact point: the norm of its integrated tangential velocity. (The
+      foot's centre moves further, because round feet roll.);
+    - peak torque: largest |tau| / limit of any joint on three legs;
+    - joint distance: least distance of any joint to its limit, the tighter published one for hips.
+    """
+    worst: dict[str, float] = {}
+    with TrialRobot(trial) as robot:
+        try:
+            robot.require(robot.go2.stand())
+            for side, leg in SIDES.items():
+                robot.truth.clear()
+                robot.require(robot.go2.high_five(side, hold=HOLD))
+                measured = _measured(robot.truth.recording(), leg)
+                for metric in HELD_METRICS:
+                    value = measured[metric.name]
+                    values = {0: value, 1: worst.get(metric.name, value)}
+                    worst[metric.name] = values[metric.direction.worst(values)]
+        except TrialFailed as failed:
+            reason = str(failed)
+            return Measurement(worst, {metric.name: reason for metric in HELD_METRICS}, reason)
+    return Measurement(worst)
+
+
+def _measured(recorded: TruthRecording, leg: Leg) -> dict[str, float]:
+    on_three_legs = recorded.part(longest_run(recorded.foot_forces[:, leg] == 0.0))
+    ticks = round(HELD_TIME / float(recorded.time[-1] - recorded.time[-2]))
+    held = on_three_legs.part(highest_window(on_three_legs.p_world_feet[:, leg, 2], ticks))
+    support = [other for other in LEGS if other is not leg]
+    model = RobotModel()
+    return {
+        "five.height": float(held.p_world_feet[:, leg, 2].min()),
+        "five.margin": 100.0 * least_margin(held, support),
+        "five.margin_phase": 100.0 * least_margin(on_three_legs, support),
+        "five.load": float(held.foot_forces[:, support].min()),
+        "five.load_phase": float(on_three_legs.foot_forces[:, support].min()),
+        "five.slip": 1000.0 * largest_slip(on_three_legs, support),
+        "five.torque": float(on_three_legs.torque_shares(model).max()),
+        "five.joints": held.joint_distance(model),
+        "five.joints_phase": on_three_legs.joint_distance(model),
+    }
+
+
+def longest_run(flags: Bool[np.ndarray, " n"]) -> slice:
+    """Where ``flags`` is true for the longest time; empty if nowhere."""
+    return max(true_runs(flags), key=lambda run: run.stop - run.start, default=slice(0, 0))
+
+
+def highest_window(heights: Float[np.ndarray, " n"], length: int) -> slice:
+    """The ``length`` consecutive samples whose least height is greatest.
+
+    Raises:
+        TrialFailed: if there are fewer samples.
+    """
+    if len(heights) < length:
+        raise TrialFailed(f"the paw was in the air for {len(heights)} ticks, {length} were asked")
+    least = np.lib.stride_tricks.sliding_window_view(heights, length).min(axis=1)
+    start = int(np.argmax(least))
+    return slice(start, start + length)
+
+
+def least_margin(recorded: TruthRecording, support: list[Leg]) -> float:
+    """Least distance [m] of the CoM to the edges of the supporting contact points."""
+    feet, com = recorded.p_world_contacts[:, support, :2], recorded.p_world_com[:, :2]
+    if not np.isfinite(feet).all():
+        return -math.inf  # a supporting foot left the ground
+    return float(moving_support_margins(feet, com).min())
+
+
+def largest_slip(recorded: TruthRecording, support: list[Leg]) -> float:
+    """Largest distance [m] that the material of a supporting foot slides at its contact point."""
+    steps = np.diff(recorded.time)[:, None, None] * recorded.v_world_contacts[1:, support]
+    return float(np.linalg.norm(np.cumsum(steps, axis=0), axis=2).max())
+
+
+# --- impacts on the held paw ----------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Impact:
+    """A ``force`` [N] on the held paw for ``duration`` [s]; ``name`` begins its metrics' names."""
+
+    name: str
+    item: str
+    force: float
+    duration: float
+
+    @property
+    def cycle(self) -> float:
+        """Time [s] from one slap to the next."""
+        return self.duration + RETURN_TIME + PAUSE
+
+    @property
+    def metrics(self) -> tuple[Metric, Metric, Metric]:
+        """Directions survived, how far the paw stays off its place, and what the call said."""
+        count = float(len(DIRECTIONS))
+        survived, off = "directions survived, of 6", "paw off after 2 s"
+        return (
+            Metric(f"{self.name}.survived", self.item, survived, "", count, Direction.AT_LEAST),
+            Metric(f"{self.name}.off", self.item, off, "mm", PLACE_TOLERANCE),
+            Metric(f"{self.name}.said", self.item, "high_five() said True", "", None),
+        )
+
+
+IMPACT_KINDS = (
+    Impact("slap", "slap on the held paw, 40 N, 0.1 s", 40.0, 0.1),
+    Impact("lean", "leaning on the held paw, 15 N, 1 s", 15.0, 1.0),
+)
+
+
+def measure_impacts(trial: Trial) -> Measurement:
+    """Slap and lean on the paw while it is held, left for even seeds and right for odd ones.
+
+    - directions survived: of six, along the axes of the robot's heading; the robot must not fall
+      until the high five is over, and must stand then. The call itself may say False, if the slap
+      took the paw below its height;
+    - paw off its place: distance, in the world, of the foot's centre 2 s after the end of the
+      force from where it was before; worst direction.
+    """
+    values: dict[str, float] = {}
+    failures: dict[str, str] = {}
+    for kind in IMPACT_KINDS:
+        survived, off, said = (metric.name for metric in kind.metrics)
+        distances, lost, values[said] = _hit_all(replace(trial, has_nominal_friction=True), kind)
+        values[survived] = float(len(DIRECTIONS) - len(lost))
+        if distances:
+            values[off] = max(distances.values())
+        if lost:
+            reason = "; ".join(f"{direction}: {why}" for direction, why in lost.items())
+            failures |= {survived: reason, off: reason}
+    return Measurement(values, failures)
+
+
+def _hit_all(trial: Trial, kind: Impact) -> tuple[dict[str, float], dict[str, str], float]:
+    """Slaps from all directions; after a fall a new robot goes on with the next one.
+
+    Returns:
+        By direction the paw's distance [mm] from its place, or why it was lost; and 1 if the last
+        call of ``high_five`` said True.
+    """
+    side = ("left", "right")[trial.seed % 2]
+    distances: dict[str, float] = {}
+    lost: dict[str, str] = {}
+    remaining, said = list(DIRECTIONS), False
+    while remaining:
+        with TrialRobot(trial) as robot:
+            found: dict[str, float] = {}
+            ticks = _hits(robot, side, kind, remaining, found)
+            robot.truth.on_tick = partial(next, ticks, None)
+            try:
+                robot.require(robot.go2.stand())
+                said = robot.go2.high_five(side, hold=SETTLE_TIME + kind.cycle * len(remaining))
+                failure = robot.truth.fall() or standing_failure(robot)
+            except TrialFailed as failed:
+                failure = str(failed)
+            if failure is not None:
+                culprit = remaining[min(len(found), len(remaining) - 1)]
+                lost[culprit] = f"{failure} ({robot.go2.last_outcome.reason})"
+                found.pop(culprit, None)
+            distances |= found
+        remaining = [d for d in remaining if d not in lost and d not in distances]
+    return distances, lost, float(said)
+
+
+def _hits(
+    robot: TrialRobot, side: str, kind: Impact, directions: Sequence[str], found: dict[str, float]
+) -> Iterator[None]:
+    """Slap the paw from one direction after the other, once it is raised; one ``next`` a tick.
+
+    Puts into ``found`` how far [mm] the paw was off its place afterwards. A robot that has fallen,
+    or whose paw is down, raises ``TrialFailed``.
+    """
+    leg = SIDES[side]
+    while robot.plant.p_world_feet[leg, 2] <= RAISED:
+        yield
+    start = robot.plant.time + SETTLE_TIME
+    for index, direction in enumerate(directions):
+        begin = start + index * kind.cycle
+        yield from _until(robot, begin)
+        place = robot.plant.p_world_feet[leg]
+        robot.push(kind.force * np.array(DIRECTIONS[direction]), kind.duration, leg.foot)
+        yield from _until(robot, begin + kind.duration + RETURN_TIME)
+        paw, fall = robot.plant.p_world_feet[leg], robot.truth.fall()
+        if fall is not None or paw[2] < RAISED:
+            raise TrialFailed(fall or f"the paw is at {paw[2]:.2f} m two seconds later")
+        found[direction] = 1000.0 * float(np.linalg.norm(paw - place))
+
+
+def _until(robot: TrialRobot, time: float) -> Iterator[None]:
+    while robot.plant.time < time:
+        yield
+
+
+HELD = Study("high-five", HELD_METRICS, measure_held)
+IMPACTS = Study("slaps", tuple(m for kind in IMPACT_KINDS for m in kind.metrics), measure_impacts)

@@ -1,0 +1,204 @@
+"""``python -m benchmarks qp_infeasibility``: answers where its constraints contradict it.
+
+Blind trots over boxes, pushes that throw the robot off its stride, random commands, and legs at the
+ends of their joints. The limits of ``wbc.relaxation`` were chosen on box layouts 0 to 5 and six
+pushes; no seed of theirs is judged here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from jaxtyping import Float
+
+from benchmarks.command import Benchmark
+from benchmarks.robots import PUSH_TIME, force_of
+from benchmarks.study import Measurement, Metric, Study
+from controller.modes import Mode
+from controller.sweeps.trials import Trial, TrialRobot
+from go2_wbc.config import Config
+from go2_wbc.planning.locomotion import GREATEST_HEIGHT, LEAST_HEIGHT, LocomotionConfig
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from go2_wbc.plant.terrain import Boxes
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import yaw_rotation
+
+FIRST_LAYOUT = 20
+"""Seed of the first layout of boxes that is judged."""
+BOX_HEIGHT = 0.08
+"""m"""
+FIRST_COMMANDS = 900
+"""Seed of the first sequence of random commands that is judged."""
+FIRST_PUSH = 700
+"""Seed of the first series of pushes that is judged."""
+IMPULSE, IMPULSE_AT_STOPS = 30.0, 20.0
+"""N s of a push; and at the ends of the joints, where a trot has less room to answer."""
+AT_STOP = 0.01
+"""Distance [rad] from its stop at which a calf counts as there."""
+LOOK = 0.02
+"""Time [s] between two looks at whether the robot is still up."""
+AFTERMATH = 1.0
+"""Time [s] for which a robot that gave up is watched, to see whether it reports a fall."""
+UPRIGHT = np.radians(30.0)
+"""Tilt below which a robot that was damped had no reason to be: the limit of ``SafetyConfig``."""
+Course = Callable[[TrialRobot, np.random.Generator], Iterator[float]]
+"""Commands and pushes of a trial; gives the time [s] until it wants to go on."""
+
+
+def over_boxes(robot: TrialRobot, rng: np.random.Generator) -> Iterator[float]:
+    """Eight seconds at 1.0 m/s over boxes that the robot does not know about."""
+    robot.go2.move(1.0)
+    yield 8.0
+
+
+def pushed(
+    robot: TrialRobot, rng: np.random.Generator, impulse: float, speed: float
+) -> Iterator[float]:
+    """Three horizontal pushes in any direction, at any instant of the stride."""
+    robot.go2.move(speed)
+    yield 1.5
+    for _ in range(3):
+        yield float(rng.uniform(0.0, 0.36))
+        angle = rng.uniform(-np.pi, np.pi)
+        robot.push(yaw_rotation(angle) @ force_of(impulse, "forward"), PUSH_TIME)
+        yield 2.5
+
+
+def commanded(robot: TrialRobot, rng: np.random.Generator, count: int = 40) -> Iterator[float]:
+    """Random velocities, ``count`` of them, a new one every 1.5 s."""
+    for _ in range(count):
+        linear_x, linear_y, angular_z = rng.uniform((-1.0, -0.6, -2.0), (1.5, 0.6, 2.0)).tolist()
+        robot.go2.move(linear_x, angular_z, linear_y=linear_y)
+        yield 1.5
+
+
+def metrics_of(name: str, item: str) -> tuple[Metric, ...]:
+    """What is counted in every trial."""
+    return (
+        Metric(f"{name}.failures", item, "ticks without an answer", "", 0.0),
+        Metric(f"{name}.damped", item, "damped while upright", "", 0.0),
+        Metric(f"{name}.grave", item, "ticks beyond the limits", "%", 0.1),
+        Metric(f"{name}.relaxed", item, "ticks relaxed", "%", None),
+        Metric(f"{name}.unreported", item, "falls not reported", "", 0.0),
+        Metric(f"{name}.falls", item, "falls", "", None),
+    )
+
+
+def watch(name: str, robot: TrialRobot, course: Iterator[float]) -> Measurement:
+    """Follow the course until its end, or until the robot gives up.
+
+    - damped while upright: 1 if the loop went limp at a tilt below 30 deg without calling it a
+      fall;
+    - shares: of the ticks from the start of the trot on;
+    - falls: 1 if the robot fell, for the controller or in truth, within a second of giving up.
+    """
+    go2 = robot.go2
+    robot.require(go2.stand())
+    robot.require(go2.walk())
+    robot.truth.clear()
+    counts, start = go2.telemetry, robot.plant.time
+    for seconds in course:
+        end = robot.plant.time + seconds
+        while is_up(robot) and robot.plant.time < end - 1e-9:
+            go2.wait(min(LOOK, end - robot.plant.time))
+        if not is_up(robot):
+            break
+    was_damped = go2.mode is Mode.DAMPED and robot.plant.truth().tilt < UPRIGHT
+    ticks = round((robot.plant.time - start) / robot.plant.control_period)
+    shares = {"grave": counts.grave_ticks, "relaxed": counts.relaxed_ticks}
+    go2.wait(0.0 if is_up(robot) else AFTERMATH)
+    has_fallen, is_reported = robot.truth.fall() is not None, go2.mode is Mode.FALLEN
+    values = {
+        "failures": float(counts.qp_failures),
+        "damped": float(was_damped),
+        "unreported": float(has_fallen and not is_reported and not was_damped),
+        "falls": float(has_fallen or is_reported),
+        **{quantity: 100.0 * count / ticks for quantity, count in shares.items()},
+    }
+    return Measurement({f"{name}.{quantity}": value for quantity, value in values.items()})
+
+
+def is_up(robot: TrialRobot) -> bool:
+    """Whether the controller still balances."""
+    return robot.go2.mode not in (Mode.FALLEN, Mode.DAMPED)
+
+
+def measure_boxes(trial: Trial) -> Measurement:
+    """8 cm boxes at 1.0 m/s."""
+    layout = FIRST_LAYOUT + trial.seed
+    terrain = Boxes(height=BOX_HEIGHT, seed=layout)
+    plant = MujocoPlant(terrain=terrain, seed=layout, sensors=trial.sensors)
+    return _measure("boxes", TrialRobot(plant), over_boxes, layout)
+
+
+def measure_pushes(trial: Trial) -> Measurement:
+    """30 N s while trotting at 0.5 m/s."""
+    seed = FIRST_PUSH + trial.seed
+    robot = TrialRobot(replace(trial, seed=seed, has_nominal_friction=True))
+    return _measure("pushes", robot, partial(pushed, impulse=IMPULSE, speed=0.5), seed)
+
+
+def measure_commands(trial: Trial) -> Measurement:
+    """Random commands on a floor and with a mass that the controller does not know."""
+    seed = FIRST_COMMANDS + trial.seed
+    return _measure("commands", TrialRobot(replace(trial, seed=seed)), commanded, seed)
+
+
+def measure_stops(trial: Trial) -> Measurement:
+    """Trot so high that the calves come to their stops, or (odd seeds) so low; and be pushed."""
+    seed = FIRST_PUSH + trial.seed
+    height = (GREATEST_HEIGHT, LEAST_HEIGHT)[trial.seed % 2]
+    config = Config(locomotion=LocomotionConfig(height=height))
+    robot = TrialRobot(replace(trial, seed=seed, has_nominal_friction=True), config)
+    course = partial(pushed, impulse=IMPULSE_AT_STOPS, speed=0.8)
+    with robot:
+        measured = watch("stops", robot, course(robot, np.random.default_rng(seed)))
+        distance = calf_distance(robot.truth.recording())
+    near = 100.0 * float((distance < AT_STOP).mean())
+    return Measurement({**measured.values, "stops.near": near})
+
+
+def calf_distance(recorded: TruthRecording) -> Float[np.ndarray, " n"]:
+    """Distance [rad] of the nearest calf from one of its stops, at every tick; negative beyond."""
+    model, angles = RobotModel(), recorded.q[:, 7:]
+    distance = np.minimum(angles - model.q_lower, model.q_upper - angles)
+    return distance[:, 2::3].min(axis=1)
+
+
+def _measure(name: str, robot: TrialRobot, course: Course, seed: int) -> Measurement:
+    with robot:
+        return watch(name, robot, course(robot, np.random.default_rng(seed)))
+
+
+PUSHES = "trot 0.5 m/s, three pushes of 30 N s"
+STOPS = "calves at their stops, pushes of 20 N s"
+STUDIES = (
+    Study("boxes", metrics_of("boxes", "8 cm boxes, trot 1.0 m/s, 8 s"), measure_boxes),
+    Study("pushes", metrics_of("pushes", PUSHES), measure_pushes),
+    Study("commands", metrics_of("commands", "random commands, 60 s"), measure_commands),
+    Study(
+        "stops",
+        (
+            *metrics_of("stops", STOPS),
+            Metric("stops.near", STOPS, "ticks, a calf at its stop", "%", None),
+        ),
+        measure_stops,
+    ),
+)
+"""In the order of the report."""
+
+
+BENCHMARK = Benchmark(
+    "qp_infeasibility",
+    "Trots on which the QP contradicts itself: is there always an answer, is the\n"
+    "robot never damped while upright, how often do constraints give way too far.",
+    STUDIES,
+    takes="minutes on two cores",
+    examples=("--rows boxes pushes --json",),
+    sensors=True,
+)
+register, run = BENCHMARK.register, BENCHMARK.run

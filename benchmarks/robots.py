@@ -1,0 +1,118 @@
+"""Robots on trial, what pushes them, and what is true of them by the simulator."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+from controller.motion_measurement import FULL
+from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, Trial, TrialRobot
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.ground_truth import TruthRecording
+from go2_wbc.reference import Anchor
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from go2_wbc.robot.state import RobotState
+from motions.postures import STAND_HEIGHT
+
+FRICTION_RANGE, MASS_RANGE = (0.6, 1.0), (0.95, 1.05)
+"""Friction, and factor on every mass and inertia of the robot; the controller is not told."""
+HEIGHT_TOLERANCE, TILT_TOLERANCE = 0.02, math.radians(6.0)
+LOAD = 5.0
+"""Force [N] on a foot that counts as loaded; a standing foot carries about 40 N."""
+SAMPLING = 10
+"""Ticks from one sample of the mean height to the next."""
+PUSH_TIME = 0.1
+"""Duration [s] of a push."""
+DIRECTIONS: dict[str, tuple[float, float, float]] = {
+    "forward": (1.0, 0.0, 0.0),
+    "backward": (-1.0, 0.0, 0.0),
+    "left": (0.0, 1.0, 0.0),
+    "right": (0.0, -1.0, 0.0),
+    "up": (0.0, 0.0, 1.0),
+    "down": (0.0, 0.0, -1.0),
+}
+"""Unit vectors ahead, left, up of the robot."""
+
+
+def plant_of(
+    trial: Trial,
+    first_seed: int,
+    mass_range: tuple[float, float] = MASS_RANGE,
+    sensors: str | None = None,
+) -> MujocoPlant:
+    """A simulated robot under the conditions of the trial, whose ``sensors`` are the usual ones.
+
+    ``first_seed`` is that of the benchmark's first trial.
+    """
+    rng = np.random.default_rng(first_seed + trial.seed)
+    friction, mass, yaw = (rng.uniform(*r) for r in (FRICTION_RANGE, mass_range, YAW_RANGE))
+    return MujocoPlant(
+        friction=float(friction),
+        mass_scale=float(mass),
+        sensors=sensors or trial.sensors,
+        seed=first_seed + trial.seed,
+        initial_yaw=float(yaw),
+        initial_joint_noise=JOINT_NOISE,
+    )
+
+
+def force_of(impulse: float, direction: str) -> Float[np.ndarray, "3"]:
+    """Force [N] that gives ``impulse`` [N s] in ``PUSH_TIME``."""
+    return np.array(DIRECTIONS[direction]) * impulse / PUSH_TIME
+
+
+def heading_force(angle: float, impulse: float) -> Float[np.ndarray, "3"]:
+    """Force [N] that gives ``impulse`` [N s] at ``angle`` [rad] from ahead to the left."""
+    return impulse / PUSH_TIME * np.array([math.cos(angle), math.sin(angle), 0.0])
+
+
+def feet_frame(robot: TrialRobot) -> Anchor:
+    """The frame of the feet as they stand, in truth."""
+    model = RobotModel()
+    return Anchor.of_feet(model.snapshot(robot.plant.truth()).p_world_feet, model.foot_radius)
+
+
+def way_between(before: RobotState, after: RobotState) -> tuple[float, float, float]:
+    """How far the base has come ahead and to the left [m], and how far it has turned [rad]."""
+    yaw = float(before.rpy[2])
+    x, y, _ = yaw_rotation(yaw).T @ (after.p_world_base - before.p_world_base)
+    return float(x), float(y), wrap_angle(float(after.rpy[2]) - yaw)
+
+
+def standing_failure(robot: TrialRobot) -> str | None:
+    """What is missing for standing in truth, or None.
+
+    Standing is: CoM within 20 mm of its height, tilt below 6 deg, every foot loaded.
+    """
+    state, height = robot.plant.truth(), float(robot.truth.p_world_com[2])
+    if abs(height - STAND_HEIGHT) > HEIGHT_TOLERANCE:
+        return f"CoM at {height:.3f} m instead of {STAND_HEIGHT:.2f} m"
+    if state.tilt > TILT_TOLERANCE:
+        return f"tilt {math.degrees(state.tilt):.1f} deg"
+    least = float(state.foot_forces.min())
+    return f"a foot carries {least:.1f} N only" if least < LOAD else None
+
+
+def loads(recorded: TruthRecording) -> dict[str, float]:
+    """Largest shares of a torque and a speed limit; share [%] of ticks of motors at their limit."""
+    model = RobotModel()
+    shares = recorded.torque_shares(model)
+    return {
+        "torque": float(shares.max()),
+        "speed": recorded.peak_speed_share(model),
+        "saturated": 100.0 * float((shares >= FULL).mean()),
+    }
+
+
+def com_height(window: TruthRecording) -> float:
+    """Mean height [m] of the CoM as the model has it, without a payload."""
+    model, q, v = RobotModel(), window.q[::SAMPLING], window.v[::SAMPLING]
+    heights = [model.snapshot(_state(*pair)).p_world_com[2] for pair in zip(q, v, strict=True)]
+    return float(np.mean(heights))
+
+
+def _state(q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"]) -> RobotState:
+    return RobotState(0.0, q, v, np.zeros(12), np.zeros(4), np.ones(4, dtype=bool))

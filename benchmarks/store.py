@@ -1,0 +1,104 @@
+"""Finished trials on disk: an interrupted run can be resumed, with nothing measured twice.
+
+The trials of a study are the rows of a sweep, in a file of its own that ``controller.read_sweep``
+reads: a column for each metric, and in words why one has no value.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+
+from benchmarks.study import Measurement, Study
+from controller.sweeps.identity import SOURCES, identity
+from controller.sweeps.rows import SEED, Row
+from controller.sweeps.run import remove_sweep
+from controller.sweeps.sweep_file import SweepFile
+from go2_wbc.config import Config
+from go2_wbc.errors import ConfigError
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDER = Path("out/benchmarks")
+"""Where finished trials are kept, in a folder for each benchmark."""
+_WORDS = ("failures", "notes", "not_asked")
+"""Of a measurement, by metric."""
+
+
+def settings_header() -> dict[str, str]:
+    """What trials depend on besides study and seed; resumed is only what agrees."""
+    settings = hashlib.sha256(repr(Config()).encode()).hexdigest()[:12]
+    return {**identity(ROOT, (*SOURCES, "benchmarks")), "settings": settings}
+
+
+class Store:
+    """The finished trials of studies. A context manager.
+
+    Attributes:
+        finished: measurements of the run that is resumed, by study and seed.
+    """
+
+    def __init__(self, folder: Path, studies: Iterable[Study], *, resume: bool) -> None:
+        """Begin anew, or go on with what is there.
+
+        Raises:
+            ConfigError: if a file cannot be written, is not such a file, or holds trials under
+                other settings.
+        """
+        self.finished: dict[tuple[str, int], Measurement] = {}
+        self._files: dict[str, SweepFile] = {}
+        self._exits, header = ExitStack(), settings_header()
+        for study in studies:
+            file = file_of(folder, study)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            if not resume:
+                remove_sweep(file)
+            try:
+                rows = self._exits.enter_context(SweepFile(file, {"what": study.name, **header}))
+            except ConfigError as error:
+                self._exits.close()
+                if not resume:
+                    raise
+                raise ConfigError(f"{error}; run without --resume to begin anew") from error
+            self._files[study.name] = rows
+            for row in rows.rows():
+                self.finished[study.name, int(row[SEED])] = measurement_of(study, row)
+
+    def add(self, study: Study, seed: int, measurement: Measurement) -> None:
+        """Keep a trial: whoever kills the process leaves all of it or nothing."""
+        self._files[study.name].add(seed, row_of(study, measurement))
+
+    def __enter__(self) -> Store:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._exits.close()
+
+
+def file_of(folder: Path, study: Study) -> Path:
+    """Where the trials of a study are kept."""
+    return folder / f"{study.name.replace(', ', '-').replace(' ', '_')}.sqlite"
+
+
+def row_of(study: Study, measurement: Measurement) -> Row:
+    """A measurement as the row of a sweep; nan is no value."""
+    values = {m.name: float(measurement.values.get(m.name, math.nan)) for m in study.metrics}
+    words = {name: json.dumps(dict(getattr(measurement, name))) for name in _WORDS}
+    return {**values, "reason": measurement.reason, **words}
+
+
+def measurement_of(study: Study, row: Row) -> Measurement:
+    """The measurement that a row keeps."""
+    values = {m.name: float(row[m.name]) for m in study.metrics}
+    words: Mapping[str, dict[str, str]] = {name: json.loads(str(row[name])) for name in _WORDS}
+    known = {name: value for name, value in values.items() if not math.isnan(value)}
+    return Measurement(known, reason=str(row["reason"]), **words)

@@ -1,0 +1,78 @@
+"""What physics makes of a motion, played in MuJoCo whatever the check says.
+
+And at which amplitude it changes its mind: bisected by playing.
+"""
+
+from __future__ import annotations
+
+import math
+
+from benchmarks.study import Measurement, Metric, Study
+from benchmarks.validation_set.questions import Question, draws
+from controller.motion_measurement import MotionMeasurement, measure_motion
+from controller.motion_outcome import outcome_of
+from controller.sweeps.trials import Trial, TrialRobot
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.reference import MotionPlan, Posture
+from go2_wbc.robot.model import RobotModel
+
+FRICTION = 0.5
+"""Friction coefficient of the floor: the one that the check counts on."""
+NEAR, NEAR_SOLVED = 1.06, 1.13
+"""Ratio of amplitudes, one done and one failed, at which the search ends."""
+STEP, STEP_SOLVED = 1.6, 1.25
+"""Ratio of amplitudes in the search for two that differ."""
+BORDER = Metric("feasibility.border", "border", "amplitude at which physics fails", "", None)
+PLAYS = Metric("feasibility.plays", "border", "motions played to find it", "", None)
+
+
+def play(
+    plan: MotionPlan, model: RobotModel, seed: int, sensors: str = "ideal"
+) -> MotionMeasurement:
+    """Play a plan, unchecked, from its entry posture, on a plant of these ``sensors``.
+
+    Raises:
+        TrialFailed: if the robot does not get ready.
+    """
+    with TrialRobot(MujocoPlant(friction=FRICTION, seed=seed, sensors=sensors)) as robot:
+        robot.require(robot.go2.stand())
+        if plan.entry is Posture.SIT:
+            robot.require(robot.go2.sit())
+        return measure_motion(robot.go2, robot.truth, plan, model)
+
+
+def is_done(question: Question) -> bool:
+    """Whether physics does a motion, by the strict definition."""
+    model = RobotModel()
+    plan = question.plan(model)
+    return not outcome_of(play(plan, model, question.draw), plan).strict
+
+
+def measure_border(trial: Trial) -> Measurement:
+    """The border of draw number ``trial.seed``, or why there is none.
+
+    From amplitude 1 in steps to the first one at which physics changes its mind, then by bisection.
+    """
+    family, number = draws()[trial.seed]
+    step, near = (STEP_SOLVED, NEAR_SOLVED) if family.is_dynamic else (STEP, NEAR)
+    done, failed, plays = family.low, family.high, 0
+    is_low_done = is_high_failed = False
+    middle = 1.0
+    while not (is_low_done and is_high_failed) or failed / done > near:
+        plays += 1
+        if is_done(Question(family, number, middle)):
+            done, is_low_done = middle, True
+        else:
+            failed, is_high_failed = middle, True
+        if is_low_done and is_high_failed:
+            middle = math.sqrt(done * failed)
+        elif middle in (family.low, family.high):
+            why = "even the highest amplitude is done" if is_low_done else "the lowest one fails"
+            return Measurement({PLAYS.name: float(plays)}, reason=why)
+        else:
+            onwards = middle * step if is_low_done else middle / step
+            middle = min(max(onwards, family.low), family.high)
+    return Measurement({BORDER.name: math.sqrt(done * failed), PLAYS.name: float(plays)})
+
+
+BORDERS = Study("borders", (BORDER, PLAYS), measure_border)

@@ -1,0 +1,94 @@
+"""What the rows of ``behaviour`` measure."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks import robots
+from benchmarks.demo_sequence import CRITERIA, StepCheck
+from benchmarks.high_five import highest_window, largest_slip, longest_run
+from benchmarks.pushes import IMPULSE_STEP, largest_impulse
+from benchmarks.robots import plant_of
+from controller.demo.report import StepResult
+from controller.demo.run import DemoProgress
+from controller.demo.steps import DEMO_STEPS
+from controller.sweeps.trials import (
+    Trial,
+    TrialFailed,
+    TrialRobot,
+)
+from go2_wbc.legs import LEGS, Leg
+from tests.go2_wbc.plant.helpers import empty_recording
+
+
+def test_plants_of_trials_differ_within_their_ranges() -> None:
+    with closing(plant_of(Trial(0), 4100)) as one, closing(plant_of(Trial(1), 4100)) as other:
+        assert one.read().rpy[2] != other.read().rpy[2]
+    assert (robots.FRICTION_RANGE, robots.MASS_RANGE) == ((0.6, 1.0), (0.95, 1.05))
+
+
+@pytest.mark.parametrize(
+    ("greatest", "first", "found"),
+    [
+        (14.0, 14.0, 14.0),
+        (15.0, 14.0, 14.0),
+        (100.0, 14.0, 14.0 + IMPULSE_STEP),
+        (13.0, 14.0, 12.0),
+        (0.0, 14.0, 0.0),
+        (1.0, 3.0, 1.0),
+    ],
+)
+def test_the_search_ends_below_the_first_impulse_that_is_not_survived(
+    greatest: float, first: float, found: float
+) -> None:
+    assert largest_impulse(lambda impulse: impulse <= greatest, first) == found
+
+
+def test_the_longest_run_is_found() -> None:
+    flags = np.array([1, 0, 1, 1, 0, 1, 1, 1], dtype=bool)
+    assert longest_run(flags) == slice(5, 8)
+    assert longest_run(np.zeros(3, dtype=bool)) == slice(0, 0)
+
+
+def test_the_held_height_is_the_best_that_was_kept_for_the_whole_time() -> None:
+    heights = np.array([0.0, 0.9, 0.59, 0.61, 0.62, 0.6, 0.0])
+    assert highest_window(heights, 3) == slice(3, 6)
+    with pytest.raises(TrialFailed):
+        highest_window(heights, 8)
+
+
+def test_slip_is_the_largest_excursion_and_not_the_final_one() -> None:
+    v = np.zeros((201, 4, 3))
+    v[1:101, Leg.RL, 0], v[101:, Leg.RL, 0] = 0.02, -0.02  # 4 mm there and back
+    recorded = empty_recording(201, v)
+    assert largest_slip(recorded, list(LEGS)) == pytest.approx(0.004)
+    assert largest_slip(recorded, [Leg.FL]) == 0.0
+
+
+def test_every_step_of_the_demo_has_a_criterion_of_the_benchmark() -> None:
+    assert {step.name for step in DEMO_STEPS} <= set(CRITERIA)
+
+
+def test_no_step_of_the_demo_is_true_of_a_robot_that_lies_there() -> None:
+    with TrialRobot(Trial(0)) as robot:
+        before = robot.plant.read()
+        robot.go2.wait(0.01)
+        failures = {name: failure_of(robot, before) for name, failure_of in CRITERIA.items()}
+    assert [name for name, failure in failures.items() if failure is None] == []
+    assert "went" in str(failures["forward"])
+    assert "turned" in str(failures["turn"])
+
+
+def test_a_true_that_the_simulator_contradicts_is_noted() -> None:
+    result = StepResult("sit", "sit", ok=True, reason="done", start=0.0, duration=0.0)
+    with TrialRobot(Trial(0)) as robot:
+        check = StepCheck(robot)
+        check(DemoProgress(0, 1, "sit"))
+        check(DemoProgress(0, 1, "sit", result))
+        check(DemoProgress(0, 1, "sit", replace(result, ok=False, reason="fell")))
+    assert len(check.untrue) == 1
+    assert check.untrue[0].startswith("sit: pitch ")

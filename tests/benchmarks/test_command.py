@@ -1,0 +1,151 @@
+"""``python -m benchmarks``: what is run, what is printed and written, which exit code."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.__main__ import ALIASES, COMMANDS, main
+from benchmarks.behaviour import STUDIES
+from benchmarks.command import IDEAL, IMU, on_sensors
+from benchmarks.report import WIDTH
+from benchmarks.study import Measurement, Study, chosen_studies
+from controller.cli.common import ExitCode
+from controller.cli.main import Command
+from controller.sweeps.trials import Trial
+from go2_wbc.errors import CommandError
+from tests.benchmarks.conftest import Only
+from tests.benchmarks.support import fake, fall_on_seed_1, have_a_bug, measure_badly, measure_well
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_it_runs_from_the_root_of_a_checkout() -> None:
+    command = [sys.executable, "-m", "benchmarks", "--list"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    names = [line.split()[0] for line in done.stdout.splitlines()]
+    assert names == [command.name for command in COMMANDS]
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.name)
+def test_every_benchmark_has_a_help_with_examples(
+    command: Command, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(WIDTH))
+    assert main([command.name, "--help"]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert out.startswith(f"usage: python -m benchmarks {command.name}")
+    assert "examples:" in out
+    assert max(map(len, out.splitlines())) <= WIDTH
+
+
+@pytest.mark.parametrize(("former", "name"), ALIASES.items())
+def test_a_former_name_still_runs_the_benchmark(
+    former: str, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([former, "--help"]) == ExitCode.OK
+    assert capsys.readouterr().out.startswith(f"usage: python -m benchmarks {name}")
+
+
+@pytest.mark.parametrize("argv", [[], ["gallop"], ["behaviour", "--nonsense"], ["--nonsense"]])
+def test_wrong_usage_exits_with_2(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(argv) == ExitCode.USAGE
+    assert "usage: python -m benchmarks" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("measure", "code"),
+    [
+        (measure_well, ExitCode.OK),
+        (measure_badly, ExitCode.FAILED),
+        (fall_on_seed_1, ExitCode.FAILED),
+        (have_a_bug, ExitCode.RUNTIME),
+    ],
+)
+def test_the_exit_code_says_whether_every_metric_passes(
+    only: Only,
+    capsys: pytest.CaptureFixture[str],
+    measure: Callable[[Trial], Measurement],
+    code: ExitCode,
+) -> None:
+    only(fake(measure))
+    assert main(["behaviour", "--seeds", "2"]) == code
+    assert ("rows pass" in capsys.readouterr().out) == (code != ExitCode.RUNTIME)
+
+
+def test_every_result_is_told_with_what_has_failed(
+    only: Only, capsys: pytest.CaptureFixture[str]
+) -> None:
+    only(fake(fall_on_seed_1))
+    main(["behaviour", "--seeds", "2"])
+    told = capsys.readouterr().err.splitlines()
+    assert told == ["1/2 fake, seed 0: ok", "2/2 fake, seed 1: fell at t=3.20 s: roll 71 deg"]
+
+
+def test_json_goes_to_stdout_and_to_the_file_alike(
+    only: Only, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    only(fake())
+    file = tmp_path / "out" / "results.json"
+    file.parent.mkdir()
+    file.write_text("old")
+    assert main(["behaviour", "--quick", "--json", "--out", str(file)]) == ExitCode.OK
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == json.loads(file.read_text())
+    assert printed["rows"][0]["n"] == 3
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_an_interrupt_leaves_the_old_report(only: Only, tmp_path: Path) -> None:
+    def interrupt(trial: Trial) -> Measurement:
+        raise KeyboardInterrupt
+
+    only(fake(interrupt))
+    file = tmp_path / "results.json"
+    file.write_text("old")
+    assert main(["behaviour", "--out", str(file)]) == ExitCode.INTERRUPTED
+    assert file.read_text() == "old"
+
+
+def test_a_file_that_cannot_be_written_is_told_before_anything_runs(
+    only: Only, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    only(fake(have_a_bug))
+    in_the_way = tmp_path / "file"
+    in_the_way.write_text("")
+    for out, reason in ((in_the_way / "results.json", "choose a folder"), (tmp_path, "no suffix")):
+        assert main(["behaviour", "--out", str(out)]) == ExitCode.USAGE
+        assert reason in capsys.readouterr().err
+
+
+def test_list_names_every_scenario_and_threshold(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["behaviour", "--list"]) == ExitCode.OK
+    out = capsys.readouterr().out
+    assert all(scenario.name in out.splitlines() for scenario in STUDIES)
+    assert "<= 0.025 m/s" in out
+    assert max(map(len, out.splitlines())) <= WIDTH
+
+
+def test_an_unknown_scenario_is_a_usage_error_that_lists_the_valid_ones() -> None:
+    with pytest.raises(CommandError, match=r"unknown scenario 'gallop'.*high-five.*trot"):
+        chosen_studies(STUDIES, ["gallop"])
+    assert main(["behaviour", "--rows", "gallop"]) == ExitCode.USAGE
+
+
+def test_a_trial_on_sensors_is_the_same_trial_with_another_plant() -> None:
+    study = Study("fake", (), lambda trial: Measurement({}, reason=f"{trial}"))
+    assert on_sensors(study, IDEAL) is study
+    sensed = on_sensors(study, IMU)
+    assert sensed.name != study.name  # results of both are kept in one file
+    assert sensed.measure(Trial(7)).reason == str(Trial(7, sensors=IMU))
+    with closing(Trial(3).plant()) as ideal, closing(Trial(3, sensors=IMU).plant()) as plant:
+        np.testing.assert_array_equal(ideal.truth().q, plant.truth().q)
+        assert plant.read().time == plant.truth().time
+        assert not np.array_equal(plant.read().q, plant.truth().q)

@@ -1,0 +1,146 @@
+"""An interrupted run goes on where it ended; what does not fit is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from benchmarks.__main__ import main
+from benchmarks.store import Store, file_of, settings_header
+from benchmarks.study import Measurement, Metric, Study
+from controller.cli.common import ExitCode
+from controller.sweeps.run import read_sweep
+from controller.sweeps.trials import Trial
+from go2_wbc.errors import ConfigError
+from tests.benchmarks.conftest import Only
+from tests.benchmarks.support import fake, measure_well
+
+TROT = Study("trot", (Metric("a", "", "", "", None), Metric("b", "", "", "", None)), measure_well)
+FIRST = Measurement({"a": 0.1 + 0.2, "b": math.inf}, {"b": "it fell"}, "said no", {"a": "x"})
+SECOND = Measurement({"a": math.nan, "b": -0.0}, not_asked={"a": "no plan"})
+
+
+class Interrupted:
+    """Measures well, and stops like Ctrl-C before a seed; notes which seeds it was asked for."""
+
+    def __init__(self, before: int) -> None:
+        self.before, self.seeds = before, list[int]()
+
+    def __call__(self, trial: Trial) -> Measurement:
+        if trial.seed == self.before:
+            raise KeyboardInterrupt
+        self.seeds.append(trial.seed)
+        return measure_well(trial)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two trials of a run that has ended."""
+    with Store(tmp_path, [TROT], resume=False) as store:
+        store.add(TROT, 0, FIRST)
+        store.add(TROT, 7, SECOND)
+    return tmp_path
+
+
+def test_an_interrupted_run_goes_on_with_what_is_left(
+    only: Only, capsys: pytest.CaptureFixture[str], results_folder: Path
+) -> None:
+    whole, first, second = Interrupted(99), Interrupted(2), Interrupted(99)
+    only(fake(whole))
+    assert main(["behaviour", "--seeds", "4", "--json"]) == ExitCode.OK
+    expected = capsys.readouterr().out
+    only(fake(first))
+    assert main(["behaviour", "--seeds", "4", "--json"]) == ExitCode.INTERRUPTED
+    only(fake(second))
+    capsys.readouterr()
+    assert main(["behaviour", "--seeds", "4", "--json", "--resume"]) == ExitCode.OK
+    told = capsys.readouterr()
+    assert (first.seeds, second.seeds) == ([0, 1], [2, 3])
+    assert told.out == expected
+    assert "2 finished trials are taken from" in told.err
+    assert "3/4 fake, seed 2: ok" in told.err
+    assert [path.name for path in results_folder.rglob("*.sqlite")] == ["fake.sqlite"]
+
+
+def test_more_seeds_than_before_only_add_to_it(only: Only) -> None:
+    later = Interrupted(99)
+    only(fake())
+    main(["behaviour", "--seeds", "2"])
+    only(fake(later))
+    assert main(["behaviour", "--seeds", "5", "--resume"]) == ExitCode.OK
+    assert later.seeds == [2, 3, 4]
+
+
+def test_without_resume_everything_is_measured_again(only: Only) -> None:
+    again = Interrupted(99)
+    only(fake())
+    main(["behaviour", "--seeds", "2"])
+    only(fake(again))
+    main(["behaviour", "--seeds", "2"])
+    assert again.seeds == [0, 1]
+
+
+def test_trials_come_back_to_the_last_bit(folder: Path) -> None:
+    with Store(folder, [TROT], resume=True) as store:
+        found = store.finished
+    assert set(found) == {("trot", 0), ("trot", 7)}
+    assert found["trot", 0] == FIRST
+    assert found["trot", 7] == replace(SECOND, values={"b": 0.0}), "nan is no value"
+    assert math.copysign(1.0, found["trot", 7].values["b"]) == -1.0
+
+
+def test_trials_are_rows_of_a_sweep_that_says_what_they_depend_on(folder: Path) -> None:
+    kept = read_sweep(file_of(folder, TROT))
+    assert kept.about == {"what": "trot", **settings_header()}
+    assert set(kept.about) == {"what", "version", "python", "libraries", "settings", "code"}
+    assert kept.rows[0]["a"] == 0.1 + 0.2
+
+
+@pytest.mark.parametrize("name", ["version", "python", "settings", "code"])
+def test_trials_under_other_settings_are_refused_with_what_differs(
+    folder: Path, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    other = {**settings_header(), name: "another"}
+    monkeypatch.setattr("benchmarks.store.settings_header", lambda: other)
+    with pytest.raises(ConfigError, match=rf"{name} .*now another.*without --resume"):
+        Store(folder, [TROT], resume=True)
+
+
+def test_other_settings_are_a_usage_error_that_keeps_the_trials(
+    only: Only,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    results_folder: Path,
+) -> None:
+    only(fake())
+    main(["behaviour", "--seeds", "1"])
+    other = {**settings_header(), "python": "2.7"}
+    with monkeypatch.context() as later:
+        later.setattr("benchmarks.store.settings_header", lambda: other)
+        assert main(["behaviour", "--seeds", "1", "--resume"]) == ExitCode.USAGE
+    assert "now 2.7" in capsys.readouterr().err
+    assert len(read_sweep(results_folder / "behaviour" / "fake.sqlite").rows) == 1
+
+
+def test_a_file_of_something_else_is_neither_read_nor_removed(tmp_path: Path) -> None:
+    file_of(tmp_path, TROT).write_text("notes")
+    for resume in (True, False):
+        with pytest.raises(ConfigError, match="no database"):
+            Store(tmp_path, [TROT], resume=resume)
+    assert file_of(tmp_path, TROT).read_text() == "notes"
+
+
+def test_a_changed_line_of_code_changes_the_settings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "controller").mkdir()
+    file = tmp_path / "controller" / "gain.py"
+    monkeypatch.setattr("benchmarks.store.ROOT", tmp_path)
+    codes = []
+    for text in ("GAIN = 1.0", "GAIN = 2.0", "GAIN = 1.0"):
+        file.write_text(text)
+        codes.append(settings_header()["code"])
+    assert codes[0] == codes[2] != codes[1]
