@@ -19,7 +19,7 @@ UNLOAD_TIME = 0.3
 """Time [s] over which a foot gives up its load before lift-off, if there is that much: own choice,
 so that the forces of the others change slowly."""
 LEAST_RAMP = 0.03
-"""The same [s] where one foot lands as another lifts off: as ``LocomotionConfig.load_ramp``."""
+"""The same [s] where one foot lands as another lifts off."""
 
 
 class FootContacts:

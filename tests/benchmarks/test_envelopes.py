@@ -45,7 +45,7 @@ def test_what_is_stored_is_what_the_package_reads(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("axis", "speed", "is_held"), [("forward", 0.5, True), ("lateral", 1.9, False)]
+    ("axis", "speed", "is_held"), [("forward", 0.5, True), ("lateral", 3.0, False)]
 )
 def test_a_trot_holds_a_slow_speed_and_not_a_reckless_one(
     axis: str, speed: float, is_held: bool
