@@ -12,8 +12,9 @@ from go2_wbc.errors import CommandError
 from go2_wbc.geometry import moving_support_margins
 from go2_wbc.kernels.layout import Layout
 from go2_wbc.recording import Recording
+from go2_wbc.records import packed
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.motor import LEAST_SHARE
+from go2_wbc.robot.motor import note_peaks
 from go2_wbc.robot.payload import NO_PAYLOAD
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -45,12 +46,7 @@ class Telemetry:
         self._blocks: list[Float[np.ndarray, "k size"]] = []
         self._labels = np.empty(capacity, dtype=object)
         self._count = 0
-        from go2_wbc.kernels.motor import note_peaks  # compiled; importing this module is not
-
-        self._note_peaks, self._peaks = note_peaks, np.zeros((3, 12))
-        motor = model.motor
-        least = LEAST_SHARE * motor.peak
-        self._motor = np.array([motor.peak, motor.knee_speed, motor.no_load_speed, least])
+        self._motor, self._peaks = packed(model.motor), np.zeros((3, 12))
         self._v_before: Float[np.ndarray, "12"] | None = None
         self.payload = NO_PAYLOAD
         self.qp_failures = self.relaxed_ticks = self.grave_ticks = self.missed_deadlines = 0
@@ -69,7 +65,7 @@ class Telemetry:
         self._count += 1
         v = state.joint_velocities
         before = v if self._v_before is None else self._v_before
-        self._note_peaks(state.tau, v, before, self._motor, self._peaks)
+        note_peaks(state.tau, v, before, self._motor, self._peaks)
         self._v_before = v
 
     @property

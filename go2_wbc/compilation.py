@@ -37,6 +37,9 @@ import numpy as np
 from jaxtyping import AbstractArray
 from numba import types
 from numba.core.imputils import lower_cast
+from numba.extending import intrinsic
+from numba.extending import overload as overload_of
+from numba.np.arrayobj import make_array, populate_array
 
 from go2_wbc.kept_code import KeptCode, Written
 from go2_wbc.records import Record, layout_of
@@ -52,13 +55,19 @@ MODULES = (
     "go2_wbc.planning.locomotion",
     "go2_wbc.plant.mujoco.layout",
     "go2_wbc.reference",
+    "go2_wbc.robot.joint_friction",
     "go2_wbc.robot.leg_kinematics",
+    "go2_wbc.robot.motor",
     "go2_wbc.robot.payload_estimation",
     "go2_wbc.robot.rigid_body",
     "go2_wbc.robot.rotations",
     "go2_wbc.robot.safety",
     "go2_wbc.tracking.plan_curves",
     "go2_wbc.tracking.plan_tracking",
+    "go2_wbc.wbc.condensed",
+    "go2_wbc.wbc.constraints",
+    "go2_wbc.wbc.elimination",
+    "go2_wbc.wbc.tasks",
     "go2_wbc.wbc.trajectory_loads",
 )
 """Modules that hold kernels."""
@@ -256,6 +265,40 @@ def _record_type(cls: type) -> Any:
     kind = numba.from_dtype(layout_of(cls).dtype)
     _record_names[str(kind)] = cls.__name__
     return kind
+
+
+def numbers_of(record: Any) -> Any:
+    """All numbers of a record as one array."""
+    return record.row
+
+
+@overload_of(numbers_of, strict=False)
+def _numbers_of(record: Any) -> Any:
+    del record
+    return lambda record: _row_of(record)  # pyright: ignore[reportCallIssue]
+
+
+@intrinsic
+def _row_of(_context: Any, record: Any) -> Any:
+    """The memory of a record."""
+    array = types.Array(types.float64, 1, "C")
+
+    def build(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        row = make_array(array)(context, builder)
+        kind = context.get_value_type(types.CPointer(types.float64))
+        shape = (context.get_constant(types.intp, record.size // 8),)
+        step = context.get_constant(types.intp, 8)
+        populate_array(
+            row,
+            data=builder.bitcast(arguments[0], kind),
+            shape=shape,
+            strides=(step,),
+            itemsize=step,
+            meminfo=None,
+        )
+        return row._getvalue()
+
+    return array(record), build
 
 
 @lower_cast(types.NestedArray, types.Array)

@@ -149,6 +149,8 @@ def packed(value: T) -> T:
         TypeError: for a part that is no number, with its name.
         ValueError: for one of another shape than is declared, with its name.
     """
+    if getattr(type(value), "__slots__", None) == ("row",):
+        return value  # it is packed
     layout = layout_of(type(value))
     row = np.empty(layout.size)
     for name, field in layout.fields.items():
@@ -186,7 +188,7 @@ def layout_of(cls: type) -> Layout:
     """
     if not (isinstance(cls, type) and (issubclass(cls, Record) or dataclasses.is_dataclass(cls))):
         raise TypeError(f"{cls!r} is no record")
-    hints = typing.get_type_hints(cls)
+    hints = typing.get_type_hints(cls, include_extras=True)
     if dataclasses.is_dataclass(cls):
         hints = {field.name: hints[field.name] for field in dataclasses.fields(cls)}
     fields, size = {}, 0
@@ -210,6 +212,8 @@ def _field(hint: Any, start: int, where: str) -> Field:
     if isinstance(hint, type) and issubclass(hint, AbstractArray):
         if "float64" in hint.dtypes:
             return Field(start, tuple(int(n) for n in hint.dim_str.split()))
+    elif typing.get_origin(hint) is typing.Annotated:  # Annotated[tuple[float, ...], 12]
+        return Field(start, (hint.__metadata__[0],))
     elif typing.get_origin(hint) is tuple:
         kinds = typing.get_args(hint)
         if len(set(kinds)) == 1:

@@ -48,17 +48,9 @@ UNCHECKED = frozenset(
         "motions.pytest_plugin",
         "go2_wbc.contacts",
         "go2_wbc.curves",
-        "go2_wbc.kernels.bounds",
-        "go2_wbc.kernels.condensed",
-        "go2_wbc.kernels.elimination",
         "go2_wbc.kernels.estimation",
         "go2_wbc.kernels.filtering",
-        "go2_wbc.kernels.friction",
-        "go2_wbc.kernels.goals",
-        "go2_wbc.kernels.inputs",
         "go2_wbc.kernels.loading",  # loaded here
-        "go2_wbc.kernels.motor",
-        "go2_wbc.kernels.standing",
         "go2_wbc.kernels.vectors",
         "go2_wbc.compilation",  # loaded here, as is what it imports
         "go2_wbc.kept_code",

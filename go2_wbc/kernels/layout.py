@@ -112,40 +112,6 @@ REFERENCE = Layout(
 )
 """Of ``reference.Reference`` and its ``BodyTarget``."""
 
-PROGRAM = Layout(
-    position_kp=(3,),
-    position_kd=(3,),
-    position_weight=(),
-    orientation_kp=(3,),
-    orientation_kd=(3,),
-    orientation_weight=(),
-    swing_kp=(3,),
-    swing_kd=(3,),
-    swing_weight=(),
-    posture_kp=(3,),
-    posture_kd=(3,),
-    posture_weight=(),
-    flight_weight=(),
-    force_weight=(),
-    weight_of_robot=(),
-    stance_damping=(),
-    friction=(),
-    keeps_cone=(),
-    peak_torque=(12,),
-    knee_speed=(12,),
-    no_load_speed=(12,),
-    q_lower=(12,),
-    q_upper=(12,),
-    speed=(12,),
-    braking=(),
-    horizon=(),
-    singular_determinant=(),
-)
-"""Numbers of the built-in tasks and constraints of the whole-body controller."""
-
-DECISION = Layout(z=(30,), tau=(12,), tau_motors=(12,))
-"""What the QP decides: z of ``wbc.problem``, and torques without and with friction."""
-
 PLANNER = Layout(
     yaw=(),
     position=(2,),
@@ -252,22 +218,3 @@ MPC = Layout(
 
 FORCES = Layout(next=(), forces=(4, 3))
 """What the MPC has planned: when it plans again, and the force of each foot while it stands."""
-
-FRICTION = Layout(
-    dry=(12,),
-    viscous=(12,),
-    transition=(),
-    lookahead=(),
-    peak_torque=(12,),
-    knee_speed=(12,),
-    no_load_speed=(12,),
-)
-"""Of ``robot.joint_friction.JointFriction``, and of the ``MotorModel`` that no torque exceeds."""
-
-LEAST_LOAD, MOST_LOAD = 0.05, 2.0
-"""Bounds of a foot's load, over the mean of the standing feet, by which it is spared (see
-``wbc.loads``): own choice."""
-LEAST_PRESSURE = 0.2
-"""Share of the weight by which moments are divided at least: the zero-moment point stays near."""
-SPREAD = 1e-6
-"""[m^2] by which two feet, between which there is no area, count as spread to all sides."""

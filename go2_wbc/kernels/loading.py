@@ -6,11 +6,7 @@ from importlib import import_module
 
 from go2_wbc import compilation
 
-KERNELS = (
-    "condensed",
-    "estimation",
-    "motor",
-)
+KERNELS = ("estimation",)
 """Modules of this package whose import compiles, or loads what was compiled."""
 
 

@@ -14,16 +14,21 @@ gets none.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.errors import ConfigError
-from go2_wbc.kernels.layout import FRICTION
 from go2_wbc.legs import JOINT_NAMES
-from go2_wbc.robot.motor import MotorModel
+from go2_wbc.records import packed
+from go2_wbc.robot.motor import MotorModel, torque_range
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_not_negative, require_positive
+
+PerJoint = Annotated[tuple[float, ...], len(JOINT_NAMES)]
+"""A number for each joint, in the order of ``JOINT_NAMES``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,8 +52,8 @@ class JointFriction:
         lookahead: time [s] ahead of which a joint's speed decides.
     """
 
-    dry: tuple[float, ...] = (0.1,) * 12
-    viscous: tuple[float, ...] = (0.0,) * 12
+    dry: PerJoint = (0.1,) * 12
+    viscous: PerJoint = (0.0,) * 12
     transition: float = 0.1
     lookahead: float = 0.01
 
@@ -80,35 +85,51 @@ class JointFriction:
 
         ``a`` is in rad/s^2.
         """
-        dry = np.array(self.dry) * np.tanh((v + self.lookahead * a) / self.transition)
-        return dry + np.array(self.viscous) * v
+        return np.array([friction_torque(self, n, v[n], a[n]) for n in range(12)])
 
 
+@dataclass(frozen=True, slots=True)
 class FrictionFeedForward:
     """Turns the torques of the dynamics into the motors', within what these give at their speeds.
 
     Attributes:
-        numbers: the same for ``kernels.friction``.
+        friction: what is fed forward.
+        motor: what gives it.
     """
 
-    def __init__(self, friction: JointFriction, motor: MotorModel) -> None:
-        """Feed ``friction`` forward, up to what ``motor`` gives."""
-        self._friction, self._motor = friction, motor
-        self.numbers = FRICTION.pack(
-            [
-                friction.dry,
-                friction.viscous,
-                friction.transition,
-                friction.lookahead,
-                motor.peak,
-                motor.knee_speed,
-                motor.no_load_speed,
-            ]
-        )
+    friction: JointFriction
+    motor: MotorModel
 
     def motor_torques(
         self, snapshot: Snapshot, qdd: Float[np.ndarray, "18"], tau: Float[np.ndarray, "12"]
     ) -> Float[np.ndarray, "12"]:
         """``tau`` [N m] and the friction at the acceleration ``qdd``."""
-        v = snapshot.state.joint_velocities
-        return np.clip(tau + self._friction.torque(v, qdd[6:]), *self._motor.limits(v))
+        motors = np.empty(12)
+        fill_motor_torques(snapshot, packed(self), qdd, tau, motors)
+        return motors
+
+
+@subroutine
+def friction_torque(f: JointFriction, n: int, v: float, a: float) -> float:
+    """What friction takes of joint ``n`` at this speed and the acceleration to come."""
+    w = v + f.lookahead * a
+    return f.dry[n] * np.tanh(w / f.transition) + f.viscous[n] * v
+
+
+@kernel
+def fill_motor_torques(
+    now: Snapshot,
+    feed: FrictionFeedForward,
+    z: Float[np.ndarray, " n"],
+    tau: Float[np.ndarray, "12"],
+    motors: Float[np.ndarray, "12"],
+) -> None:
+    """Fill ``motors``: ``tau`` and the friction of the joints, within the motors' line.
+
+    ``z`` begins with the accelerations of base and joints.
+    """
+    for n in range(12):
+        v = now.v[6 + n]
+        asked = tau[n] + friction_torque(feed.friction, n, v, z[6 + n])
+        least, most = torque_range(feed.motor, n, v)
+        motors[n] = min(max(asked, least), most)

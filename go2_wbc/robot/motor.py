@@ -30,8 +30,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
+from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.errors import ConfigError, unknown_name
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.state import JointCommand
@@ -80,14 +81,17 @@ class MotorModel:
         self, v: Float[np.ndarray, "*n 12"]
     ) -> tuple[Float[np.ndarray, "*n 12"], Float[np.ndarray, "*n 12"]]:
         """(lower, upper) torque limits [N m] at velocities ``v`` [rad/s]; lower <= 0 <= upper."""
-        return -self.peak * self._line(-v), self.peak * self._line(v)
+        lower, upper = np.empty(v.shape), np.empty(v.shape)
+        line = (self.peak, self.knee_speed, self.no_load_speed)
+        fill_limits(v.reshape(-1, 12), *line, lower.reshape(-1, 12), upper.reshape(-1, 12))
+        return lower, upper
 
     def torque(
         self, command: JointCommand, q: Float[np.ndarray, "12"], v: Float[np.ndarray, "12"]
     ) -> Float[np.ndarray, "12"]:
         """Torques [N m] that the motors give for ``command`` at angles ``q`` and velocities ``v``.
 
-        What a plant applies at every physics step, compiled in ``kernels.motor``.
+        What a plant applies at every physics step; see ``drive``.
         """
         return np.clip(command.asked(q, v), *self.limits(v))
 
@@ -102,13 +106,85 @@ class MotorModel:
         available = np.where(tau < 0.0, -lower, upper)
         return np.abs(tau) / np.maximum(available, LEAST_SHARE * self.peak)
 
-    def _line(self, v: Float[np.ndarray, "*n 12"]) -> Float[np.ndarray, "*n 12"]:
-        """Share of the peak that a positive torque can have at velocities ``v``."""
-        beyond = np.maximum(v - self.knee_speed, 0.0)
-        return np.maximum(1.0 - beyond / (self.no_load_speed - self.knee_speed), 0.0)
-
 
 def require_motor(name: str) -> None:
     """Raise ConfigError, listing the valid names, unless ``name`` is one of ``MOTORS``."""
     if name not in MOTORS:
         raise ConfigError(unknown_name("motor", name, MOTORS))
+
+
+@subroutine
+def most_torque(v: float, peak: float, knee_speed: float, no_load_speed: float) -> float:
+    """The greatest torque of a motor at velocity ``v``; the least one is -most_torque(-v)."""
+    if not v > knee_speed:
+        return peak
+    return peak * max(1.0 - (v - knee_speed) / (no_load_speed - knee_speed), 0.0)
+
+
+@subroutine
+def torque_range(motor: MotorModel, n: int, v: float) -> tuple[float, float]:
+    """The least and the greatest torque of joint ``n`` at velocity ``v``."""
+    peak, knee, no_load = motor.peak[n], motor.knee_speed[n], motor.no_load_speed[n]
+    return -most_torque(-v, peak, knee, no_load), most_torque(v, peak, knee, no_load)
+
+
+@kernel
+def fill_limits(
+    v: Foreign[Float[np.ndarray, "n 12"]],
+    peak: Foreign[Float[np.ndarray, "12"]],
+    knee_speed: Foreign[Float[np.ndarray, "12"]],
+    no_load_speed: Foreign[Float[np.ndarray, "12"]],
+    lower: Float[np.ndarray, "n 12"],
+    upper: Float[np.ndarray, "n 12"],
+) -> None:
+    """Fill the limits of ``MotorModel`` at many velocities."""
+    for i in range(len(v)):
+        for n in range(12):
+            line = peak[n], knee_speed[n], no_load_speed[n]
+            lower[i, n] = -most_torque(-v[i, n], line[0], line[1], line[2])
+            upper[i, n] = most_torque(v[i, n], line[0], line[1], line[2])
+
+
+@kernel
+def drive(
+    command: Float[np.ndarray, "5 12"],
+    motor: MotorModel,
+    places: Int[np.ndarray, "3 12"],
+    qpos: Float[np.ndarray, " nq"],
+    qvel: Float[np.ndarray, " nv"],
+    ctrl: Float[np.ndarray, " nu"],
+    total: Float[np.ndarray, "12"],
+) -> None:
+    """``MotorModel.torque`` now, into ctrl, and added to ``total``.
+
+    ``command`` holds tau, q_des, v_des, kp and kd; ``places`` where each joint's angle, velocity
+    and control are.
+    """
+    for n in range(12):
+        q, v = qpos[places[0, n]], qvel[places[1, n]]
+        tau = command[3, n] * (command[1, n] - q) + command[0, n]
+        tau += command[4, n] * (command[2, n] - v)
+        least, most = torque_range(motor, n, v)
+        tau = max(min(tau, most), least)
+        ctrl[places[2, n]] = tau
+        total[n] += tau
+
+
+@kernel
+def note_peaks(
+    tau: Foreign[Float[np.ndarray, "12"]],
+    v: Foreign[Float[np.ndarray, "12"]],
+    v_before: Foreign[Float[np.ndarray, "12"]],
+    motor: MotorModel,
+    peaks: Float[np.ndarray, "3 12"],
+) -> None:
+    """Raise ``peaks`` to |tau|, |v| and the share of the line that ``tau`` was.
+
+    ``tau`` acted from ``v_before`` on.
+    """
+    for n in range(12):
+        least, most = torque_range(motor, n, float(v_before[n]))
+        given = most if tau[n] >= 0.0 else -least
+        peaks[0, n] = max(peaks[0, n], abs(tau[n]))
+        peaks[1, n] = max(peaks[1, n], abs(v[n]))
+        peaks[2, n] = max(peaks[2, n], abs(tau[n]) / max(given, LEAST_SHARE * motor.peak[n]))

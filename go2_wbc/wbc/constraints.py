@@ -3,24 +3,28 @@
 Equalities: the six base rows of M a + h = S' tau + J' f (no actuator there), and stance feet that
 roll without sliding. Inequalities: friction pyramid and normal force of each stance foot, torque
 limits at the measured speeds, and joint position and speed limits as bounds on the acceleration.
+
+The numbers of an inequality are filled by one compiled function, which ``bounds`` calls and the
+compiled solve (``condensed``) as well: see ``Limits``.
 """
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.reference import Reference
-from go2_wbc.robot.motor import MotorModel
+from go2_wbc.algebra.vectors import plus_scaled, triple
+from go2_wbc.compilation import kernel, subroutine
+from go2_wbc.records import V3, Record, packed
+from go2_wbc.reference import STANCE, Reference, Target
+from go2_wbc.robot.motor import MotorModel, torque_range
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.problem import FORCES, SIZE, Bounds, Rows
 
-_JOINT_SELECTION = np.zeros((12, SIZE))
-_JOINT_SELECTION[:, 6:18] = np.eye(12)
+_JOINT_SELECTION = np.eye(12, SIZE, 6)
 
 
 class Equality(ABC):
@@ -45,12 +49,36 @@ class Inequality(ABC):
         """Rows lower <= C z <= upper of this constraint now."""
 
 
+class Limits(Record):
+    """The numbers of all inequalities, each row by what it names: a foot's force, a joint.
+
+    Attributes:
+        forces: five rows of each foot that stands, of its force f [N], see ``FrictionPyramid``.
+        forces_lower, forces_upper: lower <= forces f <= upper.
+        torques: rows of the torques [N m], of the accelerations of the base (6) and of the joint's
+            leg (3), and of the force of that leg's foot (3): the others do not act on this joint.
+        torques_offset: the torque is torques (a_b, a_leg, f) + offset.
+        torques_lower, torques_upper: what the motors give.
+        joints_lower, joints_upper: bounds of the joints' accelerations [rad/s^2].
+    """
+
+    forces: Float[np.ndarray, "4 5 3"]
+    forces_lower: Float[np.ndarray, "4 5"]
+    forces_upper: Float[np.ndarray, "4 5"]
+    torques: Float[np.ndarray, "12 12"]
+    torques_offset: Float[np.ndarray, "12"]
+    torques_lower: Float[np.ndarray, "12"]
+    torques_upper: Float[np.ndarray, "12"]
+    joints_lower: Float[np.ndarray, "12"]
+    joints_upper: Float[np.ndarray, "12"]
+
+
 @dataclass(frozen=True, slots=True)
 class FloatingBaseDynamics(Equality):
     """The base has no motor: the first six rows of M a + h - J' f are zero."""
 
-    name: str = "base dynamics"
-    unit: str = "N, N m"
+    name = "base dynamics"
+    unit = "N, N m"
 
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
         """Six rows: force and moment balance of the whole robot in the base frame."""
@@ -73,16 +101,23 @@ class StanceFeetStill(Equality):
     """
 
     damping: float
-    name: str = "stance feet"
-    unit: str = "m/s^2"
+    name = "stance feet"
+    unit = "m/s^2"
 
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
         """Three rows per stance foot."""
-        stance = np.flatnonzero(reference.stance)
+        stance = [leg for leg in range(4) if reference.stance[leg]]
         A = np.zeros((3 * len(stance), SIZE))
         A[:, :18] = snapshot.J_contacts[stance].reshape(-1, 18)
-        b = -snapshot.drift_contacts[stance] - self.damping * snapshot.v_world_contacts[stance]
-        return Rows(A, b.ravel())
+        b = [-part for leg in stance for part in left_over(snapshot, self, leg)]
+        return Rows(A, np.array(b, float))
+
+
+@subroutine
+def left_over(now: Snapshot, task: StanceFeetStill, leg: int) -> V3:
+    """Drift and damped velocity of a contact point: what J a must take away."""
+    drift, velocity = triple(now.drift_contacts[leg]), triple(now.v_world_contacts[leg])
+    return plus_scaled(drift, task.damping, velocity)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,34 +128,64 @@ class FrictionPyramid(Inequality):
         friction: mu of the square pyramid, per axis; on the diagonal it allows 1.4 times as much.
             A reference may ask for less.
         keeps_cone: whether the pyramid of a foot with a planned force lies inside of the cone of
-            ``friction`` instead, an edge of it along that force.
+            ``friction`` instead, an edge of it along that force on the ground: of all inscribed
+            ones this allows most in its direction.
     """
 
     friction: float
     keeps_cone: bool = False
-    name: str = "contact forces"
-    unit: str = "N"
+    name = "contact forces"
+    unit = "N"
 
     def friction_for(self, reference: Reference) -> float:
         """What the feet may count on."""
-        return min(self.friction, reference.friction or self.friction)
+        return float(usable_friction(Target.of(reference.row), self))
 
     def bounds(self, snapshot: Snapshot, reference: Reference) -> Bounds:
-        """Five rows per stance foot."""
+        """Five rows per stance foot: +-f_x - mu f_z, +-f_y - mu f_z (at most 0), and f_z."""
+        limits = Limits()
+        fill_force_limits(Target.of(reference.row), packed(self), limits)
         stance = np.flatnonzero(reference.stance)
-        count = len(stance)
-        C = np.zeros((5 * count, SIZE))
-        lower = np.full(5 * count, -np.inf)
-        upper = np.zeros(5 * count)
-        mu = self.friction_for(reference)
-        is_inside = self.keeps_cone and reference.force_weight > 0.0
+        C = np.zeros((len(stance), 5, SIZE))
         for i, leg in enumerate(stance):
-            start, f_planned = FORCES.start + 3 * leg, reference.f_world_feet[leg]
-            pattern = pyramid_in_cone(mu, f_planned) if is_inside else friction_pyramid(mu)
-            C[5 * i : 5 * i + 5, start : start + 3] = pattern
-            lower[5 * i + 4] = reference.normal_force_min[leg]
-            upper[5 * i + 4] = reference.normal_force_max[leg]
-        return Bounds(C, lower, upper)
+            C[i, :, FORCES][:, 3 * leg : 3 * leg + 3] = limits.forces[leg]
+        lower, upper = limits.forces_lower[stance], limits.forces_upper[stance]
+        return Bounds(C.reshape(-1, SIZE), lower.ravel(), upper.ravel())
+
+
+@subroutine
+def usable_friction(target: Target, task: FrictionPyramid) -> float:
+    """What the feet may count on."""
+    return min(task.friction, target.friction) if target.friction > 0.0 else task.friction
+
+
+@subroutine
+def pyramid_of(target: Target, task: FrictionPyramid, leg: int, mu: float) -> V3:
+    """Friction and cosine and sine of the turn of a foot's pyramid."""
+    if not task.keeps_cone or target.force_weight == 0.0:
+        return mu, 1.0, 0.0
+    f = target.f_world_feet[leg]
+    turn = np.arctan2(f[1], f[0]) - np.pi / 4
+    return mu / np.sqrt(2.0), np.cos(turn), np.sin(turn)
+
+
+@kernel
+def fill_force_limits(target: Target, task: FrictionPyramid, limits: Limits) -> None:
+    """Fill the rows of every foot that stands."""
+    mu = usable_friction(target, task)
+    for leg in range(4):
+        if target.legs[leg] != STANCE:
+            continue
+        share, c, s = pyramid_of(target, task, leg, mu)
+        rows, lower, upper = limits.forces[leg], limits.forces_lower[leg], limits.forces_upper[leg]
+        for n in range(4):
+            side = 1.0 - 2.0 * (n % 2)
+            rows[n, 0] = side * (c if n < 2 else -s)
+            rows[n, 1] = side * (s if n < 2 else c)
+            rows[n, 2] = -share
+            lower[n], upper[n] = -np.inf, 0.0
+        rows[4, 0], rows[4, 1], rows[4, 2] = 0.0, 0.0, 1.0
+        lower[4], upper[4] = target.normal_force_min[leg], target.normal_force_max[leg]
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,14 +199,61 @@ class TorqueLimits(Inequality):
     """
 
     motor: MotorModel
-    name: str = "torque limits"
-    unit: str = "N m"
+    name = "torque limits"
+    unit = "N m"
 
     def bounds(self, snapshot: Snapshot, reference: Reference) -> Bounds:
         """Twelve rows, one per joint."""
-        A, offset = torque_map(snapshot)
-        lower, upper = self.motor.limits(snapshot.state.joint_velocities)
-        return Bounds(A, lower - offset, upper - offset)
+        limits = Limits()
+        fill_torque_limits(snapshot, packed(self), limits)
+        lower, upper = limits.torques_lower, limits.torques_upper
+        offset = limits.torques_offset
+        return Bounds(_torque_rows(limits), lower - offset, upper - offset)
+
+
+@kernel
+def fill_torque_limits(now: Snapshot, task: TorqueLimits, limits: Limits) -> None:
+    """Fill rows and bounds of the torques."""
+    fill_torques(now, limits)
+    for n in range(12):
+        least, most = torque_range(task.motor, n, now.v[6 + n])
+        limits.torques_lower[n], limits.torques_upper[n] = least, most
+
+
+@kernel
+def fill_torques(now: Snapshot, limits: Limits) -> None:
+    """Fill the joints' rows of M a + h - J' f = tau."""
+    for n in range(12):
+        leg = n // 3
+        M, row = now.mass_matrix[6 + n], limits.torques[n]
+        for k in range(6):
+            row[k] = M[k]
+        for i in range(3):
+            row[6 + i] = M[6 + 3 * leg + i]
+            row[9 + i] = -now.J_contacts[leg, i, 6 + n]
+        limits.torques_offset[n] = now.bias[6 + n]
+
+
+def torque_map(
+    snapshot: Snapshot,
+) -> tuple[Float[np.ndarray, "12 30"], Float[np.ndarray, "12"]]:
+    """(A, offset) such that the joint torques are A z + offset [N m].
+
+    tau = M_j a + h_j - J_j' f, the rows of the joints j in M a + h = S' tau + J' f.
+    """
+    limits = Limits()
+    fill_torques(snapshot, limits)
+    return _torque_rows(limits), limits.torques_offset
+
+
+def _torque_rows(limits: Limits) -> Float[np.ndarray, "12 30"]:
+    A = np.zeros((12, SIZE))
+    A[:, :6] = limits.torques[:, :6]
+    for leg in range(4):
+        rows = slice(3 * leg, 3 * leg + 3)
+        A[:, 6:18][rows, rows] = limits.torques[rows, 6:9]
+        A[:, FORCES][rows, rows] = limits.torques[rows, 9:]
+    return A
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,48 +284,34 @@ class JointLimits(Inequality):
     speed: Float[np.ndarray, "12"]
     braking: float
     horizon: float
-    name: str = "joint limits"
-    unit: str = "rad/s^2"
+    name = "joint limits"
+    unit = "rad/s^2"
 
     def bounds(self, snapshot: Snapshot, reference: Reference) -> Bounds:
         """Twelve rows, one per joint."""
-        q, v = snapshot.state.joint_positions, snapshot.state.joint_velocities
-        fastest = np.minimum(self.speed, self._viable_speed(self.q_upper - q, v))
-        slowest = -np.minimum(self.speed, self._viable_speed(q - self.q_lower, -v))
-        upper = np.maximum((fastest - v) / self.horizon, -self.braking)
-        lower = np.minimum((slowest - v) / self.horizon, self.braking)
-        return Bounds(_JOINT_SELECTION, lower, upper)
-
-    def _viable_speed(
-        self, distance: Float[np.ndarray, "12"], speed: Float[np.ndarray, "12"]
-    ) -> Float[np.ndarray, "12"]:
-        """v' of (1): the greatest speed after the horizon that is viable, d = ``distance``."""
-        half = self.braking * self.horizon / 2
-        radicand = half * half - 2 * half * speed + 2 * self.braking * distance
-        return np.sqrt(np.maximum(radicand, 0.0)) - half
+        limits = Limits()
+        fill_joint_limits(snapshot, packed(self), limits)
+        return Bounds(_JOINT_SELECTION, limits.joints_lower, limits.joints_upper)
 
 
-def torque_map(
-    snapshot: Snapshot,
-) -> tuple[Float[np.ndarray, "12 30"], Float[np.ndarray, "12"]]:
-    """(A, offset) such that the joint torques are A z + offset [N m].
-
-    tau = M_j a + h_j - J_j' f, the rows of the joints j in M a + h = S' tau + J' f.
-    """
-    A = np.empty((12, SIZE))
-    A[:, :18] = snapshot.mass_matrix[6:]
-    A[:, FORCES] = -snapshot.J_contacts[:, :, 6:].reshape(12, 12).T
-    return A, snapshot.bias[6:]
+@subroutine
+def viable_speed(distance: float, speed: float, braking: float, horizon: float) -> float:
+    """v' of (1) in ``JointLimits``: the greatest speed after the horizon that is viable."""
+    half = braking * horizon / 2
+    radicand = half * half - 2 * half * speed + 2 * braking * distance
+    return np.sqrt(max(radicand, 0.0)) - half
 
 
-def pyramid_in_cone(mu: float, f: Float[np.ndarray, "3"]) -> Float[np.ndarray, "5 3"]:
-    """The square pyramid inside of the cone of ``mu`` with an edge along ``f`` on the ground.
-
-    Rows as of ``friction_pyramid``. Of all inscribed ones it allows most in the direction of ``f``.
-    """
-    rows, turn = friction_pyramid(mu / math.sqrt(2.0)), math.atan2(f[1], f[0]) - math.pi / 4.0
-    rows[:4, :2] @= np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-    return rows
+@kernel
+def fill_joint_limits(now: Snapshot, task: JointLimits, limits: Limits) -> None:
+    """Fill the bounds of the joints' accelerations."""
+    braking, horizon = task.braking, task.horizon
+    for n in range(12):
+        q, speed, most = now.q[7 + n], now.v[6 + n], task.speed[n]
+        fast = viable_speed(task.q_upper[n] - q, speed, braking, horizon)
+        slow = viable_speed(q - task.q_lower[n], -speed, braking, horizon)
+        limits.joints_upper[n] = max((min(most, fast) - speed) / horizon, -braking)
+        limits.joints_lower[n] = min((-min(most, slow) - speed) / horizon, braking)
 
 
 def friction_pyramid(mu: float) -> Float[np.ndarray, "5 3"]:

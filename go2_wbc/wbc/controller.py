@@ -6,16 +6,20 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from typing import cast
 
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.algebra.active_set import SOLVED
 from go2_wbc.errors import ConfigError, QpInfeasible, unknown_name
-from go2_wbc.reference import Reference
+from go2_wbc.records import layout_of, packed
+from go2_wbc.reference import Reference, Target
 from go2_wbc.robot.joint_friction import FrictionFeedForward
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.backends import CondensedBackend, FullBackend, QpBackend
+from go2_wbc.wbc.condensed import Decision, QpNumbers, Workspace, solve_condensed
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import (
     Equality,
@@ -27,8 +31,7 @@ from go2_wbc.wbc.constraints import (
     TorqueLimits,
 )
 from go2_wbc.wbc.inputs import check_extra_tasks, check_inputs, check_problem, stacked
-from go2_wbc.wbc.problem import Bounds, Problem
-from go2_wbc.wbc.program import Program
+from go2_wbc.wbc.problem import SIZE, Bounds, Problem
 from go2_wbc.wbc.relaxation import solve_relaxed
 from go2_wbc.wbc.solution import WbcSolution
 from go2_wbc.wbc.solvers import check_solver
@@ -47,6 +50,10 @@ class WholeBodyController:
 
     Tasks (weighted least squares) and constraints are described in ``tasks`` and ``constraints``;
     ``backend`` is "condensed" (default), "full" (the same QP without elimination), or "placo".
+
+    Attributes:
+        is_compiled: whether ticks are solved by ``condensed``: with the back end "condensed" and
+            the solver "active_set".
     """
 
     def __init__(
@@ -73,19 +80,17 @@ class WholeBodyController:
         self.model = model
         self.config = config or WbcConfig()
         check_extra_tasks(extra_tasks)
-        self.tasks = (*_tasks(model, self.config), *extra_tasks)
-        self.equalities: tuple[Equality, ...] = (
-            FloatingBaseDynamics(),
-            StanceFeetStill(self.config.stance_damping),
-        )
-        self.inequalities = _inequalities(model, self.config)
-        motor = model.motor.scaled(self.config.torque_share)
-        self._friction = FrictionFeedForward(self.config.joint_friction, motor)
+        self._numbers = c = packed(_numbers(model, self.config))
+        self._extra_tasks = tuple(extra_tasks)
+        built_in = (c.position, c.orientation, c.swing, c.posture, c.force)
+        self.tasks: tuple[Task, ...] = (*built_in, *self._extra_tasks)
+        self.equalities: tuple[Equality, ...] = (FloatingBaseDynamics(), c.still)
+        self.inequalities: tuple[Inequality, ...] = (c.pyramid, c.torque, c.joint)
+        self._friction = c.friction
+        self._workspace = Workspace()
         self.backend_name = backend
         self._backend = self._make_backend(backend)
-        constraints = (*self.equalities, *self.inequalities)
-        is_compiled = backend == "condensed" and self.config.solver == "active_set"
-        self._program = Program(self.tasks, constraints, self._friction) if is_compiled else None
+        self.is_compiled = backend == "condensed" and self.config.solver == "active_set"
         if extra_tasks and backend == "placo":
             raise ConfigError("the placo back end has tasks of its own and takes no extra ones")
 
@@ -121,11 +126,6 @@ class WholeBodyController:
                 *(len(rows.lower) for rows in bounds),
             ),
         )
-
-    @property
-    def is_compiled(self) -> bool:
-        """Whether ticks are solved by the compiled kernel: condensed, and by ``active_set``."""
-        return self._program is not None
 
     def solve(
         self, snapshot: Snapshot, reference: Reference, *, relax: bool = False
@@ -172,40 +172,56 @@ class WholeBodyController:
 
     def solve_compiled(self, snapshot: Snapshot, reference: Reference) -> WbcSolution | None:
         """Solve one tick by the kernel; None if it is not used here or finds no solution."""
-        if self._program is None:
+        if not self.is_compiled:
             return None
         start = time.perf_counter()
-        decision = self._program.solve(snapshot, reference)
-        if decision is None:
+        extra = _NO_ROWS
+        if self._extra_tasks:
+            extra = self._extra_rows(snapshot, reference)
+            if not np.isfinite(extra).all():
+                return None
+        decision = Decision.of(np.empty(_DECISION))
+        target = cast(Target, reference)  # which has the row of one
+        work = self._workspace
+        outcome = solve_condensed(snapshot, target, self._numbers, extra, work, decision)
+        if outcome != SOLVED:
             return None
         spent = time.perf_counter() - start
         formulate = partial(self.formulate, snapshot, reference)
-        return WbcSolution.of_row(decision, spent, self.backend_name, formulate)
+        return WbcSolution.of(decision, spent, self.backend_name, formulate)
+
+    def _extra_rows(self, snapshot: Snapshot, reference: Reference) -> Float[np.ndarray, "k 32"]:
+        rows = [task.rows(snapshot, reference) for task in self._extra_tasks]
+        A, b = stacked(rows, self._extra_tasks)
+        counts = [len(part.b) for part in rows]
+        weights = np.repeat([task.weight_at(reference) for task in self._extra_tasks], counts)
+        return np.column_stack([A, b, weights]).astype(float, order="C")
 
 
-def _tasks(model: RobotModel, config: WbcConfig) -> tuple[Task, ...]:
-    return (
-        BodyPosition(*config.body_position.arrays, config.position_weight),
-        BodyOrientation(
-            *config.body_orientation.arrays, config.orientation_weight, config.flight_weight
-        ),
-        SwingFoot(*config.swing_foot.arrays, config.swing_weight),
-        LegPosture(*config.leg_posture.arrays, config.posture_weight),
-        ForceRegularisation(model.mass * model.gravity, config.force_weight),
-    )
+_NO_ROWS, _DECISION = np.empty((0, SIZE + 2)), layout_of(Decision).size
 
 
-def _inequalities(model: RobotModel, config: WbcConfig) -> tuple[Inequality, ...]:
+def _numbers(model: RobotModel, config: WbcConfig) -> QpNumbers:
     if (model.q_upper - model.q_lower <= 2 * config.joint_margin).any():
         raise ConfigError(f"WbcConfig.joint_margin leaves no range: {config.joint_margin} rad")
-    return (
-        FrictionPyramid(config.friction, keeps_cone=config.keeps_cone),
-        TorqueLimits(model.motor.scaled(config.torque_share)),
-        JointLimits(
+    weight, motor = model.mass * model.gravity, model.motor.scaled(config.torque_share)
+    return QpNumbers(
+        position=BodyPosition(*config.body_position.arrays, weight, config.position_weight),
+        orientation=BodyOrientation(
+            *config.body_orientation.arrays, config.orientation_weight, config.flight_weight
+        ),
+        swing=SwingFoot(*config.swing_foot.arrays, config.swing_weight),
+        posture=LegPosture(*config.leg_posture.arrays, config.posture_weight),
+        force=ForceRegularisation(weight, config.force_weight),
+        still=StanceFeetStill(config.stance_damping),
+        pyramid=FrictionPyramid(config.friction, keeps_cone=config.keeps_cone),
+        torque=TorqueLimits(motor),
+        joint=JointLimits(
             model.q_lower + config.joint_margin,
             model.q_upper - config.joint_margin,
             model.speed_limits * config.speed_share,
             config.braking,
             config.limit_horizon,
         ),
+        friction=FrictionFeedForward(config.joint_friction, motor),
     )

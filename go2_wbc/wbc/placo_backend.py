@@ -40,9 +40,8 @@ from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.backends import QpBackend
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import FrictionPyramid, JointLimits, TorqueLimits
-from go2_wbc.wbc.loads import planned_loads
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem
-from go2_wbc.wbc.tasks import Gains, forces_near
+from go2_wbc.wbc.tasks import BodyOrientation, ForceRegularisation, Gains
 
 REGULARISATION = 1e-12
 """Added by PlaCo to the diagonal of its Hessian; its default 1e-8 moves a force by 4 mN."""
@@ -72,7 +71,7 @@ class PlacoBackend(QpBackend):
         if key not in self._modes:
             self._modes[key] = _Mode(self._robot, self._model, self._config, *key)
         mode = self._modes[key]
-        mode.update(problem.snapshot.state, reference)
+        mode.update(problem)
         try:
             return mode.solve(problem)
         except QpInfeasible as error:
@@ -92,7 +91,6 @@ class _Mode:
         point: TrackedPoint,
     ) -> None:
         self._robot, self._model, self._config = robot, model, config
-        self._friction = FrictionPyramid(config.friction)
         self._point = point
         self._stance = [leg for leg in LEGS if legs[leg] is LegTask.STANCE]
         self._solver = placo.DynamicsSolver(robot)
@@ -136,10 +134,11 @@ class _Mode:
         task.configure(f"{leg.name} posture", "soft", self._config.posture_weight)
         return task
 
-    def update(self, state: RobotState, reference: Reference) -> None:
-        """Bring the robot to ``state`` and set every desired acceleration."""
+    def update(self, problem: Problem) -> None:
+        """Bring the robot to the measured state and set every desired acceleration."""
+        state, reference = problem.snapshot.state, problem.reference
         for contact in self._pressing:
-            contact.mu = self._friction.friction_for(reference)
+            contact.mu = problem.source(FrictionPyramid).friction_for(reference)
         self._robot.state.q = state.q
         self._robot.state.qd = state.v
         self._robot.update_kinematics()
@@ -147,10 +146,13 @@ class _Mode:
             self._place_contact(leg)
         self._robot.update_kinematics()
         self._update_body(state, reference)
+        weight = problem.source(BodyOrientation).weight_at(reference)
+        self._orientation.configure("orientation", "soft", weight)
         for leg in self._stance:
             self._update_contact(leg, state)
         for contact in self._pressing:
-            contact.weight_forces = self._force_weight(reference) / 2
+            weight = problem.source(ForceRegularisation).weight_at(reference)
+            contact.weight_forces = weight / 2
         for leg, task in self._swing.items():
             p, v = self._robot.get_T_world_frame(leg.foot)[:3, 3], self._velocity(leg.foot, state)
             task.ddtarget_world = _acceleration(
@@ -182,10 +184,6 @@ class _Mode:
         self._position.ddtarget_world = _acceleration(
             self._config.body_position, target.a_world, target.v_world - v, target.p_world - p
         )
-        weight = self._config.orientation_weight / (1.0 + reference.orientation_discount)
-        if not self._stance:
-            weight = min(weight, self._config.flight_weight)
-        self._orientation.configure("orientation", "soft", weight)
         self._orientation.domega_world = R @ _acceleration(
             self._config.body_orientation,
             R.T @ target.dw_world,
@@ -240,24 +238,18 @@ class _Mode:
     def _force_columns(self) -> list[int]:
         return [FORCES.start + 3 * leg + axis for leg in self._stance for axis in range(3)]
 
-    def _force_weight(self, reference: Reference) -> float:
-        return reference.force_weight or self._config.force_weight
-
     def _add_force_reference(self, problem: Problem) -> None:
         if not self._stance:
             return
-        reference, weight = problem.reference, self._model.mass * self._model.gravity
-        count = 3 * len(self._stance)
-        near = forces_near(reference, weight + float(problem.snapshot.payload[1]))
-        scale = np.ones((len(self._stance), 3))
-        if not reference.force_weight:
-            loads = planned_loads(problem.snapshot, reference, weight)
-            scale[:, :2] = np.sqrt(2.0 / loads - 1.0)[:, None]
+        task, reference = problem.source(ForceRegularisation), problem.reference
+        A, b = task.rows(problem.snapshot, reference)
+        ours = A[:, self._force_columns]  # diagonal
+        rest = np.sqrt(np.maximum(2.0 * ours**2 - np.eye(len(b)), 0.0))
         around = placo.Expression()
-        around.A = scale.reshape(-1, 1) * np.eye(count, 18 + count, 18)
-        around.b = -2 * near[self._stance].ravel()
+        around.A = np.hstack([np.zeros((len(b), 18)), rest])
+        around.b = -2 * b
         row = self._solver.problem.add_constraint(around == 0.0)
-        row.configure("soft", self._force_weight(reference) / 2)
+        row.configure("soft", task.weight_at(reference) / 2)
 
     def _add_bounds(self, problem: Problem) -> None:
         columns = [*range(18), *self._force_columns]

@@ -16,7 +16,7 @@ frame (4 x 3). The force of a foot in swing is no unknown: back ends leave its c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -30,6 +30,7 @@ ACCELERATION = slice(0, 18)
 FORCES = slice(18, 30)
 """f in z: N in the world frame, foot by foot."""
 SIZE = 30
+T = TypeVar("T")
 
 
 class Rows(NamedTuple):
@@ -89,6 +90,10 @@ class Problem:
     def stance(self) -> Bool[np.ndarray, "4"]:
         """Feet whose force is an unknown."""
         return self.reference.stance
+
+    def source(self, kind: type[T]) -> T:
+        """The task or constraint of a class."""
+        return next(source for source in self.sources if isinstance(source, kind))
 
     def residuals(self, z: Float[np.ndarray, "30"]) -> tuple[ResidualRow, ...]:
         """How far ``z`` is from every task, and by how much it breaks every constraint."""

@@ -9,12 +9,14 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import ResidualRow
-from go2_wbc.kernels.layout import DECISION
+from go2_wbc.records import layout_of
 from go2_wbc.robot.state import JointCommand
+from go2_wbc.wbc.condensed import Decision
+from go2_wbc.wbc.constraints import torque_map
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, Problem
 from go2_wbc.wbc.tasks import Task
 
-_TAU, _MOTORS = DECISION.start["tau"], DECISION.start["tau_motors"]
+_Z, _TAU, _MOTORS = (layout_of(Decision).slice(part) for part in ("z", "tau", "tau_motors"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,15 +41,12 @@ class WbcSolution:
     is_relaxed: bool = False
 
     @staticmethod
-    def of_row(
-        row: Float[np.ndarray, " size"],
-        solve_time: float,
-        backend: str,
-        formulate: Callable[[], Problem],
+    def of(
+        decision: Decision, solve_time: float, backend: str, formulate: Callable[[], Problem]
     ) -> WbcSolution:
-        """The solution whose arrays ``row`` holds (see ``kernels.layout.DECISION``)."""
-        tau, motors = row[_TAU:_MOTORS], row[_MOTORS:]
-        return WbcSolution(tau, motors, solve_time, backend, formulate, row[:_TAU])
+        """The solution with the arrays of ``decision``."""
+        row = decision.row
+        return WbcSolution(row[_TAU], row[_MOTORS], solve_time, backend, formulate, row[_Z])
 
     @staticmethod
     def from_decision(
@@ -59,10 +58,8 @@ class WbcSolution:
         is_relaxed: bool = False,
     ) -> WbcSolution:
         """Torques from the joint rows of M a + h = tau + J' f; no friction is fed forward."""
-        snapshot = problem.snapshot
-        qdd, forces = z[ACCELERATION], z[FORCES]
-        J_joints = snapshot.J_contacts[:, :, 6:].reshape(12, 12)
-        tau = snapshot.mass_matrix[6:] @ qdd + snapshot.bias[6:] - J_joints.T @ forces
+        A, offset = torque_map(problem.snapshot)
+        tau = A @ z + offset
         return WbcSolution(tau, tau, solve_time, backend, lambda: problem, z, is_relaxed)
 
     @property

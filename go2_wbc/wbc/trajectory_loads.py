@@ -16,9 +16,8 @@ from jaxtyping import Bool, Float, Int
 
 from go2_wbc.algebra.active_set import SOLVED, solve_qp
 from go2_wbc.compilation import kernel, subroutine
-from go2_wbc.kernels.layout import LEAST_PRESSURE
-from go2_wbc.kernels.standing import relative_loads as share_load
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs
+from go2_wbc.wbc.loads import LEAST_PRESSURE, share_load
 
 LegPoints = Float[np.ndarray, "5 3"]
 """Of a leg, in the base frame: points of the axes of hip, thigh and calf, the contact, a foot's

@@ -35,5 +35,5 @@ def test_a_robot_stands_without_the_libraries_of_authoring_and_drawing() -> None
     command = [sys.executable, "-c", SCRIPT]
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)
     loaded = done.stdout.split()
-    assert "go2_wbc.kernels.condensed" in loaded
+    assert "go2_wbc.wbc.condensed" in loaded
     assert not LATER.keys() & set(loaded)

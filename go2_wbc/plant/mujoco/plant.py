@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, unknown_name
-from go2_wbc.lazy import without_collecting
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.commands import DelayedCommands
@@ -30,7 +29,8 @@ from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
-from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
+from go2_wbc.records import packed
+from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel, drive
 from go2_wbc.robot.state import JointCommand, OdometryCovariance, RobotState
 from go2_wbc.world import SENSORS
 
@@ -222,7 +222,7 @@ class MujocoPlant(Plant):
         model, data = self._model, self._data
         total = np.zeros(12)
         for remaining in range(self._substeps, 0, -1):
-            self._drive(accepted, *self._motors, total)
+            drive(accepted, *self._motors, total)
             self._pushes.apply()
             mujoco.mj_step2(model, data)
             if remaining == 1:
@@ -369,13 +369,9 @@ class MujocoPlant(Plant):
 
     def _bind_kernels(self) -> None:
         """Binds the kernels of a tick and the arrays of MuJoCo's that they read and fill."""
-        with without_collecting():
-            from go2_wbc.kernels import motor  # compiled; only who needs it waits
-
-        motors, data, layout = self._motor, self._data, self._layout
-        numbers = np.array([motors.peak, motors.knee_speed, motors.no_load_speed])
+        data, layout = self._data, self._layout
         places = np.array([layout.joint_q, layout.joint_v, layout.motors], dtype=np.int64)
-        self._drive, self._motors = motor.drive, (numbers, places, data.qpos, data.qvel, data.ctrl)
+        self._motors = (packed(self._motor), places, data.qpos, data.qvel, data.ctrl)
         state = (data.qpos, data.qvel, self._R_world_base)
         base = (layout.base_q.start, layout.base_v.start)
         self._read_joints = partial(read_joints, *state, *base, places)

@@ -1,4 +1,4 @@
-"""Friction fed forward: what the model says, within the limits, and the kernel says the same."""
+"""Friction fed forward: what the model says, within the limits."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from go2_wbc.errors import ConfigError
-from go2_wbc.kernels.friction import motor_torques
 from go2_wbc.robot.joint_friction import FrictionFeedForward, JointFriction
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
@@ -67,21 +66,22 @@ def test_a_number_out_of_range_is_refused(wrong: dict[str, object], message: str
         replace(JointFriction(), **wrong)
 
 
-def test_the_kernel_says_what_the_readable_form_says() -> None:
+def test_the_motors_get_torque_and_friction_within_their_line() -> None:
     rng = np.random.default_rng(31)
     feed_forward = FrictionFeedForward(ODD, MODEL.motor)
     saturated = 0
     for _ in range(300):
         snapshot = MODEL.snapshot(turning(random_state(rng), rng))
-        z, tau = rng.normal(scale=20.0, size=30), rng.normal(scale=20.0, size=12)
-        readable = feed_forward.motor_torques(snapshot, z[:18], tau)
-        motors = np.empty(12)
-        motor_torques(snapshot.row, z, tau, feed_forward.numbers, motors)
-        np.testing.assert_allclose(motors, readable, atol=ROUNDING)
-        lower, upper = MODEL.motor.limits(snapshot.state.joint_velocities)
-        assert ((lower <= readable) & (readable <= upper)).all()
+        qdd, tau = rng.normal(scale=20.0, size=18), rng.normal(scale=20.0, size=12)
+        v = snapshot.state.joint_velocities
+        soon = v + ODD.lookahead * qdd[6:]
+        friction = ODD.dry * np.tanh(soon / ODD.transition) + ODD.viscous * v
+        lower, upper = MODEL.motor.limits(v)
+        motors = feed_forward.motor_torques(snapshot, qdd, tau)
+        np.testing.assert_allclose(motors, np.clip(tau + friction, lower, upper), atol=ROUNDING)
+        np.testing.assert_allclose(ODD.torque(v, qdd[6:]), friction, atol=ROUNDING)
         is_slowed = upper - lower < 2.0 * MODEL.torque_limits
-        saturated += int(is_slowed[(readable == lower) | (readable == upper)].sum())
+        saturated += int(is_slowed[(motors == lower) | (motors == upper)].sum())
     assert saturated > 100, "or the line is not tested"
 
 

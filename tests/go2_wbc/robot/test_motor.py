@@ -1,4 +1,7 @@
-"""The motors' line: continuous, falling, mirrored; a braking motor keeps its peak."""
+"""The motors' line: continuous, falling, mirrored; a braking motor keeps its peak.
+
+What plants and telemetry make of it in every tick is held to numpy's interpolation of the line.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from go2_wbc.errors import ConfigError
+from go2_wbc.records import packed
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.motor import KNEE_SHARE, LEAST_SHARE, MotorModel
+from go2_wbc.robot.motor import KNEE_SHARE, LEAST_SHARE, MOTORS, MotorModel, drive, note_peaks
 from go2_wbc.robot.state import JointCommand
 
 MODEL, IDEAL = RobotModel(), RobotModel(motor="ideal")
@@ -18,7 +22,34 @@ SPEEDS = np.linspace(-1.3, 1.3, 2601)[:, None] * MODEL.speed_limits
 """(n, 12) velocities of every joint, beyond the speed without load on both sides."""
 ROUNDING = 1e-9
 
+COUNT = 1000
+EXACT = 1e-12  # N m; sums in another order
+
 shares = st.floats(-2.0, 2.0)
+
+
+def line(motor: MotorModel, v: np.ndarray) -> np.ndarray:
+    """Greatest torques at velocities ``v`` (n, 12), by interpolation between the line's corners."""
+    most = np.tile(motor.peak, (len(v), 1))
+    for n in np.flatnonzero(np.isfinite(motor.no_load_speed)):
+        corners = np.array([motor.knee_speed[n], motor.no_load_speed[n]])
+        most[:, n] = np.interp(v[:, n], corners, np.array([motor.peak[n], 0.0]))
+    return most
+
+
+@pytest.mark.parametrize("name", MOTORS)
+def test_the_limits_are_the_line_between_its_corners(name: str) -> None:
+    motor = RobotModel(motor=name).motor
+    lower, upper = motor.limits(SPEEDS)
+    np.testing.assert_allclose(upper, line(motor, SPEEDS), atol=EXACT)
+    np.testing.assert_allclose(lower, -line(motor, -SPEEDS), atol=EXACT)
+
+
+def test_limits_have_the_shape_of_the_velocities() -> None:
+    v = SPEEDS[:24].reshape(2, 3, 4, 12)
+    lower, upper = LINE.limits(v)
+    assert lower.shape == upper.shape == v.shape
+    np.testing.assert_array_equal(upper[1, 2, 3], LINE.limits(SPEEDS[23])[1])
 
 
 @given(shares)
@@ -118,3 +149,43 @@ def test_an_unknown_motor_is_refused_with_the_names_that_exist() -> None:
         MotorModel.named("perfect", MODEL.description)
     with pytest.raises(ConfigError, match="valid: ideal, torque-speed"):
         RobotModel(motor="perfect")
+
+
+# --- in every tick --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", MOTORS)
+def test_a_plant_is_driven_by_the_servos_torque_cut_to_the_line(name: str) -> None:
+    motor, rng = RobotModel(motor=name).motor, np.random.default_rng(31)
+    cut = 0
+    for _ in range(COUNT):
+        places = np.array([rng.permutation(20)[:12] for _ in range(3)])
+        qpos, qvel, ctrl = rng.normal(size=20), 15.0 * rng.normal(size=20), np.zeros(20)
+        rows = rng.normal(size=(5, 12)) * np.array([[30.0], [1.0], [5.0], [20.0], [2.0]])
+        total = rng.normal(size=12)
+        before = total.copy()
+        drive(rows, packed(motor), places, qpos, qvel, ctrl, total)
+        q, v = qpos[places[0]], qvel[places[1]]
+        tau, q_des, v_des, kp, kd = rows
+        most, least = line(motor, v[None])[0], -line(motor, -v[None])[0]
+        asked = tau + kp * (q_des - q) + kd * (v_des - v)
+        expected = np.clip(asked, least, most)
+        np.testing.assert_allclose(ctrl[places[2]], expected, atol=EXACT, rtol=0)
+        np.testing.assert_allclose(total, before + expected, atol=EXACT, rtol=0)
+        np.testing.assert_allclose(motor.torque(JointCommand(*rows), q, v), expected, atol=EXACT)
+        assert np.count_nonzero(ctrl) == np.count_nonzero(expected)
+        cut += bool(((expected != asked) & (most - least > 0.0)).any())
+    assert cut > COUNT / 10
+
+
+@pytest.mark.parametrize("name", MOTORS)
+def test_peaks_are_those_of_all_ticks_so_far(name: str) -> None:
+    motor, rng = RobotModel(motor=name).motor, np.random.default_rng(32)
+    tau, v, before = (size * rng.normal(size=(COUNT, 12)) for size in (15.0, 12.0, 12.0))
+    peaks = np.zeros((3, 12))
+    for rows in zip(tau, v, before, strict=True):
+        note_peaks(*rows, packed(motor), peaks)
+    most = np.where(tau < 0.0, line(motor, -before), line(motor, before))
+    shares = np.abs(tau) / np.maximum(most, LEAST_SHARE * motor.peak)
+    expected = [np.abs(tau), np.abs(v), shares]
+    np.testing.assert_allclose(peaks, [rows.max(axis=0) for rows in expected], rtol=EXACT)

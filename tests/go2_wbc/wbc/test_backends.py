@@ -14,13 +14,13 @@ from go2_wbc.reference import LegTask, Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.backends import (
-    SINGULAR_DETERMINANT,
     CondensedBackend,
     FullBackend,
     eliminate_equalities,
 )
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.elimination import SINGULAR_DETERMINANT
 from go2_wbc.wbc.problem import FORCES, Problem
 from go2_wbc.wbc.solution import WbcSolution
 from go2_wbc.wbc.solvers import SOLVERS

@@ -17,7 +17,7 @@ from go2_wbc.wbc.constraints import (
     JointLimits,
     StanceFeetStill,
     TorqueLimits,
-    pyramid_in_cone,
+    friction_pyramid,
     torque_map,
 )
 from tests.engine_helpers import (
@@ -145,7 +145,10 @@ def test_a_force_meets_the_bounds_exactly_if_it_lies_in_the_pyramid(
 def test_a_pyramid_in_the_cone_allows_most_along_the_planned_force(
     planned: tuple[float, float], direction: float
 ) -> None:
-    sides = pyramid_in_cone(MU, np.array([*planned, 100.0]))[:4]
+    f = np.array([*planned, 100.0])
+    reference = replace(holding_reference(SNAPSHOT), f_world_feet=np.tile(f, (4, 1)))
+    cone = FrictionPyramid(MU, keeps_cone=True)
+    sides = cone.bounds(SNAPSHOT, replace(reference, force_weight=0.01)).C[:4, 18:21]
     f = np.array([np.cos(direction), np.sin(direction)])
     most = (-sides[:, 2]).min() / (sides[:, :2] @ f).max()
     assert MU / np.sqrt(2.0) - EXACT <= most <= MU + EXACT
@@ -161,9 +164,9 @@ def test_only_planned_forces_are_kept_in_the_cone() -> None:
     square, cone = FrictionPyramid(MU), FrictionPyramid(MU, keeps_cone=True)
     same = square.bounds(SNAPSHOT, planned).C
     np.testing.assert_array_equal(cone.bounds(SNAPSHOT, plain).C, same)
+    np.testing.assert_array_equal(same[:5, 18:21], friction_pyramid(MU))
     other = cone.bounds(SNAPSHOT, planned).C
-    np.testing.assert_array_equal(other[:4, 18:21], pyramid_in_cone(MU, f[0])[:4])
-    assert np.abs(other - same).max() > 0.1
+    assert (np.abs(other - same).reshape(4, 5, 30).max(axis=(1, 2)) > 0.1).all()
 
 
 # --- joint limits ---------------------------------------------------------------------------------

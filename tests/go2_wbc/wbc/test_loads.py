@@ -9,13 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from go2_wbc.kernels.layout import LEAST_LOAD, MOST_LOAD
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.reference import Reference
+from go2_wbc.reference import Reference, Target
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.controller import WholeBodyController
-from go2_wbc.wbc.loads import planned_loads, relative_loads
+from go2_wbc.wbc.loads import LEAST_LOAD, MOST_LOAD, plan_loads, share_load
 from tests.engine_helpers import JO, ST, holding_reference, standing_q, state_of
 
 MODEL = RobotModel()
@@ -27,6 +26,12 @@ EVEN_USE = 1.4  # most over least use of friction; measured 1.3, and 5.2 where f
 AHEAD, ASIDE = 0.03, -0.04  # [m] by which the CoM is off the middle of the feet, about
 PUSH = 1.5  # [m/s^2]
 HEIGHT = 0.27  # [m] of the hips over the feet
+
+
+def relative_loads(places: np.ndarray, point: np.ndarray, most: np.ndarray) -> np.ndarray:
+    loads = np.empty(len(places))
+    share_load(places, point[0], point[1], most, loads)
+    return loads
 
 
 @given(x=st.floats(-0.05, 0.05), y=st.floats(-0.04, 0.04))
@@ -82,5 +87,6 @@ def test_all_feet_use_much_the_same_part_of_their_friction(backend: str, legs: t
 def test_the_planned_loads_are_those_that_the_controller_gives() -> None:
     snapshot, reference = leaning((ST, ST, ST, ST))
     normal = WholeBodyController(MODEL).solve(snapshot, reference).forces[:, 2]
-    loads = planned_loads(snapshot, reference, WEIGHT)
+    loads = np.empty(4)
+    plan_loads(snapshot, Target.of(reference.row), WEIGHT, loads)
     np.testing.assert_allclose(loads, normal / normal.mean(), atol=0.1)

@@ -14,9 +14,9 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.wbc.backends import SINGULAR_DETERMINANT
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.elimination import SINGULAR_DETERMINANT
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.solution import WbcSolution
 from go2_wbc.wbc.tasks import Gains, Task
