@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.contacts import ContactSchedule
 from go2_wbc.errors import CommandError
-from go2_wbc.kernels.layout import REFERENCE
+from go2_wbc.records import Record
 from go2_wbc.robot.rotations import yaw_rotation
 
 LEAST_WEIGHT, MOST_WEIGHT = 1e-6, 1e2
@@ -46,9 +46,45 @@ class LegTask(IntEnum):
     JOINTS = 2
 
 
+class Target(Record):
+    """The numbers of a ``Reference``, one after the other, as kernels read and fill them.
+
+    Attributes:
+        is_com: whether position means the CoM, else the origin of the base.
+        legs: ``LegTask`` of each leg.
+
+    All others as in ``Reference`` and its ``BodyTarget``.
+    """
+
+    is_com: bool
+    p_world: Float[np.ndarray, "3"]
+    v_world: Float[np.ndarray, "3"]
+    a_world: Float[np.ndarray, "3"]
+    R_world_base: Float[np.ndarray, "3 3"]
+    w_world: Float[np.ndarray, "3"]
+    dw_world: Float[np.ndarray, "3"]
+    legs: Float[np.ndarray, "4"]
+    normal_force_min: Float[np.ndarray, "4"]
+    normal_force_max: Float[np.ndarray, "4"]
+    p_world_feet: Float[np.ndarray, "4 3"]
+    v_world_feet: Float[np.ndarray, "4 3"]
+    a_world_feet: Float[np.ndarray, "4 3"]
+    q_joints: Float[np.ndarray, "12"]
+    v_joints: Float[np.ndarray, "12"]
+    a_joints: Float[np.ndarray, "12"]
+    f_world_feet: Float[np.ndarray, "4 3"]
+    force_weight: float
+    friction: float
+    orientation_discount: float
+
+
 _LEG_TASKS = tuple(LegTask)
 _STANCE = int(LegTask.STANCE)  # a number: looking an enumeration's members up takes longer
 _BODY_PARTS = ("p_world", "v_world", "a_world", "R_world_base", "w_world", "dw_world")
+_ARRAYS = (
+    *("normal_force_min", "normal_force_max", "p_world_feet", "v_world_feet", "a_world_feet"),
+    *("q_joints", "v_joints", "a_joints", "f_world_feet"),
+)
 _NUMBERS = ("force_weight", "friction", "orientation_discount")
 
 
@@ -134,7 +170,7 @@ class Reference:
 
     @staticmethod
     def of_row(row: Float[np.ndarray, " size"]) -> Reference:
-        """The reference whose numbers ``row`` holds (see ``kernels.layout.REFERENCE``).
+        """The reference whose numbers ``row`` holds (see ``Target``).
 
         Each array is made at its first use: a tick needs few of them outside the kernels.
         """
@@ -153,17 +189,16 @@ class Reference:
             return value
 
     def _unpacked(self, name: str) -> object:
-        view = partial(REFERENCE.view, self.row)
+        target = Target.of(self.row)
         if name == "body":
-            point = _COM if view("is_com") else _BASE
-            return BodyTarget(point, *(view(part) for part in _BODY_PARTS))
+            point = _COM if target.is_com else _BASE
+            return BodyTarget(point, *(getattr(target, part) for part in _BODY_PARTS))
         if name == "stance":
-            return view("legs") == _STANCE
+            return target.legs == _STANCE
         if name == "legs":
-            return tuple(_LEG_TASKS[int(task)] for task in view("legs").tolist())
-        if name in _NUMBERS:
-            return float(view(name))
-        return view(name)
+            return tuple(_LEG_TASKS[int(task)] for task in target.legs.tolist())
+        value = getattr(target, name)
+        return float(value) if name in _NUMBERS else value
 
     @property
     def row(self) -> Float[np.ndarray, " size"]:
@@ -179,33 +214,17 @@ class Reference:
                 raise CommandError(
                     f"reference: legs must be four of {list(LegTask)}, got {self.legs!r}"
                 )
-            values = [
-                body.point is TrackedPoint.COM,
-                body.p_world,
-                body.v_world,
-                body.a_world,
-                body.R_world_base,
-                body.w_world,
-                body.dw_world,
-                self.legs,
-                self.normal_force_min,
-                self.normal_force_max,
-                self.p_world_feet,
-                self.v_world_feet,
-                self.a_world_feet,
-                self.q_joints,
-                self.v_joints,
-                self.a_joints,
-                self.f_world_feet,
-                self.force_weight,
-                self.friction,
-                self.orientation_discount,
-            ]
             try:
-                row = REFERENCE.pack(values)
-            except ValueError as error:
+                target = Target(
+                    is_com=body.point is TrackedPoint.COM,
+                    legs=self.legs,
+                    **{name: getattr(body, name) for name in _BODY_PARTS},
+                    **{name: getattr(self, name) for name in _ARRAYS + _NUMBERS},
+                )
+            except (TypeError, ValueError) as error:
                 raise CommandError(f"reference: {error}") from error
-            weight = float(REFERENCE.view(row, "force_weight"))
+            row = target.row
+            weight = float(target.force_weight)
             if np.isfinite(weight) and weight != 0.0 and not LEAST_WEIGHT <= weight <= MOST_WEIGHT:
                 raise CommandError(
                     f"reference: force_weight must be 0 or {LEAST_WEIGHT:g} to {MOST_WEIGHT:g}, "

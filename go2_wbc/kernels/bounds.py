@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.kernels.active_set import VIOLATION
+from go2_wbc.algebra.active_set import VIOLATION
 from go2_wbc.kernels.compilation import subroutine
 from go2_wbc.kernels.elimination import STANCE
 from go2_wbc.kernels.layout import PROGRAM, REFERENCE, SNAPSHOT

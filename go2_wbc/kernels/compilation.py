@@ -211,7 +211,7 @@ def cache_root() -> Path:
 def _fingerprint() -> str:
     """A hash of all that machine code depends on."""
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    for source in sorted(Path(__file__).parent.parent.rglob("*.py")):
         digest.update(source.read_bytes())
     processor = llvmlite.binding.get_host_cpu_name()
     versions = (platform.python_version(), numba.__version__, np.__version__, processor)

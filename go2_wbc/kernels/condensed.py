@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.kernels.active_set import SINGULAR, SOLVED, constrain, factorise, solve_factorised
+from go2_wbc.algebra.active_set import SINGULAR, SOLVED, constrain, factorise, solve_factorised
 from go2_wbc.kernels.bounds import MOST_ROWS, are_met, bound_forces, bound_joints
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.elimination import decide, eliminate, expand

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.algebra.linear import solve_linear
+from go2_wbc.algebra.vectors import along, cross, plus_scaled
 from go2_wbc.kernels.compilation import subroutine
 from go2_wbc.kernels.layout import PROGRAM, REFERENCE, SNAPSHOT
-from go2_wbc.kernels.vectors import along, cross, plus_scaled, vector
+from go2_wbc.kernels.vectors import vector
 
 STANCE, SWING, JOINTS = 0, 1, 2
 """The values of ``reference.LegTask``."""
@@ -48,32 +50,6 @@ def stance_leg(snapshot, program, leg, legs_map):
             legs_map[first + i, k] = -moved[i] / determinant
     for i in range(3):
         legs_map[first + i, 6] = -wanted[i] / determinant
-    return True
-
-
-@subroutine("b1(f8[:,::1], i8)")
-def solve_linear(A, n):
-    """Gauss-Jordan with pivoting: the columns from n on become (A[:, :n])^-1 A[:, n:]."""
-    columns = A.shape[1]
-    for j in range(n):
-        pivot = j
-        for i in range(j + 1, n):
-            if abs(A[i, j]) > abs(A[pivot, j]):
-                pivot = i
-        if not abs(A[pivot, j]) > 0.0:
-            return False
-        if pivot != j:
-            for k in range(j, columns):
-                A[j, k], A[pivot, k] = A[pivot, k], A[j, k]
-        inverse = 1.0 / A[j, j]
-        for k in range(j + 1, columns):
-            A[j, k] *= inverse
-        for i in range(n):
-            if i == j:
-                continue
-            factor = A[i, j]
-            for k in range(j + 1, columns):
-                A[i, k] -= factor * A[j, k]
     return True
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.algebra.vectors import rotation_of
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.filtering import (
     E_FEET,
@@ -25,7 +26,6 @@ from go2_wbc.kernels.filtering import (
     take_in_one,
     turn_world_about_robot,
 )
-from go2_wbc.kernels.vectors import rotation_of
 
 MEMORY, READING = 26, 35
 """Lengths: of what is kept from tick to tick (the time [s] at rest, the ages [s] of the feet's

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.algebra.vectors import rotation_of
 from go2_wbc.kernels.compilation import subroutine
-from go2_wbc.kernels.vectors import rotation_of
 
 STATE, ERROR = 28, 27
 QUATERNION, GYRO_BIAS, FORCE_BIAS, FEET = 6, 10, 13, 16

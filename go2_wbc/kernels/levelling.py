@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.algebra.vectors import cross
 from go2_wbc.kernels.compilation import subroutine
 from go2_wbc.kernels.layout import LOCOMOTION, PLANNER, REFERENCE, SNAPSHOT
 from go2_wbc.kernels.playing import exp_rotation
-from go2_wbc.kernels.vectors import cross
 
 _OFFSET, _STEPPING = PLANNER.start["lean_offset"], PLANNER.start["is_stepping"]
 _NUMBERS, _R = LOCOMOTION.start["levelling"], SNAPSHOT.start["R_world_base"]

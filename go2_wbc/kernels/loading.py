@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from go2_wbc import compilation
+
 KERNELS = (
     "condensed",
     "estimation",
@@ -24,5 +26,6 @@ KERNELS = (
 
 def load_kernels() -> None:
     """Compile every kernel, or load it: half a second, or about 20 s the first time."""
+    compilation.load_kernels()
     for name in KERNELS:
         import_module(f"go2_wbc.kernels.{name}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.kernels.active_set import SOLVED, solve_qp
+from go2_wbc.algebra.active_set import SOLVED, solve_qp
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.layout import LEAST_PRESSURE
 from go2_wbc.kernels.standing import relative_loads

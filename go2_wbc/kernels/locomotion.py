@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.algebra.vectors import cross
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.contact import follow_contact, loaded_time
 from go2_wbc.kernels.ground import (
@@ -24,7 +25,6 @@ from go2_wbc.kernels.levelling import level
 from go2_wbc.kernels.pose import advance_pose, lean_rotation, pose_turn
 from go2_wbc.kernels.slip import observe_slip
 from go2_wbc.kernels.swing import begin_swing, resume_swing, swing
-from go2_wbc.kernels.vectors import cross
 
 TIE = 1e-9
 """As ``contacts.TIE``."""

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.kernels.active_set import SINGULAR, constrain, factorise, solve_factorised
+from go2_wbc.algebra.active_set import SINGULAR, constrain, factorise, solve_factorised
+from go2_wbc.algebra.linear import solve_linear
 from go2_wbc.kernels.compilation import kernel, subroutine
-from go2_wbc.kernels.elimination import solve_linear
 from go2_wbc.kernels.layout import MPC, MPC_NODES
 
 _C = MPC.start

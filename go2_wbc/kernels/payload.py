@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.algebra.linear import solve_linear
+from go2_wbc.algebra.vectors import cross, plus, plus_scaled
 from go2_wbc.kernels.compilation import kernel, subroutine
-from go2_wbc.kernels.elimination import solve_linear
 from go2_wbc.kernels.layout import FEELING, FELT, FRICTION, SNAPSHOT
-from go2_wbc.kernels.vectors import V3, cross, plus, plus_scaled, put, vector
+from go2_wbc.kernels.vectors import V3, put, vector
 
 _S, _F, _C = SNAPSHOT.start, FRICTION.start, FEELING.start
 _Q, _V, _R, _M, _H = (_S[n] for n in ("q", "v", "R_world_base", "mass_matrix", "bias"))

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.algebra.vectors import rotation_of
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.landing import JOINTS, STANCE, TIE, land
 from go2_wbc.kernels.layout import CORRECTION, PLAN_CURVES, PLAYBACK, REFERENCE, SNAPSHOT
 from go2_wbc.kernels.supervision import sag_and_lean
-from go2_wbc.kernels.vectors import rotation_of
 
 _N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLAYBACK.start, CORRECTION.start
 _Q, _R, _P_COM = _N["q"], _N["R_world_base"], _N["p_world_com"]

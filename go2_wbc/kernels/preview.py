@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from go2_wbc.kernels.active_set import SOLVED
+from go2_wbc.algebra.active_set import SOLVED
+from go2_wbc.algebra.linear import solve_linear
+from go2_wbc.algebra.vectors import cross, plus
 from go2_wbc.kernels.compilation import kernel, subroutine
-from go2_wbc.kernels.elimination import STANCE, solve_linear
+from go2_wbc.kernels.elimination import STANCE
 from go2_wbc.kernels.ground import ground_at, tilt
 from go2_wbc.kernels.layout import (
     FORCES,
@@ -25,7 +27,7 @@ from go2_wbc.kernels.layout import (
 from go2_wbc.kernels.locomotion import TIE, foothold, nominal_feet
 from go2_wbc.kernels.mpc import solve_mpc
 from go2_wbc.kernels.pose import advance_pose, pose_turn
-from go2_wbc.kernels.vectors import cross, plus, vector
+from go2_wbc.kernels.vectors import vector
 
 _N, _T, _S, _C = SNAPSHOT.start, REFERENCE.start, PLANNER.start, LOCOMOTION.start
 _Q, _V, _R, _M = (_N[n] for n in ("q", "v", "R_world_base", "mass_matrix"))

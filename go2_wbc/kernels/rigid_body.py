@@ -15,21 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.algebra.vectors import about_x, about_y, along, cross, plus, plus_scaled, rotation_of
 from go2_wbc.kernels.compilation import kernel, subroutine
 from go2_wbc.kernels.layout import ROBOT, SNAPSHOT
-from go2_wbc.kernels.vectors import (
-    AXES,
-    V3,
-    about_x,
-    about_y,
-    along,
-    cross,
-    plus,
-    plus_scaled,
-    put,
-    rotation_of,
-    vector,
-)
+from go2_wbc.kernels.vectors import AXES, V3, put, vector
 
 _R, _M, _H = (SNAPSHOT.start[n] for n in ("R_world_base", "mass_matrix", "bias"))
 _P_COM, _V_COM, _J_COM, _DRIFT_COM = (

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.algebra.vectors import cross, dot, plus_scaled
 from go2_wbc.kernels.compilation import subroutine
 from go2_wbc.kernels.layout import LOCOMOTION, PLANNER, SNAPSHOT
-from go2_wbc.kernels.vectors import cross, dot, plus_scaled
 
 _N = SNAPSHOT.start
 _V_CONTACTS, _J_CONTACTS, _BIAS = (_N[n] for n in ("v_world_contacts", "J_contacts", "bias"))

@@ -70,7 +70,7 @@ class ForcePlanner:
 
     def __init__(self, model: RobotModel, config: MpcConfig) -> None:
         """Prepare for ``model``."""
-        from go2_wbc.kernels.active_set import SOLVED
+        from go2_wbc.algebra.active_set import SOLVED
         from go2_wbc.kernels.mpc import solve_mpc
 
         self._solve, self._solved = solve_mpc, SOLVED

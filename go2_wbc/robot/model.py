@@ -18,8 +18,9 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from go2_wbc.errors import DescriptionError
-from go2_wbc.kernels.layout import ROBOT, SNAPSHOT
+from go2_wbc.kernels.layout import ROBOT
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
+from go2_wbc.records import layout_of
 from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
@@ -123,7 +124,7 @@ class RobotModel:
             return self.readable_snapshot(state, payload)
         if payload.mass:
             numbers = self._loaded(numbers, payload)
-        row = np.empty(SNAPSHOT.size)
+        row = np.empty(_SNAPSHOT_SIZE)
         self._fill_snapshot(state.q, state.v, numbers, row)
         return Snapshot.of_row(state, row)
 
@@ -234,6 +235,7 @@ def _about_joint(inertia: pin.Inertia) -> Float[np.ndarray, "10"]:
     return np.array([mass, *(mass * c), *moved[np.triu_indices(3)]])
 
 
+_SNAPSHOT_SIZE = layout_of(Snapshot).size
 _PARENTS = [0, 0, 1, 2, 3, 1, 5, 6, 1, 8, 9, 1, 11, 12]
 """The joint before each, in Pinocchio's order: universe, base, and four legs of three."""
 _CALVES = [4, 7, 10, 13]

@@ -9,27 +9,21 @@ to the material point.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import partial
-from typing import TYPE_CHECKING
-
 import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import CommandError
-from go2_wbc.kernels.layout import SNAPSHOT
+from go2_wbc.records import Record
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.state import RobotState
 
-_set = object.__setattr__  # of a frozen value that is being made
 
-
-@dataclass(frozen=True, slots=True)
-class Snapshot:
+class Snapshot(Record):
     """State and dynamics of one tick. Accelerations use Pinocchio's spatial base acceleration.
 
     Attributes:
         state: the measured state that everything here belongs to.
+        q, v: its configuration and velocity.
         R_world_base: base orientation.
         mass_matrix: M(q) with rotor inertia.
         bias: h(q, v): Coriolis, centrifugal and gravity terms [N, N m].
@@ -44,7 +38,11 @@ class Snapshot:
         com_shift: by which it moves the CoM [m] in the world.
     """
 
+    __slots__ = ("state",)
+
     state: RobotState
+    q: Float[np.ndarray, "19"]
+    v: Float[np.ndarray, "18"]
     R_world_base: Float[np.ndarray, "3 3"]
     mass_matrix: Float[np.ndarray, "18 18"]
     bias: Float[np.ndarray, "18"]
@@ -59,47 +57,39 @@ class Snapshot:
     J_contacts: Float[np.ndarray, "4 3 18"]
     drift_contacts: Float[np.ndarray, "4 3"]
     v_world_contacts: Float[np.ndarray, "4 3"]
-    payload: Float[np.ndarray, "2"] = field(default_factory=partial(np.zeros, 2))
-    com_shift: Float[np.ndarray, "3"] = field(default_factory=partial(np.zeros, 3))
-    _row: Float[np.ndarray, " size"] | None = field(init=False, repr=False, default=None)
+    payload: Float[np.ndarray, "2"]
+    com_shift: Float[np.ndarray, "3"]
 
-    @staticmethod
-    def of_row(state: RobotState, row: Float[np.ndarray, " size"]) -> Snapshot:
-        """The snapshot whose arrays ``row`` holds (see ``kernels.layout.SNAPSHOT``).
-
-        Each is made at its first use: a tick needs few of them outside the kernels.
-        """
-        snapshot = object.__new__(Snapshot)
-        _set(snapshot, "state", state)
-        _set(snapshot, "_row", row)
-        return snapshot
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Float[np.ndarray, "..."]:
-            """An array of ``of_row`` that nobody has asked for yet."""
-            if name not in Snapshot.__slots__ or name == "_row":
-                raise AttributeError(f"a Snapshot has no attribute {name!r}")
-            view = SNAPSHOT.view(self._row, name)
-            _set(self, name, view)
-            return view
-
-    @property
-    def row(self) -> Float[np.ndarray, " size"]:
-        """The state's q and v and every array, one after the other, for the kernels.
+    def __init__(self, state: RobotState, **parts: Float[np.ndarray, "..."]) -> None:
+        """From the ``state`` and the other parts by name; what is left out is 0.
 
         Raises:
             CommandError: for an array of another shape than it should have.
         """
-        row = self._row
-        if row is None:
-            arrays = [getattr(self, name) for name in list(SNAPSHOT.start)[2:]]
-            try:
-                row = SNAPSHOT.pack([self.state.q, self.state.v, *arrays])
-            except ValueError as error:
-                raise CommandError(f"snapshot: {error}") from error
-            _set(self, "_row", row)
-        return row
+        try:
+            super().__init__(q=state.q, v=state.v, **parts)
+        except (ValueError, TypeError) as error:
+            raise CommandError(f"snapshot: {error}") from error
+        object.__setattr__(self, "state", state)
+
+    @staticmethod
+    def of_row(state: RobotState, row: Float[np.ndarray, " size"]) -> Snapshot:
+        """The snapshot of ``state`` whose numbers lie in ``row``."""
+        snapshot = Snapshot.of(row)
+        object.__setattr__(snapshot, "state", state)
+        return snapshot
+
+    def replaced(
+        self, state: RobotState | None = None, **parts: Float[np.ndarray, "..."]
+    ) -> Snapshot:
+        """A copy with another state, or other parts by name."""
+        own = {
+            name: getattr(self, name) for name in Snapshot.part_names() if name not in ("q", "v")
+        }
+        return Snapshot(state or self.state, **(own | parts))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return Snapshot.of_row, (self.state, self.row)
 
     @staticmethod
     def build(
@@ -134,7 +124,7 @@ class Snapshot:
         drift_contacts[:, 0] -= radius * drift_feet[:, 4]
         drift_contacts[:, 1] += radius * drift_feet[:, 3]
         return Snapshot(
-            state=state,
+            state,
             R_world_base=R,
             mass_matrix=M,
             bias=h,

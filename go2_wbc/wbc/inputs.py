@@ -14,8 +14,8 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import ConfigError, QpInfeasible
-from go2_wbc.kernels.layout import REFERENCE, SNAPSHOT
-from go2_wbc.reference import BodyTarget, Reference
+from go2_wbc.records import layout_of
+from go2_wbc.reference import BodyTarget, Reference, Target
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import is_finite_number
 from go2_wbc.wbc.problem import SIZE, Problem, Rows, Source
@@ -50,11 +50,11 @@ def check_inputs(snapshot: Snapshot, reference: Reference, solver: str) -> None:
         CommandError: for an array that has another shape than it should, or holds no numbers.
     """
     for index in _not_finite(snapshot.row):
-        name, place = SNAPSHOT.place(index)
+        name, place = layout_of(Snapshot).place(index)
         owner = "snapshot.state" if name in _IN_STATE else "snapshot"
         raise _refused(solver, f"{owner}.{name}{place}", snapshot.row[index])
     for index in _not_finite(reference.row):
-        name, place = REFERENCE.place(index)
+        name, place = layout_of(Target).place(index)
         value = reference.row[index]
         is_open = {"normal_force_min": -np.inf, "normal_force_max": np.inf}.get(name) == value
         if not is_open:

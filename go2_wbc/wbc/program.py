@@ -52,7 +52,7 @@ class Program:
         friction: FrictionFeedForward,
     ) -> None:
         """Read the numbers of the built-in tasks, which come first, and of the constraints."""
-        from go2_wbc.kernels.active_set import SOLVED
+        from go2_wbc.algebra.active_set import SOLVED
         from go2_wbc.kernels.condensed import solve_condensed
 
         self._solve, self._solved = solve_condensed, SOLVED

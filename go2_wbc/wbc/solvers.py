@@ -147,7 +147,7 @@ def solve_dense_qp(qp: DenseQp, solver: str) -> QpSolution:
 
 
 def _solve_by_active_set(qp: DenseQp) -> QpSolution:
-    from go2_wbc.kernels.active_set import MESSAGES, SOLVED, solve_qp
+    from go2_wbc.algebra.active_set import MESSAGES, SOLVED, solve_qp
 
     n, k = len(qp.g), 0 if qp.e is None else len(qp.e)
     E, e = (np.empty((0, n)), np.empty(0)) if qp.E is None or qp.e is None else (qp.E, qp.e)

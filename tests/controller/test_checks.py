@@ -74,7 +74,7 @@ def test_a_robot_that_still_moves_is_in_no_posture(posture: Posture) -> None:
 def test_a_foot_in_the_air_is_no_posture_on_four_feet(posture: Posture) -> None:
     snapshot = at_rest(posture)
     touching = np.array([True, True, False, True])
-    raised = replace(snapshot, state=replace(snapshot.state, feet_in_contact=touching))
+    raised = snapshot.replaced(state=replace(snapshot.state, feet_in_contact=touching))
     assert not CHECKS[posture](raised)
 
 

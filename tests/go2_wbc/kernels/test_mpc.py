@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from go2_wbc.kernels.active_set import SINGULAR, SOLVED
+from go2_wbc.algebra.active_set import SINGULAR, SOLVED
 from go2_wbc.kernels.layout import MPC_NODES
 from go2_wbc.kernels.mpc import solve_mpc
 from go2_wbc.planning.mpc import Horizon, MpcConfig, formulate

@@ -127,7 +127,7 @@ def test_the_comparison_notices_a_wrong_number() -> None:
     model = RobotModel()
     snapshot = model.snapshot(random_state(np.random.default_rng(0)))
     drift = snapshot.drift_contacts + 1e-9
-    assert difference(snapshot, replace(snapshot, drift_contacts=drift)) > ROUNDING
+    assert difference(snapshot, snapshot.replaced(drift_contacts=drift)) > ROUNDING
 
 
 def test_a_snapshot_stays_as_it_was_when_the_next_one_is_made() -> None:
@@ -151,7 +151,7 @@ def test_states_of_any_memory_layout_are_taken() -> None:
 
 def test_the_row_follows_an_array_that_was_replaced() -> None:
     snapshot = RobotModel().snapshot(random_state(np.random.default_rng(4)))
-    lifted = replace(snapshot, p_world_feet=snapshot.p_world_feet + 1.0)
+    lifted = snapshot.replaced(p_world_feet=snapshot.p_world_feet + 1.0)
     start = SNAPSHOT.start["p_world_feet"]
     assert lifted.row[start] == snapshot.row[start] + 1.0
 

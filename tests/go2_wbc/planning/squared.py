@@ -24,12 +24,12 @@ def resting(time: float = 0.0, yaw: float = 0.0) -> Snapshot:
     feet = MODEL.p_base_feet_nominal @ yaw_rotation(yaw).T
     feet[:, 2] = MODEL.foot_radius
     com = np.array([*feet[:, :2].mean(axis=0), CONFIG.height_on_feet])
-    return replace(snapshot, p_world_feet=feet, p_world_com=com)
+    return snapshot.replaced(p_world_feet=feet, p_world_com=com)
 
 
 def at(snapshot: Snapshot, time: float) -> Snapshot:
-    return replace(snapshot, state=replace(snapshot.state, time=time))
+    return snapshot.replaced(state=replace(snapshot.state, time=time))
 
 
 def moving(snapshot: Snapshot, v_world: np.ndarray) -> Snapshot:
-    return replace(snapshot, v_world_com=v_world)
+    return snapshot.replaced(v_world_com=v_world)

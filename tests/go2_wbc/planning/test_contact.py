@@ -24,7 +24,7 @@ def feet(until: float, *, touching: bool, above: float) -> tuple[FootContacts, C
     state = replace(SNAPSHOT.state, feet_in_contact=np.full(4, touching))
     for tick in range(1, round(until / TICK) + 1):
         phase = TROT.at(tick * TICK)
-        contacts.update(replace(SNAPSHOT, state=state), phase, np.full(4, above), TICK)
+        contacts.update(SNAPSHOT.replaced(state=state), phase, np.full(4, above), TICK)
     return contacts, phase
 
 

@@ -65,8 +65,7 @@ def test_a_body_that_sags_is_brought_to_where_it_was_asked_to_be() -> None:
     correction = SteadyStateCorrection()
     given_target, measured = target, snapshot
     for _ in range(4000):
-        measured = replace(
-            snapshot,
+        measured = snapshot.replaced(
             p_world_com=given_target.p_world + sag,
             R_world_base=exp_rotation(turn) @ given_target.R_world_base,
         )

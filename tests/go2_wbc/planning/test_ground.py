@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -29,7 +27,7 @@ def on_plane(slope: np.ndarray, height: float = 0.4) -> Snapshot:
     snapshot = MODEL.snapshot(helpers.state_of(helpers.standing_q()))
     feet, com = snapshot.p_world_feet.copy(), snapshot.p_world_com
     feet[:, 2] = height + (feet[:, :2] - com[:2]) @ slope + MODEL.foot_radius
-    return replace(snapshot, p_world_feet=feet)
+    return snapshot.replaced(p_world_feet=feet)
 
 
 def plane(snapshot: Snapshot) -> GroundPlane:
@@ -48,14 +46,14 @@ def test_feet_in_a_line_or_on_a_wall_tell_no_slope_that_no_foot_could_hold_on() 
     snapshot = on_plane(SLOPE)
     line = snapshot.p_world_feet.copy()
     line[:, 1] = 0.0
-    np.testing.assert_array_equal(plane(replace(snapshot, p_world_feet=line)).slope, 0.0)
+    np.testing.assert_array_equal(plane(snapshot.replaced(p_world_feet=line)).slope, 0.0)
     np.testing.assert_allclose(plane(on_plane(10 * SLOPE)).slope, [MOST_SLOPE, -MOST_SLOPE])
 
 
 def test_it_is_carried_along_with_the_robot() -> None:
     snapshot = on_plane(SLOPE)
     ground = plane(snapshot)
-    moved = replace(snapshot, p_world_com=snapshot.p_world_com + [0.5, 0.2, 0.0])
+    moved = snapshot.replaced(p_world_com=snapshot.p_world_com + [0.5, 0.2, 0.0])
     ground.carry(moved)
     assert ground.height == pytest.approx(0.4 + SLOPE @ [0.5, 0.2], abs=EXACT)
 

@@ -72,8 +72,7 @@ class IdealRobot:
         q[:3] = body.p_world - self.offset
         q[3:7] = pin.Quaternion(body.R_world_base).coeffs()
         v[:3] = body.R_world_base.T @ body.v_world
-        self.snapshot = replace(
-            self.snapshot,
+        self.snapshot = self.snapshot.replaced(
             state=replace(state, time=state.time + TICK, q=q, v=v),
             R_world_base=body.R_world_base,
             p_world_com=body.p_world,
@@ -133,7 +132,7 @@ def test_a_com_displaced_beyond_the_capture_margin_starts_the_gait() -> None:
     for share, steps in ((0.98, False), (1.02, True)):
         planner = started(start)
         shifted = start.p_world_com + np.array([0.0, share * CONFIG.capture_margin, 0.0])
-        planner.update(replace(start, p_world_com=shifted), ZERO_COMMAND)
+        planner.update(start.replaced(p_world_com=shifted), ZERO_COMMAND)
         assert planner.is_stepping is steps
 
 
@@ -144,7 +143,7 @@ def test_squaring_up_steps_unless_the_feet_are_below_the_hips() -> None:
     assert not planner.is_stepping
     feet = start.p_world_feet.copy()
     feet[2, 0] += 3 * CONFIG.square_tolerance
-    assert not planner.square_up(replace(start, p_world_feet=feet))
+    assert not planner.square_up(start.replaced(p_world_feet=feet))
     assert planner.is_stepping
 
 
@@ -210,7 +209,7 @@ def test_velocities_of_the_reference_are_the_rates_of_its_pose() -> None:
 
 def test_a_robot_that_hangs_low_is_asked_for_more_height() -> None:
     start = resting()
-    low = replace(start, p_world_com=start.p_world_com - [0.0, 0.0, 0.02])
+    low = start.replaced(p_world_com=start.p_world_com - [0.0, 0.0, 0.02])
     reference = hold(started(start), low, ZERO_COMMAND, 0.5)
     assert reference.body.p_world[2] > CONFIG.height + 0.01
 
@@ -226,7 +225,7 @@ def landing(snapshot: Snapshot, command: VelocityCommand) -> Reference:
 def test_a_robot_that_steps_in_place_puts_its_feet_below_its_hips() -> None:
     start = resting(yaw=0.8)
     feet = start.p_world_feet + np.random.default_rng(3).normal(scale=0.03, size=(4, 3))
-    scattered = replace(start, p_world_feet=np.array([*feet.T[:2], start.p_world_feet.T[2]]).T)
+    scattered = start.replaced(p_world_feet=np.array([*feet.T[:2], start.p_world_feet.T[2]]).T)
     planner = started(scattered)
     planner.square_up(scattered)
     reference = hold(planner, scattered, ZERO_COMMAND, SWING_END)
@@ -357,14 +356,14 @@ def test_it_goes_on_stepping_while_the_robot_still_drifts() -> None:
 
 def touching(snapshot: Snapshot, *, is_touching: bool = True) -> Snapshot:
     contact = np.full(4, is_touching)
-    return replace(snapshot, state=replace(snapshot.state, feet_in_contact=contact))
+    return snapshot.replaced(state=replace(snapshot.state, feet_in_contact=contact))
 
 
 @pytest.mark.parametrize("is_touching", [True, False])
 def test_feet_that_touch_higher_up_raise_the_reference_and_no_others(is_touching: bool) -> None:
     """Feet that came down late used to lift the trunk by 7 cm on joints with much friction."""
     start = touching(resting(), is_touching=is_touching)
-    raised = replace(start, p_world_feet=start.p_world_feet + np.array([0.0, 0.0, 0.05]))
+    raised = start.replaced(p_world_feet=start.p_world_feet + np.array([0.0, 0.0, 0.05]))
     planner = started(start)
     before = planner.update(start, VelocityCommand(0.2))
     after = hold(planner, at(raised, TICK), VelocityCommand(0.2), 2.0)
@@ -382,7 +381,7 @@ def test_the_ground_is_where_a_foot_is_first_touched_not_where_it_goes_on_to() -
     def lifted(height: float, tick: int) -> Snapshot:
         feet = start.p_world_feet + np.array([0.0, 0.0, height])
         time = TROT.swing_time + tick * TICK
-        return touching(replace(at(start, time), p_world_feet=feet))
+        return touching(at(start, time).replaced(p_world_feet=feet))
 
     heights = [
         planner.update(snapshot, command).body.p_world[2] - before.body.p_world[2]

@@ -30,7 +30,7 @@ def sliding(
     force = np.tile([0.6 * ratio * PRESSURE, -0.8 * ratio * PRESSURE, PRESSURE], (4, 1))
     tau = snapshot.bias - np.einsum("lij,li->j", snapshot.J_contacts, force)
     state = replace(snapshot.state, tau=tau[6:], feet_in_contact=np.full(4, touches))
-    return replace(snapshot, state=state, v_world_contacts=v)
+    return snapshot.replaced(state=state, v_world_contacts=v)
 
 
 def after(snapshot: Snapshot, seconds: float) -> SlipObserver:
@@ -65,14 +65,14 @@ def test_the_foot_that_shows_least_counts() -> None:
     v = np.tile(snapshot.v_world_contacts[0], (4, 1))
     tau = snapshot.state.tau.copy()
     tau[:3] = sliding(0.2, ratio=0.1).state.tau[:3]
-    both = replace(snapshot, state=replace(snapshot.state, tau=tau), v_world_contacts=v)
+    both = snapshot.replaced(state=replace(snapshot.state, tau=tau), v_world_contacts=v)
     assert after(both, 1.0).friction == pytest.approx(CONFIG.least, abs=1e-6)
 
 
 def test_a_foot_that_does_not_press_on_the_ground_leaves_it() -> None:
     snapshot = sliding(0.3, ratio=0.2)
     lifts = replace(snapshot.state, tau=2 * snapshot.bias[6:] - snapshot.state.tau)
-    assert after(replace(snapshot, state=lifts), 0.2).friction == CONFIG.most
+    assert after(snapshot.replaced(state=lifts), 0.2).friction == CONFIG.most
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,7 @@ def test_a_gait_may_swing_lower_than_the_others_but_not_higher(
     planner.start(start)
     heights = []
     for n in range(round(trot.period / tick)):
-        now = replace(start, state=replace(start.state, time=n * tick))
+        now = start.replaced(state=replace(start.state, time=n * tick))
         heights.append(planner.update(now, VelocityCommand(0.5)).p_world_feet[:, 2])
     rise = np.max(heights) - start.p_world_feet[:, 2].max()
     assert rise == pytest.approx(expected, abs=2e-3)
@@ -142,7 +142,7 @@ def references(
     for n in range(round(trot.swing_time / tick)):
         contact = np.array([stumbles and n == STUMBLE, True, True, False])
         state = replace(start.state, time=n * tick, feet_in_contact=contact)
-        found.append(planner.update(replace(start, state=state), VelocityCommand(0.5)))
+        found.append(planner.update(start.replaced(state=state), VelocityCommand(0.5)))
     return found
 
 

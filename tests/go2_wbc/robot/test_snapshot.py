@@ -206,7 +206,7 @@ def test_a_foot_moves_with_the_base_and_its_own_leg_only() -> None:
 def test_a_snapshot_does_not_change_with_the_next_one() -> None:
     """Pinocchio reuses its memory; a snapshot that shared it would change behind its holder."""
     state, _, held = scene(3)
-    fields = [name for name in held.__dataclass_fields__ if name != "state"]
+    fields = held.part_names()
     before = {name: np.array(getattr(held, name)) for name in fields}
     MODEL.snapshot(random_state(np.random.default_rng(4)))
     MODEL.forward_kinematics(random_state(np.random.default_rng(5)).q)

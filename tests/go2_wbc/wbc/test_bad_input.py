@@ -43,7 +43,7 @@ NOT_FINITE = [np.nan, np.inf, -np.inf]
 IN_BODY = [f.name for f in fields(BodyTarget) if f.name != "point"]
 NOT_NUMBERS = "body", "legs", "stance", "_row"
 IN_REFERENCE = [f.name for f in fields(Reference) if f.name not in NOT_NUMBERS]
-IN_SNAPSHOT = [f.name for f in fields(Snapshot) if f.name not in ("state", "_row")]
+IN_SNAPSHOT = Snapshot.part_names()[2:]
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +150,7 @@ def test_what_is_not_finite_in_the_snapshot_is_refused_by_name(
 ) -> None:
     snapshot, reference = moving(model)
     array, place = spoilt(getattr(snapshot, name), value)
-    broken = replace(snapshot, **{name: array})
+    broken = snapshot.replaced(**{name: array})
     expect_refusal(ways, (broken, reference), f"snapshot.{name}{place}")
 
 
@@ -220,13 +220,10 @@ def unchecked(reference: Reference, changes: dict[str, object]) -> Reference:
     return copy
 
 
-def test_a_snapshot_of_another_shape_is_refused_by_name(model: RobotModel, ways: Ways) -> None:
-    snapshot, reference = standing(model)
-    for wbc in ways.values():
-        broken = replace(snapshot)
-        object.__setattr__(broken, "bias", np.zeros(17))
-        with pytest.raises(CommandError, match=r"snapshot: bias must have the shape \(18,\)"):
-            wbc.solve(broken, reference, relax=True)
+def test_a_snapshot_of_another_shape_is_refused_by_name(model: RobotModel) -> None:
+    snapshot, _ = standing(model)
+    with pytest.raises(CommandError, match=r"snapshot: bias must have the shape \(18,\)"):
+        snapshot.replaced(bias=np.zeros(17))
 
 
 # --- bounds of forces -----------------------------------------------------------------------------

@@ -178,7 +178,7 @@ def joint_snapshot(q: np.ndarray, v: np.ndarray) -> Snapshot:
         q=np.concatenate([standing_q()[:7], q]),
         v=np.concatenate([np.zeros(6), v]),
     )
-    return replace(SNAPSHOT, state=state)
+    return SNAPSHOT.replaced(state=state)
 
 
 def joint_bounds(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,8 +12,9 @@ bring J and R up to date when a row comes or goes.
 from __future__ import annotations
 
 import numpy as np
+from jaxtyping import Float, Int
 
-from go2_wbc.kernels.compilation import kernel, subroutine
+from go2_wbc.compilation import kernel, subroutine
 
 SOLVED, INFEASIBLE, SINGULAR, UNFINISHED, BAD_BOUNDS = range(5)
 MESSAGES = (
@@ -37,8 +38,8 @@ MAX_STEPS = 400
 FREE, AT_LOWER, AT_UPPER = 0, -1, 1
 
 
-@subroutine("b1(f8[:,::1], f8[:,::1])")
-def factorise(H, L):
+@subroutine
+def factorise(H: Float[np.ndarray, "n n"], L: Float[np.ndarray, "n n"]) -> bool:
     """The lower triangle of L in H = L L', from that of H; False if H is not positive definite."""
     for j in range(H.shape[0]):
         pivot = H[j, j]
@@ -57,8 +58,10 @@ def factorise(H, L):
     return True
 
 
-@subroutine("void(f8[:,::1], f8[::1], f8[::1])")
-def solve_factorised(L, g, x):
+@subroutine
+def solve_factorised(
+    L: Float[np.ndarray, "n n"], g: Float[np.ndarray, " n"], x: Float[np.ndarray, " n"]
+) -> None:
     """x = -(L L')^-1 g."""
     n = len(g)
     for i in range(n):
@@ -73,8 +76,8 @@ def solve_factorised(L, g, x):
         x[i] = value / L[i, i]
 
 
-@subroutine("void(f8[:,::1], f8[:,::1])")
-def invert(L, J):
+@subroutine
+def invert(L: Float[np.ndarray, "n n"], J: Float[np.ndarray, "n n"]) -> None:
     """J = L^-T: column c of L^-1 is row c of J."""
     n = L.shape[0]
     for c in range(n):
@@ -87,8 +90,10 @@ def invert(L, J):
             J[c, i] = value / L[i, i]
 
 
-@subroutine("void(f8[:,::1], f8[:,::1], f8[::1], i8)")
-def take_in(J, R, d, q):
+@subroutine
+def take_in(
+    J: Float[np.ndarray, "n n"], R: Float[np.ndarray, "n n"], d: Float[np.ndarray, " n"], q: int
+) -> None:
     """Add the normal n with d = J'n as column q of R: rotate d so that nothing lies below q."""
     n = len(d)
     for j in range(n - 1, q, -1):
@@ -106,8 +111,8 @@ def take_in(J, R, d, q):
         R[i, q] = d[i]
 
 
-@subroutine("void(f8[:,::1], f8[:,::1], i8, i8)")
-def drop(J, R, place, q):
+@subroutine
+def drop(J: Float[np.ndarray, "n n"], R: Float[np.ndarray, "n n"], place: int, q: int) -> None:
     """Remove column ``place`` of the q columns of R, and make R upper triangular again."""
     n = J.shape[0]
     for j in range(place, q - 1):
@@ -130,8 +135,14 @@ def drop(J, R, place, q):
             J[k, j + 1] = c * second - s * first
 
 
-@subroutine("Tuple((i8, f8, f8))(f8[::1], f8[:,::1], f8[::1], f8[::1], i8[::1])")
-def most_violated(x, C, lower, upper, side):
+@subroutine
+def most_violated(
+    x: Float[np.ndarray, " n"],
+    C: Float[np.ndarray, "m n"],
+    lower: Float[np.ndarray, " m"],
+    upper: Float[np.ndarray, " m"],
+    side: Int[np.ndarray, " m"],
+) -> tuple[int, float, float]:
     """The free row that is violated most, or -1; 1 for its lower side, else -1; by how much."""
     found, sign, worst = -1, 1.0, 0.0
     for i in range(len(side)):
@@ -149,8 +160,16 @@ def most_violated(x, C, lower, upper, side):
     return found, sign, worst
 
 
-@subroutine("Tuple((f8, f8))(f8[:,::1], f8[:,::1], f8[::1], i8, f8[::1], f8[::1], f8[::1])")
-def directions(J, R, normal, q, d, z, r):
+@subroutine
+def directions(
+    J: Float[np.ndarray, "n n"],
+    R: Float[np.ndarray, "n n"],
+    normal: Float[np.ndarray, " n"],
+    q: int,
+    d: Float[np.ndarray, " n"],
+    z: Float[np.ndarray, " n"],
+    r: Float[np.ndarray, " n"],
+) -> tuple[float, float]:
     """Fill d = J'n, the primal direction z and the dual one r; returns |d outside|^2, |d|^2."""
     n = len(normal)
     outside, whole = 0.0, 0.0
@@ -175,8 +194,10 @@ def directions(J, R, normal, q, d, z, r):
     return outside, whole
 
 
-@subroutine("Tuple((f8, i8))(f8[::1], f8[::1], i8[::1], i8)")
-def partial_step(u, r, rows, q):
+@subroutine
+def partial_step(
+    u: Float[np.ndarray, " n"], r: Float[np.ndarray, " n"], rows: Int[np.ndarray, " n"], q: int
+) -> tuple[float, int]:
     """The step at which the first multiplier of a bound reaches zero, and its place; inf and -1."""
     step, leaving = np.inf, -1
     for i in range(q):
@@ -185,8 +206,20 @@ def partial_step(u, r, rows, q):
     return step, leaving
 
 
-@subroutine("i8(f8[:,::1], f8[:,::1], f8[::1], f8, f8, i8, i8[::1], i8, i8[::1], f8[::1], f8[::1])")
-def meet(J, R, normal, violation, slack, row, rows, q, side, u, x):
+@subroutine
+def meet(
+    J: Float[np.ndarray, "n n"],
+    R: Float[np.ndarray, "n n"],
+    normal: Float[np.ndarray, " n"],
+    violation: float,
+    slack: float,
+    row: int,
+    rows: Int[np.ndarray, " n"],
+    q: int,
+    side: Int[np.ndarray, " m"],
+    u: Float[np.ndarray, " n"],
+    x: Float[np.ndarray, " n"],
+) -> int:
     """Move x until a row is met, dropping others on the way; returns q, the new working set's size.
 
     ``row`` is the row's number, negative for an equality; ``normal`` points to where it is met. An
@@ -225,8 +258,16 @@ def meet(J, R, normal, violation, slack, row, rows, q, side, u, x):
     return -2
 
 
-@subroutine("i8(i8[::1], f8[::1], i8, i8[::1], f8[::1], f8[::1], i8)")
-def finish(rows, u, q, side, x, y, k):
+@subroutine
+def finish(
+    rows: Int[np.ndarray, " n"],
+    u: Float[np.ndarray, " n"],
+    q: int,
+    side: Int[np.ndarray, " m"],
+    x: Float[np.ndarray, " n"],
+    y: Float[np.ndarray, " k+m"],
+    k: int,
+) -> int:
     """Put the working set's multipliers in their places in y; an equality's sign waits there."""
     signs = y[:k].copy()
     y[:] = 0.0
@@ -238,8 +279,17 @@ def finish(rows, u, q, side, x, y, k):
     return SOLVED if np.isfinite(x).all() else UNFINISHED
 
 
-@subroutine("i8(f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
-def constrain(L, E, e, C, lower, upper, x, y):
+@subroutine
+def constrain(
+    L: Float[np.ndarray, "n n"],
+    E: Float[np.ndarray, "k n"],
+    e: Float[np.ndarray, " k"],
+    C: Float[np.ndarray, "m n"],
+    lower: Float[np.ndarray, " m"],
+    upper: Float[np.ndarray, " m"],
+    x: Float[np.ndarray, " n"],
+    y: Float[np.ndarray, " k+m"],
+) -> int:
     """The same as ``solve_qp``, from the minimum x without constraints, with H = L L'."""
     n, k, m = len(x), len(e), len(lower)
     y[:] = 0.0
@@ -277,8 +327,18 @@ def constrain(L, E, e, C, lower, upper, x, y):
     return UNFINISHED
 
 
-@kernel("i8(f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1])")
-def solve_qp(H, g, E, e, C, lower, upper, x, y):
+@kernel
+def solve_qp(
+    H: Float[np.ndarray, "n n"],
+    g: Float[np.ndarray, " n"],
+    E: Float[np.ndarray, "k n"],
+    e: Float[np.ndarray, " k"],
+    C: Float[np.ndarray, "m n"],
+    lower: Float[np.ndarray, " m"],
+    upper: Float[np.ndarray, " m"],
+    x: Float[np.ndarray, " n"],
+    y: Float[np.ndarray, " k+m"],
+) -> int:
     """Fill the minimiser x (n,) and the multipliers y (k + m,); returns the outcome.
 
     H x + g + (E' C') y = 0; a row of C has y >= 0 at its upper bound and y <= 0 at its lower one.

@@ -1,0 +1,1 @@
+"""Arithmetic that the rooms above share: vectors, small linear systems, quadratic programs."""
