@@ -21,11 +21,11 @@ from controller.behaviours.joints import DAMPING, Damped
 from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible
 from go2_wbc.plant.base import Plant
-from go2_wbc.reference import JointReference, Reference
+from go2_wbc.reference import JointReference, Reference, Target, sag_and_lean
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.payload_estimation import PayloadEstimator
-from go2_wbc.robot.safety import FallDetector, SafetyConfig
+from go2_wbc.robot.safety import FallDetector, SafetyConfig, is_plausible
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import JointCommand, RobotState
 from go2_wbc.wbc.controller import WholeBodyController
@@ -33,10 +33,6 @@ from go2_wbc.wbc.relaxation import is_grave
 from go2_wbc.wbc.solution import WbcSolution
 
 _log = logging.getLogger(__name__)
-
-
-UNIT_TOLERANCE = 0.01
-"""How far the norm of a measured quaternion may be from 1."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,16 +86,13 @@ class ControlLoop:
         """
         self.plant, self.model, self.wbc, self.telemetry = plant, model, wbc, telemetry
         self._dynamic_wbc = dynamic_wbc or wbc
-        from go2_wbc.kernels import supervision  # compiled; importing this module is not
-
-        self._kernels = supervision
         self._safety = safety
         self._falls = FallDetector(safety)
         self._sag = self._lean = 0.0
         self.fault: Fault | None = None
         self.warn: Callable[..., None] = _log.warning
         self.state: RobotState = plant.read()
-        if not self._is_plausible(self.state):
+        if not _is_plausible(self.state):
             raise PlantError(f"the first state of the plant is not finite: q={self.state.q}")
         self.snapshot: Snapshot = model.snapshot(self.state)
         self._payloads = payloads
@@ -168,7 +161,7 @@ class ControlLoop:
 
     def _observe(self) -> None:
         state = self.plant.read()
-        is_finite = self._is_plausible(state)
+        is_finite = _is_plausible(state)
         if is_finite and state.time > self.state.time:
             self._unanswered = 0
             self.state = state
@@ -212,12 +205,7 @@ class ControlLoop:
         if isinstance(target, JointReference):
             return 0.0, 0.0
         planned = self.behaviour.sag_and_lean
-        return planned or self._kernels.sag_and_lean(target.row, self.snapshot.row)
-
-    def _is_plausible(self, state: RobotState) -> bool:
-        q, v, tau, forces = state.q, state.v, state.tau, state.foot_forces
-        is_plausible = self._kernels.is_plausible(q, v, tau, forces, UNIT_TOLERANCE)
-        return is_plausible and isfinite(state.time)
+        return planned or sag_and_lean(Target.of(target.row), self.snapshot)
 
     def _command(self, target: Reference | JointReference) -> JointCommand:
         if isinstance(target, JointReference):
@@ -264,3 +252,8 @@ class ControlLoop:
             self.warn("QP failure at t=%.3f s, holding the last torque: %s", time, what)
             return self._last_command
         return JointCommand.damping(DAMPING)
+
+
+def _is_plausible(state: RobotState) -> bool:
+    is_a_state = is_plausible(state.q, state.v, state.tau, state.foot_forces)
+    return is_a_state and isfinite(state.time)

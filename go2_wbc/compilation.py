@@ -70,7 +70,11 @@ user's cache."""
 PLAIN_VARIABLE = "GO2_WBC_PLAIN"
 """Environment variable; 1 runs every kernel as the Python that it is written in."""
 _IS_PLAIN = os.environ.get(PLAIN_VARIABLE, "0") not in ("", "0")
-MODULES: tuple[str, ...] = ("go2_wbc.algebra.active_set",)
+MODULES: tuple[str, ...] = (
+    "go2_wbc.algebra.active_set",
+    "go2_wbc.reference",
+    "go2_wbc.robot.safety",
+)
 """Modules that hold kernels."""
 _FOREIGN = "foreign"
 Foreign = Annotated[T, _FOREIGN]

@@ -16,10 +16,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.compilation import kernel
 from go2_wbc.contacts import ContactSchedule
 from go2_wbc.errors import CommandError
 from go2_wbc.records import Record
 from go2_wbc.robot.rotations import yaw_rotation
+from go2_wbc.robot.snapshot import Snapshot
 
 LEAST_WEIGHT, MOST_WEIGHT = 1e-6, 1e2
 """Of the force regularisation: beyond them accuracy is lost."""
@@ -76,6 +78,16 @@ class Target(Record):
     force_weight: float
     friction: float
     orientation_discount: float
+
+
+@kernel
+def sag_and_lean(target: Target, now: Snapshot) -> tuple[float, float]:
+    """Depth [m] of the tracked point below where it shall be, and angle [rad] of the verticals."""
+    measured = now.p_world_com[2] if target.is_com else now.q[2]
+    cosine = 0.0
+    for i in range(3):
+        cosine += target.R_world_base[2, i] * now.R_world_base[2, i]
+    return target.p_world[2] - measured, np.arccos(min(max(cosine, -1.0), 1.0))
 
 
 _LEG_TASKS = tuple(LegTask)

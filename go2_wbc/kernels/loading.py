@@ -19,7 +19,6 @@ KERNELS = (
     "preview",
     "rigid_body",
     "simulation",
-    "supervision",
 )
 """Modules of this package whose import compiles, or loads what was compiled."""
 

@@ -1,4 +1,12 @@
-"""Safety: says whether the measured state still allows the controller to go on."""
+"""Safety: says whether the measured state still allows the controller to go on.
+
+A state is none if a number is not finite or its quaternion is not of length 1. With z of the
+highest numbers that tell of a fall, of a robot that is to balance:
+
+    height = z_base - min z_feet                          low where the legs have given way
+    clearance = z_base + min (R p)_z - min z_feet + r     over the underside's points p: it touches
+    sag, lean                                             see ``reference.sag_and_lean``
+"""
 
 from __future__ import annotations
 
@@ -7,6 +15,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_positive
@@ -32,6 +41,40 @@ an attitude that is off by a degree puts the nose off by 5 mm."""
 STRIKE = 0.05
 """Time [s] of a touch from which on it counts until the trunk is back. With 0.03 two of sixteen
 trots counted as fallen that a push of 50 N s ahead let touch the ground, and that trotted on."""
+
+UNIT_TOLERANCE = 0.01
+"""How far the norm of a measured quaternion may be from 1."""
+
+
+@kernel
+def is_plausible(
+    q: Foreign[Float[np.ndarray, "19"]],
+    v: Foreign[Float[np.ndarray, "18"]],
+    tau: Foreign[Float[np.ndarray, "12"]],
+    forces: Foreign[Float[np.ndarray, "4"]],
+) -> bool:
+    """Whether every number of a state is finite and the quaternion of ``q`` of length 1."""
+    for values in (q, v, tau, forces):
+        for value in values:
+            if not np.isfinite(value):
+                return False
+    length = np.sqrt(q[3] ** 2 + q[4] ** 2 + q[5] ** 2 + q[6] ** 2)
+    return bool(abs(length - 1.0) < UNIT_TOLERANCE)
+
+
+@kernel
+def heights(now: Snapshot) -> tuple[float, float]:
+    """Heights [m] of the base over the lowest foot's centre, and of the trunk over the ground."""
+    lowest, height = np.inf, now.q[2]
+    for leg in range(4):
+        lowest = min(lowest, now.p_world_feet[leg, 2])
+    clearance = np.inf
+    for point in range(TRUNK_UNDERSIDE.shape[0]):
+        z = 0.0
+        for i in range(3):
+            z += now.R_world_base[2, i] * TRUNK_UNDERSIDE[point, i]
+        clearance = min(clearance, z)
+    return height - lowest, height + clearance - lowest + FOOT_RADIUS
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,9 +133,7 @@ class FallDetector:
 
     def __init__(self, config: SafetyConfig) -> None:
         """Judge by ``config``."""
-        from go2_wbc.kernels.supervision import heights
-
-        self._config, self._heights = config, heights
+        self._config = config
         self.begin()
 
     def begin(self) -> None:
@@ -110,7 +151,7 @@ class FallDetector:
             may_lie: whether the belly may be on the ground.
         """
         state, config = snapshot.state, self._config
-        height, clearance = self._heights(snapshot.row, TRUNK_UNDERSIDE, FOOT_RADIUS)
+        height, clearance = heights(snapshot)
         has_sunk = not may_lie and sag > config.sink_limit
         is_aslant = lean > config.lean_limit / 2
         is_off = sag > config.sink_limit / 2 or is_aslant
@@ -140,9 +181,3 @@ class FallDetector:
             self._since.pop(what, None)
             return False
         return now - self._since.setdefault(what, now) > limit
-
-
-def trunk_clearance(snapshot: Snapshot, ground: float) -> float:
-    """Height [m] of the trunk's lowest point over flat ground at height ``ground`` [m]."""
-    z_axis: Float[np.ndarray, "3"] = snapshot.R_world_base[2]
-    return float(snapshot.state.q[2] + (TRUNK_UNDERSIDE @ z_axis).min()) - ground

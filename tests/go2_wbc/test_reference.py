@@ -10,13 +10,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from go2_wbc.errors import CommandError
-from go2_wbc.reference import Anchor, LegTask, MotionPlan, Reference
+from go2_wbc.reference import (
+    Anchor,
+    LegTask,
+    MotionPlan,
+    Reference,
+    Target,
+    TrackedPoint,
+    sag_and_lean,
+)
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
+from tests.compiled import assert_plain_is_compiled
 from tests.engine_helpers import (
     JO,
     ST,
     SW,
+    cases,
     random_reference,
     random_state,
     state_of,
@@ -142,3 +152,19 @@ def test_the_row_of_a_reference_holds_its_planned_forces() -> None:
     again = Reference.of_row(REFERENCE.row)
     assert again.force_weight == REFERENCE.force_weight
     np.testing.assert_array_equal(again.f_world_feet, REFERENCE.f_world_feet)
+
+
+def test_sag_is_measured_at_what_is_tracked_and_lean_between_the_verticals() -> None:
+    for snapshot, reference in cases(MODEL, 50, seed=11):
+        body = reference.body
+        is_com = body.point is TrackedPoint.COM
+        tracked = snapshot.p_world_com if is_com else snapshot.state.p_world_base
+        sag, lean = sag_and_lean(Target.of(reference.row), snapshot)
+        assert sag == pytest.approx(body.p_world[2] - tracked[2], abs=EXACT)
+        up = np.array([0.0, 0.0, 1.0])
+        wanted, measured = body.R_world_base.T @ up, snapshot.R_world_base.T @ up
+        angle = np.arctan2(np.linalg.norm(np.cross(wanted, measured)), wanted @ measured)
+        assert lean == pytest.approx(angle, abs=1e-9)
+        turned = reference.placed(Anchor(np.zeros(3), 1.0))
+        assert sag_and_lean(Target.of(turned.row), snapshot)[1] == pytest.approx(lean, abs=1e-9)
+        assert_plain_is_compiled(sag_and_lean, Target.of(reference.row), snapshot)

@@ -1,4 +1,4 @@
-"""What counts as a fall: tilt at once, a trunk on the ground, too low or aslant after a while."""
+"""What is no state, and what is a fall: tilt at once, a trunk too low or aslant after a while."""
 
 from __future__ import annotations
 
@@ -11,10 +11,17 @@ import pytest
 from go2_wbc.errors import ConfigError
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.description import BASE_LINK
-from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.safety import TRUNK_UNDERSIDE, FallDetector, SafetyConfig, trunk_clearance
+from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.safety import (
+    TRUNK_UNDERSIDE,
+    FallDetector,
+    SafetyConfig,
+    heights,
+    is_plausible,
+)
 from go2_wbc.robot.snapshot import Snapshot
-from tests.engine_helpers import standing_q, state_of
+from tests.compiled import assert_plain_is_compiled
+from tests.engine_helpers import random_state, standing_q, state_of
 
 # m; how closely few points can stand for the mesh of the trunk.
 POINT_TOLERANCE = 0.01
@@ -78,10 +85,25 @@ def test_the_points_of_the_trunk_lie_where_its_mesh_does_however_it_is_tilted() 
         )
 
 
+def clearance(snapshot: Snapshot, ground: float) -> float:
+    """Height of the trunk's lowest point over flat ground."""
+    R = snapshot.R_world_base
+    return float((snapshot.q[2] + TRUNK_UNDERSIDE @ R[2]).min()) - ground
+
+
+def test_heights_are_over_the_lowest_foot(model: RobotModel) -> None:
+    rng = np.random.default_rng(11)
+    for _ in range(50):
+        snapshot = model.snapshot(random_state(rng))
+        lowest = float(snapshot.p_world_feet[:, 2].min())
+        expected = (snapshot.q[2] - lowest, clearance(snapshot, lowest - FOOT_RADIUS))
+        assert heights(snapshot) == pytest.approx(expected, abs=1e-12)
+
+
 def test_a_standing_robot_has_not_fallen(falls: FallDetector, model: RobotModel) -> None:
     snapshot = standing(model)
     assert falls.reason(snapshot, 0.0, 0.0, may_lie=False) is None
-    assert trunk_clearance(snapshot, 0.0) == pytest.approx(0.3 - 0.107, abs=1e-6)
+    assert clearance(snapshot, 0.0) == pytest.approx(0.3 - 0.107, abs=1e-6)
 
 
 CONFIG = SafetyConfig()
@@ -138,7 +160,7 @@ def test_a_robot_aslant_touches_the_ground_from_further_above(
         snapshot = on_the_belly(model, time, NEARLY_FOLDED_LEG)
         reason = falls.reason(snapshot, 0.0, lean, may_lie=False)
     ground = snapshot.p_world_feet[:, 2].min() - model.foot_radius
-    assert 0.015 < trunk_clearance(snapshot, ground) < 0.025
+    assert 0.015 < clearance(snapshot, ground) < 0.025
     assert (reason is not None) is has_fallen
 
 
@@ -224,3 +246,30 @@ def test_a_trunk_that_leans_from_where_it_should_be_is_a_fall_after_the_limit(
 def test_a_limit_that_is_not_positive_is_refused(name: str) -> None:
     with pytest.raises(ConfigError, match=f"SafetyConfig.{name} must be positive"):
         replace(SafetyConfig(), **{name: 0})
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("name", ["q", "v", "tau", "foot_forces"])
+def test_every_number_of_a_state_must_be_finite(name: str, bad: float) -> None:
+    state = random_state(np.random.default_rng(12))
+    for index in range(len(getattr(state, name))):
+        values = getattr(state, name).copy()
+        values[index] = bad
+        broken = replace(state, **{name: values})
+        rows = (broken.q, broken.v, broken.tau, broken.foot_forces)
+        assert not is_plausible(*rows)
+    assert is_plausible(state.q, state.v, state.tau, state.foot_forces)
+
+
+def test_a_quaternion_must_be_of_length_one() -> None:
+    state = random_state(np.random.default_rng(13))
+    for factor, expected in ((0.985, False), (0.995, True), (1.005, True), (1.015, False)):
+        q = state.q.copy()
+        q[3:7] *= factor
+        assert is_plausible(q, state.v, state.tau, state.foot_forces) is expected
+
+
+def test_compiled_is_plain(model: RobotModel) -> None:
+    state = random_state(np.random.default_rng(14))
+    assert_plain_is_compiled(heights, model.snapshot(state))
+    assert_plain_is_compiled(is_plausible, state.q, state.v, state.tau, state.foot_forces)

@@ -1,0 +1,30 @@
+"""Compiled against plain: a kernel does what the Python that it is written in does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import deepcopy
+
+import numpy as np
+
+from go2_wbc.compilation import _call_plain, _Kernel
+
+SAME = 1e-9
+"""Relative and absolute: libraries of sines differ in the last bit, and sums of their values."""
+
+
+def assert_plain_is_compiled(
+    kernel: Callable[..., object], *arguments: object, tolerance: float = SAME
+) -> None:
+    """Both ways, each on copies: what is returned and what is filled must be the same."""
+    assert isinstance(kernel, _Kernel)
+    ours, theirs = deepcopy(arguments), deepcopy(arguments)
+    given, expected = kernel(*ours), _call_plain(kernel, *theirs)
+    pairs = [(given, expected)] if given is not None else []
+    pairs += [
+        (getattr(a, "row", a), getattr(b, "row", b)) for a, b in zip(ours, theirs, strict=True)
+    ]
+    for compiled, plain in pairs:
+        np.testing.assert_allclose(
+            np.asarray(compiled, float), np.asarray(plain, float), tolerance, tolerance
+        )
