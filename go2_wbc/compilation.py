@@ -72,6 +72,7 @@ PLAIN_VARIABLE = "GO2_WBC_PLAIN"
 _IS_PLAIN = os.environ.get(PLAIN_VARIABLE, "0") not in ("", "0")
 MODULES: tuple[str, ...] = (
     "go2_wbc.algebra.active_set",
+    "go2_wbc.plant.mujoco.layout",
     "go2_wbc.reference",
     "go2_wbc.robot.safety",
 )

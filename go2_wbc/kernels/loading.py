@@ -18,7 +18,6 @@ KERNELS = (
     "playing",
     "preview",
     "rigid_body",
-    "simulation",
 )
 """Modules of this package whose import compiles, or loads what was compiled."""
 

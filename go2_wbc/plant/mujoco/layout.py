@@ -1,4 +1,7 @@
-"""Where the Go2's quantities are inside a compiled MuJoCo model."""
+"""Where the Go2's quantities are inside a compiled MuJoCo model, and what is read there in a tick.
+
+MuJoCo's conventions (quaternion w x y z, linear velocity in the world) end here.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,9 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Int32
 
+from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
 
 # Bins into which contacts between the robot and anything else are sorted, after the four feet.
@@ -17,6 +21,77 @@ ROBOT_BINS = 6
 # Code of a geom that is not the robot's. The sum of two codes tells a robot-world pair (FOREIGN to
 # FOREIGN + 5) from robot-robot (at most 10) and world-world (2 FOREIGN).
 FOREIGN = 16
+
+
+@kernel
+def read_joints(
+    qpos: Float[np.ndarray, " nq"],
+    qvel: Float[np.ndarray, " nv"],
+    R: Float[np.ndarray, "3 3"],
+    base_q: int,
+    base_v: int,
+    places: Int[np.ndarray, "3 12"],
+    q: Float[np.ndarray, "19"],
+    v: Float[np.ndarray, "18"],
+) -> None:
+    """Fill q and v of a ``RobotState``.
+
+    Args:
+        qpos: MuJoCo's positions.
+        qvel: its velocities.
+        R: the base's orientation.
+        base_q: where in ``qpos`` the free joint's numbers begin.
+        base_v: where in ``qvel`` they do.
+        places: where each joint's angle and velocity are, in the first two rows.
+        q: is filled.
+        v: is filled.
+    """
+    for i in range(3):
+        q[i] = qpos[base_q + i]
+        q[3 + i] = qpos[base_q + 4 + i]
+        v[i] = 0.0
+        for k in range(3):
+            v[i] += R[k, i] * qvel[base_v + k]
+        v[3 + i] = qvel[base_v + 3 + i]
+    q[6] = qpos[base_q + 3]
+    for n in range(12):
+        q[7 + n], v[6 + n] = qpos[places[0, n]], qvel[places[1, n]]
+
+
+@kernel
+def bin_forces(
+    geoms: Foreign[Int32[np.ndarray, "n 2"]],
+    addresses: Foreign[Int32[np.ndarray, " n"]],
+    dimensions: Foreign[Int32[np.ndarray, " n"]],
+    efc_force: Foreign[Float[np.ndarray, " rows"]],
+    codes: Int[np.ndarray, " ngeom"],
+    is_elliptic: bool,
+    forces: Float[np.ndarray, " bins"],
+) -> None:
+    """Fill the normal forces [N] of contacts between robot and world, summed per bin.
+
+    A contact's rows of ``efc_force`` begin at its address: with elliptic cones, or without
+    friction, by the normal force; with pyramids by forces along 2 (dimension - 1) edges, of which
+    the normal force is the sum (MuJoCo's documentation, chapter Computation, "Contact").
+
+    Args:
+        geoms: of each contact.
+        addresses: of each contact, below 0 for one without force.
+        dimensions: of each contact.
+        efc_force: forces of all constraints.
+        codes: as in ``MujocoLayout``.
+        is_elliptic: of the friction cones.
+        forces: is filled.
+    """
+    forces[:] = 0.0
+    for contact in range(geoms.shape[0]):
+        which = codes[geoms[contact, 0]] + codes[geoms[contact, 1]] - FOREIGN
+        address = addresses[contact]
+        if not 0 <= which < forces.shape[0] or address < 0:
+            continue
+        rows = 1 if is_elliptic else max(2 * (dimensions[contact] - 1), 1)
+        for row in range(address, address + rows):
+            forces[which] += efc_force[row]
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,13 @@ from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.commands import DelayedCommands
 from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
-from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN
+from go2_wbc.plant.mujoco.layout import (
+    LIMB_BIN,
+    ROBOT_BINS,
+    TRUNK_BIN,
+    bin_forces,
+    read_joints,
+)
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Pushes
 from go2_wbc.plant.mujoco.saved import SavedPhysics
@@ -364,7 +370,7 @@ class MujocoPlant(Plant):
     def _bind_kernels(self) -> None:
         """Binds the kernels of a tick and the arrays of MuJoCo's that they read and fill."""
         with without_collecting():
-            from go2_wbc.kernels import motor, simulation  # compiled; only who needs them waits
+            from go2_wbc.kernels import motor  # compiled; only who needs it waits
 
         motors, data, layout = self._motor, self._data, self._layout
         numbers = np.array([motors.peak, motors.knee_speed, motors.no_load_speed])
@@ -372,8 +378,7 @@ class MujocoPlant(Plant):
         self._drive, self._motors = motor.drive, (numbers, places, data.qpos, data.qvel, data.ctrl)
         state = (data.qpos, data.qvel, self._R_world_base)
         base = (layout.base_q.start, layout.base_v.start)
-        self._read_joints = partial(simulation.measure, *state, *base, places)
-        self._bin_forces = simulation.ground_forces
+        self._read_joints = partial(read_joints, *state, *base, places)
         self._is_elliptic = bool(self._model.opt.cone == mujoco.mjtCone.mjCONE_ELLIPTIC)
 
     def _ground_forces(self) -> Float[np.ndarray, "6"]:
@@ -384,7 +389,7 @@ class MujocoPlant(Plant):
         data, forces = self._data, np.empty(ROBOT_BINS)
         contact, codes = data.contact, self._layout.geom_codes
         rows = (contact.geom, contact.efc_address, contact.dim, data.efc_force)
-        self._bin_forces(*rows, codes, self._is_elliptic, forces)
+        bin_forces(*rows, codes, self._is_elliptic, forces)
         return forces
 
     def _check_physics(self) -> None:

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.compilation import kernel_folder
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import write_atomically
 from go2_wbc.plant.mujoco.layout import MujocoLayout
@@ -98,8 +99,6 @@ def _place(model: mujoco.MjModel, data: mujoco.MjData, layout: MujocoLayout, yaw
 
 def _kept_file(model: mujoco.MjModel, data: mujoco.MjData) -> Path | None:
     """Where the outcome is kept; None if nothing can be."""
-    from go2_wbc.kernels.compilation import kernel_folder  # numba; the plant's kernels wait for it
-
     folder = kernel_folder()
     if folder is None:
         return None

@@ -9,8 +9,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from go2_wbc.kernels import compilation
-from go2_wbc.kernels.compilation import kernel_folder
+from go2_wbc import compilation
+from go2_wbc.compilation import kernel_folder
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco import settling
 from go2_wbc.robot.state import JointCommand
