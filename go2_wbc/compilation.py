@@ -74,7 +74,10 @@ MODULES: tuple[str, ...] = (
     "go2_wbc.algebra.active_set",
     "go2_wbc.plant.mujoco.layout",
     "go2_wbc.reference",
+    "go2_wbc.robot.leg_kinematics",
+    "go2_wbc.robot.rotations",
     "go2_wbc.robot.safety",
+    "go2_wbc.wbc.trajectory_loads",
 )
 """Modules that hold kernels."""
 _FOREIGN = "foreign"
@@ -455,6 +458,8 @@ def _ingredient(name: str, value: Any, seen: set[int]) -> Iterator[str]:
         yield from _ingredients(value.written, seen)
     elif isinstance(value, FunctionType):
         yield from _ingredients(value, seen)
+    elif type(value).__module__ == "go2_wbc.kernels.compilation":  # until none is left
+        yield from _ingredients(value._function, seen)
     elif isinstance(value, type) and issubclass(value, enum.Enum):
         yield f"{name} = {[(member.name, member.value) for member in value]}"
     elif isinstance(value, (bool, int, float, str, tuple, np.generic, np.ndarray)):

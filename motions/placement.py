@@ -1,6 +1,6 @@
 """Where trunk and joints are when the feet stand in their places and the CoM is where it is wanted.
 
-For many instants at once, in compiled kernels; what they are held to stands beside them.
+For many instants at once, compiled (``robot.leg_kinematics``).
 """
 
 from __future__ import annotations
@@ -9,16 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.spatial.transform import Rotation
 
-from go2_wbc.legs import LEGS
-from go2_wbc.robot.leg_kinematics import (
-    LegGeometry,
-    leg_table,
-    link_table,
-    readable_leg_angles,
-)
+from go2_wbc.robot import leg_kinematics
+from go2_wbc.robot.leg_kinematics import leg_table, link_table, settle
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import quaternions_from_rpy, rotations_from_rpy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +62,6 @@ def place(wanted: Wanted, steps: int, model: RobotModel) -> Placed:
     step leaves an eighth of the error (measured). The legs are solved once more after the last one,
     so that the feet are exactly in their places.
     """
-    from go2_wbc.kernels.kinematics import settle  # compiled; only who needs it waits for it
-
     p, joints = _own(wanted.p), _own(wanted.q_joints)
     miss, com = np.empty((len(p), 4)), np.empty((len(p), 3))
     settle(
@@ -88,31 +81,10 @@ def place(wanted: Wanted, steps: int, model: RobotModel) -> Placed:
     return Placed(p, joints, com, miss)
 
 
-def readable_place(wanted: Wanted, steps: int, model: RobotModel) -> Placed:
-    """The same as ``place``, in numpy and with Pinocchio's CoM: what the kernel is held to."""
-    attitude = Rotation.from_matrix(wanted.R)
-    q = np.hstack([wanted.p, attitude.as_quat(), wanted.q_joints])
-    base, joints = q[:, :3], q[:, 7:]  # views: q follows them
-    miss, com = np.zeros((len(q), 4)), np.zeros((len(q), 3))
-    for step in range(steps + 1):
-        for leg in LEGS:
-            places = attitude.apply(wanted.p_feet[:, leg] - base, inverse=True)
-            found = readable_leg_angles(LegGeometry.of(model, leg), places)
-            stands = ~wanted.raised[:, leg]
-            joints[stands, leg.joints] = found.q[stands]
-            miss[:, leg] = np.where(stands, found.miss, 0.0)
-        com = np.array([model.center_of_mass(row) for row in q])
-        if step < steps:
-            base += np.where(wanted.is_com[:, None], wanted.p - com, 0.0)
-    return Placed(base, joints, com, miss)
-
-
 def attitudes(rpy: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3 3"]:
     """R_world_base = Rz(yaw) Ry(pitch) Rx(roll) of every row [rad]."""
-    from go2_wbc.kernels.kinematics import rotations  # compiled, as above
-
     R = np.empty((len(rpy), 3, 3))
-    rotations(_own(rpy), R)
+    rotations_from_rpy(_own(rpy), R)
     return R
 
 
@@ -132,10 +104,8 @@ def configurations(
     poses: Float[np.ndarray, "n 6"], joints: Float[np.ndarray, "n 12"]
 ) -> Float[np.ndarray, "n 19"]:
     """q of a trunk at ``poses`` (position, then roll, pitch, yaw) with these joint angles."""
-    from go2_wbc.kernels.kinematics import quaternions  # compiled, as above
-
     xyzw = np.empty((len(poses), 4))
-    quaternions(_own(poses[:, 3:]), xyzw)
+    quaternions_from_rpy(_own(poses[:, 3:]), xyzw)
     return np.hstack([poses[:, :3], xyzw, joints])
 
 
@@ -143,10 +113,8 @@ def centres_of_mass(
     poses: Float[np.ndarray, "n 6"], joints: Float[np.ndarray, "n 12"], model: RobotModel
 ) -> Float[np.ndarray, "n 3"]:
     """CoM [m] of a trunk at ``poses`` with these joint angles."""
-    from go2_wbc.kernels import kinematics  # compiled, as above
-
     com, R = np.empty((len(poses), 3)), attitudes(poses[:, 3:])
-    kinematics.centres_of_mass(link_table(model), _own(poses[:, :3]), R, _own(joints), com)
+    leg_kinematics.centres_of_mass(link_table(model), _own(poses[:, :3]), R, _own(joints), com)
     return com
 
 

@@ -58,10 +58,8 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.goals",
         "go2_wbc.kernels.ground",
         "go2_wbc.kernels.inputs",
-        "go2_wbc.kernels.kinematics",
         "go2_wbc.kernels.landing",
         "go2_wbc.kernels.loading",  # loaded here
-        "go2_wbc.kernels.loads",
         "go2_wbc.kernels.locomotion",
         "go2_wbc.kernels.motor",
         "go2_wbc.kernels.mpc",

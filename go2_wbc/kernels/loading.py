@@ -9,8 +9,6 @@ from go2_wbc import compilation
 KERNELS = (
     "condensed",
     "estimation",
-    "kinematics",
-    "loads",
     "locomotion",
     "motor",
     "mpc",

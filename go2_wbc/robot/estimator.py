@@ -205,7 +205,7 @@ class StateEstimator:
         placement = pin_model.frames[pin_model.getFrameId(imu)].placement
         self._p_base_imu = np.array(placement.translation)
         self._geometry = [LegGeometry.of(model, leg) for leg in LEGS]
-        self._legs, self._radius = leg_table(model), model.foot_radius
+        self._legs, self._radius = leg_table(model).row.reshape(4, 6), model.foot_radius
         self._gravity = model.gravity
         self._numbers = self._in_order(model)
         self._kernel = estimation

@@ -15,6 +15,10 @@ to the foot's centre in the base frame (x ahead, y left, z up):
 
 Seen along x, y^2 + z^2 = w^2 + down^2 gives down; (y, z) is (w, -down) turned by q1. In the leg's
 plane, the law of cosines on l2, l3 and the reach sqrt(x^2 + down^2) gives q3, and then q2.
+
+The CoM of a configuration is the sum of its links' places by their shares of the mass
+(``weigh_leg``); with feet that stand and an attitude that is given it is a function of the base's
+place alone, which ``settle`` solves.
 """
 
 from __future__ import annotations
@@ -23,10 +27,12 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
+from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
+from go2_wbc.records import Record, packed
 from go2_wbc.robot.model import LEG_AXES, RobotModel
 
 
@@ -48,7 +54,7 @@ class LegGeometry:
 
     @staticmethod
     def of(model: RobotModel, leg: Leg) -> LegGeometry:
-        """The lengths of ``leg``, read from the robot's description."""
+        """The lengths of ``leg``, read from the robot's description, packed."""
         known = _KNOWN.setdefault(model, {})
         if leg not in known:
             known[leg] = LegGeometry._read(model, leg)
@@ -60,48 +66,266 @@ class LegGeometry:
         joints = [pin_model.getJointId(name) for name in JOINT_NAMES[leg.joints]]
         hip, thigh, calf = (pin_model.jointPlacements[joint].translation for joint in joints)
         foot = pin_model.frames[pin_model.getFrameId(leg.foot)].placement.translation
-        return LegGeometry(np.array(hip), float(thigh[1]), float(-calf[2]), float(-foot[2]))
-
-    @property
-    def row(self) -> Float[np.ndarray, "6"]:
-        """Its numbers one after the other, for the kernels."""
-        return np.array([*self.p_base_hip, self.width, self.thigh, self.calf])
+        lengths = float(thigh[1]), float(-calf[2]), float(-foot[2])
+        return packed(LegGeometry(np.array(hip), *lengths))
 
 
-def leg_table(model: RobotModel) -> Float[np.ndarray, "4 6"]:
-    """The geometry of each leg, for the kernels."""
-    return np.array([LegGeometry.of(model, leg).row for leg in LEGS])
+class Legs(Record):
+    """The four legs: ``legs.geometry[leg]``."""
+
+    geometry: tuple[LegGeometry, LegGeometry, LegGeometry, LegGeometry]
 
 
-def link_table(model: RobotModel) -> Float[np.ndarray, "13 7"]:
-    """Of the trunk and the legs' links, for the kernels: share of the mass, CoM, joint's place.
+class Links(Record):
+    """Trunk, then hip, thigh and calf of each leg.
 
-    The CoM [m] is given in the frame of the link's joint, the joint's place [m] in that of the link
-    before it. The trunk's joint is its own.
+    Attributes:
+        share: of the robot's mass.
+        p_com: CoM [m] in the frame of the link's joint.
+        p_joint: place of that joint [m] in the frame of the link before; the trunk's is its own.
+    """
+
+    share: Float[np.ndarray, "13"]
+    p_com: Float[np.ndarray, "13 3"]
+    p_joint: Float[np.ndarray, "13 3"]
+
+
+def leg_table(model: RobotModel) -> Legs:
+    """The geometry of each leg."""
+    return Legs(geometry=[LegGeometry.of(model, leg) for leg in LEGS])
+
+
+def link_table(model: RobotModel) -> Links:
+    """What the CoM depends on, of trunk and legs.
 
     Raises:
         DescriptionError: if a leg's joints do not turn about x, y and y.
     """
     pin_model = model.pin_model
-    table = np.zeros((13, 7))
-    for row, (inertia, place) in enumerate(
+    links = Links()
+    for n, (inertia, place) in enumerate(
         zip(pin_model.inertias[1:], pin_model.jointPlacements[1:], strict=True)
     ):
-        table[row, 0] = inertia.mass / model.mass
-        table[row, 1:4] = inertia.lever
-        if row == 0:
+        links.share[n], links.p_com[n] = inertia.mass / model.mass, inertia.lever
+        if n == 0:
             continue
-        table[row, 4:] = place.translation
-        axis, expected = pin_model.joints[row + 1].shortname(), LEG_AXES[(row - 1) % 3]
+        links.p_joint[n] = place.translation
+        axis, expected = pin_model.joints[n + 1].shortname(), LEG_AXES[(n - 1) % 3]
         if axis != expected or not np.array_equal(place.rotation, np.eye(3)):
             raise DescriptionError(
-                f"{JOINT_NAMES[row - 1]} is a {axis}; expected {expected}, not tilted"
+                f"{JOINT_NAMES[n - 1]} is a {axis}; expected {expected}, not tilted"
             )
-    return table
+    return links
 
 
 _KNOWN: WeakKeyDictionary[RobotModel, dict[Leg, LegGeometry]] = WeakKeyDictionary()
 """The legs of every living model that were asked for."""
+
+
+@subroutine
+def wrapped(angle: float) -> float:
+    """An angle between -2 pi and 2 pi, brought between -pi and pi."""
+    if angle > np.pi:
+        return angle - 2.0 * np.pi
+    if angle < -np.pi:
+        return angle + 2.0 * np.pi
+    return angle
+
+
+@subroutine
+def solve_leg(leg: LegGeometry, x: float, y: float, z: float, q: Float[np.ndarray, "3"]) -> float:
+    """Fill the three angles that bring a foot to a place in the base frame; returns the miss."""
+    x, y, z = x - leg.p_base_hip[0], y - leg.p_base_hip[1], z - leg.p_base_hip[2]
+    width, thigh, calf = leg.width, leg.thigh, leg.calf
+    across = y * y + z * z - width * width
+    down = 0.0 if across < 0.0 else np.sqrt(across)
+    if z > 0.0:
+        down = -down
+    reach = np.hypot(x, down)
+    cosine = (reach * reach - thigh * thigh - calf * calf) / (2.0 * thigh * calf)
+    if cosine > 1.0:
+        cosine = 1.0
+    elif cosine < -1.0:
+        cosine = -1.0
+    knee = -np.arccos(cosine)
+    swing = np.arctan2(-x, down)
+    swing -= np.arctan2(calf * np.sin(knee), thigh + calf * np.cos(knee))
+    q[0] = wrapped(np.arctan2(z, y) + np.arctan2(down, width))
+    q[1] = wrapped(swing)
+    q[2] = knee
+    near = max(abs(width) - np.hypot(y, z), 0.0)
+    far = max(reach - thigh - calf, abs(thigh - calf) - reach)
+    return near if far <= 0.0 else np.hypot(near, far)
+
+
+@kernel(nogil=True)
+def solve_legs(
+    leg: LegGeometry,
+    places: Float[np.ndarray, "n 3"],
+    q: Float[np.ndarray, "n 3"],
+    miss: Float[np.ndarray, " n"],
+) -> None:
+    """Fill angles and misses for foot centres in the base frame."""
+    for i in range(len(places)):
+        miss[i] = solve_leg(leg, places[i, 0], places[i, 1], places[i, 2], q[i])
+
+
+@subroutine
+def turns_of(q: Float[np.ndarray, "3"], turns: Float[np.ndarray, "6"]) -> None:
+    """Fill cosine and sine of the hip, of the thigh, and of thigh and calf together."""
+    turns[0], turns[1] = np.cos(q[0]), np.sin(q[0])
+    turns[2], turns[3] = np.cos(q[1]), np.sin(q[1])
+    turns[4], turns[5] = np.cos(q[1] + q[2]), np.sin(q[1] + q[2])
+
+
+@subroutine
+def turns_to(leg: LegGeometry, x: float, y: float, z: float, turns: Float[np.ndarray, "6"]) -> None:
+    """The same of the angles that ``solve_leg`` finds, without the angles: no more than roots."""
+    x, y, z = x - leg.p_base_hip[0], y - leg.p_base_hip[1], z - leg.p_base_hip[2]
+    width, thigh, calf = leg.width, leg.thigh, leg.calf
+    square = y * y + z * z
+    across = square - width * width
+    down = 0.0 if across < 0.0 else np.sqrt(across)
+    if z > 0.0:
+        down = -down
+    if square == 0.0:
+        y, square = 1.0, 1.0
+    length = np.sqrt(square * (width * width + down * down))
+    turns[0], turns[1] = (y * width - z * down) / length, (z * width + y * down) / length
+    reach = np.sqrt(x * x + down * down)
+    cosine = (reach * reach - thigh * thigh - calf * calf) / (2.0 * thigh * calf)
+    if cosine > 1.0:
+        cosine = 1.0
+    elif cosine < -1.0:
+        cosine = -1.0
+    sine = -np.sqrt(1.0 - cosine * cosine)
+    if reach == 0.0:
+        down, reach = 1.0, 1.0
+    a, b = thigh + calf * cosine, calf * sine
+    length = reach * np.sqrt(a * a + b * b)
+    if length == 0.0:
+        a, b, length = 0.0, -1.0, reach
+    ct, st = (down * a - x * b) / length, (-x * a - down * b) / length
+    turns[2], turns[3] = ct, st
+    turns[4], turns[5] = ct * cosine - st * sine, st * cosine + ct * sine
+
+
+@subroutine
+def weigh_leg(
+    links: Links, leg: int, turns: Float[np.ndarray, "6"], moment: Float[np.ndarray, "3"]
+) -> None:
+    """Fill what a leg adds to the CoM in the base frame: its links' places by their shares.
+
+    With x, y, y the axes of hip, thigh and calf, o_k the places of the joints on the links before
+    them, c_k and s_k the links' centres and shares of the mass:
+
+        (s1 + s2 + s3) o1
+        + Rx(q1) (s1 c1 + s2 (o2 + Ry(q2) c2) + s3 (o2 + Ry(q2) o3 + Ry(q2 + q3) c3))
+    """
+    n = 1 + 3 * leg
+    s1, s2, s3 = links.share[n], links.share[n + 1], links.share[n + 2]
+    c1, c2, c3 = links.p_com[n], links.p_com[n + 1], links.p_com[n + 2]
+    o1, o2, o3 = links.p_joint[n], links.p_joint[n + 1], links.p_joint[n + 2]
+    ch, sh, ct, st, ck, sk = turns[0], turns[1], turns[2], turns[3], turns[4], turns[5]
+    a0, a1, a2 = s2 * c2[0] + s3 * o3[0], s2 * c2[1] + s3 * o3[1], s2 * c2[2] + s3 * o3[2]
+    b0, b1, b2 = s3 * c3[0], s3 * c3[1], s3 * c3[2]
+    x = s1 * c1[0] + (s2 + s3) * o2[0] + ct * a0 + st * a2 + ck * b0 + sk * b2
+    y = s1 * c1[1] + (s2 + s3) * o2[1] + a1 + b1
+    z = s1 * c1[2] + (s2 + s3) * o2[2] - st * a0 + ct * a2 - sk * b0 + ck * b2
+    whole = s1 + s2 + s3
+    moment[0] = whole * o1[0] + x
+    moment[1] = whole * o1[1] + ch * y - sh * z
+    moment[2] = whole * o1[2] + sh * y + ch * z
+
+
+@subroutine
+def add_up(
+    links: Links,
+    moments: Float[np.ndarray, "4 3"],
+    R: Float[np.ndarray, "3 3"],
+    p: Float[np.ndarray, "3"],
+    com: Float[np.ndarray, "3"],
+) -> None:
+    """Fill the CoM in the world from the four legs' moments, at R and p of the base."""
+    share, c = links.share[0], links.p_com[0]
+    x, y, z = share * c[0], share * c[1], share * c[2]
+    for leg in range(4):
+        x, y, z = x + moments[leg, 0], y + moments[leg, 1], z + moments[leg, 2]
+    for i in range(3):
+        com[i] = p[i] + R[i, 0] * x + R[i, 1] * y + R[i, 2] * z
+
+
+@kernel(nogil=True)
+def centres_of_mass(
+    links: Links,
+    p: Float[np.ndarray, "n 3"],
+    R: Float[np.ndarray, "n 3 3"],
+    joints: Float[np.ndarray, "n 12"],
+    com: Float[np.ndarray, "n 3"],
+) -> None:
+    """Fill the CoM in the world of every configuration."""
+    moments, turns = np.empty((4, 3)), np.empty(6)
+    for i in range(len(p)):
+        for leg in range(4):
+            turns_of(joints[i, 3 * leg : 3 * leg + 3], turns)
+            weigh_leg(links, leg, turns, moments[leg])
+        add_up(links, moments, R[i], p[i], com[i])
+
+
+@subroutine
+def seen_from_base(
+    R: Float[np.ndarray, "3 3"],
+    p: Float[np.ndarray, "3"],
+    p_foot: Float[np.ndarray, "3"],
+    seen: Float[np.ndarray, "3"],
+) -> None:
+    """Fill a place of the world as the base at R and p sees it."""
+    d0, d1, d2 = p_foot[0] - p[0], p_foot[1] - p[1], p_foot[2] - p[2]
+    for k in range(3):
+        seen[k] = R[0, k] * d0 + R[1, k] * d1 + R[2, k] * d2
+
+
+@kernel(nogil=True)
+def settle(
+    wanted: Float[np.ndarray, "n 3"],
+    is_com: Bool[np.ndarray, " n"],
+    raised: Bool[np.ndarray, "n 4"],
+    R: Float[np.ndarray, "n 3 3"],
+    p_feet: Float[np.ndarray, "n 4 3"],
+    legs: Legs,
+    links: Links,
+    steps: int,
+    p: Float[np.ndarray, "n 3"],
+    joints: Float[np.ndarray, "n 12"],
+    miss: Float[np.ndarray, "n 4"],
+    com: Float[np.ndarray, "n 3"],
+) -> None:
+    """Put every trunk where its CoM, or its base, is wanted, with standing feet in their places.
+
+    ``p`` starts at the base's place and ends there, ``joints`` of raised legs stay; the others,
+    ``miss`` and ``com`` are filled. In every step but the last, p <- p + (c* - c(p)).
+    """
+    moments, turns, foot = np.empty((4, 3)), np.empty(6), np.empty(3)
+    for i in range(len(wanted)):
+        for leg in range(4):
+            if raised[i, leg]:
+                miss[i, leg] = 0.0
+                turns_of(joints[i, 3 * leg : 3 * leg + 3], turns)
+                weigh_leg(links, leg, turns, moments[leg])
+        for step in range(steps + 1):
+            for leg in range(4):
+                if raised[i, leg]:
+                    continue
+                seen_from_base(R[i], p[i], p_feet[i, leg], foot)
+                if step == steps:
+                    angles = joints[i, 3 * leg : 3 * leg + 3]
+                    miss[i, leg] = solve_leg(legs.geometry[leg], foot[0], foot[1], foot[2], angles)
+                turns_to(legs.geometry[leg], foot[0], foot[1], foot[2], turns)
+                weigh_leg(links, leg, turns, moments[leg])
+            add_up(links, moments, R[i], p[i], com[i])
+            if step < steps and is_com[i]:
+                for k in range(3):
+                    p[i, k] += wanted[i, k] - com[i, k]
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,35 +342,10 @@ class LegAngles:
 
 
 def leg_angles(geometry: LegGeometry, p_base_foot: Float[np.ndarray, "n 3"]) -> LegAngles:
-    """Joint angles for foot centres (n, 3) in the base frame [m]."""
-    from go2_wbc.kernels.kinematics import solve_legs  # compiled; only who needs it waits for it
-
+    """Joint angles for foot centres (n, 3) in the base frame [m]; ``geometry`` is packed."""
     found = LegAngles(np.empty((len(p_base_foot), 3)), np.empty(len(p_base_foot)))
-    solve_legs(geometry.row, np.ascontiguousarray(p_base_foot, float), found.q, found.miss)
+    solve_legs(geometry, np.ascontiguousarray(p_base_foot, float), found.q, found.miss)
     return found
-
-
-def readable_leg_angles(geometry: LegGeometry, p_base_foot: Float[np.ndarray, "n 3"]) -> LegAngles:
-    """The same as ``leg_angles``, in numpy: what the kernel is held to."""
-    x, y, z = (p_base_foot - geometry.p_base_hip).T
-    width, thigh, calf = geometry.width, geometry.thigh, geometry.calf
-    across = y * y + z * z - width * width
-    down = np.where(z > 0.0, -1.0, 1.0) * np.sqrt(np.maximum(across, 0.0))
-    # angle of (y, z) minus that of (w, -down)
-    hip = _wrapped(np.arctan2(z, y) + np.arctan2(down, width))
-    reach = np.hypot(x, down)
-    cosine = (reach**2 - thigh**2 - calf**2) / (2.0 * thigh * calf)
-    knee = -np.arccos(np.clip(cosine, -1.0, 1.0))
-    # direction of the foot minus that of the leg with q2 = 0: (l2 + l3 cos q3, l3 sin q3)
-    swing = np.arctan2(-x, down) - np.arctan2(calf * np.sin(knee), thigh + calf * np.cos(knee))
-    # nearer to the hip's axis than the leg's plane, and outside the ring |l2 - l3| .. l2 + l3 in it
-    too_near = np.maximum(abs(width) - np.hypot(y, z), 0.0)
-    too_far = np.maximum(np.maximum(reach - thigh - calf, abs(thigh - calf) - reach), 0.0)
-    return LegAngles(np.column_stack([hip, _wrapped(swing), knee]), np.hypot(too_near, too_far))
-
-
-def _wrapped(angle: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    return np.arctan2(np.sin(angle), np.cos(angle))
 
 
 def foot_places(geometry: LegGeometry, q: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:

@@ -8,6 +8,8 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
+from go2_wbc.compilation import kernel
+
 
 def log_rotation(R: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3"]:
     """Rotation vector [rad] of ``R``."""
@@ -52,6 +54,30 @@ def rpy_from_quaternion(quaternion: Float[np.ndarray, "4"]) -> Float[np.ndarray,
     """Roll, pitch, yaw [rad] of a quaternion x y z w that is not 0; its length does not count."""
     unit = quaternion / np.linalg.norm(quaternion)
     return rpy_from_rotation(pin.Quaternion(unit).toRotationMatrix())
+
+
+@kernel(nogil=True)
+def rotations_from_rpy(rpy: Float[np.ndarray, "n 3"], R: Float[np.ndarray, "n 3 3"]) -> None:
+    """Fill R = Rz(yaw) Ry(pitch) Rx(roll) of every row."""
+    for i in range(len(rpy)):
+        sr, sp, sy = np.sin(rpy[i, 0]), np.sin(rpy[i, 1]), np.sin(rpy[i, 2])
+        cr, cp, cy = np.cos(rpy[i, 0]), np.cos(rpy[i, 1]), np.cos(rpy[i, 2])
+        R[i, 0, 0], R[i, 0, 1], R[i, 0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
+        R[i, 1, 0], R[i, 1, 1], R[i, 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
+        R[i, 2, 0], R[i, 2, 1], R[i, 2, 2] = -sp, cp * sr, cp * cr
+
+
+@kernel(nogil=True)
+def quaternions_from_rpy(rpy: Float[np.ndarray, "n 3"], xyzw: Float[np.ndarray, "n 4"]) -> None:
+    """Fill the quaternions x y z w of the same rotations."""
+    for i in range(len(rpy)):
+        r, p, y = 0.5 * rpy[i, 0], 0.5 * rpy[i, 1], 0.5 * rpy[i, 2]
+        sr, sp, sy = np.sin(r), np.sin(p), np.sin(y)
+        cr, cp, cy = np.cos(r), np.cos(p), np.cos(y)
+        xyzw[i, 0] = cy * cp * sr - sy * sp * cr
+        xyzw[i, 1] = cy * sp * cr + sy * cp * sr
+        xyzw[i, 2] = sy * cp * cr - cy * sp * sr
+        xyzw[i, 3] = cy * cp * cr + sy * sp * sr
 
 
 def yaw_rotation(yaw: float) -> Float[np.ndarray, "3 3"]:

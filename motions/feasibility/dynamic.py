@@ -10,7 +10,8 @@ M and h are Pinocchio's, with rotor inertia, v and a as in ``Trajectory`` (the b
 frame, so w too), f the forces of the ground on the rolling contact points in the frame of the
 motion. Of the f that give the trunk its wrench within the friction pyramid, the one that deviates
 least from an even share of the weight is taken, and along the ground from none, the less the less a
-foot bears, as the whole-body controller does it; see ``_share``.
+foot bears, as the whole-body controller does it; see
+``wbc.trajectory_loads``.
 
 The ground gives no force at once: MuJoCo's contacts need 20 ms (their ``solref``), as rubber and a
 leg's gears do. M a + h is therefore averaged over ``SPREAD`` samples before it is shared. Where a
@@ -24,18 +25,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from go2_wbc.errors import QpInfeasible
 from go2_wbc.geometry import support_margins
-from go2_wbc.kernels.layout import LEAST_PRESSURE
-from go2_wbc.legs import LEGS, Leg
+from go2_wbc.records import packed
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import friction_pyramid
-from go2_wbc.wbc.loads import relative_loads
-from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
+from go2_wbc.wbc.trajectory_loads import LoadNumbers, lag, share_loads
 from go2_wbc.world import World
 from motions.feasibility.kinematic import FEET, JOINTS
 from motions.feasibility.limits import FeasibilityLimits
@@ -66,6 +63,7 @@ STILL = 1e-6
 """Joint speed [rad/s] below which a motor drives nothing: more than rounding, 1e-15."""
 NO_SUPPORT = 1.0
 """How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
+_FEW = (2, 3)
 TIGHT_TORQUE, TIGHT_LOAD, TIGHT_FRICTION, TIGHT_SUPPORT = 0.1, 10.0, 0.05, 0.01
 """Margins below which a warning is due: share of the smallest torque limit, N, 1 and m; own choice,
 about what separates a plan from its run in simulation."""
@@ -95,8 +93,6 @@ class Forces:
 
 def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
     """Contact forces and torques along ``motion``."""
-    from go2_wbc.kernels.loads import share_loads  # compiled; only who needs it waits for it
-
     rows = zip(motion.q, motion.v, motion.a, strict=True)
     needed = _spread(np.array([model.inverse_dynamics(*row) for row in rows]), motion)
     contact, tau = np.zeros((len(needed), 4, 3)), needed[:, 6:].copy()
@@ -122,9 +118,10 @@ def _spread(needed: Float[np.ndarray, "n 18"], motion: Trajectory) -> Float[np.n
     return np.where(motion.is_dynamic[:, None], needed, total / np.maximum(count, 1.0))
 
 
-def numbers_of(model: RobotModel) -> Float[np.ndarray, "4"]:
-    """Evenness, weight [N], greatest normal force [N] and foot radius [m], for the kernels."""
-    return np.array([EVENNESS, model.mass * model.gravity, NORMAL_FORCE_MAX, model.foot_radius])
+def numbers_of(model: RobotModel) -> LoadNumbers:
+    """What the shares of the load depend on."""
+    weight = model.mass * model.gravity
+    return packed(LoadNumbers(EVENNESS, weight, NORMAL_FORCE_MAX, model.foot_radius))
 
 
 def weights_of(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "6"]:
@@ -157,25 +154,6 @@ def resisted(forces: Forces, motion: Trajectory, world: World) -> Forces:
 def joint_friction(v: Float[np.ndarray, "n 12"], world: World) -> Float[np.ndarray, "n 12"]:
     """What the friction of the joints takes [N m] at the speeds ``v`` [rad/s]."""
     return world.joint_friction * (DRY * np.tanh(v / CREEP) + VISCOUS * v)
-
-
-def readable_forces_of(motion: Trajectory, model: RobotModel) -> Forces:
-    """The same as ``forces_of``, one snapshot and one QP after the other: what it is held to."""
-    count = len(motion.times)
-    contact, tau = np.zeros((count, 4, 3)), np.zeros((count, 12))
-    missing, needed = np.zeros((count, 2)), np.zeros((count, 18))
-    for row in range(count):
-        snapshot = model.snapshot(state_at(motion, row))
-        needed[row] = snapshot.mass_matrix @ motion.a[row] + snapshot.bias
-    needed = _spread(needed, motion)
-    wrench, scale = needed[:, :6], weights_of(motion, model)
-    for row in range(count):
-        snapshot = model.snapshot(state_at(motion, row))
-        shares = motion.load_share[row]
-        contact[row], missing[row] = _share(snapshot, wrench[row], shares, scale, model)
-        J = snapshot.J_contacts.reshape(12, 18)
-        tau[row] = needed[row, 6:] - J[:, 6:].T @ contact[row].ravel()
-    return Forces(contact, tau, missing, zero_moment_points(motion.q, motion.rpy, wrench), wrench)
 
 
 def torque(
@@ -242,8 +220,6 @@ def errors_of(
     Solved parts, in which they are followed otherwise, take none. ``damping`` [1/s] is what damps
     the errors besides the gains.
     """
-    from go2_wbc.kernels.loads import lag  # compiled; only who needs it waits for it
-
     config = WbcConfig()
     gains = (config.body_position.arrays, config.body_orientation.arrays)
     kp, kd = (np.concatenate(pair) for pair in zip(*gains, strict=True))
@@ -327,66 +303,3 @@ def state_at(motion: Trajectory, row: int) -> RobotState:
         foot_forces=np.zeros(4),
         feet_in_contact=motion.stance[row],
     )
-
-
-def _share(
-    snapshot: Snapshot,
-    wrench: Float[np.ndarray, "6"],
-    load_share: Float[np.ndarray, "4"],
-    scale: Float[np.ndarray, "6"],
-    model: RobotModel,
-) -> tuple[Float[np.ndarray, "4 3"], Float[np.ndarray, "2"]]:
-    """Contact forces (4, 3) [N], and what force [N] and moment [N m] they leave over.
-
-    Minimises |S (A f - w)|^2 + e |D (f - f_even)|^2 over the forces f of the loaded feet, with A
-    the base columns of their Jacobians, transposed, S = diag(``scale``), D^2 = 1
-    for the normal forces and the mean load over the foot's for those along the ground, subject to
-    |f_x|, |f_y| <= mu f_z and 0 <= f_z <= f_max s, where s is a foot's share of its load. As a QP,
-    1/2 f' H f + g' f, with H = (S A)' (S A) + e D^2 and g = -(S A)' S w - e f_even.
-    """
-    forces = np.zeros((4, 3))
-    legs = [leg for leg in LEGS if load_share[leg] > 0.0]
-    if legs:
-        A = snapshot.J_contacts[legs, :, :6].reshape(-1, 6).T
-        even = np.zeros((len(legs), 3))
-        shares = load_share[legs]
-        even[:, 2] = model.mass * model.gravity * shares / shares.sum()
-        weighted = scale[:, None] * A
-        along = 1.0 / _loads(snapshot, wrench, legs, shares, model)
-        D2 = np.column_stack([along, along, np.ones(len(legs))])
-        H = weighted.T @ weighted + EVENNESS * np.diag(D2.ravel())
-        g = -weighted.T @ (scale * wrench) - EVENNESS * even.ravel()
-        C = _PYRAMIDS[len(legs) - 1]
-        lower = np.tile([-np.inf] * 4 + [0.0], len(legs))
-        upper = np.zeros((len(legs), 5))
-        upper[:, 4] = NORMAL_FORCE_MAX * shares
-        try:
-            x = solve_dense_qp(DenseQp(H, g, C, lower, upper.ravel()), "daqp").x
-        except QpInfeasible:
-            x = np.zeros(3 * len(legs))
-        forces[legs] = x.reshape(-1, 3)
-        wrench = wrench - A @ x
-    return forces, np.array([np.linalg.norm(wrench[:3]), np.linalg.norm(wrench[3:])])
-
-
-def _loads(
-    snapshot: Snapshot,
-    wrench: Float[np.ndarray, "6"],
-    legs: list[Leg],
-    shares: Float[np.ndarray, " k"],
-    model: RobotModel,
-) -> Float[np.ndarray, " k"]:
-    """The expected loads of ``legs``, over their mean: see ``wbc.loads.relative_loads``."""
-    R = snapshot.R_world_base
-    force, moment = R @ wrench[:3], R @ wrench[3:]
-    pressure = max(force[2], LEAST_PRESSURE * model.mass * model.gravity)
-    places = snapshot.p_world_feet[legs] - snapshot.state.p_world_base
-    depth = model.foot_radius - places[:, 2].mean()
-    along = [-(moment[1] + depth * force[0]), moment[0] - depth * force[1]]
-    most = NORMAL_FORCE_MAX * shares * len(legs) / pressure
-    return relative_loads(places[:, :2], np.array(along) / pressure, most)
-
-
-_FEW = (2, 3)
-_PYRAMIDS = tuple(np.kron(np.eye(feet), friction_pyramid(PYRAMID)) for feet in (1, 2, 3, 4))
-"""Rows of one to four feet."""

@@ -25,6 +25,7 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.wbc.trajectory_loads import accelerate, least_friction, slide
 from motions.feasibility.dynamic import (
     ARM,
     PRESSED,
@@ -76,8 +77,6 @@ def slip(
     motion: Trajectory, forces: Forces, model: RobotModel, limits: FeasibilityLimits, floor: float
 ) -> Series:
     """How far each foot slides and creeps while it stands [m], on the friction ``floor``."""
-    from go2_wbc.kernels.loads import slide  # compiled; only who needs it waits for it
-
     counts = _settled(motion) & ~motion.is_dynamic[:, None]
     dt = float(motion.times[-1] - motion.times[0]) / max(len(motion.times) - 1, 1)
     ways = np.zeros(counts.shape)
@@ -92,8 +91,6 @@ def creep(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "n 4 2"]:
 
     That is -J a / ``CREEP`` of the contact points.
     """
-    from go2_wbc.kernels.loads import accelerate  # compiled; only who needs it waits for it
-
     J_a = np.empty((len(motion.times), 4, 2))
     joints, a = np.array(motion.q[:, 7:], order="C"), np.array(motion.a, order="C")
     accelerate(joints, attitudes(motion.rpy), a, leg_table(model), model.foot_radius, J_a)
@@ -111,8 +108,6 @@ def cone(facets: int = FACETS) -> Float[np.ndarray, "k 3"]:
 def _least(
     motion: Trajectory, forces: Forces, model: RobotModel, limits: FeasibilityLimits, floor: float
 ) -> Float[np.ndarray, " n"]:
-    from go2_wbc.kernels.loads import least_friction  # compiled; only who needs it waits for it
-
     normal = forces.contact[:, :, 2]
     along = np.linalg.norm(forces.contact[:, :, :2], axis=2)
     values = np.where(normal > PRESSED, along / np.maximum(normal, PRESSED), 0.0).max(axis=1)

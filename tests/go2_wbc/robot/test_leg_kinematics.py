@@ -1,17 +1,41 @@
-"""The closed-form inverse kinematics of a leg against Pinocchio's forward kinematics."""
+"""Legs and CoM of many configurations against Pinocchio."""
 
 from __future__ import annotations
 
-import numpy as np
-import pytest
+from collections.abc import Callable
 
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.spatial.transform import Rotation
+
+from go2_wbc.compilation import _Kernel
+from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
+from go2_wbc.records import packed
+from go2_wbc.robot.leg_kinematics import (
+    LegGeometry,
+    centres_of_mass,
+    foot_places,
+    leg_angles,
+    leg_table,
+    link_table,
+    settle,
+    solve_legs,
+    turns_of,
+    turns_to,
+)
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import quaternions_from_rpy, rotations_from_rpy
+from go2_wbc.wbc.trajectory_loads import share_loads
+from tests.compiled import assert_plain_is_compiled
 from tests.engine_helpers import POLAR
 
 EXACT = 1e-9  # m, rad
+ROUNDING = 1e-12  # m, rad, 1
+STEEP = 1e-7  # rad, where a leg is as long or as short as it can be, and the arc cosine is vertical
 COUNT = 200
+MANY = 1000  # places
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +99,7 @@ def test_a_place_out_of_reach_is_missed_by_its_distance_to_the_nearest_one(
 
 def test_a_foot_too_near_to_its_hip_is_missed(model: RobotModel) -> None:
     # Thigh and calf are equally long here, so only a made-up leg has a hole in its reach.
-    leg = LegGeometry(np.zeros(3), 0.1, 0.25, 0.15)
+    leg = packed(LegGeometry(np.zeros(3), 0.1, 0.25, 0.15))
     place = np.array([[0.0, 0.1, -0.04]])
     assert leg_angles(leg, place).miss == pytest.approx(0.06, abs=EXACT)
     inside = leg_angles(leg, np.array([[0.3, 0.06, 0.0]]))
@@ -89,3 +113,88 @@ def test_left_and_right_are_mirror_images(model: RobotModel, leg: Leg) -> None:
     mirrored = leg_angles(other, places * POLAR)
     expected = leg_angles(geometry, places).q * [-1.0, 1.0, 1.0]
     assert mirrored.q == pytest.approx(expected, abs=EXACT)
+
+
+def places(geometry: LegGeometry, seed: int) -> np.ndarray:
+    """Places in and out of reach, and those at which an angle is not defined."""
+    rng = np.random.default_rng(seed)
+    longest = geometry.thigh + geometry.calf
+    odd = [
+        [0.0, 0.0, 0.0],
+        [0.1, 0.0, 0.0],
+        [0.0, geometry.width, 0.0],
+        [0.0, -geometry.width, 0.0],
+        [0.0, geometry.width, -longest],
+        [longest, geometry.width, 0.0],
+        [0.0, 0.5 * geometry.width, 0.0],
+    ]
+    return geometry.p_base_hip + np.vstack([rng.uniform(-0.6, 0.6, size=(MANY, 3)), odd])
+
+
+def test_a_nan_is_answered_by_nans(model: RobotModel) -> None:
+    found = leg_angles(LegGeometry.of(model, Leg.FL), np.full((1, 3), np.nan))
+    assert np.isnan(found.q).all()
+    assert np.isnan(found.miss).all()
+
+
+@pytest.mark.parametrize("leg", LEGS)
+def test_cosines_and_sines_are_those_of_the_angles(model: RobotModel, leg: Leg) -> None:
+    geometry = LegGeometry.of(model, leg)
+    fast, slow = np.empty(6), np.empty(6)
+    for row, place in enumerate(places(geometry, 10 + int(leg))):
+        x, y, z = place.tolist()
+        turns_to(geometry, x, y, z, fast)
+        turns_of(leg_angles(geometry, place[None]).q[0], slow)
+        assert np.abs(fast - slow).max() < (ROUNDING if row < MANY else STEEP), place
+
+
+def test_the_centre_of_mass_is_pinocchios(model: RobotModel) -> None:
+    rng = np.random.default_rng(3)
+    p, joints = rng.normal(size=(MANY, 3)), rng.uniform(-3.0, 3.0, size=(MANY, 12))
+    attitude, com = Rotation.random(MANY, rng=rng), np.empty((MANY, 3))
+    centres_of_mass(link_table(model), p, attitude.as_matrix(), joints, com)
+    for row, q in enumerate(np.hstack([p, attitude.as_quat(), joints])):
+        assert com[row] == pytest.approx(model.center_of_mass(q), abs=ROUNDING)
+
+
+def test_a_robot_with_tilted_joints_is_refused() -> None:
+    other = RobotModel()
+    place = other.pin_model.jointPlacements[3]
+    tilted = pin.SE3(pin.utils.rotate("x", 0.1), place.translation)
+    other.pin_model.jointPlacements[3] = tilted
+    with pytest.raises(DescriptionError, match="FL_thigh_joint"):
+        link_table(other)
+
+
+@pytest.mark.parametrize(
+    "kernel",
+    [
+        rotations_from_rpy,
+        quaternions_from_rpy,
+        solve_legs,
+        centres_of_mass,
+        settle,
+        share_loads,
+    ],
+)
+def test_a_control_loop_need_not_wait_for_the_check_of_a_long_motion(
+    kernel: Callable[..., None],
+) -> None:
+    """Plans are made beside a loop that ticks; for 60 s of motion a kernel takes many ticks."""
+    assert isinstance(kernel, _Kernel)
+    assert kernel.compiled.targetoptions["nogil"]
+
+
+def test_compiled_is_plain(model: RobotModel) -> None:
+    rng = np.random.default_rng(4)
+    geometry, n = LegGeometry.of(model, Leg.RL), 20
+    feet = places(geometry, 20)[-n:]
+    assert_plain_is_compiled(solve_legs, geometry, feet, np.empty((n, 3)), np.empty(n))
+    R = Rotation.from_rotvec(0.3 * rng.normal(size=(n, 3))).as_matrix()
+    p, joints = rng.normal(scale=0.05, size=(n, 3)) + [0.0, 0.0, 0.3], rng.normal(size=(n, 12))
+    links, com = link_table(model), np.empty((n, 3))
+    assert_plain_is_compiled(centres_of_mass, links, p, R, joints, com)
+    raised, is_com = rng.random((n, 4)) < 0.3, rng.random(n) < 0.5
+    p_feet = model.p_base_feet_nominal + rng.normal(scale=0.02, size=(n, 4, 3))
+    given = (p, is_com, raised, R, p_feet, leg_table(model), links, 3)
+    assert_plain_is_compiled(settle, *given, p, joints, np.empty((n, 4)), com)

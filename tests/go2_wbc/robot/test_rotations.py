@@ -7,16 +7,20 @@ import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from go2_wbc.robot.rotations import (
     angular_velocity_from_rpy,
     cross,
     exp_rotation,
     log_rotation,
+    quaternions_from_rpy,
     rotation_from_rpy,
+    rotations_from_rpy,
     wrap_angle,
     yaw_rotation,
 )
+from tests.compiled import assert_plain_is_compiled
 
 EXACT = 1e-12  # rounding of numbers of order one
 STEP = 1e-5  # [s] of the central differences
@@ -92,3 +96,15 @@ def test_a_wrapped_angle_is_the_same_direction_within_half_a_turn(angle: float) 
     assert -np.pi <= wrapped <= np.pi
     assert np.cos(wrapped) == pytest.approx(np.cos(angle), abs=1e-9)
     assert np.sin(wrapped) == pytest.approx(np.sin(angle), abs=1e-9)
+
+
+def test_rotations_and_quaternions_are_those_of_roll_pitch_yaw() -> None:
+    rpy = np.random.default_rng(2).uniform(-4.0, 4.0, size=(1000, 3))
+    expected = Rotation.from_euler("ZYX", rpy[:, ::-1])
+    R, xyzw = np.empty((1000, 3, 3)), np.empty((1000, 4))
+    rotations_from_rpy(rpy, R)
+    quaternions_from_rpy(rpy, xyzw)
+    assert pytest.approx(expected.as_matrix(), abs=1e-12) == R
+    assert pytest.approx(expected.as_quat(), abs=1e-12) == xyzw
+    assert_plain_is_compiled(rotations_from_rpy, rpy, R)
+    assert_plain_is_compiled(quaternions_from_rpy, rpy, xyzw)

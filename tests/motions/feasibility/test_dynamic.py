@@ -11,11 +11,12 @@ from scipy.linalg import null_space
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, compile_timeline
-from motions.feasibility.dynamic import SPREAD, Forces, forces_of, readable_forces_of, torque
+from motions.feasibility.dynamic import SPREAD, Forces, forces_of, torque
 from motions.feasibility.limits import FeasibilityLimits
 from motions.placement import configurations
 from motions.trajectory import Trajectory, trajectory_of
 from tests.engine_helpers import state_of
+from tests.motions.feasibility.shared_loads import forces_one_by_one
 
 EXACT = 1e-5  # N; what the QP's solver leaves, and the motion itself
 
@@ -100,10 +101,10 @@ def random_trajectory(model: RobotModel, count: int, *, pace: float, seed: int) 
 
 
 @pytest.mark.parametrize(("pace", "radius"), [(0.1, 0.022), (1.0, 0.022), (1.0, 0.0), (3.0, 0.022)])
-def test_the_forces_are_those_of_the_readable_form(pace: float, radius: float) -> None:
+def test_the_forces_are_those_of_one_qp_for_each_instant(pace: float, radius: float) -> None:
     model = RobotModel(foot_radius=radius)
     motion = random_trajectory(model, 250, pace=pace, seed=round(10 * pace))
-    found, expected = forces_of(motion, model), readable_forces_of(motion, model)
+    found, expected = forces_of(motion, model), forces_one_by_one(motion, model)
     for name in ("contact", "tau", "missing", "zmp"):
         difference = np.abs(getattr(found, name) - getattr(expected, name))
         assert difference.max() < EXACT * max(1.0, pace), name

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from go2_wbc.kernels.loads import lag, least_friction, slide
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.wbc.trajectory_loads import lag, least_friction, slide
 from motions import FeasibilityChecker, Timeline, deg
 from motions.feasibility.dynamic import numbers_of, scale_of_wrench, state_at
 from motions.feasibility.friction import CREEP, HELD, cone, creep, slip

@@ -1,46 +1,84 @@
-"""Contact forces and torques along a trajectory: the arithmetic of ``motions.feasibility.dynamic``.
+"""Contact forces and torques along a trajectory, for many instants in one call.
 
-What each quantity is, and the QP that shares the load, is described there; ``legs`` holds
-``LegGeometry.row`` of each leg (``robot.leg_kinematics``).
+``motions.feasibility.dynamic`` and ``friction`` say which equations these are and what they are
+for. The forces f of k loaded feet share the load by a QP, with the columns of A the wrenches on the
+base of forces along the world's axes, s what makes moments comparable, and e the evenness:
+
+    min |s (A f - w)|^2 + e (|f_z|^2 - 2 f_z' (weight shares) + |f_xy|^2 / loads),  f in pyramids
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from jaxtyping import Bool, Float, Int
 
 from go2_wbc.algebra.active_set import SOLVED, solve_qp
-from go2_wbc.kernels.compilation import kernel, subroutine
+from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.kernels.layout import LEAST_PRESSURE
-from go2_wbc.kernels.standing import relative_loads
+from go2_wbc.kernels.standing import relative_loads as share_load
+from go2_wbc.robot.leg_kinematics import LegGeometry, Legs
+
+LegPoints = Float[np.ndarray, "5 3"]
+"""Of a leg, in the base frame: points of the axes of hip, thigh and calf, the contact, a foot's
+radius below the foot's centre, and the direction of the axes of thigh and calf."""
 
 
-@subroutine("void(f8[::1], f8[::1], f8[:,::1], f8, f8[:,::1])")
-def place_leg(leg, q, R, radius, points):
-    """Fill points of a leg in the base frame: of the axes of hip, thigh and calf, and of contact.
+@dataclass(frozen=True, slots=True)
+class LoadNumbers:
+    """What the shares of the load depend on, besides the robot's geometry.
 
-    The contact lies a foot's radius below the foot's centre. The last row is the direction of the
-    axes of thigh and calf.
+    Attributes:
+        evenness: weight of an even share, against 1 of the wrench.
+        weight: of the robot [N].
+        force_max: greatest normal force [N] of a foot.
+        foot_radius: [m].
     """
+
+    evenness: float
+    weight: float
+    force_max: float
+    foot_radius: float
+
+
+@subroutine
+def place_leg(
+    leg: LegGeometry,
+    q: Float[np.ndarray, "3"],
+    R: Float[np.ndarray, "3 3"],
+    radius: float,
+    points: LegPoints,
+) -> None:
+    """Fill the points of a leg, whose trunk is at R in the world."""
     ch, sh = np.cos(q[0]), np.sin(q[0])
     x, down = 0.0, 0.0
     for k in range(3):
-        points[0, k] = leg[k]
+        points[0, k] = leg.p_base_hip[k]
     for k in range(1, 4):  # thigh, calf, foot
-        points[k, 0] = leg[0] + x
-        points[k, 1] = leg[1] + leg[3] * ch + down * sh
-        points[k, 2] = leg[2] + leg[3] * sh - down * ch
+        points[k, 0] = leg.p_base_hip[0] + x
+        points[k, 1] = leg.p_base_hip[1] + leg.width * ch + down * sh
+        points[k, 2] = leg.p_base_hip[2] + leg.width * sh - down * ch
         if k == 1:
-            x, down = -leg[4] * np.sin(q[1]), leg[4] * np.cos(q[1])
+            x, down = -leg.thigh * np.sin(q[1]), leg.thigh * np.cos(q[1])
         elif k == 2:
-            x -= leg[5] * np.sin(q[1] + q[2])
-            down += leg[5] * np.cos(q[1] + q[2])
+            x -= leg.calf * np.sin(q[1] + q[2])
+            down += leg.calf * np.cos(q[1] + q[2])
     for k in range(3):
         points[3, k] -= radius * R[2, k]
     points[4, 0], points[4, 1], points[4, 2] = 0.0, ch, sh
 
 
-@subroutine("void(f8[:,:,::1], f8[:,::1], f8[::1], i8[::1], f8[::1], f8[::1], f8[::1])")
-def expect(points, R, wrench, loaded, shares, numbers, loads):
+@subroutine
+def expect(
+    points: Float[np.ndarray, "4 5 3"],
+    R: Float[np.ndarray, "3 3"],
+    wrench: Float[np.ndarray, "6"],
+    loaded: Int[np.ndarray, "4"],
+    shares: Float[np.ndarray, "4"],
+    c: LoadNumbers,
+    loads: Float[np.ndarray, " k"],
+) -> None:
     """Fill the expected loads of the loaded feet, over their mean."""
     k = len(loads)
     places, most = np.empty((k, 2)), np.empty(k)
@@ -49,21 +87,30 @@ def expect(points, R, wrench, loaded, shares, numbers, loads):
         for m in range(3):
             F[axis] += R[axis, m] * wrench[m]
             N[axis] += R[axis, m] * wrench[3 + m]
-    pressure = max(F[2], LEAST_PRESSURE * numbers[1])
+    pressure = max(F[2], LEAST_PRESSURE * c.weight)
     for foot in range(k):
         p = points[loaded[foot], 3]
         for axis in range(2):
             places[foot, axis] = R[axis, 0] * p[0] + R[axis, 1] * p[1] + R[axis, 2] * p[2]
         depth -= (R[2, 0] * p[0] + R[2, 1] * p[1] + R[2, 2] * p[2]) / k
-        most[foot] = numbers[2] * shares[foot] * k / pressure
+        most[foot] = c.force_max * shares[foot] * k / pressure
     x, y = -(N[1] + depth * F[0]) / pressure, (N[0] - depth * F[1]) / pressure
-    relative_loads(places, x, y, most, loads)
+    share_load(places, x, y, most, loads)
 
 
-@subroutine("void(f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1])")
-def weigh(A, wrench, shares, loads, scale, numbers, H, g):
+@subroutine
+def weigh(
+    A: Float[np.ndarray, "6 n"],
+    wrench: Float[np.ndarray, "6"],
+    shares: Float[np.ndarray, " k"],
+    loads: Float[np.ndarray, " k"],
+    scale: Float[np.ndarray, "6"],
+    c: LoadNumbers,
+    H: Float[np.ndarray, "n n"],
+    g: Float[np.ndarray, " n"],
+) -> None:
     """Fill the cost x'Hx/2 + g'x of the forces x (3 k,) of k loaded feet."""
-    evenness, weight, n, total = numbers[0], numbers[1], len(g), 0.0
+    evenness, weight, n, total = c.evenness, c.weight, len(g), 0.0
     for foot in range(len(shares)):
         total += shares[foot]
     for i in range(n):
@@ -79,8 +126,15 @@ def weigh(A, wrench, shares, loads, scale, numbers, H, g):
             H[i, j], H[j, i] = value, value
 
 
-@subroutine("void(f8[::1], f8[:,::1], f8, f8[:,::1], f8[::1], f8[::1])")
-def bound(shares, pyramid, force_max, C, lower, upper):
+@subroutine
+def bound(
+    shares: Float[np.ndarray, " k"],
+    pyramid: Float[np.ndarray, "r 3"],
+    force_max: float,
+    C: Float[np.ndarray, "m n"],
+    lower: Float[np.ndarray, " m"],
+    upper: Float[np.ndarray, " m"],
+) -> None:
     """Fill the rows of friction and normal force, which is the last of them, of the loaded feet."""
     rows = len(pyramid)
     for row in range(len(lower)):
@@ -93,8 +147,10 @@ def bound(shares, pyramid, force_max, C, lower, upper):
         upper[row] = 0.0 if kind < rows - 1 else force_max * shares[foot]
 
 
-@subroutine("void(f8[:,::1], f8[:,::1], i8, f8[:,::1])")
-def press(points, R, foot, A):
+@subroutine
+def press(
+    points: LegPoints, R: Float[np.ndarray, "3 3"], foot: int, A: Float[np.ndarray, "6 12"]
+) -> None:
     """Fill a foot's columns of A: the wrench on the base of a force along each world axis."""
     p0, p1, p2 = points[3, 0], points[3, 1], points[3, 2]
     for axis in range(3):
@@ -105,8 +161,13 @@ def press(points, R, foot, A):
         A[5, column] = p0 * r1 - p1 * r0
 
 
-@subroutine("void(f8[:,::1], f8[:,::1], f8[::1], f8[::1])")
-def relieve(points, R, f, tau):
+@subroutine
+def relieve(
+    points: LegPoints,
+    R: Float[np.ndarray, "3 3"],
+    f: Float[np.ndarray, "3"],
+    tau: Float[np.ndarray, "3"],
+) -> None:
     """Take from a leg's torques what a force on its foot does to them."""
     f0 = R[0, 0] * f[0] + R[1, 0] * f[1] + R[2, 0] * f[2]  # in the base frame
     f1 = R[0, 1] * f[0] + R[1, 1] * f[1] + R[2, 1] * f[2]
@@ -120,23 +181,40 @@ def relieve(points, R, f, tau):
             tau[joint] -= points[4, 1] * (a2 * f0 - a0 * f2) + points[4, 2] * (a0 * f1 - a1 * f0)
 
 
-@subroutine(
-    "i8(f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8, f8[:,:,::1], i8[::1], f8[::1], f8[:,::1])"
-)
-def gather(joints, R, load_share, legs, radius, points, loaded, shares, A):
-    """Fill the loaded feet's numbers, shares and columns of A; returns how many there are."""
+@subroutine
+def gather(
+    joints: Float[np.ndarray, "12"],
+    R: Float[np.ndarray, "3 3"],
+    load_share: Float[np.ndarray, "4"],
+    legs: Legs,
+    radius: float,
+    points: Float[np.ndarray, "4 5 3"],
+    loaded: Int[np.ndarray, "4"],
+    shares: Float[np.ndarray, "4"],
+    A: Float[np.ndarray, "6 12"],
+) -> int:
+    """Fill the loaded feet's c, shares and columns of A; returns how many there are."""
     k = 0
     for leg in range(4):
         if load_share[leg] > 0.0:
             loaded[k], shares[k] = leg, load_share[leg]
-            place_leg(legs[leg], joints[3 * leg : 3 * leg + 3], R, radius, points[leg])
+            place_leg(legs.geometry[leg], joints[3 * leg : 3 * leg + 3], R, radius, points[leg])
             press(points[leg], R, k, A)
             k += 1
     return k
 
 
-@subroutine("void(f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1])")
-def share(A, wrench, shares, loads, pyramid, scale, numbers, x):
+@subroutine
+def share(
+    A: Float[np.ndarray, "6 n"],
+    wrench: Float[np.ndarray, "6"],
+    shares: Float[np.ndarray, " k"],
+    loads: Float[np.ndarray, " k"],
+    pyramid: Float[np.ndarray, "r 3"],
+    scale: Float[np.ndarray, "6"],
+    c: LoadNumbers,
+    x: Float[np.ndarray, " n"],
+) -> None:
     """Fill the forces of the loaded feet; zeros if there are none."""
     n, m = len(x), len(pyramid) * len(shares)
     H, g, C, lower, upper = (
@@ -146,15 +224,20 @@ def share(A, wrench, shares, loads, pyramid, scale, numbers, x):
         np.empty(m),
         np.empty(m),
     )
-    weigh(A, wrench, shares, loads, scale, numbers, H, g)
-    bound(shares, pyramid, numbers[2], C, lower, upper)
+    weigh(A, wrench, shares, loads, scale, c, H, g)
+    bound(shares, pyramid, c.force_max, C, lower, upper)
     if solve_qp(H, g, np.empty((0, 12)), np.empty(0), C, lower, upper, x, np.empty(m)) != SOLVED:
         for j in range(n):
             x[j] = 0.0
 
 
-@subroutine("void(f8[:,::1], f8[::1], f8[::1], f8[::1])")
-def remain(A, wrench, x, left):
+@subroutine
+def remain(
+    A: Float[np.ndarray, "6 n"],
+    wrench: Float[np.ndarray, "6"],
+    x: Float[np.ndarray, " n"],
+    left: Float[np.ndarray, "6"],
+) -> None:
     """Fill what the forces leave of the wrench."""
     for r in range(6):
         left[r] = wrench[r]
@@ -162,28 +245,35 @@ def remain(A, wrench, x, left):
             left[r] -= A[r, j] * x[j]
 
 
-@kernel(
-    "void(f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], "
-    "f8[:,:,::1], f8[:,::1], f8[:,::1])",
-    nogil=True,
-)
+@kernel(nogil=True)
 def share_loads(
-    joints, R, needed, load_share, legs, pyramid, scale, numbers, contact, tau, missing
-):
+    joints: Float[np.ndarray, "n 12"],
+    R: Float[np.ndarray, "n 3 3"],
+    needed: Float[np.ndarray, "n 6"],
+    load_share: Float[np.ndarray, "n 4"],
+    legs: Legs,
+    pyramid: Float[np.ndarray, "r 3"],
+    scale: Float[np.ndarray, "6"],
+    c: LoadNumbers,
+    contact: Float[np.ndarray, "n 4 3"],
+    tau: Float[np.ndarray, "n 12"],
+    missing: Float[np.ndarray, "n 2"],
+) -> None:
     """Fill contact forces, torques, and what of force and moment the feet cannot give.
 
-    ``needed``: M a + h; ``numbers``: evenness, weight [N], greatest normal force [N], foot radius
-    [m]. ``contact`` comes with zeros, ``tau`` with the joints' rows of ``needed``.
+    ``needed``: the base's rows of M a + h. ``contact`` comes with zeros, ``tau`` with the joints'.
     """
     points, loaded, shares = np.empty((4, 5, 3)), np.empty(4, dtype=np.int64), np.empty(4)
     left, whole, loads = np.empty(6), np.empty((6, 12)), np.empty(4)
     for i in range(len(joints)):
-        k = gather(joints[i], R[i], load_share[i], legs, numbers[3], points, loaded, shares, whole)
+        k = gather(
+            joints[i], R[i], load_share[i], legs, c.foot_radius, points, loaded, shares, whole
+        )
         n = 3 * k
         A, x = whole[:, :n].copy(), np.zeros(n)
         if k > 0:
-            expect(points, R[i], needed[i], loaded, shares, numbers, loads[:k])
-            share(A, needed[i], shares[:k], loads[:k], pyramid, scale, numbers, x)
+            expect(points, R[i], needed[i], loaded, shares, c, loads[:k])
+            share(A, needed[i], shares[:k], loads[:k], pyramid, scale, c, x)
         for foot in range(k):
             leg, f = loaded[foot], x[3 * foot : 3 * foot + 3]
             relieve(points[leg], R[i], f, tau[i, 3 * leg : 3 * leg + 3])
@@ -194,14 +284,20 @@ def share_loads(
         missing[i, 1] = np.sqrt(left[3] ** 2 + left[4] ** 2 + left[5] ** 2)
 
 
-@kernel(
-    "void(f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], "
-    "f8[::1], f8, f8[::1])",
-    nogil=True,
-)
+@kernel(nogil=True)
 def least_friction(
-    joints, R, needed, load_share, legs, cone, scale, numbers, highest, tolerance, friction
-):
+    joints: Float[np.ndarray, "n 12"],
+    R: Float[np.ndarray, "n 3 3"],
+    needed: Float[np.ndarray, "n 6"],
+    load_share: Float[np.ndarray, "n 4"],
+    legs: Legs,
+    cone: Float[np.ndarray, "r 3"],
+    scale: Float[np.ndarray, "6"],
+    c: LoadNumbers,
+    highest: Float[np.ndarray, " n"],
+    tolerance: float,
+    friction: Float[np.ndarray, " n"],
+) -> None:
     """Fill the least friction coefficient with which the feet can give the wrench.
 
     ``cone``: facets at a coefficient of 1. ``highest``: what is enough; 0 where nothing is asked.
@@ -214,15 +310,17 @@ def least_friction(
         low, high = 0.0, highest[i]
         if high == 0.0:
             continue
-        k = gather(joints[i], R[i], load_share[i], legs, numbers[3], points, loaded, shares, whole)
+        k = gather(
+            joints[i], R[i], load_share[i], legs, c.foot_radius, points, loaded, shares, whole
+        )
         A, x = whole[:, : 3 * k].copy(), np.zeros(3 * k)
         if k > 0:
-            expect(points, R[i], needed[i], loaded, shares, numbers, loads[:k])
+            expect(points, R[i], needed[i], loaded, shares, c, loads[:k])
         for _ in range(7 if k > 0 else 0):
             middle = 0.5 * (low + high)
             for facet in range(len(cone) - 1):
                 facets[facet, 2] = middle * cone[facet, 2]
-            share(A, needed[i], shares[:k], loads[:k], facets, scale, numbers, x)
+            share(A, needed[i], shares[:k], loads[:k], facets, scale, c, x)
             remain(A, needed[i], x, left)
             missing = 0.0
             for r in range(6):
@@ -234,16 +332,20 @@ def least_friction(
         friction[i] = high
 
 
-@kernel(
-    "void(f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8, f8[:,:,::1])",
-    nogil=True,
-)
-def accelerate(joints, R, a, legs, radius, feet):
+@kernel(nogil=True)
+def accelerate(
+    joints: Float[np.ndarray, "n 12"],
+    R: Float[np.ndarray, "n 3 3"],
+    a: Float[np.ndarray, "n 18"],
+    legs: Legs,
+    radius: float,
+    feet: Float[np.ndarray, "n 4 2"],
+) -> None:
     """Fill J a along the ground, of the contact point of every foot, with a of base and joints."""
     points, J_a = np.empty((5, 3)), np.empty(3)
     for i in range(len(joints)):
         for leg in range(4):
-            place_leg(legs[leg], joints[i, 3 * leg : 3 * leg + 3], R[i], radius, points)
+            place_leg(legs.geometry[leg], joints[i, 3 * leg : 3 * leg + 3], R[i], radius, points)
             p = points[3]
             for k in range(3):
                 m, n = (k + 1) % 3, (k + 2) % 3
@@ -263,8 +365,16 @@ def accelerate(joints, R, a, legs, radius, feet):
                 feet[i, leg, axis] = row[0] * J_a[0] + row[1] * J_a[1] + row[2] * J_a[2]
 
 
-@kernel("void(f8[:,:,::1], f8[:,:,::1], b1[:,::1], f8, f8, f8, f8[:,::1])", nogil=True)
-def slide(forces, creep, counts, friction, mass, dt, ways):
+@kernel(nogil=True)
+def slide(
+    forces: Float[np.ndarray, "n 4 3"],
+    creep: Float[np.ndarray, "n 4 2"],
+    counts: Bool[np.ndarray, "n 4"],
+    friction: float,
+    mass: float,
+    dt: float,
+    ways: Float[np.ndarray, "n 4"],
+) -> None:
     """Fill how far every foot has slid since it began to count.
 
     A sliding block (Newmark 1965): what a force along the ground exceeds friction by accelerates
@@ -293,8 +403,14 @@ def slide(forces, creep, counts, friction, mass, dt, ways):
             ways[i, leg] = np.hypot(x, y)
 
 
-@kernel("void(f8[:,::1], f8[::1], f8[::1], f8, f8[:,::1])", nogil=True)
-def lag(pushes, kp, kd, dt, errors):
+@kernel(nogil=True)
+def lag(
+    pushes: Float[np.ndarray, "n m"],
+    kp: Float[np.ndarray, " m"],
+    kd: Float[np.ndarray, " m"],
+    dt: float,
+    errors: Float[np.ndarray, "n m"],
+) -> None:
     """Fill errors e that obey e'' + kd e' + kp e = push, from rest."""
     for axis in range(pushes.shape[1]):
         e, rate = 0.0, 0.0
