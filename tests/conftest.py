@@ -68,7 +68,6 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.levelling",
         "go2_wbc.kernels.pose",
         "go2_wbc.kernels.preview",
-        "go2_wbc.kernels.rigid_body",
         "go2_wbc.kernels.slip",
         "go2_wbc.kernels.standing",
         "go2_wbc.kernels.supervision",

@@ -88,19 +88,6 @@ SNAPSHOT = Layout(
 )
 """Of ``robot.snapshot.Snapshot``, the state's q and v first."""
 
-ROBOT = Layout(
-    mass=(),
-    gravity=(),
-    foot_radius=(),
-    links=(13, 10),
-    p_joints=(12, 3),
-    p_calf_feet=(4, 3),
-    armature=(12,),
-    payload=(4,),
-)
-"""Numbers of the robot for its snapshot: of each link mass, first moment and inertia. The trunk and
-the robot's mass have the payload in them, whose own mass and place come last."""
-
 FEELING = Layout(
     gravity=(),
     memory=(),

@@ -15,7 +15,6 @@ KERNELS = (
     "payload",
     "playing",
     "preview",
-    "rigid_body",
 )
 """Modules of this package whose import compiles, or loads what was compiled."""
 

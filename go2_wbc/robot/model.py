@@ -1,15 +1,11 @@
 """The Go2 as Pinocchio sees it: limits, geometry, and the per-tick snapshot.
 
 One ``RobotModel`` owns one Pinocchio model and data. ``snapshot(state)`` computes every dynamic
-quantity of the tick in a kernel, which ``readable_snapshot`` is the law of: CRBA in the world
-convention, the nonlinear effects, and the feet's Jacobians and drifts; the CoM terms are read off
-the first rows of the mass matrix, which are the robot's linear momentum (Wieber, Tedrake &
-Kuindersma 2016, eq. 48.16).
+quantity of the tick, by ``robot.rigid_body`` if the robot's legs turn about the axes of a Go2's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 
@@ -18,12 +14,12 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from go2_wbc.errors import DescriptionError
-from go2_wbc.kernels.layout import ROBOT
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.records import layout_of
 from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
+from go2_wbc.robot.rigid_body import RigidBodies, fill_snapshot
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.world import PAYLOAD_HALF_SIZE, World
@@ -89,7 +85,7 @@ class RobotModel:
         self._data = self.pin_model.createData()
         self._foot_frames = [self.pin_model.getFrameId(name) for name in FOOT_NAMES]
         self._zero_acceleration = np.zeros(18)
-        self._carried: tuple[Payload, Float[np.ndarray, " size"]] = NO_PAYLOAD, np.zeros(0)
+        self._carried = NO_PAYLOAD, RigidBodies()
         self._read_constants()
 
     def _read_constants(self) -> None:
@@ -112,31 +108,25 @@ class RobotModel:
     def snapshot(self, state: RobotState, payload: Payload = NO_PAYLOAD) -> Snapshot:
         """Every dynamic quantity of ``state``, computed once.
 
-        By a kernel if the robot's legs turn about x, y and y, as a Go2's do, else by Pinocchio's
-        functions. The kernel takes the robot as it is at the first call.
+        By ``robot.rigid_body`` if the robot's legs turn about x, y and y, as a Go2's do, else by
+        Pinocchio. The former takes the robot as it is at the first call.
 
         Args:
             state: measured.
             payload: what the trunk carries beside what the model has.
         """
-        numbers = self._numbers
-        if numbers is None:
-            return self.readable_snapshot(state, payload)
+        robot = self._bodies
+        if robot is None:
+            return self.pinocchio_snapshot(state, payload)
         if payload.mass:
-            numbers = self._loaded(numbers, payload)
-        row = np.empty(_SNAPSHOT_SIZE)
-        self._fill_snapshot(state.q, state.v, numbers, row)
-        return Snapshot.of_row(state, row)
+            robot = self._loaded(robot, payload)
+        snapshot = Snapshot.of_row(state, np.empty(_SNAPSHOT_SIZE))
+        fill_snapshot(state.q, state.v, robot, snapshot)
+        return snapshot
 
     @cached_property
-    def _fill_snapshot(self) -> Callable[..., None]:
-        from go2_wbc.kernels.rigid_body import fill_snapshot  # compiled; only who needs it waits
-
-        return fill_snapshot
-
-    @cached_property
-    def _numbers(self) -> Float[np.ndarray, " size"] | None:
-        """The robot's numbers for the kernel; None for a robot that it does not know."""
+    def _bodies(self) -> RigidBodies | None:
+        """The robot's numbers; None for a robot with other legs."""
         model = self.pin_model
         places = list(model.jointPlacements)[1:]
         feet = [model.frames[frame] for frame in self._foot_frames]
@@ -149,52 +139,68 @@ class RobotModel:
         )
         if not is_known:
             return None
-        return ROBOT.pack(
-            [
-                *self._constants,
-                [_about_joint(inertia) for inertia in list(model.inertias)[1:]],
-                [place.translation for place in places[1:]],
-                [foot.placement.translation for foot in feet],
-                model.armature[6:],
-                np.zeros(4),
-            ]
+        robot = RigidBodies(
+            mass=self.mass,
+            gravity=self.gravity,
+            foot_radius=self.foot_radius,
+            p_joints=[place.translation for place in places[1:]],
+            p_calf_feet=[foot.placement.translation for foot in feet],
+            armature=model.armature[6:],
         )
+        for link, inertia in enumerate(list(model.inertias)[1:]):
+            _add_inertia(robot, link, inertia)
+        return robot
 
-    def _loaded(
-        self, own: Float[np.ndarray, " size"], payload: Payload
-    ) -> Float[np.ndarray, " size"]:
+    def _loaded(self, own: RigidBodies, payload: Payload) -> RigidBodies:
         """The robot's ``own`` numbers with ``payload``; kept until it changes."""
-        carried, numbers = self._carried
+        carried, robot = self._carried
         if carried != payload:
-            numbers = own.copy()
-            numbers[ROBOT.start["mass"]] += payload.mass
-            ROBOT.view(numbers, "links")[0] += _about_joint(payload.inertia)
-            ROBOT.view(numbers, "payload")[:] = payload.mass, *payload.place
-            self._carried = payload, numbers
-        return numbers
+            robot = RigidBodies.of(own.row.copy())
+            robot.mass += payload.mass
+            _add_inertia(robot, 0, payload.inertia)
+            robot.row[_PAYLOAD] = payload.mass, *payload.place
+            self._carried = payload, robot
+        return robot
 
-    def readable_snapshot(self, state: RobotState, payload: Payload = NO_PAYLOAD) -> Snapshot:
-        """The same as ``snapshot``, by Pinocchio's own functions: what the kernel is held to."""
-        model, data = self.pin_model, self._data
+    def pinocchio_snapshot(self, state: RobotState, payload: Payload = NO_PAYLOAD) -> Snapshot:
+        """The same as ``snapshot`` by Pinocchio's own functions, for any robot."""
+        model, data, q, v = self.pin_model, self._data, state.q, state.v
+        bare = np.array(pin.centerOfMass(model, data, q))
         if payload.mass:
             model = model.copy()
             model.inertias[1] = model.inertias[1] + payload.inertia
-        q, v = state.q, state.v
         M = pin.crba(model, data, q, pin.Convention.WORLD)  # a copy, both triangles filled
         h = np.array(pin.nonLinearEffects(model, data, q, v))
-        pin.forwardKinematics(model, data, q, v, self._zero_acceleration)
-        J_feet = np.empty((4, 6, 18))
-        drift_feet = np.empty((4, 6))
+        J_com = np.array(pin.jacobianCenterOfMass(model, data, q))
+        com = np.array(pin.centerOfMass(model, data, q, v, self._zero_acceleration))
+        J, drift = np.empty((4, 6, 18)), np.empty((4, 6))
         p_feet = np.empty((4, 3))
         for leg, frame in enumerate(self._foot_frames):
             p_feet[leg] = pin.updateFramePlacement(model, data, frame).translation
-            J_feet[leg] = pin.getFrameJacobian(model, data, frame, _ALIGNED)
-            drift_feet[leg] = pin.getFrameClassicalAcceleration(model, data, frame, _ALIGNED).vector
-        return Snapshot.build(state, M, h, p_feet, J_feet, drift_feet, self._constants, payload)
-
-    @property
-    def _constants(self) -> tuple[float, float, float]:
-        return self.mass, self.gravity, self.foot_radius
+            J[leg] = pin.computeFrameJacobian(model, data, q, frame, _ALIGNED)
+            drift[leg] = pin.getFrameClassicalAcceleration(model, data, frame, _ALIGNED).vector
+        # The contact is r below the centre of the sphere, which rolls: see ``robot.snapshot``.
+        J_contacts = J[:, :3] - self.foot_radius * np.cross(J[:, 3:], _UP, axisa=1, axisc=1)
+        drift_contacts = drift[:, :3] - self.foot_radius * np.cross(drift[:, 3:], _UP)
+        return Snapshot(
+            state,
+            R_world_base=state.R_world_base,
+            mass_matrix=M,
+            bias=h,
+            p_world_com=com,
+            v_world_com=data.vcom[0],
+            J_com=J_com,
+            drift_com=data.acom[0],
+            p_world_feet=p_feet,
+            v_world_feet=J[:, :3] @ v,
+            J_feet=J[:, :3],
+            drift_feet=drift[:, :3],
+            J_contacts=J_contacts,
+            drift_contacts=drift_contacts,
+            v_world_contacts=J_contacts @ v,
+            payload=payload.mass * np.array([1.0, self.gravity]),
+            com_shift=com - bare,
+        )
 
     def center_of_mass(self, q: Float[np.ndarray, "19"]) -> Float[np.ndarray, "3"]:
         """CoM in the world [m] at configuration ``q``."""
@@ -228,14 +234,18 @@ def _burden(model: pin.Model, world: World) -> None:
         model.inertias[1] = model.inertias[1] + place.act(box)
 
 
-def _about_joint(inertia: pin.Inertia) -> Float[np.ndarray, "10"]:
-    """Mass, first moment and inertia (xx, xy, xz, yy, yz, zz) about the origin of the joint."""
+def _add_inertia(robot: RigidBodies, link: int, inertia: pin.Inertia) -> None:
+    """Add mass, first moment and inertia about the origin of the joint to a link's."""
     mass, c = inertia.mass, inertia.lever
     moved = inertia.inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
-    return np.array([mass, *(mass * c), *moved[np.triu_indices(3)]])
+    robot.link_mass[link] += mass
+    robot.link_moment[link] += mass * c
+    robot.link_inertia[link] += moved[np.triu_indices(3)]
 
 
 _SNAPSHOT_SIZE = layout_of(Snapshot).size
+_PAYLOAD = layout_of(RigidBodies).slice("payload")
+_UP = np.array([0.0, 0.0, 1.0])
 _PARENTS = [0, 0, 1, 2, 3, 1, 5, 6, 1, 8, 9, 1, 11, 12]
 """The joint before each, in Pinocchio's order: universe, base, and four legs of three."""
 _CALVES = [4, 7, 10, 13]

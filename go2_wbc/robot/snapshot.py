@@ -14,7 +14,6 @@ from jaxtyping import Float
 
 from go2_wbc.errors import CommandError
 from go2_wbc.records import Record
-from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.state import RobotState
 
 
@@ -90,55 +89,3 @@ class Snapshot(Record):
 
     def __reduce__(self) -> tuple[object, ...]:
         return Snapshot.of_row, (self.state, self.row)
-
-    @staticmethod
-    def build(
-        state: RobotState,
-        M: Float[np.ndarray, "18 18"],
-        h: Float[np.ndarray, "18"],
-        p_feet: Float[np.ndarray, "4 3"],
-        J_feet: Float[np.ndarray, "4 6 18"],
-        drift_feet: Float[np.ndarray, "4 6"],
-        constants: tuple[float, float, float],
-        payload: Payload = NO_PAYLOAD,
-    ) -> Snapshot:
-        """Derive the CoM and contact terms from what Pinocchio computed.
-
-        ``constants`` are mass [kg], gravity [m/s^2] and foot radius [m]; ``payload`` is in M and h,
-        but not in this mass.
-        """
-        bare, gravity, radius = constants
-        mass = bare + payload.mass
-        R = state.R_world_base
-        J_com = R @ M[:3] / mass
-        drift_com = R @ h[:3] / mass
-        drift_com[2] -= gravity
-        com_cross = M[:3, 3:6] / -mass
-        p_base_com = np.array([com_cross[2, 1], com_cross[0, 2], com_cross[1, 0]])
-        p_base_own = (mass * p_base_com - payload.mass * np.array(payload.place)) / bare
-        J_linear, J_angular = J_feet[:, :3], J_feet[:, 3:]
-        J_contacts = J_linear.copy()
-        J_contacts[:, 0] -= radius * J_angular[:, 1]
-        J_contacts[:, 1] += radius * J_angular[:, 0]
-        drift_contacts = drift_feet[:, :3].copy()
-        drift_contacts[:, 0] -= radius * drift_feet[:, 4]
-        drift_contacts[:, 1] += radius * drift_feet[:, 3]
-        return Snapshot(
-            state,
-            R_world_base=R,
-            mass_matrix=M,
-            bias=h,
-            p_world_com=state.q[:3] + R @ p_base_com,
-            v_world_com=J_com @ state.v,
-            J_com=J_com,
-            drift_com=drift_com,
-            p_world_feet=p_feet,
-            v_world_feet=J_linear @ state.v,
-            J_feet=J_linear,
-            drift_feet=drift_feet[:, :3],
-            J_contacts=J_contacts,
-            drift_contacts=drift_contacts,
-            v_world_contacts=J_contacts @ state.v,
-            payload=payload.mass * np.array([1.0, gravity]),
-            com_shift=R @ (p_base_com - p_base_own) if payload.mass else np.zeros(3),
-        )

@@ -46,7 +46,7 @@ def standing_torques(
     """Joint torques [N m] that hold the robot on ``stance`` feet, with the least foot forces."""
     zeros = np.zeros(4)
     measured = RobotState(0.0, state.q, state.v, np.zeros(12), zeros, zeros.astype(bool))
-    snapshot = model.readable_snapshot(measured)
+    snapshot = model.pinocchio_snapshot(measured)
     J = snapshot.J_feet[stance].reshape(-1, 18)
     forces = np.linalg.lstsq(J[:, :6].T, snapshot.bias[:6], rcond=None)[0]
     return snapshot.bias[6:] - J[:, 6:].T @ forces

@@ -1,4 +1,4 @@
-"""The snapshot's kernel is held to Pinocchio's own functions."""
+"""The snapshot of a Go2 is what Pinocchio's own functions say."""
 
 from __future__ import annotations
 
@@ -10,18 +10,20 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from go2_wbc.kernels.layout import SNAPSHOT
+from go2_wbc.records import layout_of
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
+from go2_wbc.robot.rigid_body import fill_snapshot
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
+from tests.compiled import assert_plain_is_compiled
 from tests.engine_helpers import random_state, state_of
 
 ROUNDING = 1e-12  # [SI] of values up to 1000; measured 1e-13
 FAST_ROUNDING = 1e-10  # [SI] of values up to 20,000; measured 1e-11
 STATES = 1000
-NAMES = list(SNAPSHOT.start)[2:]
+NAMES = Snapshot.part_names()[2:]
 PAYLOAD = """<link name="payload"><inertial><origin xyz="0.1 -0.05 0.12" rpy="0.3 0.2 0.1"/>
 <mass value="4.0"/><inertia ixx="0.05" ixy="0.01" ixz="0.005" iyy="0.07" iyz="0.002" izz="0.03"/>
 </inertial></link><joint name="payload_joint" type="fixed"><parent link="{link}"/>
@@ -52,14 +54,14 @@ def test_every_quantity_is_what_pinocchio_says(foot_radius: float) -> None:
     rng = np.random.default_rng(3)
     for _ in range(STATES):
         state = random_state(rng, tilt=0.7)
-        assert difference(model.snapshot(state), model.readable_snapshot(state)) < ROUNDING
+        assert difference(model.snapshot(state), model.pinocchio_snapshot(state)) < ROUNDING
 
 
 def test_it_is_in_any_attitude_at_any_speed() -> None:
     model, rng = RobotModel(), np.random.default_rng(6)
     for _ in range(STATES):
         state = fast_state(rng)
-        assert difference(model.snapshot(state), model.readable_snapshot(state)) < FAST_ROUNDING
+        assert difference(model.snapshot(state), model.pinocchio_snapshot(state)) < FAST_ROUNDING
 
 
 @pytest.mark.parametrize("link", ["base", "FR_hip", "RL_thigh", "RR_calf"])
@@ -72,7 +74,7 @@ def test_it_is_for_a_robot_that_carries_something(tmp_path: Path, link: str) -> 
     assert model.mass == pytest.approx(RobotModel().mass + 4.0)
     for _ in range(100):
         state = fast_state(rng)
-        assert difference(model.snapshot(state), model.readable_snapshot(state)) < FAST_ROUNDING
+        assert difference(model.snapshot(state), model.pinocchio_snapshot(state)) < FAST_ROUNDING
 
 
 def test_it_is_for_a_payload_that_comes_and_goes() -> None:
@@ -81,7 +83,7 @@ def test_it_is_for_a_payload_that_comes_and_goes() -> None:
         payload = Payload(mass, tuple(rng.uniform(-0.2, 0.2, size=3).tolist()))
         for _ in range(20):
             state = fast_state(rng)
-            ours, theirs = model.snapshot(state, payload), model.readable_snapshot(state, payload)
+            ours, theirs = model.snapshot(state, payload), model.pinocchio_snapshot(state, payload)
             assert difference(ours, theirs) < FAST_ROUNDING
 
 
@@ -110,15 +112,15 @@ def test_a_robot_that_carries_nothing_is_the_same_to_the_bit() -> None:
 
 
 def test_a_robot_with_other_joints_gets_pinocchios_snapshot() -> None:
-    """The kernel knows hips that turn about x, not about an axis tilted by 0.1 rad."""
+    """``robot.rigid_body`` knows hips that turn about x, not about an axis tilted by 0.1 rad."""
     model, same = RobotModel(), RobotModel()
     for robot, angle in ((model, 0.1), (same, 0.0)):
         place = robot.pin_model.jointPlacements[3]
         tilted = pin.SE3(pin.utils.rotate("x", angle), place.translation)
         robot.pin_model.jointPlacements[3] = tilted
     state = random_state(np.random.default_rng(8))
-    assert difference(model.snapshot(state), model.readable_snapshot(state)) == 0.0
-    assert 0.0 < difference(same.snapshot(state), same.readable_snapshot(state)) < ROUNDING
+    assert difference(model.snapshot(state), model.pinocchio_snapshot(state)) == 0.0
+    assert 0.0 < difference(same.snapshot(state), same.pinocchio_snapshot(state)) < ROUNDING
     assert model.snapshot(state).row.shape == same.snapshot(state).row.shape
     assert difference(model.snapshot(state), same.snapshot(state)) > 0.01
 
@@ -152,7 +154,7 @@ def test_states_of_any_memory_layout_are_taken() -> None:
 def test_the_row_follows_an_array_that_was_replaced() -> None:
     snapshot = RobotModel().snapshot(random_state(np.random.default_rng(4)))
     lifted = snapshot.replaced(p_world_feet=snapshot.p_world_feet + 1.0)
-    start = SNAPSHOT.start["p_world_feet"]
+    start = layout_of(Snapshot).fields["p_world_feet"].start
     assert lifted.row[start] == snapshot.row[start] + 1.0
 
 
@@ -161,3 +163,12 @@ def test_a_nan_in_the_state_is_seen_in_the_snapshot() -> None:
     q = state.q.copy()
     q[8] = np.nan
     assert np.isnan(RobotModel().snapshot(replace(state, q=q)).p_world_feet).any()
+
+
+def test_compiled_is_plain() -> None:
+    model, state = RobotModel(), fast_state(np.random.default_rng(12))
+    robot = model._bodies
+    assert robot is not None
+    for numbers in (robot, model._loaded(robot, Payload(3.0, (0.1, -0.05, 0.1)))):
+        snapshot = Snapshot.of_row(state, np.full(len(model.snapshot(state).row), np.nan))
+        assert_plain_is_compiled(fill_snapshot, state.q, state.v, numbers, snapshot)
