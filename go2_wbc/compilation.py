@@ -75,6 +75,7 @@ MODULES: tuple[str, ...] = (
     "go2_wbc.plant.mujoco.layout",
     "go2_wbc.reference",
     "go2_wbc.robot.leg_kinematics",
+    "go2_wbc.robot.payload_estimation",
     "go2_wbc.robot.rigid_body",
     "go2_wbc.robot.rotations",
     "go2_wbc.robot.safety",

@@ -63,7 +63,6 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.locomotion",
         "go2_wbc.kernels.motor",
         "go2_wbc.kernels.mpc",
-        "go2_wbc.kernels.payload",
         "go2_wbc.kernels.playing",
         "go2_wbc.kernels.levelling",
         "go2_wbc.kernels.pose",

@@ -88,19 +88,6 @@ SNAPSHOT = Layout(
 )
 """Of ``robot.snapshot.Snapshot``, the state's q and v first."""
 
-FEELING = Layout(
-    gravity=(),
-    memory=(),
-    least_height=(),
-    most_rise=(),
-    most_speed=(2,),
-)
-"""Numbers by which a payload is felt: of ``robot.payload_estimation.PayloadConfig``."""
-
-FELT = Layout(force=(3,), moment=(3,), gravity=(3,))
-"""What a payload takes of the standing feet, in the mean: force, and moment about the base's
-origin, and what a unit of mass weighs, all in the base frame."""
-
 REFERENCE = Layout(
     is_com=(),
     p_world=(3,),

@@ -12,7 +12,6 @@ KERNELS = (
     "locomotion",
     "motor",
     "mpc",
-    "payload",
     "playing",
     "preview",
 )

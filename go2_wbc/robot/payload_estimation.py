@@ -26,10 +26,13 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from go2_wbc.kernels.layout import FEELING, FELT
-from go2_wbc.robot.joint_friction import FrictionFeedForward, JointFriction
+from go2_wbc.algebra.linear import solve_linear
+from go2_wbc.algebra.vectors import cross, plus, plus_scaled, put, triple
+from go2_wbc.compilation import Foreign, kernel, subroutine
+from go2_wbc.records import V3, Record, packed
+from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.snapshot import Snapshot
@@ -97,6 +100,149 @@ class PayloadConfig:
         require_between(self, -self.base_height, self.base_height, "middle")
 
 
+@dataclass(frozen=True, slots=True)
+class PayloadNumbers:
+    """What the wrench of a payload is computed with, besides the snapshot.
+
+    Attributes:
+        config: when anything is felt.
+        gravity: [m/s^2].
+        dry, viscous, transition: of the joints' friction, as in ``JointFriction``.
+    """
+
+    config: PayloadConfig
+    gravity: float
+    dry: Float[np.ndarray, "12"]
+    viscous: Float[np.ndarray, "12"]
+    transition: float
+
+
+class PayloadWrench(Record):
+    """What a payload takes of the standing feet, in the base frame.
+
+    Attributes:
+        force: [N].
+        moment: about the base's origin [N m].
+        weight: of a unit of mass, by gravity and the base's acceleration [m/s^2].
+    """
+
+    force: Float[np.ndarray, "3"]
+    moment: Float[np.ndarray, "3"]
+    weight: Float[np.ndarray, "3"]
+
+
+@subroutine
+def can_feel(now: Snapshot, contact: Foreign[Bool[np.ndarray, "4"]], c: PayloadConfig) -> bool:
+    """Whether the feet alone carry the robot, and friction of the joints does not mask the load."""
+    lowest, touches = np.inf, False
+    for leg in range(4):
+        lowest = min(lowest, now.p_world_feet[leg, 2])
+        touches = touches or contact[leg]
+    if not touches or now.q[2] - lowest < c.least_height:
+        return False
+    is_slow = abs(now.v[0]) <= c.most_speed[0] and abs(now.v[1]) <= c.most_speed[1]
+    return bool(is_slow and abs(now.v_world_com[2]) <= c.most_rise)
+
+
+@subroutine
+def forces_needed(
+    now: Snapshot, a: Float[np.ndarray, "18"], needed: Float[np.ndarray, "18"]
+) -> None:
+    """Fill M a + h."""
+    for i in range(18):
+        needed[i] = now.bias[i]
+        for k in range(18):
+            needed[i] += now.mass_matrix[i, k] * a[k]
+
+
+@subroutine
+def add_foot(
+    now: Snapshot,
+    leg: int,
+    tau: Foreign[Float[np.ndarray, "12"]],
+    c: PayloadNumbers,
+    needed: Float[np.ndarray, "18"],
+    left: Float[np.ndarray, "6"],
+) -> bool:
+    """Add the wrench on the base of a foot's force to ``left``; False if the leg is singular."""
+    J, system = now.J_contacts[leg], np.empty((3, 4))
+    for i in range(3):
+        n = 3 * leg + i
+        v = now.v[6 + n]
+        taken = c.dry[n] * np.tanh(v / c.transition) + c.viscous[n] * v
+        system[i, 3] = needed[6 + n] - tau[n] + taken
+        for k in range(3):
+            system[i, k] = J[k, 6 + n]
+    if not solve_linear(system, 3):
+        return False
+    for i in range(6):
+        for k in range(3):
+            left[i] += J[k, i] * system[k, 3]
+    return True
+
+
+@subroutine
+def weight_of_mass(now: Snapshot, a: Float[np.ndarray, "18"], gravity: float) -> V3:
+    """Acceleration of the base, with gravity, in its own frame: what a unit of mass weighs."""
+    v, w = triple(now.v[:3]), triple(now.v[3:6])
+    moved = plus((a[0], a[1], a[2]), cross(w, v))
+    return plus_scaled(moved, gravity, triple(now.R_world_base[2]))
+
+
+@kernel
+def follow_wrench(
+    now: Snapshot,
+    v_before: Foreign[Float[np.ndarray, "18"]],
+    tau: Foreign[Float[np.ndarray, "12"]],
+    contact: Foreign[Bool[np.ndarray, "4"]],
+    dt: float,
+    place: Float[np.ndarray, "3"],
+    c: PayloadNumbers,
+    mean: PayloadWrench,
+) -> None:
+    """Let the mean wrench take up this tick.
+
+    Args:
+        now: of this tick.
+        v_before: velocity ``dt`` seconds ago.
+        tau: torques that acted since.
+        contact: feet in measured contact.
+        dt: [s].
+        place: of the payload that the snapshot already has.
+        c: numbers.
+        mean: is changed.
+    """
+    if not can_feel(now, contact, c.config):
+        return
+    a, needed, left = np.empty(18), np.empty(18), np.empty(6)
+    for i in range(18):
+        a[i] = (now.v[i] - v_before[i]) / dt
+    forces_needed(now, a, needed)
+    for i in range(6):
+        left[i] = -needed[i]
+    for leg in range(4):
+        if contact[leg] and not add_foot(now, leg, tau, c, needed, left):
+            return
+    weight = weight_of_mass(now, a, c.gravity)
+    known = plus_scaled((0.0, 0.0, 0.0), now.payload[0], weight)
+    force = plus(triple(left[:3]), known)
+    moment = plus(triple(left[3:]), cross(triple(place), known))
+    share = min(dt / c.config.memory, 1.0)
+    put(approached(mean.force, share, force), mean.force)
+    put(approached(mean.moment, share, moment), mean.moment)
+    put(approached(mean.weight, share, weight), mean.weight)
+
+
+@subroutine
+def approached(mean: Float[np.ndarray, "3"], share: float, value: V3) -> V3:
+    """A mean that has taken up this share of a value."""
+    return (
+        mean[0] + share * (value[0] - mean[0]),
+        mean[1] + share * (value[1] - mean[1]),
+        mean[2] + share * (value[2] - mean[2]),
+    )
+
+
 class PayloadEstimator:
     """Feels, tick by tick, what the robot carries; begins without anything."""
 
@@ -104,16 +250,10 @@ class PayloadEstimator:
         self, model: RobotModel, friction: JointFriction, config: PayloadConfig | None = None
     ) -> None:
         """Feel what ``model`` has not; ``friction`` is what the joints take of the torques."""
-        from go2_wbc.kernels.payload import feel
-
-        self._feel, self._config = feel, config or PayloadConfig()
-        c = self._config
-        self._numbers = FEELING.pack(
-            [model.gravity, c.memory, c.least_height, c.most_rise, c.most_speed]
-        )
-        self._friction = FrictionFeedForward(friction, model.motor).numbers
-        self._means = FELT.pack([np.zeros(3), np.zeros(3), [0.0, 0.0, model.gravity]])
-        self._contact = np.zeros(4)
+        self._config = c = config or PayloadConfig()
+        dry, viscous = np.array(friction.dry), np.array(friction.viscous)
+        self._numbers = packed(PayloadNumbers(c, model.gravity, dry, viscous, friction.transition))
+        self._mean = PayloadWrench(weight=[0.0, 0.0, model.gravity])
         self._last: RobotState | None = None
         self._since = 0.0
         self._belief = np.zeros(3)
@@ -126,7 +266,8 @@ class PayloadEstimator:
 
         For a robot that is lighter than its model the mass is negative.
         """
-        force, moment, weight = FELT.views(self._means)
+        mean = self._mean
+        force, moment, weight = mean.force, mean.moment, mean.weight
         x, y, z = self._config.middle
         height = self._config.base_height
         mass = float(force @ weight) / float(weight @ weight)
@@ -150,12 +291,8 @@ class PayloadEstimator:
         if last is None or not state.time > last.time:
             return self._payload
         dt = state.time - last.time
-        self._contact[:] = state.feet_in_contact
-        numbers, place = self._numbers, self._place
-        self._feel(
-            *(snapshot.row, last.v, state.tau, self._contact, dt),
-            *(place, numbers, self._friction, self._means),
-        )
+        measured = (last.v, state.tau, state.feet_in_contact, dt)
+        follow_wrench(snapshot, *measured, self._place, self._numbers, self._mean)
         self._since += dt
         if self._since >= PERIOD:
             self._follow(self._since)
@@ -191,36 +328,3 @@ class PayloadEstimator:
         mass = min(float(felt[0]), self._config.most_mass)
         most = mass * np.array(self._config.reach)
         return np.array([mass, *np.clip(felt[1:], -most, most)])
-
-
-def felt_now(
-    snapshot: Snapshot,
-    tau: Float[np.ndarray, "12"],
-    a: Float[np.ndarray, "18"],
-    payload: Payload,
-    gravity: float,
-) -> Float[np.ndarray, "9"]:
-    """What a payload takes of the feet in contact, in one tick: the law of ``kernels.payload``.
-
-    Args:
-        snapshot: of this tick, made with ``payload``.
-        tau: torques at the joints, without what friction takes [N m].
-        a: acceleration that came of them (see ``Snapshot``).
-        payload: what the snapshot already has.
-        gravity: [m/s^2].
-
-    Returns:
-        As ``kernels.layout.FELT``: force and moment about the base's origin, and what a unit of
-        mass weighs, in the base frame.
-    """
-    state, R = snapshot.state, snapshot.R_world_base
-    needed = snapshot.mass_matrix @ a + snapshot.bias
-    wrench = -needed[:6]
-    for leg in np.flatnonzero(state.feet_in_contact):
-        joints = slice(6 + 3 * leg, 9 + 3 * leg)
-        J = snapshot.J_contacts[leg]
-        f = np.linalg.solve(J[:, joints].T, needed[joints] - tau[3 * leg : 3 * leg + 3])
-        wrench = wrench + J[:, :6].T @ f
-    weight = a[:3] + np.cross(state.v[3:6], state.v[:3]) + gravity * R[2]
-    force = payload.mass * weight
-    return np.concatenate([wrench[:3] + force, wrench[3:] + np.cross(payload.place, force), weight])
