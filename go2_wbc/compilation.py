@@ -74,6 +74,7 @@ MODULES: tuple[str, ...] = (
     "go2_wbc.algebra.active_set",
     "go2_wbc.plant.mujoco.layout",
     "go2_wbc.reference",
+    "go2_wbc.robot.estimator",
     "go2_wbc.robot.leg_kinematics",
     "go2_wbc.robot.payload_estimation",
     "go2_wbc.robot.rigid_body",

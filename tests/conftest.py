@@ -52,8 +52,6 @@ UNCHECKED = frozenset(
         "go2_wbc.kernels.condensed",
         "go2_wbc.kernels.contact",
         "go2_wbc.kernels.elimination",
-        "go2_wbc.kernels.estimation",
-        "go2_wbc.kernels.filtering",
         "go2_wbc.kernels.friction",
         "go2_wbc.kernels.goals",
         "go2_wbc.kernels.ground",

@@ -8,7 +8,6 @@ from go2_wbc import compilation
 
 KERNELS = (
     "condensed",
-    "estimation",
     "locomotion",
     "motor",
     "mpc",

@@ -2,12 +2,18 @@
 
 An error-state Kalman filter after Bloesch et al., *State estimation for legged robots*, RSS (2012):
 position, velocity and orientation of the IMU, the biases of its gyro and accelerometer, and the
-feet's centres, in a world whose origin and heading are the base's at the start. The IMU drives it;
-per foot on the ground it is corrected by
+feet's centres, in a world whose origin and heading are the base's at the start (``state_filter``:
+state, error, F and Q). The IMU drives it; per foot on the ground it is corrected by
+(``foot_odometry``: H and R)
 
     place       f_i - p = R (p_i - r_imu)           (encoders through the leg's kinematics)
     velocity    v = w_i x (r n) - R u_i             (the same, differentiated)
     height      f_i = r above level ground          (once, when the foot has come down)
+
+and at rest (``rest_detection``) by
+
+    rest        v = 0, and if it lies gyro = b_g    R = still_velocity^2, still_gyro^2
+    lying       v = 0                               R = rest^2
 
 where u_i is the velocity of the foot's centre relative to the IMU. A foot is a sphere of radius r
 that rolls: its centre moves with w_i x (r n), w_i being the calf's angular velocity and n the
@@ -29,17 +35,15 @@ the heading, and of the gyro's bias while the trunk moves above them.
 A robot whose joints and IMU read rest for a while has no velocity, and if it lies its gyro reads
 its bias: a zero-velocity update (Foxlin, IEEE Computer Graphics and Applications 25(6), 2005). On
 its feet it may turn slowly and read rest: the bias taken from that let the heading of a dance of a
-minute drift by 1.7 deg, and 0.35 as it is. One that lies is told from one in flight by the gravity
-that its trunk feels, beyond what the IMU of a turning one feels beside the CoM. At speed the biases
-are hardly learnt (``learning_speed``), and not at all from a trunk on the ground. After a tumble,
-or when what is at rest has been taken for something else, the filter begins anew.
-``kernels.estimation`` and ``kernels.filtering`` are the arithmetic.
+minute drift by 1.7 deg, and 0.35 as it is. At speed the biases are hardly learnt
+(``learning_speed``), and not at all from a trunk on the ground. After a tumble, or when what is at
+rest has been taken for something else, the filter begins anew.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
@@ -47,14 +51,42 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from go2_wbc.errors import ConfigError
-from go2_wbc.lazy import without_collecting
+from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.legs import LEGS
+from go2_wbc.records import Flag, Record, packed
 from go2_wbc.robot.description import BASE_LINK
-from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_table
+from go2_wbc.robot.estimator_config import EstimatorConfig
+from go2_wbc.robot.foot_odometry import Foot, Level, follow_foot, see_foot, see_ground, take_in_leg
+from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, foot_places, leg_table
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rest_detection import (
+    TUMBLED,
+    Reading,
+    Rest,
+    begin_anew,
+    is_at_rest,
+    is_upset,
+    lies,
+    take_in_rest,
+)
 from go2_wbc.robot.state import OdometryCovariance, RobotState
-from go2_wbc.validation import require_positive
+from go2_wbc.robot.state_filter import (
+    ERROR,
+    FEET,
+    GYRO_BIAS,
+    THETA,
+    VELOCITY,
+    Estimate,
+    EstimateError,
+    Filter,
+    correct,
+    learn_in_part,
+    predict,
+    process_noise,
+    rotation_of_estimate,
+    take_in_one,
+    turn_world_about_robot,
+)
 
 IMU_FRAME = "imu"
 _START_DEVIATIONS = (0.001, 0.1, 0.01)
@@ -90,105 +122,146 @@ class SensorReading:
 
 
 @dataclass(frozen=True, slots=True)
-class EstimatorConfig:
-    """Standard deviations of what the filter is told, and when a foot counts as on the ground.
-
-    Own tuning in simulation, from the values of MIT's published code for the Cheetah 3 on.
+class EstimatorNumbers:
+    """What a step of the filter is computed with.
 
     Attributes:
-        acceleration: of the accelerometer, per sample [m/s^2].
-        foot_drift: speed of a standing foot that rolling does not explain [m/s].
-        drift_share: the same, by which it grows with the foot's speed along the trunk [m/s per
-            m/s]: turning feet creep so that the trunk seems to turn faster.
-        settled_drift: that speed once the foot has stood for ``settled_time`` [m/s].
-        settled_time: time [s] after which a foot has settled: no stride of a gait stands so long.
-        place: of a foot's place by kinematics [m].
-        velocity: of the velocity by one standing foot [m/s].
-        velocity_share: the same, by which it grows with the foot's speed along the trunk.
-        height: of the ground where a foot comes down, against level ground [m].
-        uneven: distance [m] from level ground at which a foot comes down on something else. Heavy
-            legs sink by 20 mm into MuJoCo's floor as they land; taken for steps, that left the
-            height to feet which spring back, and it drifted by 0.1 m/s.
-        uneven_time: time [s] after which the ground counts as level again, where it is then.
-        contact_force: force [N] above which a foot counts as touching: five deviations of its
-            noise. A foot felt in the middle of its swing is taken for a stone: the trunk of a trot
-            on the level went up and down by 20 mm.
-        trusted_force: force [N] from which on a foot is fully believed to stand.
-        rest: of the assumption that a robot whose feet carry nothing lies still [m/s].
-        lying_time: time [s] after which a robot is taken to lie that neither its feet carry nor
-            falls freely.
-        gyro: of the gyro, per sample [rad/s].
-        gyro_bias: of its bias at the start [rad/s].
-        gyro_bias_walk: by which that changes in a second [rad/s].
-        accelerometer_bias: of the accelerometer's bias at the start [m/s^2].
-        accelerometer_bias_walk: by which that changes in a second [m/s^2].
-        learning_speed: speed of the trunk [m/s] at which half of what corrects the biases is
-            believed. A foot creeps ahead as it comes down and back as it pushes off, in step with
-            the trunk's bouncing: fast, that looks like a tilt, and a bias that hides it.
-        tilt: of roll and pitch at the start, by the accelerometer [rad].
-        slip: deviations of a standing foot's velocity above which it is taken for slipping.
-        still_time: time [s] after which what reads as rest is taken for it.
-        still_joints: root of the mean square of the joints' smoothed velocities at rest
-            [rad/s].
-        still_turning: angular velocity at rest [rad/s].
-        still_force: by which the accelerometer's length differs from gravity at rest [m/s^2].
-        still_velocity: of the velocity at rest [m/s].
-        still_gyro: of the gyro's bias by one reading at rest, swaying included [rad/s].
-        still_drift: speed of a foot at rest [m/s].
-        touchdown_slip: speed of a foot's centre when it has just come down [m/s].
-        touchdown_time: in which that decays by 1 / e [s].
-        vertical: speed at which a standing foot is pressed flat and springs back [m/s].
-        vertical_share: the same, by which it grows with the trunk's speed [m/s per m/s]: at speed
-            a pitch is as good a reason for what feet spring back.
-        compliance: by which a foot's sphere is pressed flat [m/N]; it rolls on its middle.
-        longest_step: time [s] between two readings after which the filter begins anew.
+        config: of the estimator.
+        legs: their lengths.
+        p_base_imu: place of the IMU in the base frame [m].
+        foot_radius: [m].
+        gravity: [m/s^2].
     """
 
-    acceleration: float = 0.2
-    foot_drift: float = 0.05
-    drift_share: float = 0.2
-    settled_drift: float = 0.005
-    settled_time: float = 0.45
-    place: float = 0.002
-    velocity: float = 0.05
-    velocity_share: float = 0.05
-    height: float = 0.02
-    uneven: float = 0.03
-    uneven_time: float = 2.0
-    contact_force: float = 10.0
-    trusted_force: float = 30.0
-    rest: float = 0.3
-    lying_time: float = 0.1
-    gyro: float = 0.02
-    gyro_bias: float = 0.02
-    gyro_bias_walk: float = 1e-4
-    accelerometer_bias: float = 0.05
-    accelerometer_bias_walk: float = 1e-3
-    learning_speed: float = 1.0
-    tilt: float = 0.02
-    slip: float = 3.0
-    still_time: float = 0.3
-    still_joints: float = 0.03
-    still_turning: float = 0.12
-    still_force: float = 0.6
-    still_velocity: float = 0.02
-    still_gyro: float = 0.05
-    still_drift: float = 0.0005
-    touchdown_slip: float = 1.5
-    touchdown_time: float = 0.009
-    vertical: float = 0.5
-    vertical_share: float = 0.1
-    compliance: float = 5e-5
-    longest_step: float = 0.1
+    config: EstimatorConfig
+    legs: Legs
+    p_base_imu: Float[np.ndarray, "3"]
+    foot_radius: float
+    gravity: float
 
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is not positive, or forces the wrong way round."""
-        require_positive(self, *(f.name for f in fields(self)))
-        if self.trusted_force <= self.contact_force:
-            raise ConfigError(
-                f"trusted_force must be above contact_force ({self.contact_force:g} N), "
-                f"got {self.trusted_force:g} N"
-            )
+
+class EstimatorState(Record):
+    """What is kept from tick to tick.
+
+    Attributes:
+        filter: the estimate, and how sure it is.
+        gyro: the last reading [rad/s].
+        rest: whether the robot rests, lies or has tumbled.
+        level: the ground.
+        feet: what the legs measure.
+    """
+
+    filter: Filter
+    gyro: Float[np.ndarray, "3"]
+    rest: Rest
+    level: Level
+    feet: tuple[Foot, Foot, Foot, Foot]
+
+
+@subroutine
+def learning(x: Estimate, speed: float) -> float:
+    """Share of their corrections that the biases take: 1 at rest, half at ``speed``."""
+    ratio = (x.v[0] * x.v[0] + x.v[1] * x.v[1]) / (speed * speed)
+    return 1.0 / (1.0 + ratio * ratio)
+
+
+@subroutine
+def report(
+    x: Estimate,
+    reading: Reading,
+    w: Float[np.ndarray, "3"],
+    p_imu: Float[np.ndarray, "3"],
+    R: Float[np.ndarray, "3 3"],
+    q: Float[np.ndarray, "19"],
+    v: Float[np.ndarray, "18"],
+) -> None:
+    """Fill q (19,) and v (18,) of a ``RobotState`` from the motion of the IMU."""
+    rotation_of_estimate(x, R)
+    turning = (
+        w[1] * p_imu[2] - w[2] * p_imu[1],
+        w[2] * p_imu[0] - w[0] * p_imu[2],
+        w[0] * p_imu[1] - w[1] * p_imu[0],
+    )
+    for i in range(3):
+        q[i], v[i], v[3 + i] = x.p[i], -turning[i], w[i]
+        for k in range(3):
+            q[i] -= R[i, k] * p_imu[k]
+            v[i] += R[k, i] * x.v[k]
+    q[3:7] = x.quaternion
+    q[7:], v[6:] = reading.q_joints, reading.v_joints
+
+
+@subroutine
+def follow_feet(
+    s: EstimatorState,
+    reading: Reading,
+    c: EstimatorNumbers,
+    w: Float[np.ndarray, "3"],
+    R: Float[np.ndarray, "3 3"],
+    rests: Flag,
+) -> bool:
+    """Let the legs measure, and move the feet on; returns whether some foot stands."""
+    f, told = s.filter, c.config
+    speed = np.sqrt(f.x.v[0] * f.x.v[0] + f.x.v[1] * f.x.v[1])
+    vertical, is_carried = told.vertical + told.vertical_share * speed, False
+    for leg in range(4):
+        foot, force = s.feet[leg], reading.foot_forces[leg]
+        joints = slice(3 * leg, 3 * leg + 3)
+        pressed = c.foot_radius - 0.5 * told.compliance * force
+        q, u = reading.q_joints[joints], reading.v_joints[joints]
+        see_foot(foot, c.legs.geometry[leg], q, u, c.p_base_imu, w, pressed, R)
+        age = follow_foot(f, foot, leg, force, reading.dt, vertical, rests, told)
+        see_ground(f, foot, leg, force, age, c.foot_radius, s.level, told)
+        if foot.carries:
+            is_carried = True
+    return is_carried
+
+
+@kernel
+def estimate(
+    s: EstimatorState,
+    reading: Reading,
+    c: EstimatorNumbers,
+    q: Float[np.ndarray, "19"],
+    v: Float[np.ndarray, "18"],
+) -> int:
+    """Take in a reading, ``reading.dt`` seconds after the last one, and fill the robot's state.
+
+    Returns whether the estimate has to begin anew, and why; see ``begin_anew``.
+    """
+    f, told, dt, gravity = s.filter, c.config, reading.dt, c.gravity
+    x, P = f.x, f.P
+    w, mean, R, noise = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(ERROR)
+    f.error[:] = 0.0
+    for k in range(3):
+        w[k] = reading.gyro[k] - x.gyro_bias[k]
+        mean[k] = 0.5 * (reading.gyro[k] + s.gyro[k]) - x.gyro_bias[k]
+        s.gyro[k] = reading.gyro[k]
+    process_noise(told, dt, noise)
+    rests = is_at_rest(x, s.rest, reading, gravity, told)
+    predict(f, dt, mean, reading.accelerometer, gravity, R, noise)
+    rotation_of_estimate(x, R)
+    biases = slice(GYRO_BIAS, FEET)
+    before, share_learnt = P[biases, biases].copy(), learning(x, told.learning_speed)
+    s.level.doubt_time = max(s.level.doubt_time - dt, 0.0)
+    is_carried = follow_feet(s, reading, c, w, R, rests)
+    for leg in range(4):
+        take_in_leg(f, s.feet[leg], leg, told)
+    is_lying = lies(x, s.rest, reading, is_carried, gravity, told)
+    if is_upset(s.rest, dt, is_lying, R) and not rests:
+        share_learnt = 0.0
+    if rests:
+        take_in_rest(f, reading, is_carried, told)
+    elif is_lying:
+        for k in range(3):
+            take_in_one(f, VELOCITY + k, -x.v[k], told.rest**2)
+    learn_in_part(f, before, share_learnt)
+    turn_world_about_robot(P)
+    correct(f)
+    for k in range(3):
+        w[k] = reading.gyro[k] - x.gyro_bias[k]
+    report(x, reading, w, c.p_base_imu, R, q, v)
+    return begin_anew(x, s.rest, reading, R, gravity, told)
 
 
 class StateEstimator:
@@ -196,43 +269,18 @@ class StateEstimator:
 
     def __init__(self, model: RobotModel, config: EstimatorConfig | None = None) -> None:
         """Estimate the state of ``model``'s robot."""
-        with without_collecting():
-            from go2_wbc.kernels import estimation, filtering  # compiled; who needs it waits
-
         self._config = config or EstimatorConfig()
         pin_model = model.pin_model
         imu = IMU_FRAME if pin_model.existFrame(IMU_FRAME) else BASE_LINK
         placement = pin_model.frames[pin_model.getFrameId(imu)].placement
         self._p_base_imu = np.array(placement.translation)
         self._geometry = [LegGeometry.of(model, leg) for leg in LEGS]
-        self._legs, self._radius = leg_table(model).row.reshape(4, 6), model.foot_radius
-        self._gravity = model.gravity
-        self._numbers = self._in_order(model)
-        self._kernel = estimation
-        self._biases = slice(filtering.GYRO_BIAS, filtering.FEET)
+        sizes = self._p_base_imu, model.foot_radius, model.gravity
+        self._numbers = packed(EstimatorNumbers(self._config, leg_table(model), *sizes))
         self._time = -np.inf  # before the first reading
-        self._x = np.zeros(filtering.STATE)
-        self._x[9] = 1.0
-        self._P = np.zeros((filtering.ERROR, filtering.ERROR))
-        self._memory = np.zeros(estimation.MEMORY)
-
-    def _in_order(self, model: RobotModel) -> Float[np.ndarray, " n"]:
-        """The numbers of the filter, in the kernel's order."""
-        c = self._config
-        return np.array(
-            [
-                *(c.acceleration, c.foot_drift, c.place, c.velocity, c.height),
-                *(c.contact_force, c.trusted_force, c.rest, c.gyro, c.gyro_bias_walk),
-                *(c.accelerometer_bias_walk, c.slip, c.still_time, c.still_joints),
-                *(c.still_turning, c.still_force, c.still_velocity, c.still_drift),
-                *(model.foot_radius, model.gravity),
-                *(c.touchdown_slip, c.touchdown_time, c.vertical, c.compliance, c.still_gyro),
-                *(c.vertical_share, c.lying_time, c.learning_speed),
-                *(c.drift_share, c.velocity_share),
-                *(c.uneven, c.uneven_time, c.gyro_bias, c.accelerometer_bias),
-                *(c.settled_drift, c.settled_time),
-            ]
-        )
+        self._reading, self._state = Reading(), EstimatorState()
+        self._x, self._P = self._state.filter.x, self._state.filter.P
+        self._x.quaternion[3] = 1.0
 
     def update(self, reading: SensorReading) -> RobotState:
         """Take in a reading that is newer than the last one; returns the state at its time."""
@@ -240,21 +288,12 @@ class StateEstimator:
         if not 0.0 <= step <= self._config.longest_step:
             self._begin(reading)
             step = 0.0
-        row = np.concatenate(
-            [
-                [step],
-                reading.gyro,
-                reading.accelerometer,
-                reading.q_joints,
-                reading.v_joints,
-                reading.foot_forces,
-            ]
-        )
+        self._read(reading, step)
         q, v = np.empty(19), np.empty(18)
-        if off := self._advance(row, q, v):
-            self._forget(reading, keeps_height=off == self._kernel.TUMBLED)
-            row[0] = 0.0
-            self._advance(row, q, v)
+        if off := estimate(self._state, self._reading, self._numbers, q, v):
+            self._forget(reading, keeps_height=off == TUMBLED)
+            self._reading.dt = 0.0
+            estimate(self._state, self._reading, self._numbers, q, v)
         self._time = reading.time
         return RobotState(
             time=reading.time,
@@ -265,14 +304,12 @@ class StateEstimator:
             feet_in_contact=reading.foot_forces > self._config.contact_force,
         )
 
-    def _advance(
-        self, row: Float[np.ndarray, "35"], q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"]
-    ) -> int:
-        """One step of the filter, which fills q and v; returns why to begin anew, or 0."""
-        kept = self._x, self._P, self._memory
-        return int(
-            self._kernel.estimate(*kept, row, self._legs, self._p_base_imu, self._numbers, q, v)
-        )
+    def _read(self, reading: SensorReading, step: float) -> None:
+        taken = self._reading
+        taken.dt = step
+        taken.gyro[:], taken.accelerometer[:] = reading.gyro, reading.accelerometer
+        taken.q_joints[:], taken.v_joints[:] = reading.q_joints, reading.v_joints
+        taken.foot_forces[:] = reading.foot_forces
 
     def covariance(self) -> OdometryCovariance:
         """How sure the last state is of the base, from the covariance of the filter's errors.
@@ -281,39 +318,31 @@ class StateEstimator:
         dp_base = dp - theta x R r, dv_base = R' (dv - theta x v) - dw x r, and dw is the bias's
         error and the gyro's noise. That place and heading go wrong together is not kept.
         """
-        R, r = pin.Quaternion(self._x[6:10]).toRotationMatrix(), pin.skew(self._p_base_imu)
-        one = np.eye(3)
-        of_pose, of_twist = np.zeros((6, len(self._P))), np.zeros((6, len(self._P)))
-        of_pose[:3, :3], of_pose[:3, 6:9], of_pose[3:, 6:9] = (
-            one,
-            pin.skew(R @ self._p_base_imu),
-            one,
-        )
-        of_twist[:3, 3:6], of_twist[:3, 6:9] = R.T, R.T @ pin.skew(self._x[3:6])
-        of_twist[:, 9:12] = of_gyro = -np.vstack([r, one])
-        twist = of_twist @ self._P @ of_twist.T + self._config.gyro**2 * of_gyro @ of_gyro.T
-        return OdometryCovariance(of_pose @ self._P @ of_pose.T, twist)
+        x, P, r = self._x, self._P, self._p_base_imu
+        R, one = pin.Quaternion(x.quaternion).toRotationMatrix(), np.eye(3)
+        of_pose, of_twist = np.zeros((6, ERROR)), np.zeros((6, ERROR))
+        velocity, theta, gyro = (slice(n, n + 3) for n in (VELOCITY, THETA, GYRO_BIAS))
+        of_pose[:3, :3], of_pose[:3, theta], of_pose[3:, theta] = one, pin.skew(R @ r), one
+        of_twist[:3, velocity], of_twist[:3, theta] = R.T, R.T @ pin.skew(x.v)
+        of_twist[:, gyro] = of_gyro = -np.vstack([pin.skew(r), one])
+        twist = of_twist @ P @ of_twist.T + self._config.gyro**2 * of_gyro @ of_gyro.T
+        return OdometryCovariance(of_pose @ P @ of_pose.T, twist)
 
     def save(self) -> Mapping[str, Any]:
         """All that the next estimates depend on, besides the readings."""
         return MappingProxyType(
-            {
-                "time": self._time,
-                "x": self._x.copy(),
-                "P": self._P.copy(),
-                "memory": self._memory.copy(),
-            }
+            {"time": self._time, "state": EstimatorState.of(self._state.row.copy())}
         )
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go back to what ``save`` returned."""
         self._time = saved["time"]
-        self._x[:], self._P[:], self._memory[:] = saved["x"], saved["P"], saved["memory"]
+        self._state.row[:] = saved["state"].row
 
     def _forget(self, reading: SensorReading, keeps_height: bool) -> None:
         """Begin anew, without biases; at the height that the IMU had, or on level ground at 0."""
-        self._x[self._biases] = 0.0
-        self._begin(reading, float(self._x[2]) if keeps_height else None, knows_biases=False)
+        self._x.gyro_bias[:], self._x.force_bias[:] = 0.0, 0.0
+        self._begin(reading, float(self._x.p[2]) if keeps_height else None, knows_biases=False)
 
     def _begin(
         self, reading: SensorReading, height: float | None = None, knows_biases: bool = True
@@ -322,29 +351,35 @@ class StateEstimator:
 
         Heading and biases stay what they were. ``height`` [m] of the IMU: None for level ground.
         """
-        is_first, config, x = np.isinf(self._time), self._config, self._x
-        R = _upright(pin.Quaternion(x[6:10]).toRotationMatrix(), reading.accelerometer - x[13:16])
+        is_first, config, x, P = np.isinf(self._time), self._config, self._x, self._P
+        R = pin.Quaternion(x.quaternion).toRotationMatrix()
+        R = _upright(R, reading.accelerometer - x.force_bias)
         p_feet = self._feet(reading, R)
         if is_first:
-            x[:3] = R @ self._p_base_imu
-        above = self._radius - float(p_feet[:, 2].min())
-        x[2] = above if height is None else height
-        x[3:6], x[6:10] = 0.0, pin.Quaternion(R).coeffs()
-        x[16:] = (x[:3] + p_feet).ravel()
-        biases = np.diag(self._P)[9:15].copy()
+            x.p[:] = R @ self._p_base_imu
+        above = self._numbers.foot_radius - float(p_feet[:, 2].min())
+        x.p[2] = above if height is None else height
+        x.v[:], x.quaternion[:] = 0.0, pin.Quaternion(R).coeffs()
+        x.p_feet[:] = x.p + p_feet
+        biases = slice(GYRO_BIAS, FEET)
+        known = np.diag(P)[biases].copy()
         if is_first or not knows_biases:
-            biases[:3], biases[3:] = config.gyro_bias**2, config.accelerometer_bias**2
-        is_thrown = abs(np.linalg.norm(reading.accelerometer) - self._gravity) > config.still_force
+            known[:3], known[3:] = config.gyro_bias**2, config.accelerometer_bias**2
+        force = np.linalg.norm(reading.accelerometer)
+        is_thrown = abs(force - self._numbers.gravity) > config.still_force
         place, velocity, feet = _THROWN_DEVIATIONS if is_thrown else _START_DEVIATIONS
         tilt = _THROWN_TILT if is_thrown else config.tilt
-        turning = [tilt, tilt, _STEADY_HEADING]
-        deviations = np.array([*[place] * 3, *[velocity] * 3, *turning, *[0.0] * 6, *[feet] * 12])
-        self._P[:] = np.diag(deviations**2)
-        self._P[range(9, 15), range(9, 15)] = biases
-        self._memory[:] = 0.0
-        self._memory[self._kernel.LEVEL] = x[2] - above
-        self._memory[5:8] = reading.gyro
-        self._memory[8:20] = reading.v_joints
+        deviations = EstimateError(theta=[tilt, tilt, _STEADY_HEADING])
+        deviations.p[:], deviations.v[:], deviations.p_feet[:] = place, velocity, feet
+        variances = deviations.row**2
+        variances[biases] = known
+        P[:] = np.diag(variances)
+        s = self._state
+        s.rest.row[:], s.level.row[:] = 0.0, 0.0
+        s.level.height = x.p[2] - above
+        s.gyro[:], s.rest.joint_speeds[:] = reading.gyro, reading.v_joints
+        for foot in s.feet:
+            foot.age = 0.0
 
     def _feet(
         self, reading: SensorReading, R: Float[np.ndarray, "3 3"]

@@ -18,6 +18,7 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import JointCommand, RobotState
+from go2_wbc.robot.state_filter import GYRO_BIAS, EstimateError
 from tests.engine_helpers import STAND_JOINTS
 
 # m/s; of the estimate while trotting at 0.5 m/s. A foot taken for a point that does not roll would
@@ -200,10 +201,10 @@ def test_the_covariance_stays_symmetric() -> None:
     estimator = StateEstimator(RobotModel())
     estimator.update(reading(0.0))
     saved = estimator.save()
-    saved["P"][3, 7] += 1e-7
+    saved["state"].filter.P[3, 7] += 1e-7
     estimator.restore(saved)
     estimator.update(reading(0.002))
-    P = estimator.save()["P"]
+    P = estimator.save()["state"].filter.P
     assert np.abs(P - P.T).max() < ROUNDING
 
 
@@ -274,11 +275,11 @@ def test_what_tells_of_the_heading_does_not_move_a_robot_that_stands() -> None:
     estimator = StateEstimator(model)
     estimator.update(reading(0.0))
     saved = estimator.save()
-    p_feet = saved["x"][16:].reshape(4, 3) - saved["x"][:3]
-    lever = np.zeros(27)
-    lever[11], lever[8], lever[1] = 1.0, -WALKED, -WALKED * FAR / 2
-    lever[15:] = (lever[:3] - WALKED * np.cross([0.0, 0.0, 1.0], p_feet)).ravel()
-    saved["P"][:] += np.outer(lever, lever) * UNSURE**2
+    kept, lever = saved["state"].filter, EstimateError()
+    p_feet = kept.x.p_feet - kept.x.p
+    lever.gyro_bias[2], lever.theta[2], lever.p[1] = 1.0, -WALKED, -WALKED * FAR / 2
+    lever.p_feet[:] = lever.p - WALKED * np.cross([0.0, 0.0, 1.0], p_feet)
+    kept.P[:] += np.outer(lever.row, lever.row) * UNSURE**2
     estimator.restore(saved)
     given = [replace(reading(STEP * n), gyro=np.array([0.0, 0.0, TWIST])) for n in range(1, 101)]
     end = [estimator.update(one) for one in given][-1]
@@ -313,9 +314,9 @@ def test_feet_that_stay_tell_the_bias_of_the_gyro_of_one_that_dances() -> None:
             v_joints=(joints[n + 1] - joints[n]) / STEP,
         )
         estimator.update(now)
-    saved = estimator.save()
-    assert saved["x"][12] == pytest.approx(bias, abs=LEARNT_BAR)
-    assert np.sqrt(saved["P"][11, 11]) < LEARNT_BAR
+    kept, yaw = estimator.save()["state"].filter, GYRO_BIAS + 2
+    assert kept.x.gyro_bias[2] == pytest.approx(bias, abs=LEARNT_BAR)
+    assert np.sqrt(kept.P[yaw, yaw]) < LEARNT_BAR
 
 
 def test_numbers_must_be_positive() -> None:

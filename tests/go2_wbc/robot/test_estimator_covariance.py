@@ -12,6 +12,7 @@ from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.plant.sensors import EXACT, SensorNoise
 from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.state_filter import Estimate
 from tests.engine_helpers import STAND_JOINTS
 
 P_BASE_IMU = np.array([-0.02557, 0.0, 0.04232])  # m; the URDF's imu_joint
@@ -21,12 +22,12 @@ DERIVED = 1e-6  # of covariances of order 1
 LEAST, MOST = 0.1, 2.5  # of an error's root mean square over the deviation that is stated
 
 
-def base(x: np.ndarray, error: np.ndarray, gyro: np.ndarray) -> tuple[np.ndarray, ...]:
+def base(x: Estimate, error: np.ndarray, gyro: np.ndarray) -> tuple[np.ndarray, ...]:
     """Position, orientation, linear and angular velocity of the base if ``x`` is off by that."""
-    R = pin.exp3(error[6:9]) @ pin.Quaternion(x[6:10]).toRotationMatrix()
-    w = gyro - (x[10:13] + error[9:12])
-    v = R.T @ (x[3:6] + error[3:6])
-    return x[:3] + error[:3] - R @ P_BASE_IMU, R, v - np.cross(w, P_BASE_IMU), w
+    R = pin.exp3(error[6:9]) @ pin.Quaternion(x.quaternion).toRotationMatrix()
+    w = gyro - (x.gyro_bias + error[9:12])
+    v = R.T @ (x.v + error[3:6])
+    return x.p + error[:3] - R @ P_BASE_IMU, R, v - np.cross(w, P_BASE_IMU), w
 
 
 def test_the_covariance_of_the_base_is_that_of_the_errors_of_the_filter() -> None:
@@ -34,10 +35,11 @@ def test_the_covariance_of_the_base_is_that_of_the_errors_of_the_filter() -> Non
     up = np.array([0.0, 0.0, 9.81])
     rest = np.zeros(12)
     estimator.update(SensorReading(0.0, GYRO_READING, up, STAND_JOINTS, rest, rest, np.zeros(4)))
-    saved = dict(estimator.save())
+    saved = estimator.save()
     root = rng.normal(size=(27, 27))
-    saved["P"], x = root @ root.T / 27, saved["x"]
-    x[3:6], x[6:10] = rng.normal(size=3), pin.Quaternion(pin.exp3(rng.normal(size=3))).coeffs()
+    P, x = saved["state"].filter.P, saved["state"].filter.x
+    P[:], x.v[:] = root @ root.T / 27, rng.normal(size=3)
+    x.quaternion[:] = pin.Quaternion(pin.exp3(rng.normal(size=3))).coeffs()
     estimator.restore(saved)
     p, R, v, w = base(x, np.zeros(27), GYRO_READING)
     of_pose, of_twist, of_noise = np.empty((6, 27)), np.empty((6, 27)), np.empty((6, 3))
@@ -50,8 +52,8 @@ def test_the_covariance_of_the_base_is_that_of_the_errors_of_the_filter() -> Non
         of_noise[:, i] = np.concatenate([v_i - v, w_i - w]) / NUDGE
     gyro = EstimatorConfig().gyro ** 2 * of_noise @ of_noise.T
     covariance = estimator.covariance()
-    np.testing.assert_allclose(covariance.pose, of_pose @ saved["P"] @ of_pose.T, atol=DERIVED)
-    expected = of_twist @ saved["P"] @ of_twist.T + gyro
+    np.testing.assert_allclose(covariance.pose, of_pose @ P @ of_pose.T, atol=DERIVED)
+    expected = of_twist @ P @ of_twist.T + gyro
     np.testing.assert_allclose(covariance.twist, expected, atol=DERIVED)
 
 

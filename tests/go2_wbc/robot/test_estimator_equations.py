@@ -1,8 +1,8 @@
-"""The estimator's kernel against the same filter in numpy: all numbers at once, by an inverse.
+"""The estimator against the documented filter in numpy: all numbers at once, by an inverse.
 
 Its Jacobians are finite differences of the functions that they are of, and its feet and their
-velocities come from Pinocchio; nothing is shared with the kernel but the equations of
-``robot.estimator`` (Kalman, J. Basic Eng. 82, 1960; Sola, *Quaternion kinematics for the
+velocities come from Pinocchio; nothing is shared with the estimator but the equations
+of ``robot.estimator`` (Kalman, J. Basic Eng. 82, 1960; Sola, *Quaternion kinematics for the
 error-state Kalman filter*, 2017, sec. 7).
 """
 
@@ -15,8 +15,9 @@ import pinocchio as pin
 import pytest
 
 from go2_wbc.legs import FOOT_NAMES
-from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
+from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator, estimate
 from go2_wbc.robot.model import RobotModel
+from tests.compiled import assert_plain_is_compiled
 from tests.engine_helpers import STAND_JOINTS
 
 STEP, COUNT = 0.002, 40  # s; of readings
@@ -55,7 +56,7 @@ def readings(case: str) -> list[SensorReading]:
     ]
 
 
-class Twin:
+class DocumentedFilter:
     """The filter, written for reading: x is p, v, R, gyro bias, force bias, feet."""
 
     def __init__(self, model: RobotModel, first: SensorReading) -> None:
@@ -229,11 +230,11 @@ class Twin:
 def test_the_estimate_is_that_of_the_documented_filter(case: str) -> None:
     model = RobotModel()
     given = readings(case)
-    estimator, twin = StateEstimator(model, CONFIG), Twin(model, given[0])
+    estimator, documented = StateEstimator(model, CONFIG), DocumentedFilter(model, given[0])
     states = [estimator.update(reading) for reading in given]
     for reading in given[1:]:
-        twin.step(reading, STEP)
-    p, v, R, b, *_ = twin.x
+        documented.step(reading, STEP)
+    p, v, R, b, *_ = documented.x
     w = given[-1].gyro - b
     found = states[-1]
     assert found.R_world_base == pytest.approx(R, abs=EXACT)
@@ -241,6 +242,17 @@ def test_the_estimate_is_that_of_the_documented_filter(case: str) -> None:
     assert found.v[:3] == pytest.approx(R.T @ v - np.cross(w, P_BASE_IMU), abs=EXACT)
     assert found.v[3:6] == pytest.approx(w, abs=EXACT)
     assert np.abs(v).max() > 1e2 * EXACT
-    deviations = np.sqrt(np.diag(twin.P))
-    off = (estimator.save()["P"] - twin.P) / np.outer(deviations, deviations)
+    deviations = np.sqrt(np.diag(documented.P))
+    off = (estimator.save()["state"].filter.P - documented.P) / np.outer(deviations, deviations)
     assert np.abs(off).max() < SAME
+
+
+@pytest.mark.parametrize("case", FORCES)
+def test_compiled_is_plain(case: str) -> None:
+    estimator, given = StateEstimator(RobotModel(), CONFIG), readings(case)
+    for reading in given[:20]:
+        estimator.update(reading)
+    estimator._read(given[20], STEP)
+    made = np.empty(19), np.empty(18)
+    kept = estimator._state, estimator._reading, estimator._numbers
+    assert_plain_is_compiled(estimate, *kept, *made)

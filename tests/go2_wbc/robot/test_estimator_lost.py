@@ -14,6 +14,7 @@ from controller import GO2Controller
 from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state_filter import THETA
 from tests.engine_helpers import STAND_JOINTS
 
 STEP = 0.002  # s
@@ -63,7 +64,7 @@ def test_who_begins_in_the_air_does_not_trust_its_tilt() -> None:
     for felt in (resting(0.0, np.eye(3)), replace(resting(0.0, np.eye(3)), accelerometer=FALLING)):
         estimator = StateEstimator(RobotModel())
         estimator.update(felt)
-        deviations.append(float(estimator.save()["P"][6, 6]) ** 0.5)
+        deviations.append(float(estimator.save()["state"].filter.P[THETA, THETA]) ** 0.5)
     assert deviations[0] < EstimatorConfig().tilt
     assert deviations[1] > 0.5
 
@@ -81,17 +82,18 @@ def test_a_robot_that_rolled_onto_its_feet_forgets_its_biases_and_keeps_its_heig
         R = pin.rpy.rpyToMatrix(2.0 - rate * STEP * (tick + 1), 0.0, 0.0)
         rolling = replace(resting(STEP * (200 + tick), R), gyro=np.array([-rate, 0.0, 0.0]))
         estimator.update(rolling)
-    saved = dict(estimator.save())
-    x = saved["x"].copy()
-    x[10:16] = 0.04
-    estimator.restore(saved | {"x": x})
+    saved = estimator.save()
+    x = saved["state"].filter.x
+    x.gyro_bias[:], x.force_bias[:] = 0.04, 0.04
+    estimator.restore(saved)
     rests = [resting(STEP * (400 + tick), np.eye(3), forces=40.0) for tick in range(300)]
     states = [estimator.update(given) for given in rests]
     assert tilt_between(states[-1], np.eye(3)) < TILT_BAR
-    assert np.abs(estimator.save()["x"][10:16]).max() < 0.002
+    x = estimator.save()["state"].filter.x
+    assert np.abs([x.gyro_bias, x.force_bias]).max() < 0.002
     heights = np.array([state.q[2] for state in states])
     assert np.abs(np.diff(heights)).max() < HEIGHT_BAR
-    assert estimator.save()["memory"][-1] == 0.0
+    assert not estimator.save()["state"].rest.tumbled
 
 
 def test_a_robot_that_never_tumbled_does_not_begin_anew() -> None:
@@ -100,7 +102,7 @@ def test_a_robot_that_never_tumbled_does_not_begin_anew() -> None:
     for tick in range(300):
         estimator.update(resting(STEP * tick, leaning if tick < 200 else np.eye(3), forces=40.0))
     estimator.update(resting(STEP * 300, np.eye(3), forces=40.0))
-    assert estimator.save()["memory"][-1] == 0.0
+    assert not estimator.save()["state"].rest.tumbled
 
 
 @pytest.mark.slow

@@ -1,0 +1,248 @@
+"""What a leg tells the state estimator: where its foot is, how fast the trunk, how high the ground.
+
+With s_i the place of the foot's centre from the IMU along the world's axes by the leg's kinematics,
+and m_i the velocity that the IMU has if the foot rolls (rows of the error as in ``state_filter``):
+
+    place      f_i - p - theta x s_i = s_i       r = place^2
+    velocity   v + theta x v = m_i               r = k ((velocity / trust)^2 + slip^2 + creep^2)
+    height     f_i,z = that of the ground        r = height^2, once, when the foot has come down
+
+A turn of the estimate turns a leg's velocity with it, by theta x v. trust grows from 0 to 1 between
+``contact_force`` and ``trusted_force``, slip decays after touchdown, creep grows with the foot's
+speed along the trunk, vertically ``vertical`` is added, and k is ``slip_factor``. A foot drifts by
+a speed of its own, which is its part of Q.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.algebra.vectors import put
+from go2_wbc.compilation import subroutine
+from go2_wbc.records import Flag, Record
+from go2_wbc.robot.estimator_config import EstimatorConfig
+from go2_wbc.robot.leg_kinematics import LegGeometry
+from go2_wbc.robot.state_filter import (
+    FEET,
+    THETA,
+    VELOCITY,
+    Filter,
+    put_turned,
+    take_in,
+    take_in_one,
+)
+
+LEAST_TRUST = 1e-3
+"""Trust in a foot in the air: its place drifts a thousand times as fast as a standing one's."""
+_HEIGHT_GATE = 9.0
+"""Square of the deviations by which a foot's height may be off that of flat ground; else it stands
+on something else, and its height says nothing."""
+_LEVEL_SHARE = 0.2
+"""Share of a landing foot's height in that of the ground, while this is not believed."""
+
+
+class Foot(Record):
+    """A foot, as its leg measures it, along the world's axes.
+
+    Attributes:
+        age: time [s] for which it has touched the ground; the rest is of this tick alone.
+        place: of its centre from the IMU [m].
+        velocity: of the IMU if it rolls on the ground [m/s].
+        rolling: velocity of its centre then [m/s].
+        speed: of it along the trunk [m/s].
+        carries: whether it counts as standing.
+        variance: of the velocity; 0 if it is not to be taken in.
+        height_off: of the ground above it [m], where that is known to be level; else inf.
+    """
+
+    age: float
+    place: Float[np.ndarray, "3"]
+    velocity: Float[np.ndarray, "3"]
+    rolling: Float[np.ndarray, "3"]
+    speed: float
+    carries: bool
+    variance: Float[np.ndarray, "3"]
+    height_off: float
+
+
+class Level(Record):
+    """The ground, as far as it is level.
+
+    Attributes:
+        height: [m].
+        doubt_time: for which it is not believed [s].
+    """
+
+    height: float
+    doubt_time: float
+
+
+@subroutine
+def see_foot(
+    foot: Foot,
+    leg: LegGeometry,
+    q: Float[np.ndarray, "3"],
+    u: Float[np.ndarray, "3"],
+    p_imu: Float[np.ndarray, "3"],
+    w: Float[np.ndarray, "3"],
+    radius: float,
+    R: Float[np.ndarray, "3 3"],
+) -> None:
+    """Fill what a leg measures, along the world's axes.
+
+    q and u are the angles and speeds of its joints, w the angular velocity of the base.
+    """
+    c1, s1, c2, s2 = np.cos(q[0]), np.sin(q[0]), np.cos(q[1]), np.sin(q[1])
+    c3, s3, bend = np.cos(q[1] + q[2]), np.sin(q[1] + q[2]), u[1] + u[2]
+    hip, width, thigh, calf = leg.p_base_hip, leg.width, leg.thigh, leg.calf
+    down = thigh * c2 + calf * c3
+    longer = -thigh * s2 * u[1] - calf * s3 * bend
+    x = hip[0] - thigh * s2 - calf * s3 - p_imu[0]
+    y = hip[1] + width * c1 + down * s1 - p_imu[1]
+    z = hip[2] + width * s1 - down * c1 - p_imu[2]
+    dx = -thigh * c2 * u[1] - calf * c3 * bend
+    dy = longer * s1 + (down * c1 - width * s1) * u[0]
+    foot.speed = np.sqrt(dx * dx + dy * dy)
+    dx += w[1] * z - w[2] * y
+    dy += w[2] * x - w[0] * z
+    dz = (width * c1 + down * s1) * u[0] - longer * c1 + w[0] * y - w[1] * x
+    put_turned(R, (x, y, z), foot.place)
+    put_turned(R, (-dx, -dy, -dz), foot.velocity)
+    put_turned(R, (w[0] + u[0], w[1] + c1 * bend, w[2] + s1 * bend), foot.rolling)
+    x, y, z = foot.rolling[0], foot.rolling[1], foot.rolling[2]
+    put((radius * y, -radius * x, 0.0), foot.rolling)  # w x (0, 0, r)
+    foot.velocity[0] += foot.rolling[0]
+    foot.velocity[1] += foot.rolling[1]
+
+
+@subroutine
+def slip_factor(f: Filter, foot: Foot, gate: float) -> float:
+    """Factor on the variances of a foot that stands: above 1 if it moves as no standing one would.
+
+    With chi^2 the square of the velocity's innovation over its variance, and the gate its greatest
+    usual root: max(1, chi^2 / gate^2), so that an outlier counts by its size no longer (Huber,
+    *Robust Statistics*, 1981).
+    """
+    chi = 0.0
+    for k in range(3):
+        off = foot.velocity[k] - f.x.v[k]
+        chi += off * off / (f.P[VELOCITY + k, VELOCITY + k] + foot.variance[k])
+    return max(1.0, chi / (gate * gate))
+
+
+@subroutine
+def height_off(level: Level, ground: float, variance: float, c: EstimatorConfig) -> float:
+    """How far the ground is above ``ground`` [m], where a foot stands on it; inf if unknown.
+
+    ``variance``: of that difference. Once a foot has come down on something else, the ground is
+    not level: its height follows the feet, and says nothing of them for a while.
+    """
+    off = level.height - ground
+    if abs(off) > c.uneven or off * off > _HEIGHT_GATE * variance:
+        level.doubt_time = c.uneven_time
+    if level.doubt_time > 0.0:
+        level.height -= _LEVEL_SHARE * off
+        return np.inf
+    return off
+
+
+@subroutine
+def follow_foot(
+    f: Filter,
+    foot: Foot,
+    leg: int,
+    force: float,
+    dt: float,
+    vertical: float,
+    rests: Flag,
+    c: EstimatorConfig,
+) -> float:
+    """Move a foot on by ``dt``, and fill how far what it tells is believed; returns its last age.
+
+    Args:
+        f: whose estimate and covariance of the foot are moved on.
+        foot: as ``see_foot`` has filled it.
+        leg: which.
+        force: on it [N].
+        dt: [s].
+        vertical: speed at which standing feet are pressed flat and spring back [m/s].
+        rests: whether nothing moves.
+        c: numbers.
+    """
+    age = foot.age if force > c.contact_force else -dt
+    slip = c.touchdown_slip * np.exp(-max(age, 0.0) / c.touchdown_time)
+    share = (force - c.contact_force) / (c.trusted_force - c.contact_force)
+    trust = min(max(share, LEAST_TRUST), 1.0)
+    foot.age = age + dt
+    creeping = c.settled_drift if age > c.settled_time else c.foot_drift
+    level = creeping / trust + slip + c.drift_share * foot.speed
+    factor = 1.0
+    foot.carries, foot.variance[:] = trust > LEAST_TRUST, 0.0
+    if foot.carries:
+        creep, variance = c.velocity_share * foot.speed, foot.variance
+        variance[:2] = (c.velocity / trust) ** 2 + slip * slip + creep * creep
+        variance[2] = variance[0] + vertical * vertical
+        factor = slip_factor(f, foot, c.slip)
+        variance *= factor
+    for k in range(3):
+        drift = level if k < 2 else level + vertical
+        if rests:
+            drift = c.still_drift
+        f.P[FEET + 3 * leg + k, FEET + 3 * leg + k] += factor * (drift * dt) ** 2
+        f.x.p_feet[leg, k] += dt * foot.rolling[k]
+    return age
+
+
+@subroutine
+def see_ground(
+    f: Filter,
+    foot: Foot,
+    leg: int,
+    force: float,
+    age: float,
+    radius: float,
+    level: Level,
+    c: EstimatorConfig,
+) -> None:
+    """Fill how far the ground is above the foot if it has just settled there; inf if unknown.
+
+    ``age``: of its contact [s] before this tick; ``radius``: of the foot [m].
+    """
+    settled = 3.0 * c.touchdown_time
+    foot.height_off = np.inf
+    if age < settled <= foot.age:
+        ground = f.x.p_feet[leg, 2] - radius + c.compliance * force
+        z = FEET + 2 + 3 * leg
+        foot.height_off = height_off(level, ground, f.P[z, z] + c.height**2, c)
+
+
+@subroutine
+def take_in_leg(f: Filter, foot: Foot, leg: int, c: EstimatorConfig) -> None:
+    """Take in what a leg measures: its place, its velocity if it stands, and its height.
+
+    A turn of the estimate turns a leg's velocity with it, by theta x v. The estimate is put there
+    for v, not what the leg measures: its noise would stand in the gain and in what that multiplies,
+    and a mean of their product, which tilted a standing robot by a degree a minute.
+    """
+    x, s, m, variance = f.x, foot.place, foot.velocity, c.place**2
+    places, shares = np.empty(4, np.int64), np.empty(4)
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        # R s = f - p - theta x R s; the k-th number of the product has those at i and j
+        places[0], places[1], places[2], places[3] = (
+            FEET + 3 * leg + k,
+            k,
+            THETA + i,
+            THETA + j,
+        )
+        shares[0], shares[1], shares[2], shares[3] = 1.0, -1.0, -s[j], s[i]
+        off = s[k] - x.p_feet[leg, k] + x.p[k]
+        take_in(f, places, shares, 4, off, variance)
+        if foot.variance[k] > 0.0:
+            places[1], shares[1] = VELOCITY + k, 1.0
+            shares[2], shares[3] = -x.v[j], x.v[i]
+            off = m[k] - x.v[k]
+            take_in(f, places[1:], shares[1:], 3, off, foot.variance[k])
+    if foot.height_off != np.inf:
+        take_in_one(f, FEET + 2 + 3 * leg, foot.height_off, c.height**2)

@@ -1,0 +1,168 @@
+"""Whether a robot rests, lies or has tumbled, or its estimate is lost, by what its sensors read.
+
+At rest are joints that do not move and an IMU that feels gravity alone and does not turn. One that
+lies is told from one in flight by the gravity that its trunk feels, beyond what the IMU of a
+turning one feels beside the CoM. Each has to last: see ``EstimatorConfig``. To the filter
+(``state_filter``) rest is a measurement of the velocity, and lying one of the gyro's bias, too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from jaxtyping import Float
+
+from go2_wbc.compilation import subroutine
+from go2_wbc.records import Flag, Record
+from go2_wbc.robot.estimator_config import EstimatorConfig
+from go2_wbc.robot.state_filter import GYRO_BIAS, VELOCITY, Estimate, Filter, take_in_one
+
+_SMOOTHING = 0.05
+"""Time constant [s] in which the joints' speeds are smoothed, to tell slow motion from noise."""
+_FLIGHT, _ARM = 0.5, 0.1
+"""Share of gravity that a trunk feels at least if something carries it, while in flight it feels
+none; and the greatest distance [m] of the CoM from the IMU, by which one that turns feels w^2 r."""
+KNOWN, TUMBLED, LOST = range(3)
+"""Whether an estimate holds, or has to begin anew."""
+_UPRIGHT = np.cos(np.radians(15.0))
+"""Cosine of the angle between the accelerometer's up and the estimate's, at rest, if it is lost."""
+_OVER, _CALM = np.cos(np.radians(50.0)), 1.0
+"""Cosine of the tilt from which on a robot is tumbling, and for how long [s] after it has lain or
+tumbled no biases are learnt: the trunk and what slides beside it tell wrong velocities."""
+_RUNAWAY, _BIASES = 0.5, 5.0
+"""Speed [m/s] that an estimate of a robot at rest has if it is lost, and by how many deviations a
+bias is then off 0."""
+
+
+class Reading(Record):
+    """What the filter takes of a ``SensorReading``.
+
+    Attributes:
+        dt: time [s] since the last one.
+
+    All others as there.
+    """
+
+    dt: float
+    gyro: Float[np.ndarray, "3"]
+    accelerometer: Float[np.ndarray, "3"]
+    q_joints: Float[np.ndarray, "12"]
+    v_joints: Float[np.ndarray, "12"]
+    foot_forces: Float[np.ndarray, "4"]
+
+
+class Rest(Record):
+    """What is remembered of it.
+
+    Attributes:
+        joint_speeds: smoothed [rad/s].
+        still_time: for which all has been at rest [s].
+        lying_time: for which something else than the feet has carried the robot [s].
+        lost_time: for which the estimate has been lost [s].
+        upset_time: for which no biases are learnt [s].
+        tumbled: whether the robot has.
+    """
+
+    joint_speeds: Float[np.ndarray, "12"]
+    still_time: float
+    lying_time: float
+    lost_time: float
+    upset_time: float
+    tumbled: bool
+
+
+@subroutine
+def is_at_rest(
+    x: Estimate, rest: Rest, reading: Reading, gravity: float, c: EstimatorConfig
+) -> bool:
+    """Whether joints, gyro and accelerometer have read rest for long enough."""
+    speed, turning, force = 0.0, 0.0, 0.0
+    share = min(reading.dt / _SMOOTHING, 1.0)
+    for n in range(12):
+        rest.joint_speeds[n] += share * (reading.v_joints[n] - rest.joint_speeds[n])
+        speed += rest.joint_speeds[n] ** 2 / 12.0
+    for k in range(3):
+        turning += (reading.gyro[k] - x.gyro_bias[k]) ** 2
+        force += (reading.accelerometer[k] - x.force_bias[k]) ** 2
+    is_still = (
+        speed < c.still_joints**2
+        and turning < c.still_turning**2
+        and abs(np.sqrt(force) - gravity) < c.still_force
+    )
+    rest.still_time = rest.still_time + reading.dt if is_still else 0.0
+    return bool(rest.still_time >= c.still_time)
+
+
+@subroutine
+def lies(
+    x: Estimate, rest: Rest, reading: Reading, is_carried: Flag, gravity: float, c: EstimatorConfig
+) -> bool:
+    """Whether something else than the feet has carried the robot for long enough."""
+    force, turning = 0.0, 0.0
+    for k in range(3):
+        force += (reading.accelerometer[k] - x.force_bias[k]) ** 2
+        turning += (reading.gyro[k] - x.gyro_bias[k]) ** 2
+    is_lying = not is_carried and np.sqrt(force) > _FLIGHT * gravity + _ARM * turning  # w^2 r
+    rest.lying_time = rest.lying_time + reading.dt if is_lying else 0.0
+    return bool(rest.lying_time >= c.lying_time)
+
+
+@subroutine
+def begin_anew(
+    x: Estimate,
+    rest: Rest,
+    reading: Reading,
+    R: Float[np.ndarray, "3 3"],
+    gravity: float,
+    c: EstimatorConfig,
+) -> int:
+    """``KNOWN``, ``TUMBLED`` if a robot that did is at rest on its belly or feet, or ``LOST``.
+
+    Lost is who has taken a trunk at rest, for long enough, for one that is tilted or moves. Rest is
+    told by the readings alone: an estimate that is lost has lost the biases, too. Jolts, as of legs
+    that are drawn in, are taken off the time at rest.
+    """
+    turning, force, upwards, speed, joints, most = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        turning += reading.gyro[k] ** 2
+        force += reading.accelerometer[k] ** 2
+        upwards += R[2, k] * reading.accelerometer[k]
+        speed += x.v[k] ** 2
+        most = max(most, abs(x.gyro_bias[k]) / c.gyro_bias)
+        most = max(most, abs(x.force_bias[k]) / c.accelerometer_bias)
+    for n in range(12):
+        joints += rest.joint_speeds[n] ** 2 / 12.0
+    force = np.sqrt(force)
+    if R[2, 2] < _OVER:
+        rest.tumbled = True
+    moves = speed > _RUNAWAY**2 and joints < c.still_joints**2
+    is_lost = moves or upwards < _UPRIGHT * force or most > _BIASES
+    if not (is_lost or (rest.tumbled and R[2, 2] > _OVER)):
+        rest.lost_time = 0.0
+        return KNOWN
+    is_still = turning < c.still_turning**2 and abs(force - gravity) < c.still_force
+    rest.lost_time = max(rest.lost_time + (reading.dt if is_still else -reading.dt), 0.0)
+    if rest.lost_time < c.still_time:
+        return KNOWN
+    return LOST if is_lost else TUMBLED
+
+
+@subroutine
+def is_upset(rest: Rest, dt: float, is_lying: Flag, R: Float[np.ndarray, "3 3"]) -> bool:
+    """Whether the robot lies or is tilted far, or has been until a moment ago."""
+    is_down = is_lying or R[2, 2] < _OVER
+    rest.upset_time = _CALM if is_down else max(rest.upset_time - dt, 0.0)
+    return bool(rest.upset_time > 0.0)
+
+
+@subroutine
+def take_in_rest(f: Filter, reading: Reading, is_carried: Flag, c: EstimatorConfig) -> None:
+    """Take in that nothing moves: no velocity, and a gyro that reads its bias.
+
+    Of a robot that its feet carry the gyro's bias is learnt by these: slow turns of its trunk read
+    as rest, too.
+    """
+    for k in range(3):
+        take_in_one(f, VELOCITY + k, -f.x.v[k], c.still_velocity**2)
+        if not is_carried:
+            off = reading.gyro[k] - f.x.gyro_bias[k]
+            take_in_one(f, GYRO_BIAS + k, off, c.still_gyro**2)
