@@ -25,7 +25,7 @@ from go2_wbc.robot.state import RobotState
 from go2_wbc.world import PAYLOAD_HALF_SIZE, World
 
 FOOT_RADIUS = 0.022
-"""Radius [m] of the spherical foot: the foot mesh's, see the robot description."""
+"""Radius [m] of the spherical foot, of the URDF's foot mesh and of every published MJCF."""
 ROTOR_ARMATURE = np.tile([0.0045, 0.0045, 0.0164], 4)
 """Reflected rotor inertia [kg m^2] per joint; same provenance as the plant's ``JointDynamics``."""
 LEG_AXES = ("JointModelRX", "JointModelRY", "JointModelRY")

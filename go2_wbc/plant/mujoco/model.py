@@ -18,10 +18,10 @@ from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant.mujoco.visuals import add_visuals
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.description import BASE_LINK, RobotDescription
+from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.validation import require_not_negative
 from go2_wbc.world import PAYLOAD_HALF_SIZE
 
-FOOT_RADIUS = 0.022  # m; radius of the foot in the URDF's foot mesh and in every published MJCF
 FLOOR = "go2_wbc_floor"
 _GRID = "go2_wbc_grid"
 IMU_SITE = "go2_wbc_imu"

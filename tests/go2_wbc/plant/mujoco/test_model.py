@@ -22,9 +22,10 @@ from benchmarks.agreement import (
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.plant.mujoco.model import FOOT_RADIUS, PAYLOAD_BODY, JointDynamics
+from go2_wbc.plant.mujoco.model import PAYLOAD_BODY, JointDynamics
 from go2_wbc.plant.terrain import Boxes, Patch, Ramp, Slope, Stairs, Terrain
 from go2_wbc.robot.description import find_description
+from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.state import JointCommand
 from tests.go2_wbc.plant.helpers import STAND
 
