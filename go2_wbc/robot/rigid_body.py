@@ -40,7 +40,7 @@ from go2_wbc.robot.snapshot import Snapshot
 
 Inertia = tuple[float, float, float, float, float, float]
 Body = tuple[float, V3, Inertia]
-Leg = tuple[float, float, V3, V3, V3, V3, Body, Body, Body]
+LegBodies = tuple[float, float, V3, V3, V3, V3, Body, Body, Body]
 """Cosine and sine of the hip's angle, places and bodies: see ``place_leg``."""
 Wrench = tuple[V3, V3]
 """Force and moment."""
@@ -175,7 +175,7 @@ def put_twice(M: Float[np.ndarray, "18 18"], i: int, k: int, value: float) -> No
 
 
 @subroutine
-def couple(now: Snapshot, n: int, mass: float, base: Axes, linear: V3, angular: V3) -> None:
+def couple_to_base(now: Snapshot, n: int, mass: float, base: Axes, linear: V3, angular: V3) -> None:
     """Fill what couples a joint to the base: the robot's momentum if it alone turns at 1 rad/s."""
     velocity = along(base, linear)
     for i in range(3):
@@ -198,7 +198,7 @@ def fill_foot_column(
 
 
 @subroutine
-def place_leg(robot: RigidBodies, now: Snapshot, leg: int) -> Leg:
+def place_leg(robot: RigidBodies, now: Snapshot, leg: int) -> LegBodies:
     """Where a leg's parts are: cosine and sine of the hip's angle, places, and bodies.
 
     The places are those of hip, thigh, calf and foot, each from the one before; but for the first
@@ -223,7 +223,7 @@ def place_leg(robot: RigidBodies, now: Snapshot, leg: int) -> Leg:
 
 
 @subroutine
-def compose(robot: RigidBodies, now: Snapshot, n: int, base: Axes, leg: Leg) -> Body:
+def composite_leg(robot: RigidBodies, now: Snapshot, n: int, base: Axes, leg: LegBodies) -> Body:
     """Fill rows and columns n to n + 2, a leg's, of M and J_com; returns the stiff leg.
 
     A column is the momentum of all that lies beyond the joint, turning at 1 rad/s about it. The leg
@@ -241,7 +241,7 @@ def compose(robot: RigidBodies, now: Snapshot, n: int, base: Axes, leg: Leg) -> 
     put_twice(M, n, n + 2, angular[0])
     linear = about_x(c, s, linear)
     angular = plus(about_x(c, s, angular), cross(p_hip, linear))
-    couple(now, n + 2, mass, base, linear, angular)
+    couple_to_base(now, n + 2, mass, base, linear, angular)
     _, h, (_, xy, _, yy, yz, _) = lower
     linear = (h[2], 0.0, -h[0])
     angular = plus((xy, yy, yz), cross(p_thigh, linear))
@@ -249,18 +249,18 @@ def compose(robot: RigidBodies, now: Snapshot, n: int, base: Axes, leg: Leg) -> 
     put_twice(M, n, n + 1, angular[0])
     linear = about_x(c, s, linear)
     angular = plus(about_x(c, s, angular), cross(p_hip, linear))
-    couple(now, n + 1, mass, base, linear, angular)
+    couple_to_base(now, n + 1, mass, base, linear, angular)
     whole = body_about_x(c, s, whole)
     _, h, (xx, xy, xz, _, _, _) = whole
     M[n, n] = xx + armature[0]
     linear = (0.0, -h[2], h[1])
     angular = plus((xx, xy, xz), cross(p_hip, linear))
-    couple(now, n, mass, base, linear, angular)
+    couple_to_base(now, n, mass, base, linear, angular)
     return whole
 
 
 @subroutine
-def move(
+def newton_euler(
     robot: RigidBodies, now: Snapshot, n: int, base: Axes, acceleration: V3, leg: Leg
 ) -> Wrench:
     """Fill bias of joints n to n + 2, velocities and drifts of the foot; returns the leg's wrench.
@@ -292,7 +292,7 @@ def move(
     axes = hip_axes(base, c, s)
     a = acceleration_at(a3, w3, dw3, p_foot)
     motion = along(axes, v), along(axes, w3), along(axes, a), along(axes, dw3)
-    roll(robot, now, n // 3 - 2, motion)
+    fill_foot_motion(robot, now, n // 3 - 2, motion)
     f1 = about_x(c, s, f1)
     return f1, plus(about_x(c, s, m1), cross(p_hip, f1))
 
@@ -309,7 +309,9 @@ def hip_axes(base: Axes, c: float, s: float) -> Axes:
 
 
 @subroutine
-def roll(robot: RigidBodies, now: Snapshot, leg: int, motion: tuple[V3, V3, V3, V3]) -> None:
+def fill_foot_motion(
+    robot: RigidBodies, now: Snapshot, leg: int, motion: tuple[V3, V3, V3, V3]
+) -> None:
     """Fill velocities and drifts of a foot's centre and its contact."""
     v, w, a, dw = motion
     radius, a = robot.foot_radius, (a[0], a[1], a[2] - robot.gravity)
@@ -320,7 +322,9 @@ def roll(robot: RigidBodies, now: Snapshot, leg: int, motion: tuple[V3, V3, V3, 
 
 
 @subroutine
-def fill_foot(robot: RigidBodies, now: Snapshot, leg_index: int, base: Axes, leg: Leg) -> None:
+def fill_foot(
+    robot: RigidBodies, now: Snapshot, leg_index: int, base: Axes, leg: LegBodies
+) -> None:
     """Fill the place of a foot's centre, its Jacobian and that of its contact."""
     c, s, p_hip, p_thigh, p_calf, p_foot, _, _, _ = leg
     radius, n = robot.foot_radius, 6 + 3 * leg_index
@@ -414,8 +418,8 @@ def fill_snapshot(
     force, moment = wrench_on(whole, acceleration, w, _ZERO)
     for n in range(4):
         leg, first = place_leg(robot, now, n), 6 + 3 * n
-        whole = joined(whole, compose(robot, now, first, base, leg), leg[2])
-        f, m = move(robot, now, first, base, acceleration, leg)
+        whole = joined(whole, composite_leg(robot, now, first, base, leg), leg[2])
+        f, m = newton_euler(robot, now, first, base, acceleration, leg)
         force, moment = plus(force, f), plus(moment, m)
         fill_foot(robot, now, n, base, leg)
     fill_base(robot, now, base, whole, force, moment)

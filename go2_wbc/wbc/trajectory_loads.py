@@ -43,7 +43,7 @@ class LoadNumbers:
 
 
 @subroutine
-def place_leg(
+def fill_leg_points(
     leg: LegGeometry,
     q: Float[np.ndarray, "3"],
     R: Float[np.ndarray, "3 3"],
@@ -70,7 +70,7 @@ def place_leg(
 
 
 @subroutine
-def expect(
+def fill_expected_loads(
     points: Float[np.ndarray, "4 5 3"],
     R: Float[np.ndarray, "3 3"],
     wrench: Float[np.ndarray, "6"],
@@ -99,7 +99,7 @@ def expect(
 
 
 @subroutine
-def weigh(
+def fill_cost(
     A: Float[np.ndarray, "6 n"],
     wrench: Float[np.ndarray, "6"],
     shares: Float[np.ndarray, " k"],
@@ -127,7 +127,7 @@ def weigh(
 
 
 @subroutine
-def bound(
+def fill_bounds(
     shares: Float[np.ndarray, " k"],
     pyramid: Float[np.ndarray, "r 3"],
     force_max: float,
@@ -148,7 +148,7 @@ def bound(
 
 
 @subroutine
-def press(
+def fill_wrench_columns(
     points: LegPoints, R: Float[np.ndarray, "3 3"], foot: int, A: Float[np.ndarray, "6 12"]
 ) -> None:
     """Fill a foot's columns of A: the wrench on the base of a force along each world axis."""
@@ -162,7 +162,7 @@ def press(
 
 
 @subroutine
-def relieve(
+def take_from_torques(
     points: LegPoints,
     R: Float[np.ndarray, "3 3"],
     f: Float[np.ndarray, "3"],
@@ -182,7 +182,7 @@ def relieve(
 
 
 @subroutine
-def gather(
+def gather_loaded_feet(
     joints: Float[np.ndarray, "12"],
     R: Float[np.ndarray, "3 3"],
     load_share: Float[np.ndarray, "4"],
@@ -198,14 +198,16 @@ def gather(
     for leg in range(4):
         if load_share[leg] > 0.0:
             loaded[k], shares[k] = leg, load_share[leg]
-            place_leg(legs.geometry[leg], joints[3 * leg : 3 * leg + 3], R, radius, points[leg])
-            press(points[leg], R, k, A)
+            fill_leg_points(
+                legs.geometry[leg], joints[3 * leg : 3 * leg + 3], R, radius, points[leg]
+            )
+            fill_wrench_columns(points[leg], R, k, A)
             k += 1
     return k
 
 
 @subroutine
-def share(
+def solve_forces(
     A: Float[np.ndarray, "6 n"],
     wrench: Float[np.ndarray, "6"],
     shares: Float[np.ndarray, " k"],
@@ -224,15 +226,15 @@ def share(
         np.empty(m),
         np.empty(m),
     )
-    weigh(A, wrench, shares, loads, scale, c, H, g)
-    bound(shares, pyramid, c.force_max, C, lower, upper)
+    fill_cost(A, wrench, shares, loads, scale, c, H, g)
+    fill_bounds(shares, pyramid, c.force_max, C, lower, upper)
     if solve_qp(H, g, np.empty((0, 12)), np.empty(0), C, lower, upper, x, np.empty(m)) != SOLVED:
         for j in range(n):
             x[j] = 0.0
 
 
 @subroutine
-def remain(
+def fill_missing_wrench(
     A: Float[np.ndarray, "6 n"],
     wrench: Float[np.ndarray, "6"],
     x: Float[np.ndarray, " n"],
@@ -266,20 +268,20 @@ def share_loads(
     points, loaded, shares = np.empty((4, 5, 3)), np.empty(4, dtype=np.int64), np.empty(4)
     left, whole, loads = np.empty(6), np.empty((6, 12)), np.empty(4)
     for i in range(len(joints)):
-        k = gather(
+        k = gather_loaded_feet(
             joints[i], R[i], load_share[i], legs, c.foot_radius, points, loaded, shares, whole
         )
         n = 3 * k
         A, x = whole[:, :n].copy(), np.zeros(n)
         if k > 0:
-            expect(points, R[i], needed[i], loaded, shares, c, loads[:k])
-            share(A, needed[i], shares[:k], loads[:k], pyramid, scale, c, x)
+            fill_expected_loads(points, R[i], needed[i], loaded, shares, c, loads[:k])
+            solve_forces(A, needed[i], shares[:k], loads[:k], pyramid, scale, c, x)
         for foot in range(k):
             leg, f = loaded[foot], x[3 * foot : 3 * foot + 3]
-            relieve(points[leg], R[i], f, tau[i, 3 * leg : 3 * leg + 3])
+            take_from_torques(points[leg], R[i], f, tau[i, 3 * leg : 3 * leg + 3])
             for axis in range(3):
                 contact[i, leg, axis] = f[axis]
-        remain(A, needed[i], x, left)
+        fill_missing_wrench(A, needed[i], x, left)
         missing[i, 0] = np.sqrt(left[0] ** 2 + left[1] ** 2 + left[2] ** 2)
         missing[i, 1] = np.sqrt(left[3] ** 2 + left[4] ** 2 + left[5] ** 2)
 
@@ -310,18 +312,18 @@ def least_friction(
         low, high = 0.0, highest[i]
         if high == 0.0:
             continue
-        k = gather(
+        k = gather_loaded_feet(
             joints[i], R[i], load_share[i], legs, c.foot_radius, points, loaded, shares, whole
         )
         A, x = whole[:, : 3 * k].copy(), np.zeros(3 * k)
         if k > 0:
-            expect(points, R[i], needed[i], loaded, shares, c, loads[:k])
+            fill_expected_loads(points, R[i], needed[i], loaded, shares, c, loads[:k])
         for _ in range(7 if k > 0 else 0):
             middle = 0.5 * (low + high)
             for facet in range(len(cone) - 1):
                 facets[facet, 2] = middle * cone[facet, 2]
-            share(A, needed[i], shares[:k], loads[:k], facets, scale, c, x)
-            remain(A, needed[i], x, left)
+            solve_forces(A, needed[i], shares[:k], loads[:k], facets, scale, c, x)
+            fill_missing_wrench(A, needed[i], x, left)
             missing = 0.0
             for r in range(6):
                 missing += (scale[r] * left[r]) ** 2
@@ -345,7 +347,9 @@ def accelerate(
     points, J_a = np.empty((5, 3)), np.empty(3)
     for i in range(len(joints)):
         for leg in range(4):
-            place_leg(legs.geometry[leg], joints[i, 3 * leg : 3 * leg + 3], R[i], radius, points)
+            fill_leg_points(
+                legs.geometry[leg], joints[i, 3 * leg : 3 * leg + 3], R[i], radius, points
+            )
             p = points[3]
             for k in range(3):
                 m, n = (k + 1) % 3, (k + 2) % 3
