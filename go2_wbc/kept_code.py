@@ -41,8 +41,8 @@ CACHE_VARIABLE = "GO2_WBC_CACHE_DIR"
 """Environment variable that names the folder for compiled kernels and solved plans; by default the
 user's cache."""
 _OUR_OWN = ("go2_wbc", "motions", "controller", "viz")
-KEPT = 4
-"""How many versions of a kernel are kept: those of other environments, or branches."""
+KEPT = 8
+"""How many versions of a kernel are kept, those used last: of other environments, or branches."""
 
 
 class Written(ABC):
@@ -81,6 +81,7 @@ class KeptCode(NullCache):
             return None
         try:
             content = self._file.read_bytes()
+            self._file.touch()  # it is in use
         except OSError:
             say_that_it_takes_time()
             return None

@@ -57,7 +57,7 @@ PRINTERS = (
 )
 """Files that talk to a person and may print."""
 
-MAX_FILE_LINES = 400
+MAX_FILE_LINES = 500
 MAX_BODY_LINES = 70
 MAX_BODY_LINES_P90 = 30
 

@@ -90,7 +90,6 @@ class WholeBodyController:
         self._workspace = Workspace()
         self.backend_name = backend
         self._backend = self._make_backend(backend)
-        self.is_compiled = backend == "condensed" and self.config.solver == "active_set"
         if extra_tasks and backend == "placo":
             raise ConfigError("the placo back end has tasks of its own and takes no extra ones")
 
@@ -169,6 +168,11 @@ class WholeBodyController:
             return solve_relaxed(problem, self.config.solver)
         except QpInfeasible as contradiction:
             raise error from contradiction
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether ticks are solved by the compiled kernel: condensed, and by ``active_set``."""
+        return self.backend_name == "condensed" and self.config.solver == "active_set"
 
     def solve_compiled(self, snapshot: Snapshot, reference: Reference) -> WbcSolution | None:
         """Solve one tick by the kernel; None if it is not used here or finds no solution."""
