@@ -22,7 +22,7 @@ from go2_wbc.reference import (
     Reference,
     TrackedPoint,
 )
-from go2_wbc.tracking.plan_curves import PlanCurves, StanceLoad
+from go2_wbc.tracking.plan_curves import CURVES, PlanCurves, StanceLoad
 from motions.batch_kinematics import Wanted, attitudes
 from motions.plan.dynamic_span import DynamicSpan
 from motions.postures import NORMAL_FORCE_MAX, NORMAL_FORCE_MIN
@@ -34,6 +34,8 @@ FORCE_WEIGHT = 1e-2
 """Weight [1/N^2] by which the forces of a solved part are kept to: they lie in the friction cone
 that it was solved with, an even share of the load may not. From 0.001 to 0.1 it makes no difference
 to slips (own experiments)."""
+_CUBIC = 4
+"""Coefficients of a cubic."""
 LEAST_FEET = 3
 """Standing feet that span an area, so that a robot that stops there can keep standing."""
 
@@ -144,8 +146,13 @@ class CompiledPlan(MotionPlan):
     _asked: PlanCurves = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Bind what the kernel reads; raise MotionError for tables of different lengths."""
+        """Bind what the kernel reads; raise MotionError for other curves, or lengths of tables."""
         contacts, curves = self.contacts, self.curves
+        shape = curves.c.shape
+        if len(shape) != 3 or shape[::2] != (_CUBIC, CURVES) or curves.x[0] != 0.0:
+            raise MotionError(
+                f"plan {self.name!r}: curves must be {CURVES} cubics from 0 s on, got {list(shape)}"
+            )
         if self.swings.shape != contacts.modes.shape:
             raise MotionError(
                 f"plan {self.name!r}: swings must have a row for each of {len(contacts.times)} "

@@ -13,7 +13,6 @@ from go2_wbc.errors import MotionFileError
 from go2_wbc.files import checked_output, write_atomically
 from go2_wbc.robot.fingerprint import fingerprint
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.tracking.plan_curves import CURVES
 from motions.dynamics.dynamic_trajectory import UNREADABLE
 from motions.language.clock import SAME
 from motions.plan.compiled_plan import CompiledPlan
@@ -24,8 +23,6 @@ PLAN_FORMAT: Final = Format("go2_wbc.plan", 2, "a saved plan", ".plan")
 _DESCRIPTION: Final = "description"
 """Name of the JSON text in the archive."""
 _ROBOT, _PLAN = "robot", "plan"
-_CUBIC: Final = 4
-"""Coefficients of a cubic."""
 
 
 def save_plan(plan: object, path: Path | str, *, model: RobotModel | None = None) -> Path:
@@ -111,10 +108,6 @@ def _arrays_of(file: Path) -> dict[str, np.ndarray]:
 def _require_sane(plan: CompiledPlan) -> None:
     """Raise MotionFileError for numbers that fit no plan."""
     curves, contacts = plan.curves, plan.contacts
-    if curves.c.shape[::2] != (_CUBIC, CURVES) or curves.c.ndim != 3 or curves.x[0] != 0.0:
-        raise MotionFileError(
-            f"plan.curves must be {CURVES} cubics from 0 s on, got {list(curves.c.shape)}"
-        )
     if contacts.period is not None:
         raise MotionFileError(f"plan.contacts must not repeat, got a period of {contacts.period}")
     ends = (0.0, *plan.beats, curves.x[-1])
