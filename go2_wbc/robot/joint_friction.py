@@ -100,11 +100,6 @@ class FrictionFeedForward:
     friction: JointFriction
     motor: MotorModel
 
-    @property
-    def numbers(self) -> Float[np.ndarray, " size"]:
-        """The same as a row, for kernels."""
-        return packed(self).row  # pyright: ignore[reportAttributeAccessIssue]
-
     def motor_torques(
         self, snapshot: Snapshot, qdd: Float[np.ndarray, "18"], tau: Float[np.ndarray, "12"]
     ) -> Float[np.ndarray, "12"]:

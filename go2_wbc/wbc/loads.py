@@ -26,21 +26,6 @@ SPREAD = 1e-6
 """[m^2] by which two feet, between which there is no area, count as spread to all sides."""
 
 
-def relative_loads(
-    places: Float[np.ndarray, "k 2"], point: Float[np.ndarray, "2"], most: Float[np.ndarray, " k"]
-) -> Float[np.ndarray, " k"]:
-    """Normal forces of k feet, over their mean.
-
-    Args:
-        places: of the feet on the ground [m].
-        point: the zero-moment point c [m].
-        most: what each foot may bear, over the mean.
-    """
-    loads = np.empty(len(places))
-    share_load(places, point[0], point[1], most, loads)
-    return loads
-
-
 @subroutine
 def share_load(
     places: Float[np.ndarray, "k 2"],
@@ -49,7 +34,14 @@ def share_load(
     most: Float[np.ndarray, " k"],
     loads: Float[np.ndarray, " k"],
 ) -> None:
-    """Fill the loads, over their mean, of feet at ``places`` for a zero-moment point at (x, y)."""
+    """Fill the normal forces of k feet, over their mean.
+
+    Args:
+        places: of the feet on the ground [m].
+        x, y: the zero-moment point c [m].
+        most: what each foot may bear, over the mean.
+        loads: is filled.
+    """
     k = len(loads)
     mx, my, xx, xy, yy = 0.0, 0.0, SPREAD, 0.0, SPREAD
     for foot in range(k):

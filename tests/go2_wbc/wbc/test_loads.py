@@ -14,7 +14,7 @@ from go2_wbc.reference import Reference, Target
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.controller import WholeBodyController
-from go2_wbc.wbc.loads import LEAST_LOAD, MOST_LOAD, plan_loads, relative_loads
+from go2_wbc.wbc.loads import LEAST_LOAD, MOST_LOAD, plan_loads, share_load
 from tests.engine_helpers import JO, ST, holding_reference, standing_q, state_of
 
 MODEL = RobotModel()
@@ -26,6 +26,28 @@ EVEN_USE = 1.4  # most over least use of friction; measured 1.3, and 5.2 where f
 AHEAD, ASIDE = 0.03, -0.04  # [m] by which the CoM is off the middle of the feet, about
 PUSH = 1.5  # [m/s^2]
 HEIGHT = 0.27  # [m] of the hips over the feet
+
+
+def relative_loads(places: np.ndarray, point: np.ndarray, most: np.ndarray) -> np.ndarray:
+    loads = np.empty(len(places))
+    share_load(places, point[0], point[1], most, loads)
+    return loads
+
+
+@given(
+    st.integers(2, 4),
+    st.lists(st.floats(-0.05, 0.05), min_size=10, max_size=10).map(np.array),
+)
+def test_of_all_loads_that_act_at_that_point_the_most_even_are_taken(
+    feet: int, off: np.ndarray
+) -> None:
+    """Least squares of least length: off the line of two feet, the nearest point on it counts."""
+    places, point = FEET[4 - feet :] + 0.2 * off[:8].reshape(4, 2)[4 - feet :], off[8:] / 4
+    middle = places.mean(axis=0)
+    point = point + middle
+    A = np.vstack([np.ones(feet), (places - middle).T / feet])
+    more = np.linalg.lstsq(A, np.array([0.0, *(point - middle)]), rcond=1e-9)[0]
+    np.testing.assert_allclose(relative_loads(places, point, OPEN[:feet]), 1 + more, atol=ROUNDING)
 
 
 @given(x=st.floats(-0.05, 0.05), y=st.floats(-0.04, 0.04))

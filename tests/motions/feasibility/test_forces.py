@@ -14,8 +14,8 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.wbc import loads
 from go2_wbc.wbc.constraints import friction_pyramid
-from go2_wbc.wbc.loads import LEAST_PRESSURE, relative_loads
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from motions import FeasibilityChecker, Timeline, compile_timeline
 from motions.batch_kinematics import configurations, zero_moment_points
@@ -174,15 +174,19 @@ def expected_loads(
     shares: Float[np.ndarray, " k"],
     model: RobotModel,
 ) -> Float[np.ndarray, " k"]:
-    """The expected loads of ``legs``, over their mean: see ``wbc.loads.relative_loads``."""
+    """The expected loads of ``legs``, over their mean: see ``wbc.loads``."""
     R = snapshot.R_world_base
     force, moment = R @ wrench[:3], R @ wrench[3:]
-    pressure = max(force[2], LEAST_PRESSURE * model.mass * model.gravity)
+    pressure = max(force[2], loads.LEAST_PRESSURE * model.mass * model.gravity)
     places = snapshot.p_world_feet[legs] - snapshot.state.p_world_base
     depth = model.foot_radius - places[:, 2].mean()
     along = [-(moment[1] + depth * force[0]), moment[0] - depth * force[1]]
     most = NORMAL_FORCE_MAX * shares * len(legs) / pressure
-    return relative_loads(places[:, :2], np.array(along) / pressure, most)
+    point, middle = np.array(along) / pressure, places[:, :2].mean(axis=0)
+    arms = places[:, :2] - middle
+    slope = np.linalg.solve(arms.T @ arms + loads.SPREAD * np.eye(2), point - middle)
+    load = np.minimum(1.0 + len(legs) * arms @ slope, most)
+    return np.clip(load, loads.LEAST_LOAD, loads.MOST_LOAD)
 
 
 @pytest.mark.parametrize(("pace", "radius"), [(0.1, 0.022), (1.0, 0.022), (1.0, 0.0), (3.0, 0.022)])
