@@ -13,8 +13,20 @@ from benchmarks.balance import dropped
 from controller import GO2Controller
 from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rest_detection import (
+    KNOWN,
+    LOST,
+    TUMBLED,
+    Reading,
+    Rest,
+    begin_anew,
+    is_at_rest,
+    is_upset,
+    lies,
+    take_in_rest,
+)
 from go2_wbc.robot.state import RobotState
-from go2_wbc.robot.state_filter import THETA
+from go2_wbc.robot.state_filter import GYRO_BIAS, THETA, VELOCITY, Estimate, Filter
 from tests.engine_helpers import STAND_JOINTS
 
 STEP = 0.002  # s
@@ -116,3 +128,139 @@ def test_a_dropped_robot_stands_up_on_its_own_sensors(seed: int) -> None:
         assert go2.stand(), go2.last_outcome.reason
     assert plant.truth().tilt < np.radians(3.0)
     plant.close()
+
+
+# --- decision tables ------------------------------------------------------------------------------
+
+C, G, DT = EstimatorConfig(), 9.81, 0.002
+UP = [0.0, 0.0, G]
+CARRYING = 0.5 * G
+"""What a trunk feels at least if something carries it."""
+
+
+def read(
+    gyro: float = 0.0, force: float = G, rate: float = 0.0, over: float = 0.0
+) -> tuple[Estimate, Rest, Reading]:
+    """An estimate with biases, and a reading that turns and moves by this much beyond them."""
+    x = Estimate(gyro_bias=[0.01, -0.02, 0.0], force_bias=[0.02, 0.0, 0.05])
+    taken = Reading(dt=DT, gyro=x.gyro_bias + [0.0, gyro, 0.0], v_joints=np.full(12, rate))
+    taken.accelerometer[:] = x.force_bias + [force * np.sin(over), 0.0, force * np.cos(over)]
+    return x, Rest(joint_speeds=np.full(12, rate)), taken
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "rests"),
+    [
+        ({}, True),
+        ({"gyro": 0.99 * C.still_turning, "rate": 0.99 * C.still_joints}, True),
+        ({"gyro": 1.01 * C.still_turning}, False),
+        ({"rate": 1.01 * C.still_joints}, False),
+        ({"force": G + 0.99 * C.still_force}, True),
+        ({"force": G + 1.01 * C.still_force}, False),
+        ({"force": G - 1.01 * C.still_force}, False),
+    ],
+)
+def test_at_rest_is_what_has_not_moved_for_a_while(*, kwargs: dict, rests: bool) -> None:
+    x, rest, taken = read(**kwargs)
+    rest.still_time = C.still_time - 1.5 * DT
+    assert not is_at_rest(x, rest, taken, G, C)
+    assert is_at_rest(x, rest, taken, G, C) is rests
+    assert (rest.still_time > 0.0) == rests
+
+
+def test_speeds_of_joints_are_smoothed() -> None:
+    x, rest, taken = read()
+    taken.v_joints[:] = 1.0
+    is_at_rest(x, rest, taken, G, C)
+    np.testing.assert_allclose(rest.joint_speeds, DT / 0.05)
+    taken.dt = 1.0
+    is_at_rest(x, rest, taken, G, C)
+    np.testing.assert_allclose(rest.joint_speeds, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("force", "gyro", "is_carried", "is_lying"),
+    [
+        (1.01 * CARRYING, 0.0, False, True),
+        (0.99 * CARRYING, 0.0, False, False),  # falls freely
+        (1.01 * CARRYING + 0.1 * 9.0, 3.0, False, True),
+        (0.99 * CARRYING + 0.1 * 9.0, 3.0, False, False),  # and turns
+        (G, 0.0, True, False),  # stands
+    ],
+)
+def test_who_lies_feels_gravity_and_no_foot(
+    *, force: float, gyro: float, is_carried: bool, is_lying: bool
+) -> None:
+    x, rest, taken = read(gyro, force)
+    rest.lying_time = C.lying_time - 1.5 * DT
+    assert not lies(x, rest, taken, is_carried, G, C)
+    assert lies(x, rest, taken, is_carried, G, C) is is_lying
+    assert (rest.lying_time > 0.0) == is_lying
+
+
+@pytest.mark.parametrize(
+    ("tilt", "is_lying", "is_down"), [(51.0, False, True), (49.0, False, False), (0.0, True, True)]
+)
+def test_who_was_down_is_upset_for_a_second(*, tilt: float, is_lying: bool, is_down: bool) -> None:
+    rest, level = Rest(), np.eye(3)
+    R = pin.rpy.rpyToMatrix(np.radians(tilt), 0.0, 0.0)
+    assert is_upset(rest, DT, is_lying, R) is is_down
+    ticks = 0
+    while is_upset(rest, DT, False, level):
+        ticks += 1
+    assert ticks * DT == pytest.approx(1.0 - DT if is_down else 0.0, abs=1.5 * DT)
+
+
+@pytest.mark.parametrize(
+    ("what", "found"),
+    [
+        ({}, KNOWN),
+        ({"speed": 0.49}, KNOWN),
+        ({"speed": 0.51}, LOST),
+        ({"speed": 0.51, "rate": 1.01 * C.still_joints}, KNOWN),
+        ({"over": np.radians(14.5)}, KNOWN),
+        ({"over": np.radians(15.5)}, LOST),
+        ({"gyro_bias": 4.9 * C.gyro_bias}, KNOWN),
+        ({"gyro_bias": -5.1 * C.gyro_bias}, LOST),
+        ({"force_bias": 4.9 * C.accelerometer_bias}, KNOWN),
+        ({"force_bias": -5.1 * C.accelerometer_bias}, LOST),
+        ({"tumbled": True}, TUMBLED),
+        ({"tumbled": True, "speed": 0.51}, LOST),
+        ({"tumbled": True, "roll": 51.0}, LOST),
+        ({"roll": 51.0}, LOST),
+    ],
+)
+def test_when_an_estimate_begins_anew(*, what: dict, found: int) -> None:
+    x, rest, taken = read(rate=what.get("rate", 0.0), over=what.get("over", 0.0))
+    x.v[0], rest.tumbled = what.get("speed", 0.0), what.get("tumbled", False)
+    x.gyro_bias[:] = x.force_bias[:] = 0.0
+    x.gyro_bias[1], x.force_bias[2] = what.get("gyro_bias", 0.0), what.get("force_bias", 0.0)
+    taken.gyro[:] = 0.0
+    R = pin.rpy.rpyToMatrix(np.radians(what.get("roll", 0.0)), 0.0, 0.0)
+    rest.lost_time = C.still_time - 1.5 * DT
+    assert begin_anew(x, rest, taken, R, G, C) == KNOWN
+    assert begin_anew(x, rest, taken, R, G, C) == found
+    assert rest.tumbled == ("tumbled" in what or "roll" in what)
+    assert (rest.lost_time == 0.0) == (found == KNOWN)
+
+
+@pytest.mark.parametrize("shaken", [{"gyro": 1.01 * C.still_turning}, {"force": G + 0.7}])
+def test_who_is_shaken_is_not_found_yet(shaken: dict) -> None:
+    x, rest, taken = read(**shaken)
+    x.v[0], rest.lost_time = 1.0, C.still_time + 10 * DT
+    taken.gyro[:] -= x.gyro_bias
+    assert begin_anew(x, rest, taken, np.eye(3), G, C) == LOST
+    assert rest.lost_time == pytest.approx(C.still_time + 9 * DT)
+
+
+@pytest.mark.parametrize("is_carried", [False, True])
+def test_rest_tells_the_velocity_and_of_who_lies_the_gyros_bias(*, is_carried: bool) -> None:
+    f, (_, _, taken) = Filter(), read(gyro=0.2)
+    f.P[:], f.x.v[:] = np.eye(27), (0.1, -0.2, 0.3)
+    take_in_rest(f, taken, is_carried, C)
+    velocity, biases = slice(VELOCITY, VELOCITY + 3), slice(GYRO_BIAS, GYRO_BIAS + 3)
+    np.testing.assert_allclose(f.error[velocity], -f.x.v / (1.0 + C.still_velocity**2))
+    told = 0.0 if is_carried else taken.gyro / (1.0 + C.still_gyro**2)
+    np.testing.assert_allclose(f.error[biases], told)
+    variance = 1.0 if is_carried else 1.0 - 1.0 / (1.0 + C.still_gyro**2)
+    np.testing.assert_allclose(np.diag(f.P)[biases], variance)
