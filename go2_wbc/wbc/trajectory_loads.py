@@ -227,7 +227,7 @@ def solve_forces(
     )
     fill_cost(A, wrench, shares, loads, scale, c, H, g)
     fill_bounds(shares, pyramid, c.force_max, C, lower, upper)
-    if solve_qp(H, g, np.empty((0, 12)), np.empty(0), C, lower, upper, x, np.empty(m)) != SOLVED:
+    if solve_qp(H, g, np.empty((0, n)), np.empty(0), C, lower, upper, x, np.empty(m)) != SOLVED:
         for j in range(n):
             x[j] = 0.0
 

@@ -1,0 +1,256 @@
+"""What legs tell, against Pinocchio and decision tables, and of a motion that is known exactly.
+
+In the last the readings are without noise or simulation.
+The trunk sways and turns every way at once while three feet roll on the ground; the fourth is in
+the air and kicks. The joints' rates follow from the feet's Jacobians, and nothing of the filter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from go2_wbc.legs import FOOT_NAMES, LEGS, Leg
+from go2_wbc.robot.estimator import IMU_FRAME, EstimatorConfig, SensorReading, StateEstimator
+from go2_wbc.robot.foot_odometry import (
+    LEAST_TRUST,
+    Foot,
+    Level,
+    follow_foot,
+    height_off,
+    see_foot,
+    see_ground,
+    slip_factor,
+)
+from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
+from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
+from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state_filter import FEET, VELOCITY, Filter
+from tests.engine_helpers import STAND_JOINTS, state_of
+
+TICK, COUNT = 0.002, 700  # s; of readings
+STANDING = 0.4  # s
+NUDGE = 1e-4  # s; of differences
+# m/s and m. The filter takes the acceleration as constant over a tick.
+SPEED_ERROR, PLACE_ERROR = 3e-3, 2e-3
+TURNING_ERROR, TILT_ERROR = 2e-3, 2e-3  # rad/s, rad
+IN_THE_AIR = Leg.FL
+CONTACT_FORCE = EstimatorConfig().contact_force
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """What was measured, and what was true."""
+
+    readings: list[SensorReading]
+    states: list[RobotState]
+
+
+def pose(t: float) -> tuple[np.ndarray, np.ndarray]:
+    """Place [m] and rotation of a trunk that is at rest first, by which gravity is known."""
+    phase = np.array([0.7, 1.0, 1.3]) * 2.0 * np.pi * max(t - STANDING, 0.0)
+    place = np.array([0.03, -0.02, 0.015]) * (1.0 - np.cos(phase)) + [0.0, 0.0, 0.27]
+    rpy = np.array([0.10, 0.08, 0.15]) * (1.0 - np.cos(phase[::-1]))
+    return place, rotation_from_rpy(*rpy)
+
+
+def twist(t: float) -> np.ndarray:
+    """Velocity (6,) of the trunk in its own frame."""
+    (p0, R0), (_, R), (p1, R1) = pose(t - NUDGE), pose(t), pose(t + NUDGE)
+    return np.concatenate([R.T @ (p1 - p0), log_rotation(R0.T @ R1)]) / (2.0 * NUDGE)
+
+
+def imu_acceleration(t: float, p_base_imu: np.ndarray) -> np.ndarray:
+    """Specific force [m/s^2] at the IMU in the base frame."""
+    before, now, after = (p + R @ p_base_imu for p, R in map(pose, (t - NUDGE, t, t + NUDGE)))
+    return pose(t)[1].T @ ((before - 2.0 * now + after) / NUDGE**2 + [0.0, 0.0, 9.81])
+
+
+def state_at(t: float, joints: np.ndarray, model: RobotModel) -> RobotState:
+    """The state in which the contact points of the standing feet do not move."""
+    p, R = pose(t)
+    q = np.concatenate([p, pin.Quaternion(R).coeffs(), joints])
+    v = np.concatenate([twist(t), np.zeros(12)])
+    J_contacts = model.snapshot(state_of(q)).J_contacts
+    for leg in LEGS:
+        columns = slice(6 + leg.joints.start, 6 + leg.joints.stop)
+        J = J_contacts[leg]
+        v[columns] = -np.linalg.solve(J[:, columns], J[:, :6] @ v[:6])
+    v[6:][IN_THE_AIR.joints] = 2.0 * np.sin(9.0 * t) * np.array([1.0, -1.0, 1.0])
+    return state_of(q, v, t)
+
+
+@pytest.fixture(scope="module")
+def model() -> RobotModel:
+    return RobotModel()
+
+
+@pytest.fixture(scope="module")
+def motion(model: RobotModel) -> Motion:
+    data = model.pin_model.createData()
+    pin.forwardKinematics(model.pin_model, data, pin.neutral(model.pin_model))
+    frame = model.pin_model.getFrameId(IMU_FRAME)
+    p_base_imu = np.array(pin.updateFramePlacement(model.pin_model, data, frame).translation)
+    p_feet = model.p_base_feet_nominal.copy()
+    p_feet[:, 2] = model.foot_radius - pose(0.0)[0][2]
+    places = [leg_angles(LegGeometry.of(model, leg), p_feet[leg][None]).q[0] for leg in LEGS]
+    joints, readings, states = np.concatenate(places), [], []
+    for t in TICK * np.arange(COUNT):
+        state = state_at(t, joints, model)
+        halfway = state_at(t + TICK / 2, joints + TICK / 2 * state.joint_velocities, model)
+        forces = np.full(4, 50.0)
+        forces[IN_THE_AIR] = 0.0
+        readings.append(
+            SensorReading(
+                time=t,
+                gyro=state.v[3:6],
+                accelerometer=imu_acceleration(t, p_base_imu),
+                q_joints=joints,
+                v_joints=state.joint_velocities,
+                tau=np.arange(12.0),
+                foot_forces=forces,
+            )
+        )
+        states.append(state)
+        joints = joints + TICK * halfway.joint_velocities
+    return Motion(readings, states)
+
+
+def test_place_and_speed_of_an_exactly_known_motion_are_found(
+    motion: Motion, model: RobotModel
+) -> None:
+    estimator = StateEstimator(model, EstimatorConfig(compliance=1e-9))
+    found = [estimator.update(reading) for reading in motion.readings]
+    off_v = np.array([a.v - b.v for a, b in zip(found, motion.states, strict=True)])
+    off_q = np.array([a.q - b.q for a, b in zip(found, motion.states, strict=True)])
+    assert np.abs(off_v[50:, :3]).max() < SPEED_ERROR
+    assert np.abs(off_q[:, :3]).max() < PLACE_ERROR
+    assert np.abs(off_v[:, 3:6]).max() < TURNING_ERROR
+    assert np.abs(off_q[:, 3:7]).max() < TILT_ERROR
+    assert np.abs(off_v[:, 6:]).max() < 1e-12
+    assert np.abs(off_q[:, 7:]).max() < 1e-12
+
+
+def test_what_needs_no_estimate_is_passed_on(motion: Motion, model: RobotModel) -> None:
+    reading = motion.readings[7]
+    forces = np.array([0.0, CONTACT_FORCE, CONTACT_FORCE + 0.01, 40.0])
+    scaled = replace(reading, foot_forces=forces)
+    state = StateEstimator(model).update(scaled)
+    assert state.time == reading.time
+    assert state.tau.tolist() == reading.tau.tolist()
+    assert state.foot_forces.tolist() == forces.tolist()
+    assert state.feet_in_contact.tolist() == [False, False, True, True]
+
+
+@pytest.mark.parametrize("leg", LEGS)
+def test_a_leg_measures_what_pinocchio_computes(model: RobotModel, leg: Leg) -> None:
+    rng, robot = np.random.default_rng(int(leg)), model.pin_model
+    data, frame = robot.createData(), robot.getFrameId(FOOT_NAMES[leg])
+    w, p_imu, radius = rng.normal(size=3), rng.normal(scale=0.05, size=3), 0.02
+    R = rotation_from_rpy(0.3, -0.2, 0.9)
+    joints, rates = STAND_JOINTS + 0.3 * rng.normal(size=12), rng.normal(size=12)
+    q = np.concatenate([np.zeros(6), [1.0], joints])
+    pin.forwardKinematics(robot, data, q, np.concatenate([np.zeros(3), w, rates]))
+    place = np.array(pin.updateFramePlacement(robot, data, frame).translation)
+    motion = pin.getFrameVelocity(robot, data, frame, pin.LOCAL_WORLD_ALIGNED)
+    foot = Foot()
+    given = (joints[leg.joints], rates[leg.joints], p_imu, w, radius, R)
+    see_foot(foot, LegGeometry.of(model, leg), *given)
+    own = motion.linear - np.cross(w, place)
+    rolling = np.cross(R @ motion.angular, [0.0, 0.0, radius])
+    velocity = rolling - R @ (motion.linear - np.cross(w, p_imu))
+    np.testing.assert_allclose(foot.place, R @ (place - p_imu), atol=1e-12)
+    np.testing.assert_allclose(foot.rolling, rolling, atol=1e-12)
+    np.testing.assert_allclose(foot.velocity, velocity, atol=1e-12)
+    assert foot.speed == pytest.approx(np.hypot(own[0], own[1]))
+
+
+C = EstimatorConfig()
+
+
+def unsure() -> Filter:
+    f = Filter()
+    f.P[:] = np.diag(np.arange(1.0, 28.0) ** 2 * 1e-4)
+    f.x.v[:] = 0.1, -0.2, 0.3
+    return f
+
+
+def test_a_foot_whose_velocity_is_odd_counts_less() -> None:
+    f, foot = unsure(), Foot(velocity=[0.1, -0.2, 0.3], variance=[0.01, 0.02, 0.03])
+    assert slip_factor(f, foot, 3.0) == 1.0
+    foot.velocity[:] += 3.0, -2.0, 1.0
+    spread = np.diag(f.P)[VELOCITY : VELOCITY + 3] + foot.variance
+    chi = (np.array([9.0, 4.0, 1.0]) / spread).sum()
+    assert slip_factor(f, foot, 3.0) == pytest.approx(chi / 9.0)
+
+
+@pytest.mark.parametrize(
+    ("age", "force", "trust", "stays"),
+    [
+        (0.3, 0.9 * C.contact_force, LEAST_TRUST, False),
+        (0.3, C.contact_force, LEAST_TRUST, False),
+        (0.3, 0.5 * (C.contact_force + C.trusted_force), 0.5, True),
+        (0.3, C.trusted_force, 1.0, True),
+        (0.3, 2.0 * C.trusted_force, 1.0, True),
+        (0.004, 2.0 * C.trusted_force, 1.0, True),
+        (C.settled_time + 0.01, 2.0 * C.trusted_force, 1.0, True),
+    ],
+)
+@pytest.mark.parametrize("rests", [False, True])
+def test_how_far_a_foot_is_believed(
+    *, age: float, force: float, trust: float, stays: bool, rests: bool
+) -> None:
+    f, dt, vertical, leg = unsure(), 0.002, 0.7, 2
+    foot = Foot(age=age, rolling=[1.0, 2.0, 0.0], velocity=f.x.v, speed=0.4)
+    before, begun = np.diag(f.P).copy(), age if stays else -dt
+    assert follow_foot(f, foot, leg, force, dt, vertical, rests, C) == begun
+    assert foot.age == begun + dt
+    assert foot.carries is stays
+    slip = C.touchdown_slip * np.exp(-max(begun, 0.0) / C.touchdown_time)
+    creep = C.velocity_share * 0.4
+    variance = (C.velocity / trust) ** 2 + slip**2 + creep**2 if stays else 0.0
+    risen = variance + vertical**2 if stays else 0.0
+    np.testing.assert_allclose(foot.variance, [variance, variance, risen])
+    own = C.settled_drift if begun > C.settled_time else C.foot_drift
+    drift = own / trust + slip + C.drift_share * 0.4
+    drifts = np.full(3, C.still_drift) if rests else drift + np.array([0.0, 0.0, vertical])
+    expected = np.zeros(27)
+    expected[FEET + 6 : FEET + 9] = (drifts * dt) ** 2
+    np.testing.assert_allclose(np.diag(f.P) - before, expected, rtol=1e-6, atol=1e-15)
+    np.testing.assert_allclose(f.x.p_feet[leg], [0.002, 0.004, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("off", "doubt", "told"),
+    [(0.01, 0.0, True), (-0.01, 0.0, True), (0.01, 0.5, False), (0.031, 0.0, False)],
+)
+def test_the_ground_is_level_until_a_foot_comes_down_beside_it(
+    *, off: float, doubt: float, told: bool
+) -> None:
+    level = Level(height=0.05, doubt_time=doubt)
+    found = height_off(level, 0.05 - off, 1.0, C)
+    assert found == (pytest.approx(off) if told else np.inf)
+    assert level.height == pytest.approx(0.05 - (0.0 if told else 0.2 * off))
+    assert level.doubt_time == (C.uneven_time if abs(off) > C.uneven else doubt)
+
+
+def test_a_height_that_is_too_sure_to_be_wrong_is_not_that_of_level_ground() -> None:
+    for deviation, told in ((0.0034, True), (0.0033, False)):
+        assert np.isfinite(height_off(Level(), 0.01, deviation**2, C)) == told
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "looks"), [(2.9, 3.1, True), (2.7, 2.9, False), (3.0, 3.2, False)]
+)
+def test_the_ground_is_looked_at_once_when_a_foot_has_settled(
+    *, before: float, after: float, looks: bool
+) -> None:
+    f, foot, level = unsure(), Foot(age=after * C.touchdown_time), Level(height=0.004)
+    f.x.p_feet[1, 2], force, radius = 0.024, 50.0, 0.022
+    see_ground(f, foot, 1, force, before * C.touchdown_time, radius, level, C)
+    ground = 0.024 - radius + C.compliance * force
+    assert foot.height_off == (pytest.approx(0.004 - ground) if looks else np.inf)
