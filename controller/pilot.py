@@ -41,9 +41,9 @@ from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ModeError, StanceMismatch
 from go2_wbc.legs import Leg
+from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.pose import LEVEL, BodyPose
-from go2_wbc.reference import MotionPlan, Posture
 from motions.postures import lie_down, rise, sit_down
 
 READY_TIME = 0.2

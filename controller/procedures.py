@@ -19,8 +19,8 @@ from controller.checks import (
 from controller.loop import Fault
 from controller.runner import Runner
 from go2_wbc.errors import DynamicMotionRefused
+from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import Plant
-from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.snapshot import Snapshot
 
 SETTLE_LIMIT = 3.0

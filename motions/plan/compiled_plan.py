@@ -12,16 +12,8 @@ from scipy.interpolate import PPoly
 from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
 from go2_wbc.errors import MotionError
 from go2_wbc.legs import Leg
-from go2_wbc.reference import (
-    Anchor,
-    Footsteps,
-    LegTask,
-    MotionPlan,
-    PlanFeedback,
-    Posture,
-    Reference,
-    TrackedPoint,
-)
+from go2_wbc.motion_plan import Footsteps, MotionPlan, PlanFeedback, Posture
+from go2_wbc.reference import Anchor, LegTask, Reference, TrackedPoint
 from go2_wbc.tracking.plan_curves import PlanCurves, StanceLoad
 from motions.batch_kinematics import Wanted, attitudes
 from motions.plan.dynamic_span import DynamicSpan

@@ -9,7 +9,7 @@ from controller.jobs import Answer, Job, JobServer, Reply
 from controller.modes import Mode
 from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import Go2WbcError, unknown_name
-from go2_wbc.reference import MotionPlan, Posture
+from go2_wbc.motion_plan import MotionPlan, Posture
 from motions import CompiledPlan, FeasibilityChecker, find_motion
 from motions.authoring import Value, parse_values
 
