@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.contacts import ContactSchedule
+from go2_wbc.legs import Leg
 from go2_wbc.reference import Reference
 
 
@@ -63,6 +64,24 @@ class PlanFeedback:
     gains: Float[np.ndarray, "12 36"]
 
 
+@dataclass(frozen=True, slots=True)
+class HeldFoot:
+    """A foot that must be held up.
+
+    Attributes:
+        name: of the span.
+        leg: whose foot.
+        start, end: when [s].
+        height: planned for its centre above the ground [m].
+    """
+
+    name: str
+    leg: Leg
+    start: float
+    end: float
+    height: float
+
+
 class MotionPlan(ABC):
     """A motion, ready to be played: a reference for every instant, in the motion's own frame.
 
@@ -108,3 +127,8 @@ class MotionPlan(ABC):
     def footsteps(self) -> Footsteps | None:
         """How its feet step; None if none does: each comes down where it stood."""
         return None
+
+    @property
+    def held_feet(self) -> tuple[HeldFoot, ...]:
+        """Its acceptance: feet that must be measured at their heights, for it to count as done."""
+        return ()
