@@ -21,7 +21,7 @@ from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_outcome import FELL
 from controller.sweeps.rows import Row
 from controller.sweeps.summary import rate_interval
-from go2_wbc.reference import MotionPlan, Posture
+from go2_wbc.motion_plan import MotionPlan, Posture
 from motions import FeasibilityChecker, compile_motion, motion_names
 
 PLAYS = 2000

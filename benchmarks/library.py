@@ -18,9 +18,10 @@ from benchmarks.truth_vs_estimate import sensing_plant
 from controller.checks import END_HEADING, END_PLACE
 from controller.motion_measurement import MotionMeasurement, during_motion, measure_motion
 from controller.sweeps.trials import Trial, TrialRobot
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
-from go2_wbc.reference import Anchor, MotionPlan
+from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
 from go2_wbc.robot.rotations import wrap_angle
 from motions import compile_timeline, load_motion, motion_names

@@ -24,7 +24,7 @@ from controller.pilot import Pilot
 from controller.procedures import Aborted
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.config import Config
-from go2_wbc.legs import JOINT_NAMES, Leg
+from go2_wbc.legs import JOINT_NAMES
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.model import JointDynamics, build_spec, finish
@@ -35,7 +35,6 @@ from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.solution import WbcSolution
 from motions import compile_timeline, load_motion
-from motions.library.high_five import HEIGHT
 
 STATES = 200
 """Random states of a trial on which the two models are compared."""
@@ -185,7 +184,7 @@ def _exercise(pilot: Pilot, plant: MujocoPlant) -> None:
     pilot.rest()
     pilot.stand()
     plan = compile_timeline(load_motion("high_five", hold=1.0), RobotModel())
-    pilot.high_five(plan, Leg.FR, HEIGHT)
+    pilot.high_five(plan)
     pilot.sit()
 
 

@@ -25,7 +25,7 @@ from benchmarks.command import Benchmark
 from benchmarks.store import ROOT
 from benchmarks.study import Measurement, Metric, Study
 from controller.sweeps.trials import Trial, TrialFailed
-from go2_wbc.reference import MotionPlan
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, compile_timeline, load_motion
 

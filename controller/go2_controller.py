@@ -224,16 +224,14 @@ class GO2Controller:
         Raises:
             CommandError: for another side or time.
         """
-        from motions.library.high_five import HEIGHT
-
-        leg = front_leg(arguments.checked("side", side, str, "a string", CommandError))
+        front_leg(arguments.checked("side", side, str, "a string", CommandError))
         hold = finite_number("hold", hold)
         arguments.within("hold", hold, 0.5, 30.0)
         if plan is None:
-            timeline = motions.load_motion("high_five", side=side, hold=hold, height=HEIGHT)
+            timeline = motions.load_motion("high_five", side=side, hold=hold)
             with self._planning:
                 plan = motions.compile_timeline(timeline, self._checker.model)
-        return self._call("high_five", lambda: self._pilot.high_five(plan, leg, HEIGHT))
+        return self._call("high_five", lambda: self._pilot.high_five(plan))
 
     def play(
         self, motion: motions.Playable, *, check: bool = True, allow_dynamic: bool = False

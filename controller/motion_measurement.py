@@ -11,8 +11,9 @@ from controller.modes import Mode
 from controller.placed_plan import PlacedPlan
 from controller.written_motion import off_written
 from go2_wbc.legs import LEGS
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant.mujoco.ground_truth import TOUCH, GroundTruth, TruthRecording, true_runs
-from go2_wbc.reference import STANCE, Anchor, LegTask, MotionPlan, Target
+from go2_wbc.reference import STANCE, Anchor, LegTask, Target
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
 

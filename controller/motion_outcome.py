@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from controller.motion_measurement import MotionMeasurement
-from go2_wbc.reference import MotionPlan
+from go2_wbc.motion_plan import MotionPlan
 from motions import CompiledPlan
 
 STRICT, STOPS, LENIENT, FELL = "strict", "stops", "lenient", "fell"

@@ -8,17 +8,13 @@ procedures into calls.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from functools import partial
-from statistics import fmean
 
-import motions
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
 from controller.checks import (
     LYING_HEIGHT,
     base_height,
-    ground_height,
     is_lying,
     is_sitting,
     is_standing,
@@ -27,6 +23,7 @@ from controller.modes import Mode
 from controller.navigation import Goal
 from controller.procedures import (
     Aborted,
+    HeldFeet,
     Measurements,
     ProcedureRunner,
     Touches,
@@ -40,18 +37,15 @@ from controller.walker import Walker
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ModeError, StanceMismatch
-from go2_wbc.legs import Leg
+from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.pose import LEVEL, BodyPose
-from go2_wbc.reference import MotionPlan, Posture
 from motions.postures import lie_down, rise, sit_down
 
 READY_TIME = 0.2
 """Time [s] that a robot is given to stand ready in walking mode."""
 HOLD_TIME = 0.4
 """Time [s] in which a robot that stands takes the exact posture."""
-PAW_TOLERANCE = 0.03
-"""Distance [m] that the paw, on the average of the hold, may be below its planned height."""
 
 
 class Pilot:
@@ -268,14 +262,8 @@ class Pilot:
 
     # --- motions --------------------------------------------------------------------------
 
-    def play(
-        self,
-        plan: MotionPlan,
-        watch: Callable[[float], None] | None = None,
-        *,
-        allow_dynamic: bool = False,
-    ) -> Measurements:
-        """Play ``plan``; ``watch(t)`` is called after every tick, t seconds into it.
+    def play(self, plan: MotionPlan, *, allow_dynamic: bool = False) -> Measurements:
+        """Play ``plan``, and measure whether it was done.
 
         Raises:
             DynamicMotionRefused: if the plan is dynamic, the plant may be a robot, and the caller
@@ -287,12 +275,11 @@ class Pilot:
             refuse_dynamic_on_hardware(plan, plant)
         self._meet_entry(plan)
         behaviour = PlayPlan(plan, self._config.wbc.joint_friction)
-        touches = Touches(plant)
+        touches, held = Touches(plant), HeldFeet(plan)
 
         def finished() -> bool:
             touches.note()
-            if watch is not None:
-                watch(self._loop.state.time - start)
+            held.note(self._loop.snapshot, self._loop.state.time - start)
             return behaviour.is_finished(self._loop.snapshot)
 
         self.playing = behaviour  # from now on a cancel() reaches it; one before is seen here
@@ -312,7 +299,7 @@ class Pilot:
         finally:
             self.playing = None
         touches.require_few(plan)
-        return judged(behaviour, self._loop.snapshot, at_rest)
+        return held.judged(judged(behaviour, self._loop.snapshot, at_rest))
 
     def return_safely(self) -> None:
         """Let the procedure that plays a motion leave it and stand; any thread may call it."""
@@ -330,33 +317,10 @@ class Pilot:
         if plan.entry is Posture.STAND:
             self.square_up()
 
-    def high_five(self, plan: motions.CompiledPlan, leg: Leg, height: float) -> Measurements:
-        """Give a high five, from any mode but fallen, and measure how high the paw was held.
-
-        Args:
-            plan: with a span named "held".
-            leg: the one that is raised.
-            height: planned for the paw's centre [m].
-        """
+    def high_five(self, plan: MotionPlan) -> Measurements:
+        """Give a high five, from any mode but fallen."""
         self._ensure_standing()
-        loop, (hold_start, hold_end) = self._loop, plan.spans["held"]
-        heights: list[float] = []
-
-        def watch(t: float) -> None:
-            if hold_start <= t <= hold_end:
-                ground = ground_height(loop.snapshot)
-                heights.append(float(loop.snapshot.p_world_feet[leg, 2]) - ground)
-
-        measured = self.play(plan, watch)
-        measured = {
-            **measured,
-            "planned paw height [m]": height,
-            "least paw height [m]": min(heights),
-            "mean paw height [m]": fmean(heights),
-        }
-        if fmean(heights) < height - PAW_TOLERANCE:
-            raise Aborted(f"the paw was not held at its height: {listed(measured)}", measured)
-        return measured
+        return self.play(plan)
 
     def square_up(self) -> None:
         """Stand with the feet below the hips, stepping in place if need be."""

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
 from go2_wbc.records import layout_of
-from go2_wbc.reference import Anchor, LegTask, MotionPlan, Target
+from go2_wbc.reference import Anchor, LegTask, Target
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.batch_kinematics import attitudes
 

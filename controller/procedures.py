@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from statistics import fmean
 from typing import NoReturn
 
 from controller.behaviours.base import Behaviour
@@ -11,6 +12,7 @@ from controller.behaviours.standing import Standing
 from controller.checks import (
     arrival_measurements,
     deviation_measurements,
+    ground_height,
     has_arrived,
     is_small,
     is_standing,
@@ -19,8 +21,8 @@ from controller.checks import (
 from controller.loop import Fault
 from controller.runner import Runner
 from go2_wbc.errors import DynamicMotionRefused
+from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import Plant
-from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.snapshot import Snapshot
 
 SETTLE_LIMIT = 3.0
@@ -35,6 +37,8 @@ TOUCH_FORCE = 1.0
 """Force [N] of the ground on trunk or legs that counts as a touch."""
 TOUCH_TIME = 0.01
 """Time [s] for which they may touch it in a motion: what the benchmarks call a touch."""
+PAW_TOLERANCE = 0.03
+"""Distance [m] that a foot, on the average of its hold, may be below its planned height."""
 SINK_TIME = 1.0
 """Time [s] for which a robot that went limp on its feet is watched: it sinks, or it falls."""
 
@@ -165,6 +169,35 @@ class Touches:
             raise Aborted(
                 f"{plan.name} touched the ground with trunk or legs for {self._time:.2f} s"
             )
+
+
+class HeldFeet:
+    """Measures how high the feet are held that a plan holds up."""
+
+    def __init__(self, plan: MotionPlan) -> None:
+        """None may be held."""
+        self._plan, self._held = plan, plan.held_feet
+        self._heights: list[list[float]] = [[] for _ in self._held]
+
+    def note(self, snapshot: Snapshot, t: float) -> None:
+        """Once a tick, ``t`` seconds into the plan."""
+        for foot, heights in zip(self._held, self._heights, strict=True):
+            if foot.start <= t <= foot.end:
+                heights.append(float(snapshot.p_world_feet[foot.leg, 2]) - ground_height(snapshot))
+
+    def judged(self, measured: Measurements) -> Measurements:
+        """``measured`` with the heights, if they are those of the plan; else raise ``Aborted``."""
+        found, is_low = dict(measured), False
+        for foot, heights in zip(self._held, self._heights, strict=True):
+            where = f" in {foot.name}" if len(self._held) > 1 else ""
+            found[f"planned paw height{where} [m]"] = foot.height
+            found[f"least paw height{where} [m]"] = min(heights)
+            found[f"mean paw height{where} [m]"] = fmean(heights)
+            is_low = is_low or fmean(heights) < foot.height - PAW_TOLERANCE
+        if is_low:
+            name = self._plan.name
+            raise Aborted(f"{name} held no paw at its height: {listed(found)}", found)
+        return found
 
 
 def judged(played: PlayPlan, snapshot: Snapshot, at_rest: Measurements) -> Measurements:

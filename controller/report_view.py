@@ -10,9 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from go2_wbc.errors import PlantError
 from go2_wbc.legs import LEGS
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant.mujoco.ground_truth import true_runs
 from go2_wbc.recording import Recording
-from go2_wbc.reference import Anchor, MotionPlan
+from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from motions import CheckedMotion, CompiledPlan, FeasibilityReport, Finding
 from motions.authoring import Choice, Parameter

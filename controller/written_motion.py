@@ -10,8 +10,9 @@ from jaxtyping import Bool, Float
 
 from controller.placed_plan import PlacedPlan
 from go2_wbc.legs import LEGS
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording, true_runs
-from go2_wbc.reference import Anchor, LegTask, MotionPlan
+from go2_wbc.reference import Anchor, LegTask
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.dynamics.phases import PhaseProblem

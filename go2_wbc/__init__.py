@@ -14,11 +14,12 @@ if TYPE_CHECKING:
     from go2_wbc.contacts import GAITS, ContactSchedule, Gait
     from go2_wbc.errors import Go2WbcError, MotionInfeasible, QpInfeasible
     from go2_wbc.legs import LEGS, Leg
+    from go2_wbc.motion_plan import MotionPlan, Posture, Stance
     from go2_wbc.planning.command import VelocityCommand
     from go2_wbc.planning.locomotion import LocomotionPlanner
     from go2_wbc.plant import MujocoPlant, Plant
     from go2_wbc.recording import Recording
-    from go2_wbc.reference import JointReference, MotionPlan, Posture, Reference, Stance
+    from go2_wbc.reference import JointReference, Reference
     from go2_wbc.robot.model import RobotModel
     from go2_wbc.robot.snapshot import Snapshot
     from go2_wbc.robot.state import JointCommand, RobotState
@@ -70,11 +71,12 @@ _public = lazy_exports(
         "contacts": ("GAITS", "ContactSchedule", "Gait"),
         "errors": ("Go2WbcError", "MotionInfeasible", "QpInfeasible"),
         "legs": ("LEGS", "Leg"),
+        "motion_plan": ("MotionPlan", "Posture", "Stance"),
         "planning.command": ("VelocityCommand",),
         "planning.locomotion": ("LocomotionPlanner",),
         "plant": ("MujocoPlant", "Plant"),
         "recording": ("Recording",),
-        "reference": ("JointReference", "MotionPlan", "Posture", "Reference", "Stance"),
+        "reference": ("JointReference", "Reference"),
         "robot.model": ("RobotModel",),
         "robot.snapshot": ("Snapshot",),
         "robot.state": ("JointCommand", "RobotState"),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -32,6 +33,24 @@ def lazy_exports(package: str, homes: Mapping[str, Sequence[str]]) -> Callable[[
         with without_collecting():
             module = _imported(home_of[name])
         return getattr(module, name)
+
+    return load
+
+
+def moved_names(module: str, homes: Mapping[str, str]) -> Callable[[str], object]:
+    """The module-level ``__getattr__`` of a module that others still ask for what it had.
+
+    Args:
+        module: its dotted name.
+        homes: the modules that define the names now.
+    """
+
+    def load(name: str) -> object:
+        if name not in homes:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        told = f"{module}.{name} has moved: import it from {homes[name]}"
+        warnings.warn(told, DeprecationWarning, stacklevel=2)
+        return getattr(_imported(homes[name]), name)
 
     return load
 

@@ -7,7 +7,6 @@ trunk lies on the ground and no contact model holds.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from enum import Enum, IntEnum
 from functools import partial
@@ -17,8 +16,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.compilation import kernel
-from go2_wbc.contacts import ContactSchedule
 from go2_wbc.errors import CommandError
+from go2_wbc.lazy import moved_names
 from go2_wbc.records import Record
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
@@ -26,18 +25,6 @@ from go2_wbc.robot.snapshot import Snapshot
 LEAST_WEIGHT, MOST_WEIGHT = 1e-6, 1e2
 """Of the force regularisation: beyond them accuracy is lost."""
 _set = object.__setattr__  # of a frozen value that is being made
-
-
-class Posture(Enum):
-    """Resting postures between which motions lead."""
-
-    LIE = "lie"
-    SIT = "sit"
-    STAND = "stand"
-
-
-Stance = Posture
-"""The former name of ``Posture``, kept for scripts that use it."""
 
 
 class LegTask(IntEnum):
@@ -296,91 +283,6 @@ class Anchor:
 
 
 @dataclass(frozen=True, slots=True)
-class Footsteps:
-    """What is known of a plan whose feet step to places, so that they can land when they do.
-
-    Attributes:
-        contacts: who stands when.
-        swings: (m, 4) at each event of ``contacts``, the feet in the air that follow their places.
-        unloads: (m, 4) when [s] each foot that stands lifts off next, if it gives up its load
-            before that; inf if it pushes off.
-        ramp: time [s] over which a foot takes up its load after touchdown and gives it up before
-            lift-off.
-        normal_force_min, normal_force_max: bounds [N] of a stance foot's normal force.
-    """
-
-    contacts: ContactSchedule
-    swings: Bool[np.ndarray, "m 4"]
-    unloads: Float[np.ndarray, "m 4"]
-    ramp: float
-    normal_force_min: float
-    normal_force_max: float
-
-
-@dataclass(frozen=True, slots=True)
-class PlanFeedback:
-    """How a solved plan brings the robot back to its state, at one instant.
-
-    Attributes:
-        q: (19,) planned configuration, in the motion's frame.
-        v: (18,) planned velocity.
-        gains: feedback of the state's error (as Pinocchio's ``difference`` of planned and measured
-            q, then of v) into torques: tau - gains @ error [N m].
-    """
-
-    q: Float[np.ndarray, "19"]
-    v: Float[np.ndarray, "18"]
-    gains: Float[np.ndarray, "12 36"]
-
-
-class MotionPlan(ABC):
-    """A motion, ready to be played: a reference for every instant, in the motion's own frame.
-
-    Attributes:
-        name: what users call it.
-        entry: stance in which it starts.
-        exit: stance in which it ends.
-        duration: [s].
-    """
-
-    name: str
-    entry: Posture
-    exit: Posture
-    duration: float
-
-    @property
-    def is_dynamic(self) -> bool:
-        """Whether there are phases that fewer than three feet carry: flight, or two feet.
-
-        Such a motion cannot be stopped in the middle, and is refused on hardware unless allowed.
-        """
-        return False
-
-    @abstractmethod
-    def at(self, t: float) -> Reference:
-        """The reference ``t`` seconds after the start; the ends are held outside [0, duration]."""
-
-    def row_at(self, t: float) -> Float[np.ndarray, " size"]:
-        """The numbers of ``at(t)`` in one row; a plan that can fill it by a kernel does so."""
-        return self.at(t).row
-
-    @property
-    def has_dynamic_spans(self) -> bool:
-        """Whether some of it is solved by the whole robot's dynamics."""
-        return False
-
-    def feedback_at(self, t: float) -> PlanFeedback | None:
-        """The feedback ``t`` seconds after the start; None where it was not solved for two feet."""
-        del t
-        return None
-
-    @property
-    def footsteps(self) -> Footsteps | None:
-        """How its feet step; None if none does: each comes down where it stood."""
-        return None
-
-
-@dataclass(frozen=True, slots=True)
 class JointReference:
     """Joint targets for a servo: no contact model, no balance.
 
@@ -400,3 +302,7 @@ class JointReference:
     def stance(self) -> Bool[np.ndarray, "4"]:
         """No foot is planned to carry the robot."""
         return np.zeros(4, dtype=bool)
+
+
+_OF_PLANS = ("Footsteps", "MotionPlan", "PlanFeedback", "Posture", "Stance")
+__getattr__ = moved_names(__name__, dict.fromkeys(_OF_PLANS, "go2_wbc.motion_plan"))

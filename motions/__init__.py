@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from go2_wbc.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from go2_wbc.reference import Posture
+    from go2_wbc.motion_plan import Posture
     from motions.authoring import Choice, Motion, Range, motion
     from motions.dynamics.phases import Tolerance
     from motions.feasibility import (

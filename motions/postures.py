@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.curves import Segment
-from go2_wbc.reference import MotionPlan, Posture, Reference, TrackedPoint
+from go2_wbc.motion_plan import MotionPlan, Posture
+from go2_wbc.reference import Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.tracking.plan_curves import standing_target
 from motions.batch_kinematics import Wanted, attitudes, place

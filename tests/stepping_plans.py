@@ -9,7 +9,7 @@ from scipy.interpolate import CubicHermiteSpline, PPoly
 
 from go2_wbc.contacts import ContactSchedule
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.model import RobotModel
 from motions.plan.compiled_plan import CompiledPlan
 from motions.postures import STAND_HEIGHT, standing_feet

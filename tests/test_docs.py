@@ -18,7 +18,7 @@ from controller.cli.main import COMMANDS
 from go2_wbc.config import Config, load_config
 from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.motor import KNEE_SHARE
 from go2_wbc.wbc.tasks import Gains
 from go2_wbc.world import World

@@ -12,8 +12,8 @@ from benchmarks.validation_set.questions import Question, draws
 from controller.motion_measurement import MotionMeasurement, measure_motion
 from controller.motion_outcome import outcome_of
 from controller.sweeps.trials import Trial, TrialRobot
+from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.reference import MotionPlan, Posture
 from go2_wbc.robot.model import RobotModel
 
 FRICTION = 0.5

@@ -9,7 +9,8 @@ from benchmarks.validation_set.drawing import Draw, Family
 from benchmarks.validation_set.dynamic_families import DYNAMIC
 from benchmarks.validation_set.feet_families import FEET, GOING
 from benchmarks.validation_set.trunk_families import TRUNK
-from go2_wbc.reference import MotionPlan, Posture, Reference
+from go2_wbc.motion_plan import MotionPlan, Posture
+from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline
 

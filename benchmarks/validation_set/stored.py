@@ -15,7 +15,8 @@ from benchmarks.store import ROOT, settings_header
 from controller.motion_outcome import Outcome
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import write_atomically
-from go2_wbc.reference import MotionPlan, Target
+from go2_wbc.motion_plan import MotionPlan
+from go2_wbc.reference import Target
 
 FOLDER = Path(__file__).parent
 BORDERS_FILE, OUTCOMES_FILE = FOLDER / "borders.json", FOLDER / "outcomes.json"

@@ -12,7 +12,7 @@ from benchmarks.validation_set.drawing import (
     named,
     to_and_fro,
 )
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from motions import Timeline, deg
 
 EASES = ("cubic", "in", "out", "linear")

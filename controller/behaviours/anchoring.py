@@ -9,8 +9,9 @@ from jaxtyping import Float
 
 from go2_wbc.curves import Ease
 from go2_wbc.legs import Leg
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.correction import tracked_position
-from go2_wbc.reference import Anchor, MotionPlan, Target
+from go2_wbc.reference import Anchor, Target
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot

@@ -11,8 +11,9 @@ from controller.behaviours.anchoring import Approach, anchor_of
 from controller.behaviours.base import Behaviour
 from controller.behaviours.safe_return import SafeReturn
 from controller.behaviours.weight import FeltWeight
+from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.planning.correction import tracked_position
-from go2_wbc.reference import Anchor, MotionPlan, Posture, Reference, Target
+from go2_wbc.reference import Anchor, Reference, Target
 from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation

@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from go2_wbc.reference import MotionPlan, Reference
+from go2_wbc.motion_plan import MotionPlan
+from go2_wbc.reference import Reference
 
 TURNING = 0.3
 """Time [s] in which the plan's clock comes to a stop."""

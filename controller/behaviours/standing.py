@@ -26,9 +26,10 @@ from controller.behaviours.walking import Walking
 from go2_wbc.contacts import GAITS, Gait, Stride
 from go2_wbc.geometry import support_margin
 from go2_wbc.legs import Leg
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.locomotion import LEAST_HEIGHT, LocomotionConfig
-from go2_wbc.reference import MotionPlan, Reference
+from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot

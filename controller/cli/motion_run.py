@@ -55,9 +55,9 @@ def run(args: argparse.Namespace) -> int:
     from controller.motion_measurement import measure_motion
     from controller.report_view import performed
     from go2_wbc.files import checked_output
+    from go2_wbc.motion_plan import Posture
     from go2_wbc.plant import plant_in_world
     from go2_wbc.plant.mujoco.ground_truth import GroundTruth
-    from go2_wbc.reference import Posture
     from motions import FeasibilityChecker
     from viz import HTML_SUFFIXES, export_html
 

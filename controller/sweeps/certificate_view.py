@@ -10,7 +10,7 @@ from controller.sweeps.identity import digest, identity
 from controller.sweeps.motion_study import archive_of, world_of
 from controller.sweeps.rows import SEED, Row
 from controller.sweeps.summary import CONFIDENCE
-from go2_wbc.reference import MotionPlan
+from go2_wbc.motion_plan import MotionPlan
 from motions import CompiledPlan
 from viz.content import CertifiedRate, CertifiedRun, ReplayContent
 

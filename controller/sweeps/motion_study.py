@@ -16,8 +16,8 @@ from controller.motion_outcome import outcome_of, shares_of
 from controller.sweeps.rows import Row
 from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
+from go2_wbc.motion_plan import Posture
 from go2_wbc.plant import MujocoPlant, plant_in_world
-from go2_wbc.reference import Posture
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
 from motions import CompiledPlan, load_plan, save_plan

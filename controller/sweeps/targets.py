@@ -165,7 +165,7 @@ def motion_target(motion: object, name: str = "", world: World | None = None) ->
         TimelineError, MotionFileError: for a motion that cannot be used.
     """
     from controller.sweeps.motion_study import MotionStudy, archive_of, text_of
-    from go2_wbc.reference import Posture
+    from go2_wbc.motion_plan import Posture
     from go2_wbc.robot.model import RobotModel
     from go2_wbc.world import DOUBTFUL
     from motions import CompiledPlan

@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.reference import Anchor, PlanFeedback, Reference
+from go2_wbc.motion_plan import PlanFeedback
+from go2_wbc.reference import Anchor, Reference
 from go2_wbc.robot.rotations import log_rotation, rotation_from_quaternion, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
 

@@ -14,17 +14,10 @@ from jaxtyping import Bool, Float
 
 from go2_wbc.algebra.vectors import rotation_vector
 from go2_wbc.compilation import Foreign, kernel, subroutine
+from go2_wbc.motion_plan import Footsteps
 from go2_wbc.planning.correction import Correction, CorrectionConfig, correct
 from go2_wbc.records import Record, packed
-from go2_wbc.reference import (
-    JOINTS,
-    STANCE,
-    Anchor,
-    Footsteps,
-    Reference,
-    Target,
-    sag_and_lean,
-)
+from go2_wbc.reference import JOINTS, STANCE, Anchor, Reference, Target, sag_and_lean
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.tracking.landing import Landing, Landings, land
 from go2_wbc.tracking.plan_curves import StanceLoad

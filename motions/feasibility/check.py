@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from go2_wbc.errors import MotionError
 from go2_wbc.legs import LEGS
-from go2_wbc.reference import MotionPlan
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
 from motions.batch_kinematics import centres_of_mass

@@ -11,8 +11,8 @@ from jaxtyping import Bool
 
 from go2_wbc.errors import CommandError
 from go2_wbc.legs import LEGS
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.recording import Recording
-from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.authoring import Motion
 from motions.dynamics.phases import Progress

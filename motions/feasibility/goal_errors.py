@@ -9,7 +9,8 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from go2_wbc.legs import FOOT_NAMES, LEGS, Leg
-from go2_wbc.reference import Anchor, MotionPlan
+from go2_wbc.motion_plan import MotionPlan
+from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.dynamics.curves import feet_at

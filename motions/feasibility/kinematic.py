@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
-from go2_wbc.reference import Anchor, MotionPlan, Posture
+from go2_wbc.motion_plan import MotionPlan, Posture
+from go2_wbc.reference import Anchor
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation

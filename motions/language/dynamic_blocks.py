@@ -15,7 +15,7 @@ from typing import TypeVar
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from motions import arguments
 from motions.arguments import positive, quantity
 from motions.dynamics import phase_builders as build

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from motions.dynamics.phases import Phase, PhaseProblem
 from motions.language.easing import Easing
 

@@ -12,7 +12,7 @@ from typing import TypeVar
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from motions.arguments import positive
 from motions.dynamics.phases import Tolerance
 from motions.language.clock import SAME, BeatClock

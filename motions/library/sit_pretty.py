@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from motions import Choice, Timeline, deg, motion
 
 

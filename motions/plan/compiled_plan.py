@@ -12,16 +12,8 @@ from scipy.interpolate import PPoly
 from go2_wbc.contacts import TIE, ContactPhase, ContactSchedule
 from go2_wbc.errors import MotionError
 from go2_wbc.legs import Leg
-from go2_wbc.reference import (
-    Anchor,
-    Footsteps,
-    LegTask,
-    MotionPlan,
-    PlanFeedback,
-    Posture,
-    Reference,
-    TrackedPoint,
-)
+from go2_wbc.motion_plan import Footsteps, HeldFoot, MotionPlan, PlanFeedback, Posture
+from go2_wbc.reference import Anchor, LegTask, Reference, TrackedPoint
 from go2_wbc.tracking.plan_curves import CURVES, PlanCurves, StanceLoad
 from motions.batch_kinematics import Wanted, attitudes
 from motions.plan.dynamic_span import DynamicSpan
@@ -92,24 +84,6 @@ class PlanSamples(Wanted):
             raised=np.array([[t is LegTask.JOINTS for t in one.legs] for one in references]),
             normal_force_max=np.array([one.normal_force_max for one in references]),
         )
-
-
-@dataclass(frozen=True, slots=True)
-class HeldFoot:
-    """A foot that must be held up.
-
-    Attributes:
-        name: of the span.
-        leg: whose foot.
-        start, end: when [s].
-        height: planned for its centre above the ground [m].
-    """
-
-    name: str
-    leg: Leg
-    start: float
-    end: float
-    height: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -200,7 +174,7 @@ class CompiledPlan(MotionPlan):
 
     @property
     def held_feet(self) -> tuple[HeldFoot, ...]:
-        """Its acceptance: feet that must be measured at their heights, for it to count as done."""
+        """Feet that it holds up; see ``MotionPlan.held_feet``."""
         found = []
         for name, leg in self.held.items():
             start, end = self.spans[name]

@@ -11,7 +11,8 @@ from scipy.interpolate import CubicHermiteSpline, PPoly
 from scipy.spatial.transform import Rotation
 
 from go2_wbc.errors import MotionError
-from go2_wbc.reference import Anchor, PlanFeedback
+from go2_wbc.motion_plan import PlanFeedback
+from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rpy_from_rotation, yaw_rotation
 from motions.dynamics.curves import sampled

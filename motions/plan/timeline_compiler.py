@@ -16,7 +16,8 @@ from scipy.interpolate import PPoly
 from go2_wbc.contacts import ContactSchedule
 from go2_wbc.curves import Ease
 from go2_wbc.errors import PlanNotFound, TimelineError
-from go2_wbc.reference import Anchor, Posture
+from go2_wbc.motion_plan import Posture
+from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory

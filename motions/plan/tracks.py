@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float
 from scipy.interpolate import CubicSpline
 
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.leg_kinematics import LegAngles, LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from motions.batch_kinematics import attitudes, foot_centres, turned, turned_back

@@ -17,7 +17,7 @@ import pinocchio as pin
 from jaxtyping import Bool, Float
 
 from go2_wbc.errors import MotionError
-from go2_wbc.reference import MotionPlan
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions.batch_kinematics import (
     angles_of,

@@ -8,7 +8,8 @@ from jaxtyping import Float
 
 from controller.behaviours.anchoring import APPROACH, FARTHEST, Approach, anchor_of
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Anchor, MotionPlan, Target
+from go2_wbc.motion_plan import MotionPlan
+from go2_wbc.reference import Anchor, Target
 from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import RobotState

@@ -17,7 +17,7 @@ from controller.checks import (
     posture_measurements,
 )
 from go2_wbc.legs import LEGS
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy

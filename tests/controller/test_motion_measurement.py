@@ -12,9 +12,9 @@ from controller.modes import Mode
 from controller.motion_measurement import SETTLED_CONTACT, _slip, measure_motion
 from controller.motion_outcome import FELL, outcome_of
 from go2_wbc.legs import Leg
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
-from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, deg
 from tests.go2_wbc.plant.helpers import empty_recording

@@ -10,8 +10,9 @@ import pytest
 from controller.placed_plan import PlacedPlan
 from go2_wbc.curves import Segment
 from go2_wbc.legs import LEGS
+from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
-from go2_wbc.reference import Anchor, LegTask, MotionPlan, Posture, TrackedPoint
+from go2_wbc.reference import Anchor, LegTask, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from motions import Timeline, compile_timeline, deg

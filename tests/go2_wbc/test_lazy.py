@@ -10,7 +10,7 @@ from types import ModuleType
 
 import pytest
 
-from go2_wbc import legs
+from go2_wbc import legs, motion_plan, reference
 from go2_wbc.lazy import lazy_exports, without_collecting
 
 MODULE = """
@@ -97,3 +97,12 @@ def test_frozen_objects_are_not_counted_where_nothing_is_imported(
 ) -> None:
     monkeypatch.setattr(gc, "get_freeze_count", lambda: pytest.fail("takes tens of ms"))
     assert lazy_exports("go2_wbc", {"legs": ("Leg",)})("Leg") is legs.Leg
+
+
+def test_a_name_that_has_moved_is_found_and_says_where_it_is() -> None:
+    with pytest.warns(DeprecationWarning, match=r"import it from go2_wbc\.motion_plan") as told:
+        from go2_wbc.reference import Posture
+    assert Posture is motion_plan.Posture
+    assert told[0].filename == __file__
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        getattr(reference, "nothing")  # noqa: B009 - no type checker knows it

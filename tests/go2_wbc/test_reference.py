@@ -10,15 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from go2_wbc.errors import CommandError
-from go2_wbc.reference import (
-    Anchor,
-    LegTask,
-    MotionPlan,
-    Reference,
-    Target,
-    TrackedPoint,
-    sag_and_lean,
-)
+from go2_wbc.motion_plan import MotionPlan
+from go2_wbc.reference import Anchor, LegTask, Reference, Target, TrackedPoint, sag_and_lean
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from tests.compiled import assert_plain_is_compiled

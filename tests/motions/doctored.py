@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from go2_wbc.legs import Leg
-from go2_wbc.reference import MotionPlan, Posture, Reference
+from go2_wbc.motion_plan import MotionPlan, Posture
+from go2_wbc.reference import Reference
 from motions import CompiledPlan
 
 # rad; beyond the upper limit of a calf, -0.838.

@@ -7,7 +7,7 @@ import pytest
 
 from go2_wbc.errors import CommandError, TimelineError
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import (
     CompiledPlan,

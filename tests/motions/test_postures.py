@@ -9,7 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from go2_wbc.curves import Ease, Segment
-from go2_wbc.reference import LegTask, MotionPlan, Posture, TrackedPoint
+from go2_wbc.motion_plan import MotionPlan, Posture
+from go2_wbc.reference import LegTask, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import angular_velocity_from_rpy, rotation_from_rpy
 from motions.postures import (

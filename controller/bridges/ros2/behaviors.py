@@ -9,11 +9,10 @@ from controller.jobs import Answer, Job, JobServer, Reply
 from controller.modes import Mode
 from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import Go2WbcError, unknown_name
-from go2_wbc.reference import MotionPlan, Posture
-from motions import CompiledPlan, FeasibilityChecker, find_motion
-from motions.authoring import Value, parse_values
+from go2_wbc.motion_plan import MotionPlan, Posture
+from motions import FeasibilityChecker, find_motion
+from motions.authoring import parse_values
 
-HIGH_FIVE = "high_five"
 STOP, DAMP = "stop", "damp"
 ORDERS: Mapping[str, Callable[[GO2Controller], bool]] = {
     "sit": lambda go2: go2.sit(),
@@ -21,7 +20,7 @@ ORDERS: Mapping[str, Callable[[GO2Controller], bool]] = {
     "walk": lambda go2: go2.walk(),
     "stand": lambda go2: go2.stand(),
     "lie_down": lambda go2: go2.lie_down(),
-    HIGH_FIVE: lambda go2: go2.high_five(),
+    "high_five": lambda go2: go2.high_five(),
     "recover": lambda go2: go2.recover(),
 }
 """What happens for a name; ``up`` and ``stand`` are the same."""
@@ -85,18 +84,13 @@ def _measured(go2: GO2Controller, act: Callable[[GO2Controller], bool]) -> Measu
 def motion_job(motion: str, settings: Sequence[str], go2: GO2Controller, reply: Reply) -> Job:
     """The job that goes to where a motion starts and plays it."""
     plans: list[MotionPlan] = []
-    values: dict[str, Value] = {}
 
     def prepare() -> None:
-        values.update(parse_values(settings))
-        plans.append(FeasibilityChecker().plan(find_motion(motion)(**values)))
+        timeline = find_motion(motion)(**parse_values(settings))
+        plans.append(FeasibilityChecker().plan(timeline))
 
     def play(job: Job) -> bool:
         (plan,) = plans
-        if motion == HIGH_FIVE and isinstance(plan, CompiledPlan) and "height" not in values:
-            job.phase = "playing"
-            side, hold = str(values.get("side", "right")), float(values.get("hold", 2.0))
-            return go2.high_five(side, hold, plan=plan)
         if not _take_entry(go2, plan) or job.is_cancelled:
             return False
         job.phase = "playing"

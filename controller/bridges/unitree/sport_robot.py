@@ -17,10 +17,10 @@ from controller.procedures import ProcedureRunner
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import CommandError, Go2WbcError
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.plant.base import Plant
-from go2_wbc.reference import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState

@@ -13,7 +13,7 @@ from benchmarks.validation_set.questions import FAMILIES, Question, draws
 from controller.motion_measurement import MotionMeasurement
 from controller.motion_outcome import UNPLANNED, Outcome, outcome_of
 from controller.sweeps.trials import Trial
-from go2_wbc.reference import MotionPlan
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
 from motions.plan.compiled_plan import Problem

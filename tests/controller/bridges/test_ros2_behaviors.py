@@ -155,6 +155,14 @@ def test_a_high_five_is_compiled_and_checked_once(monkeypatch: pytest.MonkeyPatc
     assert done == ["compiled in prepare", "checked in prepare"]
 
 
+def test_a_high_five_at_another_height_is_measured_as_well() -> None:
+    # It was played as any motion, and nobody looked at the paw: its name alone was known.
+    with GO2Controller(plant=WatchedPlant()) as go2:
+        answer = played(go2, "high_five", "hold=0.5", "height=0.62")
+    assert answer.success, answer.message
+    assert "planned paw height [m] 0.62," in answer.message
+
+
 def test_a_motion_that_does_not_exist_is_answered_with_those_that_do() -> None:
     answer = played(FakeGo2(), "levitate")
     assert not answer.success

@@ -8,7 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from go2_wbc.reference import Anchor, LegTask, PlanFeedback, Reference
+from go2_wbc.motion_plan import PlanFeedback
+from go2_wbc.reference import Anchor, LegTask, Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import exp_rotation, yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot

@@ -9,7 +9,7 @@ import pytest
 
 from go2_wbc.errors import CommandError, MotionInfeasible
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg, load_motion
 from motions.feasibility import FeasibilityReport

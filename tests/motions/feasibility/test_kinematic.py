@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.reference import MotionPlan
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
 from motions.feasibility.collision import SelfCollision

@@ -11,7 +11,7 @@ import pytest
 
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import LEGS, Leg
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from motions import Timeline, deg
 from motions.dynamics.phases import Phase
 from motions.language.keys import PhaseKey

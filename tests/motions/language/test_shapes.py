@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.errors import TimelineError
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.rotations import yaw_rotation
 from motions import FeasibilityChecker, Timeline, deg, load_motion
 from motions.language.footing import Footing

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from go2_wbc.errors import TimelineError
 from go2_wbc.geometry import support_margin
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from motions import Timeline, compile_timeline, deg
 from motions.language.keys import BalanceShift, BodyKey, LegKey

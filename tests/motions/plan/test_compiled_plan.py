@@ -10,7 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from go2_wbc.contacts import GAITS, TIE, ContactSchedule
-from go2_wbc.reference import LegTask, MotionPlan, TrackedPoint
+from go2_wbc.motion_plan import MotionPlan
+from go2_wbc.reference import LegTask, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation
 from motions import Timeline, compile_timeline, deg, load_motion

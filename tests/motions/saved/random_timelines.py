@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError
 from go2_wbc.legs import Leg
-from go2_wbc.reference import Posture
+from go2_wbc.motion_plan import Posture
 from motions import Timeline
 from motions.language.keys import BODY_CHANNELS
 

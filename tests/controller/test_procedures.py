@@ -1,0 +1,71 @@
+"""Feet that a motion holds up are measured: on the average of each hold, near their heights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pytest
+
+from controller.procedures import PAW_TOLERANCE, Aborted, HeldFeet
+from go2_wbc.legs import Leg
+from go2_wbc.motion_plan import HeldFoot, MotionPlan, Posture
+from go2_wbc.reference import Reference
+from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
+from go2_wbc.robot.snapshot import Snapshot
+from tests.engine_helpers import standing_q, state_of
+
+MODEL = RobotModel()
+FIRST = HeldFoot("first", Leg.FR, 1.0, 2.0, 0.3)
+SECOND = HeldFoot("second", Leg.FL, 2.5, 3.0, 0.2)
+CENTIMETRE = 0.01
+
+
+@dataclass
+class Holding(MotionPlan):
+    held: tuple[HeldFoot, ...]
+    name: str = "holding"
+    entry: Posture = Posture.STAND
+    exit: Posture = Posture.STAND
+    duration: float = 4.0
+
+    def at(self, t: float) -> Reference:
+        raise NotImplementedError
+
+    @property
+    def held_feet(self) -> tuple[HeldFoot, ...]:
+        return self.held
+
+
+def raised(leg: Leg, height: float) -> Snapshot:
+    """The foot of ``leg`` at this height over the ground below the others."""
+    snapshot = MODEL.snapshot(state_of(standing_q()))
+    feet = snapshot.p_world_feet.copy()
+    feet[leg, 2] = feet[Leg.RL, 2] - FOOT_RADIUS + height
+    return snapshot.replaced(p_world_feet=feet)
+
+
+def test_a_foot_counts_on_the_average_of_its_hold_and_at_no_other_time() -> None:
+    held = HeldFeet(Holding((FIRST,)))
+    for t, height in ((0.99, 9.0), (1.0, 0.3 - PAW_TOLERANCE), (2.0, 0.305), (2.01, 0.0)):
+        held.note(raised(Leg.FR, height), t)
+    measured = held.judged({"yaw [deg]": 1.0})
+    assert measured["yaw [deg]"] == 1.0
+    assert measured["planned paw height [m]"] == 0.3
+    assert measured["least paw height [m]"] == pytest.approx(0.3 - PAW_TOLERANCE)
+    assert measured["mean paw height [m]"] == pytest.approx(0.3025 - PAW_TOLERANCE / 2)
+
+
+def test_a_foot_that_was_too_low_is_told_with_what_was_measured() -> None:
+    held = HeldFeet(Holding((FIRST, SECOND)))
+    held.note(raised(Leg.FR, 0.3), 1.5)
+    held.note(raised(Leg.FL, 0.2 - PAW_TOLERANCE - CENTIMETRE), 2.7)
+    with pytest.raises(Aborted, match=r"holding held no paw at its height: .*in second") as told:
+        held.judged({})
+    assert told.value.measured["mean paw height in first [m]"] == pytest.approx(0.3)
+    assert told.value.measured["mean paw height in second [m]"] == pytest.approx(0.16)
+
+
+def test_a_plan_that_holds_no_foot_is_not_measured() -> None:
+    held = HeldFeet(Holding(()))
+    held.note(raised(Leg.FR, 0.3), 1.5)
+    assert held.judged({"yaw [deg]": 1.0}) == {"yaw [deg]": 1.0}
