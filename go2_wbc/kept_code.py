@@ -5,7 +5,8 @@ subroutines' own code and constants, their records, the versions and the process
 one function makes anew only what calls it. A file that is damaged is made anew; where no file can
 be written, kernels are compiled in every process.
 
-Loading is part of every start, so it must not take long: it needs nothing of Numba's compiler; see
+Loading is part of every start, so it must not take long: a list says which file belongs to which
+kernel as long as no source has changed, and loading needs nothing of Numba's compiler; see
 ``_what_running_takes``.
 """
 
@@ -14,14 +15,15 @@ from __future__ import annotations
 import enum
 import hashlib
 import inspect
+import json
 import logging
 import os
 import pickle
 import platform
 import tempfile
-from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from functools import cache, cached_property
+from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
@@ -29,11 +31,13 @@ from typing import Any
 import llvmlite.binding
 import numba
 import numpy as np
-from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.environment import Environment
+from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python  # pyright: ignore[reportAttributeAccessIssue]
 from numba.core.serialize import dumps
+
+from go2_wbc.written import Written
 
 _log = logging.getLogger(__name__)
 
@@ -45,67 +49,97 @@ KEPT = 8
 """How many versions of a kernel are kept, those used last: of other environments, or branches."""
 
 
-class Written(ABC):
-    """A function that is compiled.
+class KeptCode:
+    """The file in which a kernel's machine code is kept."""
 
-    Attributes:
-        written: the function.
-    """
+    def __init__(self, kernel: Written) -> None:
+        """Finds the file: by the list of those of these sources, or by all that it depends on."""
+        self._kernel, self._folder = kernel, kernel_folder()
+        self._file: Path | None = None
+        self._takes_rows: list[bool] = []
+        listed = None if self._folder is None else _listed(self._folder).get(kernel.name)
+        if self._folder is not None and listed is not None:
+            self._file, self._takes_rows = self._folder / listed[0], listed[1]
 
-    written: Any  # a function
-
-    @property
-    def name(self) -> str:
-        """Module and function."""
-        return f"{self.written.__module__}.{self.written.__qualname__}"
-
-    @cached_property
-    @abstractmethod
-    def signature(self) -> Any:
-        """As Numba has it."""
-
-
-class KeptCode(NullCache):
-    """The file in which a kernel's machine code is kept, in the place of Numba's own cache."""
-
-    def __init__(self, made: Written) -> None:
-        self._kernel = made
-        folder = kernel_folder()
-        self._file = None if folder is None else folder / f"{made.name}-{fingerprint(made)}.code"
-
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """What was kept; None if there is none that can be used."""
-        del sig
-        if self._file is None:
+    def load(self) -> tuple[Any, list[bool]]:
+        """What was kept, or None, and which arguments are rows."""
+        if self._folder is None:
             say_that_it_takes_time()
-            return None
+            return None, []
+        if self._file is None:
+            name = f"{self._kernel.name}-{fingerprint(self._kernel)}.code"
+            self._file = self._folder / name
+            kinds = self._kernel.signature.args
+            self._takes_rows = [isinstance(kind, numba.types.Record) for kind in kinds]
         try:
             content = self._file.read_bytes()
             self._file.touch()  # it is in use
         except OSError:
             say_that_it_takes_time()
-            return None
+            return None, self._takes_rows
         if content[:_DIGEST] != _digest(content[_DIGEST:]):
             _log.warning("%s is damaged: it is compiled anew", self._file)
-            return None
+            return None, self._takes_rows
         _offer_runtime()
-        return CompileResult._rebuild(target_context, *pickle.loads(content[_DIGEST:]))
+        _list(self._folder, self._kernel.name, self._file.name, self._takes_rows)
+        context = cpu_target.target_context
+        return CompileResult._rebuild(context, *pickle.loads(content[_DIGEST:])), self._takes_rows
 
-    def save_overload(self, sig: Any, cres: Any) -> None:
+    def save(self, code: Any, takes_rows: list[bool]) -> None:
         """Keep it, and not more than a few older ones."""
-        del sig
-        if self._file is None or cres.library.has_dynamic_globals:
+        if self._folder is None or self._file is None or code.library.has_dynamic_globals:
             return
-        content = dumps(_what_running_takes(cres))
+        content = dumps(_what_running_takes(code))
         try:
-            with tempfile.NamedTemporaryFile(dir=self._file.parent, delete=False) as file:
-                file.write(_digest(content) + content)
-            Path(file.name).replace(self._file)
-            others = self._file.parent.glob(f"{self._kernel.name}-*.code")
+            _write(self._file, _digest(content) + content)
+            others = self._folder.glob(f"{self._kernel.name}-*.code")
             for old in sorted(others, key=lambda path: path.stat().st_mtime)[:-KEPT]:
                 old.unlink()
         except OSError as error:
-            _log.warning("the compiled kernels cannot be kept in %s: %s", self._file.parent, error)
+            _log.warning("the compiled kernels cannot be kept in %s: %s", self._folder, error)
+        _list(self._folder, self._kernel.name, self._file.name, takes_rows)
+
+
+_lists: dict[Path, dict[str, tuple[str, list[bool]]]] = {}
+"""Of each folder: which file belongs to which kernel, as the sources are now."""
+
+
+def _listed(folder: Path) -> dict[str, tuple[str, list[bool]]]:
+    """Which file belongs to which kernel: to find it out anew takes 0.2 s for all."""
+    if folder not in _lists:
+        try:
+            _lists[folder] = json.loads(_list_file(folder).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            _lists[folder] = {}
+    return _lists[folder]
+
+
+def _list(folder: Path, kernel: str, file: str, takes_rows: list[bool]) -> None:
+    """Put a kernel of the engine on the list, if it is not there."""
+    known = _listed(folder)
+    if kernel.startswith("go2_wbc.") and known.get(kernel) != [file, takes_rows]:
+        known[kernel] = [file, takes_rows]  # type: ignore[assignment]
+        with suppress(OSError):
+            _write(_list_file(folder), json.dumps(known).encode())
+
+
+def _list_file(folder: Path) -> Path:
+    return folder / f"{_sources()}.list"
+
+
+@cache
+def _sources() -> str:
+    """A hash of all of the engine's sources, and of what else machine code depends on."""
+    digest = hashlib.sha256(repr(_machine()).encode())
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _write(path: Path, content: bytes) -> None:
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+        file.write(content)
+    Path(file.name).replace(path)
 
 
 _DIGEST = 32
@@ -186,14 +220,16 @@ def cache_root() -> Path:
 
 def fingerprint(routine: Written) -> str:
     """A hash of all that a kernel's machine code depends on."""
-    versions = (platform.python_version(), numba.__version__, np.__version__)
-    processor = (
-        llvmlite.binding.get_host_cpu_name(),
-        str(llvmlite.binding.get_host_cpu_features()),
-    )
-    parts = [repr((versions, processor, str(routine.signature)))]
+    parts = [repr((_machine(), str(routine.signature)))]
     parts += _ingredients(routine.written, set())
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
+
+
+def _machine() -> tuple[str, ...]:
+    """Versions and processor."""
+    binding = llvmlite.binding
+    versions = (platform.python_version(), numba.__version__, np.__version__)
+    return (*versions, binding.get_host_cpu_name(), str(binding.get_host_cpu_features()))
 
 
 def _ingredients(function: Any, seen: set[int]) -> Iterator[str]:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from go2_wbc.compilation import _call_plain, _Kernel
+from go2_wbc.compilation import Kernel, _call_plain
 
 SAME = 1e-9
 """Relative and absolute: libraries of sines differ in the last bit, and sums of their values."""
@@ -16,7 +16,7 @@ def assert_plain_is_compiled(
     kernel: Callable[..., object], *arguments: object, tolerance: float = SAME
 ) -> None:
     """Both ways, each on copies: what is returned and what is filled must be the same."""
-    assert isinstance(kernel, _Kernel)
+    assert isinstance(kernel, Kernel)
     ours, theirs = ([_copied(value) for value in arguments] for _ in range(2))
     given, expected = kernel(*ours), _call_plain(kernel, *theirs)
     pairs = [(given, expected)] if given is not None else []

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.compilation import numbers_of, subroutine
+from go2_wbc.compilation import subroutine
 from go2_wbc.errors import ConfigError, QpInfeasible
-from go2_wbc.records import layout_of
+from go2_wbc.records import layout_of, numbers_of
 from go2_wbc.reference import BodyTarget, Reference, Target
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import is_finite_number
