@@ -50,10 +50,6 @@ class WholeBodyController:
 
     Tasks (weighted least squares) and constraints are described in ``tasks`` and ``constraints``;
     ``backend`` is "condensed" (default), "full" (the same QP without elimination), or "placo".
-
-    Attributes:
-        is_compiled: whether ticks are solved by ``condensed``: with the back end "condensed" and
-            the solver "active_set".
     """
 
     def __init__(
@@ -192,7 +188,7 @@ class WholeBodyController:
             return None
         spent = time.perf_counter() - start
         formulate = partial(self.formulate, snapshot, reference)
-        return WbcSolution.of(decision, spent, self.backend_name, formulate)
+        return WbcSolution.of_row(decision.row, spent, self.backend_name, formulate)
 
     def _extra_rows(self, snapshot: Snapshot, reference: Reference) -> Float[np.ndarray, "k 32"]:
         rows = [task.rows(snapshot, reference) for task in self._extra_tasks]
