@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from go2_wbc.algebra.active_set import SOLVED
+from go2_wbc.algebra.active_set import SOLVED, VIOLATION
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.legs import Leg
 from go2_wbc.reference import LegTask, Reference, Target
@@ -21,7 +21,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.wbc.condensed import Decision, Workspace, solve_condensed
+from go2_wbc.wbc.condensed import Decision, Workspace, is_within, solve_condensed
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.elimination import SINGULAR_DETERMINANT
@@ -279,6 +279,17 @@ def test_the_python_that_is_compiled_gives_the_same(config: WbcConfig) -> None:
             assert plain_solve(*given, Workspace(), found) == outcome
         if outcome == SOLVED:
             np.testing.assert_allclose(found.row, expected.row, atol=PLAIN, rtol=0)
+
+
+@pytest.mark.parametrize("bound", [-30.0, -0.5, 0.0, 0.5, 30.0])
+def test_a_bound_counts_as_met_by_the_active_sets_tolerance(bound: float) -> None:
+    """Stricter, a tick would go the long way for nothing; laxer, it would end beyond its bounds."""
+    slack = VIOLATION * (1.0 + abs(bound))
+    for off, expected in ((0.0, True), (0.9 * slack, True), (1.1 * slack, False)):
+        assert is_within(bound + off, bound - 1.0, bound) is expected
+        assert is_within(bound - off, bound, bound + 1.0) is expected
+    assert not is_within(bound, bound + slack, bound - slack), "no bounds at all"
+    assert not is_within(np.nan, -np.inf, np.inf)
 
 
 def test_residuals_are_those_of_the_readable_problem() -> None:
