@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from types import UnionType
 from typing import TypeVar
@@ -11,6 +12,7 @@ from go2_wbc.config import Config, load_config
 from go2_wbc.errors import CommandError, ConfigError, Go2WbcError
 from go2_wbc.planning.command import finite_number
 from go2_wbc.plant.base import Plant
+from go2_wbc.wbc.tasks import Task
 
 NAMESPACE = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 _Value = TypeVar("_Value")
@@ -27,6 +29,12 @@ def checked(
     if not isinstance(value, kinds):
         raise error(f"{name} must be {what}, got {value!r}")
     return value
+
+
+def tasks(given: Sequence[Task]) -> tuple[Task, ...]:
+    """``given``; raise ConfigError unless all are tasks."""
+    given = checked("extra_tasks", given, list | tuple, "a list of tasks")
+    return tuple(checked("extra_tasks", task, Task, "a list of tasks") for task in given)
 
 
 def pace(realtime: bool, plant: Plant | None) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 
@@ -18,6 +18,7 @@ from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.wbc.controller import WholeBodyController
+from go2_wbc.wbc.tasks import Task
 
 RECORDED_TIME = 240.0
 """Seconds of robot time that the telemetry keeps."""
@@ -33,6 +34,7 @@ class PilotSettings:
         recorded_time: robot time [s] that the telemetry keeps; 0 keeps the last tick.
         description: what the controller takes the robot for; by default the installed Go2.
         after_tick: is called after every tick, in the thread that ticks.
+        extra_tasks: a user's own tasks of the whole-body QP.
     """
 
     realtime: bool = False
@@ -40,6 +42,7 @@ class PilotSettings:
     recorded_time: float = RECORDED_TIME
     description: RobotDescription | None = None
     after_tick: Callable[[], None] = lambda: None
+    extra_tasks: Sequence[Task] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +72,7 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
         settings: by default headless and without realtime.
 
     Raises:
-        ConfigError: for a back end that does not exist.
+        ConfigError: for a back end that does not exist or takes no tasks of a user's own.
         SolverUnavailable: if the configured QP solver is unknown or not installed.
         DescriptionError: if the robot's files are missing, broken, or not a Go2's.
         PlantError: if the plant does not answer, or another pilot drives it.
@@ -80,8 +83,10 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
     with without_collecting():
         load_kernels()
     model = RobotModel(settings.description, motor=config.motor)
-    wbc = WholeBodyController(model, config.backend, config.wbc)
-    dynamic_wbc = WholeBodyController(model, config.backend, config.wbc.for_dynamics)
+    wbc, dynamic_wbc = (
+        WholeBodyController(model, config.backend, numbers, extra_tasks=settings.extra_tasks)
+        for numbers in (config.wbc, config.wbc.for_dynamics)
+    )
     telemetry = Telemetry(model, max(1, round(settings.recorded_time / plant.control_period)))
     payloads = None
     if config.payload.enabled and config.backend != "placo":  # whose robot is PlaCo's own

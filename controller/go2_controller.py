@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
@@ -28,6 +28,7 @@ from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
+from go2_wbc.wbc.tasks import Task
 
 _log = logging.getLogger(__name__)
 
@@ -58,6 +59,7 @@ class GO2Controller:
         config: Config | Path | str | None = None,
         urdf: Path | str | None = None,
         after_tick: Callable[[], None] = lambda: None,
+        extra_tasks: Sequence[Task] = (),
     ) -> None:
         """Take over a robot that lies on the ground, damped.
 
@@ -70,9 +72,11 @@ class GO2Controller:
             urdf: another URDF of the Go2 instead of the installed one: what the controller takes
                 the robot for. Without ``plant`` the simulated robot is built from it, too.
             after_tick: is called after every control period, in the thread that ticks.
+            extra_tasks: tasks of your own in the whole-body QP, beside the built-in ones, whenever
+                it balances the robot. They are asked in the thread that ticks.
 
         Raises:
-            ConfigError: for a namespace or configuration that is not valid, or without
+            ConfigError: for a namespace, configuration or task that is not valid, or without
                 ``realtime`` for a plant that needs it.
             SolverUnavailable: if the configured QP solver is unknown or not installed.
             DescriptionError: if the robot's files are missing, broken, or not a Go2's.
@@ -86,7 +90,11 @@ class GO2Controller:
         urdf = arguments.checked("urdf", urdf, Path | str | None, "a path")
         description = find_description(None if urdf is None else Path(urdf))
         settings = PilotSettings(
-            realtime=realtime, viewer=viewer, description=description, after_tick=after_tick
+            realtime=realtime,
+            viewer=viewer,
+            description=description,
+            after_tick=after_tick,
+            extra_tasks=arguments.tasks(extra_tasks),
         )
         with ExitStack() as opened:
             if plant is None:

@@ -121,7 +121,7 @@ class Record:
         """The numbers that lie in ``row`` already."""
         layout_of(cls)
         record = object.__new__(cls)
-        object.__setattr__(record, "row", row)
+        _set_row(record, row)
         return record
 
     @classmethod
@@ -140,6 +140,9 @@ class Record:
 
     def __repr__(self) -> str:
         return _described(self, layout_of(type(self)))
+
+
+_set_row = vars(Record)["row"].__set__  # of its slot: a record is made in every tick
 
 
 def packed(value: T) -> T:

@@ -32,7 +32,7 @@ from go2_wbc.algebra.linear import solve_linear
 from go2_wbc.algebra.vectors import cross, plus, plus_scaled, put, triple
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.records import V3, Record, packed
-from go2_wbc.robot.joint_friction import JointFriction
+from go2_wbc.robot.joint_friction import JointFriction, friction_torque
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.snapshot import Snapshot
@@ -107,14 +107,12 @@ class PayloadNumbers:
     Attributes:
         config: when anything is felt.
         gravity: [m/s^2].
-        dry, viscous, transition: of the joints' friction, as in ``JointFriction``.
+        friction: what the joints take of the torques.
     """
 
     config: PayloadConfig
     gravity: float
-    dry: Float[np.ndarray, "12"]
-    viscous: Float[np.ndarray, "12"]
-    transition: float
+    friction: JointFriction
 
 
 class PayloadWrench(Record):
@@ -168,8 +166,7 @@ def add_foot(
     J, system = now.J_contacts[leg], np.empty((3, 4))
     for i in range(3):
         n = 3 * leg + i
-        v = now.v[6 + n]
-        taken = c.dry[n] * np.tanh(v / c.transition) + c.viscous[n] * v
+        taken = friction_torque(c.friction, n, now.v[6 + n], 0.0)
         system[i, 3] = needed[6 + n] - tau[n] + taken
         for k in range(3):
             system[i, k] = J[k, 6 + n]
@@ -251,8 +248,7 @@ class PayloadEstimator:
     ) -> None:
         """Feel what ``model`` has not; ``friction`` is what the joints take of the torques."""
         self._config = c = config or PayloadConfig()
-        dry, viscous = np.array(friction.dry), np.array(friction.viscous)
-        self._numbers = packed(PayloadNumbers(c, model.gravity, dry, viscous, friction.transition))
+        self._numbers = packed(PayloadNumbers(c, model.gravity, friction))
         self._mean = PayloadWrench(weight=[0.0, 0.0, model.gravity])
         self._last: RobotState | None = None
         self._since = 0.0

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from typing import cast
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +14,7 @@ from jaxtyping import Float
 from go2_wbc.algebra.active_set import SOLVED
 from go2_wbc.errors import ConfigError, QpInfeasible, unknown_name
 from go2_wbc.records import layout_of, packed
-from go2_wbc.reference import Reference, Target
+from go2_wbc.reference import Reference
 from go2_wbc.robot.joint_friction import FrictionFeedForward
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
@@ -50,10 +50,6 @@ class WholeBodyController:
 
     Tasks (weighted least squares) and constraints are described in ``tasks`` and ``constraints``;
     ``backend`` is "condensed" (default), "full" (the same QP without elimination), or "placo".
-
-    Attributes:
-        is_compiled: whether ticks are solved by ``condensed``: with the back end "condensed" and
-            the solver "active_set".
     """
 
     def __init__(
@@ -90,6 +86,7 @@ class WholeBodyController:
         self._workspace = Workspace()
         self.backend_name = backend
         self._backend = self._make_backend(backend)
+        self._is_compiled = backend == "condensed" and self.config.solver == "active_set"
         if extra_tasks and backend == "placo":
             raise ConfigError("the placo back end has tasks of its own and takes no extra ones")
 
@@ -172,11 +169,11 @@ class WholeBodyController:
     @property
     def is_compiled(self) -> bool:
         """Whether ticks are solved by the compiled kernel: condensed, and by ``active_set``."""
-        return self.backend_name == "condensed" and self.config.solver == "active_set"
+        return self._is_compiled
 
     def solve_compiled(self, snapshot: Snapshot, reference: Reference) -> WbcSolution | None:
         """Solve one tick by the kernel; None if it is not used here or finds no solution."""
-        if not self.is_compiled:
+        if not self._is_compiled:
             return None
         start = time.perf_counter()
         extra = _NO_ROWS
@@ -185,14 +182,14 @@ class WholeBodyController:
             if not np.isfinite(extra).all():
                 return None
         decision = Decision.of(np.empty(_DECISION))
-        target = cast(Target, reference)  # which has the row of one
+        target: Any = reference  # has the row of a ``Target``
         work = self._workspace
         outcome = solve_condensed(snapshot, target, self._numbers, extra, work, decision)
         if outcome != SOLVED:
             return None
         spent = time.perf_counter() - start
         formulate = partial(self.formulate, snapshot, reference)
-        return WbcSolution.of(decision, spent, self.backend_name, formulate)
+        return WbcSolution.of_row(decision.row, spent, self.backend_name, formulate)
 
     def _extra_rows(self, snapshot: Snapshot, reference: Reference) -> Float[np.ndarray, "k 32"]:
         rows = [task.rows(snapshot, reference) for task in self._extra_tasks]

@@ -41,11 +41,13 @@ class WbcSolution:
     is_relaxed: bool = False
 
     @staticmethod
-    def of(
-        decision: Decision, solve_time: float, backend: str, formulate: Callable[[], Problem]
+    def of_row(
+        row: Float[np.ndarray, " size"],
+        solve_time: float,
+        backend: str,
+        formulate: Callable[[], Problem],
     ) -> WbcSolution:
-        """The solution with the arrays of ``decision``."""
-        row = decision.row
+        """The solution whose arrays ``row`` holds (see ``condensed.Decision``)."""
         return WbcSolution(row[_TAU], row[_MOTORS], solve_time, backend, formulate, row[_Z])
 
     @staticmethod

@@ -103,6 +103,7 @@ def test_a_refused_call_is_the_last_outcome() -> None:
 
 WRONG_TYPES = """
 from controller import GO2Controller
+from go2_wbc import Task
 from go2_wbc.errors import CommandError, ConfigError
 
 go2 = GO2Controller()
@@ -119,6 +120,8 @@ calls = {
         lambda: GO2Controller(config={"wbc": {}}), lambda: GO2Controller(plant="robot"),
         lambda: GO2Controller(urdf=3), lambda: GO2Controller(realtime="yes"),
         lambda: GO2Controller(viewer=1), lambda: GO2Controller(urdf=b"go2.urdf"),
+        lambda: GO2Controller(extra_tasks=Task), lambda: GO2Controller(extra_tasks=[Task]),
+        lambda: GO2Controller(extra_tasks=None), lambda: GO2Controller(extra_tasks="tasks"),
     ],
 }
 for kind, refused in calls.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import pytest
 import qpsolvers
 
 from controller import GO2Controller
+from controller.assembly import PilotSettings, build_pilot
 from go2_wbc.config import Config
 from go2_wbc.errors import (
     ClosedError,
@@ -21,10 +22,14 @@ from go2_wbc.errors import (
     SolverUnavailable,
 )
 from go2_wbc.plant import MujocoPlant
+from go2_wbc.reference import Reference
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import MOTORS
+from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.problem import SIZE, Rows
+from go2_wbc.wbc.tasks import Task
 from motions.postures import STAND_HEIGHT
 from tests.controller.plants import WatchedPlant
 
@@ -133,3 +138,53 @@ def test_the_motor_is_the_same_for_robot_controller_and_check(motor: str) -> Non
         models = (go2._runner.loop.model, go2._checker.model)
         for found in (go2._plant.motor, *(model.motor for model in models)):
             assert np.array_equal(found.no_load_speed, expected)
+
+
+# --- tasks of a user's own ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class SteadyTrunk(Task):
+    """Slow the trunk's turning down, and note which robots were asked."""
+
+    asked: list[float] = field(default_factory=list)
+    weight: float = 30.0
+    name: str = "steady trunk"
+    unit: str = "rad/s^2"
+
+    def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
+        self.asked.append(snapshot.state.time)
+        return Rows(np.eye(2, SIZE, 3), -50.0 * snapshot.v[3:5])
+
+
+def pitching(*tasks: Task) -> float:
+    """How fast the trunk pitches at a trot, root mean square [rad/s]."""
+    with GO2Controller(extra_tasks=tasks) as go2:
+        assert go2.stand()
+        go2.walk("trot")
+        go2.move(0.5)
+        go2.wait(3.0)
+        run = go2.recording()
+        return float(np.sqrt(np.mean(run.v[run.time > run.time[-1] - 2.0, 4] ** 2)))
+
+
+def test_a_task_of_ones_own_is_followed_while_the_robot_walks() -> None:
+    task = SteadyTrunk()
+    assert pitching(task) < 0.6 * pitching()
+    assert len(task.asked) > 1500
+
+
+def test_a_task_of_ones_own_is_asked_in_plans_with_few_feet_too(plant: WatchedPlant) -> None:
+    task = SteadyTrunk()
+    built = build_pilot(plant, Config(), PilotSettings(extra_tasks=(task,)))
+    try:
+        loop = built.runner.loop
+        for wbc in (loop.wbc, loop._dynamic_wbc):
+            assert wbc.tasks[-1] is task
+    finally:
+        built.close()
+
+
+def test_placo_takes_no_tasks_of_ones_own(plant: WatchedPlant) -> None:
+    with pytest.raises(ConfigError, match="the placo back end"):
+        GO2Controller(plant=plant, config=Config(backend="placo"), extra_tasks=[SteadyTrunk()])

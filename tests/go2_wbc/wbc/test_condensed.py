@@ -1,19 +1,27 @@
-"""The compiled QP is held to the readable one: same torques, refused where that is refused."""
+"""The compiled QP against the full one, solved by daqp: same torques, refused where that is.
+
+Both take their rows from ``tasks`` and ``constraints``, which are held to finite differences and
+Pinocchio. What is proved here is the elimination, the cost, the bounds in the unknowns and the
+active-set method.
+"""
 
 from __future__ import annotations
 
+import inspect
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
+from go2_wbc.algebra.active_set import SOLVED, VIOLATION
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.legs import Leg
-from go2_wbc.reference import LegTask, Reference
+from go2_wbc.reference import LegTask, Reference, Target
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.wbc.condensed import Decision, Workspace, is_within, solve_condensed
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.elimination import SINGULAR_DETERMINANT
@@ -31,6 +39,7 @@ from tests.engine_helpers import (
 )
 
 AGREEMENT = 1e-6  # [N m] between two solvers; measured 2.3e-8
+PLAIN = 1e-9  # [N, N m, rad/s^2] where the mathematical libraries differ; measured 0
 PULL = 1.0  # [N] of the forces' regularisation on a robot at rest; measured 0.5, 0.06 N m
 COUNT = 1040  # 80 of every contact mode
 FAST_COUNT = 208  # 16 of every contact mode
@@ -229,6 +238,58 @@ def test_tasks_of_a_users_own_are_condensed_along() -> None:
         ours, theirs = compiled.solve(snapshot, reference), readable.solve(snapshot, reference)
         np.testing.assert_allclose(ours.tau, theirs.tau, atol=AGREEMENT, rtol=0)
         assert [row.name for row in ours.residuals] == [row.name for row in theirs.residuals]
+
+
+def test_torques_are_those_of_inverse_dynamics() -> None:
+    model = RobotModel()
+    wbc = WholeBodyController(model)
+    for snapshot, reference in cases(model, 52, seed=28):
+        solution = wbc.solve_compiled(snapshot, reference)
+        if solution is None:
+            continue
+        state = snapshot.state
+        needed = model.inverse_dynamics(state.q, state.v, solution.qdd)
+        pushed = np.einsum("fai,fa->i", snapshot.J_contacts, solution.forces)
+        np.testing.assert_allclose(needed - pushed, [*np.zeros(6), *solution.tau], atol=1e-8)
+
+
+def test_a_tick_leaves_nothing_to_the_next() -> None:
+    """The workspace is kept from tick to tick: what a tick with other legs left is not used."""
+    model = RobotModel()
+    kept = WholeBodyController(model, config=SATURATING)
+    for snapshot, reference in cases(model, 52, seed=34):
+        fresh = WholeBodyController(model, config=SATURATING)
+        ours, theirs = (wbc.solve_compiled(snapshot, reference) for wbc in (kept, fresh))
+        assert (ours is None) == (theirs is None)
+        if ours is not None and theirs is not None:
+            np.testing.assert_array_equal(ours.tau, theirs.tau)
+
+
+@pytest.mark.parametrize("config", [SATURATING, ODD_NUMBERS], ids=["saturating", "odd numbers"])
+def test_the_python_that_is_compiled_gives_the_same(config: WbcConfig) -> None:
+    model, rng = RobotModel(), np.random.default_rng(36)
+    wbc, plain_solve = WholeBodyController(model, config=config), inspect.unwrap(solve_condensed)
+    rows = np.ascontiguousarray(rng.normal(size=(2, SIZE + 2)))
+    for snapshot, plain in cases(model, 13, seed=35):
+        reference = with_planned_forces(plain, rng) if rng.random() < 0.5 else plain
+        target, found, expected = Target.of(reference.row), Decision(), Decision()
+        given = snapshot, target, wbc._numbers, rows
+        outcome = solve_condensed(*given, Workspace(), expected)
+        with np.errstate(all="ignore"):
+            assert plain_solve(*given, Workspace(), found) == outcome
+        if outcome == SOLVED:
+            np.testing.assert_allclose(found.row, expected.row, atol=PLAIN, rtol=0)
+
+
+@pytest.mark.parametrize("bound", [-30.0, -0.5, 0.0, 0.5, 30.0])
+def test_a_bound_counts_as_met_by_the_active_sets_tolerance(bound: float) -> None:
+    """Stricter, a tick would go the long way for nothing; laxer, it would end beyond its bounds."""
+    slack = VIOLATION * (1.0 + abs(bound))
+    for off, expected in ((0.0, True), (0.9 * slack, True), (1.1 * slack, False)):
+        assert is_within(bound + off, bound - 1.0, bound) is expected
+        assert is_within(bound - off, bound, bound + 1.0) is expected
+    assert not is_within(bound, bound + slack, bound - slack), "no bounds at all"
+    assert not is_within(np.nan, -np.inf, np.inf)
 
 
 def test_residuals_are_those_of_the_readable_problem() -> None:

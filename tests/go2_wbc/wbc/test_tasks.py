@@ -10,6 +10,7 @@ import pytest
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import LegTask, Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.rotations import exp_rotation, log_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.loads import plan_loads
@@ -21,6 +22,7 @@ from go2_wbc.wbc.tasks import (
     LegPosture,
     SwingFoot,
     Task,
+    orientation_error,
 )
 from tests.engine_helpers import (
     JO,
@@ -38,6 +40,7 @@ SEEDS = range(12)
 STEP = 1e-5  # [s] of the central differences
 DIFFERENCE = 1e-5  # [m/s^2, rad/s^2] error of a first difference of a velocity; measured 1e-8
 EXACT = 1e-10  # rounding of numbers up to 100
+LOGARITHM = 1e-12  # [rad] measured 7e-15, next to 3 rad
 GAINS = Gains((60.0, 50.0, 40.0), (15.0, 14.0, 13.0))
 KP, KD = GAINS.arrays
 LEGS_OF_ALL_KINDS = (ST, SW, JO, SW)
@@ -105,6 +108,44 @@ def test_body_orientation_compares_the_angular_acceleration_in_base_axes(seed: i
     wanted = R.T @ target.dw_world + KD * (R.T @ (target.w_world - w)) + KP * error
     found = residual(BodyOrientation(KP, KD), snapshot, reference, z)
     np.testing.assert_allclose(found, rate - wanted, atol=DIFFERENCE)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-7, 1e-3, 1.0, 2.9, 2.999, 3.001, 3.1, np.pi - 1e-6])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_attitudes_error_is_the_logarithm_up_to_a_turn_by_pi(seed: int, angle: float) -> None:
+    snapshot, reference, _ = scene(seed)
+    axis = np.random.default_rng(seed).normal(size=3)
+    turn = angle * axis / np.linalg.norm(axis)
+    R_des = snapshot.R_world_base @ exp_rotation(turn)
+    reference = replace(reference, body=replace(reference.body, R_world_base=R_des))
+    error = orientation_error(snapshot, Target.of(reference.row))
+    np.testing.assert_allclose(error, turn, atol=LOGARITHM)
+
+
+def test_a_payload_falls_with_the_robot() -> None:
+    """The CoM's acceleration is that of all mass, under all weight."""
+    bare, reference, z = scene(3)
+    snapshot = MODEL.snapshot(bare.state, Payload(4.0, (0.05, 0.08, 0.1)))
+    target = replace(reference.body, point=TrackedPoint.COM)
+    reference = replace(reference, body=target)
+    z = balanced(snapshot, reference, z)
+    a_com = snapshot.J_com @ z[:18] + snapshot.drift_com
+    wanted = (
+        target.a_world
+        + KD * (target.v_world - snapshot.v_world_com)
+        + KP * (target.p_world - snapshot.p_world_com)
+    )
+    task = BodyPosition(KP, KD, MODEL.mass * MODEL.gravity)
+    np.testing.assert_allclose(residual(task, snapshot, reference, z), a_com - wanted, atol=1e-9)
+
+
+def test_feet_are_asked_to_bear_a_payload_evenly() -> None:
+    bare, reference, z = scene(3)
+    snapshot = MODEL.snapshot(bare.state, Payload(4.0, (0.05, 0.08, 0.1)))
+    reference = replace(reference, legs=(ST, SW, ST, ST))
+    found = residual(ForceRegularisation(160.0), snapshot, reference, z).reshape(3, 3)
+    share = (160.0 + 4.0 * MODEL.gravity) / 3.0
+    np.testing.assert_allclose(found[:, 2], z[[20, 26, 29]] - share, atol=EXACT)
 
 
 @pytest.mark.parametrize("axis", range(3))
