@@ -272,10 +272,11 @@ def test_what_a_leg_tells_is_taken_in_as_by_its_matrices(
     H = np.zeros((7, 27))
     p, v, theta, own = (slice(n, n + 3) for n in (0, VELOCITY, THETA, FEET + 3 * leg))
     H[:3, p], H[:3, theta], H[:3, own] = -one, pin.skew(foot.place), one
-    H[3:6, v], H[3:6, theta], H[6, own.stop - 1] = one, -pin.skew(f.x.v), 1.0
+    H[3:6, v], H[3:6, theta], H[6, own.stop - 1] = one, pin.skew(f.x.v), 1.0
     off = np.concatenate([foot.place - f.x.p_feet[leg] + f.x.p, foot.velocity - f.x.v, [0.013]])
     told = np.repeat([True, stands, settled], [3, 3, 1])
-    H, off, noise = H[told], off[told], np.array([*[C.place**2] * 3, *variance, C.height**2])[told]
+    noise = np.array([*[C.place**2] * 3, *variance, C.height**2])
+    H, off, noise = H[told], off[told], noise[told]
     K = f.P @ H.T @ np.linalg.inv(H @ f.P @ H.T + np.diag(noise))
     error, P = K @ off, f.P - K @ H @ f.P
     take_in_leg(f, foot, leg, C)
