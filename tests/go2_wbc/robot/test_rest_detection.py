@@ -256,11 +256,11 @@ def test_who_is_shaken_is_not_found_yet(shaken: dict) -> None:
 @pytest.mark.parametrize("is_carried", [False, True])
 def test_rest_tells_the_velocity_and_of_who_lies_the_gyros_bias(*, is_carried: bool) -> None:
     f, (_, _, taken) = Filter(), read(gyro=0.2)
-    f.P[:], f.x.v[:] = np.eye(27), (0.1, -0.2, 0.3)
+    f.P[:], f.x.v[:], f.x.gyro_bias[:] = np.eye(27), (0.1, -0.2, 0.3), 0.05
     take_in_rest(f, taken, is_carried, C)
     velocity, biases = slice(VELOCITY, VELOCITY + 3), slice(GYRO_BIAS, GYRO_BIAS + 3)
     np.testing.assert_allclose(f.error[velocity], -f.x.v / (1.0 + C.still_velocity**2))
-    told = 0.0 if is_carried else taken.gyro / (1.0 + C.still_gyro**2)
+    told = 0.0 if is_carried else (taken.gyro - 0.05) / (1.0 + C.still_gyro**2)
     np.testing.assert_allclose(f.error[biases], told)
     variance = 1.0 if is_carried else 1.0 - 1.0 / (1.0 + C.still_gyro**2)
     np.testing.assert_allclose(np.diag(f.P)[biases], variance)
