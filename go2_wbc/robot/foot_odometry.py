@@ -1,11 +1,12 @@
 """What a leg tells the state estimator: where its foot is, how fast the trunk, how high the ground.
 
 With s_i the place of the foot's centre from the IMU along the world's axes by the leg's kinematics,
-and m_i the velocity that the IMU has if the foot rolls (rows of the error as in ``state_filter``):
+and m_i the velocity that the IMU has if the foot rolls (innovation and h as in ``state_filter``):
 
-    place      f_i - p - theta x s_i = s_i       r = place^2
-    velocity   v + theta x v = m_i               r = k ((velocity / trust)^2 + slip^2 + creep^2)
-    height     f_i,z = that of the ground        r = height^2, once, when the foot has come down
+    place      s_i - (f_i - p) = df_i - dp - theta x s_i     r = place^2
+    velocity   m_i - v = dv - theta x v                      r = k ((velocity / trust)^2 + slip^2
+                                                                    + creep^2)
+    height     ground - f_i,z = df_i,z                       r = height^2, once after touchdown
 
 A turn of the estimate turns a leg's velocity with it, by theta x v. trust grows from 0 to 1 between
 ``contact_force`` and ``trusted_force``, slip decays after touchdown, creep grows with the foot's

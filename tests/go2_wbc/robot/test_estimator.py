@@ -18,7 +18,7 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.state import JointCommand, RobotState
-from go2_wbc.robot.state_filter import GYRO_BIAS, EstimateError
+from go2_wbc.robot.state_filter import FEET, GYRO_BIAS, EstimateError
 from tests.engine_helpers import STAND_JOINTS
 
 # m/s; of the estimate while trotting at 0.5 m/s. A foot taken for a point that does not roll would
@@ -317,6 +317,22 @@ def test_feet_that_stay_tell_the_bias_of_the_gyro_of_one_that_dances() -> None:
     kept, yaw = estimator.save()["state"].filter, GYRO_BIAS + 2
     assert kept.x.gyro_bias[2] == pytest.approx(bias, abs=LEARNT_BAR)
     assert np.sqrt(kept.P[yaw, yaw]) < LEARNT_BAR
+
+
+def test_after_a_pause_the_filter_begins_at_rest_with_the_biases_that_it_knew() -> None:
+    estimator, config = StateEstimator(RobotModel()), EstimatorConfig()
+    estimator.update(reading(0.0))
+    saved = estimator.save()
+    kept, biases = saved["state"].filter, slice(GYRO_BIAS, FEET)
+    first = [config.gyro_bias] * 3 + [config.accelerometer_bias] * 3
+    np.testing.assert_allclose(np.sqrt(np.diag(kept.P)[biases]), first)
+    kept.x.force_bias[:], kept.P[GYRO_BIAS, GYRO_BIAS] = (0.5, -0.4, 0.1), 1e-8
+    estimator.restore(saved)
+    felt = replace(reading(1.0), accelerometer=np.array([0.5, -0.4, 9.81 + 0.1]))
+    state, kept = estimator.update(felt), estimator.save()["state"].filter
+    assert state.tilt < 1e-6
+    assert kept.x.force_bias == pytest.approx([0.5, -0.4, 0.1], abs=1e-6)
+    assert np.sqrt(np.diag(kept.P)[biases]) == pytest.approx([1e-4, *first[1:]], rel=1e-3)
 
 
 def test_numbers_must_be_positive() -> None:

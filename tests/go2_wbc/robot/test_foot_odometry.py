@@ -24,12 +24,13 @@ from go2_wbc.robot.foot_odometry import (
     see_foot,
     see_ground,
     slip_factor,
+    take_in_leg,
 )
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from go2_wbc.robot.state import RobotState
-from go2_wbc.robot.state_filter import FEET, VELOCITY, Filter
+from go2_wbc.robot.state_filter import FEET, THETA, VELOCITY, Filter
 from tests.engine_helpers import STAND_JOINTS, state_of
 
 TICK, COUNT = 0.002, 700  # s; of readings
@@ -254,3 +255,30 @@ def test_the_ground_is_looked_at_once_when_a_foot_has_settled(
     see_ground(f, foot, 1, force, before * C.touchdown_time, radius, level, C)
     ground = 0.024 - radius + C.compliance * force
     assert foot.height_off == (pytest.approx(0.004 - ground) if looks else np.inf)
+
+
+@pytest.mark.parametrize(("stands", "settled"), [(True, True), (True, False), (False, True)])
+@pytest.mark.parametrize("leg", LEGS)
+def test_what_a_leg_tells_is_taken_in_as_by_its_matrices(
+    leg: Leg, *, stands: bool, settled: bool
+) -> None:
+    rng, f, one = np.random.default_rng(3), Filter(), np.eye(3)
+    f.x.row[:] = rng.normal(size=len(f.x.row))
+    root = rng.normal(size=(27, 27))
+    f.P[:] = root @ root.T / 27
+    variance = [0.01, 0.02, 0.4] if stands else [0.0, 0.0, 0.0]
+    foot = Foot(place=rng.normal(size=3), velocity=rng.normal(size=3), variance=variance)
+    foot.height_off = 0.013 if settled else np.inf
+    H = np.zeros((7, 27))
+    p, v, theta, own = (slice(n, n + 3) for n in (0, VELOCITY, THETA, FEET + 3 * leg))
+    H[:3, p], H[:3, theta], H[:3, own] = -one, pin.skew(foot.place), one
+    H[3:6, v], H[3:6, theta], H[6, own.stop - 1] = one, pin.skew(f.x.v), 1.0
+    off = np.concatenate([foot.place - f.x.p_feet[leg] + f.x.p, foot.velocity - f.x.v, [0.013]])
+    told = np.repeat([True, stands, settled], [3, 3, 1])
+    noise = np.array([*[C.place**2] * 3, *variance, C.height**2])
+    H, off, noise = H[told], off[told], noise[told]
+    K = f.P @ H.T @ np.linalg.inv(H @ f.P @ H.T + np.diag(noise))
+    error, P = K @ off, f.P - K @ H @ f.P
+    take_in_leg(f, foot, leg, C)
+    np.testing.assert_allclose(f.error, error, atol=1e-8)
+    np.testing.assert_allclose(f.P, P, atol=1e-8)

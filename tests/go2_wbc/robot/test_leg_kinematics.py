@@ -186,6 +186,18 @@ def test_a_control_loop_need_not_wait_for_the_check_of_a_long_motion(
     assert kernel.compiled.targetoptions["nogil"]  # type: ignore[attr-defined]
 
 
+def test_a_settled_trunk_stands_on_its_feet(model: RobotModel) -> None:
+    p, joints, feet = np.array([[0.01, 0.02, 0.28]]), np.zeros((1, 12)), model.p_base_feet_nominal
+    wanted, miss, com = p.copy(), np.empty((1, 4)), np.empty((1, 3))
+    given = (np.array([True]), np.zeros((1, 4), dtype=bool), np.eye(3)[None], feet[None].copy())
+    settle(wanted, *given, leg_table(model), link_table(model), 9, p, joints, miss, com)
+    found = model.forward_kinematics(np.concatenate([p[0], [0.0, 0.0, 0.0, 1.0], joints[0]]))
+    assert com[0] == pytest.approx(found[0], abs=EXACT)
+    assert com[0] == pytest.approx(wanted[0], abs=1e-6)
+    assert found[1] == pytest.approx(feet, abs=EXACT)
+    assert miss.max() == 0.0
+
+
 def test_compiled_is_plain(model: RobotModel) -> None:
     rng = np.random.default_rng(4)
     geometry, n = LegGeometry.of(model, Leg.RL), 20

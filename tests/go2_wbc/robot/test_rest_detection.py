@@ -217,6 +217,7 @@ def test_who_was_down_is_upset_for_a_second(*, tilt: float, is_lying: bool, is_d
         ({}, KNOWN),
         ({"speed": 0.49}, KNOWN),
         ({"speed": 0.51}, LOST),
+        ({"speed": 0.51, "rate": 0.99 * C.still_joints}, LOST),
         ({"speed": 0.51, "rate": 1.01 * C.still_joints}, KNOWN),
         ({"over": np.radians(14.5)}, KNOWN),
         ({"over": np.radians(15.5)}, LOST),
@@ -244,23 +245,33 @@ def test_when_an_estimate_begins_anew(*, what: dict, found: int) -> None:
     assert (rest.lost_time == 0.0) == (found == KNOWN)
 
 
-@pytest.mark.parametrize("shaken", [{"gyro": 1.01 * C.still_turning}, {"force": G + 0.7}])
-def test_who_is_shaken_is_not_found_yet(shaken: dict) -> None:
-    x, rest, taken = read(**shaken)
+@pytest.mark.parametrize(
+    ("gyro", "force", "way"),
+    [
+        (1.01 * C.still_turning, G, -1),
+        (-1.01 * C.still_turning, G, -1),
+        (-0.99 * C.still_turning, G, 1),
+        (0.0, G + 1.01 * C.still_force, -1),
+        (0.0, G - 1.01 * C.still_force, -1),
+        (0.0, G + 0.99 * C.still_force, 1),
+    ],
+)
+def test_who_is_shaken_is_found_later(gyro: float, force: float, way: int) -> None:
+    x, rest, taken = read(gyro, force)
     x.v[0], rest.lost_time = 1.0, C.still_time + 10 * DT
-    taken.gyro[:] -= x.gyro_bias
+    taken.gyro[:], taken.accelerometer[:] = (0.0, gyro, 0.0), (0.0, 0.0, force)
     assert begin_anew(x, rest, taken, np.eye(3), G, C) == LOST
-    assert rest.lost_time == pytest.approx(C.still_time + 9 * DT)
+    assert rest.lost_time == pytest.approx(C.still_time + (10 + way) * DT)
 
 
 @pytest.mark.parametrize("is_carried", [False, True])
 def test_rest_tells_the_velocity_and_of_who_lies_the_gyros_bias(*, is_carried: bool) -> None:
     f, (_, _, taken) = Filter(), read(gyro=0.2)
-    f.P[:], f.x.v[:] = np.eye(27), (0.1, -0.2, 0.3)
+    f.P[:], f.x.v[:], f.x.gyro_bias[:] = np.eye(27), (0.1, -0.2, 0.3), 0.05
     take_in_rest(f, taken, is_carried, C)
     velocity, biases = slice(VELOCITY, VELOCITY + 3), slice(GYRO_BIAS, GYRO_BIAS + 3)
     np.testing.assert_allclose(f.error[velocity], -f.x.v / (1.0 + C.still_velocity**2))
-    told = 0.0 if is_carried else taken.gyro / (1.0 + C.still_gyro**2)
+    told = 0.0 if is_carried else (taken.gyro - 0.05) / (1.0 + C.still_gyro**2)
     np.testing.assert_allclose(f.error[biases], told)
     variance = 1.0 if is_carried else 1.0 - 1.0 / (1.0 + C.still_gyro**2)
     np.testing.assert_allclose(np.diag(f.P)[biases], variance)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.legs import JOINT_NAMES
-from go2_wbc.plant.mujoco.layout import FOREIGN, ROBOT_BINS, bin_forces, read_joints
+from go2_wbc.plant.mujoco.layout import FOREIGN, LIMB_BIN, ROBOT_BINS, bin_forces, read_joints
 from go2_wbc.plant.mujoco.plant import MujocoPlant
 from go2_wbc.plant.terrain import Boxes
 from tests.compiled import assert_plain_is_compiled
@@ -81,3 +81,18 @@ def test_joints_and_base_are_where_mujoco_says() -> None:
             np.testing.assert_allclose(v, expected_v, atol=1e-12)
             np.testing.assert_allclose(v, state.v, atol=1e-12)
             assert_plain_is_compiled(read_joints, *given, q, v)
+
+
+@pytest.mark.parametrize(
+    ("is_elliptic", "force"), [(True, 10.0), (False, 10.0 + 11.0 + 12.0 + 13.0)]
+)
+def test_contacts_without_a_bin_or_a_force_are_passed_over(
+    *, is_elliptic: bool, force: float
+) -> None:
+    codes = np.array([1, LIMB_BIN, FOREIGN, FOREIGN])
+    geoms = np.array([[0, 1], [2, 3], [0, 2], [3, 0]], dtype=np.int32)  # both robot's, none, ...
+    addresses = np.array([0, 0, -1, 10], dtype=np.int32)
+    dimensions, forces = np.full(4, 3, dtype=np.int32), np.empty(ROBOT_BINS)
+    given = (geoms, addresses, dimensions, np.arange(20.0), codes, is_elliptic)
+    bin_forces(*given, forces)
+    assert forces.tolist() == [0.0, force, 0.0, 0.0, 0.0, 0.0]
