@@ -21,6 +21,7 @@ from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ClosedError, CommandError
 from go2_wbc.legs import front_leg
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.planning.pose import BodyPose
 from go2_wbc.plant import MujocoPlant, Plant
@@ -263,14 +264,23 @@ class GO2Controller:
             MotionInfeasible: if the motion breaks a limit of the robot; carries the findings.
         """
         self._check_open()
-        with self._planning:  # one thread at a time
-            plan = self._checker.plan(motion, check=check)
+        plan = self.prepare(motion, check=check)
+        with self._planning:
             departed = self._checker.departure(plan)
 
         def play() -> Measurements:
             return {**self._pilot.play(plan, allow_dynamic=allow_dynamic), **departed}
 
         return self._call("play", play)
+
+    def prepare(self, motion: motions.Playable, *, check: bool = True) -> MotionPlan:
+        """What ``play`` plays: compiled, and checked, for this robot. Any thread may call it.
+
+        Raises:
+            CommandError, TimelineError, MotionFileError, MotionInfeasible: see ``play``.
+        """
+        with self._planning:  # one thread at a time
+            return self._checker.plan(motion, check=check)
 
     def cancel(self) -> None:
         """From another thread or the plant: leave the motion that plays, safely, and stand.

@@ -190,7 +190,7 @@ class HeldFeet:
         found, is_low = dict(measured), False
         for foot, heights in zip(self._held, self._heights, strict=True):
             where = f" in {foot.name}" if len(self._held) > 1 else ""
-            found[f"planned paw height{where} [m]"] = foot.height
+            found[f"planned paw height{where} [m]"] = round(foot.height, 9)  # of a curve
             found[f"least paw height{where} [m]"] = min(heights)
             found[f"mean paw height{where} [m]"] = fmean(heights)
             is_low = is_low or fmean(heights) < foot.height - PAW_TOLERANCE

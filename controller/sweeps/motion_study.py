@@ -18,7 +18,6 @@ from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, TrialFailed, TrialR
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.motion_plan import Posture
 from go2_wbc.plant import MujocoPlant, plant_in_world
-from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
 from motions import CompiledPlan, load_plan, save_plan
 
@@ -36,11 +35,6 @@ def plan_of(archive: bytes) -> CompiledPlan:
         file = Path(folder, "swept.plan")
         file.write_bytes(archive)
         return load_plan(file)
-
-
-@cache
-def _model() -> RobotModel:
-    return RobotModel()
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +83,7 @@ class MotionStudy:
     def _played(self, robot: TrialRobot) -> MotionMeasurement:
         plan, go2 = plan_of(self.archive), robot.go2
         robot.require(go2.sit() if plan.entry is Posture.SIT else go2.stand())
-        return measure_motion(go2, robot.truth, plan, _model())
+        return measure_motion(go2, robot.truth, plan, robot.model)
 
 
 _NOTHING = MotionMeasurement(

@@ -56,11 +56,10 @@ def replay(path: Path | str, seed: int) -> Replay:
         raise CommandError(f"{path} has no row of seed {seed}; it has {seeds}")
     study = MotionStudy(archive, world_of(str(about["world"])))
     world, plant = study.drawn(seed)
-    checker = FeasibilityChecker()
-    checked = checker.evaluate(plan_of(archive))
     with TrialRobot(plant) as robot:
+        checked = FeasibilityChecker(robot.model).evaluate(plan_of(archive))
         row = {SEED: seed, **study.row(world, robot)}
-        content = performed(checked, robot.go2.recording(), checker.model)
+        content = performed(checked, robot.go2.recording(), robot.model)
     return Replay(
         title=f"{about.get('what')}, seed {seed}",
         row=row,

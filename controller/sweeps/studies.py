@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.planning.command import VelocityCommand
-from go2_wbc.robot.model import RobotModel
 
 START_TIME = 1.5
 """Time [s] after a command that is left out: the ramp takes 0.7 s, settling the rest."""
@@ -29,11 +27,6 @@ RECOVERY_TIME = 2.0
 """Time [s] after a push until the robot is looked at."""
 _STREAM = 1
 """Keeps the numbers of a push apart from those of the robot and its world."""
-
-
-@cache
-def _model() -> RobotModel:
-    return RobotModel()
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +71,7 @@ class GaitStudy:
             "side_error": float(left.mean()) - self.command.linear_y,
             "turn_error": float(turned) - self.command.angular_z,
             "speed_ripple": float(ahead.std()),
-            "torque": float(recorded.torque_shares(_model()).max()),
+            "torque": float(recorded.torque_shares(robot.model).max()),
         }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from jaxtyping import Float
@@ -13,6 +14,7 @@ from controller.modes import Mode
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 
 FRICTION_RANGE = (0.5, 1.0)
@@ -75,6 +77,11 @@ class Trial:
         )
 
 
+@cache
+def _model(motor: str) -> RobotModel:
+    return RobotModel(motor=motor)
+
+
 class TrialRobot:
     """A robot on trial, lying at first: calls succeed, or ``TrialFailed`` is raised.
 
@@ -89,6 +96,12 @@ class TrialRobot:
         self.plant = trial.plant() if isinstance(trial, Trial) else trial
         self.truth = GroundTruth(self.plant)
         self.go2 = GO2Controller(plant=self.truth, config=config)
+        self._motor = (config or Config()).motor
+
+    @property
+    def model(self) -> RobotModel:
+        """What the controller takes the robot for, for those who plan and judge."""
+        return _model(self._motor)
 
     def close(self) -> None:
         """End the robot; idempotent."""

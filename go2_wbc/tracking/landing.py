@@ -2,18 +2,18 @@
 
 What becomes of a foot that steps, from tick to tick:
 
-| it is  | the plan asks for       | contact | it will be   | and is asked to             |
-|--------|-------------------------|---------|--------------|-----------------------------|
-| down   | stance                  | any     | down         | stand                       |
-| down   | swing, as of now        | any     | in the air   | swing as planned            |
-| down   | swing, still            | any     | down         | stand: it has landed early  |
-| in air | swing, less than 60 %   | any     | in the air   | swing as planned            |
-| in air | swing, 60 % and more    | no      | in the air   | swing as planned            |
-| in air | swing, 60 % and more    | yes     | down         | stand                       |
-| in air | stance                  | yes     | down         | stand                       |
-| in air | stance, for up to 0.2 s | no      | in the air   | swing, pressed downwards    |
-| in air | stance, for longer      | no      | down         | stand; counted as missed    |
-| any    | joints                  | any     | down         | follow its joints           |
+    | it is  | the plan asks for       | contact | it will be   | and is asked to             |
+    |--------|-------------------------|---------|--------------|-----------------------------|
+    | down   | stance                  | any     | down         | stand                       |
+    | down   | swing, as of now        | any     | in the air   | swing as planned            |
+    | down   | swing, still            | any     | down         | stand: it has landed early  |
+    | in air | swing, less than 60 %   | any     | in the air   | swing as planned            |
+    | in air | swing, 60 % and more    | no      | in the air   | swing as planned            |
+    | in air | swing, 60 % and more    | yes     | down         | stand                       |
+    | in air | stance                  | yes     | down         | stand                       |
+    | in air | stance, for up to 0.2 s | no      | in the air   | swing, pressed downwards    |
+    | in air | stance, for longer      | no      | down         | stand; counted as missed    |
+    | any    | joints                  | any     | down         | follow its joints           |
 
 - A foot that went on towards its place after it met the ground would push against it. The plan's
   time is not changed by an early landing, so that a beat stays one.

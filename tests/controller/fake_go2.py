@@ -12,10 +12,11 @@ from controller.modes import Mode, Outcome
 from controller.telemetry import Telemetry
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import Go2WbcError, ModeError
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
-from motions import CompiledPlan
+from motions import CompiledPlan, FeasibilityChecker, Playable
 from motions.postures import SIT_POSE, STAND_HEIGHT
 
 PERIOD = 0.01
@@ -99,6 +100,9 @@ class FakeGo2(GO2Controller):
     ) -> bool:
         self._pass(0.5, is_raised=True)
         return self._do("high_five", Mode.STANDING, RAISED)
+
+    def prepare(self, motion: Playable, *, check: bool = True) -> MotionPlan:
+        return FeasibilityChecker().plan(motion, check=check)
 
     @property
     def mode(self) -> Mode:

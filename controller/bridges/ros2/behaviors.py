@@ -10,7 +10,7 @@ from controller.modes import Mode
 from controller.procedures import Aborted, Measurements
 from go2_wbc.errors import Go2WbcError, unknown_name
 from go2_wbc.motion_plan import MotionPlan, Posture
-from motions import FeasibilityChecker, find_motion
+from motions import find_motion
 from motions.authoring import parse_values
 
 STOP, DAMP = "stop", "damp"
@@ -86,8 +86,7 @@ def motion_job(motion: str, settings: Sequence[str], go2: GO2Controller, reply: 
     plans: list[MotionPlan] = []
 
     def prepare() -> None:
-        timeline = find_motion(motion)(**parse_values(settings))
-        plans.append(FeasibilityChecker().plan(timeline))
+        plans.append(go2.prepare(find_motion(motion)(**parse_values(settings))))
 
     def play(job: Job) -> bool:
         (plan,) = plans

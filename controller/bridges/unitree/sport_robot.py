@@ -83,7 +83,8 @@ class SportRobot:
     def __init__(self, plant: Plant, config: Config) -> None:
         """Take over a robot that lies on the ground."""
         self._config = config = config.beside_hardware
-        self._checker = FeasibilityChecker()  # with a model of its own: the loop is another thread
+        # With a model of its own: the loop is another thread.
+        self._checker = FeasibilityChecker(RobotModel(motor=config.motor))
         plans = playable_plans(self._checker.model)
         walks = {api: name for api, name in WALKS.items() if name in GAITS}
         self.unsupported = (MOTIONS.keys() | WALKS.keys()) - plans.keys() - walks.keys()

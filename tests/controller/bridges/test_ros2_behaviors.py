@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import pytest
 
 from controller.bridges.ros2.behaviors import COMMANDS, Jobs, motion_job, order
@@ -19,10 +20,15 @@ from controller.go2_controller import GO2Controller
 from controller.jobs import Answer, JobServer
 from controller.modes import Mode
 from controller.pacing import LogThrottle
+from go2_wbc.config import Config
 from go2_wbc.errors import CommandError, ModeError
+from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import quaternion_from_rpy
+from motions import FeasibilityChecker, Playable
 from motions.authoring import parse_values
 from motions.feasibility.report import FeasibilityReport
 from motions.plan.timeline_compiler import compile_timeline
@@ -130,6 +136,22 @@ def test_a_motion_is_prepared_beside_the_loop_and_played_from_lying() -> None:
         answer = played(go2, "nod", "times=1")
         assert answer.success, answer.message
         assert go2.mode is Mode.STANDING
+
+
+def test_a_motion_is_prepared_for_the_robot_that_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
+    # It was compiled and checked for the installed Go2, whatever its motors were taken for.
+    models: list[RobotModel] = []
+    plan = FeasibilityChecker.plan
+
+    def noted(checker: FeasibilityChecker, motion: Playable, *, check: bool = True) -> MotionPlan:
+        models.append(checker.model)
+        return plan(checker, motion, check=check)
+
+    monkeypatch.setattr(FeasibilityChecker, "plan", noted)
+    plant = WatchedPlant(MujocoPlant(motor="ideal"))
+    with GO2Controller(plant=plant, config=Config(motor="ideal")) as go2:
+        assert played(go2, "nod", "times=1").success
+    assert [np.isinf(model.motor.no_load_speed).all() for model in models] == [True, True]
 
 
 def test_a_high_five_is_compiled_and_checked_once(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,6 +18,7 @@ from go2_wbc.tracking.landing import (
     PRESS_SPEED,
     TIME_OUT,
     Landing,
+    carry,
     land,
 )
 from go2_wbc.tracking.plan_curves import StanceLoad
@@ -303,3 +304,27 @@ def test_a_leg_that_follows_its_joints_forgets_its_landing() -> None:
     assert s.feet[3].touchdown == -np.inf
     assert not s.feet[3].is_awaited
     assert tick(s, 3, ST, 0.0, np.inf, contact=False).normal_force_max[3] == 400.0, "as planned"
+
+
+@pytest.mark.parametrize("away", [0.5 * NEAR, 1.5 * NEAR, 10.0 * NEAR])
+def test_in_flight_body_feet_and_plan_move_as_one_and_what_is_left_is_near(away: float) -> None:
+    rng, now = np.random.default_rng(4), MODEL.snapshot(state_of(standing_q()))
+    now = now.replaced(v_world_com=rng.normal(size=3))
+    s, direction = Landing.at(Anchor(rng.normal(size=3), 0.0)), np.array([0.6, -0.8, 0.0])
+    off, feet = -away * direction + [0.0, 0.0, 0.3], rng.normal(size=(2, 4, 3))
+    planned = Target(
+        p_world=now.p_world_com + off,
+        v_world=rng.normal(size=3),
+        p_world_feet=feet[0],
+        v_world_feet=feet[1],
+    )
+    target = Target.of(planned.row.copy())
+    carry(now, s, target)
+    moved = max(away - NEAR, 0.0) * direction
+    np.testing.assert_allclose(target.p_world - planned.p_world, moved, atol=1e-12)
+    np.testing.assert_allclose(s.anchor.p_world - s.origin.p_world, moved, atol=1e-12)
+    np.testing.assert_allclose(target.p_world_feet - feet[0], np.tile(moved, (4, 1)), atol=1e-12)
+    share = max(1.0 - NEAR / away, 0.0) * np.array([1.0, 1.0, 0.0])
+    faster = share * (now.v_world_com - planned.v_world)
+    np.testing.assert_allclose(target.v_world_feet - feet[1], np.tile(faster, (4, 1)), atol=1e-12)
+    np.testing.assert_array_equal(target.v_world, planned.v_world)

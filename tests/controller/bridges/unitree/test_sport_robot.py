@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.pose import LEVEL, BodyPose
 from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.model import RobotModel
 from tests.controller.plants import HANG_GUARD
 
 PUSH, PUSH_TIME = 300.0, 0.1  # N, s: feet in place do not hold it
@@ -40,6 +42,16 @@ def robot(plant: MujocoPlant, monkeypatch: pytest.MonkeyPatch) -> Iterator[Sport
     robot.perform(Api.BALANCE_STAND)
     yield robot
     robot.close()
+
+
+def test_motions_are_for_the_motors_that_are_driven(
+    plant: MujocoPlant, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    models: list[RobotModel] = []
+    monkeypatch.setattr(sport_robot, "playable_plans", lambda model: models.append(model) or {})
+    with closing(SportRobot(plant, Config(motor="ideal"))) as robot:
+        models.append(robot._checker.model)
+    assert [np.isinf(model.motor.no_load_speed).all() for model in models] == [True, True]
 
 
 def test_a_lean_waits_for_steps_for_balance(robot: SportRobot, plant: MujocoPlant) -> None:
