@@ -13,9 +13,8 @@ import motions  # what is named motions.X below is imported when it is used, sci
 from controller import arguments
 from controller.assembly import PilotSettings, build_pilot
 from controller.calls import Calls
-from controller.modes import Mode, Outcome
+from controller.modes import Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
-from controller.procedures import Measurements
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar, final, runtime_checkable
 
-from controller.procedures import Aborted, Measurements, listed
+from controller.modes import Aborted, Measurements, listed
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.robot.state import RobotState
 

@@ -13,8 +13,7 @@ from typing import final
 from controller.gamepad import PadReading
 from controller.go2_controller import GO2Controller
 from controller.jobs import Answer, Job, JobServer
-from controller.modes import Mode
-from controller.procedures import Aborted, Measurements
+from controller.modes import Aborted, Measurements, Mode
 from go2_wbc.errors import ClosedError, Go2WbcError
 from go2_wbc.planning.command import VelocityCommand
 

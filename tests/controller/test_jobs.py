@@ -10,7 +10,7 @@ import pytest
 
 from controller import jobs
 from controller.jobs import Answer, Job, JobServer
-from controller.procedures import Aborted, Measurements
+from controller.modes import Aborted, Measurements
 from go2_wbc.errors import ModeError
 from tests.controller.job_clients import Client, Clock, Robot, failing, now
 from tests.controller.plants import HANG_GUARD, in_thread
