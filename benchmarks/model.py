@@ -184,7 +184,7 @@ def _exercise(pilot: Pilot, plant: MujocoPlant) -> None:
     pilot.rest()
     pilot.stand()
     plan = compile_timeline(load_motion("high_five", hold=1.0), RobotModel())
-    pilot.high_five(plan)
+    pilot.play(plan)
     pilot.sit()
 
 

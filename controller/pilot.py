@@ -253,8 +253,15 @@ class Pilot:
 
     # --- motions --------------------------------------------------------------------------
 
-    def play(self, plan: MotionPlan, *, allow_dynamic: bool = False) -> Measurements:
+    def play(
+        self, plan: MotionPlan, *, allow_dynamic: bool = False, stands_up: bool = False
+    ) -> Measurements:
         """Play ``plan``, and measure whether it was done.
+
+        Args:
+            plan: the motion.
+            allow_dynamic: let also a plant that may be a robot play a dynamic plan.
+            stands_up: stand before, from any mode but fallen.
 
         Raises:
             DynamicMotionRefused: if the plan is dynamic, the plant may be a robot, and the caller
@@ -262,6 +269,8 @@ class Pilot:
             StanceMismatch: if the plan starts from another stance.
         """
         plant = self._loop.plant
+        if stands_up:
+            self._ensure_standing()
         if not allow_dynamic:
             _refuse_dynamic_on_hardware(plan, plant)
         self._meet_entry(plan)
@@ -307,11 +316,6 @@ class Pilot:
             )
         if plan.entry is Posture.STAND:
             self.square_up()
-
-    def high_five(self, plan: MotionPlan) -> Measurements:
-        """Give a high five, from any mode but fallen."""
-        self._ensure_standing()
-        return self.play(plan)
 
     def square_up(self) -> None:
         """Stand with the feet below the hips, stepping in place if need be."""
