@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Float
 
-from controller.behaviours.base import Behaviour
+from controller.behaviours import Behaviour
 from controller.behaviours.joints import Damped, ServoJoints
 from controller.checks import unfolded_legs
 from controller.loop import ControlLoop

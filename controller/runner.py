@@ -15,11 +15,10 @@ from contextlib import suppress
 from typing import NoReturn, TypeVar
 from weakref import WeakValueDictionary
 
-from controller.background_log import BackgroundLog
-from controller.behaviours.base import Behaviour
+from controller.behaviours import Behaviour
 from controller.behaviours.standing import Standing
 from controller.checks import is_standing, posture_measurements
-from controller.errands import NOT_YET, Errands, LoopEnded, LoopHangs, Pending
+from controller.errands import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pending
 from controller.loop import ControlLoop, Fault
 from controller.modes import Aborted, Measurements, listed
 from controller.pacing import Pacer
