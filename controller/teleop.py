@@ -151,7 +151,7 @@ class Teleop:
 
         def tell(answer: Answer) -> None:
             if not isinstance(answer.error, ClosedError):
-                self._news.put(f"{label}: {'done' if answer.success else answer.message}")
+                self._news.put(f"{label}: {'done' if answer.ok else answer.reason}")
             self._doing = ""
 
         self._jobs.submit(Job(label, perform, tell))

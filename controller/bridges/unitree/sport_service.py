@@ -311,7 +311,7 @@ _MODE_OF_STATE: Final = {
 
 
 def _code_of(answer: Answer) -> Code:
-    if answer.success:
+    if answer.ok:
         return Code.OK
     if answer.is_refused:
         return Code.NOT_READY
