@@ -18,7 +18,7 @@ import numpy as np
 from benchmarks.command import add_sweep, positive, publish, run_sweep
 from benchmarks.probability_runs import NOT_READY, exam, model, played, world_of
 from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.motion_outcome import FELL
+from controller.motion_failures import FELL
 from controller.sweeps.rows import Row
 from controller.sweeps.summary import rate_interval
 from go2_wbc.motion_plan import MotionPlan, Posture

@@ -46,7 +46,7 @@ from benchmarks.validation_set.stored import (
     write_outcomes,
 )
 from controller.cli.common import ExitCode, Subparsers, add_parser
-from controller.motion_outcome import FELL, LENIENT, STOPS, STRICT, Outcome, outcome_of
+from controller.motion_failures import FELL, LENIENT, STOPS, STRICT, MotionFailures, failures_of
 from controller.sweeps.trials import Trial
 from go2_wbc.errors import CommandError
 from go2_wbc.robot.model import RobotModel
@@ -157,7 +157,7 @@ def dynamic() -> list[Question]:
 
 
 @cache
-def _known() -> dict[str, Outcome]:
+def _known() -> dict[str, MotionFailures]:
     return read_outcomes()[0]
 
 
@@ -182,7 +182,7 @@ def ask(trial: Trial, *, of: str, is_played: bool) -> Measurement:
     outcome = None if is_played else _known().get(name)
     if outcome is None:
         played = play(plan, checker.model, question.draw, trial.sensors)
-        outcome = outcome_of(played, plan)
+        outcome = failures_of(played, plan)
     reasons = {REFUSED.name: tuple(dict.fromkeys(found.check for found in report.failures))}
     reasons |= {metric.name: outcome.by(kind) for kind, metric in OUTCOMES.items()}
     values = {metric: float(bool(reason)) for metric, reason in reasons.items()}
@@ -227,7 +227,7 @@ def _case(question: Question, one: Measurement) -> Case:
 
     family = question.family
     refusal = reasons(REFUSED) or (("refused",) if one.values[REFUSED.name] else ())
-    outcome = Outcome(*(reasons(metric) for metric in OUTCOMES.values()))
+    outcome = MotionFailures(*(reasons(metric) for metric in OUTCOMES.values()))
     half = CAUSES if question.stratum == CAUSES else family.half
     is_dynamic = family.is_dynamic
     return Case(question.name, family.name, half, question.stratum, is_dynamic, refusal, outcome)

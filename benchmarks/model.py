@@ -20,8 +20,8 @@ from jaxtyping import Float
 
 from benchmarks.study import Measurement, Metric, Study
 from controller.assembly import build_pilot
+from controller.modes import Aborted
 from controller.pilot import Pilot
-from controller.procedures import Aborted
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.config import Config
 from go2_wbc.legs import JOINT_NAMES
@@ -184,7 +184,7 @@ def _exercise(pilot: Pilot, plant: MujocoPlant) -> None:
     pilot.rest()
     pilot.stand()
     plan = compile_timeline(load_motion("high_five", hold=1.0), RobotModel())
-    pilot.high_five(plan)
+    pilot.play(plan)
     pilot.sit()
 
 

@@ -20,8 +20,8 @@ from benchmarks.validation_set.physics import play
 from benchmarks.validation_set.questions import IMPOSSIBLE, Question, questions
 from benchmarks.validation_set.random_timelines import RandomTimeline, random_timelines
 from benchmarks.validation_set.stored import read_borders
+from controller.motion_failures import failures_of
 from controller.motion_measurement import measure_motion
-from controller.motion_outcome import outcome_of
 from controller.sweeps.trials import TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.motion_plan import MotionPlan, Posture
@@ -60,7 +60,7 @@ def _drawn(sentence: RandomTimeline) -> dict[str, object]:
     """The row of a sentence."""
     checker = FeasibilityChecker(model())
     plan = checker.plan(sentence.line, check=False)
-    harm = outcome_of(play(plan, model(), sentence.number), plan).strict
+    harm = failures_of(play(plan, model(), sentence.number), plan).strict
     kind = (f"sentence {sentence.number}", DRAWN, DRAWN)
     return _row(sentence.name, kind, checker.world, checker.check(plan), harm)
 
@@ -112,7 +112,7 @@ def played(plan: MotionPlan, world: World, seed: int) -> tuple[str, ...]:
         except (TrialFailed, Go2WbcError):
             return (NOT_READY,)
         measured = measure_motion(robot.go2, robot.truth, plan, model())
-    return outcome_of(measured, plan).strict
+    return failures_of(measured, plan).strict
 
 
 @lru_cache(maxsize=1)

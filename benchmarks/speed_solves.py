@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks.speed_placo import BarePlaco
 from benchmarks.study import Direction, Measurement, Metric
 from controller.assembly import build_pilot
-from controller.procedures import Aborted
+from controller.modes import Aborted
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand

@@ -23,8 +23,8 @@ from benchmarks.speed_solves import recorded_ticks, slowness
 from benchmarks.study import Direction, Measurement, Metric
 from controller.assembly import build_pilot
 from controller.go2_controller import GO2Controller
+from controller.modes import Aborted
 from controller.pacing import Pacer
-from controller.procedures import Aborted
 from controller.sweeps.trials import Trial, TrialFailed
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand

@@ -14,13 +14,4 @@ if TYPE_CHECKING:
 
 __all__ = ["Certificate", "GO2Controller", "Mode", "Outcome", "certify", "sweep"]
 
-
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "go2_controller": ("GO2Controller",),
-        "modes": ("Mode", "Outcome"),
-        "sweeps.certify": ("Certificate", "certify"),
-        "sweeps.run": ("sweep",),
-    },
-)
+__getattr__ = lazy_exports(__name__)

@@ -63,12 +63,6 @@ def duration(name: str, value: float) -> float:
     return seconds
 
 
-def within(name: str, seconds: float, least: float, most: float) -> None:
-    """Raise CommandError unless ``seconds`` lies between ``least`` and ``most``."""
-    if not least <= seconds <= most:
-        raise CommandError(f"{name} must be {least:g} to {most:g} s, got {seconds}")
-
-
 def namespace(value: str) -> str:
     """``value``; raise ConfigError if it is not a name."""
     if not isinstance(value, str) or not NAMESPACE.match(value):

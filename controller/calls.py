@@ -8,9 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import final
 
-from controller.modes import Mode, Outcome
+from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.pilot import Pilot
-from controller.procedures import Aborted, Measurements, interruption
 from controller.runner import Runner
 from go2_wbc.errors import Go2WbcError, ModeError
 
@@ -67,7 +66,7 @@ class Calls:
         except Go2WbcError:
             raise
         except BaseException as error:
-            reason = interruption(name, error)
+            reason = _interruption(name, error)
             try:
                 self._pilot.collapse(reason)
                 reason = f"{reason}, damped"
@@ -109,3 +108,10 @@ class Calls:
         is_known = fault is not None and fault.reason in reason  # the loop has logged it
         if not (ok or is_known):
             _log.warning("%s", reason)
+
+
+def _interruption(name: str, error: BaseException) -> str:
+    """Why the call ``name`` ended by ``error``, in plain words."""
+    if isinstance(error, KeyboardInterrupt):
+        return f"interrupted during {name}()"
+    return f"{type(error).__name__} during {name}(): {error}"

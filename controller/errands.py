@@ -1,13 +1,15 @@
-"""Work that other threads hand to the thread of a loop, so that none of them can stop it.
+"""What threads hand to each other so that none can stop a loop: work for it, and its log lines.
 
 Ctrl-C raises ``KeyboardInterrupt`` between two instructions of the main thread, also just after it
 has taken a lock. A lock of the loop that it kept so would leave the robot without commands. So
-whoever wants something of the loop hands in an errand and waits for the answer; all that the
-threads share are queues whose ``put`` never waits.
+whoever wants something of the loop hands in an errand and waits for the answer, and the loop has
+its lines logged by another thread, since it would wait for the lock of a log handler in the same
+way. All that the threads share are queues whose ``put`` never waits.
 """
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
@@ -16,6 +18,8 @@ from typing import Generic, NoReturn, TypeVar, final
 
 POLL = 0.05
 """Time [s] after which a waiting thread looks whether the loop still runs."""
+FLUSH_LIMIT = 0.5
+"""Time [s] in which the last log lines are written."""
 
 Result = TypeVar("Result")
 
@@ -119,3 +123,29 @@ class Errands:
             seen = self._rounds
             if waited >= patience:
                 raise LoopHangs
+
+
+@final
+class BackgroundLog:
+    """Writes warnings in a thread of its own."""
+
+    def __init__(self, warn: Callable[..., None]) -> None:
+        """Write with ``warn``, a method of a ``logging.Logger``."""
+        self._warn = warn
+        self._lines: SimpleQueue[tuple[str, tuple[object, ...]] | None] = SimpleQueue()
+        self._thread = threading.Thread(target=self._write, name="go2-log", daemon=True)
+        self._thread.start()
+
+    def warning(self, message: str, *args: object) -> None:
+        """Write ``message % args`` soon; never waits."""
+        self._lines.put((message, args))
+
+    def close(self) -> None:
+        """Write what has been told so far, if that takes no long time; idempotent."""
+        self._lines.put(None)
+        self._thread.join(FLUSH_LIMIT)
+
+    def _write(self) -> None:
+        while (line := self._lines.get()) is not None:
+            message, args = line
+            self._warn(message, *args)

@@ -13,14 +13,12 @@ import motions  # what is named motions.X below is imported when it is used, sci
 from controller import arguments
 from controller.assembly import PilotSettings, build_pilot
 from controller.calls import Calls
-from controller.modes import Mode, Outcome
+from controller.modes import Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
-from controller.procedures import Measurements
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
-from go2_wbc.errors import ClosedError, CommandError
-from go2_wbc.legs import front_leg
+from go2_wbc.errors import ClosedError, CommandError, TimelineError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.planning.pose import BodyPose
@@ -233,14 +231,14 @@ class GO2Controller:
         Raises:
             CommandError: for another side or time.
         """
-        front_leg(arguments.checked("side", side, str, "a string", CommandError))
-        hold = finite_number("hold", hold)
-        arguments.within("hold", hold, 0.5, 30.0)
         if plan is None:
-            timeline = motions.load_motion("high_five", side=side, hold=hold)
+            try:
+                timeline = motions.load_motion("high_five", side=side, hold=hold)
+            except TimelineError as error:
+                raise CommandError(str(error)) from None
             with self._planning:
                 plan = motions.compile_timeline(timeline, self._checker.model)
-        return self._call("high_five", lambda: self._pilot.high_five(plan))
+        return self._call("high_five", lambda: self._pilot.play(plan, stands_up=True))
 
     def play(
         self, motion: motions.Playable, *, check: bool = True, allow_dynamic: bool = False

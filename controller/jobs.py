@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Generic, Protocol, TypeVar, final, runtime_checkable
 
-from controller.procedures import Aborted, Measurements, listed
+from controller.modes import Aborted, Measurements, Outcome, listed
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.robot.state import RobotState
 
@@ -35,20 +35,15 @@ Robot = TypeVar("Robot", bound=_Stoppable)
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
-    """What came of a job.
+class Answer(Outcome):
+    """What came of a job, which is ``ok`` too if it has begun when the patience ends.
 
     Attributes:
-        success: whether it was done, as measured; or has begun, if the patience has ended.
-        message: why, in plain words, with what was measured.
-        duration: robot time [s] that it took.
         cancelled: whether it ended early because it was called off.
         is_refused: whether it was never begun.
         error: what was raised, if anything.
     """
 
-    success: bool
-    message: str
     duration: float = 0.0
     cancelled: bool = False
     is_refused: bool = False
@@ -213,8 +208,8 @@ class JobServer(Generic[Robot]):
         if job is None or not job._is_prepared:
             return False
         self.last = answer = self._carry_out(job)
-        level = logging.INFO if answer.success else logging.WARNING
-        _log.log(level, "%s: %s", job.name, answer.message)
+        level = logging.INFO if answer.ok else logging.WARNING
+        _log.log(level, "%s: %s", job.name, answer.reason)
         self._finish(job, answer)
         return True
 
@@ -237,11 +232,12 @@ class JobServer(Generic[Robot]):
         duration = self.robot.state.time - job.start
         if error is not None:
             is_cancelled = job.is_cancelled and isinstance(error, Aborted)
-            return Answer(False, message, duration, is_cancelled, error=error)
+            return Answer(False, message, duration, cancelled=is_cancelled, error=error)
         if refusal:
-            return Answer(False, refusal, duration, job.is_cancelled, is_refused=True)
+            cancelled = job.is_cancelled
+            return Answer(False, refusal, duration, cancelled=cancelled, is_refused=True)
         told = f": {listed(measured)}" if measured else ""
-        return Answer(True, f"done in {duration:.1f} s{told}", duration)
+        return Answer(True, f"done in {duration:.1f} s{told}", duration, measured)
 
     def _take_turn(self) -> None:
         """Let the next job have its turn; the lock is held."""

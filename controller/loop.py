@@ -16,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from math import inf, isfinite
 
-from controller.behaviours.base import Behaviour
+from controller.behaviours import Behaviour
 from controller.behaviours.joints import DAMPING, Damped
 from controller.telemetry import Telemetry
 from go2_wbc.errors import PlantError, PlantTimeout, QpInfeasible

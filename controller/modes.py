@@ -1,4 +1,4 @@
-"""Modes of the robot, and the outcome of a call."""
+"""Modes of the robot, and what comes of what it is asked to do."""
 
 from __future__ import annotations
 
@@ -25,6 +25,10 @@ class Mode(Enum):
         return self in (Mode.STANDING, Mode.SITTING, Mode.WALKING, Mode.MOVING)
 
 
+Measurements = Mapping[str, float]
+"""Measured quantities by name with unit."""
+
+
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """What came of a blocking call.
@@ -39,8 +43,21 @@ class Outcome:
     ok: bool
     reason: str
     duration: float
-    measured: Mapping[str, float] = field(default_factory=dict)
+    measured: Measurements = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         """Truth of the outcome is ``ok``."""
         return self.ok
+
+
+class Aborted(Exception):
+    """A procedure did not reach its end; the message says why, ``measured`` what was measured."""
+
+    def __init__(self, reason: str, measured: Measurements | None = None) -> None:
+        super().__init__(reason)
+        self.measured = dict(measured or {})
+
+
+def listed(measured: Measurements) -> str:
+    """``measured`` in one line."""
+    return ", ".join(f"{name} {value:.3g}" for name, value in measured.items())

@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 from functools import partial
 
+from controller.acceptance import HeldFeet, Touches, judged
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
 from controller.checks import (
@@ -19,27 +20,18 @@ from controller.checks import (
     is_sitting,
     is_standing,
 )
-from controller.modes import Mode
+from controller.modes import Aborted, Measurements, Mode, listed
 from controller.navigation import Goal
-from controller.procedures import (
-    Aborted,
-    HeldFeet,
-    Measurements,
-    ProcedureRunner,
-    Touches,
-    judged,
-    listed,
-    refuse_dynamic_on_hardware,
-)
 from controller.recovery import get_onto_belly, lie_limp, tuck
 from controller.runner import Runner
 from controller.walker import Walker
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
-from go2_wbc.errors import ModeError, StanceMismatch
+from go2_wbc.errors import DynamicMotionRefused, ModeError, StanceMismatch
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.pose import LEVEL, BodyPose
+from go2_wbc.plant import Plant
 from motions.postures import lie_down, rise, sit_down
 
 READY_TIME = 0.2
@@ -62,7 +54,6 @@ class Pilot:
         self._loop = runner.loop
         self._model = runner.loop.model
         self._config = config
-        self._procedures = ProcedureRunner(runner)
         self._walker = Walker(runner, config)
         self._goal: Goal | None = None
         self._commands = threading.Lock()  # held to take one, and to begin what takes none
@@ -76,7 +67,7 @@ class Pilot:
         fault = self._loop.fault
         if fault is not None:
             return Mode.FALLEN if fault.is_fall else Mode.DAMPED
-        is_stepping = self._mode is Mode.STANDING and self._procedures.is_stepping
+        is_stepping = self._mode is Mode.STANDING and self._runner.is_stepping
         return Mode.MOVING if is_stepping else self._mode
 
     @property
@@ -105,20 +96,20 @@ class Pilot:
 
     def stand(self) -> Measurements:
         """Stand, from any mode but fallen."""
-        self._procedures.stop_stepping()
+        self._runner.stop_stepping()
         mode = self.mode
         if mode is Mode.WALKING:
             self._finish_walking("come to rest")
         if mode in (Mode.LYING, Mode.DAMPED) or self._is_on_the_ground:
             self._mode = Mode.MOVING
-            tuck(self._procedures)
+            tuck(self._runner)
         entry = {Mode.SITTING: Posture.SIT, Mode.LYING: Posture.LIE}.get(mode, Posture.STAND)
         duration = HOLD_TIME if mode in (Mode.STANDING, Mode.WALKING) else 1.2
         self._take_posture(self._make_standing(entry, duration))
-        if self._procedures.settles(is_standing):
+        if self._runner.settles(is_standing):
             return self._arrive(Posture.STAND)
         # It stands on other ground than it believed in as it began: feet slid, or left a box.
-        self._procedures.stop_stepping()
+        self._runner.stop_stepping()
         self._take_posture(self._make_standing(Posture.STAND, HOLD_TIME))
         return self._settle(Posture.STAND, "stand")
 
@@ -131,12 +122,12 @@ class Pilot:
 
     def lie_down(self) -> Measurements:
         """Lie down and go limp."""
-        self._procedures.stop_stepping()
+        self._runner.stop_stepping()
         if self.mode not in (Mode.LYING, Mode.DAMPED) and not self._is_on_the_ground:
             if self.mode is not Mode.MOVING:  # a stand that failed need not succeed to lie down
                 self._ensure_standing()
             self._take_posture(ChangePosture(lie_down))
-        lie_limp(self._procedures)
+        lie_limp(self._runner)
         return self._settle(Posture.LIE, "lie down")
 
     def recover(self) -> Measurements:
@@ -144,13 +135,13 @@ class Pilot:
         if self.mode.is_upright:
             return self.stand()
         self._mode = Mode.DAMPED
-        get_onto_belly(self._procedures)
+        get_onto_belly(self._runner)
         self._mode = Mode.LYING
         return self.stand()
 
     def _take_posture(self, change: ChangePosture) -> None:
         self._mode = Mode.MOVING
-        self._procedures.run(change, 5.0)
+        self._runner.run(change, 5.0)
 
     def _make_standing(self, entry: Posture, duration: float) -> Standing:
         make_plan = partial(rise, entry=entry, duration=duration)
@@ -158,12 +149,12 @@ class Pilot:
 
     def _settle(self, posture: Posture, what: str) -> Measurements:
         _, check = _RESTING[posture]
-        self._procedures.settle(what, check)
+        self._runner.settle(what, check)
         return self._arrive(posture)
 
     def _arrive(self, posture: Posture) -> Measurements:
         self._mode, _ = _RESTING[posture]
-        return self._procedures.measurements()
+        return self._runner.measurements()
 
     def _ensure_standing(self) -> None:
         if self.mode is not Mode.STANDING:
@@ -181,7 +172,7 @@ class Pilot:
             self._walker.take(gait)
         self.wait(READY_TIME)
         self._mode = Mode.WALKING
-        return self._procedures.measurements()
+        return self._runner.measurements()
 
     def set_command(
         self, command: VelocityCommand, pose: BodyPose | None = None
@@ -209,7 +200,7 @@ class Pilot:
         if self.mode is Mode.WALKING:
             self._walker.halt()
             self._walker.finish("come to rest")
-        return self._procedures.measurements()
+        return self._runner.measurements()
 
     def _finish_walking(self, what: str) -> None:
         """Come to rest in order to do something else: no command is taken any more."""
@@ -239,7 +230,7 @@ class Pilot:
                 return goal.is_done(loop.state)
 
             goal.begin(loop.state)
-            self._procedures.until(is_over, goal.time_limit, goal.name)
+            self._runner.until(is_over, goal.time_limit, goal.name)
             self.rest()
             was_halted = self._goal is None
         finally:
@@ -262,8 +253,15 @@ class Pilot:
 
     # --- motions --------------------------------------------------------------------------
 
-    def play(self, plan: MotionPlan, *, allow_dynamic: bool = False) -> Measurements:
+    def play(
+        self, plan: MotionPlan, *, allow_dynamic: bool = False, stands_up: bool = False
+    ) -> Measurements:
         """Play ``plan``, and measure whether it was done.
+
+        Args:
+            plan: the motion.
+            allow_dynamic: let also a plant that may be a robot play a dynamic plan.
+            stands_up: stand before, from any mode but fallen.
 
         Raises:
             DynamicMotionRefused: if the plan is dynamic, the plant may be a robot, and the caller
@@ -271,8 +269,10 @@ class Pilot:
             StanceMismatch: if the plan starts from another stance.
         """
         plant = self._loop.plant
+        if stands_up:
+            self._ensure_standing()
         if not allow_dynamic:
-            refuse_dynamic_on_hardware(plan, plant)
+            _refuse_dynamic_on_hardware(plan, plant)
         self._meet_entry(plan)
         behaviour = PlayPlan(plan, self._config.wbc.joint_friction)
         touches, held = Touches(plant), HeldFeet(plan)
@@ -285,17 +285,17 @@ class Pilot:
         self.playing = behaviour  # from now on a cancel() reaches it; one before is seen here
         try:
             if self._must_return:
-                measured = self._procedures.measurements()
+                measured = self._runner.measurements()
                 raise Aborted(f"{plan.name} was cancelled before it began", measured)
             self._mode = Mode.MOVING
-            self._procedures.engage(behaviour)
+            self._runner.engage(behaviour)
             start = self._loop.state.time
-            self._procedures.until(finished, plan.duration + 1.0, plan.name)
+            self._runner.until(finished, plan.duration + 1.0, plan.name)
             if self._must_return:
                 raise Aborted(f"{plan.name} was cancelled; the robot stands", self.stand())
             at_rest = self._settle(plan.exit, plan.name)
             if plan.exit is Posture.STAND:
-                self._procedures.engage(self._make_standing(Posture.STAND, HOLD_TIME))
+                self._runner.engage(self._make_standing(Posture.STAND, HOLD_TIME))
         finally:
             self.playing = None
         touches.require_few(plan)
@@ -308,7 +308,7 @@ class Pilot:
             playing.return_safely()
 
     def _meet_entry(self, plan: MotionPlan) -> None:
-        self._procedures.stop_stepping()
+        self._runner.stop_stepping()
         mode, (entry, _) = self.mode, _RESTING[plan.entry]
         if mode is not entry and (mode, entry) != (Mode.WALKING, Mode.STANDING):
             raise StanceMismatch(
@@ -316,11 +316,6 @@ class Pilot:
             )
         if plan.entry is Posture.STAND:
             self.square_up()
-
-    def high_five(self, plan: MotionPlan) -> Measurements:
-        """Give a high five, from any mode but fallen."""
-        self._ensure_standing()
-        return self.play(plan)
 
     def square_up(self) -> None:
         """Stand with the feet below the hips, stepping in place if need be."""
@@ -339,11 +334,11 @@ class Pilot:
     def wait(self, seconds: float) -> Measurements:
         """Let time pass, whatever happens in it; a fault ends up in ``mode``."""
         known_fault = self._loop.fault
-        self._procedures.let_pass(seconds)
+        self._runner.let_pass(seconds)
         fault = self._loop.fault
         if fault is not None and fault is not known_fault:
-            raise Aborted(fault.reason, self._procedures.measurements())
-        return self._procedures.measurements()
+            raise Aborted(fault.reason, self._runner.measurements())
+        return self._runner.measurements()
 
     @property
     def _is_on_the_ground(self) -> bool:
@@ -356,3 +351,14 @@ _RESTING = {
     Posture.STAND: (Mode.STANDING, is_standing),
 }
 """The mode of a robot that rests in a posture, and whether it does."""
+
+
+def _refuse_dynamic_on_hardware(plan: MotionPlan, plant: Plant) -> None:
+    """Raise ``DynamicMotionRefused`` for a dynamic plan on a plant that may be a robot."""
+    if plan.is_dynamic and plant.is_hardware:
+        raise DynamicMotionRefused(
+            f"motion {plan.name!r} is dynamic: fewer than three feet carry the robot in parts "
+            f"of it, so it cannot be stopped there, and {type(plant).__name__} may move a "
+            "robot. No dynamic motion of this project was tried on one. To play it all the "
+            "same: play(..., allow_dynamic=True)"
+        )

@@ -13,11 +13,11 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Float
 
-from controller.behaviours.base import Behaviour
+from controller.behaviours import Behaviour
 from controller.behaviours.joints import Damped, ServoJoints
 from controller.checks import unfolded_legs
 from controller.loop import ControlLoop
-from controller.procedures import ProcedureRunner
+from controller.runner import Runner
 from go2_wbc.legs import LEGS, Leg
 from motions.postures import SPLAYED_JOINTS, TUCKED_JOINTS
 
@@ -43,46 +43,46 @@ OUTWARDS = 0.7
 """Hip angle [rad] at which a left leg swings past the trunk without touching it."""
 
 
-def tuck(procedures: ProcedureRunner) -> None:
+def tuck(runner: Runner) -> None:
     """Fold the legs below the trunk, ready to rise.
 
     Raises:
         Aborted: if the robot does not lie on its belly, or a leg does not fold; it then counts as
             fallen. Also if it is tipped meanwhile.
     """
-    loop = procedures.loop
+    loop = runner.loop
     if loop.state.tilt > ON_BELLY:
-        procedures.give_up(f"cannot stand up from {_attitude(loop)}; call recover()")
+        runner.give_up(f"cannot stand up from {_attitude(loop)}; call recover()")
     way = ((TUCK_TIME, TUCKED_JOINTS),)
-    procedures.run(ServoJoints("tuck", way, stays_on_belly=True), TUCK_TIME + GRACE)
+    runner.run(ServoJoints("tuck", way, stays_on_belly=True), TUCK_TIME + GRACE)
     jammed = unfolded_legs(loop.snapshot)
     if jammed:
-        procedures.give_up(f"cannot stand up: {_names(jammed)} not below the trunk; call recover()")
+        runner.give_up(f"cannot stand up: {_names(jammed)} not below the trunk; call recover()")
 
 
-def lie_limp(procedures: ProcedureRunner) -> None:
+def lie_limp(runner: Runner) -> None:
     """Spread the folded legs and go limp."""
-    if procedures.loop.state.tilt < ON_BELLY:  # or it would rest on folded legs, belly in the air
+    if runner.loop.state.tilt < ON_BELLY:  # or it would rest on folded legs, belly in the air
         splay = ServoJoints("splay", ((SPLAY_TIME, SPLAYED_JOINTS),), stays_on_belly=True)
-        procedures.run(splay, SPLAY_TIME + GRACE)
-    procedures.run(Damped("lie", LIMP_TIME, stays_on_belly=True), LIMP_TIME + GRACE)
+        runner.run(splay, SPLAY_TIME + GRACE)
+    runner.run(Damped("lie", LIMP_TIME, stays_on_belly=True), LIMP_TIME + GRACE)
 
 
-def get_onto_belly(procedures: ProcedureRunner) -> None:
+def get_onto_belly(runner: Runner) -> None:
     """Roll a robot that has fallen onto its belly, with folded legs.
 
     Raises:
         Aborted: if it still lies otherwise in the end; it then counts as fallen.
     """
-    loop = procedures.loop
-    procedures.run(Damped("recover", LIMP_TIME), LIMP_TIME + 1.0)
+    loop = runner.loop
+    runner.run(Damped("recover", LIMP_TIME), LIMP_TIME + 1.0)
     for step in roll_over(loop):
-        procedures.run(step, STEP_LIMIT)
+        runner.run(step, STEP_LIMIT)
     if loop.state.tilt > ON_BELLY:
-        procedures.give_up(f"could not roll onto the belly: {_attitude(loop)}")
+        runner.give_up(f"could not roll onto the belly: {_attitude(loop)}")
     jammed = unfolded_legs(loop.snapshot)
     if jammed:
-        procedures.give_up(f"could not fold {_names(jammed)} below the trunk")
+        runner.give_up(f"could not fold {_names(jammed)} below the trunk")
 
 
 def _names(legs: list[Leg]) -> str:

@@ -1,4 +1,4 @@
-"""Lets robot time pass: inside calls, or in a background thread at wall-clock pace.
+"""Lets robot time pass until something is measured: inside calls, or in a background thread.
 
 Without ``realtime`` nothing moves between calls and every run is deterministic. With it, a thread
 ticks the loop all the time and calls wait for what they want to see.
@@ -12,16 +12,19 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TypeVar
+from typing import NoReturn, TypeVar
 from weakref import WeakValueDictionary
 
-from controller.background_log import BackgroundLog
-from controller.behaviours.base import Behaviour
-from controller.errands import NOT_YET, Errands, LoopEnded, LoopHangs, Pending
+from controller.behaviours import Behaviour
+from controller.behaviours.standing import Standing
+from controller.checks import is_standing, posture_measurements
+from controller.errands import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pending
 from controller.loop import ControlLoop, Fault
+from controller.modes import Aborted, Measurements, listed
 from controller.pacing import Pacer
 from go2_wbc.errors import ClosedError, ModeError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant
+from go2_wbc.robot.snapshot import Snapshot
 
 _log = logging.getLogger(__name__)
 
@@ -31,6 +34,16 @@ LEAST_PAUSE = 1e-4
 """Least pause [s] between two ticks, in which other threads get hold of the interpreter."""
 POLL = 0.001
 """Time [s] after which a thread that interrupts another one's call looks again."""
+SETTLE_LIMIT = 3.0
+"""Time [s] in which a posture must come to rest after its motion."""
+STEPS_LIMIT = 4.0
+"""Time [s] in which steps for balance must come to rest."""
+CALM_TIME = 0.1
+"""Time [s] for which a posture must hold without a break."""
+ROUNDING = 1e-9
+"""Time [s] by which a sum of control periods may miss its end."""
+SINK_TIME = 1.0
+"""Time [s] for which a robot that went limp on its feet is watched: it sinks, or it falls."""
 HANG_LIMIT = 2.0
 """Time [s] for which one tick may keep others waiting; a plant that blocks longer hangs."""
 _DRIVEN: WeakValueDictionary[int, Plant] = WeakValueDictionary()
@@ -68,6 +81,8 @@ class Runner:
     ``interrupt`` and ``close`` set a flag that is read before every tick. With it the thread in the
     background alone touches the loop, and others hand in errands; should the plant block there,
     they end with ``PlantTimeout`` instead of waiting with it.
+
+    What a procedure waits for comes, or ``Aborted`` says in plain words why it did not.
     """
 
     def __init__(
@@ -155,13 +170,11 @@ class Runner:
             )
         self._known_fault = self.loop.fault
 
-    def engage(self, behaviour: Behaviour) -> Fault | None:
-        """Switch to ``behaviour``, unless a fault has come up since ``begin``.
-
-        Returns:
-            That fault, or None if ``behaviour`` has begun.
+    def engage(self, behaviour: Behaviour) -> None:
+        """Switch to ``behaviour``.
 
         Raises:
+            Aborted: if a fault has come up since ``begin``.
             PlantError: if the plant fails.
             ClosedError: if the controller is closed meanwhile.
         """
@@ -174,7 +187,9 @@ class Runner:
             self.loop.engage(behaviour, observe=not self.is_realtime)
             return None
 
-        return self.between_ticks(switch)
+        fault = self.between_ticks(switch)
+        if fault is not None:
+            raise self._aborted(fault.reason)
 
     def interrupt(self, reason: str) -> None:
         """Go limp at once, from any thread; returns when the loop has taken notice.
@@ -234,6 +249,85 @@ class Runner:
             if not isinstance(verdict, Pending):
                 return verdict
         return False
+
+    # --- until something is measured ----------------------------------------------------------
+
+    def run(self, behaviour: Behaviour, limit: float) -> None:
+        """Switch to ``behaviour`` and let it finish, within ``limit`` seconds."""
+        self.engage(behaviour)
+        self.until(lambda: behaviour.is_finished(self.loop.snapshot), limit, behaviour.label)
+
+    def settle(self, what: str, check: Callable[[Snapshot], bool]) -> None:
+        """Let time pass until ``check`` has held for a while."""
+        if not self.settles(check):
+            raise self._late(what, SETTLE_LIMIT)
+
+    def settles(self, check: Callable[[Snapshot], bool]) -> bool:
+        """Let time pass until ``check`` has held for a while; whether it came to that."""
+        loop = self.loop
+        calm_since: list[float] = []
+
+        def calm() -> bool:
+            if not check(loop.snapshot):
+                calm_since.clear()
+                return False
+            calm_since.append(loop.state.time)
+            return loop.state.time - calm_since[0] >= CALM_TIME
+
+        return self._comes(calm, SETTLE_LIMIT)
+
+    def until(self, is_done: Callable[[], bool], limit: float, what: str) -> None:
+        """Let time pass until ``is_done()``, for ``limit`` seconds at most."""
+        if not self._comes(is_done, limit):
+            raise self._late(what, limit)
+
+    def _comes(self, is_done: Callable[[], bool], limit: float) -> bool:
+        """Whether ``is_done()`` came within ``limit`` seconds; a fault is raised."""
+        if self.advance_until(is_done, limit):
+            return True
+        fault = self.loop.fault
+        if fault is not None and fault.may_fall:
+            self.let_pass(SINK_TIME)
+            fault = self.loop.fault or fault
+        if fault is not None:
+            raise self._aborted(fault.reason)
+        return False
+
+    def _late(self, what: str, limit: float) -> Aborted:
+        reason = f"{what} not done within {limit:.1f} s: {listed(self.measurements())}"
+        return self._aborted(reason)
+
+    @property
+    def is_stepping(self) -> bool:
+        """Whether a standing robot steps for balance now."""
+        behaviour = self.loop.behaviour
+        return isinstance(behaviour, Standing) and behaviour.is_stepping
+
+    def stop_stepping(self) -> None:
+        """Wait until a robot that steps for balance stands again."""
+        if self.is_stepping:
+            self.until(lambda: not self.is_stepping, STEPS_LIMIT, "stand again")
+            self.settle("stand again", is_standing)
+
+    def let_pass(self, seconds: float) -> None:
+        """Let time pass, whatever happens in it."""
+        end = self.loop.state.time + seconds - ROUNDING
+        while self.loop.state.time < end:
+            self.advance_until(lambda: False, end - self.loop.state.time)
+
+    def give_up(self, reason: str) -> NoReturn:
+        """Go limp; the robot counts as fallen."""
+        self.between_ticks(lambda: self.loop.abandon(Fault(reason, is_fall=True)))
+        raise self._aborted(reason)
+
+    def measurements(self) -> Measurements:
+        """What is measured now."""
+        return posture_measurements(self.loop.snapshot)
+
+    def _aborted(self, reason: str) -> Aborted:
+        return Aborted(reason, self.measurements())
+
+    # --- how time passes ------------------------------------------------------------------------
 
     def _hanging(self) -> PlantTimeout:
         return PlantTimeout(f"the plant has kept the loop waiting for more than {HANG_LIMIT:g} s")

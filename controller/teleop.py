@@ -13,8 +13,7 @@ from typing import final
 from controller.gamepad import PadReading
 from controller.go2_controller import GO2Controller
 from controller.jobs import Answer, Job, JobServer
-from controller.modes import Mode
-from controller.procedures import Aborted, Measurements
+from controller.modes import Aborted, Measurements, Mode
 from go2_wbc.errors import ClosedError, Go2WbcError
 from go2_wbc.planning.command import VelocityCommand
 
@@ -152,7 +151,7 @@ class Teleop:
 
         def tell(answer: Answer) -> None:
             if not isinstance(answer.error, ClosedError):
-                self._news.put(f"{label}: {'done' if answer.success else answer.message}")
+                self._news.put(f"{label}: {'done' if answer.ok else answer.reason}")
             self._doing = ""
 
         self._jobs.submit(Job(label, perform, tell))

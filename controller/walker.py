@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from controller.behaviours.walking import Walking
-from controller.procedures import ProcedureRunner
 from controller.runner import Runner
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS, Gait, find_gait
@@ -29,7 +28,6 @@ class Walker:
     def __init__(self, runner: Runner, config: Config) -> None:
         """Walk on ``runner``, at first with the trot."""
         self._runner, self._config = runner, config
-        self._procedures = ProcedureRunner(runner)
         self.walking = self._make(find_gait("trot"))
         self._envelope = self._envelope_of(self.walking)
 
@@ -57,7 +55,7 @@ class Walker:
         choice = self._choice(gait)
         walking = self._make(find_gait(LADDER[0] if gait == AUTO else gait))
         walking.choice = choice
-        self._procedures.engage(walking)
+        self._runner.engage(walking)
         self.walking = walking
         self._envelope = self._envelope_of(walking)
 
@@ -84,7 +82,7 @@ class Walker:
         self._envelope = envelope_of(gait, self._config.envelope)
         asked = self._envelope.clip(walking.command)
         walking.command = slowed = middle.clip(asked)
-        self._procedures.until(lambda: walking.follows_command, STOP_LIMIT, "slow down")
+        self._runner.until(lambda: walking.follows_command, STOP_LIMIT, "slow down")
 
         def pass_over() -> None:
             walking.choice = None
@@ -126,7 +124,7 @@ class Walker:
     def finish(self, what: str) -> None:
         """Let the steps come to an end."""
         walking, loop = self.walking, self._runner.loop
-        self._procedures.until(lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, what)
+        self._runner.until(lambda: walking.is_finished(loop.snapshot), STOP_LIMIT, what)
 
     def square_up(self) -> bool:
         """Start to put the feet below the hips; returns whether they are."""

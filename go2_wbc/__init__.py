@@ -64,29 +64,7 @@ __all__ = [
 
 __version__: str
 
-_public = lazy_exports(
-    __name__,
-    {
-        "config": ("Config", "load_config"),
-        "contacts": ("GAITS", "ContactSchedule", "Gait"),
-        "errors": ("Go2WbcError", "MotionInfeasible", "QpInfeasible"),
-        "legs": ("LEGS", "Leg"),
-        "motion_plan": ("MotionPlan", "Posture", "Stance"),
-        "planning.command": ("VelocityCommand",),
-        "planning.locomotion": ("LocomotionPlanner",),
-        "plant": ("MujocoPlant", "Plant"),
-        "recording": ("Recording",),
-        "reference": ("JointReference", "Reference"),
-        "robot.model": ("RobotModel",),
-        "robot.snapshot": ("Snapshot",),
-        "robot.state": ("JointCommand", "RobotState"),
-        "wbc.config": ("WbcConfig",),
-        "wbc.controller": ("WholeBodyController",),
-        "wbc.solution": ("WbcSolution",),
-        "wbc.tasks": ("Task",),
-        "world": ("World",),
-    },
-)
+_public = lazy_exports(__name__)
 
 
 def __getattr__(name: str) -> object:

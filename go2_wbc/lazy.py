@@ -6,32 +6,44 @@ Pinocchio and MuJoCo for a command line that only prints its help.
 
 from __future__ import annotations
 
+import ast
 import gc
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 
 
-def lazy_exports(package: str, homes: Mapping[str, Sequence[str]]) -> Callable[[str], object]:
+def lazy_exports(package: str) -> Callable[[str], object]:
     """The module-level ``__getattr__`` (PEP 562) of ``package``.
+
+    Its public names are those that its ``__init__`` imports ``if TYPE_CHECKING``: type checkers
+    follow these imports, and whoever runs the program makes each when its name is first used. That
+    is how lazy_loader (SPEC 1 of Scientific Python) reads its stubs.
 
     Args:
         package: its dotted name.
-        homes: the public names by the module that defines them, relative to ``package``.
 
     Raises:
         ImportError: by what is returned, if a module cannot be imported.
     """
-    home_of = {name: f"{package}.{home}" for home, names in homes.items() for name in names}
+
+    @cache
+    def homes() -> dict[str, str]:
+        source = Path(str(sys.modules[package].__file__)).read_text(encoding="utf-8")
+        blocks = [s for s in ast.parse(source).body if isinstance(s, ast.If)]
+        imports = [s for block in blocks for s in block.body if isinstance(s, ast.ImportFrom)]
+        return {name.name: str(item.module) for item in imports for name in item.names}
 
     def load(name: str) -> object:
-        if name not in home_of:
+        if name not in homes():
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         with without_collecting():
-            module = _imported(home_of[name])
+            module = _imported(homes()[name])
         return getattr(module, name)
 
     return load

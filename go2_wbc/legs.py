@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from go2_wbc.errors import CommandError, unknown_name
-
 
 class Leg(IntEnum):
     """A leg; its value is its row in every per-leg array."""
@@ -56,14 +54,3 @@ JOINT_NAMES: tuple[str, ...] = tuple(
 )
 FOOT_NAMES: tuple[str, ...] = tuple(leg.foot for leg in LEGS)
 SIDES: dict[str, Leg] = {"left": Leg.FL, "right": Leg.FR}
-
-
-def front_leg(side: str) -> Leg:
-    """The front leg of ``"left"`` or ``"right"``.
-
-    Raises:
-        CommandError: for any other word.
-    """
-    if side not in SIDES:
-        raise CommandError(unknown_name("side", side, SIDES))
-    return SIDES[side]

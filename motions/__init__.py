@@ -60,29 +60,4 @@ __all__ = [
     "suggest",
 ]
 
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "authoring": ("Choice", "Motion", "Range", "motion"),
-        "dynamics.phases": ("Tolerance",),
-        "feasibility": (
-            "CheckedMotion",
-            "FeasibilityChecker",
-            "FeasibilityReport",
-            "Finding",
-            "Playable",
-            "Suggestion",
-            "check",
-            "compile_motion",
-            "suggest",
-        ),
-        "language.timeline": ("Timeline", "deg"),
-        "music.beat_tracking": ("Beats", "beats"),
-        "plan.compiled_plan": ("CompiledPlan",),
-        "plan.timeline_compiler": ("compile_timeline",),
-        "postures": ("Posture",),
-        "registry": ("find_motion", "load_file", "load_motion", "motion_names"),
-        "saved.motion_file": ("save_motion",),
-        "saved.plan_file": ("load_plan", "save_plan"),
-    },
-)
+__getattr__ = lazy_exports(__name__)

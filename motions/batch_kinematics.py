@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.interpolate import CubicSpline
 
 from go2_wbc.legs import LEGS
 from go2_wbc.robot import leg_kinematics
@@ -163,6 +162,8 @@ def rates(
     dv_b/dt = R' a_w - w_b x v_b (Featherstone 2008, ch. 2: spatial, not classical); so that of
     w_b = R' w_w is R' dw_w.
     """
+    from scipy.interpolate import CubicSpline  # a robot that plays no motion stands without scipy
+
     R = attitudes(rpy)
     spline = CubicSpline(times, np.hstack([q[:, :3], rpy, q[:, 7:]]), bc_type="clamped")
     rate, acceleration = spline(times, 1), spline(times, 2)

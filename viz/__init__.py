@@ -31,15 +31,4 @@ __all__ = [
     "margin_figure",
 ]
 
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "content": ("Annotation", "MarginCurve", "ReplayContent", "Verdict"),
-        "render.animation": ("ANIMATION_SUFFIXES", "export_animation"),
-        "render.distribution_plot": ("export_distributions",),
-        "render.figure_style": ("PLOT_SUFFIXES",),
-        "render.margin_plot": ("export_plot", "margin_figure"),
-        "render.still": ("export_filmstrip",),
-        "replay.html_page": ("HTML_SUFFIXES", "export_html"),
-    },
-)
+__getattr__ = lazy_exports(__name__)

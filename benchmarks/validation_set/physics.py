@@ -9,8 +9,8 @@ import math
 
 from benchmarks.study import Measurement, Metric, Study
 from benchmarks.validation_set.questions import Question, draws
+from controller.motion_failures import failures_of
 from controller.motion_measurement import MotionMeasurement, measure_motion
-from controller.motion_outcome import outcome_of
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import MujocoPlant
@@ -45,7 +45,7 @@ def is_done(question: Question) -> bool:
     """Whether physics does a motion, by the strict definition."""
     model = RobotModel()
     plan = question.plan(model)
-    return not outcome_of(play(plan, model, question.draw), plan).strict
+    return not failures_of(play(plan, model, question.draw), plan).strict
 
 
 def measure_border(trial: Trial) -> Measurement:

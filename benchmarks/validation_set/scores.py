@@ -11,7 +11,15 @@ from dataclasses import dataclass
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from benchmarks.validation_set.questions import STRATA
-from controller.motion_outcome import FELL, LENIENT, NOT_DONE, STOPS, STRICT, UNPLANNED, Outcome
+from controller.motion_failures import (
+    FELL,
+    LENIENT,
+    NOT_DONE,
+    STOPS,
+    STRICT,
+    UNPLANNED,
+    MotionFailures,
+)
 
 _ROW = "{name:<17}{n:>4}{done:>5}" + "".join(f"{{shares[{k}]:>13}}" for k in range(4))
 _HEADS = ("refused", "wrong:", "passed", "done:")
@@ -41,7 +49,7 @@ class Case:
     stratum: str
     is_dynamic: bool
     refusal: tuple[str, ...]
-    outcome: Outcome
+    outcome: MotionFailures
 
     @property
     def has_plan(self) -> bool:
@@ -112,7 +120,7 @@ class Score:
 
     @staticmethod
     def of(cases: Iterable[Case], definition: str = STRICT) -> Score:
-        """The score on ``cases`` by a definition of ``controller.motion_outcome``."""
+        """The score on ``cases`` by a definition of ``controller.motion_failures``."""
         pairs = [(bool(case.refusal), bool(case.outcome.by(definition))) for case in cases]
         both, neither = pairs.count((True, True)), pairs.count((False, False))
         refused, failed = sum(r for r, _ in pairs), sum(f for _, f in pairs)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.store import ROOT, settings_header
-from controller.motion_outcome import Outcome
+from controller.motion_failures import MotionFailures
 from go2_wbc.errors import ConfigError
 from go2_wbc.files import write_atomically
 from go2_wbc.motion_plan import MotionPlan
@@ -69,7 +69,7 @@ def write_borders(borders: Mapping[str, float | None], path: Path = BORDERS_FILE
     _write(path, {name: value and round(value, 4) for name, value in borders.items()})
 
 
-def read_outcomes(path: Path = OUTCOMES_FILE) -> tuple[dict[str, Outcome], str]:
+def read_outcomes(path: Path = OUTCOMES_FILE) -> tuple[dict[str, MotionFailures], str]:
     """Stored outcomes by name and digest of the plan, and why none of them hold; or "".
 
     Raises:
@@ -82,10 +82,10 @@ def read_outcomes(path: Path = OUTCOMES_FILE) -> tuple[dict[str, Outcome], str]:
     other = [f"{key} {was.get(key)}, now {now[key]}" for key in now if was.get(key) != now[key]]
     if other:
         return {}, f"stored outcomes are of other settings ({'; '.join(other)})"
-    return {key: Outcome(*map(tuple, row)) for key, row in stored.items()}, ""
+    return {key: MotionFailures(*map(tuple, row)) for key, row in stored.items()}, ""
 
 
-def write_outcomes(outcomes: Mapping[str, Outcome], path: Path = OUTCOMES_FILE) -> None:
+def write_outcomes(outcomes: Mapping[str, MotionFailures], path: Path = OUTCOMES_FILE) -> None:
     """Keep outcomes, one a line, below what they depend on."""
     rows = {key: list(asdict(outcome).values()) for key, outcome in outcomes.items()}
     _write(path, {"header": physics_header(), **rows})

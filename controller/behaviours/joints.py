@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float
 
-from controller.behaviours.base import Behaviour
+from controller.behaviours import Behaviour
 from go2_wbc.curves import Curve, keyframes
 from go2_wbc.reference import JointReference
 from go2_wbc.robot.snapshot import Snapshot

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from jaxtyping import Float
 
+from controller.behaviours import Behaviour
 from controller.behaviours.anchoring import Approach, anchor_of
-from controller.behaviours.base import Behaviour
 from controller.behaviours.safe_return import SafeReturn
 from controller.behaviours.weight import FeltWeight
 from go2_wbc.motion_plan import MotionPlan, Posture

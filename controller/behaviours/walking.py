@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller.behaviours.base import Behaviour
+from controller.behaviours import Behaviour
 from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
 from go2_wbc.planning.gait_choice import DWELL, GaitChoice

@@ -26,11 +26,4 @@ __all__ = [
     "run_demo",
 ]
 
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "report": ("DemoReport", "DemoTotals", "Measurement", "StepResult"),
-        "run": ("DemoProgress", "run_demo"),
-        "steps": ("DEMO_STEPS", "DemoStep"),
-    },
-)
+__getattr__ = lazy_exports(__name__)

@@ -11,4 +11,4 @@ if TYPE_CHECKING:
 
 __all__ = ["Progress", "SweepResult", "read_sweep", "sweep"]
 
-__getattr__ = lazy_exports(__name__, {"run": ("Progress", "SweepResult", "read_sweep", "sweep")})
+__getattr__ = lazy_exports(__name__)

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+from controller.motion_failures import failures_of, shares_of
 from controller.motion_measurement import MotionMeasurement, measure_motion
-from controller.motion_outcome import outcome_of, shares_of
 from controller.sweeps.rows import Row
 from controller.sweeps.trials import JOINT_NOISE, YAW_RANGE, TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
@@ -52,7 +52,7 @@ class MotionStudy:
     def __call__(self, seed: int) -> Row:
         """Whether it was done, what went wrong, and what was measured.
 
-        See ``motion_outcome`` (strict) and ``MotionMeasurement``; lengths in m, times in s.
+        See ``motion_failures`` (strict) and ``MotionMeasurement``; lengths in m, times in s.
         """
         world, plant = self.drawn(seed)
         with TrialRobot(plant) as robot:
@@ -65,7 +65,7 @@ class MotionStudy:
         except (TrialFailed, Go2WbcError) as error:
             measured = replace(_NOTHING, fall=str(error))
         plan = plan_of(self.archive)
-        harm, shares = outcome_of(measured, plan).strict, shares_of(measured, plan)
+        harm, shares = failures_of(measured, plan).strict, shares_of(measured, plan)
         closest, (share, _) = max(shares.items(), key=lambda item: np.nan_to_num(item[1][0]))
         values = {**measured.as_dict(), "fall": measured.fall or ""}
         row: Row = {"done": not harm, "harm": "; ".join(harm)}

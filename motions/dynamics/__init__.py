@@ -36,16 +36,4 @@ __all__ = [
     "solve_cached",
 ]
 
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "plan_cache": ("solve_cached",),
-        "plan_limits": ("PlanLimits",),
-        "phases": ("FullState", "Phase", "PhaseProblem", "Tolerance"),
-        "continuation": ("Solved",),
-        "curves": ("pieces",),
-        "solver": ("solve",),
-        "dynamic_trajectory": ("DynamicTrajectory", "Miss"),
-        "plan_audit": ("Reading", "audit"),
-    },
-)
+__getattr__ = lazy_exports(__name__)

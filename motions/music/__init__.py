@@ -29,13 +29,4 @@ __all__ = [
     "made_song",
 ]
 
-__getattr__ = lazy_exports(
-    __name__,
-    {
-        "choreography": ("Dance", "compose", "feasible_dance"),
-        "beat_tracking": ("Beats", "beats"),
-        "dance_timing": ("DancedAccents", "danced"),
-        "dance_moves": ("MOVES", "Accent", "Move"),
-        "songs": ("Song", "click_track", "made_song"),
-    },
-)
+__getattr__ = lazy_exports(__name__)

@@ -28,11 +28,14 @@ from benchmarks.validation_set.questions import draw_name, draws
 from benchmarks.validation_set.scores import Case
 from controller.cli.common import ExitCode
 from controller.go2_controller import GO2Controller
-from controller.motion_outcome import STRICT, Outcome
+from controller.motion_failures import STRICT, MotionFailures
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.model import RobotModel
 
-FINE, BAD = Outcome((), (), (), ()), Outcome(("fell",), ("fell",), ("fell",), ("fell",))
+FINE, BAD = (
+    MotionFailures((), (), (), ()),
+    MotionFailures(("fell",), ("fell",), ("fell",), ("fell",)),
+)
 COUNT = 12
 
 
@@ -117,13 +120,13 @@ def test_dynamic_motions_of_one_half_are_asked_by_themselves(
 def test_what_is_remade_is_stored_beside_what_was_stored(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
 ) -> None:
-    kept: dict[str, Outcome] = {}
+    kept: dict[str, MotionFailures] = {}
     fakes = {of: replace(one, measure=fake) for of, one in feasibility.REMADE.items()}
     monkeypatch.setattr(feasibility, "REMADE", fakes)
     monkeypatch.setattr(feasibility, "write_outcomes", kept.update)
     monkeypatch.setattr(feasibility, "_known", lambda: {"old": FINE, "1": FINE})
     main(["feasibility", "--motions", "2", "--jobs", "1", "--remake"])
-    assert kept == {"old": FINE, "0": FINE, "1": Outcome(*(4 * [("friction", "fell")]))}
+    assert kept == {"old": FINE, "0": FINE, "1": MotionFailures(*(4 * [("friction", "fell")]))}
     assert "2 motions" in capsys.readouterr().out
 
 
@@ -161,7 +164,7 @@ def test_physics_is_asked_only_where_no_outcome_is_stored(
         return object()
 
     monkeypatch.setattr(feasibility, "play", play)
-    monkeypatch.setattr(feasibility, "outcome_of", lambda _run, _plan: BAD)
+    monkeypatch.setattr(feasibility, "failures_of", lambda _run, _plan: BAD)
     monkeypatch.setattr(feasibility, "_known", dict[str, object])
     first = ask(Trial(0), of=EXAM, is_played=False)
     assert len(played) == 1
@@ -182,7 +185,7 @@ def test_on_sensors_all_is_played_and_nothing_is_stored(monkeypatch: pytest.Monk
         return object()
 
     monkeypatch.setattr(feasibility, "play", play)
-    monkeypatch.setattr(feasibility, "outcome_of", lambda _run, _plan: BAD)
+    monkeypatch.setattr(feasibility, "failures_of", lambda _run, _plan: BAD)
     on_sensors(feasibility.REMADE[EXAM], IMU).measure(Trial(0))
     feasibility.REMADE[EXAM].measure(Trial(0))
     assert asked == [IMU, IDEAL]

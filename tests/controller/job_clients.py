@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from controller.jobs import Answer, Job, JobServer
-from controller.procedures import Measurements
+from controller.modes import Measurements
 from go2_wbc.robot.state import RobotState
 from tests.controller.plants import HANG_GUARD, lying_state
 

@@ -11,7 +11,6 @@ import pytest
 
 from controller import GO2Controller, Mode
 from controller.behaviours.plans import ChangePosture
-from controller.procedures import ProcedureRunner
 from go2_wbc.robot.safety import SafetyConfig
 from motions.postures import lean
 from tests.controller.plants import PERIOD, WatchedPlant
@@ -86,7 +85,7 @@ def _trot_ready(go2: GO2Controller) -> None:
 
 def _lean(go2: GO2Controller) -> None:
     posture = ChangePosture(lambda pose: lean(pose, np.array(LEANING)))
-    ProcedureRunner(go2._runner).run(posture, 2.0)
+    go2._runner.run(posture, 2.0)
 
 
 def _walk(go2: GO2Controller) -> None:

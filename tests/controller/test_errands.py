@@ -1,4 +1,4 @@
-"""What other threads ask of a loop is done between its ticks, or they are told why not."""
+"""What threads ask of a loop is done between its ticks, and none waits for a log handler."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import count
 
 import pytest
 
-from controller.errands import NOT_YET, Errands, LoopEnded, LoopHangs, Pending
+from controller.errands import NOT_YET, BackgroundLog, Errands, LoopEnded, LoopHangs, Pending
 from tests.controller.plants import HANG_GUARD, in_thread
 
 
@@ -112,3 +112,30 @@ def test_what_is_asked_after_the_end_is_not_done(errands: Errands) -> None:
     with pytest.raises(LoopEnded):
         errands.ask(lambda: done.append(1), HANG_GUARD)
     assert not done
+
+
+# --- log lines ----------------------------------------------------------------------------------
+
+
+def test_lines_are_written_in_order_until_it_is_closed() -> None:
+    written: list[str] = []
+    log = BackgroundLog(lambda message, *args: written.append(message % args))
+    for number in range(50):
+        log.warning("line %d", number)
+    log.close()
+    assert written == [f"line {number}" for number in range(50)]
+
+
+def test_neither_a_line_nor_the_end_waits_for_a_handler_that_is_taken() -> None:
+    handler, written = threading.Lock(), threading.Event()
+
+    def warn(_message: str) -> None:
+        with handler:
+            written.set()
+
+    log = BackgroundLog(warn)
+    with handler:
+        in_thread(lambda: log.warning("fell")).result(HANG_GUARD)
+        in_thread(log.close).result(HANG_GUARD)
+        assert not written.is_set()
+    assert written.wait(HANG_GUARD)

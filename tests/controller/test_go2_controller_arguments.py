@@ -39,7 +39,6 @@ def lying() -> Iterator[GO2Controller]:
         ("angle", lambda go2, bad: go2.turn_left(bad)),
         ("angle", lambda go2, bad: go2.turn_right(bad)),
         ("distance", lambda go2, bad: go2.move_forward(bad)),
-        ("hold", lambda go2, bad: go2.high_five(hold=bad)),
         ("seconds", lambda go2, bad: go2.wait(bad)),
     ],
 )
@@ -56,6 +55,9 @@ def test_a_number_that_is_not_finite_is_refused_by_name(
     [
         (lambda go2: go2.high_five(hold=0.4), "hold must be 0.5 to 30 s, got 0.4"),
         (lambda go2: go2.high_five(hold=31.0), "hold must be 0.5 to 30 s, got 31.0"),
+        (lambda go2: go2.high_five(hold=nan), "hold must be 0.5 to 30 s, got nan"),
+        (lambda go2: go2.high_five(hold=inf), "hold must be 0.5 to 30 s, got inf"),
+        (lambda go2: go2.high_five(hold=-inf), "hold must be 0.5 to 30 s, got -inf"),
         (lambda go2: go2.wait(-0.1), "seconds must not be negative, got -0.1"),
         (lambda go2: go2.turn_left(90.0), r"angle must be within \+-62.8 rad, got 90.0"),
         (lambda go2: go2.turn_right(90.0), r"angle must be within \+-62.8 rad, got -90.0"),

@@ -10,7 +10,7 @@ import pytest
 
 from controller import jobs
 from controller.jobs import Answer, Job, JobServer
-from controller.procedures import Aborted, Measurements
+from controller.modes import Aborted, Measurements
 from go2_wbc.errors import ModeError
 from tests.controller.job_clients import Client, Clock, Robot, failing, now
 from tests.controller.plants import HANG_GUARD, in_thread
@@ -65,7 +65,9 @@ def test_a_job_is_answered_after_it_was_carried_out_with_what_was_measured(
     client.submit("stand", act)
     assert client.answers == []
     assert client.jobs.work()
-    assert client.only("stand") == Answer(True, "done in 1.5 s: height [m] 0.31", 1.5)
+    assert client.only("stand") == Answer(
+        True, "done in 1.5 s: height [m] 0.31", 1.5, {"height [m]": 0.31}
+    )
     assert client.jobs.last is client.only("stand")
     assert client.jobs.job is None
     assert not client.jobs.work()
@@ -81,9 +83,9 @@ def test_a_second_job_is_refused_at_once_and_the_first_goes_on(
     assert not client.is_accepted
     refused = client.only("up")
     assert refused.is_refused
-    assert refused.message == "busy with 'sit' since 0.4 s; ask again when it has answered"
+    assert refused.reason == "busy with 'sit' since 0.4 s; ask again when it has answered"
     client.jobs.work()
-    assert client.only("sit").success
+    assert client.only("sit").ok
     assert client.jobs.refusal() == ""
 
 
@@ -105,11 +107,11 @@ def test_a_bug_in_an_action_is_answered_and_the_server_goes_on(
 ) -> None:
     client.submit("dance", failing(ZeroDivisionError("beat")))
     client.jobs.work()
-    assert client.only("dance").message == "ZeroDivisionError: beat"
+    assert client.only("dance").reason == "ZeroDivisionError: beat"
     assert "Traceback" in caplog.text
     client.submit("sit")
     client.jobs.work()
-    assert client.only("sit").success
+    assert client.only("sit").ok
 
 
 def test_a_reply_that_fails_does_not_stop_the_server(
@@ -120,7 +122,7 @@ def test_a_reply_that_fails_does_not_stop_the_server(
     assert "sit could not be answered" in caplog.text
     client.submit("up")
     client.jobs.work()
-    assert client.only("up").success
+    assert client.only("up").ok
 
 
 def test_somebody_who_fails_to_hear_of_an_end_does_not_stop_the_server(
@@ -133,7 +135,7 @@ def test_somebody_who_fails_to_hear_of_an_end_does_not_stop_the_server(
 
     client.submit("sit", act)
     assert client.jobs.work()
-    assert client.only("sit").success
+    assert client.only("sit").ok
     assert "sit could not be answered" in caplog.text
 
 
@@ -172,9 +174,9 @@ def test_after_the_patience_what_runs_has_begun_and_what_waits_is_refused(
     queued.jobs.work()
     assert len(queued.answers) == 2  # the end of the dance is no second answer
     assert queued.jobs.last is not None
-    assert not queued.jobs.last.success
+    assert not queued.jobs.last.ok
     queued.jobs.work()
-    assert queued.only("late").success
+    assert queued.only("late").ok
     assert not queued.jobs.work()
 
 
@@ -194,7 +196,7 @@ def test_a_job_is_prepared_in_another_thread_and_carried_out_afterwards(client: 
     goes_on.set()
     worked_off(client)
     assert seen == ["prepare", "played"]
-    assert client.only("nod").success
+    assert client.only("nod").ok
 
 
 @pytest.mark.parametrize(
@@ -209,7 +211,7 @@ def test_an_error_of_the_preparation_is_the_answer(
 ) -> None:
     client.submit("nod", failing(AssertionError("played")), failing(error))
     worked_off(client)
-    assert client.only("nod").message == message
+    assert client.only("nod").reason == message
 
 
 def test_going_limp_during_the_preparation_keeps_the_job_from_beginning(
@@ -221,7 +223,7 @@ def test_going_limp_during_the_preparation_keeps_the_job_from_beginning(
     goes_on.set()
     worked_off(client)
     answer = client.only("nod")
-    assert (answer.success, answer.cancelled, answer.is_refused) == (False, True, True)
+    assert (answer.ok, answer.cancelled, answer.is_refused) == (False, True, True)
     assert robot.calls == ["damp"]
 
 
@@ -247,8 +249,8 @@ def test_a_job_that_is_called_off_says_so_and_then_whoever_wants_to_know_is_told
     client.submit("nod", act)
     client.jobs.work()
     answer = client.only("nod")
-    assert (answer.success, answer.cancelled, answer.is_refused) == (False, True, False)
-    assert answer.message == "nod was cancelled"
+    assert (answer.ok, answer.cancelled, answer.is_refused) == (False, True, False)
+    assert answer.reason == "nod was cancelled"
     assert robot.calls == ["cancel", "told"]
 
 
@@ -281,7 +283,7 @@ def test_going_limp_ends_what_runs_and_refuses_what_waits(robot: Robot, threaded
     threaded.jobs.damp()
     assert threaded.only("hello").is_refused
     answer = threaded.only("dance")
-    assert (answer.message, answer.cancelled, answer.is_refused) == ("damped", True, False)
+    assert (answer.reason, answer.cancelled, answer.is_refused) == ("damped", True, False)
 
 
 def test_a_robot_goes_limp_before_an_action_begins_or_after_never_in_between(
@@ -299,7 +301,7 @@ def test_a_robot_goes_limp_before_an_action_begins_or_after_never_in_between(
         raise Aborted("damped")
 
     threaded.submit("stand", act, begin=begin)
-    assert threaded.only("stand").message == "damped"
+    assert threaded.only("stand").reason == "damped"
     assert robot.calls == ["begin", "damp"]
 
 
@@ -337,7 +339,7 @@ def test_a_job_that_outlives_the_server_is_called_off_and_not_answered_again(
     threaded.jobs.abandon("the server is ending")
     robot.damp()
     threaded.jobs.abandon("the server is ending", HANG_GUARD)
-    assert threaded.only("dance").message == "the server is ending"
+    assert threaded.only("dance").reason == "the server is ending"
     assert "failed" not in caplog.text
 
 

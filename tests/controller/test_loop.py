@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controller.behaviours.base import Behaviour
+from controller.behaviours import Behaviour
 from controller.behaviours.joints import Damped, ServoJoints
 from controller.loop import ControlLoop, Fault
 from controller.telemetry import Telemetry

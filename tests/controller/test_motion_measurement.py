@@ -9,8 +9,8 @@ import pytest
 
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
+from controller.motion_failures import FELL, failures_of
 from controller.motion_measurement import SETTLED_CONTACT, _slip, measure_motion
-from controller.motion_outcome import FELL, outcome_of
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant import MujocoPlant
@@ -97,4 +97,4 @@ def test_a_robot_that_goes_limp_has_fallen_before_it_lies(
         assert go2.mode in (Mode.FALLEN, Mode.DAMPED)
     assert found.fall == found.reason
     assert "fell" in str(found.fall)
-    assert FELL in outcome_of(found, plan).strict
+    assert FELL in failures_of(found, plan).strict

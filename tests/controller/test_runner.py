@@ -14,6 +14,7 @@ import pytest
 import controller.runner
 from controller.behaviours.joints import Damped, ServoJoints
 from controller.loop import ControlLoop
+from controller.modes import Aborted
 from controller.runner import Runner
 from controller.telemetry import Telemetry
 from go2_wbc.errors import ClosedError, ModeError, PlantTimeout
@@ -164,11 +165,10 @@ def test_a_fault_between_two_behaviours_of_a_call_is_not_lost(make_runner: MakeR
     # damp() once vanished when it came just before the next behaviour of a running call.
     runner = make_runner(realtime=False)
     runner.begin()
-    assert runner.engage(Damped("first")) is None
+    runner.engage(Damped("first"))
     runner.interrupt("a test")
-    fault = runner.engage(Damped("second"))
-    assert fault is not None
-    assert fault.reason == "a test"
+    with pytest.raises(Aborted, match=r"^a test$"):
+        runner.engage(Damped("second"))
     assert runner.loop.behaviour.label == "damped"
 
 
@@ -176,7 +176,7 @@ def test_a_fault_from_before_a_call_does_not_forbid_it(make_runner: MakeRunner) 
     runner = make_runner(realtime=False)
     runner.interrupt("a test")
     runner.begin()
-    assert runner.engage(Damped()) is None
+    runner.engage(Damped())
     assert runner.loop.fault is None
 
 
@@ -185,7 +185,8 @@ def test_the_same_fault_again_counts_as_a_new_one(make_runner: MakeRunner) -> No
     runner.interrupt("a test")
     runner.begin()
     runner.interrupt("a test")
-    assert runner.engage(Damped()) is not None
+    with pytest.raises(Aborted, match=r"^a test$"):
+        runner.engage(Damped())
 
 
 def test_the_last_word_to_the_plant_is_to_go_limp(
@@ -300,7 +301,7 @@ def test_in_realtime_ctrl_c_at_any_moment_of_a_wait_leaves_a_loop_that_runs(
         interrupt_somewhere_in(lambda: runner.advance_until(lambda: False, FOREVER), rng)
         runner.interrupt("a test")
         runner.begin()
-        assert runner.engage(Damped()) is None
+        runner.engage(Damped())
         assert runner.advance_until(lambda: True, FOREVER)
 
 
@@ -309,7 +310,7 @@ def test_in_realtime_a_log_handler_that_is_taken_keeps_no_robot_from_going_limp(
 ) -> None:
     # Ctrl-C in a program that logged left its lock taken: the loop waited for it before it damped.
     runner = make_runner(realtime=True)
-    assert runner.engage(ServoJoints("hold", ((1.0, TUCKED_JOINTS),))) is None
+    runner.engage(ServoJoints("hold", ((1.0, TUCKED_JOINTS),)))
     handler = logging.StreamHandler(io.StringIO())
     logging.getLogger().addHandler(handler)
     handler.acquire()

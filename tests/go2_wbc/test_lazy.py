@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
@@ -17,6 +18,21 @@ MODULE = """
 import gc
 was_collecting = gc.isenabled()
 """
+INIT = """
+from typing import TYPE_CHECKING
+from go2_wbc.lazy import lazy_exports
+if TYPE_CHECKING:
+    from {package}.home import {name}
+__getattr__ = lazy_exports(__name__)
+"""
+
+
+def package(parent: Path, package: str, name: str, home: str) -> str:
+    """Written: one whose ``name`` is in a module with the text ``home``; returns its name."""
+    (folder := parent / package).mkdir()
+    (folder / "__init__.py").write_text(INIT.format(package=package, name=name))
+    (folder / "home.py").write_text(home)
+    return package
 
 
 @pytest.fixture(params=[True, False], ids=["collecting", "not collecting"])
@@ -31,33 +47,26 @@ def is_collecting(request: pytest.FixtureRequest) -> Iterator[bool]:
 def test_no_garbage_is_looked_for_during_an_import(
     is_collecting: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = tmp_path / f"lazy_package_{is_collecting}"
-    folder.mkdir()
-    (folder / "__init__.py").touch()
-    (folder / "home.py").write_text(MODULE)
+    made = package(tmp_path, f"lazy_package_{is_collecting}", "was_collecting", MODULE)
     monkeypatch.syspath_prepend(tmp_path)
-    load = lazy_exports(folder.name, {"home": ("was_collecting",)})
-    assert load("was_collecting") is False
+    assert import_module(made).was_collecting is False
     assert gc.isenabled() is is_collecting
 
 
-def test_an_import_that_fails_leaves_the_collector_as_it_was(is_collecting: bool) -> None:
-    load = lazy_exports("go2_wbc", {"no_such_module": ("Anything",)})
+def test_an_import_that_fails_leaves_the_collector_as_it_was(
+    is_collecting: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = package(tmp_path, f"lazy_failing_{is_collecting}", "Thing", "import no_such_module\n")
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ModuleNotFoundError, match="no_such_module"):
-        load("Anything")
+        _ = import_module(made).Thing
     assert gc.isenabled() is is_collecting
 
 
 def test_an_attribute_that_a_module_lacks_is_not_taken_for_a_missing_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder = tmp_path / "lazy_broken"
-    folder.mkdir()
-    (folder / "__init__.py").write_text(
-        "from go2_wbc.lazy import lazy_exports\n"
-        "__getattr__ = lazy_exports(__name__, {'home': ('Thing',)})\n"
-    )
-    (folder / "home.py").write_text("import math\nmath.no_such_function\nThing = 1\n")
+    package(tmp_path, "lazy_broken", "Thing", "import math\nmath.no_such_function\nThing = 1\n")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ImportError, match=r"lazy_broken\.home .*'no_such_function'") as caught:
         exec("from lazy_broken import Thing", {})
@@ -66,7 +75,7 @@ def test_an_attribute_that_a_module_lacks_is_not_taken_for_a_missing_name(
 
 def test_an_unknown_name_is_refused() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'Other'"):
-        lazy_exports("go2_wbc", {"legs": ("Leg",)})("Other")
+        lazy_exports("go2_wbc")("Other")
 
 
 @pytest.fixture
@@ -96,7 +105,7 @@ def test_frozen_objects_are_not_counted_where_nothing_is_imported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(gc, "get_freeze_count", lambda: pytest.fail("takes tens of ms"))
-    assert lazy_exports("go2_wbc", {"legs": ("Leg",)})("Leg") is legs.Leg
+    assert lazy_exports("go2_wbc")("Leg") is legs.Leg
 
 
 def test_a_name_that_has_moved_is_found_and_says_where_it_is() -> None:
@@ -106,3 +115,12 @@ def test_a_name_that_has_moved_is_found_and_says_where_it_is() -> None:
     assert told[0].filename == __file__
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         getattr(reference, "nothing")  # noqa: B009 - no type checker knows it
+
+
+PACKAGES = ("go2_wbc", "motions", "motions.dynamics", "motions.music", "viz", "controller")
+
+
+@pytest.mark.parametrize("name", [*PACKAGES, "controller.demo", "controller.sweeps"])
+def test_every_public_name_of_a_package_is_found(name: str) -> None:
+    found = import_module(name)
+    assert [public for public in found.__all__ if getattr(found, public, None) is None] == []

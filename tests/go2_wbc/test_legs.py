@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-import pytest
 
-from go2_wbc.errors import CommandError
-from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS, Leg, front_leg
+from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 
@@ -45,14 +43,3 @@ def test_the_mirror_of_a_leg_is_across_and_comes_back() -> None:
         assert leg.mirror.side == -leg.side
         assert leg.mirror.is_front == leg.is_front
         assert leg.mirror.mirror is leg
-
-
-def test_a_front_leg_is_found_by_its_side() -> None:
-    assert front_leg("left") is Leg.FL
-    assert front_leg("right") is Leg.FR
-
-
-@pytest.mark.parametrize("word", ["middle", "", "Left", "FL"])
-def test_any_other_side_is_refused_with_the_valid_words(word: str) -> None:
-    with pytest.raises(CommandError, match=f"side '{word}'; valid: left, right"):
-        front_leg(word)

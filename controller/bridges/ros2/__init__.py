@@ -16,4 +16,4 @@ if TYPE_CHECKING:
 
 __all__ = ["GO2ControllerNode", "serve"]
 
-__getattr__ = lazy_exports(__name__, {"client": ("GO2ControllerNode",), "server": ("serve",)})
+__getattr__ = lazy_exports(__name__)

@@ -75,14 +75,14 @@ class MotionActions:
         return ros.PlayMotion.Feedback(phase=job.phase, progress=progress, elapsed=elapsed)
 
     def _conclude(self, handle: Any, answer: Answer) -> Any:
-        if answer.success:
+        if answer.ok:
             handle.succeed()
         elif answer.cancelled and handle.is_cancel_requested:
             handle.canceled()
         else:
             handle.abort()
         return ros.PlayMotion.Result(
-            success=answer.success, message=answer.message, duration=float(answer.duration)
+            success=answer.ok, message=answer.reason, duration=float(answer.duration)
         )
 
     def close(self) -> None:

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from controller.go2_controller import GO2Controller
 from controller.jobs import Answer, Job, JobServer, Reply
-from controller.modes import Mode
-from controller.procedures import Aborted, Measurements
+from controller.modes import Aborted, Measurements, Mode
 from go2_wbc.errors import Go2WbcError, unknown_name
 from go2_wbc.motion_plan import MotionPlan, Posture
 from motions import find_motion

@@ -19,8 +19,8 @@ from controller.bridges.ros2.names import (
     topic,
 )
 from controller.bridges.ros2.states import state_of
+from controller.modes import listed
 from controller.navigation import DriveStraight, Goal, TurnInPlace
-from controller.procedures import listed
 from go2_wbc.errors import BridgeError, MissingDependency
 from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.robot.state import RobotState

@@ -52,7 +52,7 @@ class PolledService:
             self._act(request, partial(self._answer, header))
 
     def _answer(self, header: Any, answer: Answer) -> None:
-        response = self._kind.Response(success=answer.success, message=answer.message)
+        response = self._kind.Response(success=answer.ok, message=answer.reason)
         self._service.send_response(response, header)
 
 

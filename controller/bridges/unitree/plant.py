@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Final, final
 
 import numpy as np
 
-from controller.background_log import BackgroundLog
 from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree.codec import encode_message
 from controller.bridges.unitree.extra import require_dds
@@ -27,6 +26,7 @@ from controller.bridges.unitree.low_level import (
     with_own_attitude,
 )
 from controller.bridges.unitree.sport_api import SWITCHER_SERVICE, Code, SwitcherApi
+from controller.errands import BackgroundLog
 from controller.pacing import SWITCH_INTERVAL
 from go2_wbc.errors import ClosedError, CommandError, PlantError, PlantTimeout
 from go2_wbc.plant.base import Plant

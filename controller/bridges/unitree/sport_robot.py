@@ -13,7 +13,6 @@ from controller.assembly import PilotSettings, build_pilot
 from controller.behaviours.plans import ChangePosture
 from controller.bridges.unitree.sport_api import Api
 from controller.modes import Mode
-from controller.procedures import ProcedureRunner
 from go2_wbc.config import Config
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import CommandError, Go2WbcError
@@ -92,7 +91,6 @@ class SportRobot:
         settings = PilotSettings(realtime=True, recorded_time=0.0)
         self._assembly = build_pilot(plant, config, settings)
         self.pilot, self._runner = self._assembly.pilot, self._assembly.runner
-        self._procedures = ProcedureRunner(self._runner)
         self.is_locked = False
         self.is_leaning = False
         self.pose = LEVEL
@@ -147,19 +145,19 @@ class SportRobot:
 
     def lean_to(self, rpy: tuple[float, float, float]) -> None:
         """Turn the trunk to roll, pitch, yaw [rad] over the feet and hold it, or ``Aborted``."""
-        self._procedures.stop_stepping()
+        self._runner.stop_stepping()
         if self.mode is Mode.WALKING:
             self.pilot.square_up()
         target = np.array(rpy)
         self.is_leaning = True
         behaviour = ChangePosture(lambda pose: lean(pose, target, LEAN_TIME))
-        self._procedures.run(behaviour, LEAN_LIMIT)
+        self._runner.run(behaviour, LEAN_LIMIT)
 
         def is_there(snapshot: Snapshot) -> bool:
             missing = np.abs(snapshot.state.rpy[:2] - target[:2])
             return bool(missing.max() < ATTITUDE_TOLERANCE)
 
-        self._procedures.settle("lean", is_there)
+        self._runner.settle("lean", is_there)
 
     def can_hold(self, pose: BodyPose) -> bool:
         """Whether it can hold ``pose`` while it walks."""

@@ -22,8 +22,7 @@ from controller.bridges.unitree.sport_api import Api, Code, SportMode, SportStat
 from controller.bridges.unitree.sport_path import SportPath
 from controller.bridges.unitree.sport_robot import MOTIONS, POSE, STANDING_UP, WALKS, SportRobot
 from controller.jobs import Answer, Job, JobServer
-from controller.modes import Mode
-from controller.procedures import Aborted, Measurements
+from controller.modes import Aborted, Measurements, Mode
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
 from go2_wbc.planning.pose import BodyPose
@@ -312,7 +311,7 @@ _MODE_OF_STATE: Final = {
 
 
 def _code_of(answer: Answer) -> Code:
-    if answer.success:
+    if answer.ok:
         return Code.OK
     if answer.is_refused:
         return Code.NOT_READY

@@ -8,12 +8,12 @@ import pytest
 
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from benchmarks.validation_set.scores import Case, Score, Share, noticed, render, scores, wrong_ones
-from controller.motion_outcome import FELL, LENIENT, NOT_DONE, STRICT, UNPLANNED, Outcome
+from controller.motion_failures import FELL, LENIENT, NOT_DONE, STRICT, UNPLANNED, MotionFailures
 
 
 def case(refused: bool, failed: bool, *, half: str = TEST, why: str = "slip 12 mm") -> Case:
     harm = (why,) if failed else ()
-    outcome = Outcome(harm, harm, (), ("fell",) if why == "fell" else ())
+    outcome = MotionFailures(harm, harm, (), ("fell",) if why == "fell" else ())
     refusal = ("friction",) if refused else ()
     return Case("name 0 1.0", "name", half, "easy", False, refusal, outcome)
 
@@ -59,16 +59,24 @@ def test_the_table_has_both_halves_and_fits_a_terminal() -> None:
 
 def test_motions_without_a_plan_are_counted_apart() -> None:
     cases = [
-        Case("a", "a", TEST, "easy", True, ("dynamic plan",), Outcome((UNPLANNED,), (), (), ())),
-        Case("b", "b", TEST, "easy", True, (), Outcome((), (), (), ())),
+        Case(
+            "a",
+            "a",
+            TEST,
+            "easy",
+            True,
+            ("dynamic plan",),
+            MotionFailures((UNPLANNED,), (), (), ()),
+        ),
+        Case("b", "b", TEST, "easy", True, (), MotionFailures((), (), (), ())),
     ]
     found = scores(cases)
     assert (found["test dynamic"].n, found["test solved"].n) == (2, 1)
 
 
 def test_it_is_told_how_often_play_noticed_what_went_wrong() -> None:
-    told = replace(case(False, True), outcome=Outcome((NOT_DONE, "fell"), (), (), ()))
-    unplanned = replace(case(True, True), outcome=Outcome((UNPLANNED,), (), (), ()))
+    told = replace(case(False, True), outcome=MotionFailures((NOT_DONE, "fell"), (), (), ()))
+    unplanned = replace(case(True, True), outcome=MotionFailures((UNPLANNED,), (), (), ()))
     said = noticed([told, case(True, True), case(False, False), unplanned])
     assert said.startswith("Of 2 motions that were played and went wrong")
     assert said.endswith("says so of 1.")

@@ -16,12 +16,15 @@ from benchmarks.validation_set.stored import (
     write_borders,
     write_outcomes,
 )
-from controller.motion_outcome import Outcome
+from controller.motion_failures import MotionFailures
 from go2_wbc.errors import ConfigError
 from go2_wbc.robot.model import RobotModel
 
 BORDERS: dict[str, float | None] = {"crouch 0": 1.25, "rise 0": None}
-OUTCOMES = {"a 0 1.0 x": Outcome(("slip 12 mm",), ("fell",), (), ()), "b": Outcome((), (), (), ())}
+OUTCOMES = {
+    "a 0 1.0 x": MotionFailures(("slip 12 mm",), ("fell",), (), ()),
+    "b": MotionFailures((), (), (), ()),
+}
 
 
 def test_borders_are_read_as_they_were_written(tmp_path: Path) -> None:

@@ -60,22 +60,22 @@ def test_an_order_is_answered_after_it_has_happened(command: str, call: str) -> 
     assert answers == []
     assert jobs.work()
     assert go2.calls == [call]
-    assert [answer.success for answer in answers] == [True]
-    assert "done in" in answers[0].message
+    assert [answer.ok for answer in answers] == [True]
+    assert "done in" in answers[0].reason
 
 
 def test_an_unknown_order_is_refused_with_the_valid_names() -> None:
     (answer,) = ordered(jobs_of(FakeGo2()), "levitate")
-    assert not answer.success
-    assert "'levitate'" in answer.message
-    assert all(name in answer.message for name in COMMANDS)
+    assert not answer.ok
+    assert "'levitate'" in answer.reason
+    assert all(name in answer.reason for name in COMMANDS)
 
 
 def test_what_did_not_happen_is_answered_with_the_reason() -> None:
     (answer,) = ordered(jobs_of(FakeGo2(refusals={"sit": "sit not done within 3.0 s"})), "sit")
-    assert (answer.success, answer.message) == (False, "sit not done within 3.0 s")
+    assert (answer.ok, answer.reason) == (False, "sit not done within 3.0 s")
     (answer,) = ordered(jobs_of(FakeGo2(errors={"walk": ModeError("fallen: recover")})), "walk")
-    assert (answer.success, answer.message) == (False, "fallen: recover")
+    assert (answer.ok, answer.reason) == (False, "fallen: recover")
 
 
 def test_a_second_order_is_refused_at_once_and_the_first_goes_on() -> None:
@@ -83,11 +83,11 @@ def test_a_second_order_is_refused_at_once_and_the_first_goes_on() -> None:
     jobs, first, second = jobs_of(go2), [], []
     order(jobs, "sit", first.append)
     order(jobs, "up", second.append)
-    assert "busy with 'sit'" in second[0].message
+    assert "busy with 'sit'" in second[0].reason
     jobs.work()
-    assert first[0].success
+    assert first[0].ok
     assert go2.calls == ["sit"]
-    assert ordered(jobs, "up")[0].success
+    assert ordered(jobs, "up")[0].ok
 
 
 def test_stop_in_a_motion_leaves_it_and_is_answered_when_the_robot_stands() -> None:
@@ -101,9 +101,9 @@ def test_stop_in_a_motion_leaves_it_and_is_answered_when_the_robot_stands() -> N
         plant.once_at(go2.state.time + 2.0, stop)
         while not jobs.work():
             time.sleep(0.01)
-        assert not answers["nod"].success
-        assert "cancelled" in answers["nod"].message
-        assert answers["stop"].success
+        assert not answers["nod"].ok
+        assert "cancelled" in answers["nod"].reason
+        assert answers["stop"].ok
         assert go2.mode is Mode.STANDING
 
 
@@ -115,8 +115,8 @@ def test_damp_in_a_posture_ends_it() -> None:
         damp = lambda: order(jobs, "damp", lambda answer: answers.setdefault("damp", answer))  # noqa: E731
         plant.once_at(1.2, damp)
         jobs.work()
-        assert not answers["up"].success
-        assert answers["damp"].success
+        assert not answers["up"].ok
+        assert answers["damp"].ok
         assert go2.mode is Mode.DAMPED
 
 
@@ -134,7 +134,7 @@ def played(go2: GO2Controller, motion: str, *settings: str) -> Answer:
 def test_a_motion_is_prepared_beside_the_loop_and_played_from_lying() -> None:
     with GO2Controller(plant=WatchedPlant()) as go2:
         answer = played(go2, "nod", "times=1")
-        assert answer.success, answer.message
+        assert answer.ok, answer.reason
         assert go2.mode is Mode.STANDING
 
 
@@ -172,8 +172,8 @@ def test_a_high_five_is_compiled_and_checked_once(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(FeasibilityReport, "of", staticmethod(report))
     with GO2Controller(plant=WatchedPlant()) as go2:
         answer = played(go2, "high_five", "hold=0.5", "side=left")
-    assert answer.success, answer.message
-    assert "mean paw height" in answer.message
+    assert answer.ok, answer.reason
+    assert "mean paw height" in answer.reason
     assert done == ["compiled in prepare", "checked in prepare"]
 
 
@@ -181,14 +181,14 @@ def test_a_high_five_at_another_height_is_measured_as_well() -> None:
     # It was played as any motion, and nobody looked at the paw: its name alone was known.
     with GO2Controller(plant=WatchedPlant()) as go2:
         answer = played(go2, "high_five", "hold=0.5", "height=0.62")
-    assert answer.success, answer.message
-    assert "planned paw height [m] 0.62," in answer.message
+    assert answer.ok, answer.reason
+    assert "planned paw height [m] 0.62," in answer.reason
 
 
 def test_a_motion_that_does_not_exist_is_answered_with_those_that_do() -> None:
     answer = played(FakeGo2(), "levitate")
-    assert not answer.success
-    assert answer.message.startswith("unknown motion 'levitate'; valid: beckon,")
+    assert not answer.ok
+    assert answer.reason.startswith("unknown motion 'levitate'; valid: beckon,")
 
 
 @pytest.mark.parametrize(
@@ -198,8 +198,8 @@ def test_a_motion_that_does_not_exist_is_answered_with_those_that_do() -> None:
 def test_wrong_settings_are_answered_with_the_reason(settings: list[str], complaint: str) -> None:
     go2 = FakeGo2()
     answer = played(go2, "nod", *settings)
-    assert not answer.success
-    assert complaint in answer.message
+    assert not answer.ok
+    assert complaint in answer.reason
     assert go2.calls == []
 
 

@@ -17,9 +17,8 @@ from controller.bridges.unitree.codec import Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
 from controller.bridges.unitree.sport_robot import MOTIONS, WALKS, SportRobot
 from controller.bridges.unitree.sport_service import WAITING, SportService
-from controller.modes import Mode
+from controller.modes import Aborted, Mode
 from controller.navigation import APPROACH
-from controller.procedures import Aborted
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import ClosedError, CommandError, MissingDependency, PlantError
 from go2_wbc.motion_plan import MotionPlan

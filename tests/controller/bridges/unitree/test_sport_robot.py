@@ -59,13 +59,13 @@ def test_a_lean_waits_for_steps_for_balance(robot: SportRobot, plant: MujocoPlan
     robot._runner.between_ticks(lambda: plant.push(np.array([PUSH, 0.0, 0.0]), PUSH_TIME))
     assert wait_until(lambda: robot.mode is Mode.MOVING, HANG_GUARD)
     were_stepping: list[bool] = []
-    run = robot._procedures.run
+    run = robot._runner.run
 
     def watched(behaviour: ChangePosture, limit: float) -> None:
-        were_stepping.append(robot._procedures.is_stepping)
+        were_stepping.append(robot._runner.is_stepping)
         run(behaviour, limit)
 
-    robot._procedures.run = watched  # type: ignore[method-assign,assignment]
+    robot._runner.run = watched  # type: ignore[method-assign,assignment]
     robot.begin()
     robot.lean_to((0.1, 0.1, 0.0))
     assert were_stepping == [False]
@@ -80,7 +80,7 @@ def test_an_attitude_and_a_height_are_kept_on_the_way_and_end_with_it(robot: Spo
     robot.begin()
     robot.perform(Api.MOVE)
     robot.steer(VelocityCommand(0.3), 1.0)
-    robot._procedures.let_pass(2.5)
+    robot._runner.let_pass(2.5)
     assert robot.state.rpy[:2] == pytest.approx([POSE.roll, POSE.pitch], abs=OFF)
     assert robot.state.q[2] - before == pytest.approx(POSE.height, abs=0.015)
     robot.begin()

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from controller.procedures import PAW_TOLERANCE, Aborted, HeldFeet
+from controller.acceptance import PAW_TOLERANCE, HeldFeet
+from controller.modes import Aborted
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import HeldFoot, MotionPlan, Posture
 from go2_wbc.reference import Reference

@@ -27,7 +27,7 @@ LENIENT_OFF = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class MotionFailures:
     """What went wrong, in words, by each definition; nothing did where it is empty.
 
     Attributes:
@@ -49,15 +49,15 @@ class Outcome:
         return found
 
 
-def outcome_of(run: MotionMeasurement, plan: MotionPlan) -> Outcome:
+def failures_of(run: MotionMeasurement, plan: MotionPlan) -> MotionFailures:
     """Judge what was measured by all definitions."""
     fell = _true({"fell": run.fall is not None})
     if any(problem.check == "dynamic plan" for problem in getattr(plan, "problems", ())):
         unplanned = (UNPLANNED, *fell)
-        return Outcome(unplanned, unplanned, unplanned, fell)
+        return MotionFailures(unplanned, unplanned, unplanned, fell)
     strict = _strictly(run, plan)
     pressed = _true({f"on a stop {1e3 * run.stopped:.0f} ms": run.stopped > MOMENT})
-    return Outcome(strict, (*strict, *pressed), _leniently(run, plan), fell)
+    return MotionFailures(strict, (*strict, *pressed), _leniently(run, plan), fell)
 
 
 def shares_of(run: MotionMeasurement, plan: MotionPlan) -> dict[str, tuple[float, str]]:
