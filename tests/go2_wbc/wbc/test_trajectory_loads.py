@@ -10,7 +10,7 @@ from go2_wbc.records import packed
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.constraints import friction_pyramid
-from go2_wbc.wbc.loads import LEAST_PRESSURE, relative_loads
+from go2_wbc.wbc.loads import LEAST_PRESSURE, share_load
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from go2_wbc.wbc.trajectory_loads import (
     LoadNumbers,
@@ -74,7 +74,8 @@ def optimum(
     pressure = max(force[2], LEAST_PRESSURE * WEIGHT)
     depth = -places[:, 2].mean()
     point = [-(moment[1] + depth * force[0]), moment[0] - depth * force[1]] / pressure
-    loads = relative_loads(places[:, :2], point, 400.0 * shares * k / pressure)
+    loads = np.empty(k)
+    share_load(places[:, :2].copy(), *point, 400.0 * shares * k / pressure, loads)
     weights = 1e-4 * np.column_stack([1.0 / loads, 1.0 / loads, np.ones(k)]).ravel()
     even = np.zeros((k, 3))
     even[:, 2] = WEIGHT * shares / shares.sum()
