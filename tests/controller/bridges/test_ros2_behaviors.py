@@ -150,7 +150,7 @@ def test_a_motion_is_prepared_for_the_robot_that_is_driven(monkeypatch: pytest.M
     monkeypatch.setattr(FeasibilityChecker, "plan", noted)
     plant = WatchedPlant(MujocoPlant(motor="ideal"))
     with GO2Controller(plant=plant, config=Config(motor="ideal")) as go2:
-        assert played(go2, "nod", "times=1").success
+        assert played(go2, "nod", "times=1").ok
     assert [np.isinf(model.motor.no_load_speed).all() for model in models] == [True, True]
 
 
