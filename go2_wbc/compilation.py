@@ -22,8 +22,10 @@ it between runs. No fast-math flag is set: the bits of a result depend on the in
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from importlib import import_module
 from typing import Any, TypeVar, cast, overload
@@ -62,6 +64,8 @@ MODULES = (
     "go2_wbc.wbc.trajectory_loads",
 )
 """Modules that hold kernels."""
+_PROBED = 8
+"""Of so many kernels one is looked for, to see whether many are missing."""
 
 
 class Routine(Written):
@@ -162,12 +166,34 @@ def _as_compiled(value: Any, hint: Any) -> Any:
     return np.float64(value) if hint is float else value
 
 
-def load_kernels() -> None:
-    """Compile every kernel, or load it: half a second, or about 20 s the first time.
+def load_kernels(*, backwards: bool = False) -> None:
+    """Compile every kernel, or load it: half a second, or about 30 s the first time.
 
-    Before a robot is taken over: a loop must not wait for a compiler.
+    Before a robot is taken over: a loop must not wait for a compiler. Where many are missing,
+    another process helps, from the end of the list: each finds what the other has kept.
     """
-    for module in map(import_module, MODULES):
-        for value in vars(module).values():
-            if isinstance(value, Kernel) and value.written.__module__ == module.__name__:
-                value.load()
+    kernels = [
+        value
+        for module in map(import_module, MODULES)
+        for value in vars(module).values()
+        if isinstance(value, Kernel) and value.written.__module__ == module.__name__
+    ]
+    helper = None if backwards or _IS_PLAIN else _helper(kernels)
+    for made in reversed(kernels) if backwards else kernels:
+        made.load()
+    if helper is not None:
+        helper.kill()
+        helper.wait()
+
+
+def _helper(kernels: Sequence[Kernel]) -> subprocess.Popen[bytes] | None:
+    """A process that compiles the last ones first, where that is worth it."""
+    from go2_wbc.kept_code import KeptCode
+
+    if (os.cpu_count() or 1) < 2 or all(KeptCode(made).is_there() for made in kernels[::_PROBED]):
+        return None
+    script = "from go2_wbc.compilation import load_kernels; load_kernels(backwards=True)"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    quiet = subprocess.DEVNULL
+    command = [sys.executable, "-c", script]
+    return subprocess.Popen(command, env=environment, stdin=quiet, stdout=quiet, stderr=quiet)

@@ -61,6 +61,10 @@ class KeptCode:
         if self._folder is not None and listed is not None:
             self._file, self._takes_rows = self._folder / listed[0], listed[1]
 
+    def is_there(self) -> bool:
+        """Whether it has been kept; also where nothing can be."""
+        return self._folder is None or (self._file is not None and self._file.exists())
+
     def load(self) -> tuple[Any, list[bool]]:
         """What was kept, or None, and which arguments are rows."""
         if self._folder is None:
@@ -188,7 +192,7 @@ def _offer_runtime() -> None:
 def say_that_it_takes_time() -> None:
     """Log once that kernels are compiled now."""
     if kernel_folder() is not None:
-        _log.warning("compiling the control kernels for this machine, once (about 20 s)")
+        _log.warning("compiling the control kernels for this machine, once (about 30 s)")
 
 
 @cache
@@ -200,7 +204,7 @@ def kernel_folder() -> Path | None:
         tempfile.TemporaryFile(dir=folder).close()
     except OSError as error:
         _log.warning(
-            "compiling the control kernels (about 20 s); they cannot be kept: %s. Name a folder "
+            "compiling the control kernels (about 30 s); they cannot be kept: %s. Name a folder "
             "that can be written in %s",
             error,
             CACHE_VARIABLE,

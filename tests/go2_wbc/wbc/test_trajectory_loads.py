@@ -74,8 +74,8 @@ def optimum(
     pressure = max(force[2], LEAST_PRESSURE * WEIGHT)
     depth = -places[:, 2].mean()
     point = [-(moment[1] + depth * force[0]), moment[0] - depth * force[1]] / pressure
-    loads = np.empty(k)
-    share_load(places[:, :2].copy(), *point, 400.0 * shares * k / pressure, loads)
+    loads, (x, y) = np.empty(k), point
+    share_load(places[:, :2].copy(), x, y, 400.0 * shares * k / pressure, loads)
     weights = 1e-4 * np.column_stack([1.0 / loads, 1.0 / loads, np.ones(k)]).ravel()
     even = np.zeros((k, 3))
     even[:, 2] = WEIGHT * shares / shares.sum()
