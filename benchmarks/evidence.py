@@ -1,5 +1,7 @@
 """``python -m benchmarks evidence``: fills tables of the documentation from the results.
 
+What was not measured stays as it is.
+
 ``evidence.json`` says, by the mark above a table, which metrics are its rows, what each is called,
 how a value is printed, and what the closest peer reaches. A row has one metric with mean and worst,
 or two: on the true state and on the robot's own sensors.
@@ -111,14 +113,20 @@ class Table:
         """All that it shows."""
         return {name for line in self.lines for name in line.metrics if name}
 
-    def text(self, rows: Mapping[str, Row]) -> str:
+    def text(self, rows: Mapping[str, Row], before: str = "") -> str:
         """The table as Markdown, from the results by metric.
+
+        A line of which nothing was measured stays as it was ``before``.
 
         Raises:
             ConfigError: if a metric is missing or has no value.
         """
+        known = {text.split(" | ")[0].removeprefix("| "): text for text in before.splitlines()}
         head = [f"| {' | '.join(self.head)} |", "|" + "---|" * len(self.head)]
-        return "\n".join([*head, *(line.text(rows) for line in self.lines)])
+        for line in self.lines:
+            stays = rows.keys().isdisjoint(line.metrics) and line.what in known
+            head.append(known[line.what] if stays else line.text(rows))
+        return "\n".join(head)
 
 
 @cache
@@ -197,7 +205,7 @@ def filled(text: str, rows: Mapping[str, Row]) -> str:
         end = text.find(END, start)
         if end < 0:
             raise ConfigError(f"the text has no {END} after {mark}")
-        text = f"{text[:start]}{table.text(rows)}\n{text[end:]}"
+        text = f"{text[:start]}{table.text(rows, text[start:end])}\n{text[end:]}"
     return text
 
 

@@ -99,6 +99,14 @@ def test_of_two_tables_of_a_page_only_that_is_filled_of_which_there_are_results(
     assert filled(text, sensed) == text.replace("older\n", f"{SENSED.text(sensed)}\n")
 
 
+def test_a_line_that_was_not_measured_stays() -> None:
+    before = TRUTH.text(ROWS)
+    (first, *_), one = TRUTH.lines, {"n": 9, "mean": 0.125, "worst": 0.25}
+    after = TRUTH.text({first.metrics[0]: one}, before).splitlines()
+    assert after[2] == first.text({first.metrics[0]: one})
+    assert after[3:] == before.splitlines()[3:]
+
+
 def test_the_command_fills_a_file_from_several_results(tmp_path: Path) -> None:
     readme, results = tmp_path / "PAGE.md", []
     readme.write_text(f"before\n{BEGIN}: x -->\nold\n{END}\n")
