@@ -121,12 +121,12 @@ class Table:
         Raises:
             ConfigError: if a metric is missing or has no value.
         """
-        known = {text.split(" | ")[0].removeprefix("| "): text for text in before.splitlines()}
-        head = [f"| {' | '.join(self.head)} |", "|" + "---|" * len(self.head)]
-        for line in self.lines:
-            stays = rows.keys().isdisjoint(line.metrics) and line.what in known
-            head.append(known[line.what] if stays else line.text(rows))
-        return "\n".join(head)
+        found = [f"| {' | '.join(self.head)} |", "|" + "---|" * len(self.head)]
+        old = [*before.splitlines()[len(found) :], *("" for _ in self.lines)]
+        for line, was in zip(self.lines, old, strict=False):
+            stays = rows.keys().isdisjoint(line.metrics) and was.startswith(f"| {line.what} |")
+            found.append(was if stays else line.text(rows))
+        return "\n".join(found)
 
 
 @cache
