@@ -153,14 +153,10 @@ ACTIONS: dict[str, Callable[[], Flow]] = {
 
 def _run_plain() -> None:
     """From now on compiled functions run as the Python that they are written in."""
-    from importlib import import_module
+    from go2_wbc.compilation import all_kernels, call_plain
 
-    from go2_wbc import compilation
-
-    for name in compilation.MODULES:
-        for value in vars(import_module(name)).values():
-            if isinstance(value, compilation.Kernel):
-                type(value).__call__ = compilation._call_plain
+    for kernel in all_kernels():
+        type(kernel).__call__ = call_plain
 
 
 def picture(flow: Flow, title: str) -> str:
