@@ -127,6 +127,6 @@ def _blurred_mask(
     texels: Float[np.ndarray, "n 3"], triangles: Int[np.ndarray, "m 3"], blur: float
 ) -> Float[np.ndarray, "s s"]:
     covered = np.zeros((_TEXELS, _TEXELS), dtype=np.uint8)
-    covered.reshape(-1)[rasterize(texels, triangles, covered.shape).pixel] = 255
+    covered.reshape(-1)[rasterize(texels, triangles, covered.shape)[0]] = 255
     image = Image.fromarray(covered).filter(ImageFilter.GaussianBlur(blur))
     return np.asarray(image, dtype=np.float32) / 255

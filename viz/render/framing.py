@@ -7,7 +7,7 @@ from jaxtyping import Float, Int
 from scipy.ndimage import gaussian_filter1d
 
 from go2_wbc.recording import Recording
-from viz.render.posed_robot import PosedRobot
+from viz.render.robot_meshes import PosedRobot
 
 _STEP = 0.08  # [s] between the poses that are looked at; the camera is slower than that
 _TRUNK_ENDS = np.array([[0.33, 0.0, 0.08], [-0.25, 0.0, 0.08]])  # [m] nose and tail, base frame

@@ -7,8 +7,6 @@ pixels and not of a Python loop. The nearest triangle wins (z-buffer: Catmull 19
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -16,25 +14,14 @@ _LEAST_AREA = 1e-9  # [px^2] flatter triangles have no inside
 _COVERAGE_SLACK = 1e-6  # [px] samples this close to an edge count, so that no crack opens
 
 
-@dataclass(frozen=True, slots=True)
-class Fragments:
-    """The visible samples of a picture.
-
-    Attributes:
-        pixel: (k,) flat index, row * width + column, each at most once.
-        triangle: (k,) row of the triangle that is in front there.
-    """
-
-    pixel: Int[np.ndarray, " k"]
-    triangle: Int[np.ndarray, " k"]
-
-
 def rasterize(
     points: Float[np.ndarray, "n 3"],
     triangles: Int[np.ndarray, "m 3"],
     size: tuple[int, int],
-) -> Fragments:
-    """Find the triangle that is in front at each sample.
+) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
+    """The samples that are covered, and the row of the triangle that is in front at each.
+
+    A sample is known by its flat index, row * width + column.
 
     A sample lies at the centre of its pixel. Of two triangles the one with the larger third
     coordinate is in front; give 1 / distance, which is linear in the picture where distance is
@@ -141,7 +128,7 @@ def _resolve(
     nearness: Float[np.ndarray, " k"],
     triangle: Int[np.ndarray, " k"],
     samples: int,
-) -> Fragments:
+) -> tuple[Int[np.ndarray, " v"], Int[np.ndarray, " v"]]:
     """Keep the nearest candidate of each sample; among equals the last triangle."""
     nearest = np.zeros(samples, dtype=np.float32)
     np.maximum.at(nearest, pixel, nearness)
@@ -149,4 +136,4 @@ def _resolve(
     winner = np.full(samples, -1, dtype=np.int32)
     winner[pixel[front]] = triangle[front]
     seen = np.flatnonzero(winner >= 0)
-    return Fragments(seen, winner[seen])
+    return seen, winner[seen]

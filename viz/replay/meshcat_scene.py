@@ -19,10 +19,10 @@ import pinocchio as pin
 from meshcat.transformations import rotation_matrix, translation_matrix
 
 from go2_wbc.legs import LEGS
-from viz.palette import FORCE, INK, LEG_COLORS
 from viz.render.mesh import Surface
 from viz.render.robot_meshes import RobotVisuals
 from viz.replay.packing import Pack
+from viz.style import FORCE, INK, LEG_COLORS
 
 _NORMAL_LEVELS = 127  # of a signed 8-bit number
 _SHAFT_RADIUS, _HEAD_RADIUS, _HEAD_LENGTH = 0.007, 0.018, 0.035  # [m] force arrow

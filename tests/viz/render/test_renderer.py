@@ -10,10 +10,9 @@ from go2_wbc.robot.model import FOOT_RADIUS
 from viz.render.camera import Camera
 from viz.render.floor import paint_floor
 from viz.render.mesh import Surface
-from viz.render.posed_robot import PosedRobot
 from viz.render.rasterizer import rasterize
 from viz.render.renderer import render, towards_lights
-from viz.render.robot_meshes import load_robot_visuals
+from viz.render.robot_meshes import PosedRobot, load_robot_visuals
 
 _TOUCH = 2.5  # [px] sole in the picture against the projected contact point
 
@@ -37,8 +36,8 @@ def test_each_foot_meets_the_floor_where_its_contact_point_is(leg: int) -> None:
     surface = robot.at(q)
     near = np.linalg.norm(surface.points - contact, axis=1) < 2 * FOOT_RADIUS
     faces = surface.triangles[near[surface.triangles].all(axis=1)]
-    seen = rasterize(camera.project(surface.points), faces, camera.size)
-    lowest = seen.pixel.max() // camera.size[0]
+    pixels, _ = rasterize(camera.project(surface.points), faces, camera.size)
+    lowest = pixels.max() // camera.size[0]
     foot = camera.project(np.array([contact]))[0]
     sphere = camera.project(contact[None] + np.array([0.0, 0.0, FOOT_RADIUS]))[0]
     radius = FOOT_RADIUS * camera.focal_length * sphere[2]

@@ -15,8 +15,7 @@ from go2_wbc.legs import Leg
 from go2_wbc.recording import Recording
 from viz.render.frame_renderer import FrameRenderer, ShotStyle
 from viz.render.framing import camera_path, heading_path, nearest_rows
-from viz.render.posed_robot import PosedRobot
-from viz.render.robot_meshes import load_robot_visuals
+from viz.render.robot_meshes import PosedRobot, load_robot_visuals
 from viz.render.still import telling_times
 
 

@@ -19,7 +19,7 @@ from tests.viz.page_reader import packed_parts, read_data
 from tests.viz.verdicts import made_up_verdict
 from viz.content import ReplayContent
 from viz.replay.html_page import PAGE_LIMIT
-from viz.replay.replay_data import reduced
+from viz.replay.page_data import reduced
 
 _ROUNDING = 1e-3
 """Steps of the 16-bit numbers [m, rad, N]."""
