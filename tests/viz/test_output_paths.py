@@ -10,11 +10,13 @@ import pytest
 import viz
 from go2_wbc.errors import ConfigError
 from go2_wbc.recording import Recording
+from tests.viz.verdicts import made_up_verdict
 
 _EXPORTS: dict[str, Callable[[Recording, Path], Path]] = {
     ".html": lambda recording, path: viz.export_html(recording, path, title="t"),
     ".webp": lambda recording, path: viz.export_animation(recording, path),
     ".png": lambda recording, path: viz.export_filmstrip(recording, path),
+    ".svg": lambda _recording, path: viz.export_plot(made_up_verdict(3.0), path, title="t"),
 }
 
 

@@ -85,12 +85,7 @@ def frame_times(recording: Recording, *, speed: float | int, fps: float | int) -
 
 
 def encoded_webp(frames: Sequence[Image.Image], milliseconds: int, limit: int) -> bytes:
-    """The pictures as one looping WebP, in the best quality that is small enough.
-
-    Args:
-        frames: two or more, of one size.
-        milliseconds: from one to the next.
-        limit: largest size [bytes].
+    """Two or more pictures as one looping WebP, in the best quality of at most ``limit`` bytes.
 
     Raises:
         ConfigError: if the file is too large in every quality.

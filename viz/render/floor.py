@@ -26,12 +26,9 @@ _BLUR_LOW, _BLUR_HIGH = 0.010, 0.028  # [m] standard deviation of the blur for l
 def paint_floor(
     camera: Camera, casters: Surface, light: Float[np.ndarray, "3"]
 ) -> Float[np.ndarray, "h w 3"]:
-    """The picture without the robot: floor, background and shadow.
+    """The picture without the robot: floor, background, and the shadow of ``casters``.
 
-    Args:
-        camera: where the picture is taken from.
-        casters: what throws a shadow.
-        light: unit vector towards the light in the world.
+    ``light`` is the unit vector towards the light in the world.
     """
     horizon, x, y = _floor_points(camera)
     visible = _visibility(x, y, camera)

@@ -75,12 +75,7 @@ def plane_coefficients(
     """Slopes along x and y, and value at the origin, of the plane through three corner values.
 
     From value[k] - value[0] = slope_x (x[k] - x[0]) + slope_y (y[k] - y[0]) for k = 1, 2 by
-    Cramer's rule, whose determinant is twice the area.
-
-    Args:
-        x: columns of the three corners [px].
-        y: rows of the three corners [px].
-        value: the quantity at the corners.
+    Cramer's rule, whose determinant is twice the area; ``x`` and ``y`` are columns and rows [px].
     """
     area = _doubled_area(x, y)
     d1, d2 = value[1] - value[0], value[2] - value[0]

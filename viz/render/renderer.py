@@ -93,11 +93,7 @@ def _interpolated(
 ) -> list[Float[np.ndarray, " k"]]:
     """Vertex values at samples, linear over each triangle and never beyond its corners.
 
-    Args:
-        projected: the vertices in the picture.
-        corners: vertices of each visible triangle.
-        values: the quantities, a column each.
-        samples: row, column and triangle of each sample.
+    ``samples`` are row and column of each, and its column of ``corners``, the visible triangles.
     """
     row, column, slot = samples
     x, y = projected[:, 0][corners], projected[:, 1][corners]

@@ -47,11 +47,7 @@ class SharedMesh(shapes.Geometry):
 
 
 def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
-    """The commands that build the scene, and how the page moves it.
-
-    Args:
-        visuals: the robot.
-        pack: receives the vertices.
+    """The commands that build the scene, and how the page moves it; ``pack`` gets the vertices.
 
     Returns:
         Header entries: ``meshes`` (count), ``commands``, ``base`` (path of the moving trunk) and

@@ -51,14 +51,6 @@ def test_every_mesh_lies_as_in_pinocchios_own_loader() -> None:
         np.testing.assert_allclose(points.max(axis=0), box.max_.ravel(), atol=2e-5)
 
 
-@pytest.mark.parametrize("part", ["hip", "thigh", "calf", "foot"])
-@pytest.mark.parametrize("end", ["F", "R"])
-def test_the_right_legs_look_like_the_left_ones_in_a_mirror(part: str, end: str) -> None:
-    left, right = _points_of(f"{end}L_{part}"), _points_of(f"{end}R_{part}") * [1.0, -1.0, 1.0]
-    np.testing.assert_allclose(left.min(axis=0), right.min(axis=0), atol=_MESH_ERROR)
-    np.testing.assert_allclose(left.max(axis=0), right.max(axis=0), atol=_MESH_ERROR)
-
-
 def test_the_sole_of_each_foot_is_where_the_contact_model_puts_it() -> None:
     feet = PosedRobot(load_robot_visuals()).feet(_STAND)
     for leg in LEGS:
