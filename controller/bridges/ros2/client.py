@@ -8,8 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from controller import arguments
-from controller.bridges.ros2 import imports as ros
-from controller.bridges.ros2.names import (
+from controller.bridges.ros2 import (
     BEHAVIOR_SERVICE,
     CMD_VEL,
     COMMAND_PERIOD,
@@ -18,6 +17,7 @@ from controller.bridges.ros2.names import (
     ODOM,
     topic,
 )
+from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.states import state_of
 from controller.modes import listed
 from controller.navigation import DriveStraight, Goal, TurnInPlace

@@ -3,6 +3,10 @@
 Everything but the action runs in one thread: after every control period the loop asks for calls
 and commands, publishes what is due, and sleeps if it is to keep the pace of the wall clock. What
 goes wrong in here is logged and counted; it never stops the control of the robot.
+
+An executor takes 0.1 ms a turn to find that there is nothing to do, and half a millisecond for a
+callback; asking a handle takes 2 us. The handles are not documented: that is why the extra pins
+the version of rclpy.
 """
 
 from __future__ import annotations
@@ -16,23 +20,23 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 from controller import arguments
-from controller.bridges.ros2 import imports as ros
-from controller.bridges.ros2.actions import MotionActions
-from controller.bridges.ros2.behaviors import COMMANDS, order
-from controller.bridges.ros2.names import (
+from controller.bridges.ros2 import (
     BEHAVIOR_SERVICE,
-    BODY_POSE,
     CMD_VEL,
+    COMMAND_QUEUE,
     SERVER_NODE,
     STATISTICS_SERVICE,
 )
+from controller.bridges.ros2 import imports as ros
+from controller.bridges.ros2.actions import MotionActions
+from controller.bridges.ros2.behaviors import COMMANDS, order
 from controller.bridges.ros2.namespace_lock import GraphWatch, lock_namespace
-from controller.bridges.ros2.polling import PolledService, PolledSubscription
 from controller.bridges.ros2.states import StatePublisher
 from controller.bridges.ros2.velocity import VelocityInput
 from controller.go2_controller import GO2Controller
@@ -154,7 +158,7 @@ class RobotNode:
         )
         self._jobs = JobServer(go2)
         self._velocity = VelocityInput(go2, config.cautious_envelope, config.pose)
-        self._poses = PolledSubscription(node, ros.Pose, BODY_POSE, self._take_pose)
+        self._poses = PolledSubscription(node, ros.Pose, "body_pose", self._take_pose)
         self._twists = PolledSubscription(node, ros.Twist, CMD_VEL, self._take_twist)
         self._commands = (
             PolledService(node, ros.RobotBehaviorCommand, BEHAVIOR_SERVICE, self._take_command)
@@ -275,3 +279,48 @@ class RobotNode:
             self._actions.close()
         time.sleep(LINGER)
         self._node.destroy_node()
+
+
+class PolledSubscription:
+    """Takes the messages of a topic when asked."""
+
+    def __init__(self, node: Any, kind: Any, name: str, act: Callable[[Any], None]) -> None:
+        """Subscribe ``node`` to the topic ``name``; ``act`` is given each message."""
+        self._kind, self._act = kind, act
+        self._handle = node.create_subscription(kind, name, _never, COMMAND_QUEUE).handle
+
+    def poll(self) -> None:
+        """Take the messages that have come since, at most one queue full."""
+        for _ in range(COMMAND_QUEUE):
+            with self._handle:
+                taken = self._handle.take_message(self._kind, False)
+            if taken is None:
+                return
+            self._act(taken[0])
+
+
+class PolledService:
+    """Takes the calls of a service that answers ``success`` and ``message`` when asked."""
+
+    def __init__(self, node: Any, kind: Any, name: str, act: Callable[[Any, Reply], None]) -> None:
+        """Offer the service ``name`` on ``node``; ``act`` is given each request and its reply."""
+        self._kind, self._act = kind, act
+        self._service = node.create_service(kind, name, _never)
+
+    def poll(self) -> None:
+        """Take the calls that have come since, at most one queue full."""
+        handle = self._service.handle
+        for _ in range(COMMAND_QUEUE):
+            with handle:
+                request, header = handle.service_take_request(self._kind.Request)
+            if request is None:
+                return
+            self._act(request, partial(self._answer, header))
+
+    def _answer(self, header: Any, answer: Answer) -> None:
+        response = self._kind.Response(success=answer.ok, message=answer.reason)
+        self._service.send_response(response, header)
+
+
+def _never(*_arguments: Any) -> None:
+    """The callback that ROS wants; no executor ever calls it."""

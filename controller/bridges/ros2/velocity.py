@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 
-from controller.bridges.ros2.names import CMD_VEL_SILENCE
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from controller.pacing import LogThrottle
@@ -22,6 +21,9 @@ from go2_wbc.planning.pose import LEVEL, BodyPose, PoseEnvelope
 from go2_wbc.robot.rotations import rpy_from_quaternion
 
 _log = logging.getLogger(__name__)
+
+CMD_VEL_SILENCE = 0.5
+"""Robot time [s] without a command after which the robot stops."""
 
 
 class VelocityInput:

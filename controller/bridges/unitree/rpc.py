@@ -12,7 +12,7 @@ from functools import partial
 from typing import Final, final
 
 from controller.bridges.unitree.bus import Bus
-from controller.bridges.unitree.codec import (
+from controller.bridges.unitree.messages import (
     Reply,
     Request,
     Response,

@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 from controller.bridges.ros2.behaviors import COMMANDS, Jobs, motion_job, order
-from controller.bridges.ros2.names import CMD_VEL_SILENCE
-from controller.bridges.ros2.velocity import VelocityInput
+from controller.bridges.ros2.velocity import CMD_VEL_SILENCE, VelocityInput
 from controller.go2_controller import GO2Controller
 from controller.jobs import Answer, JobServer
 from controller.modes import Mode

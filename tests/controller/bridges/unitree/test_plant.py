@@ -14,11 +14,10 @@ import pytest
 
 from benchmarks.bridges.processes import wait_until
 from controller import GO2Controller
-from controller.bridges.unitree import layout
-from controller.bridges.unitree.codec import decode_message, encode_message
+from controller.bridges.unitree import messages
 from controller.bridges.unitree.guards import GuardConfig
-from controller.bridges.unitree.layout import seal
 from controller.bridges.unitree.low_level import low_cmd_message, low_state_message
+from controller.bridges.unitree.messages import decode_message, encode_message, seal
 from controller.bridges.unitree.plant import UnitreePlant
 from go2_wbc.errors import (
     CommandError,
@@ -83,7 +82,7 @@ class Robot:
         return [encode_message(message)]
 
     def write(self, data: bytes) -> None:
-        self.commands.append(decode_message(layout.LOW_CMD, data))
+        self.commands.append(decode_message(messages.LOW_CMD, data))
 
     def is_damped_since(self, start: int) -> bool:
         """Whether many commands come from then on, and all of them brake."""

@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks.bridges.processes import wait_until
 from controller.bridges.unitree import sport_api, sport_robot, sport_service
-from controller.bridges.unitree.codec import Request
+from controller.bridges.unitree.messages import Request
 from controller.bridges.unitree.sport_api import Api, Code, SportMode
 from controller.bridges.unitree.sport_robot import MOTIONS, WALKS, SportRobot
 from controller.bridges.unitree.sport_service import WAITING, SportService
