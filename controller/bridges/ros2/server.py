@@ -26,13 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from controller import arguments
-from controller.bridges.ros2 import (
-    BEHAVIOR_SERVICE,
-    CMD_VEL,
-    COMMAND_QUEUE,
-    SERVER_NODE,
-    STATISTICS_SERVICE,
-)
+from controller.bridges import ros2
 from controller.bridges.ros2 import imports as ros
 from controller.bridges.ros2.actions import MotionActions
 from controller.bridges.ros2.behaviors import COMMANDS, order
@@ -53,6 +47,8 @@ LATE = 0.25
 """Lag [s] behind the wall clock after which the pace is given up and taken up anew."""
 LINGER = 0.2
 """Time [s] in which the last answers reach their callers before the node goes."""
+Poll = Callable[[], None]
+"""Takes what has come since the last call, at most one queue full, and acts on it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,14 +120,7 @@ def serve(
                 after_tick=lambda: node.serve(stop),
             )
         )
-        node = RobotNode(
-            context,
-            go2,
-            simulator,
-            config,
-            realtime=settings.realtime,
-            sensors=settings.sensors,
-        )
+        node = RobotNode(context, go2, simulator, config, settings)
         stack.callback(node.close)
         on_ready(node.offer)
         node.run(stop, watch)
@@ -147,42 +136,38 @@ class RobotNode:
         go2: GO2Controller,
         simulator: MujocoPlant,
         config: Config,
-        *,
-        realtime: bool,
-        sensors: str,
+        settings: ServerSettings,
     ) -> None:
         """Offer ``go2``, which drives ``simulator``, in ``context``."""
         self._go2, namespace = go2, go2.namespace
         self._node = node = ros.Node(
-            SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
+            ros2.SERVER_NODE, namespace=namespace, context=context, start_parameter_services=False
         )
         self._jobs = JobServer(go2)
         self._velocity = VelocityInput(go2, config.cautious_envelope, config.pose)
-        self._poses = PolledSubscription(node, ros.Pose, "body_pose", self._take_pose)
-        self._twists = PolledSubscription(node, ros.Twist, CMD_VEL, self._take_twist)
-        self._commands = (
-            PolledService(node, ros.RobotBehaviorCommand, BEHAVIOR_SERVICE, self._take_command)
-            if ros.RobotBehaviorCommand is not None
-            else None
-        )
+        self._poll_twists = polled_topic(node, ros.Twist, ros2.CMD_VEL, self._take_twist)
+        self._poll_poses = polled_topic(node, ros.Pose, "body_pose", self._take_pose)
+        self._poll_commands: Poll = lambda: None
+        if (kind := ros.RobotBehaviorCommand) is not None:
+            self._poll_commands = polled_service(
+                node,
+                kind,
+                ros2.BEHAVIOR_SERVICE,
+                lambda request, reply: self._order(request.command, reply),
+            )
         self._triggers = cycle(self._offer_triggers())
-        self._states = StatePublisher(node, simulator, realtime=realtime, sensors=sensors)
-        self._actions = (
-            MotionActions(context, namespace, self._jobs) if ros.PlayMotion is not None else None
+        self._states = StatePublisher(
+            node, simulator, realtime=settings.realtime, sensors=settings.sensors
         )
-        self._pacer = Pacer(simulator.control_period, LATE) if realtime else None
+        self._actions = ros.PlayMotion and MotionActions(context, namespace, self._jobs)
+        self._pacer = Pacer(simulator.control_period, LATE) if settings.realtime else None
         self._throttle, self._errors = LogThrottle(_log), 0
         self._cpu, self._began = 0.0, time.monotonic()
 
-    def _offer_triggers(self) -> Iterator[PolledService]:
-        for name in COMMANDS:
-            yield PolledService(
-                self._node,
-                ros.Trigger,
-                name,
-                lambda _request, reply, name=name: self._order(name, reply),
-            )
-        yield PolledService(self._node, ros.Trigger, STATISTICS_SERVICE, self._tell_statistics)
+    def _offer_triggers(self) -> Iterator[Poll]:
+        acts = {name: partial(self._take_trigger, name) for name in COMMANDS}
+        for name, act in {**acts, ros2.STATISTICS_SERVICE: self._tell_statistics}.items():
+            yield polled_service(self._node, ros.Trigger, name, act)
 
     @property
     def offer(self) -> str:
@@ -215,16 +200,12 @@ class RobotNode:
             self._pacer.wait(lambda: self._guarded(self._poll_commands))
 
     def _serve_once(self) -> None:
-        next(self._triggers).poll()
+        next(self._triggers)()
         self._poll_commands()
-        self._twists.poll()
-        self._poses.poll()
+        self._poll_twists()
+        self._poll_poses()
         self._velocity.expire()
         self._states.publish_due()
-
-    def _poll_commands(self) -> None:
-        if self._commands is not None:
-            self._commands.poll()
 
     def _guarded(self, act: Callable[[], object]) -> None:
         began = time.thread_time()
@@ -245,8 +226,8 @@ class RobotNode:
         at = pose.orientation
         self._velocity.accept_pose(pose.position.z, (at.x, at.y, at.z, at.w))
 
-    def _take_command(self, request: Any, reply: Reply) -> None:
-        self._order(request.command, reply)
+    def _take_trigger(self, name: str, _request: Any, reply: Reply) -> None:
+        self._order(name, reply)
 
     def _order(self, command: str, reply: Reply) -> None:
         order(self._jobs, command, reply)
@@ -281,45 +262,37 @@ class RobotNode:
         self._node.destroy_node()
 
 
-class PolledSubscription:
-    """Takes the messages of a topic when asked."""
+def polled_topic(node: Any, kind: Any, name: str, act: Callable[[Any], None]) -> Poll:
+    """Subscribe ``node`` to a topic; ``act`` is given each message when it is polled."""
+    handle = node.create_subscription(kind, name, _never, ros2.COMMAND_QUEUE).handle
 
-    def __init__(self, node: Any, kind: Any, name: str, act: Callable[[Any], None]) -> None:
-        """Subscribe ``node`` to the topic ``name``; ``act`` is given each message."""
-        self._kind, self._act = kind, act
-        self._handle = node.create_subscription(kind, name, _never, COMMAND_QUEUE).handle
-
-    def poll(self) -> None:
-        """Take the messages that have come since, at most one queue full."""
-        for _ in range(COMMAND_QUEUE):
-            with self._handle:
-                taken = self._handle.take_message(self._kind, False)
+    def poll() -> None:
+        for _ in range(ros2.COMMAND_QUEUE):
+            with handle:
+                taken = handle.take_message(kind, False)
             if taken is None:
                 return
-            self._act(taken[0])
+            act(taken[0])
+
+    return poll
 
 
-class PolledService:
-    """Takes the calls of a service that answers ``success`` and ``message`` when asked."""
+def polled_service(node: Any, kind: Any, name: str, act: Callable[[Any, Reply], None]) -> Poll:
+    """Offer a service that answers ``success`` and ``message``; ``act`` is given each request."""
+    service = node.create_service(kind, name, _never)
 
-    def __init__(self, node: Any, kind: Any, name: str, act: Callable[[Any, Reply], None]) -> None:
-        """Offer the service ``name`` on ``node``; ``act`` is given each request and its reply."""
-        self._kind, self._act = kind, act
-        self._service = node.create_service(kind, name, _never)
+    def answer(header: Any, answer: Answer) -> None:
+        service.send_response(kind.Response(success=answer.ok, message=answer.reason), header)
 
-    def poll(self) -> None:
-        """Take the calls that have come since, at most one queue full."""
-        handle = self._service.handle
-        for _ in range(COMMAND_QUEUE):
-            with handle:
-                request, header = handle.service_take_request(self._kind.Request)
+    def poll() -> None:
+        for _ in range(ros2.COMMAND_QUEUE):
+            with service.handle:
+                request, header = service.handle.service_take_request(kind.Request)
             if request is None:
                 return
-            self._act(request, partial(self._answer, header))
+            act(request, partial(answer, header))
 
-    def _answer(self, header: Any, answer: Answer) -> None:
-        response = self._kind.Response(success=answer.ok, message=answer.reason)
-        self._service.send_response(response, header)
+    return poll
 
 
 def _never(*_arguments: Any) -> None:

@@ -49,13 +49,9 @@ class VelocityInput:
         )
 
     def accept(self, x: float, y: float, turn: float, *, is_busy: bool) -> None:
-        """Follow the velocity x, y [m/s], turn [rad/s], if that is possible now.
+        """Follow the velocity x forward, y to the left [m/s], turn left [rad/s], if it can now.
 
-        Args:
-            x: forward.
-            y: to the left.
-            turn: to the left.
-            is_busy: whether the robot carries out a behaviour, which is not to be disturbed.
+        Not while it ``is_busy`` with a behaviour, which is not to be disturbed.
         """
         self.counts["received"] += 1
         if not all(map(math.isfinite, (x, y, turn))):
@@ -79,9 +75,7 @@ class VelocityInput:
     def accept_pose(self, height: float, quaternion: tuple[float, float, float, float]) -> None:
         """Take a pose of the trunk while the robot walks; it lasts until the next one.
 
-        Args:
-            height: from the usual one [m].
-            quaternion: of the trunk from that of one that walks level, x y z w; all 0 is level.
+        ``height`` [m] is from the usual one, ``quaternion`` (x y z w) from level; all 0 is level.
         """
         try:
             rpy = _attitude(quaternion)

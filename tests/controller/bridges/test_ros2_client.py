@@ -6,6 +6,7 @@ import json
 import math
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 from unittest.mock import patch
@@ -181,8 +182,6 @@ def test_a_class_from_the_course_runs_unmodified(server: Process, probe: Watchin
 
 
 def test_somebody_else_may_spin_the_node(go2: Any) -> None:
-    import threading
-
     from rclpy.executors import SingleThreadedExecutor
 
     executor = SingleThreadedExecutor()

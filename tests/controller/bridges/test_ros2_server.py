@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import re
 import signal
-import time
 from collections.abc import Iterator
 from contextlib import closing
 from typing import Any
@@ -25,8 +23,6 @@ SPEED_TOLERANCE = 0.02
 """Share of the commanded speed, over several strides."""
 DRIVES = 4
 """How often a busy machine gets the chance to send commands without a gap of half a second."""
-CATCH_UP = 0.5
-"""Time [s] by which a robot that was late may be faster than the wall clock."""
 RATE_TOLERANCE = 0.05
 """Share of a rate: a few messages are on their way when the counting begins and ends."""
 
@@ -42,27 +38,6 @@ def test_a_behaviour_is_answered_when_odometry_bears_it_out(
     answer = probe.call("Sit")
     assert answer.success, answer.message
     assert probe.height() == pytest.approx(0.235, abs=0.02)
-
-
-def test_an_unknown_behaviour_is_refused_with_the_valid_names(
-    server: Process, probe: WatchingProbe
-) -> None:
-    answer = probe.call("levitate")
-    assert not answer.success
-    assert "valid: damp, high_five, lie_down, recover, sit, stand, stop, up, walk" in answer.message
-
-
-def test_a_second_call_during_one_is_refused_at_once(server: Process, probe: WatchingProbe) -> None:
-    probe.call("up")
-    began = time.monotonic()
-    first = probe.send("sit")
-    second = probe.result(probe.send("up"))
-    assert not second.success
-    since = re.search(r"busy with 'sit' since (\d+\.\d) s", second.message)
-    assert since is not None
-    assert float(since[1]) < time.monotonic() - began + CATCH_UP
-    assert not first.done()
-    assert probe.result(first).success
 
 
 def test_velocities_are_real_ones_and_end_with_silence(
@@ -119,36 +94,6 @@ def test_sideways_and_turning_velocities_are_followed_too(
     dx, dy = end.xy[0] - start.xy[0], end.xy[1] - start.xy[1]
     aside = -math.sin(start.yaw) * dx + math.cos(start.yaw) * dy
     assert aside / (end.time - start.time) == pytest.approx(0.2, rel=0.1)
-
-
-def test_a_velocity_that_is_not_finite_or_out_of_mode_moves_nothing(
-    server: Process, probe: WatchingProbe
-) -> None:
-    assert probe.call("walk").success
-    assert probe.trigger("stop").success
-    before, counts = probe.place(), probe.statistics()["cmd_vel"]
-    drive_until_counted(probe, math.nan, "not_finite")
-    assert probe.call("up").success
-    drive_until_counted(probe, 0.5, "out_of_mode")
-    assert probe.place().way_from(before) < 0.02
-    assert probe.statistics()["cmd_vel"]["followed"] == counts["followed"]
-    assert "not finite" in server.text
-
-
-def drive_until_counted(probe: WatchingProbe, x: float, kind: str) -> None:
-    before = probe.statistics()["cmd_vel"][kind]
-
-    def is_counted() -> bool:
-        probe.drive(0.5, x)
-        return probe.statistics()["cmd_vel"][kind] > before
-
-    assert wait_until(is_counted, ANSWER), kind
-
-
-def test_the_triggers_do_the_same_as_the_command(server: Process, probe: WatchingProbe) -> None:
-    assert probe.trigger("up").success
-    assert probe.trigger("stop").success
-    assert probe.statistics()["mode"] == "standing"
 
 
 def test_every_topic_comes_at_its_rate(server: Process, probe: WatchingProbe) -> None:
