@@ -49,9 +49,7 @@ def paint_floor(
     return picture
 
 
-def _floor_points(
-    camera: Camera,
-) -> tuple[int, Float[np.ndarray, "r w"], Float[np.ndarray, "r w"]]:
+def _floor_points(camera: Camera) -> tuple[int, Float[np.ndarray, "r w"], Float[np.ndarray, "r w"]]:
     """First row that shows the floor, and the floor's x and y [m] in the pixels from there on.
 
     The camera has no roll, so distance along the view depends on the row alone.

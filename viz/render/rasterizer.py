@@ -15,9 +15,7 @@ _COVERAGE_SLACK = 1e-6  # [px] samples this close to an edge count, so that no c
 
 
 def rasterize(
-    points: Float[np.ndarray, "n 3"],
-    triangles: Int[np.ndarray, "m 3"],
-    size: tuple[int, int],
+    points: Float[np.ndarray, "n 3"], triangles: Int[np.ndarray, "m 3"], size: tuple[int, int]
 ) -> tuple[Int[np.ndarray, " k"], Int[np.ndarray, " k"]]:
     """The samples that are covered, and the row of the triangle that is in front at each.
 
@@ -68,9 +66,7 @@ def _doubled_area(
 
 
 def plane_coefficients(
-    x: Float[np.ndarray, "3 m"],
-    y: Float[np.ndarray, "3 m"],
-    value: Float[np.ndarray, "3 m"],
+    x: Float[np.ndarray, "3 m"], y: Float[np.ndarray, "3 m"], value: Float[np.ndarray, "3 m"]
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
     """Slopes along x and y, and value at the origin, of the plane through three corner values.
 

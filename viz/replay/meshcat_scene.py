@@ -72,12 +72,7 @@ def robot_scene(visuals: RobotVisuals, pack: Pack) -> dict[str, object]:
             node.set_object(SharedMesh(table[item.meshPath, row]), _material(part))
             node.set_transform(item.placement.homogeneous)
     _add_markers(scene)
-    return {
-        "meshes": len(table),
-        "commands": _plain(commands),
-        "base": paths[1],
-        "joints": joints,
-    }
+    return {"meshes": len(table), "commands": _plain(commands), "base": paths[1], "joints": joints}
 
 
 def _plain(commands: list[object]) -> object:

@@ -11,12 +11,7 @@ from controller.go2_controller import GO2Controller
 from controller.modes import Mode
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError
-from go2_wbc.planning.command import (
-    ZERO_COMMAND,
-    VelocityCommand,
-    VelocityEnvelope,
-    finite_number,
-)
+from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope, finite_number
 from go2_wbc.planning.pose import LEVEL, BodyPose, PoseEnvelope
 from go2_wbc.robot.rotations import rpy_from_quaternion
 
@@ -34,10 +29,7 @@ class VelocityInput:
     """
 
     def __init__(
-        self,
-        go2: GO2Controller,
-        envelope: VelocityEnvelope,
-        poses: PoseEnvelope | None = None,
+        self, go2: GO2Controller, envelope: VelocityEnvelope, poses: PoseEnvelope | None = None
     ) -> None:
         """Drive ``go2`` within the envelopes of velocities and of poses."""
         self._go2, self._envelope, self._poses = go2, envelope, poses or PoseEnvelope()

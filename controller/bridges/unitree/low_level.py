@@ -18,12 +18,7 @@ from jaxtyping import Float, Shaped
 
 from controller.behaviours.joints import DAMPING
 from controller.bridges.unitree import messages
-from controller.bridges.unitree.messages import (
-    FEET_SWAPPED,
-    JOINTS_SWAPPED,
-    MOTORS,
-    decode_message,
-)
+from controller.bridges.unitree.messages import FEET_SWAPPED, JOINTS_SWAPPED, MOTORS, decode_message
 from controller.pacing import LogThrottle
 from go2_wbc.errors import CommandError
 from go2_wbc.plant.sensors import ImuSample

@@ -27,13 +27,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
-from motions import (
-    FeasibilityChecker,
-    Timeline,
-    compile_motion,
-    compile_timeline,
-    motion_names,
-)
+from motions import FeasibilityChecker, Timeline, compile_motion, compile_timeline, motion_names
 from motions.postures import lean
 
 _log = logging.getLogger(__name__)

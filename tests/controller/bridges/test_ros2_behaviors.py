@@ -236,9 +236,7 @@ def test_a_velocity_lasts_half_a_second(go2: GO2Controller, velocity: VelocityIn
 
 
 def test_velocities_that_cannot_be_followed_are_counted_and_warned_of_once(
-    caplog: pytest.LogCaptureFixture,
-    go2: GO2Controller,
-    velocity: VelocityInput,
+    caplog: pytest.LogCaptureFixture, go2: GO2Controller, velocity: VelocityInput
 ) -> None:
     velocity._throttle = LogThrottle(logging.getLogger("cmd_vel"), math.inf)
     for _ in range(5):

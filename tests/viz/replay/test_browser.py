@@ -78,9 +78,7 @@ def test_the_readouts_follow_the_time(browser: Tab) -> None:
     assert float(shown.split()[0]) == pytest.approx(100 * height, abs=0.06)
 
 
-def test_what_lies_on_the_floor_is_drawn_above_it_although_feet_press_into_it(
-    browser: Tab,
-) -> None:
+def test_what_lies_on_the_floor_is_drawn_above_it_although_feet_press_into_it(browser: Tab) -> None:
     lower = "replay.data.feet = replay.data.feet.map((value, i) => i % 3 === 2 ? value {} : value);"
     corners = "replay.scene.polygon.geometry.attributes.position"
     try:
