@@ -4,42 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import trimesh
 
 from viz.render.camera import Camera
 from viz.render.rasterizer import rasterize
-
-_EDGE = 1e-5  # [px] a sample this close to an edge may fall on either side
-
-
-def _camera(size: tuple[int, int] = (120, 90)) -> Camera:
-    return Camera(np.zeros(3), np.deg2rad(35.0), np.deg2rad(25.0), 3.0, size)
-
-
-def _signed_distances(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Distances [px] of points to the edges of a clockwise (y down) polygon, positive inside."""
-    edges = np.roll(corners, -1, axis=0) - corners
-    lengths = np.hypot(*edges.T)
-    across = edges[:, 0, None] * (y - corners[:, 1, None])
-    along = edges[:, 1, None] * (x - corners[:, 0, None])
-    return (across - along) / lengths[:, None]
-
-
-def test_the_silhouette_of_a_cube_is_the_hull_of_its_projected_corners() -> None:
-    camera = _camera()
-    cube = trimesh.creation.box((0.6, 0.6, 0.6))
-    projected = camera.project(cube.vertices)
-    pixels, _ = rasterize(projected, cube.faces, camera.size)
-    covered = np.zeros(camera.size[0] * camera.size[1], dtype=bool)
-    covered[pixels] = True
-    row, column = np.divmod(np.arange(len(covered)), camera.size[0])
-    hull = trimesh.convex.hull_points(projected[:, :2])
-    centre = hull.mean(axis=0)
-    around = hull[np.argsort(np.arctan2(*(hull - centre).T[::-1]))]
-    depth = _signed_distances(around, column + 0.5, row + 0.5).min(axis=0)
-    clear = np.abs(depth) > _EDGE
-    assert covered.sum() > 500
-    np.testing.assert_array_equal(covered[clear], depth[clear] > 0)
 
 
 @pytest.mark.parametrize("seed", range(5))
