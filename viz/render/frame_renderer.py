@@ -98,27 +98,23 @@ class FrameRenderer:
         strip = image.crop((0, height - band, width, height))
         fine = (width * _SUPERSAMPLING, band * _SUPERSAMPLING)
         strip = strip.resize(fine, Image.Resampling.BICUBIC)
-        draw, scale = ImageDraw.Draw(strip), unit * _SUPERSAMPLING
-        clock = f"{time:.1f} s" + (f"   {speed:g}x" if speed != 1.0 else "")
-        self._write(draw, time, clock, fine[1] - 28 * scale, scale)
-        self._draw_feet(draw, self._row(time), fine, scale)
+        self._draw_label(strip, time, speed, unit * _SUPERSAMPLING)
+        self._draw_feet(strip, time, unit * _SUPERSAMPLING)
         if with_progress:
-            top, share = fine[1] - 4 * scale, time / max(self._recording.duration, 1e-9)
-            draw.rectangle((0, top, fine[0], fine[1]), fill=TRACK)
-            draw.rectangle((0, top, fine[0] * share, fine[1]), fill=ACCENT)
+            self._draw_progress(strip, time, unit * _SUPERSAMPLING)
         image.paste(strip.resize((width, band), Image.Resampling.BOX), (0, height - band))
         return np.asarray(image)
 
-    def _write(
-        self, draw: ImageDraw.ImageDraw, time: float, clock: str, middle: float, unit: float
-    ) -> None:
-        """Label and clock, with their middle at this row."""
+    def _draw_label(self, strip: Image.Image, time: float, speed: float, unit: float) -> None:
+        """What the robot does, or what it breaks, in red; and the time."""
         broken = self._broken_at(time)
         label = self._recording.labels[self._row(time)]
         if broken is not None:
             label = f"{broken.limit}: {broken.subject}"
         words = label.replace("_", " ").strip()
         text = words[:1].upper() + words[1:]
+        clock = f"{time:.1f} s" + (f"   {speed:g}x" if speed != 1.0 else "")
+        draw, middle = ImageDraw.Draw(strip), strip.height - 28 * unit
         font, small = ImageFont.load_default(15 * unit), ImageFont.load_default(11.5 * unit)
         left, pad, half = 14 * unit, 11 * unit, 13 * unit
         right = left + draw.textlength(text, font) + 2 * pad
@@ -127,17 +123,22 @@ class FrameRenderer:
         draw.text((left + pad, middle), text, "white", font, anchor="lm")
         draw.text((right + 10 * unit, middle), clock, MUTED, small, anchor="lm")
 
-    def _draw_feet(
-        self, draw: ImageDraw.ImageDraw, k: int, size: tuple[int, int], unit: float
-    ) -> None:
+    def _draw_feet(self, strip: Image.Image, time: float, unit: float) -> None:
         """A box for each foot, coloured while it touches the floor."""
-        small, middle = ImageFont.load_default(11.5 * unit), size[1] - 28 * unit
-        contacts = self._recording.foot_forces[k] > _LEAST_FORCE
+        draw, middle = ImageDraw.Draw(strip), strip.height - 28 * unit
+        font = ImageFont.load_default(11.5 * unit)
+        contacts = self._recording.foot_forces[self._row(time)] > _LEAST_FORCE
         for leg, color, touches in zip(LEGS, LEG_COLORS, contacts, strict=True):
-            x = size[0] - (14 + 34 * (len(LEGS) - 1 - leg) + 14) * unit
+            x = strip.width - (14 + 34 * (len(LEGS) - 1 - leg) + 14) * unit
             box = (x - 14 * unit, middle - 10 * unit, x + 14 * unit, middle + 10 * unit)
             draw.rounded_rectangle(box, 6 * unit, fill=color if touches else TRACK)
-            draw.text((x, middle), leg.name, "white" if touches else MUTED, small, anchor="mm")
+            draw.text((x, middle), leg.name, "white" if touches else MUTED, font, anchor="mm")
+
+    def _draw_progress(self, strip: Image.Image, time: float, unit: float) -> None:
+        draw, top = ImageDraw.Draw(strip), strip.height - 4 * unit
+        share = time / max(self._recording.duration, 1e-9)
+        draw.rectangle((0, top, strip.width, strip.height), fill=TRACK)
+        draw.rectangle((0, top, strip.width * share, strip.height), fill=ACCENT)
 
     def _row(self, time: float) -> int:
         return int(nearest_rows(self._recording, np.array([time]))[0])
