@@ -157,7 +157,7 @@ def test_a_motion_tells_its_progress_and_can_be_cancelled(go2: Any) -> None:
     assert go2.state().q[2] > 0.27
 
 
-def test_a_class_from_the_course_runs_unmodified(server: Process, probe: WatchingProbe) -> None:
+def test_a_class_from_the_course_runs_unmodified(probe: WatchingProbe) -> None:
     from tests.controller.bridges.student import StudentController
 
     student = StudentController()

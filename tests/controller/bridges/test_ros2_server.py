@@ -27,9 +27,7 @@ RATE_TOLERANCE = 0.05
 """Share of a rate: a few messages are on their way when the counting begins and ends."""
 
 
-def test_a_behaviour_is_answered_when_odometry_bears_it_out(
-    server: Process, probe: WatchingProbe
-) -> None:
+def test_a_behaviour_is_answered_when_odometry_bears_it_out(probe: WatchingProbe) -> None:
     low = probe.height()
     answer = probe.call("UP")
     assert answer.success, answer.message
@@ -40,9 +38,7 @@ def test_a_behaviour_is_answered_when_odometry_bears_it_out(
     assert probe.height() == pytest.approx(0.235, abs=0.02)
 
 
-def test_velocities_are_real_ones_and_end_with_silence(
-    server: Process, probe: WatchingProbe
-) -> None:
+def test_velocities_are_real_ones_and_end_with_silence(probe: WatchingProbe) -> None:
     assert probe.call("walk").success
     start, end = driven(probe, 5.0, 0.3)
     assert end.speed_from(start) == pytest.approx(0.3, rel=SPEED_TOLERANCE)
@@ -70,9 +66,7 @@ def driven(
     raise AssertionError("no drive")
 
 
-def test_an_order_ends_the_velocity_that_came_before_it(
-    server: Process, probe: WatchingProbe
-) -> None:
+def test_an_order_ends_the_velocity_that_came_before_it(probe: WatchingProbe) -> None:
     # A robot that was told to walk while it walked forgot to stop when the commands ceased.
     assert probe.call("walk").success
     probe.drive(1.0, 0.3)
@@ -83,9 +77,7 @@ def test_an_order_ends_the_velocity_that_came_before_it(
     assert probe.place().way_from(resting) < 0.005
 
 
-def test_sideways_and_turning_velocities_are_followed_too(
-    server: Process, probe: WatchingProbe
-) -> None:
+def test_sideways_and_turning_velocities_are_followed_too(probe: WatchingProbe) -> None:
     assert probe.call("walk").success
     start, end = driven(probe, 3.0, 0.0, 0.5)
     turned = math.remainder(end.yaw - start.yaw, math.tau)
@@ -96,7 +88,7 @@ def test_sideways_and_turning_velocities_are_followed_too(
     assert aside / (end.time - start.time) == pytest.approx(0.2, rel=0.1)
 
 
-def test_every_topic_comes_at_its_rate(server: Process, probe: WatchingProbe) -> None:
+def test_every_topic_comes_at_its_rate(probe: WatchingProbe) -> None:
     first = probe.statistics()
     probe.let_pass(3.0)
     second = probe.statistics()
@@ -112,9 +104,7 @@ def test_every_topic_comes_at_its_rate(server: Process, probe: WatchingProbe) ->
     assert second["errors"] == 0
 
 
-def test_the_messages_say_what_a_standing_robot_measures(
-    server: Process, probe: WatchingProbe
-) -> None:
+def test_the_messages_say_what_a_standing_robot_measures(probe: WatchingProbe) -> None:
     from quadropted_msgs.msg import RobotFootContact
     from sensor_msgs.msg import Imu, JointState
     from tf2_msgs.msg import TFMessage
@@ -142,9 +132,7 @@ def test_the_messages_say_what_a_standing_robot_measures(
     assert transform.transform.translation.z == pytest.approx(probe.height(), abs=0.01)
 
 
-def test_odometry_says_how_sure_it_is_and_a_pose_is_taken_while_walking(
-    server: Process, probe: WatchingProbe
-) -> None:
+def test_odometry_says_how_sure_it_is_and_a_pose_is_taken_on_the_way(probe: WatchingProbe) -> None:
     from geometry_msgs.msg import Pose
     from nav_msgs.msg import Odometry
 
@@ -192,9 +180,7 @@ def goal_of(probe: WatchingProbe, motion: str, *settings: str) -> tuple[Any, lis
     return probe.result(client.send_goal_async(goal, feedback_callback=note)), feedback
 
 
-def test_a_motion_has_feedback_with_progress_and_a_result(
-    server: Process, probe: WatchingProbe
-) -> None:
+def test_a_motion_has_feedback_with_progress_and_a_result(probe: WatchingProbe) -> None:
     handle, feedback = goal_of(probe, "nod", "times=1")
     assert handle.accepted
     answer = probe.result(handle.get_result_async())
@@ -207,7 +193,7 @@ def test_a_motion_has_feedback_with_progress_and_a_result(
     assert {message.phase for message in feedback} >= {"playing"}
 
 
-def test_a_high_five_that_is_cancelled_ends_standing(server: Process, probe: WatchingProbe) -> None:
+def test_a_high_five_that_is_cancelled_ends_standing(probe: WatchingProbe) -> None:
     assert probe.call("up").success
     handle, feedback = goal_of(probe, "high_five", "hold=5.0")
     assert wait_until(lambda: bool(feedback) and feedback[-1].progress >= 0.4, ANSWER)
@@ -221,9 +207,7 @@ def test_a_high_five_that_is_cancelled_ends_standing(server: Process, probe: Wat
     assert feedback[-1].phase == "returning"
 
 
-def test_a_motion_that_does_not_exist_is_aborted_with_the_names(
-    server: Process, probe: WatchingProbe
-) -> None:
+def test_a_motion_that_does_not_exist_is_aborted_with_the_names(probe: WatchingProbe) -> None:
     handle, _ = goal_of(probe, "levitate")
     answer = probe.result(handle.get_result_async())
     assert answer.status == 6  # aborted
@@ -304,7 +288,7 @@ def test_a_free_running_server_ends_well_too(free_runners: tuple[Process, Proces
         assert server.code == 0
 
 
-def test_two_robots_live_side_by_side(server: Process, probe: WatchingProbe) -> None:
+def test_two_robots_live_side_by_side(probe: WatchingProbe) -> None:
     with serving(namespace="robot2") as second, closing(WatchingProbe("robot2")) as other:
         assert other.call("up").success
         assert probe.call("sit").success
