@@ -21,7 +21,7 @@ from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
 from go2_wbc.planning.gait_clock import Clock
-from go2_wbc.planning.ground import Ground, GroundConfig, apex_raise, delay
+from go2_wbc.planning.ground import Ground, apex_raise, delay
 from go2_wbc.records import Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
@@ -73,17 +73,15 @@ class Swing(Record):
 
 
 @subroutine
-def begin_swing(
-    swing: Swing, p_foot: Float[np.ndarray, "3"], ground: Ground, c: GroundConfig
-) -> None:
+def begin_swing(swing: Swing, p_foot: Float[np.ndarray, "3"], ground: Ground) -> None:
     """A foot leaves the ground."""
     swing.start[:] = p_foot
-    swing.raised, swing.delay, swing.begun = apex_raise(ground, c), delay(ground, c), 0.0
+    swing.raised, swing.delay, swing.begun = apex_raise(ground), delay(ground), 0.0
 
 
 @subroutine
 def resume_swing(
-    swing: Swing, p_foot: Float[np.ndarray, "3"], ground: Ground, c: GroundConfig, progress: float
+    swing: Swing, p_foot: Float[np.ndarray, "3"], ground: Ground, progress: float
 ) -> None:
     """A foot has been stopped at ``progress``; it goes on from there, once in a swing.
 
@@ -92,7 +90,7 @@ def resume_swing(
     """
     if swing.begun == 0.0:
         swing.start[:] = p_foot
-        swing.raised, swing.delay, swing.begun = 0.0, delay(ground, c), progress
+        swing.raised, swing.delay, swing.begun = 0.0, delay(ground), progress
 
 
 @subroutine
