@@ -25,7 +25,7 @@ from jaxtyping import Float
 from go2_wbc.algebra.vectors import rotation_by
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
-from go2_wbc.records import Record
+from go2_wbc.records import V3, Record
 from go2_wbc.reference import Target, TrackedPoint
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -73,12 +73,18 @@ def correct(
         s.offset[i] = integrated(at, error[i], dt, RATE, POSITION_WINDOW, POSITION_LIMIT)
         s.offset[k] = integrated(s.offset[k], error[k], dt, RATE, ANGLE_WINDOW, ANGLE_LIMIT)
         target.p_world[i] += s.offset[i]
-    turn, planned, R = np.empty((3, 3)), target.R_world_base.copy(), target.R_world_base
-    rotation_by((s.offset[3], s.offset[4], s.offset[5]), turn)
+    turn_by((s.offset[3], s.offset[4], s.offset[5]), target.R_world_base)
+
+
+@subroutine
+def turn_by(rotation: V3, R: Float[np.ndarray, "3 3"]) -> None:
+    """Turn an attitude by a rotation vector [rad] in the world."""
+    turn, before = np.empty((3, 3)), R.copy()
+    rotation_by(rotation, turn)
     for i in range(3):
         for k in range(3):
             R[i, k] = (
-                turn[i, 0] * planned[0, k] + turn[i, 1] * planned[1, k] + turn[i, 2] * planned[2, k]
+                turn[i, 0] * before[0, k] + turn[i, 1] * before[1, k] + turn[i, 2] * before[2, k]
             )
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.algebra.vectors import cross, rotation_by
+from go2_wbc.algebra.vectors import cross
 from go2_wbc.compilation import Foreign, subroutine
 from go2_wbc.planning.correction import (
     ANGLE_WINDOW,
@@ -22,6 +22,7 @@ from go2_wbc.planning.correction import (
     POSITION_WINDOW,
     RATE,
     integrated,
+    turn_by,
 )
 from go2_wbc.planning.ground import Ground, ground_at, tilt
 from go2_wbc.planning.pose import lean_rotation, pose_turn
@@ -197,10 +198,4 @@ def level(
         error = cross(measured, (wanted[0, 2], wanted[1, 2], wanted[2, 2]))
         for i in range(2):
             offset[i] = integrated(offset[i], error[i], dt, rate, window, LEAN_LIMIT)
-    turn, before = np.empty((3, 3)), wanted.copy()
-    rotation_by((offset[0], offset[1], 0.0), turn)
-    for i in range(3):
-        for k in range(3):
-            wanted[i, k] = (
-                turn[i, 0] * before[0, k] + turn[i, 1] * before[1, k] + turn[i, 2] * before[2, k]
-            )
+    turn_by((offset[0], offset[1], 0.0), wanted)
