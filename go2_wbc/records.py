@@ -236,34 +236,18 @@ def _property(field: Field) -> property:
     """The part as an attribute: a number, a flag, an array, a record or records of ``row``."""
     start, end, shape, record = field.start, field.start + field.size, field.shape, field.record
 
+    if record is not None and shape:
+        step = layout_of(record).size
+        parts = [slice(k, k + step) for k in range(start, end, step)]
+        return property(lambda self: tuple(_looking_at(record, self.row[part]) for part in parts))
     if record is not None:
-
-        def get_records(self: Any) -> Any:
-            if not shape:
-                return _looking_at(record, self.row[start:end])
-            step = layout_of(record).size
-            return tuple(
-                _looking_at(record, self.row[k : k + step]) for k in range(start, end, step)
-            )
-
-        return property(get_records)
+        return property(lambda self: _looking_at(record, self.row[start:end]))
     if field.is_flag:
-
-        def get_flag(self: Any) -> bool:
-            return bool(self.row[start])
-
-        return property(get_flag, _setter(start))
+        return property(lambda self: bool(self.row[start]), _setter(start))
     if not shape:
-
-        def get_number(self: Any) -> float:
-            return self.row[start]
-
-        return property(get_number, _setter(start))
-
-    def get_array(self: Any) -> Float[np.ndarray, "..."]:
-        return self.row[start:end].reshape(shape)
-
-    return property(get_array)  # to be written into: compiled, an array cannot be exchanged either
+        return property(lambda self: self.row[start], _setter(start))
+    # To be written into: compiled, an array cannot be exchanged either.
+    return property(lambda self: self.row[start:end].reshape(shape))
 
 
 def _setter(start: int) -> Any:
