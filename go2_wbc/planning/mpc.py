@@ -29,8 +29,8 @@ from dataclasses import InitVar, dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from go2_wbc.algebra.active_set import SINGULAR, constrain, factorise, solve_factorised
-from go2_wbc.algebra.linear import solve_linear
+from go2_wbc.algebra.active_set import SINGULAR, constrain
+from go2_wbc.algebra.linear import factorise, solve_factorised, solve_linear
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import Record
 from go2_wbc.validation import (

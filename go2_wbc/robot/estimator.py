@@ -49,11 +49,20 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
 
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.legs import LEGS
-from go2_wbc.records import Record, packed
+from go2_wbc.records import (
+    Array3,
+    Array3x3,
+    Array4,
+    Array4x3,
+    Array12,
+    Array18,
+    Array19,
+    Record,
+    packed,
+)
 from go2_wbc.robot.description import BASE_LINK
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.foot_odometry import Foot, Level, follow_foot, see_foot, see_ground, take_in_leg
@@ -113,12 +122,12 @@ class SensorReading:
     """
 
     time: float
-    gyro: Float[np.ndarray, "3"]
-    accelerometer: Float[np.ndarray, "3"]
-    q_joints: Float[np.ndarray, "12"]
-    v_joints: Float[np.ndarray, "12"]
-    tau: Float[np.ndarray, "12"]
-    foot_forces: Float[np.ndarray, "4"]
+    gyro: Array3
+    accelerometer: Array3
+    q_joints: Array12
+    v_joints: Array12
+    tau: Array12
+    foot_forces: Array4
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +144,7 @@ class EstimatorNumbers:
 
     config: EstimatorConfig
     legs: Legs
-    p_base_imu: Float[np.ndarray, "3"]
+    p_base_imu: Array3
     foot_radius: float
     gravity: float
 
@@ -152,7 +161,7 @@ class EstimatorState(Record):
     """
 
     filter: Filter
-    gyro: Float[np.ndarray, "3"]
+    gyro: Array3
     rest: Rest
     level: Level
     feet: tuple[Foot, Foot, Foot, Foot]
@@ -167,13 +176,7 @@ def learning(x: Estimate, speed: float) -> float:
 
 @subroutine
 def report(
-    x: Estimate,
-    reading: Reading,
-    w: Float[np.ndarray, "3"],
-    p_imu: Float[np.ndarray, "3"],
-    R: Float[np.ndarray, "3 3"],
-    q: Float[np.ndarray, "19"],
-    v: Float[np.ndarray, "18"],
+    x: Estimate, reading: Reading, w: Array3, p_imu: Array3, R: Array3x3, q: Array19, v: Array18
 ) -> None:
     """Fill q (19,) and v (18,) of a ``RobotState`` from the motion of the IMU."""
     rotation_of_estimate(x, R)
@@ -193,12 +196,7 @@ def report(
 
 @subroutine
 def follow_feet(
-    s: EstimatorState,
-    reading: Reading,
-    c: EstimatorNumbers,
-    w: Float[np.ndarray, "3"],
-    R: Float[np.ndarray, "3 3"],
-    rests: bool,
+    s: EstimatorState, reading: Reading, c: EstimatorNumbers, w: Array3, R: Array3x3, rests: bool
 ) -> bool:
     """Let the legs measure, and move the feet on; returns whether some foot stands."""
     f, told = s.filter, c.config
@@ -219,11 +217,7 @@ def follow_feet(
 
 @kernel
 def estimate(
-    s: EstimatorState,
-    reading: Reading,
-    c: EstimatorNumbers,
-    q: Float[np.ndarray, "19"],
-    v: Float[np.ndarray, "18"],
+    s: EstimatorState, reading: Reading, c: EstimatorNumbers, q: Array19, v: Array18
 ) -> int:
     """Take in a reading, ``reading.dt`` seconds after the last one, and fill the robot's state.
 
@@ -381,18 +375,14 @@ class StateEstimator:
         for foot in s.feet:
             foot.age = 0.0
 
-    def _feet(
-        self, reading: SensorReading, R: Float[np.ndarray, "3 3"]
-    ) -> Float[np.ndarray, "4 3"]:
+    def _feet(self, reading: SensorReading, R: Array3x3) -> Array4x3:
         """Places of the feet's centres [m] from the IMU, along the world's axes."""
         angles = reading.q_joints.reshape(4, 1, 3)
         places = [foot_places(leg, q) for leg, q in zip(self._geometry, angles, strict=True)]
         return (np.concatenate(places) - self._p_base_imu) @ R.T
 
 
-def _upright(
-    R: Float[np.ndarray, "3 3"], force: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "3 3"]:
+def _upright(R: Array3x3, force: Array3) -> Array3x3:
     """The orientation with the heading of ``R`` in which ``force`` points up."""
     up = force / np.linalg.norm(force)
     roll = np.arctan2(up[1], up[2])

@@ -17,11 +17,10 @@ a speed of its own, which is its part of Q.
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.algebra.vectors import put
 from go2_wbc.compilation import subroutine
-from go2_wbc.records import Record
+from go2_wbc.records import Array3, Array3x3, Record
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.leg_kinematics import LegGeometry
 from go2_wbc.robot.state_filter import (
@@ -58,12 +57,12 @@ class Foot(Record):
     """
 
     age: float
-    place: Float[np.ndarray, "3"]
-    velocity: Float[np.ndarray, "3"]
-    rolling: Float[np.ndarray, "3"]
+    place: Array3
+    velocity: Array3
+    rolling: Array3
     speed: float
     carries: bool
-    variance: Float[np.ndarray, "3"]
+    variance: Array3
     height_off: float
 
 
@@ -83,12 +82,12 @@ class Level(Record):
 def see_foot(
     foot: Foot,
     leg: LegGeometry,
-    q: Float[np.ndarray, "3"],
-    u: Float[np.ndarray, "3"],
-    p_imu: Float[np.ndarray, "3"],
-    w: Float[np.ndarray, "3"],
+    q: Array3,
+    u: Array3,
+    p_imu: Array3,
+    w: Array3,
     radius: float,
-    R: Float[np.ndarray, "3 3"],
+    R: Array3x3,
 ) -> None:
     """Fill what a leg measures, along the world's axes.
 

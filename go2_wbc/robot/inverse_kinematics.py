@@ -25,6 +25,7 @@ from jaxtyping import Float
 from go2_wbc.errors import DescriptionError, IkError, ResidualRow
 from go2_wbc.geometry import convex_hull, support_margin
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS, Leg
+from go2_wbc.records import Array4x3, Array19
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 
@@ -46,7 +47,7 @@ class PoseTargets:
         joint_margin: least distance [rad] of every joint to its limits.
     """
 
-    p_world_feet: Float[np.ndarray, "4 3"]
+    p_world_feet: Array4x3
     rpy: tuple[float, float, float]
     height: float
     raised: Leg | None = None
@@ -124,11 +125,8 @@ def load_placo_robot(model: RobotModel) -> placo.RobotWrapper:
 
 
 def solve_pose(
-    model: RobotModel,
-    targets: PoseTargets,
-    q_start: Float[np.ndarray, "19"],
-    config: IkConfig | None = None,
-) -> Float[np.ndarray, "19"]:
+    model: RobotModel, targets: PoseTargets, q_start: Array19, config: IkConfig | None = None
+) -> Array19:
     """The pose that meets ``targets``, found from ``q_start`` and as near to it as they allow.
 
     Only one thread at a time may solve with the same ``model``; see the module.
@@ -170,10 +168,7 @@ def _limit_joints(robot: placo.RobotWrapper, model: RobotModel, margin: float) -
 
 
 def _formulate(
-    robot: placo.RobotWrapper,
-    targets: PoseTargets,
-    q_start: Float[np.ndarray, "19"],
-    config: IkConfig,
+    robot: placo.RobotWrapper, targets: PoseTargets, q_start: Array19, config: IkConfig
 ) -> tuple[placo.KinematicsSolver, list[placo.Task]]:
     """PlaCo's solver with every target soft, and the tasks to be made exact afterwards."""
     solver = placo.KinematicsSolver(robot)
@@ -201,7 +196,7 @@ def _formulate(
 
 
 def _joints_task(
-    solver: placo.KinematicsSolver, legs: Sequence[Leg], q: Float[np.ndarray, "19"]
+    solver: placo.KinematicsSolver, legs: Sequence[Leg], q: Array19
 ) -> placo.JointsTask:
     task = solver.add_joints_task()
     for leg in legs:
@@ -228,11 +223,7 @@ def _iterate(
 
 
 def _residuals(
-    model: RobotModel,
-    targets: PoseTargets,
-    q_start: Float[np.ndarray, "19"],
-    q: Float[np.ndarray, "19"],
-    config: IkConfig,
+    model: RobotModel, targets: PoseTargets, q_start: Array19, q: Array19, config: IkConfig
 ) -> list[tuple[ResidualRow, float]]:
     """How far ``q`` misses each target, with the tolerance."""
     com, feet = model.forward_kinematics(q)

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Int
 
 from go2_wbc.errors import DescriptionError
+from go2_wbc.records import ArrayNx3
 
 _UNPAINTED = (171, 177, 197, 255)  # a part without a material gets the trunk's grey
 
@@ -24,7 +25,7 @@ class MeshPart:
         rgba: red, green, blue, opacity in 0..1.
     """
 
-    points: Float[np.ndarray, "n 3"]
+    points: ArrayNx3
     triangles: Int[np.ndarray, "m 3"]
     rgba: tuple[float, ...]
 

@@ -11,11 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
 
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
-from go2_wbc.records import layout_of
+from go2_wbc.records import Array3, Array4x3, Array12, Array18, Array19, layout_of
 from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
@@ -57,7 +56,7 @@ class RobotModel:
         self,
         description: RobotDescription | None = None,
         *,
-        armature: Float[np.ndarray, "12"] = ROTOR_ARMATURE,
+        armature: Array12 = ROTOR_ARMATURE,
         foot_radius: float = FOOT_RADIUS,
         motor: str = TORQUE_SPEED,
         world: World | None = None,
@@ -202,22 +201,18 @@ class RobotModel:
             com_shift=com - bare,
         )
 
-    def center_of_mass(self, q: Float[np.ndarray, "19"]) -> Float[np.ndarray, "3"]:
+    def center_of_mass(self, q: Array19) -> Array3:
         """CoM in the world [m] at configuration ``q``."""
         return np.array(pin.centerOfMass(self.pin_model, self._data, q))
 
-    def forward_kinematics(
-        self, q: Float[np.ndarray, "19"]
-    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4 3"]]:
+    def forward_kinematics(self, q: Array19) -> tuple[Array3, Array4x3]:
         """CoM (3,) and foot centres (4, 3) in the world [m] at configuration ``q``."""
         com = np.array(pin.centerOfMass(self.pin_model, self._data, q))
         pin.updateFramePlacements(self.pin_model, self._data)
         feet = np.array([self._data.oMf[f].translation for f in self._foot_frames])
         return com, feet
 
-    def inverse_dynamics(
-        self, q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"], a: Float[np.ndarray, "18"]
-    ) -> Float[np.ndarray, "18"]:
+    def inverse_dynamics(self, q: Array19, v: Array18, a: Array18) -> Array18:
         """Generalised force M(q) a + h(q, v) [N, N m]."""
         return np.array(pin.rnea(self.pin_model, self._data, q, v, a))
 

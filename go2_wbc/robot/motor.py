@@ -34,6 +34,7 @@ from jaxtyping import Float, Int
 
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.errors import ConfigError, unknown_name
+from go2_wbc.records import Array12, ArrayNx12
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.state import JointCommand
 
@@ -57,9 +58,9 @@ class MotorModel:
         no_load_speed: speeds [rad/s] at which it is gone; infinite for an ideal motor.
     """
 
-    peak: Float[np.ndarray, "12"]
-    knee_speed: Float[np.ndarray, "12"]
-    no_load_speed: Float[np.ndarray, "12"]
+    peak: Array12
+    knee_speed: Array12
+    no_load_speed: Array12
 
     @staticmethod
     def named(name: str, description: RobotDescription) -> MotorModel:
@@ -86,9 +87,7 @@ class MotorModel:
         fill_limits(v.reshape(-1, 12), *line, lower.reshape(-1, 12), upper.reshape(-1, 12))
         return lower, upper
 
-    def torque(
-        self, command: JointCommand, q: Float[np.ndarray, "12"], v: Float[np.ndarray, "12"]
-    ) -> Float[np.ndarray, "12"]:
+    def torque(self, command: JointCommand, q: Array12, v: Array12) -> Array12:
         """Torques [N m] that the motors give for ``command`` at angles ``q`` and velocities ``v``.
 
         What a plant applies at every physics step; see ``drive``.
@@ -130,12 +129,12 @@ def torque_range(motor: MotorModel, n: int, v: float) -> tuple[float, float]:
 
 @kernel
 def fill_limits(
-    v: Foreign[Float[np.ndarray, "n 12"]],
-    peak: Foreign[Float[np.ndarray, "12"]],
-    knee_speed: Foreign[Float[np.ndarray, "12"]],
-    no_load_speed: Foreign[Float[np.ndarray, "12"]],
-    lower: Float[np.ndarray, "n 12"],
-    upper: Float[np.ndarray, "n 12"],
+    v: Foreign[ArrayNx12],
+    peak: Foreign[Array12],
+    knee_speed: Foreign[Array12],
+    no_load_speed: Foreign[Array12],
+    lower: ArrayNx12,
+    upper: ArrayNx12,
 ) -> None:
     """Fill the limits of ``MotorModel`` at many velocities."""
     for i in range(len(v)):
@@ -153,7 +152,7 @@ def drive(
     qpos: Float[np.ndarray, " nq"],
     qvel: Float[np.ndarray, " nv"],
     ctrl: Float[np.ndarray, " nu"],
-    total: Float[np.ndarray, "12"],
+    total: Array12,
 ) -> None:
     """``MotorModel.torque`` now, into ctrl, and added to ``total``.
 
@@ -172,9 +171,9 @@ def drive(
 
 @kernel
 def note_peaks(
-    tau: Foreign[Float[np.ndarray, "12"]],
-    v: Foreign[Float[np.ndarray, "12"]],
-    v_before: Foreign[Float[np.ndarray, "12"]],
+    tau: Foreign[Array12],
+    v: Foreign[Array12],
+    v_before: Foreign[Array12],
     motor: MotorModel,
     peaks: Float[np.ndarray, "3 12"],
 ) -> None:

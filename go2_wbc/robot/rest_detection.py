@@ -9,10 +9,9 @@ turning one feels beside the CoM. Each has to last: see ``EstimatorConfig``. To 
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
-from go2_wbc.records import Record
+from go2_wbc.records import Array3, Array3x3, Array4, Array12, Record
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.state_filter import GYRO_BIAS, VELOCITY, Estimate, Filter, take_in_one
 
@@ -43,11 +42,11 @@ class Reading(Record):
     """
 
     dt: float
-    gyro: Float[np.ndarray, "3"]
-    accelerometer: Float[np.ndarray, "3"]
-    q_joints: Float[np.ndarray, "12"]
-    v_joints: Float[np.ndarray, "12"]
-    foot_forces: Float[np.ndarray, "4"]
+    gyro: Array3
+    accelerometer: Array3
+    q_joints: Array12
+    v_joints: Array12
+    foot_forces: Array4
 
 
 class Rest(Record):
@@ -62,7 +61,7 @@ class Rest(Record):
         tumbled: whether the robot has.
     """
 
-    joint_speeds: Float[np.ndarray, "12"]
+    joint_speeds: Array12
     still_time: float
     lying_time: float
     lost_time: float
@@ -108,12 +107,7 @@ def lies(
 
 @subroutine
 def begin_anew(
-    x: Estimate,
-    rest: Rest,
-    reading: Reading,
-    R: Float[np.ndarray, "3 3"],
-    gravity: float,
-    c: EstimatorConfig,
+    x: Estimate, rest: Rest, reading: Reading, R: Array3x3, gravity: float, c: EstimatorConfig
 ) -> int:
     """``KNOWN``, ``TUMBLED`` if a robot that did is at rest on its belly or feet, or ``LOST``.
 
@@ -147,7 +141,7 @@ def begin_anew(
 
 
 @subroutine
-def is_upset(rest: Rest, dt: float, is_lying: bool, R: Float[np.ndarray, "3 3"]) -> bool:
+def is_upset(rest: Rest, dt: float, is_lying: bool, R: Array3x3) -> bool:
     """Whether the robot lies or is tilted far, or has been until a moment ago."""
     is_down = is_lying or R[2, 2] < _OVER
     rest.upset_time = _CALM if is_down else max(rest.upset_time - dt, 0.0)

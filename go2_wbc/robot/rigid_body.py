@@ -34,7 +34,7 @@ from go2_wbc.algebra.vectors import (
     triple,
 )
 from go2_wbc.compilation import Foreign, kernel, subroutine
-from go2_wbc.records import V3, Record
+from go2_wbc.records import V3, Array4x3, Array12, Array18, Array19, Record
 from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -70,8 +70,8 @@ class RigidBodies(Record):
     link_moment: Float[np.ndarray, "13 3"]
     link_inertia: Float[np.ndarray, "13 6"]
     p_joints: Float[np.ndarray, "12 3"]
-    p_calf_feet: Float[np.ndarray, "4 3"]
-    armature: Float[np.ndarray, "12"]
+    p_calf_feet: Array4x3
+    armature: Array12
     payload: Payload
 
 
@@ -396,10 +396,7 @@ def fill_payload(robot: RigidBodies, now: Snapshot, base: Axes, moment: V3) -> N
 
 @kernel
 def fill_snapshot(
-    q: Foreign[Float[np.ndarray, "19"]],
-    v: Foreign[Float[np.ndarray, "18"]],
-    robot: RigidBodies,
-    now: Snapshot,
+    q: Foreign[Array19], v: Foreign[Array18], robot: RigidBodies, now: Snapshot
 ) -> None:
     """Fill a snapshot, from the measured q and v, for ``robot``."""
     now.q[:], now.v[:] = q, v

@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.compilation import Foreign, kernel
+from go2_wbc.records import Array4, Array12, Array18, Array19
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_positive
@@ -48,10 +48,7 @@ UNIT_TOLERANCE = 0.01
 
 @kernel
 def is_plausible(
-    q: Foreign[Float[np.ndarray, "19"]],
-    v: Foreign[Float[np.ndarray, "18"]],
-    tau: Foreign[Float[np.ndarray, "12"]],
-    forces: Foreign[Float[np.ndarray, "4"]],
+    q: Foreign[Array19], v: Foreign[Array18], tau: Foreign[Array12], forces: Foreign[Array4]
 ) -> bool:
     """Whether every number of a state is finite and the quaternion of ``q`` of length 1."""
     for values in (q, v, tau, forces):

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import QpInfeasible
-from go2_wbc.records import packed
+from go2_wbc.records import Array30, packed
 from go2_wbc.reference import Target
 from go2_wbc.wbc.constraints import StanceFeetStill
 from go2_wbc.wbc.elimination import Reduction, reduce_equalities
@@ -24,7 +24,7 @@ class QpBackend(ABC):
         self.solver = solver
 
     @abstractmethod
-    def solve(self, problem: Problem) -> Float[np.ndarray, "30"]:
+    def solve(self, problem: Problem) -> Array30:
         """The optimal decision vector z.
 
         Raises:
@@ -35,7 +35,7 @@ class QpBackend(ABC):
 class FullBackend(QpBackend):
     """The QP in accelerations and stance forces, with its equalities."""
 
-    def solve(self, problem: Problem) -> Float[np.ndarray, "30"]:
+    def solve(self, problem: Problem) -> Array30:
         """The optimal decision vector z; see ``QpBackend.solve``."""
         unknown = np.concatenate([np.ones(18, dtype=bool), np.repeat(problem.stance, 3)])
         qp = dense_qp(problem, np.eye(SIZE)[:, unknown], np.zeros(SIZE), with_equalities=True)
@@ -48,7 +48,7 @@ class CondensedBackend(QpBackend):
     With the solver "active_set" a tick is solved by ``condensed`` without assembling a problem.
     """
 
-    def solve(self, problem: Problem) -> Float[np.ndarray, "30"]:
+    def solve(self, problem: Problem) -> Array30:
         """The optimal decision vector z; see ``QpBackend.solve``."""
         reduction = eliminate_equalities(problem)
         if reduction is None:
@@ -57,9 +57,7 @@ class CondensedBackend(QpBackend):
         return _embed(problem, dense_qp(problem, Z, z0), Z, z0, self.solver)
 
 
-def eliminate_equalities(
-    problem: Problem,
-) -> tuple[Float[np.ndarray, "30 12"], Float[np.ndarray, "30"]] | None:
+def eliminate_equalities(problem: Problem) -> tuple[Float[np.ndarray, "30 12"], Array30] | None:
     """Z and z0 such that z = Z u + z0 meets every equality (``elimination``); None if singular."""
     reduction, still = Reduction(), packed(problem.source(StanceFeetStill))
     target = Target.of(problem.reference.row)
@@ -69,11 +67,7 @@ def eliminate_equalities(
 
 
 def dense_qp(
-    problem: Problem,
-    Z: Float[np.ndarray, "30 n"],
-    z0: Float[np.ndarray, "30"],
-    *,
-    with_equalities: bool = False,
+    problem: Problem, Z: Float[np.ndarray, "30 n"], z0: Array30, *, with_equalities: bool = False
 ) -> DenseQp:
     """The QP in u for z = Z u + z0.
 
@@ -95,12 +89,8 @@ def dense_qp(
 
 
 def _embed(
-    problem: Problem,
-    qp: DenseQp,
-    Z: Float[np.ndarray, "30 n"],
-    z0: Float[np.ndarray, "30"],
-    solver: str,
-) -> Float[np.ndarray, "30"]:
+    problem: Problem, qp: DenseQp, Z: Float[np.ndarray, "30 n"], z0: Array30, solver: str
+) -> Array30:
     try:
         return Z @ solve_dense_qp(qp, solver).x + z0
     except QpInfeasible as error:

@@ -13,16 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.algebra.active_set import (
-    SINGULAR,
-    SOLVED,
-    VIOLATION,
-    constrain,
-    factorise,
-    solve_factorised,
-)
+from go2_wbc.algebra.active_set import SINGULAR, SOLVED, VIOLATION, constrain
+from go2_wbc.algebra.linear import factorise, solve_factorised
 from go2_wbc.compilation import kernel, subroutine
-from go2_wbc.records import Record
+from go2_wbc.records import Array12, Array30, Record
 from go2_wbc.reference import STANCE, Target
 from go2_wbc.robot.joint_friction import FrictionFeedForward, fill_motor_torques
 from go2_wbc.robot.snapshot import Snapshot
@@ -86,9 +80,9 @@ class Decision(Record):
         tau_motors: those that the motors are told [N m].
     """
 
-    z: Float[np.ndarray, "30"]
-    tau: Float[np.ndarray, "12"]
-    tau_motors: Float[np.ndarray, "12"]
+    z: Array30
+    tau: Array12
+    tau_motors: Array12
 
 
 class Workspace(Record):
@@ -107,9 +101,9 @@ class Workspace(Record):
     limits: Limits
     reduction: Reduction
     H: Float[np.ndarray, "12 12"]
-    g: Float[np.ndarray, "12"]
+    g: Array12
     L: Float[np.ndarray, "12 12"]
-    u: Float[np.ndarray, "12"]
+    u: Array12
     C: Float[np.ndarray, "44 12"]
     lower: Float[np.ndarray, "44"]
     upper: Float[np.ndarray, "44"]
@@ -141,7 +135,7 @@ def add_row(
     b: float,
     weight: float,
     H: Float[np.ndarray, "12 12"],
-    g: Float[np.ndarray, "12"],
+    g: Array12,
 ) -> None:
     """Add weight |row (u, 1) - b|^2 / 2 to the cost; columns other than first to end are 0."""
     rest = weight * (row[12] - b)
@@ -156,10 +150,7 @@ def add_row(
 
 @subroutine
 def add_tasks(
-    rows: TaskRows,
-    base: Float[np.ndarray, "6 13"],
-    H: Float[np.ndarray, "12 12"],
-    g: Float[np.ndarray, "12"],
+    rows: TaskRows, base: Float[np.ndarray, "6 13"], H: Float[np.ndarray, "12 12"], g: Array12
 ) -> None:
     """Add the cost of the built-in tasks."""
     row = np.empty(13)
@@ -189,7 +180,7 @@ def add_extra_tasks(
     rows: Float[np.ndarray, "k 32"],
     affine: Float[np.ndarray, "30 13"],
     H: Float[np.ndarray, "12 12"],
-    g: Float[np.ndarray, "12"],
+    g: Array12,
 ) -> None:
     """Add the cost of a user's own tasks: A, b, weight."""
     row = np.empty(13)
@@ -202,7 +193,7 @@ def add_extra_tasks(
 
 
 @subroutine
-def fill_tau(limits: Limits, z: Float[np.ndarray, "30"], tau: Float[np.ndarray, "12"]) -> None:
+def fill_tau(limits: Limits, z: Array30, tau: Array12) -> None:
     """Fill the torques of a decision."""
     for n in range(12):
         first, row = 3 * (n // 3), limits.torques[n]

@@ -18,7 +18,7 @@ from jaxtyping import Float
 
 from go2_wbc.algebra.vectors import plus_scaled, triple
 from go2_wbc.compilation import kernel, subroutine
-from go2_wbc.records import V3, Record, packed
+from go2_wbc.records import V3, Array12, Record, packed
 from go2_wbc.reference import STANCE, Reference, Target
 from go2_wbc.robot.motor import MotorModel, torque_range
 from go2_wbc.robot.snapshot import Snapshot
@@ -66,11 +66,11 @@ class Limits(Record):
     forces_lower: Float[np.ndarray, "4 5"]
     forces_upper: Float[np.ndarray, "4 5"]
     torques: Float[np.ndarray, "12 12"]
-    torques_offset: Float[np.ndarray, "12"]
-    torques_lower: Float[np.ndarray, "12"]
-    torques_upper: Float[np.ndarray, "12"]
-    joints_lower: Float[np.ndarray, "12"]
-    joints_upper: Float[np.ndarray, "12"]
+    torques_offset: Array12
+    torques_lower: Array12
+    torques_upper: Array12
+    joints_lower: Array12
+    joints_upper: Array12
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,9 +234,7 @@ def fill_torques(now: Snapshot, limits: Limits) -> None:
         limits.torques_offset[n] = now.bias[6 + n]
 
 
-def torque_map(
-    snapshot: Snapshot,
-) -> tuple[Float[np.ndarray, "12 30"], Float[np.ndarray, "12"]]:
+def torque_map(snapshot: Snapshot) -> tuple[Float[np.ndarray, "12 30"], Array12]:
     """(A, offset) such that the joint torques are A z + offset [N m].
 
     tau = M_j a + h_j - J_j' f, the rows of the joints j in M a + h = S' tau + J' f.
@@ -279,9 +277,9 @@ class JointLimits(Inequality):
         horizon: time [s] in which a bound on the velocity must be met.
     """
 
-    q_lower: Float[np.ndarray, "12"]
-    q_upper: Float[np.ndarray, "12"]
-    speed: Float[np.ndarray, "12"]
+    q_lower: Array12
+    q_upper: Array12
+    speed: Array12
     braking: float
     horizon: float
     name = "joint limits"

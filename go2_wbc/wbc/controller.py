@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from go2_wbc.algebra.active_set import SOLVED
 from go2_wbc.errors import ConfigError, QpInfeasible, unknown_name
-from go2_wbc.records import layout_of, packed
+from go2_wbc.records import Array30, layout_of, packed
 from go2_wbc.reference import Reference
 from go2_wbc.robot.joint_friction import FrictionFeedForward
 from go2_wbc.robot.model import RobotModel
@@ -160,7 +160,7 @@ class WholeBodyController:
         motors = self._friction.motor_torques(snapshot, solution.qdd, solution.tau)
         return replace(solution, tau_motors=motors)
 
-    def _relaxed(self, problem: Problem, error: QpInfeasible) -> Float[np.ndarray, "30"]:
+    def _relaxed(self, problem: Problem, error: QpInfeasible) -> Array30:
         try:
             return solve_relaxed(problem, self.config.solver)
         except QpInfeasible as contradiction:

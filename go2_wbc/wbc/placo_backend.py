@@ -27,10 +27,10 @@ from __future__ import annotations
 
 import numpy as np
 import placo
-from jaxtyping import Float
 
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
+from go2_wbc.records import Array3, Array6, Array30
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.inverse_kinematics import load_placo_robot
 from go2_wbc.robot.model import RobotModel
@@ -64,7 +64,7 @@ class PlacoBackend(QpBackend):
         self._robot = load_placo_robot(model)
         self._modes: dict[tuple[tuple[LegTask, ...], TrackedPoint], _Mode] = {}
 
-    def solve(self, problem: Problem) -> Float[np.ndarray, "30"]:
+    def solve(self, problem: Problem) -> Array30:
         """The optimal decision vector z; see ``QpBackend.solve``."""
         reference = problem.reference
         key = (reference.legs, reference.body.point)
@@ -212,10 +212,10 @@ class _Mode:
         for name, acceleration in zip(JOINT_NAMES[columns], desired, strict=True):
             task.set_joint(name, 0.0, 0.0, float(acceleration))
 
-    def _velocity(self, frame: str, state: RobotState) -> Float[np.ndarray, "6"]:
+    def _velocity(self, frame: str, state: RobotState) -> Array6:
         return self._robot.frame_jacobian(frame, _WORLD_ALIGNED) @ state.v
 
-    def solve(self, problem: Problem) -> Float[np.ndarray, "30"]:
+    def solve(self, problem: Problem) -> Array30:
         """z of PlaCo's QP with our rows added."""
         if not self._solver.solve(False).success:
             raise QpInfeasible(SOLVER, "tasks, friction and torque limits contradict each other")
@@ -284,16 +284,11 @@ def _on_the_line(limits: TorqueLimits, snapshot: Snapshot, reference: Reference)
     return Bounds(C, lower, np.where(greatest < limits.motor.peak, upper, np.inf))
 
 
-def _acceleration(
-    gains: Gains,
-    feed_forward: Float[np.ndarray, "3"],
-    rate_error: Float[np.ndarray, "3"],
-    error: Float[np.ndarray, "3"],
-) -> Float[np.ndarray, "3"]:
+def _acceleration(gains: Gains, feed_forward: Array3, rate_error: Array3, error: Array3) -> Array3:
     return feed_forward + np.asarray(gains.kd) * rate_error + np.asarray(gains.kp) * error
 
 
-def _without_limits(problem: Problem) -> Float[np.ndarray, "30"]:
+def _without_limits(problem: Problem) -> Array30:
     root = np.sqrt(problem.weights)
     A = np.concatenate([problem.equalities.A, root[:, None] * problem.tasks.A])
     b = np.concatenate([problem.equalities.b, root * problem.tasks.b])

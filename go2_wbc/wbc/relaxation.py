@@ -22,6 +22,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.errors import QpInfeasible, ResidualRow
+from go2_wbc.records import Array30
 from go2_wbc.wbc.problem import SIZE, Problem
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 
@@ -43,7 +44,7 @@ def is_grave(violations: Iterable[ResidualRow]) -> bool:
     return any(row.norm > LIMITS.get(row.name, np.inf) for row in violations)
 
 
-def solve_relaxed(problem: Problem, solver: str) -> Float[np.ndarray, "30"]:
+def solve_relaxed(problem: Problem, solver: str) -> Array30:
     """The decision z of the relaxed problem.
 
     Raises:

@@ -20,7 +20,7 @@ from jaxtyping import Float
 
 from go2_wbc.algebra.vectors import rotation_vector
 from go2_wbc.compilation import kernel, subroutine
-from go2_wbc.records import V3, Record, packed
+from go2_wbc.records import V3, Array3, Array18, Record, packed
 from go2_wbc.reference import JOINTS, STANCE, SWING, Reference, Target
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.validation import require_between
@@ -58,7 +58,7 @@ class Gains:
         return Gains((kp, kp, kp), (kd, kd, kd))
 
     @property
-    def arrays(self) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    def arrays(self) -> tuple[Array3, Array3]:
         """kp and kd as arrays."""
         return np.array(self.kp), np.array(self.kd)
 
@@ -92,8 +92,8 @@ class TaskRows(Record):
     """
 
     A: Float[np.ndarray, "18 18"]
-    b: Float[np.ndarray, "18"]
-    weight: Float[np.ndarray, "18"]
+    b: Array18
+    weight: Array18
 
     def of_decision(self, which: list[int], reference: Reference) -> Rows:
         """Some of the rows, as rows of the decision z."""
@@ -120,8 +120,8 @@ class BodyPosition(Task):
         weight: of the task.
     """
 
-    kp: Float[np.ndarray, "3"]
-    kd: Float[np.ndarray, "3"]
+    kp: Array3
+    kd: Array3
     weight_of_robot: float
     weight: float = 1.0
     name = "body position"
@@ -174,8 +174,8 @@ class BodyOrientation(Task):
     is the most that it weighs then. The reference may divide the weight.
     """
 
-    kp: Float[np.ndarray, "3"]
-    kd: Float[np.ndarray, "3"]
+    kp: Array3
+    kd: Array3
     weight: float = 10.0
     flight_weight: float = 0.05
     name = "body orientation"
@@ -243,8 +243,8 @@ def fill_body_orientation(
 class SwingFoot(Task):
     """Move the foot centres of the swing legs along the reference, in the world frame."""
 
-    kp: Float[np.ndarray, "3"]
-    kd: Float[np.ndarray, "3"]
+    kp: Array3
+    kd: Array3
     weight: float = 1.0
     name = "swing feet"
     unit = "m/s^2"
@@ -280,8 +280,8 @@ def fill_swing_feet(now: Snapshot, target: Target, task: SwingFoot, rows: TaskRo
 class LegPosture(Task):
     """Move the joints of raised legs along the reference; free of leg singularities."""
 
-    kp: Float[np.ndarray, "3"]
-    kd: Float[np.ndarray, "3"]
+    kp: Array3
+    kd: Array3
     weight: float = 1.0
     name = "leg posture"
     unit = "rad/s^2"
