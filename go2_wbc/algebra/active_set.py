@@ -19,8 +19,9 @@ from jaxtyping import Float, Int
 from go2_wbc.algebra.linear import Square, Vector, factorise, solve_factorised
 from go2_wbc.compilation import kernel, subroutine
 
-Rows, Bounds = Float[np.ndarray, "m n"], Float[np.ndarray, " m"]
-Places, Sides = Int[np.ndarray, " n"], Int[np.ndarray, " m"]
+Rows = Float[np.ndarray, "m n"]
+Bounds = Float[np.ndarray, " m"]
+Sides = Int[np.ndarray, " m"]
 
 SOLVED, INFEASIBLE, SINGULAR, UNFINISHED, BAD_BOUNDS = range(5)
 MESSAGES = (
@@ -54,7 +55,7 @@ class WorkingSet(NamedTuple):
 
     J: Square
     R: Square
-    rows: Places
+    rows: Int[np.ndarray, " n"]
     u: Vector
     side: Sides
 

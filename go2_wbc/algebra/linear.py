@@ -7,7 +7,8 @@ from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
 
-Vector, Square = Float[np.ndarray, " n"], Float[np.ndarray, "n n"]
+Vector = Float[np.ndarray, " n"]
+Square = Float[np.ndarray, "n n"]
 DEFINITE = 1e-14
 """Share of a diagonal entry of H that must be left as its pivot."""
 

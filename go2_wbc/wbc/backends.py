@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-
 import numpy as np
 from jaxtyping import Float
 
@@ -16,45 +14,26 @@ from go2_wbc.wbc.problem import SIZE, Problem
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 
 
-class QpBackend(ABC):
-    """Solves an assembled problem."""
+def solve_full(problem: Problem, solver: str) -> Array30:
+    """The optimal decision z, by the QP in accelerations and stance forces, with its equalities.
 
-    def __init__(self, solver: str) -> None:
-        """Args: solver: name of a dense QP solver, see ``solvers``."""
-        self.solver = solver
-
-    @abstractmethod
-    def solve(self, problem: Problem) -> Array30:
-        """The optimal decision vector z.
-
-        Raises:
-            QpInfeasible: with the residual table of the best unconstrained point.
-        """
+    Raises:
+        QpInfeasible: with the residual table of the best unconstrained point.
+    """
+    unknown = np.concatenate([np.ones(18, dtype=bool), np.repeat(problem.stance, 3)])
+    Z, z0 = np.eye(SIZE)[:, unknown], np.zeros(SIZE)
+    return _embed(problem, dense_qp(problem, Z, z0, with_equalities=True), Z, z0, solver)
 
 
-class FullBackend(QpBackend):
-    """The QP in accelerations and stance forces, with its equalities."""
-
-    def solve(self, problem: Problem) -> Array30:
-        """The optimal decision vector z; see ``QpBackend.solve``."""
-        unknown = np.concatenate([np.ones(18, dtype=bool), np.repeat(problem.stance, 3)])
-        qp = dense_qp(problem, np.eye(SIZE)[:, unknown], np.zeros(SIZE), with_equalities=True)
-        return _embed(problem, qp, np.eye(SIZE)[:, unknown], np.zeros(SIZE), self.solver)
-
-
-class CondensedBackend(QpBackend):
-    """The QP in three unknowns per leg, equalities eliminated.
+def solve_condensed(problem: Problem, solver: str) -> Array30:
+    """The same by the QP in three unknowns per leg, equalities eliminated; in full if singular.
 
     With the solver "active_set" a tick is solved by ``condensed`` without assembling a problem.
     """
-
-    def solve(self, problem: Problem) -> Array30:
-        """The optimal decision vector z; see ``QpBackend.solve``."""
-        reduction = eliminate_equalities(problem)
-        if reduction is None:
-            return FullBackend(self.solver).solve(problem)
-        Z, z0 = reduction
-        return _embed(problem, dense_qp(problem, Z, z0), Z, z0, self.solver)
+    reduction = eliminate_equalities(problem)
+    if reduction is None:
+        return solve_full(problem, solver)
+    return _embed(problem, dense_qp(problem, *reduction), *reduction, solver)
 
 
 def eliminate_equalities(problem: Problem) -> tuple[Float[np.ndarray, "30 12"], Array30] | None:

@@ -20,33 +20,10 @@ from go2_wbc.records import Array12, Array30, Record
 from go2_wbc.reference import STANCE, Target
 from go2_wbc.robot.joint_friction import FrictionFeedForward, fill_motor_torques
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.wbc.constraints import (
-    FrictionPyramid,
-    JointLimits,
-    Limits,
-    StanceFeetStill,
-    TorqueLimits,
-    fill_force_limits,
-    fill_joint_limits,
-    fill_torque_limits,
-)
+from go2_wbc.wbc.constraints import Constraints, Limits, fill_limits
 from go2_wbc.wbc.elimination import Reduction, decide, eliminate, expand
 from go2_wbc.wbc.inputs import are_valid
-from go2_wbc.wbc.tasks import (
-    LEG_ROWS,
-    TASK_ROWS,
-    BodyOrientation,
-    BodyPosition,
-    ForceRegularisation,
-    LegPosture,
-    SwingFoot,
-    TaskRows,
-    fill_body_orientation,
-    fill_body_position,
-    fill_forces,
-    fill_leg_posture,
-    fill_swing_feet,
-)
+from go2_wbc.wbc.tasks import LEG_ROWS, TASK_ROWS, BuiltInTasks, TaskRows, fill_tasks
 
 UNSUITED = 10
 """Outcome, beside those of ``active_set``: a singular leg, which is for the full QP, or numbers
@@ -57,17 +34,10 @@ MOST_ROWS = 44
 
 @dataclass(frozen=True, slots=True)
 class QpNumbers:
-    """The built-in tasks and the constraints of a whole-body controller."""
+    """What a whole-body controller is told of its robot."""
 
-    position: BodyPosition
-    orientation: BodyOrientation
-    swing: SwingFoot
-    posture: LegPosture
-    force: ForceRegularisation
-    still: StanceFeetStill
-    pyramid: FrictionPyramid
-    torque: TorqueLimits
-    joint: JointLimits
+    tasks: BuiltInTasks
+    constraints: Constraints
     friction: FrictionFeedForward
 
 
@@ -107,24 +77,6 @@ class Workspace(Record):
     C: Float[np.ndarray, "44 12"]
     lower: Float[np.ndarray, "44"]
     upper: Float[np.ndarray, "44"]
-
-
-@subroutine
-def fill_tasks(now: Snapshot, target: Target, c: QpNumbers, rows: TaskRows) -> None:
-    """Fill the rows of all built-in tasks."""
-    fill_body_position(now, target, c.position, rows)
-    fill_body_orientation(now, target, c.orientation, rows)
-    fill_swing_feet(now, target, c.swing, rows)
-    fill_leg_posture(now, target, c.posture, rows)
-    fill_forces(now, target, c.force, rows)
-
-
-@subroutine
-def fill_limits(now: Snapshot, target: Target, c: QpNumbers, limits: Limits) -> None:
-    """Fill the rows of all inequalities."""
-    fill_force_limits(target, c.pyramid, limits)
-    fill_torque_limits(now, c.torque, limits)
-    fill_joint_limits(now, c.joint, limits)
 
 
 @subroutine
@@ -279,7 +231,7 @@ def solve_bounded(target: Target, w: Workspace) -> int:
 
 
 @kernel
-def solve_condensed(
+def solve_tick(
     now: Snapshot,
     target: Target,
     c: QpNumbers,
@@ -291,11 +243,11 @@ def solve_condensed(
 
     ``extra`` are rows of a user's own tasks: A, b, weight.
     """
-    if not are_valid(now, target) or not eliminate(now, target, c.still, w.reduction):
+    if not are_valid(now, target) or not eliminate(now, target, c.constraints.still, w.reduction):
         return UNSUITED
     w.H[:] = 0.0
     w.g[:] = 0.0
-    fill_tasks(now, target, c, w.tasks)
+    fill_tasks(now, target, c.tasks, w.tasks)
     add_tasks(w.tasks, w.reduction.base, w.H, w.g)
     if len(extra) > 0:
         expand(target, w.reduction)
@@ -303,7 +255,7 @@ def solve_condensed(
     if not factorise(w.H, w.L):
         return SINGULAR
     solve_factorised(w.L, w.g, w.u)
-    fill_limits(now, target, c, w.limits)
+    fill_limits(now, target, c.constraints, w.limits)
     decide(target, w.reduction, w.u, decision.z)
     fill_tau(w.limits, decision.z, decision.tau)
     outcome = SOLVED

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from go2_wbc.records import Array3
 from go2_wbc.reference import LEAST_WEIGHT, MOST_WEIGHT
 from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.validation import (
@@ -12,13 +15,37 @@ from go2_wbc.validation import (
     require_positive,
     require_share,
 )
-from go2_wbc.wbc.tasks import Gains
 
 WEIGHTS = (1e-3, 1e3)
 """Least and greatest weight of a task. At all 16 corners of these ranges four solvers agree within
 5e-4 N m on 39 random problems; with 1e-4 to 1e4, some report success with 9 N m between them."""
 FORCE_WEIGHTS = (LEAST_WEIGHT, MOST_WEIGHT)
 """Least and greatest weight of the force regularisation, measured along."""
+
+GREATEST_GAIN = 1e6
+"""(2 / dt)^2 [1/s^2] at 500 ticks a second: a loop with more than that swings itself up."""
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """Proportional [1/s^2] and derivative [1/s] gain of a task, per axis."""
+
+    kp: tuple[float, float, float]
+    kd: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a gain that is negative or above ``GREATEST_GAIN``."""
+        require_between(self, 0.0, GREATEST_GAIN, "kp", "kd")
+
+    @staticmethod
+    def uniform(kp: float, kd: float) -> Gains:
+        """The same gain on three axes."""
+        return Gains((kp, kp, kp), (kd, kd, kd))
+
+    @property
+    def arrays(self) -> tuple[Array3, Array3]:
+        """kp and kd as arrays."""
+        return np.array(self.kp), np.array(self.kd)
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,6 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import cross, log_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
-from go2_wbc.wbc.backends import QpBackend
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import FrictionPyramid, JointLimits, TorqueLimits
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem
@@ -50,7 +49,7 @@ _BASE = "base"
 _WORLD_ALIGNED = "local_world_aligned"
 
 
-class PlacoBackend(QpBackend):
+class PlacoBackend:
     """Solves the same QP through PlaCo; see the module's docstring for what is aligned how.
 
     One PlaCo solver is kept per contact mode (tasks of the legs and tracked point) seen so far.
@@ -58,14 +57,17 @@ class PlacoBackend(QpBackend):
 
     def __init__(self, model: RobotModel, config: WbcConfig) -> None:
         """Load the robot into PlaCo, with the armature and foot radius of ``model``."""
-        super().__init__(SOLVER)
         self._model = model
         self._config = config
         self._robot = load_placo_robot(model)
         self._modes: dict[tuple[tuple[LegTask, ...], TrackedPoint], _Mode] = {}
 
     def solve(self, problem: Problem) -> Array30:
-        """The optimal decision vector z; see ``QpBackend.solve``."""
+        """The optimal decision z.
+
+        Raises:
+            QpInfeasible: with the residual table of the best point without limits.
+        """
         reference = problem.reference
         key = (reference.legs, reference.body.point)
         if key not in self._modes:

@@ -21,7 +21,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.wbc.condensed import Decision, Workspace, is_within, solve_condensed
+from go2_wbc.wbc.condensed import Decision, Workspace, is_within, solve_tick
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.elimination import SINGULAR_DETERMINANT
@@ -268,13 +268,13 @@ def test_a_tick_leaves_nothing_to_the_next() -> None:
 @pytest.mark.parametrize("config", [SATURATING, ODD_NUMBERS], ids=["saturating", "odd numbers"])
 def test_the_python_that_is_compiled_gives_the_same(config: WbcConfig) -> None:
     model, rng = RobotModel(), np.random.default_rng(36)
-    wbc, plain_solve = WholeBodyController(model, config=config), inspect.unwrap(solve_condensed)
+    wbc, plain_solve = WholeBodyController(model, config=config), inspect.unwrap(solve_tick)
     rows = np.ascontiguousarray(rng.normal(size=(2, SIZE + 2)))
     for snapshot, plain in cases(model, 13, seed=35):
         reference = with_planned_forces(plain, rng) if rng.random() < 0.5 else plain
         target, found, expected = Target.of(reference.row), Decision(), Decision()
         given = snapshot, target, wbc._numbers, rows
-        outcome = solve_condensed(*given, Workspace(), expected)
+        outcome = solve_tick(*given, Workspace(), expected)
         with np.errstate(all="ignore"):
             assert plain_solve(*given, Workspace(), found) == outcome
         if outcome == SOLVED:
