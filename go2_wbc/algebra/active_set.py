@@ -14,14 +14,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from go2_wbc.algebra.linear import Square, Vector, factorise, solve_factorised
 from go2_wbc.compilation import kernel, subroutine
 
 Rows = Float[np.ndarray, "m n"]
 Bounds = Float[np.ndarray, " m"]
-Sides = Int[np.ndarray, " m"]
+Taken = Bool[np.ndarray, " m"]
 
 SOLVED, INFEASIBLE, SINGULAR, UNFINISHED, BAD_BOUNDS = range(5)
 MESSAGES = (
@@ -40,8 +40,6 @@ DEPENDENT = 1e-18
 MAX_STEPS = 400
 """Rows taken in or dropped. 44 rows needed 40 at most (own measurement)."""
 
-FREE, AT_LOWER, AT_UPPER = 0, -1, 1
-
 
 class WorkingSet(NamedTuple):
     """The rows that are met with equality; how many they are, q, goes beside it.
@@ -50,14 +48,14 @@ class WorkingSet(NamedTuple):
         J, R: J' N = (R; 0), see the module.
         rows: the number of each row, negative for an equality.
         u: their multipliers.
-        side: of each inequality, in the working set or not.
+        taken: whether each inequality is among them.
     """
 
     J: Square
     R: Square
     rows: Int[np.ndarray, " n"]
     u: Vector
-    side: Sides
+    taken: Taken
 
 
 @subroutine
@@ -101,8 +99,8 @@ def take_in(w: WorkingSet, d: Vector, q: int) -> None:
 @subroutine
 def drop(w: WorkingSet, place: int, q: int) -> None:
     """Remove column ``place`` of the q columns of R, and make R upper triangular again."""
-    J, R, rows, u, side = w
-    side[rows[place]] = FREE
+    J, R, rows, u, taken = w
+    taken[rows[place]] = False
     for j in range(place, q - 1):
         rows[j], u[j] = rows[j + 1], u[j + 1]
         for i in range(j + 2):
@@ -123,12 +121,12 @@ def drop(w: WorkingSet, place: int, q: int) -> None:
 
 @subroutine
 def most_violated(
-    x: Vector, C: Rows, lower: Bounds, upper: Bounds, side: Sides
+    x: Vector, C: Rows, lower: Bounds, upper: Bounds, taken: Taken
 ) -> tuple[int, float, float]:
     """The free row that is violated most, or -1; 1 for its lower side, else -1; by how much."""
     found, sign, worst = -1, 1.0, 0.0
-    for i in range(len(side)):
-        if side[i] != FREE:
+    for i in range(len(taken)):
+        if taken[i]:
             continue
         value = 0.0
         for j in range(len(x)):
@@ -221,20 +219,6 @@ def meet(
 
 
 @subroutine
-def finish(w: WorkingSet, q: int, x: Vector, y: Vector, k: int) -> int:
-    """Put the working set's multipliers in their places in y; an equality's sign waits there."""
-    signs = y[:k].copy()
-    y[:] = 0.0
-    for i in range(q):
-        row = w.rows[i]
-        if row < 0:
-            y[-1 - row] = signs[-1 - row] * w.u[i]
-        else:
-            y[k + row] = w.side[row] * w.u[i]
-    return SOLVED if np.isfinite(x).all() else UNFINISHED
-
-
-@subroutine
 def constrain(
     L: Square,
     E: Float[np.ndarray, "k n"],
@@ -243,39 +227,36 @@ def constrain(
     lower: Bounds,
     upper: Bounds,
     x: Vector,
-    y: Float[np.ndarray, " rows"],
 ) -> int:
     """The same as ``solve_qp``, from the minimum x without constraints, with H = L L'."""
-    n, k, m = len(x), len(e), len(lower)
-    y[:] = 0.0
+    n, m = len(x), len(lower)
     for i in range(m):
         if not lower[i] <= upper[i]:
             return BAD_BOUNDS
-    J, R, side = np.empty((n, n)), np.zeros((n, n)), np.zeros(m, dtype=np.int64)
-    w = WorkingSet(J, R, np.empty(n, dtype=np.int64), np.empty(n), side)
+    J, R, taken = np.empty((n, n)), np.zeros((n, n)), np.zeros(m, dtype=np.bool_)
+    w = WorkingSet(J, R, np.empty(n, dtype=np.int64), np.empty(n), taken)
     invert(L, J)
     normal, q = np.empty(n), 0
-    for i in range(k):
+    for i in range(len(e)):
         value = e[i]
         for j in range(n):
             value -= E[i, j] * x[j]
         sign = 1.0 if value >= 0.0 else -1.0
         for j in range(n):
             normal[j] = sign * E[i, j]
-        y[i] = -sign  # until the end
         q = meet(w, q, -1 - i, normal, abs(value), VIOLATION * (1.0 + abs(e[i])), x)
         if q < 0:
             return INFEASIBLE if q == -1 else UNFINISHED
     for _ in range(MAX_STEPS):
-        row, sign, violation = most_violated(x, C, lower, upper, side)
+        row, sign, violation = most_violated(x, C, lower, upper, taken)
         if row < 0:
-            return finish(w, q, x, y, k)
+            return SOLVED if np.isfinite(x).all() else UNFINISHED
         for j in range(n):
             normal[j] = sign * C[row, j]
         q = meet(w, q, row, normal, violation, 0.0, x)
         if q < 0:
             return INFEASIBLE if q == -1 else UNFINISHED
-        side[row] = AT_LOWER if sign > 0.0 else AT_UPPER
+        taken[row] = True
     return UNFINISHED
 
 
@@ -289,14 +270,10 @@ def solve_qp(
     lower: Bounds,
     upper: Bounds,
     x: Vector,
-    y: Float[np.ndarray, " rows"],
 ) -> int:
-    """Fill the minimiser x (n,) and the multipliers y (k + m,); returns the outcome.
-
-    H x + g + (E' C') y = 0; a row of C has y >= 0 at its upper bound and y <= 0 at its lower one.
-    """
+    """Fill the minimiser x; returns the outcome."""
     L = np.empty((len(g), len(g)))
     if not factorise(H, L):
         return SINGULAR
     solve_factorised(L, g, x)
-    return constrain(L, E, e, C, lower, upper, x, y)
+    return constrain(L, E, e, C, lower, upper, x)

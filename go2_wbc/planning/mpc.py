@@ -290,7 +290,7 @@ def solve_mpc(
     solve_factorised(L, g, x)
     C, lower, upper = np.empty((rows, n)), np.empty(rows), np.empty(rows)
     bound(friction, c.force_max, share, feet, C, lower, upper)
-    outcome = constrain(L, np.empty((0, n)), np.empty(0), C, lower, upper, x, np.empty(rows))
+    outcome = constrain(L, np.empty((0, n)), np.empty(0), C, lower, upper, x)
     for a in range(len(feet)):
         for i in range(3):
             forces[feet[a, 0], feet[a, 1], i] = x[3 * a + i]

@@ -71,7 +71,7 @@ def _embed(
     problem: Problem, qp: DenseQp, Z: Float[np.ndarray, "30 n"], z0: Array30, solver: str
 ) -> Array30:
     try:
-        return Z @ solve_dense_qp(qp, solver).x + z0
+        return Z @ solve_dense_qp(qp, solver) + z0
     except QpInfeasible as error:
         # H u = -g: the optimum without bounds, which tells best what asked for too much
         best = Z @ np.linalg.lstsq(qp.H, -qp.g, rcond=None)[0] + z0

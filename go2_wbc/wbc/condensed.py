@@ -226,8 +226,8 @@ def bound_unknowns(target: Target, limits: Limits, w: Workspace) -> int:
 def solve_bounded(target: Target, w: Workspace) -> int:
     """Move u from the minimum without bounds to that within all; returns the outcome."""
     m = bound_unknowns(target, w.limits, w)
-    E, e, multipliers = np.empty((0, 12)), np.empty(0), np.empty(m)
-    return constrain(w.L, E, e, w.C[:m], w.lower[:m], w.upper[:m], w.u, multipliers)
+    E, e = np.empty((0, 12)), np.empty(0)
+    return constrain(w.L, E, e, w.C[:m], w.lower[:m], w.upper[:m], w.u)
 
 
 @kernel

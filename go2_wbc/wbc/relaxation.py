@@ -69,9 +69,9 @@ def solve_relaxed(problem: Problem, solver: str) -> Array30:
     H[n:, n:] = SLACK_WEIGHT * np.eye(12)
     C, lower, upper = _relaxed_bounds(problem, unknown)
     hard = np.concatenate([E[base], np.zeros((6, 12))], axis=1)
-    solution = solve_dense_qp(DenseQp(H, g, C, lower, upper, hard, e[base]), solver)
+    x = solve_dense_qp(DenseQp(H, g, C, lower, upper, hard, e[base]), solver)
     z = np.zeros(SIZE)
-    z[unknown] = solution.x[:n]
+    z[unknown] = x[:n]
     return z
 
 

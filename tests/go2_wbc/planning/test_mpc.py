@@ -67,7 +67,7 @@ def test_forces_are_those_of_the_stacked_program(config: MpcConfig) -> None:
         horizon = random_horizon(rng, haste=(0.3, 1.0, 3.0)[index % 3])
         program = formulate(horizon, config, MASS, GRAVITY)
         qp = DenseQp(program.H, program.g, program.C, program.lower, program.upper)
-        theirs = program.forces(solve_dense_qp(qp, "daqp").x)
+        theirs = program.forces(solve_dense_qp(qp, "daqp"))
         outcome, ours = solved(config, horizon)
         assert outcome == SOLVED
         np.testing.assert_allclose(ours, theirs, atol=AGREEMENT, rtol=0)
