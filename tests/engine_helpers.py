@@ -240,3 +240,12 @@ def symmetric_model() -> RobotModel:
     lever = trunk.lever * [1.0, 0.0, 1.0]
     model.pin_model.inertias[1] = pin.Inertia(trunk.mass, lever, inertia)
     return model
+
+
+def angular_velocity_from_rpy(
+    rpy: np.ndarray, rate: np.ndarray, acceleration: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """World-frame w and dw of roll, pitch, yaw rates, by Pinocchio."""
+    E = pin.rpy.computeRpyJacobian(rpy, pin.LOCAL_WORLD_ALIGNED)
+    dE = pin.rpy.computeRpyJacobianTimeDerivative(rpy, rate, pin.LOCAL_WORLD_ALIGNED)
+    return E @ rate, E @ acceleration + dE @ rate

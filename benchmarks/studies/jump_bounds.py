@@ -111,7 +111,7 @@ def physics_rows(model: RobotModel) -> tuple[PhysicsRow, ...]:
     limits = PlanLimits()
     planned = model.motor.scaled(limits.torque_share)
     free = replace(limits, force_max=NO_CAP, speed_share=1.0)
-    ideal = replace(model.motor, no_load_speed=np.full(12, np.inf))
+    ideal = MotorModel.named(IDEAL, model.description)
     best = best_take_off(model, planned, limits)
     whole = best_take_off(model, model.motor, free)
     strong = best_take_off(model, ideal, free)

@@ -6,6 +6,7 @@ quantity of the tick, by ``robot.rigid_body`` if the robot's legs turn about the
 
 from __future__ import annotations
 
+import hashlib
 from functools import cached_property
 from pathlib import Path
 
@@ -29,6 +30,11 @@ ROTOR_ARMATURE = np.tile([0.0045, 0.0045, 0.0164], 4)
 """Reflected rotor inertia [kg m^2] per joint; same provenance as the plant's ``JointDynamics``."""
 LEG_AXES = ("JointModelRX", "JointModelRY", "JointModelRY")
 """What Pinocchio calls the joints of a leg: they turn about x, y and y."""
+FINGERPRINT_DECIMALS = 9
+"""Decimals of the numbers [SI units] that count: what a file was computed for stays the same robot
+if another Pinocchio rounds its last digits differently."""
+FINGERPRINT = 16
+"""Letters of a fingerprint."""
 HIP_LIMIT = 0.838
 """Published hip abduction limit [rad]; the URDF's 1.0472 is wider."""
 
@@ -215,6 +221,30 @@ class RobotModel:
     def inverse_dynamics(self, q: Array19, v: Array18, a: Array18) -> Array18:
         """Generalised force M(q) a + h(q, v) [N, N m]."""
         return np.array(pin.rnea(self.pin_model, self._data, q, v, a))
+
+
+def fingerprint(model: RobotModel) -> str:
+    """What tells the robot of ``model`` from others: masses, lengths, limits and motors.
+
+    Comments and order of its URDF, meshes and colours do not count.
+    """
+    pin_model = model.pin_model
+    feet = [pin_model.frames[pin_model.getFrameId(name)].placement for name in FOOT_NAMES]
+    numbers = [
+        *(placement.homogeneous for placement in pin_model.jointPlacements),
+        *(inertia.matrix() for inertia in pin_model.inertias),
+        *(placement.homogeneous for placement in feet),
+        pin_model.armature,
+        model.q_lower,
+        model.q_upper,
+        model.torque_limits,
+        model.speed_limits,
+        np.array([model.foot_radius, model.gravity]),
+    ]
+    digest = hashlib.sha256()
+    for array in numbers:
+        digest.update((np.round(array, FINGERPRINT_DECIMALS) + 0.0).tobytes())  # no -0
+    return digest.hexdigest()[:FINGERPRINT]
 
 
 def _burden(model: pin.Model, world: World) -> None:

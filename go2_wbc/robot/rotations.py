@@ -17,18 +17,6 @@ def log_rotation(R: Array3x3) -> Array3:
     return pin.log3(R)
 
 
-def exp_rotation(vector: Array3) -> Array3x3:
-    """Rotation by the rotation vector [rad]."""
-    return pin.exp3(vector)
-
-
-def cross(a: Array3, b: Array3) -> Array3:
-    """a x b; ten times faster than numpy's general one."""
-    a0, a1, a2 = a
-    b0, b1, b2 = b
-    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
-
-
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Array3x3:
     """R = Rz(yaw) Ry(pitch) Rx(roll), angles in rad."""
     return pin.rpy.rpyToMatrix(roll, pitch, yaw)
@@ -93,27 +81,6 @@ def turned(
     """Each of the vectors turned by its angle [rad]."""
     (x, y), cosine, sine = vectors.T, np.cos(angles), np.sin(angles)
     return np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
-
-
-def angular_velocity_from_rpy(
-    rpy: Array3, rate: Array3, acceleration: Array3
-) -> tuple[Array3, Array3]:
-    """World-frame angular velocity [rad/s] and acceleration [rad/s^2] of roll, pitch, yaw rates.
-
-    Source: Craig, Introduction to Robotics, 3rd ed., eq. 5.44 for the Z-Y-X set.
-    """
-    _, pitch, yaw = rpy
-    cy, sy, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
-    E = np.array([[cy * cp, -sy, 0.0], [sy * cp, cy, 0.0], [-sp, 0.0, 1.0]])
-    dp, dy = rate[1], rate[2]
-    dE = np.array(
-        [
-            [-sy * dy * cp - cy * sp * dp, -cy * dy, 0.0],
-            [cy * dy * cp - sy * sp * dp, -sy * dy, 0.0],
-            [-cp * dp, 0.0, 0.0],
-        ]
-    )
-    return E @ rate, E @ acceleration + dE @ rate
 
 
 def wrap_angle(angle: float) -> float:

@@ -34,7 +34,7 @@ from go2_wbc.records import Array3, Array6, Array30
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.inverse_kinematics import load_placo_robot
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import cross, log_rotation
+from go2_wbc.robot.rotations import log_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.config import WbcConfig
@@ -197,7 +197,7 @@ class _Mode:
         velocity = self._velocity(f"{leg.name}_contact", state)
         w = velocity[3:]
         down = np.array([0.0, 0.0, -self._model.foot_radius])
-        centripetal = cross(w, cross(w, down))
+        centripetal = np.cross(w, np.cross(w, down))
         damping = self._config.stance_damping * velocity[:3]
         self._contacts[leg].ddtarget_world = centripetal - damping
 

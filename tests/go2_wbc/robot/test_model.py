@@ -12,7 +12,14 @@ import pytest
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.description import find_description
-from go2_wbc.robot.model import FOOT_RADIUS, HIP_LIMIT, ROTOR_ARMATURE, RobotModel
+from go2_wbc.robot.model import (
+    FINGERPRINT,
+    FOOT_RADIUS,
+    HIP_LIMIT,
+    ROTOR_ARMATURE,
+    RobotModel,
+    fingerprint,
+)
 from tests.engine_helpers import random_state
 
 EXACT = 1e-12  # rounding of numbers of order one
@@ -145,3 +152,26 @@ def test_a_urdf_that_pinocchio_cannot_read_is_refused_with_its_path(tmp_path: Pa
     broken = installed_urdf().replace('<parent link="FL_hip"', '<parent link="nothing"')
     with pytest.raises(DescriptionError, match=r"cannot read the URDF .*robot\.urdf"):
         described(tmp_path, broken)
+
+
+def changed(mass: float) -> RobotModel:
+    model = RobotModel()
+    model.pin_model.inertias[1].mass += mass
+    return model
+
+
+def test_models_of_the_same_robot_have_the_same_fingerprint() -> None:
+    own = fingerprint(RobotModel())
+    assert len(own) == FINGERPRINT
+    assert own == fingerprint(RobotModel())
+    assert own == fingerprint(changed(1e-12))  # as another library's rounding does
+
+
+def test_another_mass_rotor_or_foot_is_another_robot() -> None:
+    models = [
+        RobotModel(),
+        changed(1e-3),
+        RobotModel(armature=np.full(12, 0.01)),
+        RobotModel(foot_radius=0.023),
+    ]
+    assert len({fingerprint(model) for model in models}) == len(models)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import LegTask, Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import Payload
-from go2_wbc.robot.rotations import exp_rotation, log_rotation
+from go2_wbc.robot.rotations import log_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.loads import plan_loads
 from go2_wbc.wbc.tasks import (
@@ -116,7 +117,7 @@ def test_the_attitudes_error_is_the_logarithm_up_to_a_turn_by_pi(seed: int, angl
     snapshot, reference, _ = scene(seed)
     axis = np.random.default_rng(seed).normal(size=3)
     turn = angle * axis / np.linalg.norm(axis)
-    R_des = snapshot.R_world_base @ exp_rotation(turn)
+    R_des = snapshot.R_world_base @ pin.exp3(turn)
     reference = replace(reference, body=replace(reference.body, R_world_base=R_des))
     error = orientation_error(snapshot, Target.of(reference.row))
     np.testing.assert_allclose(error, turn, atol=LOGARITHM)
@@ -154,7 +155,7 @@ def test_a_trunk_turned_away_is_turned_back(axis: int) -> None:
     turn = 0.1 * np.eye(3)[axis]
     away = replace(
         reference.body,
-        R_world_base=snapshot.R_world_base @ exp_rotation(-turn),
+        R_world_base=snapshot.R_world_base @ pin.exp3(-turn),
         w_world=snapshot.R_world_base @ snapshot.state.v[3:6],
         dw_world=np.zeros(3),
     )
