@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 
+from go2_wbc.errors import QpInfeasible
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import BodyTarget, LegTask, Reference, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
+from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.solution import WbcSolution
 
 Legs = tuple[LegTask, ...]
@@ -166,6 +168,31 @@ def fast_cases(model: RobotModel, count: int, seed: int) -> Iterator[tuple[Snaps
         body = replace(body, a_world=np.array([0.0, 0.0, rng.uniform(0.0, 60.0)]))
         force = np.full(4, 400.0)
         yield snapshot, replace(reference, body=body, normal_force_max=force)
+
+
+def standing(model: RobotModel, legs: Legs = FOUR_FEET) -> tuple[Snapshot, Reference]:
+    """At rest on its feet, and asked to go on."""
+    snapshot = model.snapshot(state_of(standing_q()))
+    return snapshot, holding_reference(snapshot, legs)
+
+
+def solved_alike(
+    ours: WholeBodyController,
+    theirs: WholeBodyController,
+    problems: Iterable[tuple[Snapshot, Reference]],
+    tolerance: float,
+) -> Iterator[tuple[Snapshot, Reference, WbcSolution, WbcSolution]]:
+    """What two controllers find: the same torques [N m], or no solution, both."""
+    for snapshot, reference in problems:
+        found = ours.solve_compiled(snapshot, reference)
+        try:
+            other = theirs.solve(snapshot, reference)
+        except QpInfeasible:
+            other = None
+        assert (found is None) == (other is None)
+        if found is not None and other is not None:
+            np.testing.assert_allclose(found.tau, other.tau, atol=tolerance, rtol=0)
+            yield snapshot, reference, found, other
 
 
 def moved(model: RobotModel, state: RobotState, a: np.ndarray, dt: float) -> RobotState:

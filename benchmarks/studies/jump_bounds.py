@@ -43,7 +43,7 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.motor import MotorModel
+from go2_wbc.robot.motor import IDEAL, MotorModel
 from motions.dynamics.phase_builders import PUSH
 from motions.dynamics.plan_limits import PlanLimits
 

@@ -50,6 +50,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from go2_wbc.algebra.vectors import cross, triple
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.legs import LEGS
 from go2_wbc.records import (
@@ -180,11 +181,7 @@ def report(
 ) -> None:
     """Fill q (19,) and v (18,) of a ``RobotState`` from the motion of the IMU."""
     rotation_of_estimate(x, R)
-    turning = (
-        w[1] * p_imu[2] - w[2] * p_imu[1],
-        w[2] * p_imu[0] - w[0] * p_imu[2],
-        w[0] * p_imu[1] - w[1] * p_imu[0],
-    )
+    turning = cross(triple(w), triple(p_imu))
     for i in range(3):
         q[i], v[i], v[3 + i] = x.p[i], -turning[i], w[i]
         for k in range(3):

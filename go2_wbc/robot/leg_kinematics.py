@@ -29,6 +29,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.algebra.vectors import turned_back
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
@@ -153,10 +154,7 @@ def solve_leg(leg: LegGeometry, x: float, y: float, z: float, q: Array3) -> floa
         down = -down
     reach = np.hypot(x, down)
     cosine = (reach * reach - thigh * thigh - calf * calf) / (2.0 * thigh * calf)
-    if cosine > 1.0:
-        cosine = 1.0
-    elif cosine < -1.0:
-        cosine = -1.0
+    cosine = min(max(cosine, -1.0), 1.0)
     knee = -np.arccos(cosine)
     swing = np.arctan2(-x, down)
     swing -= np.arctan2(calf * np.sin(knee), thigh + calf * np.cos(knee))
@@ -201,10 +199,7 @@ def turns_to(leg: LegGeometry, x: float, y: float, z: float, turns: Array6) -> N
     turns[0], turns[1] = (y * width - z * down) / length, (z * width + y * down) / length
     reach = np.sqrt(x * x + down * down)
     cosine = (reach * reach - thigh * thigh - calf * calf) / (2.0 * thigh * calf)
-    if cosine > 1.0:
-        cosine = 1.0
-    elif cosine < -1.0:
-        cosine = -1.0
+    cosine = min(max(cosine, -1.0), 1.0)
     sine = -np.sqrt(1.0 - cosine * cosine)
     if reach == 0.0:
         down, reach = 1.0, 1.0
@@ -267,14 +262,6 @@ def centres_of_mass(
         add_up(links, moments, R[i], p[i], com[i])
 
 
-@subroutine
-def seen_from_base(R: Array3x3, p: Array3, p_foot: Array3, seen: Array3) -> None:
-    """Fill a place of the world as the base at R and p sees it."""
-    d0, d1, d2 = p_foot[0] - p[0], p_foot[1] - p[1], p_foot[2] - p[2]
-    for k in range(3):
-        seen[k] = R[0, k] * d0 + R[1, k] * d1 + R[2, k] * d2
-
-
 @kernel(nogil=True)
 def settle(
     wanted: ArrayNx3,
@@ -295,7 +282,7 @@ def settle(
     ``p`` starts at the base's place and ends there, ``joints`` of raised legs stay; the others,
     ``miss`` and ``com`` are filled. In every step but the last, p <- p + (c* - c(p)).
     """
-    moments, turns, foot = np.empty((4, 3)), np.empty(6), np.empty(3)
+    moments, turns = np.empty((4, 3)), np.empty(6)
     for i in range(len(wanted)):
         for leg in range(4):
             if raised[i, leg]:
@@ -306,11 +293,13 @@ def settle(
             for leg in range(4):
                 if raised[i, leg]:
                     continue
-                seen_from_base(R[i], p[i], p_feet[i, leg], foot)
+                sizes, foot = legs.geometry[leg], p_feet[i, leg]
+                away = foot[0] - p[i, 0], foot[1] - p[i, 1], foot[2] - p[i, 2]
+                x, y, z = turned_back(R[i], away)  # as the base sees it
                 if step == steps:
                     angles = joints[i, 3 * leg : 3 * leg + 3]
-                    miss[i, leg] = solve_leg(legs.geometry[leg], foot[0], foot[1], foot[2], angles)
-                turns_to(legs.geometry[leg], foot[0], foot[1], foot[2], turns)
+                    miss[i, leg] = solve_leg(sizes, x, y, z, angles)
+                turns_to(sizes, x, y, z, turns)
                 weigh_leg(links, leg, turns, moments[leg])
             add_up(links, moments, R[i], p[i], com[i])
             if step < steps and is_com[i]:

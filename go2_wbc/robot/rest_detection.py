@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from go2_wbc.algebra.vectors import dot, triple
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import Array3, Array3x3, Array4, Array12, Record
 from go2_wbc.robot.estimator_config import EstimatorConfig
@@ -70,22 +71,33 @@ class Rest(Record):
 
 
 @subroutine
+def squared(a: Array3, b: Array3) -> float:
+    """|a - b|^2."""
+    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
+
+
+@subroutine
+def has_still_joints(rest: Rest, c: EstimatorConfig) -> bool:
+    """Whether the joints, smoothed, hardly move."""
+    speed = 0.0
+    for n in range(12):
+        speed += rest.joint_speeds[n] ** 2 / 12.0
+    return bool(speed < c.still_joints**2)
+
+
+@subroutine
 def is_at_rest(
     x: Estimate, rest: Rest, reading: Reading, gravity: float, c: EstimatorConfig
 ) -> bool:
     """Whether joints, gyro and accelerometer have read rest for long enough."""
-    speed, turning, force = 0.0, 0.0, 0.0
     share = min(reading.dt / _SMOOTHING, 1.0)
     for n in range(12):
         rest.joint_speeds[n] += share * (reading.v_joints[n] - rest.joint_speeds[n])
-        speed += rest.joint_speeds[n] ** 2 / 12.0
-    for k in range(3):
-        turning += (reading.gyro[k] - x.gyro_bias[k]) ** 2
-        force += (reading.accelerometer[k] - x.force_bias[k]) ** 2
+    force = np.sqrt(squared(reading.accelerometer, x.force_bias))
     is_still = (
-        speed < c.still_joints**2
-        and turning < c.still_turning**2
-        and abs(np.sqrt(force) - gravity) < c.still_force
+        has_still_joints(rest, c)
+        and squared(reading.gyro, x.gyro_bias) < c.still_turning**2
+        and abs(force - gravity) < c.still_force
     )
     rest.still_time = rest.still_time + reading.dt if is_still else 0.0
     return bool(rest.still_time >= c.still_time)
@@ -96,11 +108,9 @@ def lies(
     x: Estimate, rest: Rest, reading: Reading, is_carried: bool, gravity: float, c: EstimatorConfig
 ) -> bool:
     """Whether something else than the feet has carried the robot for long enough."""
-    force, turning = 0.0, 0.0
-    for k in range(3):
-        force += (reading.accelerometer[k] - x.force_bias[k]) ** 2
-        turning += (reading.gyro[k] - x.gyro_bias[k]) ** 2
-    is_lying = not is_carried and np.sqrt(force) > _FLIGHT * gravity + _ARM * turning  # w^2 r
+    force = np.sqrt(squared(reading.accelerometer, x.force_bias))
+    turning = squared(reading.gyro, x.gyro_bias)
+    is_lying = not is_carried and force > _FLIGHT * gravity + _ARM * turning  # w^2 r
     rest.lying_time = rest.lying_time + reading.dt if is_lying else 0.0
     return bool(rest.lying_time >= c.lying_time)
 
@@ -115,25 +125,21 @@ def begin_anew(
     told by the readings alone: an estimate that is lost has lost the biases, too. Jolts, as of legs
     that are drawn in, are taken off the time at rest.
     """
-    turning, force, upwards, speed, joints, most = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    gyro, accelerometer, nothing = reading.gyro, reading.accelerometer, np.zeros(3)
+    force, most = np.sqrt(squared(accelerometer, nothing)), 0.0
     for k in range(3):
-        turning += reading.gyro[k] ** 2
-        force += reading.accelerometer[k] ** 2
-        upwards += R[2, k] * reading.accelerometer[k]
-        speed += x.v[k] ** 2
         most = max(most, abs(x.gyro_bias[k]) / c.gyro_bias)
         most = max(most, abs(x.force_bias[k]) / c.accelerometer_bias)
-    for n in range(12):
-        joints += rest.joint_speeds[n] ** 2 / 12.0
-    force = np.sqrt(force)
+    upwards = dot(triple(R[2]), triple(accelerometer))
     if R[2, 2] < _OVER:
         rest.tumbled = True
-    moves = speed > _RUNAWAY**2 and joints < c.still_joints**2
+    moves = squared(x.v, nothing) > _RUNAWAY**2 and has_still_joints(rest, c)
     is_lost = moves or upwards < _UPRIGHT * force or most > _BIASES
     if not (is_lost or (rest.tumbled and R[2, 2] > _OVER)):
         rest.lost_time = 0.0
         return KNOWN
-    is_still = turning < c.still_turning**2 and abs(force - gravity) < c.still_force
+    is_turning = squared(gyro, nothing) >= c.still_turning**2
+    is_still = not is_turning and abs(force - gravity) < c.still_force
     rest.lost_time = max(rest.lost_time + (reading.dt if is_still else -reading.dt), 0.0)
     if rest.lost_time < c.still_time:
         return KNOWN

@@ -27,7 +27,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from go2_wbc.algebra.vectors import rotation_of
+from go2_wbc.algebra.vectors import put, rotation_of, turned
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import V3, Array3, Array3x3, Array4, Array4x3, Record, layout_of
 from go2_wbc.robot.estimator_config import EstimatorConfig
@@ -107,13 +107,6 @@ def turn(quaternion: Array4, by: V3, in_world: bool) -> None:
 
 
 @subroutine
-def put_turned(R: Array3x3, a: V3, into: Array3) -> None:
-    """Put R a into an array."""
-    for i in range(3):
-        into[i] = R[i, 0] * a[0] + R[i, 1] * a[1] + R[i, 2] * a[2]
-
-
-@subroutine
 def rotation_of_estimate(x: Estimate, R: Array3x3) -> None:
     """Fill the rotation matrix of the trunk."""
     q = x.quaternion
@@ -174,7 +167,7 @@ def predict(
     turn(x.quaternion, half, False)
     rotation_of_estimate(x, R)
     a, bias = accelerometer, x.force_bias
-    put_turned(R, (a[0] - bias[0], a[1] - bias[1], a[2] - bias[2]), force)
+    put(turned(R, (a[0] - bias[0], a[1] - bias[1], a[2] - bias[2])), force)
     for i in range(3):
         acceleration = force[i] - (gravity if i == 2 else 0.0)
         x.p[i] += dt * x.v[i] + 0.5 * dt * dt * acceleration

@@ -137,7 +137,8 @@ def _by_active_set(qp: DenseQp, solver: str) -> Float[np.ndarray, " n"]:
 
     x = np.empty(len(qp.g))
     arrays = (qp.H, qp.g, *qp.equalities, qp.C, qp.lower, qp.upper)
-    outcome = solve_qp(*(np.ascontiguousarray(array, float) for array in arrays), x)
+    H, g, E, e, C, lower, upper = (np.ascontiguousarray(array, float) for array in arrays)
+    outcome = solve_qp(H, g, E, e, C, lower, upper, x)
     if outcome != SOLVED:
         raise QpInfeasible(solver, MESSAGES[outcome])
     return x

@@ -223,6 +223,7 @@ def test_a_singular_stance_leg_is_solved_in_full(leg: Leg) -> None:
     problem = controller().formulate(snapshot, reference)
     assert eliminate_equalities(problem) is None
     np.testing.assert_array_equal(solve_condensed(problem, "daqp"), solve_full(problem, "daqp"))
+    assert controller(solver="active_set").solve_compiled(snapshot, reference) is None
     lifted = tuple(LegTask.JOINTS if one is leg else LegTask.STANCE for one in LEGS)
     problem = controller().formulate(snapshot, replace(reference, legs=lifted))
     assert eliminate_equalities(problem) is not None
