@@ -27,12 +27,10 @@ from tests.engine_helpers import (
     SW,
     Legs,
     cases,
-    holding_reference,
     motion_error,
     random_reference,
     random_state,
-    standing_q,
-    state_of,
+    standing,
 )
 
 AGREEMENT = 1e-4  # [N m] between two back ends; PlaCo's measured 1e-5
@@ -88,11 +86,6 @@ def moving(model: RobotModel, legs: Legs = (ST, SW, JO, ST)) -> tuple[Snapshot, 
     rng = np.random.default_rng(0)
     snapshot = model.snapshot(random_state(rng))
     return snapshot, random_reference(snapshot, legs, 2.0, rng)
-
-
-def standing(model: RobotModel) -> tuple[Snapshot, Reference]:
-    snapshot = model.snapshot(state_of(standing_q()))
-    return snapshot, holding_reference(snapshot)
 
 
 def spoilt(array: np.ndarray | float, value: float) -> tuple[np.ndarray | float, str]:
