@@ -27,7 +27,7 @@ from go2_wbc.robot.rest_detection import (
 )
 from go2_wbc.robot.state import RobotState
 from go2_wbc.robot.state_filter import GYRO_BIAS, THETA, VELOCITY, Estimate, Filter
-from tests.engine_helpers import STAND_JOINTS
+from tests.engine_helpers import standing_reading
 
 STEP = 0.002  # s
 ON_BACK = pin.rpy.rpyToMatrix(2.5, -0.3, 0.0)
@@ -41,8 +41,7 @@ def resting(
 ) -> SensorReading:
     """What a robot reads that does not move."""
     felt = R.T @ [0.0, 0.0, 9.81] + [jolt, 0.0, 0.0]
-    loads = np.full(4, forces)
-    return SensorReading(time, np.zeros(3), felt, STAND_JOINTS, np.zeros(12), np.zeros(12), loads)
+    return standing_reading(time, accelerometer=felt, foot_forces=np.full(4, forces))
 
 
 def tilt_between(state: RobotState, R: Float[np.ndarray, "3 3"]) -> float:
