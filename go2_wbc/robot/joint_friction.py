@@ -25,13 +25,14 @@ from go2_wbc.legs import JOINT_NAMES
 from go2_wbc.records import Array12, Array18, packed
 from go2_wbc.robot.motor import MotorModel, torque_range
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import require_not_negative, require_positive
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
 PerJoint = Annotated[tuple[float, ...], len(JOINT_NAMES)]
 """A number for each joint, in the order of ``JOINT_NAMES``."""
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(NOT_NEGATIVE, dry=NOT_NEGATIVE, viscous=NOT_NEGATIVE, transition=POSITIVE)
 class JointFriction:
     """What is fed forward against the friction of the joints.
 
@@ -58,9 +59,7 @@ class JointFriction:
     lookahead: float = 0.01
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_not_negative(self, "dry", "viscous", "lookahead")
-        require_positive(self, "transition")
+        """Raise ConfigError for another count of numbers than twelve."""
         for name in ("dry", "viscous"):
             count = len(getattr(self, name))
             if count != len(JOINT_NAMES):

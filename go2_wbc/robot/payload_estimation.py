@@ -23,7 +23,7 @@ shakes the robot, so m is the ratio of the forces, and the place is the lever of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool
@@ -37,7 +37,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
-from go2_wbc.validation import require_between, require_positive, require_share
+from go2_wbc.validation import FINITE, POSITIVE, SHARE, ranged, require_between
 
 PERIOD = 0.02
 """Time [s] from one change of the belief to the next: much less than its response takes."""
@@ -46,6 +46,7 @@ NOTHING = 0.02
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE, release=SHARE, middle=FINITE)
 class PayloadConfig:
     """Numbers of the estimate of the payload.
 
@@ -93,10 +94,7 @@ class PayloadConfig:
     most_speed: tuple[float, float] = (1.5, 0.4)
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        others = {"enabled", "release", "middle"}
-        require_positive(self, *(f.name for f in fields(self) if f.name not in others))
-        require_share(self, "release")
+        """Raise ConfigError for a middle that is not in the robot."""
         require_between(self, -self.base_height, self.base_height, "middle")
 
 

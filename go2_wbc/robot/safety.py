@@ -10,7 +10,7 @@ highest numbers that tell of a fall, of a robot that is to balance:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.records import Array4, Array12, Array18, Array19
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import require_positive
+from go2_wbc.validation import POSITIVE, ranged
 
 TRUNK_UNDERSIDE = np.array(
     [
@@ -75,6 +75,7 @@ def heights(now: Snapshot) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
 class SafetyConfig:
     """When to give up and go limp.
 
@@ -115,10 +116,6 @@ class SafetyConfig:
     stale_limit: float = 0.03
     qp_patience: int = 10
     grave_limit_time: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a limit that is not positive."""
-        require_positive(self, *(field.name for field in fields(self)))
 
     def greatest_tilt(self, *, is_astray: bool) -> float:
         """Tilt [rad] beyond which a robot has fallen: of two limits the lower one, if astray."""
