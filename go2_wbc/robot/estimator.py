@@ -56,9 +56,7 @@ from go2_wbc.legs import LEGS
 from go2_wbc.records import (
     Array3,
     Array3x3,
-    Array4,
     Array4x3,
-    Array12,
     Array18,
     Array19,
     Record,
@@ -71,7 +69,6 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, foot_places, leg_tab
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rest_detection import (
     TUMBLED,
-    Reading,
     Rest,
     begin_anew,
     is_at_rest,
@@ -79,7 +76,7 @@ from go2_wbc.robot.rest_detection import (
     lies,
     take_in_rest,
 )
-from go2_wbc.robot.state import OdometryCovariance, RobotState
+from go2_wbc.robot.state import OdometryCovariance, RobotState, SensorReading
 from go2_wbc.robot.state_filter import (
     ERROR,
     FEET,
@@ -106,29 +103,6 @@ _THROWN_DEVIATIONS, _THROWN_TILT = (0.001, 2.0, 1.0), 1.0
 """The same of a robot that falls, or is thrown, and of its roll and pitch [rad]."""
 _STEADY_HEADING = 1e-4
 """Deviation [rad] of the heading when the filter begins: it is 0 by definition."""
-
-
-@dataclass(frozen=True, slots=True)
-class SensorReading:
-    """What the robot measures at one instant.
-
-    Attributes:
-        time: robot time [s].
-        gyro: angular velocity [rad/s] in the base frame.
-        accelerometer: specific force [m/s^2] in the base frame; +9.81 upwards at rest.
-        q_joints: joint angles [rad].
-        v_joints: joint velocities [rad/s].
-        tau: joint torques [N m].
-        foot_forces: normal force at each foot [N].
-    """
-
-    time: float
-    gyro: Array3
-    accelerometer: Array3
-    q_joints: Array12
-    v_joints: Array12
-    tau: Array12
-    foot_forces: Array4
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +151,13 @@ def learning(x: Estimate, speed: float) -> float:
 
 @subroutine
 def report(
-    x: Estimate, reading: Reading, w: Array3, p_imu: Array3, R: Array3x3, q: Array19, v: Array18
+    x: Estimate,
+    reading: SensorReading,
+    w: Array3,
+    p_imu: Array3,
+    R: Array3x3,
+    q: Array19,
+    v: Array18,
 ) -> None:
     """Fill q (19,) and v (18,) of a ``RobotState`` from the motion of the IMU."""
     rotation_of_estimate(x, R)
@@ -193,7 +173,13 @@ def report(
 
 @subroutine
 def follow_feet(
-    s: EstimatorState, reading: Reading, c: EstimatorNumbers, w: Array3, R: Array3x3, rests: bool
+    s: EstimatorState,
+    reading: SensorReading,
+    dt: float,
+    c: EstimatorNumbers,
+    w: Array3,
+    R: Array3x3,
+    rests: bool,
 ) -> bool:
     """Let the legs measure, and move the feet on; returns whether some foot stands."""
     f, told = s.filter, c.config
@@ -205,7 +191,7 @@ def follow_feet(
         pressed = c.foot_radius - 0.5 * told.compliance * force
         q, u = reading.q_joints[joints], reading.v_joints[joints]
         see_foot(foot, c.legs.geometry[leg], q, u, c.p_base_imu, w, pressed, R)
-        age = follow_foot(f, foot, leg, force, reading.dt, vertical, rests, told)
+        age = follow_foot(f, foot, leg, force, dt, vertical, rests, told)
         see_ground(f, foot, leg, force, age, c.foot_radius, s.level, told)
         if foot.carries:
             is_carried = True
@@ -214,13 +200,18 @@ def follow_feet(
 
 @kernel
 def estimate(
-    s: EstimatorState, reading: Reading, c: EstimatorNumbers, q: Array19, v: Array18
+    s: EstimatorState,
+    reading: SensorReading,
+    dt: float,
+    c: EstimatorNumbers,
+    q: Array19,
+    v: Array18,
 ) -> int:
-    """Take in a reading, ``reading.dt`` seconds after the last one, and fill the robot's state.
+    """Take in a reading, ``dt`` seconds after the last one, and fill the robot's state.
 
     Returns whether the estimate has to begin anew, and why; see ``begin_anew``.
     """
-    f, told, dt, gravity = s.filter, c.config, reading.dt, c.gravity
+    f, told, gravity = s.filter, c.config, c.gravity
     x, P = f.x, f.P
     w, mean, R, noise = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(ERROR)
     f.error[:] = 0.0
@@ -229,16 +220,16 @@ def estimate(
         mean[k] = 0.5 * (reading.gyro[k] + s.gyro[k]) - x.gyro_bias[k]
         s.gyro[k] = reading.gyro[k]
     process_noise(told, dt, noise)
-    rests = is_at_rest(x, s.rest, reading, gravity, told)
+    rests = is_at_rest(x, s.rest, reading, dt, gravity, told)
     predict(f, dt, mean, reading.accelerometer, gravity, R, noise)
     rotation_of_estimate(x, R)
     biases = slice(GYRO_BIAS, FEET)
     before, share_learnt = P[biases, biases].copy(), learning(x, told.learning_speed)
     s.level.doubt_time = max(s.level.doubt_time - dt, 0.0)
-    is_carried = follow_feet(s, reading, c, w, R, rests)
+    is_carried = follow_feet(s, reading, dt, c, w, R, rests)
     for leg in range(4):
         take_in_leg(f, s.feet[leg], leg, told)
-    is_lying = lies(x, s.rest, reading, is_carried, gravity, told)
+    is_lying = lies(x, s.rest, reading, dt, is_carried, gravity, told)
     if is_upset(s.rest, dt, is_lying, R) and not rests:
         share_learnt = 0.0
     if rests:
@@ -252,7 +243,7 @@ def estimate(
     for k in range(3):
         w[k] = reading.gyro[k] - x.gyro_bias[k]
     report(x, reading, w, c.p_base_imu, R, q, v)
-    return begin_anew(x, s.rest, reading, R, gravity, told)
+    return begin_anew(x, s.rest, reading, dt, R, gravity, told)
 
 
 class StateEstimator:
@@ -269,7 +260,9 @@ class StateEstimator:
         sizes = self._p_base_imu, model.foot_radius, model.gravity
         self._numbers = packed(EstimatorNumbers(self._config, leg_table(model), *sizes))
         self._time = -np.inf  # before the first reading
-        self._reading, self._state = Reading(), EstimatorState()
+        zeros = np.zeros(12)
+        reading = SensorReading(0.0, zeros[:3], zeros[:3], zeros, zeros, zeros, zeros[:4])
+        self._reading, self._state = packed(reading), EstimatorState()
         self._x, self._P = self._state.filter.x, self._state.filter.P
         self._x.quaternion[3] = 1.0
 
@@ -279,12 +272,11 @@ class StateEstimator:
         if not 0.0 <= step <= self._config.longest_step:
             self._begin(reading)
             step = 0.0
-        self._read(reading, step)
+        self._read(reading)
         q, v = np.empty(19), np.empty(18)
-        if off := estimate(self._state, self._reading, self._numbers, q, v):
+        if off := estimate(self._state, self._reading, step, self._numbers, q, v):
             self._forget(reading, keeps_height=off == TUMBLED)
-            self._reading.dt = 0.0
-            estimate(self._state, self._reading, self._numbers, q, v)
+            estimate(self._state, self._reading, 0.0, self._numbers, q, v)
         self._time = reading.time
         return RobotState(
             time=reading.time,
@@ -295,9 +287,8 @@ class StateEstimator:
             feet_in_contact=reading.foot_forces > self._config.contact_force,
         )
 
-    def _read(self, reading: SensorReading, step: float) -> None:
+    def _read(self, reading: SensorReading) -> None:
         taken = self._reading
-        taken.dt = step
         taken.gyro[:], taken.accelerometer[:] = reading.gyro, reading.accelerometer
         taken.q_joints[:], taken.v_joints[:] = reading.q_joints, reading.v_joints
         taken.foot_forces[:] = reading.foot_forces

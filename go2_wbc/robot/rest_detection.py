@@ -12,8 +12,9 @@ import numpy as np
 
 from go2_wbc.algebra.vectors import dot, triple
 from go2_wbc.compilation import subroutine
-from go2_wbc.records import Array3, Array3x3, Array4, Array12, Record
+from go2_wbc.records import Array3, Array3x3, Array12, Record
 from go2_wbc.robot.estimator_config import EstimatorConfig
+from go2_wbc.robot.state import SensorReading
 from go2_wbc.robot.state_filter import GYRO_BIAS, VELOCITY, Estimate, Filter, take_in_one
 
 _SMOOTHING = 0.05
@@ -31,23 +32,6 @@ tumbled no biases are learnt: the trunk and what slides beside it tell wrong vel
 _RUNAWAY, _BIASES = 0.5, 5.0
 """Speed [m/s] that an estimate of a robot at rest has if it is lost, and by how many deviations a
 bias is then off 0."""
-
-
-class Reading(Record):
-    """What the filter takes of a ``SensorReading``.
-
-    Attributes:
-        dt: time [s] since the last one.
-
-    All others as there.
-    """
-
-    dt: float
-    gyro: Array3
-    accelerometer: Array3
-    q_joints: Array12
-    v_joints: Array12
-    foot_forces: Array4
 
 
 class Rest(Record):
@@ -87,10 +71,10 @@ def has_still_joints(rest: Rest, c: EstimatorConfig) -> bool:
 
 @subroutine
 def is_at_rest(
-    x: Estimate, rest: Rest, reading: Reading, gravity: float, c: EstimatorConfig
+    x: Estimate, rest: Rest, reading: SensorReading, dt: float, gravity: float, c: EstimatorConfig
 ) -> bool:
     """Whether joints, gyro and accelerometer have read rest for long enough."""
-    share = min(reading.dt / _SMOOTHING, 1.0)
+    share = min(dt / _SMOOTHING, 1.0)
     for n in range(12):
         rest.joint_speeds[n] += share * (reading.v_joints[n] - rest.joint_speeds[n])
     force = np.sqrt(squared(reading.accelerometer, x.force_bias))
@@ -99,25 +83,37 @@ def is_at_rest(
         and squared(reading.gyro, x.gyro_bias) < c.still_turning**2
         and abs(force - gravity) < c.still_force
     )
-    rest.still_time = rest.still_time + reading.dt if is_still else 0.0
+    rest.still_time = rest.still_time + dt if is_still else 0.0
     return bool(rest.still_time >= c.still_time)
 
 
 @subroutine
 def lies(
-    x: Estimate, rest: Rest, reading: Reading, is_carried: bool, gravity: float, c: EstimatorConfig
+    x: Estimate,
+    rest: Rest,
+    reading: SensorReading,
+    dt: float,
+    is_carried: bool,
+    gravity: float,
+    c: EstimatorConfig,
 ) -> bool:
     """Whether something else than the feet has carried the robot for long enough."""
     force = np.sqrt(squared(reading.accelerometer, x.force_bias))
     turning = squared(reading.gyro, x.gyro_bias)
     is_lying = not is_carried and force > _FLIGHT * gravity + _ARM * turning  # w^2 r
-    rest.lying_time = rest.lying_time + reading.dt if is_lying else 0.0
+    rest.lying_time = rest.lying_time + dt if is_lying else 0.0
     return bool(rest.lying_time >= c.lying_time)
 
 
 @subroutine
 def begin_anew(
-    x: Estimate, rest: Rest, reading: Reading, R: Array3x3, gravity: float, c: EstimatorConfig
+    x: Estimate,
+    rest: Rest,
+    reading: SensorReading,
+    dt: float,
+    R: Array3x3,
+    gravity: float,
+    c: EstimatorConfig,
 ) -> int:
     """``KNOWN``, ``TUMBLED`` if a robot that did is at rest on its belly or feet, or ``LOST``.
 
@@ -140,7 +136,7 @@ def begin_anew(
         return KNOWN
     is_turning = squared(gyro, nothing) >= c.still_turning**2
     is_still = not is_turning and abs(force - gravity) < c.still_force
-    rest.lost_time = max(rest.lost_time + (reading.dt if is_still else -reading.dt), 0.0)
+    rest.lost_time = max(rest.lost_time + (dt if is_still else -dt), 0.0)
     if rest.lost_time < c.still_time:
         return KNOWN
     return LOST if is_lost else TUMBLED
@@ -155,7 +151,7 @@ def is_upset(rest: Rest, dt: float, is_lying: bool, R: Array3x3) -> bool:
 
 
 @subroutine
-def take_in_rest(f: Filter, reading: Reading, is_carried: bool, c: EstimatorConfig) -> None:
+def take_in_rest(f: Filter, reading: SensorReading, is_carried: bool, c: EstimatorConfig) -> None:
     """Take in that nothing moves: no velocity, and a gyro that reads its bias.
 
     Of a robot that its feet carry the gyro's bias is learnt by these: slow turns of its trunk read

@@ -82,6 +82,29 @@ class RobotState:
 
 
 @dataclass(frozen=True, slots=True)
+class SensorReading:
+    """What the robot measures at one instant.
+
+    Attributes:
+        time: robot time [s].
+        gyro: angular velocity [rad/s] in the base frame.
+        accelerometer: specific force [m/s^2] in the base frame; +9.81 upwards at rest.
+        q_joints: joint angles [rad].
+        v_joints: joint velocities [rad/s].
+        tau: joint torques [N m].
+        foot_forces: normal force at each foot [N].
+    """
+
+    time: float
+    gyro: Array3
+    accelerometer: Array3
+    q_joints: Array12
+    v_joints: Array12
+    tau: Array12
+    foot_forces: Array4
+
+
+@dataclass(frozen=True, slots=True)
 class OdometryCovariance:
     """How sure a state is of the base: of its errors, as ``nav_msgs/Odometry`` has them.
 
