@@ -37,6 +37,19 @@ T = TypeVar("T")
 
 V3 = tuple[float, float, float]
 """A vector as three numbers, which compiled code keeps in registers."""
+Array3 = Float[np.ndarray, "3"]
+"""A vector in memory; so are the others, by their shapes."""
+Array4 = Float[np.ndarray, "4"]
+Array6 = Float[np.ndarray, "6"]
+Array12 = Float[np.ndarray, "12"]
+Array18 = Float[np.ndarray, "18"]
+Array19 = Float[np.ndarray, "19"]
+Array30 = Float[np.ndarray, "30"]
+Array3x3 = Float[np.ndarray, "3 3"]
+Array4x3 = Float[np.ndarray, "4 3"]
+ArrayNx3 = Float[np.ndarray, "n 3"]
+ArrayNx12 = Float[np.ndarray, "n 12"]
+ArrayNx3x3 = Float[np.ndarray, "n 3 3"]
 
 
 @dataclass(frozen=True, slots=True)

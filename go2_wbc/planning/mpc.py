@@ -29,8 +29,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from go2_wbc.algebra.active_set import SINGULAR, constrain, factorise, solve_factorised
-from go2_wbc.algebra.linear import solve_linear
+from go2_wbc.algebra.active_set import SINGULAR, constrain
+from go2_wbc.algebra.linear import factorise, solve_factorised, solve_linear
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Retired, ranged, retires
@@ -275,7 +275,7 @@ def solve_mpc(c: MpcConfig, h: Horizon) -> int:
     solve_factorised(L, g, x)
     C, lower, upper = np.empty((rows, n)), np.empty(rows), np.empty(rows)
     bound(c.force_max, h, feet, C, lower, upper)
-    outcome = constrain(L, np.empty((0, n)), np.empty(0), C, lower, upper, x, np.empty(rows))
+    outcome = constrain(L, np.empty((0, n)), np.empty(0), C, lower, upper, x)
     for a in range(len(feet)):
         for i in range(3):
             h.forces[feet[a, 0], feet[a, 1], i] = x[3 * a + i]

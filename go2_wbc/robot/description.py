@@ -11,15 +11,21 @@ import sys
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Int
 
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
+from go2_wbc.records import ArrayNx3
 
 BASE_LINK = "base"
 INSTALL_LINE = "pip install example-robot-data"
 _SHARE = Path("cmeel.prefix") / "share"
 _ROBOT = Path("example-robot-data") / "robots" / "go2_description"
 _PACKAGE_PREFIX = "package://"
+_UNPAINTED = (171, 177, 197, 255)  # a part without a material gets the trunk's grey
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +39,9 @@ class RobotDescription:
         disabled_pairs: pairs of links that the SRDF excludes from collision.
         efforts: torque limit of each joint [N m], in the order of ``JOINT_NAMES``.
         speeds: speed limit of each joint [rad/s], in the order of ``JOINT_NAMES``.
+        mass: of all links [kg].
+        origins: of each joint in the frame of the one above it [m], in the order of
+            ``JOINT_NAMES``; those of hips in the frame of the base.
     """
 
     urdf_path: Path
@@ -41,6 +50,14 @@ class RobotDescription:
     disabled_pairs: tuple[tuple[str, str], ...]
     efforts: tuple[float, ...]
     speeds: tuple[float, ...]
+    mass: float
+    origins: tuple[tuple[float, ...], ...]
+
+    def distance(self, first: str, second: str) -> float:
+        """Between two neighbouring joints of a leg, or two hips [m]."""
+        one, other = (self.origins[JOINT_NAMES.index(name)] for name in (first, second))
+        is_hip = second.endswith("hip_joint")
+        return math.dist(one, other) if is_hip else math.hypot(*other)
 
     def mesh_path(self, filename: str) -> Path:
         """The file that a mesh name of the URDF means.
@@ -94,6 +111,8 @@ def find_description(urdf: Path | str | None = None) -> RobotDescription:
         disabled_pairs=() if srdf is None else parse_disabled_pairs(srdf),
         efforts=efforts,
         speeds=speeds,
+        mass=sum(_number(m.get("value")) for m in root.iterfind("link/inertial/mass")),
+        origins=_joint_origins(root),
     )
 
 
@@ -165,6 +184,12 @@ def _joint_limits(urdf: Path, root: ET.Element) -> tuple[tuple[float, ...], tupl
     return tuple(efforts), tuple(speeds)
 
 
+def _joint_origins(root: ET.Element) -> tuple[tuple[float, ...], ...]:
+    origins = {joint.get("name"): joint.find("origin") for joint in root.findall("joint")}
+    texts = [None if (o := origins[name]) is None else o.get("xyz") for name in JOINT_NAMES]
+    return tuple(tuple(map(_number, (text or "0 0 0").split())) for text in texts)
+
+
 def _check_masses(urdf: Path, root: ET.Element) -> None:
     for link in root.findall("link"):
         mass = link.find("inertial/mass")
@@ -181,3 +206,43 @@ def _number(text: str | None) -> float:
     except ValueError:
         return math.nan
     return value if math.isfinite(value) else math.nan
+
+
+@dataclass(frozen=True, slots=True)
+class MeshPart:
+    """All faces of a mesh file that have one colour.
+
+    Attributes:
+        points: (n, 3) vertices [m] in the frame of the file.
+        triangles: (m, 3) rows of ``points``.
+        rgba: red, green, blue, opacity in 0..1.
+    """
+
+    points: ArrayNx3
+    triangles: Int[np.ndarray, "m 3"]
+    rgba: tuple[float, ...]
+
+
+def read_mesh(path: Path) -> tuple[MeshPart, ...]:
+    """The parts of a mesh file, COLLADA or another, one for each colour.
+
+    Raises:
+        DescriptionError: if the file cannot be read or holds no triangles.
+    """
+    import trimesh  # takes long, and is needed only where somebody looks at the robot
+    from trimesh.visual import TextureVisuals
+
+    try:
+        scene: Any = trimesh.load_scene(path)
+    except (OSError, ValueError) as error:
+        raise DescriptionError(f"cannot read the mesh {path}: {error}") from error
+    parts = []
+    for mesh in scene.dump():
+        is_painted = isinstance(mesh.visual, TextureVisuals)
+        color = mesh.visual.material.main_color if is_painted else _UNPAINTED
+        rgba = tuple(float(value) / 255.0 for value in color)
+        if len(mesh.faces):
+            parts.append(MeshPart(np.array(mesh.vertices), np.array(mesh.faces), rgba))
+    if not parts:
+        raise DescriptionError(f"the mesh {path} holds no triangles")
+    return tuple(parts)

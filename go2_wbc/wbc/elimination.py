@@ -29,7 +29,7 @@ from jaxtyping import Float
 from go2_wbc.algebra.linear import solve_linear
 from go2_wbc.algebra.vectors import along, cross, triple
 from go2_wbc.compilation import kernel, subroutine
-from go2_wbc.records import Record
+from go2_wbc.records import Array12, Array30, Record
 from go2_wbc.reference import STANCE, Target
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.constraints import StanceFeetStill, left_over
@@ -141,9 +141,7 @@ def expand(target: Target, r: Reduction) -> None:
 
 
 @subroutine
-def decide(
-    target: Target, r: Reduction, u: Float[np.ndarray, "12"], z: Float[np.ndarray, "30"]
-) -> None:
+def decide(target: Target, r: Reduction, u: Array12, z: Array30) -> None:
     """Fill the decision z that the unknowns lead to."""
     for i in range(6):
         value = r.base[i, 12]

@@ -12,7 +12,7 @@ from go2_wbc.curves import Curve, Ease
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import LegTask, TrackedPoint
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import angular_velocity_from_rpy, rotation_from_rpy
+from go2_wbc.robot.rotations import rotation_from_rpy
 from motions.postures import (
     LIE_POSE,
     NORMAL_FORCE_MAX,
@@ -23,6 +23,7 @@ from motions.postures import (
     rise,
     sit_down,
 )
+from tests.engine_helpers import angular_velocity_from_rpy
 
 # m; with 3 cm the leg's determinant is a third of that of a leg that still moves smoothly.
 LEAST_DROP = 0.03

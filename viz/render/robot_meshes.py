@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from go2_wbc.robot.description import find_description
-from go2_wbc.robot.mesh_file import read_mesh
+from go2_wbc.robot.description import find_description, read_mesh
 from viz.render.mesh import Surface, simplify, smooth_surface
 
 _CREASE = np.deg2rad(22.0)  # the files have lost their smoothing; 22 deg looks like it

@@ -66,7 +66,7 @@ def test_forces_are_those_of_the_stacked_program(config: MpcConfig) -> None:
         outcome, ours = solved(config, horizon)
         program = formulate(horizon, config)
         qp = DenseQp(program.H, program.g, program.C, program.lower, program.upper)
-        theirs = program.forces(solve_dense_qp(qp, "daqp").x)
+        theirs = program.forces(solve_dense_qp(qp, "daqp"))
         assert outcome == SOLVED
         np.testing.assert_allclose(ours, theirs, atol=AGREEMENT, rtol=0)
         free = program.forces(np.linalg.solve(program.H, -program.g))

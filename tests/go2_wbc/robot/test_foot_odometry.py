@@ -85,24 +85,22 @@ def state_at(t: float, joints: np.ndarray, model: RobotModel) -> RobotState:
     return state_of(q, v, t)
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
+MODEL = RobotModel()
 
 
 @pytest.fixture(scope="module")
-def motion(model: RobotModel) -> Motion:
-    data = model.pin_model.createData()
-    pin.forwardKinematics(model.pin_model, data, pin.neutral(model.pin_model))
-    frame = model.pin_model.getFrameId(IMU_FRAME)
-    p_base_imu = np.array(pin.updateFramePlacement(model.pin_model, data, frame).translation)
-    p_feet = model.p_base_feet_nominal.copy()
-    p_feet[:, 2] = model.foot_radius - pose(0.0)[0][2]
-    places = [leg_angles(LegGeometry.of(model, leg), p_feet[leg][None]).q[0] for leg in LEGS]
+def motion() -> Motion:
+    data = MODEL.pin_model.createData()
+    pin.forwardKinematics(MODEL.pin_model, data, pin.neutral(MODEL.pin_model))
+    frame = MODEL.pin_model.getFrameId(IMU_FRAME)
+    p_base_imu = np.array(pin.updateFramePlacement(MODEL.pin_model, data, frame).translation)
+    p_feet = MODEL.p_base_feet_nominal.copy()
+    p_feet[:, 2] = MODEL.foot_radius - pose(0.0)[0][2]
+    places = [leg_angles(LegGeometry.of(MODEL, leg), p_feet[leg][None]).q[0] for leg in LEGS]
     joints, readings, states = np.concatenate(places), [], []
     for t in TICK * np.arange(COUNT):
-        state = state_at(t, joints, model)
-        halfway = state_at(t + TICK / 2, joints + TICK / 2 * state.joint_velocities, model)
+        state = state_at(t, joints, MODEL)
+        halfway = state_at(t + TICK / 2, joints + TICK / 2 * state.joint_velocities, MODEL)
         forces = np.full(4, 50.0)
         forces[IN_THE_AIR] = 0.0
         readings.append(
@@ -121,10 +119,8 @@ def motion(model: RobotModel) -> Motion:
     return Motion(readings, states)
 
 
-def test_place_and_speed_of_an_exactly_known_motion_are_found(
-    motion: Motion, model: RobotModel
-) -> None:
-    estimator = StateEstimator(model, EstimatorConfig(compliance=1e-9))
+def test_place_and_speed_of_an_exactly_known_motion_are_found(motion: Motion) -> None:
+    estimator = StateEstimator(MODEL, EstimatorConfig(compliance=1e-9))
     found = [estimator.update(reading) for reading in motion.readings]
     off_v = np.array([a.v - b.v for a, b in zip(found, motion.states, strict=True)])
     off_q = np.array([a.q - b.q for a, b in zip(found, motion.states, strict=True)])
@@ -136,11 +132,11 @@ def test_place_and_speed_of_an_exactly_known_motion_are_found(
     assert np.abs(off_q[:, 7:]).max() < 1e-12
 
 
-def test_what_needs_no_estimate_is_passed_on(motion: Motion, model: RobotModel) -> None:
+def test_what_needs_no_estimate_is_passed_on(motion: Motion) -> None:
     reading = motion.readings[7]
     forces = np.array([0.0, CONTACT_FORCE, CONTACT_FORCE + 0.01, 40.0])
     scaled = replace(reading, foot_forces=forces)
-    state = StateEstimator(model).update(scaled)
+    state = StateEstimator(MODEL).update(scaled)
     assert state.time == reading.time
     assert state.tau.tolist() == reading.tau.tolist()
     assert state.foot_forces.tolist() == forces.tolist()
@@ -148,8 +144,8 @@ def test_what_needs_no_estimate_is_passed_on(motion: Motion, model: RobotModel) 
 
 
 @pytest.mark.parametrize("leg", LEGS)
-def test_a_leg_measures_what_pinocchio_computes(model: RobotModel, leg: Leg) -> None:
-    rng, robot = np.random.default_rng(int(leg)), model.pin_model
+def test_a_leg_measures_what_pinocchio_computes(leg: Leg) -> None:
+    rng, robot = np.random.default_rng(int(leg)), MODEL.pin_model
     data, frame = robot.createData(), robot.getFrameId(FOOT_NAMES[leg])
     w, p_imu, radius = rng.normal(size=3), rng.normal(scale=0.05, size=3), 0.02
     R = rotation_from_rpy(0.3, -0.2, 0.9)
@@ -160,7 +156,7 @@ def test_a_leg_measures_what_pinocchio_computes(model: RobotModel, leg: Leg) -> 
     motion = pin.getFrameVelocity(robot, data, frame, pin.LOCAL_WORLD_ALIGNED)
     foot = Foot()
     given = (joints[leg.joints], rates[leg.joints], p_imu, w, radius, R)
-    see_foot(foot, LegGeometry.of(model, leg), *given)
+    see_foot(foot, LegGeometry.of(MODEL, leg), *given)
     own = motion.linear - np.cross(w, place)
     rolling = np.cross(R @ motion.angular, [0.0, 0.0, radius])
     velocity = rolling - R @ (motion.linear - np.cross(w, p_imu))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
@@ -18,7 +19,7 @@ from go2_wbc.records import packed
 from go2_wbc.reference import Anchor, BodyTarget, LegTask, Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
-from go2_wbc.robot.rotations import exp_rotation, quaternion_from_rpy, rotation_from_rpy
+from go2_wbc.robot.rotations import quaternion_from_rpy, rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.tracking.landing import Landing
 from go2_wbc.tracking.plan_curves import StanceLoad
@@ -37,7 +38,7 @@ def random_plan(rng: np.random.Generator, near: np.ndarray | None = None) -> Ref
     """Every number another one; the attitude anything, or close to ``near``."""
     R = rotation_from_rpy(*rng.uniform(-3.0, 3.0, size=3))
     if near is not None:
-        R = near @ exp_rotation(rng.normal(scale=0.2, size=3))
+        R = near @ pin.exp3(rng.normal(scale=0.2, size=3))
     p, v, a, w, dw = rng.normal(scale=0.3, size=(5, 3))
     point = TrackedPoint.COM if rng.random() < 0.5 else TrackedPoint.BASE
     legs = tuple(LegTask(int(task)) for task in rng.integers(3, size=4))
