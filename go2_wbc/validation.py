@@ -142,31 +142,6 @@ def require(config: object, rule: Range, *names: str) -> None:
                 )
 
 
-def require_positive(config: object, *names: str) -> None:
-    """Raise ConfigError unless each named field of ``config`` is finite and above 0."""
-    require(config, POSITIVE, *names)
-
-
-def require_not_negative(config: object, *names: str) -> None:
-    """Raise ConfigError unless each named field of ``config`` is finite and at least 0."""
-    require(config, NOT_NEGATIVE, *names)
-
-
-def require_finite(config: object, *names: str) -> None:
-    """Raise ConfigError unless each named field of ``config`` is a finite number."""
-    require(config, FINITE, *names)
-
-
-def require_between(config: object, low: float, high: float, *names: str) -> None:
-    """Raise ConfigError unless each named field of ``config`` is in [``low``, ``high``]."""
-    require(config, between(low, high), *names)
-
-
-def require_share(config: object, *names: str) -> None:
-    """Raise ConfigError unless each named field of ``config`` is in (0, 1]."""
-    require(config, SHARE, *names)
-
-
 def is_finite_number(value: object) -> TypeGuard[Real]:
     """Whether ``value`` is a finite number; True and False are none."""
     return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)

@@ -37,7 +37,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
-from go2_wbc.validation import FINITE, POSITIVE, SHARE, ranged, require_between
+from go2_wbc.validation import FINITE, POSITIVE, SHARE, between, ranged, require
 
 PERIOD = 0.02
 """Time [s] from one change of the belief to the next: much less than its response takes."""
@@ -95,7 +95,7 @@ class PayloadConfig:
 
     def __post_init__(self) -> None:
         """Raise ConfigError for a middle that is not in the robot."""
-        require_between(self, -self.base_height, self.base_height, "middle")
+        require(self, between(-self.base_height, self.base_height), "middle")
 
 
 @dataclass(frozen=True, slots=True)
