@@ -44,22 +44,15 @@ class FootContact(Record):
 
 @subroutine
 def follow_contact(
-    foot: FootContact,
-    above: float,
-    touches: bool,
-    planned: bool,
-    progress: float,
-    dt: float,
+    foot: FootContact, above: float, touches: bool, planned: bool, progress: float, dt: float
 ) -> bool:
     """Bring a foot to this tick, ``dt`` seconds after the last; returns whether it stands.
 
     Args:
-        foot: is brought to this tick.
         above: height [m] of the foot above the ground as it is known.
         touches: whether a contact is measured.
         planned: whether it shall stand.
         progress: share of its swing that has passed.
-        dt: [s].
     """
     if planned:
         foot.is_early = False

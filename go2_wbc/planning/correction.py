@@ -20,12 +20,11 @@ second, in which a robot that had just stood up with 4 kg 8 cm aside leaned by 6
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.algebra.vectors import rotation_by
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
-from go2_wbc.records import V3, Record
+from go2_wbc.records import V3, Array3, Array3x3, Array6, Record
 from go2_wbc.reference import Target, TrackedPoint
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -54,15 +53,13 @@ class Correction(Record):
         knows_payload: whether ``carried`` has been found yet.
     """
 
-    offset: Float[np.ndarray, "6"]
-    carried: Float[np.ndarray, "3"]
+    offset: Array6
+    carried: Array3
     knows_payload: bool
 
 
 @subroutine
-def correct(
-    now: Snapshot, error: Float[np.ndarray, "6"], dt: float, s: Correction, target: Target
-) -> None:
+def correct(now: Snapshot, error: Array6, dt: float, s: Correction, target: Target) -> None:
     """Put the correction into the body's target, after ``dt`` seconds of ``error``.
 
     ``error``: of the target less what is measured: position [m] and rotation vector [rad].
@@ -77,7 +74,7 @@ def correct(
 
 
 @subroutine
-def turn_by(rotation: V3, R: Float[np.ndarray, "3 3"]) -> None:
+def turn_by(rotation: V3, R: Array3x3) -> None:
     """Turn an attitude by a rotation vector [rad] in the world."""
     turn, before = np.empty((3, 3)), R.copy()
     rotation_by(rotation, turn)
@@ -125,6 +122,6 @@ def hand_over(now: Snapshot, s: Correction) -> None:
         s.offset[2 + i] -= max(min(change[i], max(held, 0.0)), min(held, 0.0))
 
 
-def tracked_position(snapshot: Snapshot, point: TrackedPoint) -> Float[np.ndarray, "3"]:
+def tracked_position(snapshot: Snapshot, point: TrackedPoint) -> Array3:
     """Measured position [m] of ``point`` in the world."""
     return snapshot.p_world_com if point is TrackedPoint.COM else snapshot.state.p_world_base

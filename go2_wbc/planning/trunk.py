@@ -26,7 +26,7 @@ from go2_wbc.planning.correction import (
 )
 from go2_wbc.planning.ground import Ground, ground_at, tilt
 from go2_wbc.planning.pose import lean_rotation, pose_turn
-from go2_wbc.records import Record
+from go2_wbc.records import Array3, Array4, Record
 from go2_wbc.reference import Target
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -49,8 +49,8 @@ class Command(Record):
         pose: of the trunk: height [m], roll, pitch, yaw [rad]; see ``BodyPose``.
     """
 
-    velocity: Float[np.ndarray, "3"]
-    pose: Float[np.ndarray, "4"]
+    velocity: Array3
+    pose: Array4
 
 
 class Trunk(Record):
@@ -68,11 +68,11 @@ class Trunk(Record):
 
     yaw: float
     position: Float[np.ndarray, "2"]
-    velocity: Float[np.ndarray, "3"]
+    velocity: Array3
     height_offset: float
     lean_offset: Float[np.ndarray, "2"]
-    pose: Float[np.ndarray, "4"]
-    pose_rate: Float[np.ndarray, "4"]
+    pose: Array4
+    pose_rate: Array4
 
 
 @subroutine
@@ -105,13 +105,7 @@ def world_velocity(trunk: Trunk) -> tuple[float, float]:
 
 
 @subroutine
-def ramp(
-    velocity: Float[np.ndarray, "3"],
-    command: Command,
-    linear: float,
-    angular: float,
-    dt: float,
-) -> None:
+def ramp(velocity: Array3, command: Command, linear: float, angular: float, dt: float) -> None:
     """Bring a velocity nearer to the commanded one, by these accelerations [m/s^2], [rad/s^2]."""
     for i in range(3):
         most = (angular if i == 2 else linear) * dt

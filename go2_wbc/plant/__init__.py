@@ -13,11 +13,7 @@ __all__ = ["MujocoPlant", "Plant", "plant_in_world"]
 
 
 def plant_in_world(
-    world: World,
-    *,
-    seed: int = 0,
-    initial_yaw: float = 0.0,
-    initial_joint_noise: float = 0.0,
+    world: World, *, seed: int = 0, initial_yaw: float = 0.0, initial_joint_noise: float = 0.0
 ) -> MujocoPlant:
     """A simulated robot in ``world``.
 

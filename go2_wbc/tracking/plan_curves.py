@@ -84,9 +84,7 @@ def stand(
     Args:
         is_com: whether the first three components of ``body`` move the CoM, else the base.
         body: x, y, z [m] and roll, pitch, yaw [rad], their rates, and their accelerations.
-        least: normal force [N] of each foot.
-        greatest: the same.
-        target: is filled.
+        least, greatest: bounds [N] of the feet's normal forces.
     """
     target.is_com = is_com
     set_body(body[0], body[1], body[2], target)

@@ -8,12 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from go2_wbc.geometry import (
-    convex_hull,
-    moving_support_margins,
-    support_margin,
-    support_margins,
-)
+from go2_wbc.geometry import convex_hull, moving_support_margins, support_margin, support_margins
 
 ROUNDING = 1e-9  # coordinates are at most 1 m
 SQUARE = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])

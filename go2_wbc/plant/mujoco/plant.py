@@ -18,13 +18,7 @@ from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, u
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
-from go2_wbc.plant.mujoco.layout import (
-    LIMB_BIN,
-    ROBOT_BINS,
-    TRUNK_BIN,
-    bin_forces,
-    read_joints,
-)
+from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
 from go2_wbc.plant.mujoco.pushes import Push, Pushes
 from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle

@@ -126,11 +126,7 @@ def test_a_share_of_the_envelope_scales_every_bound() -> None:
     half = VelocityEnvelope().scaled(0.5)
     whole = VelocityEnvelope()
     assert half == VelocityEnvelope(
-        whole.forward / 2,
-        whole.backward / 2,
-        whole.lateral / 2,
-        whole.turning / 2,
-        whole.curve / 4,
+        whole.forward / 2, whole.backward / 2, whole.lateral / 2, whole.turning / 2, whole.curve / 4
     )
 
 

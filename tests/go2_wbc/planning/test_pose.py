@@ -14,14 +14,7 @@ from go2_wbc.contacts import GAITS
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
-from go2_wbc.planning.pose import (
-    LEVEL,
-    BodyPose,
-    PoseConfig,
-    PoseEnvelope,
-    advance_pose,
-    pose_turn,
-)
+from go2_wbc.planning.pose import LEVEL, BodyPose, PoseConfig, PoseEnvelope, advance_pose, pose_turn
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation

@@ -9,12 +9,7 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
-from go2_wbc.planning.correction import (
-    ANGLE_WINDOW,
-    POSITION_WINDOW,
-    RATE,
-    tracked_position,
-)
+from go2_wbc.planning.correction import ANGLE_WINDOW, POSITION_WINDOW, RATE, tracked_position
 from go2_wbc.records import packed
 from go2_wbc.reference import Anchor, BodyTarget, LegTask, Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel

@@ -70,9 +70,7 @@ def test_an_export_that_has_our_sensors_is_accepted(tmp_path: Path) -> None:
     assert MujocoPlant(path).read().tilt < 0.2
 
 
-def test_motors_and_floor_are_added_where_they_are_missing(
-    users_mjcf: Callable[..., Path],
-) -> None:
+def test_motors_and_floor_are_added_where_they_are_missing(users_mjcf: Callable[..., Path]) -> None:
     def edit(spec: mujoco.MjSpec) -> None:
         delete_actuators(spec)
         spec.delete(spec.geom(FLOOR))
@@ -192,9 +190,7 @@ def test_a_push_at_a_foot_without_a_body_acts_at_the_foot_not_at_the_calfs_centr
     assert gained == pytest.approx(np.cross(arm, force) * plant.control_period, rel=0.01, abs=1e-5)
 
 
-def test_friction_of_a_users_model_is_its_own_unless_asked(
-    users_mjcf: Callable[..., Path],
-) -> None:
+def test_friction_of_a_users_model_is_its_own_unless_asked(users_mjcf: Callable[..., Path]) -> None:
     def edit(spec: mujoco.MjSpec) -> None:
         for geom in spec.geoms:
             geom.friction = [0.33, 0.005, 0.0001]
