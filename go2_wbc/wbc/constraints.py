@@ -19,7 +19,7 @@ from jaxtyping import Float
 from go2_wbc.algebra.vectors import plus_scaled, triple
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.errors import ConfigError
-from go2_wbc.records import V3, Array12, Record, packed
+from go2_wbc.records import V3, Array6, Array12, Record, packed
 from go2_wbc.reference import STANCE, Reference, Target
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import MotorModel, torque_range
@@ -76,6 +76,25 @@ class Limits(Record):
     joints_upper: Array12
 
 
+class BaseRows(Record):
+    """The base's rows A z = b of M a + h = J' f."""
+
+    A: Float[np.ndarray, "6 30"]
+    b: Array6
+
+
+@kernel
+def fill_base_dynamics(now: Snapshot, rows: BaseRows) -> None:
+    """Fill force and moment balance of the whole robot in the base frame."""
+    for i in range(6):
+        for k in range(18):
+            rows.A[i, k] = now.mass_matrix[i, k]
+        for leg in range(4):
+            for k in range(3):
+                rows.A[i, 18 + 3 * leg + k] = -now.J_contacts[leg, k, i]
+        rows.b[i] = -now.bias[i]
+
+
 @dataclass(frozen=True, slots=True)
 class FloatingBaseDynamics(Equality):
     """The base has no motor: the first six rows of M a + h - J' f are zero."""
@@ -84,11 +103,10 @@ class FloatingBaseDynamics(Equality):
     unit = "N, N m"
 
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
-        """Six rows: force and moment balance of the whole robot in the base frame."""
-        A = np.empty((6, SIZE))
-        A[:, :18] = snapshot.mass_matrix[:6]
-        A[:, FORCES] = -snapshot.J_contacts[:, :, :6].reshape(12, 6).T
-        return Rows(A, -snapshot.bias[:6])
+        """Six rows, see ``fill_base_dynamics``."""
+        rows = BaseRows()
+        fill_base_dynamics(snapshot, rows)
+        return Rows(rows.A, rows.b)
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,9 +35,6 @@ class WholeBodyController:
 
     Tasks (weighted least squares) and constraints are described in ``tasks`` and ``constraints``;
     ``backend`` is "condensed" (default), "full" (the same QP without elimination), or "placo".
-
-    Attributes:
-        is_compiled: whether ticks are solved by the compiled kernel: condensed, by ``active_set``.
     """
 
     def __init__(
@@ -79,7 +76,7 @@ class WholeBodyController:
         self._workspace = Workspace()
         self.backend_name = backend
         self._solver, self._solve = self._back_end(backend)
-        self.is_compiled = backend == "condensed" and self.config.solver == "active_set"
+        self._is_compiled = backend == "condensed" and self.config.solver == "active_set"
         if extra_tasks and backend == "placo":
             raise ConfigError("the placo back end has tasks of its own and takes no extra ones")
 
@@ -158,6 +155,11 @@ class WholeBodyController:
             return solve_relaxed(problem, self.config.solver)
         except QpInfeasible as contradiction:
             raise error from contradiction
+
+    @property
+    def is_compiled(self) -> bool:
+        """Whether ticks are solved by the compiled kernel: condensed, and by ``active_set``."""
+        return self._is_compiled
 
     def solve_compiled(self, snapshot: Snapshot, reference: Reference) -> WbcSolution | None:
         """Solve one tick by the kernel; None if it is not used here or finds no solution."""

@@ -25,8 +25,6 @@ Without any stance foot the QP is a free fall and has a solution, as for the oth
 
 from __future__ import annotations
 
-from typing import TypeVar
-
 import numpy as np
 import placo
 
@@ -39,15 +37,21 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
-from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.config import Gains, WbcConfig
 from go2_wbc.wbc.constraints import FrictionPyramid, JointLimits, TorqueLimits
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem
-from go2_wbc.wbc.tasks import BodyOrientation, ForceRegularisation, Gains
+from go2_wbc.wbc.tasks import (
+    BodyOrientation,
+    BodyPosition,
+    ForceRegularisation,
+    LegPosture,
+    SwingFoot,
+    Task,
+)
 
 REGULARISATION = 1e-12
 """Added by PlaCo to the diagonal of its Hessian; its default 1e-8 moves a force by 4 mN."""
 SOLVER = "placo"
-SomeTask = TypeVar("SomeTask", bound=placo.Prioritized)
 _BASE = "base"
 _WORLD_ALIGNED = "local_world_aligned"
 
@@ -107,21 +111,26 @@ class _Mode:
         for name, limit in zip(JOINT_NAMES, model.torque_limits, strict=True):
             self._solver.set_torque_limit(name, float(limit * config.torque_share))
         if point is TrackedPoint.COM:
-            position = self._solver.add_com_task(np.zeros(3))
+            self._position = self._solver.add_com_task(np.zeros(3))
         else:
-            position = self._solver.add_position_task(_BASE, np.zeros(3))
-        self._position = _soft(position, "position", config.position_weight)
+            self._position = self._solver.add_position_task(_BASE, np.zeros(3))
         self._orientation = self._solver.add_orientation_task(_BASE, np.eye(3))
         self._pressing: list[placo.Contact] = []
         self._contacts = {leg: self._add_contact(leg) for leg in self._stance}
-        self._swing, self._posture = {}, {}
-        for leg in LEGS:
-            if legs[leg] is LegTask.SWING:
-                foot = self._solver.add_position_task(leg.foot, np.zeros(3))
-                self._swing[leg] = _soft(foot, f"{leg.name} swing", config.swing_weight)
-            elif legs[leg] is LegTask.JOINTS:
-                joints = self._solver.add_joints_task()
-                self._posture[leg] = _soft(joints, f"{leg.name} posture", config.posture_weight)
+        self._swing = {
+            leg: self._solver.add_position_task(leg.foot, np.zeros(3))
+            for leg in LEGS
+            if legs[leg] is LegTask.SWING
+        }
+        self._posture = {
+            leg: self._solver.add_joints_task() for leg in LEGS if legs[leg] is LegTask.JOINTS
+        }
+        self._soft: list[tuple[str, placo.Prioritized, type[Task]]] = [
+            ("position", self._position, BodyPosition),
+            ("orientation", self._orientation, BodyOrientation),
+            *((f"{leg.name} swing", task, SwingFoot) for leg, task in self._swing.items()),
+            *((f"{leg.name} posture", task, LegPosture) for leg, task in self._posture.items()),
+        ]
         self._solver.set_kp(0.0)
         self._solver.set_kd(0.0)
 
@@ -145,8 +154,8 @@ class _Mode:
             self._place_contact(leg)
         self._robot.update_kinematics()
         self._update_body(state, reference)
-        weight = problem.source(BodyOrientation).weight_at(reference)
-        self._orientation.configure("orientation", "soft", weight)
+        for name, task, kind in self._soft:
+            task.configure(name, "soft", problem.source(kind).weight_at(reference))
         for leg in self._stance:
             self._update_contact(leg, state)
         for contact in self._pressing:
@@ -266,11 +275,6 @@ def _on_the_line(limits: TorqueLimits, snapshot: Snapshot, reference: Reference)
     least, greatest = limits.motor.limits(snapshot.state.joint_velocities)
     lower = np.where(least > -limits.motor.peak, lower, -np.inf)
     return Bounds(C, lower, np.where(greatest < limits.motor.peak, upper, np.inf))
-
-
-def _soft(task: SomeTask, name: str, weight: float) -> SomeTask:
-    task.configure(name, "soft", weight)
-    return task
 
 
 def _acceleration(gains: Gains, feed_forward: Array3, rate_error: Array3, error: Array3) -> Array3:
