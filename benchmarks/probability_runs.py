@@ -25,7 +25,7 @@ from controller.motion_measurement import measure_motion
 from controller.sweeps.trials import TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.motion_plan import MotionPlan, Posture
-from go2_wbc.plant.mujoco.worlds import plant_in_world
+from go2_wbc.plant import plant_in_world
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
 from motions import FeasibilityChecker, FeasibilityReport

@@ -22,8 +22,7 @@ from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.inverse_kinematics import load_placo_robot
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
-from go2_wbc.wbc.config import WbcConfig
-from go2_wbc.wbc.tasks import Gains
+from go2_wbc.wbc.config import Gains, WbcConfig
 
 BASE = "base"
 Mode = tuple[tuple[LegTask, ...], TrackedPoint]

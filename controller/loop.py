@@ -147,7 +147,7 @@ class ControlLoop:
                 as the plant still obeys, and the fault is noted; so for any other exception.
         """
         try:
-            if self._observe():
+            if self._observe() and not self.plant.is_live:  # whose commands may come late
                 self._motors.update(self._last_command, self.state, self.plant.control_period)
             self._look_after_parts()
             self._guard()

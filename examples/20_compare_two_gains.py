@@ -12,7 +12,7 @@ import numpy as np
 from controller import GO2Controller
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
-from go2_wbc.wbc.tasks import Gains
+from go2_wbc.wbc.config import Gains
 
 FORCE, DURATION = 60.0, 0.1  # N to the left, s
 

@@ -1,15 +1,16 @@
 """Smooth functions of time, each with its own first and second derivative.
 
-A curve is evaluated anywhere; outside [0, duration] it holds its end values with zero rate.
-Minimum jerk (Flash & Hogan 1985) is the default for motions of the body: it starts and ends at rest
-with zero acceleration. ``keyframes`` chains such pieces.
+Outside [0, duration] a curve holds its end values with zero rate. Minimum jerk (Flash & Hogan 1985)
+is the default for motions of the body: it starts and ends at rest with zero acceleration.
 """
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -17,8 +18,7 @@ from jaxtyping import Float
 from go2_wbc.errors import CommandError
 
 
-@dataclass(frozen=True, slots=True)
-class CurvePoint:
+class CurvePoint(NamedTuple):
     """Value of a curve with its first and second time derivative, each (n,)."""
 
     value: Float[np.ndarray, " n"]
@@ -62,78 +62,51 @@ class Ease(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Segment:
-    """One eased piece from ``start`` to ``end``, both (n,), in ``duration`` seconds (> 0)."""
-
-    start: Float[np.ndarray, " n"]
-    end: Float[np.ndarray, " n"]
-    duration: float
-    ease: Ease = Ease.MINIMUM_JERK
-
-    def __post_init__(self) -> None:
-        """Raise CommandError on a duration that is not positive."""
-        if not self.duration > 0.0:
-            raise CommandError(f"a curve's duration must be > 0 s, got {self.duration}")
-
-    def at(self, t: float) -> CurvePoint:
-        """The curve at ``t`` seconds after its start."""
-        if t <= 0.0:
-            return _at_rest(self.start)
-        if t >= self.duration:
-            return _at_rest(self.end)
-        # with s = t / T: dx/dt = (dx/ds) / T, d2x/dt2 = (d2x/ds2) / T^2
-        value, rate, acceleration = self.ease.progress(t / self.duration)
-        delta = self.end - self.start
-        return CurvePoint(
-            self.start + value * delta,
-            rate / self.duration * delta,
-            acceleration / self.duration**2 * delta,
-        )
-
-
-@dataclass(frozen=True, slots=True)
 class Curve:
-    """Segments one after another; holds its ends outside [0, duration]."""
+    """An eased way from each key to the next; comes to rest at each with minimum jerk and cubic.
 
-    segments: tuple[Segment, ...]
-    starts: tuple[float, ...]
-
-    @property
-    def duration(self) -> float:
-        """Seconds from the first start to the last end."""
-        return self.starts[-1] + self.segments[-1].duration
-
-    def at(self, t: float) -> CurvePoint:
-        """The curve at ``t`` seconds; at a joint of two segments the later one counts."""
-        index = int(np.searchsorted(self.starts, t, side="right")) - 1
-        index = max(index, 0)
-        return self.segments[index].at(t - self.starts[index])
-
-
-def keyframes(
-    times: Sequence[float],
-    values: Sequence[Float[np.ndarray, " n"]],
-    ease: Ease = Ease.MINIMUM_JERK,
-) -> Curve:
-    """A curve that passes through each value (n,) at its time [s] after the first key's.
-
-    It comes to rest at every key with minimum jerk and cubic easing.
+    Attributes:
+        times: of the keys [s], increasing; those of the curve count from the first one.
+        values: what it passes through, each (n,).
+        ease: of every piece.
 
     Raises:
         CommandError: if there are fewer than two keys, or the times do not increase.
     """
-    if len(times) < 2 or len(times) != len(values):
-        raise CommandError(
-            "keyframes need two or more times and as many values, "
-            f"got {len(times)} times and {len(values)} values"
+
+    times: Sequence[float]
+    values: Sequence[Float[np.ndarray, " n"]]
+    ease: Ease = Ease.MINIMUM_JERK
+
+    def __post_init__(self) -> None:
+        """Raise CommandError for keys without a way between them."""
+        count, values = len(self.times), len(self.values)
+        if count < 2 or count != values:
+            raise CommandError(
+                "a curve needs two or more times and as many values, "
+                f"got {count} times and {values} values"
+            )
+        for duration in np.diff(self.times).tolist():
+            if not duration > 0.0:
+                raise CommandError(f"a curve's duration must be > 0 s, got {duration}")
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first key to the last."""
+        return self.times[-1] - self.times[0]
+
+    def at(self, t: float) -> CurvePoint:
+        """The curve ``t`` seconds after its first key."""
+        starts = [time - self.times[0] for time in self.times[:-1]]
+        piece = max(bisect_right(starts, t) - 1, 0)
+        start, end = self.values[piece], self.values[piece + 1]
+        t, duration = t - starts[piece], self.times[piece + 1] - self.times[piece]
+        if t <= 0.0 or t >= duration:
+            zero = np.zeros_like(start)
+            return CurvePoint(start if t <= 0.0 else end, zero, zero)
+        # with s = t / T: dx/dt = (dx/ds) / T, d2x/dt2 = (d2x/ds2) / T^2
+        value, rate, acceleration = self.ease.progress(t / duration)
+        delta = end - start
+        return CurvePoint(
+            start + value * delta, rate / duration * delta, acceleration / duration**2 * delta
         )
-    segments = tuple(
-        Segment(np.asarray(a, float), np.asarray(b, float), t1 - t0, ease)
-        for a, b, t0, t1 in zip(values[:-1], values[1:], times[:-1], times[1:], strict=True)
-    )
-    return Curve(segments, tuple(t - times[0] for t in times[:-1]))
-
-
-def _at_rest(value: Float[np.ndarray, " n"]) -> CurvePoint:
-    zero = np.zeros_like(value)
-    return CurvePoint(value, zero, zero)

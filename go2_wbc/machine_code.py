@@ -105,6 +105,9 @@ def _type_of(hint: Any, where: str) -> Any:
         return types.Array(array.dtype, array.ndim, "A", readonly=True)
     if typing.get_origin(hint) is tuple:
         return types.Tuple([_type_of(kind, where) for kind in typing.get_args(hint)])
+    if isinstance(hint, type) and issubclass(hint, tuple):  # a NamedTuple
+        parts = typing.get_type_hints(hint, include_extras=True).items()
+        return types.NamedTuple([_type_of(kind, f"{where}.{part}") for part, kind in parts], hint)
     if isinstance(hint, type) and issubclass(hint, AbstractArray):
         names = set(hint.dtypes)
         number = next(t for name, t in _NUMBERS.items() if name in names)

@@ -37,6 +37,19 @@ T = TypeVar("T")
 
 V3 = tuple[float, float, float]
 """A vector as three numbers, which compiled code keeps in registers."""
+Array3 = Float[np.ndarray, "3"]
+"""A vector in memory; so are the others, by their shapes."""
+Array4 = Float[np.ndarray, "4"]
+Array6 = Float[np.ndarray, "6"]
+Array12 = Float[np.ndarray, "12"]
+Array18 = Float[np.ndarray, "18"]
+Array19 = Float[np.ndarray, "19"]
+Array30 = Float[np.ndarray, "30"]
+Array3x3 = Float[np.ndarray, "3 3"]
+Array4x3 = Float[np.ndarray, "4 3"]
+ArrayNx3 = Float[np.ndarray, "n 3"]
+ArrayNx12 = Float[np.ndarray, "n 12"]
+ArrayNx3x3 = Float[np.ndarray, "n 3 3"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,34 +249,18 @@ def _property(field: Field) -> property:
     """The part as an attribute: a number, a flag, an array, a record or records of ``row``."""
     start, end, shape, record = field.start, field.start + field.size, field.shape, field.record
 
+    if record is not None and shape:
+        step = layout_of(record).size
+        parts = [slice(k, k + step) for k in range(start, end, step)]
+        return property(lambda self: tuple(_looking_at(record, self.row[part]) for part in parts))
     if record is not None:
-
-        def get_records(self: Any) -> Any:
-            if not shape:
-                return _looking_at(record, self.row[start:end])
-            step = layout_of(record).size
-            return tuple(
-                _looking_at(record, self.row[k : k + step]) for k in range(start, end, step)
-            )
-
-        return property(get_records)
+        return property(lambda self: _looking_at(record, self.row[start:end]))
     if field.is_flag:
-
-        def get_flag(self: Any) -> bool:
-            return bool(self.row[start])
-
-        return property(get_flag, _setter(start))
+        return property(lambda self: bool(self.row[start]), _setter(start))
     if not shape:
-
-        def get_number(self: Any) -> float:
-            return self.row[start]
-
-        return property(get_number, _setter(start))
-
-    def get_array(self: Any) -> Float[np.ndarray, "..."]:
-        return self.row[start:end].reshape(shape)
-
-    return property(get_array)  # to be written into: compiled, an array cannot be exchanged either
+        return property(lambda self: self.row[start], _setter(start))
+    # To be written into: compiled, an array cannot be exchanged either.
+    return property(lambda self: self.row[start:end].reshape(shape))
 
 
 def _setter(start: int) -> Any:

@@ -241,24 +241,12 @@ class Reference:
 
     def placed(self, anchor: Anchor) -> Reference:
         """This reference, given in the frame of a motion, in the world."""
-        R = yaw_rotation(anchor.yaw)
-        body = self.body
-        return replace(
-            self,
-            body=BodyTarget(
-                point=body.point,
-                p_world=anchor.p_world + R @ body.p_world,
-                v_world=R @ body.v_world,
-                a_world=R @ body.a_world,
-                R_world_base=R @ body.R_world_base,
-                w_world=R @ body.w_world,
-                dw_world=R @ body.dw_world,
-            ),
-            p_world_feet=anchor.p_world + self.p_world_feet @ R.T,
-            v_world_feet=self.v_world_feet @ R.T,
-            a_world_feet=self.a_world_feet @ R.T,
-            f_world_feet=self.f_world_feet @ R.T,
-        )
+        R, body = yaw_rotation(anchor.yaw), self.body
+        turned = {name: R @ getattr(body, name) for name in _BODY_PARTS}
+        turned["p_world"] = anchor.p_world + turned["p_world"]
+        feet = {name: getattr(self, name) @ R.T for name in _ARRAYS if name.endswith("_feet")}
+        feet["p_world_feet"] = anchor.p_world + feet["p_world_feet"]
+        return replace(self, body=replace(body, **turned), **feet)
 
 
 @dataclass(frozen=True, slots=True)

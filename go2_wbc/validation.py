@@ -20,6 +20,7 @@ import warnings
 from collections.abc import Callable
 from dataclasses import InitVar, dataclass
 from numbers import Real
+from types import ModuleType
 from typing import Any, TypeGuard, TypeVar
 
 from go2_wbc.errors import ConfigError
@@ -88,6 +89,13 @@ class Retired:
     instead: str
 
 
+def past_table(module: ModuleType, *names: str) -> object:
+    """A retired table of a file: its keys, and the constants of ``module`` that they are now."""
+    keys = {name: getattr(module, name.upper()) for name in names}
+    kinds = [(name, type(value), value) for name, value in keys.items()]
+    return dataclasses.make_dataclass(module.__name__, kinds, frozen=True)()
+
+
 def retires(**names: object) -> Callable[[_Class], _Class]:
     """Let a dataclass, and its table in a file, take what it had of old; next to ``@dataclass``.
 
@@ -95,7 +103,7 @@ def retires(**names: object) -> Callable[[_Class], _Class]:
     keyword; an ``InitVar`` of the class keeps its place, and is passed to its ``__post_init__``.
 
     Args:
-        names: what each is now, a number or a ``Retired``.
+        names: what each is now: a number, a ``past_table``, or a ``Retired``.
     """
     table = {
         name: item if isinstance(item, Retired) else Retired(item, f"it is always {item!r}")
@@ -132,31 +140,6 @@ def require(config: object, rule: Range, *names: str) -> None:
                 raise ConfigError(
                     f"{type(config).__name__}.{name} must be {rule.what}, got {field!r}"
                 )
-
-
-def require_positive(config: object, *names: str) -> None:
-    """Raise ConfigError unless each named field of ``config`` is finite and above 0."""
-    require(config, POSITIVE, *names)
-
-
-def require_not_negative(config: object, *names: str) -> None:
-    """Raise ConfigError unless each named field of ``config`` is finite and at least 0."""
-    require(config, NOT_NEGATIVE, *names)
-
-
-def require_finite(config: object, *names: str) -> None:
-    """Raise ConfigError unless each named field of ``config`` is a finite number."""
-    require(config, FINITE, *names)
-
-
-def require_between(config: object, low: float, high: float, *names: str) -> None:
-    """Raise ConfigError unless each named field of ``config`` is in [``low``, ``high``]."""
-    require(config, between(low, high), *names)
-
-
-def require_share(config: object, *names: str) -> None:
-    """Raise ConfigError unless each named field of ``config`` is in (0, 1]."""
-    require(config, SHARE, *names)
 
 
 def is_finite_number(value: object) -> TypeGuard[Real]:

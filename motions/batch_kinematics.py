@@ -194,7 +194,7 @@ def _angular_rates(
     rate: Float[np.ndarray, "n 3"],
     acceleration: Float[np.ndarray, "n 3"],
 ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
-    """World-frame w [rad/s] and dw [rad/s^2] of every row; see ``angular_velocity_from_rpy``."""
+    """World-frame w [rad/s] and dw [rad/s^2] of every row (Craig, 3rd ed., eq. 5.44)."""
     _, p, y = rpy.T
     cp, sp, cy, sy = np.cos(p), np.sin(p), np.cos(y), np.sin(y)
     ahead, aside = np.column_stack([cy, sy, 0.0 * y]), np.column_stack([-sy, cy, 0.0 * y])

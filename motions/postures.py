@@ -9,11 +9,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.curves import Segment
+from go2_wbc.curves import Curve
 from go2_wbc.motion_plan import MotionPlan, Posture
-from go2_wbc.reference import Reference, TrackedPoint
+from go2_wbc.reference import Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.tracking.plan_curves import standing_target
+from go2_wbc.tracking.plan_curves import stand
 from motions.batch_kinematics import Wanted, attitudes, place
 
 NORMAL_FORCE_MIN = 0.0
@@ -103,7 +103,7 @@ class PosturePlan(MotionPlan):
     entry: Posture
     exit: Posture
     point: TrackedPoint
-    body: Segment
+    body: Curve
 
     @property
     def duration(self) -> float:  # type: ignore[override]
@@ -116,14 +116,14 @@ class PosturePlan(MotionPlan):
 
     def row_at(self, t: float) -> Float[np.ndarray, " size"]:
         """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
-        body = self.body.at(t)
-        curves = np.array([body.value, body.rate, body.acceleration])
-        return standing_target(self.point, curves, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX).row
+        target, is_com = Target(), self.point is TrackedPoint.COM
+        stand(is_com, np.array(self.body.at(t)), NORMAL_FORCE_MIN, NORMAL_FORCE_MAX, target)
+        return target.row
 
 
 def rise(start: Float[np.ndarray, "6"], entry: Posture, duration: float = 1.2) -> PosturePlan:
     """From a CoM pose (6,) to standing."""
-    way = Segment(start, STAND_POSE, duration)
+    way = Curve((0.0, duration), (start, STAND_POSE))
     return PosturePlan("stand", entry, Posture.STAND, TrackedPoint.COM, way)
 
 
@@ -131,17 +131,17 @@ def lean(
     start: Float[np.ndarray, "6"], rpy: Float[np.ndarray, "3"], duration: float = 1.0
 ) -> PosturePlan:
     """From a standing CoM pose (6,) to standing with the trunk at roll, pitch, yaw [rad]."""
-    way = Segment(start, np.concatenate([STAND_POSE[:3], rpy]), duration)
+    way = Curve((0.0, duration), (start, np.concatenate([STAND_POSE[:3], rpy])))
     return PosturePlan("lean", Posture.STAND, Posture.STAND, TrackedPoint.COM, way)
 
 
 def sit_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> PosturePlan:
     """From a standing base pose (6,) to the dog-like sit."""
-    way = Segment(start, SIT_POSE, duration)
+    way = Curve((0.0, duration), (start, SIT_POSE))
     return PosturePlan("sit", Posture.STAND, Posture.SIT, TrackedPoint.BASE, way)
 
 
 def lie_down(start: Float[np.ndarray, "6"], duration: float = 1.5) -> PosturePlan:
     """From a standing base pose (6,) down to the ground."""
-    way = Segment(start, LIE_POSE, duration)
+    way = Curve((0.0, duration), (start, LIE_POSE))
     return PosturePlan("lie down", Posture.STAND, Posture.LIE, TrackedPoint.BASE, way)

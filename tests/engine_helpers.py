@@ -2,32 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 
+from go2_wbc.errors import QpInfeasible
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import BodyTarget, LegTask, Reference, TrackedPoint
+from go2_wbc.robot.estimator import SensorReading
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
+from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.solution import WbcSolution
 
 Legs = tuple[LegTask, ...]
 ST, SW, JO = LegTask.STANCE, LegTask.SWING, LegTask.JOINTS
 FOUR_FEET: Legs = (ST, ST, ST, ST)
-THREE_FEET: tuple[Legs, ...] = (
-    (SW, ST, ST, ST),
-    (ST, SW, ST, ST),
-    (ST, ST, SW, ST),
-    (ST, ST, ST, SW),
-    (JO, ST, ST, ST),
-    (ST, JO, ST, ST),
-    (ST, ST, JO, ST),
-    (ST, ST, ST, JO),
+THREE_FEET: tuple[Legs, ...] = tuple(
+    tuple(kind if leg is up else ST for leg in LEGS) for kind in (SW, JO) for up in LEGS
 )
 TWO_FEET: tuple[Legs, ...] = (
     (ST, SW, SW, ST),
@@ -168,6 +164,38 @@ def fast_cases(model: RobotModel, count: int, seed: int) -> Iterator[tuple[Snaps
         yield snapshot, replace(reference, body=body, normal_force_max=force)
 
 
+def standing(model: RobotModel, legs: Legs = FOUR_FEET) -> tuple[Snapshot, Reference]:
+    """At rest on its feet, and asked to go on."""
+    snapshot = model.snapshot(state_of(standing_q()))
+    return snapshot, holding_reference(snapshot, legs)
+
+
+def solved_alike(
+    ours: WholeBodyController,
+    theirs: WholeBodyController,
+    problems: Iterable[tuple[Snapshot, Reference]],
+    tolerance: float,
+) -> Iterator[tuple[Snapshot, Reference, WbcSolution, WbcSolution]]:
+    """What two controllers find: the same torques [N m], or no solution, both."""
+    for snapshot, reference in problems:
+        found = ours.solve_compiled(snapshot, reference)
+        try:
+            other = theirs.solve(snapshot, reference)
+        except QpInfeasible:
+            other = None
+        assert (found is None) == (other is None)
+        if found is not None and other is not None:
+            np.testing.assert_allclose(found.tau, other.tau, atol=tolerance, rtol=0)
+            yield snapshot, reference, found, other
+
+
+def standing_reading(time: float = 0.0, **changes: np.ndarray) -> SensorReading:
+    """What the sensors of a robot read that stands at rest, but for the ``changes``."""
+    up, zeros = np.array([0.0, 0.0, 9.81]), np.zeros(12)
+    reading = SensorReading(time, np.zeros(3), up, STAND_JOINTS, zeros, zeros, np.full(4, 40.0))
+    return replace(reading, **changes)
+
+
 def moved(model: RobotModel, state: RobotState, a: np.ndarray, dt: float) -> RobotState:
     """The state ``dt`` later under the constant generalised acceleration ``a``, to second order."""
     q = pin.integrate(model.pin_model, state.q, state.v * dt + a * dt * dt / 2)
@@ -208,27 +236,22 @@ def mirrored_state(state: RobotState) -> RobotState:
 
 
 def mirrored_reference(reference: Reference) -> Reference:
-    body = reference.body
-    fl, fr, rl, rr = reference.legs
-    return Reference(
+    body, (fl, fr, rl, rr) = reference.body, reference.legs
+    polar, axial = ("p_world", "v_world", "a_world"), ("w_world", "dw_world")
+    feet, joints = ("p_world_feet", "v_world_feet", "a_world_feet"), ("q", "v", "a")
+    forces = ("normal_force_min", "normal_force_max")
+    return replace(
+        reference,
         body=replace(
             body,
-            p_world=body.p_world * POLAR,
-            v_world=body.v_world * POLAR,
-            a_world=body.a_world * POLAR,
             R_world_base=mirrored_rotation(body.R_world_base),
-            w_world=body.w_world * AXIAL,
-            dw_world=body.dw_world * AXIAL,
+            **{name: getattr(body, name) * POLAR for name in polar},
+            **{name: getattr(body, name) * AXIAL for name in axial},
         ),
         legs=(fr, fl, rr, rl),
-        normal_force_min=reference.normal_force_min[MIRRORED_LEGS],
-        normal_force_max=reference.normal_force_max[MIRRORED_LEGS],
-        p_world_feet=mirrored_feet(reference.p_world_feet),
-        v_world_feet=mirrored_feet(reference.v_world_feet),
-        a_world_feet=mirrored_feet(reference.a_world_feet),
-        q_joints=mirrored_joints(reference.q_joints),
-        v_joints=mirrored_joints(reference.v_joints),
-        a_joints=mirrored_joints(reference.a_joints),
+        **{name: getattr(reference, name)[MIRRORED_LEGS] for name in forces},
+        **{name: mirrored_feet(getattr(reference, name)) for name in feet},
+        **{f"{x}_joints": mirrored_joints(getattr(reference, f"{x}_joints")) for x in joints},
     )
 
 
@@ -240,3 +263,12 @@ def symmetric_model() -> RobotModel:
     lever = trunk.lever * [1.0, 0.0, 1.0]
     model.pin_model.inertias[1] = pin.Inertia(trunk.mass, lever, inertia)
     return model
+
+
+def angular_velocity_from_rpy(
+    rpy: np.ndarray, rate: np.ndarray, acceleration: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """World-frame w and dw of roll, pitch, yaw rates, by Pinocchio."""
+    E = pin.rpy.computeRpyJacobian(rpy, pin.LOCAL_WORLD_ALIGNED)
+    dE = pin.rpy.computeRpyJacobianTimeDerivative(rpy, rate, pin.LOCAL_WORLD_ALIGNED)
+    return E @ rate, E @ acceleration + dE @ rate

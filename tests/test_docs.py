@@ -20,7 +20,7 @@ from go2_wbc.curves import Ease
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.motor import KNEE_SHARE
-from go2_wbc.wbc.tasks import Gains
+from go2_wbc.wbc.config import Gains
 from go2_wbc.world import World
 from motions import FeasibilityChecker, Timeline, check, compile_timeline, load_motion
 from motions.feasibility import FeasibilityLimits

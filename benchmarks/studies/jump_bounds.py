@@ -43,7 +43,7 @@ from go2_wbc.errors import ConfigError
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.motor import MotorModel
+from go2_wbc.robot.motor import IDEAL, MotorModel
 from motions.dynamics.phase_builders import PUSH
 from motions.dynamics.plan_limits import PlanLimits
 
@@ -111,7 +111,7 @@ def physics_rows(model: RobotModel) -> tuple[PhysicsRow, ...]:
     limits = PlanLimits()
     planned = model.motor.scaled(limits.torque_share)
     free = replace(limits, force_max=NO_CAP, speed_share=1.0)
-    ideal = replace(model.motor, no_load_speed=np.full(12, np.inf))
+    ideal = MotorModel.named(IDEAL, model.description)
     best = best_take_off(model, planned, limits)
     whole = best_take_off(model, model.motor, free)
     strong = best_take_off(model, ideal, free)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from controller.behaviours import Behaviour
-from go2_wbc.curves import Curve, keyframes
+from go2_wbc.curves import Curve
 from go2_wbc.reference import JointReference
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -79,7 +79,7 @@ class ServoJoints(_OnTheGround):
         super().start(snapshot)
         times = np.cumsum([0.0, *(duration for duration, _ in self._targets)]).tolist()
         values = [snapshot.state.joint_positions.copy(), *(q for _, q in self._targets)]
-        self._curve: Curve = keyframes(times, values)
+        self._curve = Curve(times, values)
         self.duration = self._curve.duration
 
     def update(self, snapshot: Snapshot) -> JointReference:

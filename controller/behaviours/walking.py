@@ -7,7 +7,7 @@ import numpy as np
 from controller.behaviours import Behaviour
 from go2_wbc.contacts import Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
-from go2_wbc.planning.gait_choice import DWELL, GaitChoice
+from go2_wbc.planning.envelopes import DWELL, GaitChoice
 from go2_wbc.planning.gait_clock import time_between
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
 from go2_wbc.planning.pose import LEVEL, BodyPose

@@ -28,7 +28,7 @@ from sphinx.util.docutils import SphinxDirective
 
 from controller.cli.main import COMMANDS, PROGRAM
 from go2_wbc.planning.envelopes import measured_envelopes
-from go2_wbc.wbc.tasks import Gains
+from go2_wbc.wbc.config import Gains
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("go2_wbc", "motions", "viz", "controller")

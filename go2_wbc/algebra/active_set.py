@@ -11,10 +11,17 @@ bring J and R up to date when a row comes or goes.
 
 from __future__ import annotations
 
-import numpy as np
-from jaxtyping import Float, Int
+from typing import NamedTuple
 
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from go2_wbc.algebra.linear import Square, Vector, factorise, solve_factorised
 from go2_wbc.compilation import kernel, subroutine
+
+Rows = Float[np.ndarray, "m n"]
+Bounds = Float[np.ndarray, " m"]
+Taken = Bool[np.ndarray, " m"]
 
 SOLVED, INFEASIBLE, SINGULAR, UNFINISHED, BAD_BOUNDS = range(5)
 MESSAGES = (
@@ -30,54 +37,29 @@ VIOLATION = 1e-10
 """Violation, relative to 1 + |bound|, below which a row counts as met."""
 DEPENDENT = 1e-18
 """Squared share of a normal outside the working set's span below which it counts as inside."""
-DEFINITE = 1e-14
-"""Share of a diagonal entry of H that must be left as its pivot."""
 MAX_STEPS = 400
 """Rows taken in or dropped. 44 rows needed 40 at most (own measurement)."""
 
-FREE, AT_LOWER, AT_UPPER = 0, -1, 1
+
+class WorkingSet(NamedTuple):
+    """The rows that are met with equality; how many they are, q, goes beside it.
+
+    Attributes:
+        J, R: J' N = (R; 0), see the module.
+        rows: the number of each row, negative for an equality.
+        u: their multipliers.
+        taken: whether each inequality is among them.
+    """
+
+    J: Square
+    R: Square
+    rows: Int[np.ndarray, " n"]
+    u: Vector
+    taken: Taken
 
 
 @subroutine
-def factorise(H: Float[np.ndarray, "n n"], L: Float[np.ndarray, "n n"]) -> bool:
-    """The lower triangle of L in H = L L', from that of H; False if H is not positive definite."""
-    for j in range(H.shape[0]):
-        pivot = H[j, j]
-        for k in range(j):
-            pivot -= L[j, k] * L[j, k]
-        if not pivot > DEFINITE * H[j, j]:  # a nan fails too
-            return False
-        root = np.sqrt(pivot)
-        inverse = 1.0 / root
-        L[j, j] = root
-        for i in range(j + 1, H.shape[0]):
-            value = H[i, j]
-            for k in range(j):
-                value -= L[i, k] * L[j, k]
-            L[i, j] = value * inverse
-    return True
-
-
-@subroutine
-def solve_factorised(
-    L: Float[np.ndarray, "n n"], g: Float[np.ndarray, " n"], x: Float[np.ndarray, " n"]
-) -> None:
-    """x = -(L L')^-1 g."""
-    n = len(g)
-    for i in range(n):
-        value = -g[i]
-        for k in range(i):
-            value -= L[i, k] * x[k]
-        x[i] = value / L[i, i]
-    for i in range(n - 1, -1, -1):
-        value = x[i]
-        for k in range(i + 1, n):
-            value -= L[k, i] * x[k]
-        x[i] = value / L[i, i]
-
-
-@subroutine
-def invert(L: Float[np.ndarray, "n n"], J: Float[np.ndarray, "n n"]) -> None:
+def invert(L: Square, J: Square) -> None:
     """J = L^-T: column c of L^-1 is row c of J."""
     n = L.shape[0]
     for c in range(n):
@@ -91,31 +73,36 @@ def invert(L: Float[np.ndarray, "n n"], J: Float[np.ndarray, "n n"]) -> None:
 
 
 @subroutine
-def take_in(
-    J: Float[np.ndarray, "n n"], R: Float[np.ndarray, "n n"], d: Float[np.ndarray, " n"], q: int
-) -> None:
+def rotate(J: Square, j: int, c: float, s: float) -> None:
+    """Rotate columns j and j + 1 by the angle of this cosine and sine."""
+    for k in range(J.shape[0]):
+        first, second = J[k, j], J[k, j + 1]
+        J[k, j] = c * first + s * second
+        J[k, j + 1] = c * second - s * first
+
+
+@subroutine
+def take_in(w: WorkingSet, d: Vector, q: int) -> None:
     """Add the normal n with d = J'n as column q of R: rotate d so that nothing lies below q."""
-    n = len(d)
-    for j in range(n - 1, q, -1):
+    J, R = w.J, w.R
+    for j in range(len(d) - 1, q, -1):
         a, b = d[j - 1], d[j]
         if b == 0.0:
             continue
         length = np.hypot(a, b)
-        c, s = a / length, b / length
         d[j - 1], d[j] = length, 0.0
-        for k in range(n):
-            first, second = J[k, j - 1], J[k, j]
-            J[k, j - 1] = c * first + s * second
-            J[k, j] = c * second - s * first
+        rotate(J, j - 1, a / length, b / length)
     for i in range(q + 1):
         R[i, q] = d[i]
 
 
 @subroutine
-def drop(J: Float[np.ndarray, "n n"], R: Float[np.ndarray, "n n"], place: int, q: int) -> None:
+def drop(w: WorkingSet, place: int, q: int) -> None:
     """Remove column ``place`` of the q columns of R, and make R upper triangular again."""
-    n = J.shape[0]
+    J, R, rows, u, taken = w
+    taken[rows[place]] = False
     for j in range(place, q - 1):
+        rows[j], u[j] = rows[j + 1], u[j + 1]
         for i in range(j + 2):
             R[i, j] = R[i, j + 1]
     for j in range(place, q - 1):
@@ -129,24 +116,17 @@ def drop(J: Float[np.ndarray, "n n"], R: Float[np.ndarray, "n n"], place: int, q
             first, second = R[j, k], R[j + 1, k]
             R[j, k] = c * first + s * second
             R[j + 1, k] = c * second - s * first
-        for k in range(n):
-            first, second = J[k, j], J[k, j + 1]
-            J[k, j] = c * first + s * second
-            J[k, j + 1] = c * second - s * first
+        rotate(J, j, c, s)
 
 
 @subroutine
 def most_violated(
-    x: Float[np.ndarray, " n"],
-    C: Float[np.ndarray, "m n"],
-    lower: Float[np.ndarray, " m"],
-    upper: Float[np.ndarray, " m"],
-    side: Int[np.ndarray, " m"],
+    x: Vector, C: Rows, lower: Bounds, upper: Bounds, taken: Taken
 ) -> tuple[int, float, float]:
     """The free row that is violated most, or -1; 1 for its lower side, else -1; by how much."""
     found, sign, worst = -1, 1.0, 0.0
-    for i in range(len(side)):
-        if side[i] != FREE:
+    for i in range(len(taken)):
+        if taken[i]:
             continue
         value = 0.0
         for j in range(len(x)):
@@ -162,16 +142,10 @@ def most_violated(
 
 @subroutine
 def directions(
-    J: Float[np.ndarray, "n n"],
-    R: Float[np.ndarray, "n n"],
-    normal: Float[np.ndarray, " n"],
-    q: int,
-    d: Float[np.ndarray, " n"],
-    z: Float[np.ndarray, " n"],
-    r: Float[np.ndarray, " n"],
+    w: WorkingSet, normal: Vector, q: int, d: Vector, z: Vector, r: Vector
 ) -> tuple[float, float]:
     """Fill d = J'n, the primal direction z and the dual one r; returns |d outside|^2, |d|^2."""
-    n = len(normal)
+    J, R, n = w.J, w.R, len(normal)
     outside, whole = 0.0, 0.0
     for j in range(n):
         value = 0.0
@@ -195,10 +169,9 @@ def directions(
 
 
 @subroutine
-def partial_step(
-    u: Float[np.ndarray, " n"], r: Float[np.ndarray, " n"], rows: Int[np.ndarray, " n"], q: int
-) -> tuple[float, int]:
+def partial_step(w: WorkingSet, r: Vector, q: int) -> tuple[float, int]:
     """The step at which the first multiplier of a bound reaches zero, and its place; inf and -1."""
+    rows, u = w.rows, w.u
     step, leaving = np.inf, -1
     for i in range(q):
         if rows[i] >= 0 and r[i] > 0.0 and u[i] < step * r[i]:
@@ -208,17 +181,7 @@ def partial_step(
 
 @subroutine
 def meet(
-    J: Float[np.ndarray, "n n"],
-    R: Float[np.ndarray, "n n"],
-    normal: Float[np.ndarray, " n"],
-    violation: float,
-    slack: float,
-    row: int,
-    rows: Int[np.ndarray, " n"],
-    q: int,
-    side: Int[np.ndarray, " m"],
-    u: Float[np.ndarray, " n"],
-    x: Float[np.ndarray, " n"],
+    w: WorkingSet, q: int, row: int, normal: Vector, violation: float, slack: float, x: Vector
 ) -> int:
     """Move x until a row is met, dropping others on the way; returns q, the new working set's size.
 
@@ -226,15 +189,15 @@ def meet(
     equality that the others imply is left out, if it is met within ``slack``. -1: it cannot be met;
     -2: too many steps.
     """
-    n = len(x)
+    n, rows, u = len(x), w.rows, w.u
     d, z, r = np.empty(n), np.empty(n), np.empty(n)
     gained = 0.0  # the row's own multiplier
     for _ in range(MAX_STEPS):
-        outside, whole = directions(J, R, normal, q, d, z, r)
+        outside, whole = directions(w, normal, q, d, z, r)
         has_direction = outside > DEPENDENT * whole
         if row < 0 and not has_direction and violation <= slack:
             return q
-        partial, leaving = partial_step(u, r, rows, q)
+        partial, leaving = partial_step(w, r, q)
         full = violation / outside if has_direction else np.inf
         step = min(partial, full)
         if not step < np.inf:
@@ -247,104 +210,70 @@ def meet(
                 x[i] += step * z[i]
             violation -= step * outside
         if full <= partial:
-            take_in(J, R, d, q)
+            take_in(w, d, q)
             rows[q], u[q] = row, gained
             return q + 1
-        side[rows[leaving]] = FREE
-        drop(J, R, leaving, q)
-        for i in range(leaving, q - 1):
-            rows[i], u[i] = rows[i + 1], u[i + 1]
+        drop(w, leaving, q)
         q -= 1
     return -2
 
 
 @subroutine
-def finish(
-    rows: Int[np.ndarray, " n"],
-    u: Float[np.ndarray, " n"],
-    q: int,
-    side: Int[np.ndarray, " m"],
-    x: Float[np.ndarray, " n"],
-    y: Float[np.ndarray, " rows"],
-    k: int,
-) -> int:
-    """Put the working set's multipliers in their places in y; an equality's sign waits there."""
-    signs = y[:k].copy()
-    y[:] = 0.0
-    for i in range(q):
-        if rows[i] < 0:
-            y[-1 - rows[i]] = signs[-1 - rows[i]] * u[i]
-        else:
-            y[k + rows[i]] = side[rows[i]] * u[i]
-    return SOLVED if np.isfinite(x).all() else UNFINISHED
-
-
-@subroutine
 def constrain(
-    L: Float[np.ndarray, "n n"],
+    L: Square,
     E: Float[np.ndarray, "k n"],
     e: Float[np.ndarray, " k"],
-    C: Float[np.ndarray, "m n"],
-    lower: Float[np.ndarray, " m"],
-    upper: Float[np.ndarray, " m"],
-    x: Float[np.ndarray, " n"],
-    y: Float[np.ndarray, " rows"],
+    C: Rows,
+    lower: Bounds,
+    upper: Bounds,
+    x: Vector,
 ) -> int:
     """The same as ``solve_qp``, from the minimum x without constraints, with H = L L'."""
-    n, k, m = len(x), len(e), len(lower)
-    y[:] = 0.0
+    n, m = len(x), len(lower)
     for i in range(m):
         if not lower[i] <= upper[i]:
             return BAD_BOUNDS
-    J, R = np.empty((n, n)), np.zeros((n, n))
+    J, R, taken = np.empty((n, n)), np.zeros((n, n)), np.zeros(m, dtype=np.bool_)
+    w = WorkingSet(J, R, np.empty(n, dtype=np.int64), np.empty(n), taken)
     invert(L, J)
-    rows, u = np.empty(n, dtype=np.int64), np.empty(n)  # working set: rows and multipliers
-    side = np.zeros(m, dtype=np.int64)
-    normal = np.empty(n)
-    q = 0
-    for i in range(k):
+    normal, q = np.empty(n), 0
+    for i in range(len(e)):
         value = e[i]
         for j in range(n):
             value -= E[i, j] * x[j]
         sign = 1.0 if value >= 0.0 else -1.0
         for j in range(n):
             normal[j] = sign * E[i, j]
-        y[i] = -sign  # until the end
-        slack = VIOLATION * (1.0 + abs(e[i]))
-        q = meet(J, R, normal, abs(value), slack, -1 - i, rows, q, side, u, x)
+        q = meet(w, q, -1 - i, normal, abs(value), VIOLATION * (1.0 + abs(e[i])), x)
         if q < 0:
             return INFEASIBLE if q == -1 else UNFINISHED
     for _ in range(MAX_STEPS):
-        row, sign, violation = most_violated(x, C, lower, upper, side)
+        row, sign, violation = most_violated(x, C, lower, upper, taken)
         if row < 0:
-            return finish(rows, u, q, side, x, y, k)
+            return SOLVED if np.isfinite(x).all() else UNFINISHED
         for j in range(n):
             normal[j] = sign * C[row, j]
-        q = meet(J, R, normal, violation, 0.0, row, rows, q, side, u, x)
+        q = meet(w, q, row, normal, violation, 0.0, x)
         if q < 0:
             return INFEASIBLE if q == -1 else UNFINISHED
-        side[row] = AT_LOWER if sign > 0.0 else AT_UPPER
+        taken[row] = True
     return UNFINISHED
 
 
 @kernel
 def solve_qp(
-    H: Float[np.ndarray, "n n"],
-    g: Float[np.ndarray, " n"],
+    H: Square,
+    g: Vector,
     E: Float[np.ndarray, "k n"],
     e: Float[np.ndarray, " k"],
-    C: Float[np.ndarray, "m n"],
-    lower: Float[np.ndarray, " m"],
-    upper: Float[np.ndarray, " m"],
-    x: Float[np.ndarray, " n"],
-    y: Float[np.ndarray, " rows"],
+    C: Rows,
+    lower: Bounds,
+    upper: Bounds,
+    x: Vector,
 ) -> int:
-    """Fill the minimiser x (n,) and the multipliers y (k + m,); returns the outcome.
-
-    H x + g + (E' C') y = 0; a row of C has y >= 0 at its upper bound and y <= 0 at its lower one.
-    """
+    """Fill the minimiser x; returns the outcome."""
     L = np.empty((len(g), len(g)))
     if not factorise(H, L):
         return SINGULAR
     solve_factorised(L, g, x)
-    return constrain(L, E, e, C, lower, upper, x, y)
+    return constrain(L, E, e, C, lower, upper, x)

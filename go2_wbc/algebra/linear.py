@@ -1,4 +1,4 @@
-"""Small systems of linear equations."""
+"""Small systems of linear equations: Gauss-Jordan elimination, and H = L L' (Cholesky)."""
 
 from __future__ import annotations
 
@@ -6,6 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
+
+Vector = Float[np.ndarray, " n"]
+Square = Float[np.ndarray, "n n"]
+DEFINITE = 1e-14
+"""Share of a diagonal entry of H that must be left as its pivot."""
 
 
 @subroutine
@@ -35,3 +40,39 @@ def solve_linear(A: Float[np.ndarray, "n m"], n: int) -> bool:
             for k in range(j + 1, columns):
                 A[i, k] -= factor * A[j, k]
     return True
+
+
+@subroutine
+def factorise(H: Square, L: Square) -> bool:
+    """The lower triangle of L in H = L L', from that of H; False if H is not positive definite."""
+    for j in range(H.shape[0]):
+        pivot = H[j, j]
+        for k in range(j):
+            pivot -= L[j, k] * L[j, k]
+        if not pivot > DEFINITE * H[j, j]:  # a nan fails too
+            return False
+        root = np.sqrt(pivot)
+        inverse = 1.0 / root
+        L[j, j] = root
+        for i in range(j + 1, H.shape[0]):
+            value = H[i, j]
+            for k in range(j):
+                value -= L[i, k] * L[j, k]
+            L[i, j] = value * inverse
+    return True
+
+
+@subroutine
+def solve_factorised(L: Square, g: Vector, x: Vector) -> None:
+    """x = -(L L')^-1 g."""
+    n = len(g)
+    for i in range(n):
+        value = -g[i]
+        for k in range(i):
+            value -= L[i, k] * x[k]
+        x[i] = value / L[i, i]
+    for i in range(n - 1, -1, -1):
+        value = x[i]
+        for k in range(i + 1, n):
+            value -= L[k, i] * x[k]
+        x[i] = value / L[i, i]

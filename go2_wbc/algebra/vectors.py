@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
-from go2_wbc.records import V3
+from go2_wbc.records import V3, Array3, Array3x3, Array4
 
 Axes = tuple[V3, V3, V3]
 """The three axes of a frame."""
 
 
 @subroutine
-def triple(a: Float[np.ndarray, "3"]) -> V3:
+def triple(a: Array3) -> V3:
     """The numbers of an array."""
     return a[0], a[1], a[2]
 
 
 @subroutine
-def put(a: V3, into: Float[np.ndarray, "3"]) -> None:
+def put(a: V3, into: Array3) -> None:
     """Put a vector into an array."""
     into[0], into[1], into[2] = a
 
@@ -72,7 +71,27 @@ def along(axes: Axes, a: V3) -> V3:
 
 
 @subroutine
-def rotation_of(x: float, y: float, z: float, w: float, R: Float[np.ndarray, "3 3"]) -> None:
+def turned(R: Array3x3, a: V3) -> V3:
+    """R a."""
+    return (
+        R[0, 0] * a[0] + R[0, 1] * a[1] + R[0, 2] * a[2],
+        R[1, 0] * a[0] + R[1, 1] * a[1] + R[1, 2] * a[2],
+        R[2, 0] * a[0] + R[2, 1] * a[1] + R[2, 2] * a[2],
+    )
+
+
+@subroutine
+def turned_back(R: Array3x3, a: V3) -> V3:
+    """R' a."""
+    return (
+        R[0, 0] * a[0] + R[1, 0] * a[1] + R[2, 0] * a[2],
+        R[0, 1] * a[0] + R[1, 1] * a[1] + R[2, 1] * a[2],
+        R[0, 2] * a[0] + R[1, 2] * a[1] + R[2, 2] * a[2],
+    )
+
+
+@subroutine
+def rotation_of(x: float, y: float, z: float, w: float, R: Array3x3) -> None:
     """Fill the rotation matrix of a unit quaternion."""
     R[0, 0], R[0, 1], R[0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
     R[1, 0], R[1, 1], R[1, 2] = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
@@ -80,7 +99,7 @@ def rotation_of(x: float, y: float, z: float, w: float, R: Float[np.ndarray, "3 
 
 
 @subroutine
-def rotation_by(vector: V3, R: Float[np.ndarray, "3 3"]) -> None:
+def rotation_by(vector: V3, R: Array3x3) -> None:
     """Fill the rotation by a rotation vector [rad]."""
     angle = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     factor = np.sin(angle / 2) / angle if angle > 1e-6 else 0.5 - angle * angle / 48
@@ -89,7 +108,7 @@ def rotation_by(vector: V3, R: Float[np.ndarray, "3 3"]) -> None:
 
 
 @subroutine
-def rotation_vector(R: Float[np.ndarray, "3 3"]) -> V3:
+def rotation_vector(R: Array3x3) -> V3:
     """The rotation vector [rad] of a rotation matrix, of length 0 to pi."""
     q = np.empty(4)
     quaternion_of(R, q)
@@ -102,7 +121,7 @@ def rotation_vector(R: Float[np.ndarray, "3 3"]) -> V3:
 
 
 @subroutine
-def quaternion_of(R: Float[np.ndarray, "3 3"], q: Float[np.ndarray, "4"]) -> None:
+def quaternion_of(R: Array3x3, q: Array4) -> None:
     """Fill the quaternion x y z w of ``R``, from its largest component (Shepperd 1978)."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
     largest, i = trace, 3

@@ -14,28 +14,16 @@ walked in 6 and 5 without (own simulation).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.records import Record
-from go2_wbc.validation import POSITIVE, SHARE, ranged
 
-
-@dataclass(frozen=True, slots=True)
-@ranged(POSITIVE, earliest=SHARE)
-class ContactConfig:
-    """When contacts count, from a search on this robot in simulation.
-
-    Attributes:
-        earliest: share of the swing from which on a contact may be a landing.
-        step: height [m] above the ground from which on it is one.
-    """
-
-    earliest: float = 0.7
-    step: float = 0.015
+EARLIEST = 0.7
+"""Share of the swing from which on a contact may be a landing."""
+STEP = 0.015
+"""Height [m] above the ground from which on it is one. Both are from a search in simulation."""
 
 
 class FootContact(Record):
@@ -56,30 +44,21 @@ class FootContact(Record):
 
 @subroutine
 def follow_contact(
-    foot: FootContact,
-    c: ContactConfig,
-    above: float,
-    touches: bool,
-    planned: bool,
-    progress: float,
-    dt: float,
+    foot: FootContact, above: float, touches: bool, planned: bool, progress: float, dt: float
 ) -> bool:
     """Bring a foot to this tick, ``dt`` seconds after the last; returns whether it stands.
 
     Args:
-        foot: is brought to this tick.
-        c: when contacts count.
         above: height [m] of the foot above the ground as it is known.
         touches: whether a contact is measured.
         planned: whether it shall stand.
         progress: share of its swing that has passed.
-        dt: [s].
     """
     if planned:
         foot.is_early = False
     elif not foot.is_early:
         foot.since = np.inf
-        if touches and above > c.step and progress >= c.earliest - TIE:
+        if touches and above > STEP and progress >= EARLIEST - TIE:
             foot.is_early, foot.since = True, 0.0
     foot.since += dt
     return planned or foot.is_early

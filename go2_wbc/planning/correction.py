@@ -19,49 +19,28 @@ second, in which a robot that had just stood up with 4 kg 8 cm aside leaned by 6
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.algebra.vectors import rotation_by
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
-from go2_wbc.records import Record
+from go2_wbc.records import V3, Array3, Array3x3, Array6, Record
 from go2_wbc.reference import Target, TrackedPoint
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import NOT_NEGATIVE, ranged
 
-
-@dataclass(frozen=True, slots=True)
-@ranged(NOT_NEGATIVE)
-class CorrectionConfig:
-    """Numbers of the correction.
-
-    The angles were found on the simulated robot: a load of 4 kg, 5 cm beside its middle, leans it
-    by 15 deg where errors beyond 0.1 rad are dropped, by 9 with a limit of 0.15 rad, by 2 with
-    these.
-
-    Attributes:
-        rate: share of the remaining error that is added per second [1/s].
-        position_limit: greatest correction [m] per axis.
-        position_window: an error [m] beyond this counts as this.
-        angle_limit: greatest correction [rad] per axis.
-        angle_window: an error [rad] beyond this counts as this.
-        height_per_weight: correction [m/N] that a payload's weight takes; this and the next two as
-            found with 2 to 6 kg, up to 15 cm beside the middle.
-        roll_per_moment: the same of its moment about the axis ahead [rad/(N m)].
-        pitch_per_moment: and about the axis aside.
-    """
-
-    rate: float = 2.0
-    position_limit: float = 0.06
-    position_window: float = 0.04
-    angle_limit: float = 0.3
-    angle_window: float = 0.3
-    height_per_weight: float = 0.00055
-    roll_per_moment: float = 0.08
-    pitch_per_moment: float = 0.0085
+RATE = 2.0
+"""Share of the remaining error that is added per second [1/s]."""
+POSITION_LIMIT, POSITION_WINDOW = 0.06, 0.04
+"""Greatest correction [m] per axis, and the error [m] beyond which one counts as this."""
+ANGLE_LIMIT, ANGLE_WINDOW = 0.3, 0.3
+"""The same of the attitude [rad]. A load of 4 kg, 5 cm beside the middle of the simulated robot,
+leaned it by 15 deg where errors beyond 0.1 rad were dropped, by 9 with a limit of 0.15 rad, by 2
+with these."""
+HEIGHT_PER_WEIGHT = 0.00055
+"""Correction [m/N] that a payload's weight takes; this and the next two as found with 2 to 6 kg, up
+to 15 cm beside the middle."""
+ROLL_PER_MOMENT, PITCH_PER_MOMENT = 0.08, 0.0085
+"""The same of its moment about the axis ahead and the one aside [rad/(N m)]."""
 
 
 class Correction(Record):
@@ -74,37 +53,35 @@ class Correction(Record):
         knows_payload: whether ``carried`` has been found yet.
     """
 
-    offset: Float[np.ndarray, "6"]
-    carried: Float[np.ndarray, "3"]
+    offset: Array6
+    carried: Array3
     knows_payload: bool
 
 
 @subroutine
-def correct(
-    now: Snapshot,
-    error: Float[np.ndarray, "6"],
-    dt: float,
-    c: CorrectionConfig,
-    s: Correction,
-    target: Target,
-) -> None:
+def correct(now: Snapshot, error: Array6, dt: float, s: Correction, target: Target) -> None:
     """Put the correction into the body's target, after ``dt`` seconds of ``error``.
 
     ``error``: of the target less what is measured: position [m] and rotation vector [rad].
     """
-    hand_over(now, c, s)
+    hand_over(now, s)
     for i in range(3):
-        at, by = s.offset[i], c.position_window
-        s.offset[i] = integrated(at, error[i], dt, c.rate, by, c.position_limit)
-        at, by = s.offset[3 + i], c.angle_window
-        s.offset[3 + i] = integrated(at, error[3 + i], dt, c.rate, by, c.angle_limit)
+        at, k = s.offset[i], 3 + i
+        s.offset[i] = integrated(at, error[i], dt, RATE, POSITION_WINDOW, POSITION_LIMIT)
+        s.offset[k] = integrated(s.offset[k], error[k], dt, RATE, ANGLE_WINDOW, ANGLE_LIMIT)
         target.p_world[i] += s.offset[i]
-    turn, planned, R = np.empty((3, 3)), target.R_world_base.copy(), target.R_world_base
-    rotation_by((s.offset[3], s.offset[4], s.offset[5]), turn)
+    turn_by((s.offset[3], s.offset[4], s.offset[5]), target.R_world_base)
+
+
+@subroutine
+def turn_by(rotation: V3, R: Array3x3) -> None:
+    """Turn an attitude by a rotation vector [rad] in the world."""
+    turn, before = np.empty((3, 3)), R.copy()
+    rotation_by(rotation, turn)
     for i in range(3):
         for k in range(3):
             R[i, k] = (
-                turn[i, 0] * planned[0, k] + turn[i, 1] * planned[1, k] + turn[i, 2] * planned[2, k]
+                turn[i, 0] * before[0, k] + turn[i, 1] * before[1, k] + turn[i, 2] * before[2, k]
             )
 
 
@@ -118,7 +95,7 @@ def integrated(
 
 
 @subroutine
-def hand_over(now: Snapshot, c: CorrectionConfig, s: Correction) -> None:
+def hand_over(now: Snapshot, s: Correction) -> None:
     """Take out of the offset what is known of the payload since the last tick."""
     mass, weight = now.payload[0], now.payload[1]
     gravity = weight / mass if mass > 0.0 else 0.0
@@ -128,9 +105,9 @@ def hand_over(now: Snapshot, c: CorrectionConfig, s: Correction) -> None:
     moment = now.mass_matrix[0, 0] * gravity
     x, y = moment * now.com_shift[0], moment * now.com_shift[1]
     load = (
-        c.height_per_weight * weight,
-        c.roll_per_moment * (cosine * y - sine * x),
-        -c.pitch_per_moment * (cosine * x + sine * y),
+        HEIGHT_PER_WEIGHT * weight,
+        ROLL_PER_MOMENT * (cosine * y - sine * x),
+        -PITCH_PER_MOMENT * (cosine * x + sine * y),
     )
     change = np.zeros(3)
     for i in range(3):
@@ -145,6 +122,6 @@ def hand_over(now: Snapshot, c: CorrectionConfig, s: Correction) -> None:
         s.offset[2 + i] -= max(min(change[i], max(held, 0.0)), min(held, 0.0))
 
 
-def tracked_position(snapshot: Snapshot, point: TrackedPoint) -> Float[np.ndarray, "3"]:
+def tracked_position(snapshot: Snapshot, point: TrackedPoint) -> Array3:
     """Measured position [m] of ``point`` in the world."""
     return snapshot.p_world_com if point is TrackedPoint.COM else snapshot.state.p_world_base

@@ -23,7 +23,7 @@ from go2_wbc.contacts import TIE
 from go2_wbc.planning.footholds import foothold, nominal_feet
 from go2_wbc.planning.gait_clock import Clock
 from go2_wbc.planning.ground import ground_at, tilt
-from go2_wbc.planning.mpc import NODES, solve_mpc
+from go2_wbc.planning.mpc import INTERVAL, NODES, STEP, Horizon, solve_mpc
 from go2_wbc.planning.pose import advance_pose, pose_turn
 from go2_wbc.planning.trunk import Command, ramp
 from go2_wbc.planning.walk import Planner, Walk
@@ -74,22 +74,22 @@ def turn_from(now: Snapshot, yaw: float, turn: Float[np.ndarray, "3"]) -> None:
 
 
 @subroutine
-def fill_goals(s: Planner, c: Walk, command: Command, goals: Float[np.ndarray, "nodes 12"]) -> None:
+def fill_goals(s: Planner, c: Walk, command: Command) -> None:
     """Pose and rate wanted at the end of each node: the command ramped and integrated."""
-    config, step, velocity = c.config, c.config.mpc.step, s.trunk.velocity.copy()
+    config, velocity, goals = c.config, s.trunk.velocity.copy(), s.horizon.goals
     yaw, x, y = s.trunk.yaw, s.trunk.position[0], s.trunk.position[1]
-    a, b = tilt(s.ground, config.ground)
+    a, b = tilt(s.ground)
     steep = np.hypot(a, b)
     share = np.arctan(steep) / steep if steep > 0.0 else 1.0
     goals[:] = 0.0
     for k in range(NODES):
-        ramp(velocity, command, config.linear_acceleration, config.angular_acceleration, step)
-        yaw += velocity[2] * step
+        ramp(velocity, command, config.linear_acceleration, config.angular_acceleration, STEP)
+        yaw += velocity[2] * STEP
         cosine, sine = np.cos(yaw), np.sin(yaw)
         goals[k, 9] = cosine * velocity[0] - sine * velocity[1]
         goals[k, 10] = sine * velocity[0] + cosine * velocity[1]
-        x += goals[k, 9] * step
-        y += goals[k, 10] * step
+        x += goals[k, 9] * STEP
+        y += goals[k, 10] * STEP
         goals[k, 2], goals[k, 8] = yaw - s.trunk.yaw, velocity[2]
         goals[k, 3], goals[k, 4] = x, y
         goals[k, 0], goals[k, 1] = share * b, -share * a
@@ -98,12 +98,12 @@ def fill_goals(s: Planner, c: Walk, command: Command, goals: Float[np.ndarray, "
 
 
 @subroutine
-def lean_goals(s: Planner, c: Walk, command: Command, goals: Float[np.ndarray, "nodes 12"]) -> None:
+def lean_goals(s: Planner, c: Walk, command: Command) -> None:
     """Add to the goals of a level trunk the pose on its way."""
     pose, rate = s.trunk.pose.copy(), s.trunk.pose_rate.copy()
-    turn, w = np.empty(3), np.empty(3)
+    turn, w, goals = np.empty(3), np.empty(3), s.horizon.goals
     for k in range(NODES):
-        advance_pose(pose, rate, c.config.pose, command.pose, c.config.mpc.step)
+        advance_pose(pose, rate, c.config.pose, command.pose, STEP)
         pose_turn(s.trunk.yaw + goals[k, 2], pose, rate, turn, w)
         goals[k, 2] += pose[3] - s.trunk.pose[3]
         goals[k, 5] += pose[0]
@@ -114,18 +114,13 @@ def lean_goals(s: Planner, c: Walk, command: Command, goals: Float[np.ndarray, "
 
 
 @subroutine
-def fill_contacts(
-    clock: Clock,
-    step: float,
-    share: Float[np.ndarray, "nodes 4"],
-    landings: Float[np.ndarray, "nodes 4"],
-) -> None:
+def fill_contacts(clock: Clock, h: Horizon) -> None:
     """Share of each node that each foot stands, and in how many strides it will have landed for it.
 
     The latter is at most 0 for a foot that stands there now.
     """
-    period, duty = clock.period, clock.duty
-    span = step / period
+    period, duty, share, landings = clock.period, clock.duty, h.share, h.landings
+    span = STEP / period
     for leg in range(4):
         first = (clock.time / period - clock.offsets[leg] + TIE) % 1.0 - TIE
         for k in range(NODES):
@@ -155,19 +150,13 @@ def excess_velocity(now: Snapshot, s: Planner, c: Walk) -> tuple[float, float]:
 
 
 @subroutine
-def fill_arms(
-    now: Snapshot,
-    s: Planner,
-    c: Walk,
-    goals: Float[np.ndarray, "nodes 12"],
-    landings: Float[np.ndarray, "nodes 4"],
-    arms: Float[np.ndarray, "nodes 4 3"],
-) -> None:
+def fill_arms(now: Snapshot, s: Planner, c: Walk) -> None:
     """From the CoM in the middle of each node to the contact points [m].
 
     A foot that comes down once more is then below its hip in the middle of its stance.
     """
-    period, duty, step = s.clock.period, s.clock.duty, c.config.mpc.step
+    period, duty, h = s.clock.period, s.clock.duty, s.horizon
+    goals, landings = h.goals, h.landings
     fading, com = c.config.mpc.throw_time, triple(now.p_world_com)
     base = plus((now.q[0], now.q[1], now.q[2]), triple(now.com_shift))
     nominal, goal, footholds = np.empty((4, 2)), np.empty(3), np.empty((4, 2))
@@ -180,7 +169,7 @@ def fill_arms(
     before_x, before_y = here_x, here_y
     excess_x, excess_y = excess_velocity(now, s, c)
     for k in range(NODES):
-        left = np.exp(-(k + 0.5) * step / fading)
+        left = np.exp(-(k + 0.5) * STEP / fading)
         thrown = fading * (1.0 - left)
         way_x = (before_x + goals[k, 3]) / 2 - here_x + excess_x * thrown
         way_y = (before_y + goals[k, 4]) / 2 - here_y + excess_y * thrown
@@ -188,7 +177,7 @@ def fill_arms(
         rate = goals[k, 8]
         for leg in range(4):
             wait = landings[k, leg] * period
-            arm = arms[k, leg]
+            arm = h.arms[k, leg]
             if landings[k, leg] == 0.0:
                 foot = now.p_world_feet[leg]
                 arm[0] = foot[0] - com[0] - way_x
@@ -204,7 +193,7 @@ def fill_arms(
                 x = c.p_base_feet_nominal[leg, 0]
                 y = s.clock.width * c.p_base_feet_nominal[leg, 1]
                 hip_x, hip_y = cosine * x - sine * y, sine * x + cosine * y
-                early = duty * period / 2 + wait - (k + 0.5) * step
+                early = duty * period / 2 + wait - (k + 0.5) * STEP
                 v_x, v_y = goals[k, 9] + excess_x * left, goals[k, 10] + excess_y * left
                 arm[0] = base[0] - com[0] + hip_x + (v_x - rate * hip_y) * early
                 arm[1] = base[1] - com[1] + hip_y + (v_y + rate * hip_x) * early
@@ -212,44 +201,32 @@ def fill_arms(
 
 
 @subroutine
-def look_ahead(
-    now: Snapshot,
-    s: Planner,
-    c: Walk,
-    command: Command,
-    state: Float[np.ndarray, "12"],
-    goals: Float[np.ndarray, "nodes 12"],
-    share: Float[np.ndarray, "nodes 4"],
-    arms: Float[np.ndarray, "nodes 4 3"],
-) -> None:
-    """Fill what the MPC looks at; see ``solve_mpc``."""
-    turn, w = np.empty(3), now.v[3:6]
+def look_ahead(now: Snapshot, s: Planner, c: Walk, command: Command) -> None:
+    """Fill what the MPC looks at."""
+    turn, w, state = np.empty(3), now.v[3:6], s.horizon.state
     turn_from(now, s.trunk.yaw + s.trunk.pose[3], turn)
     for i in range(3):
         state[i], state[3 + i] = turn[i], now.p_world_com[i]
         state[6 + i], state[9 + i] = 0.0, now.v_world_com[i]
         for k in range(3):
             state[6 + i] += now.R_world_base[i, k] * w[k]
-    landings = np.empty((NODES, 4))
-    fill_goals(s, c, command, goals)
-    fill_contacts(s.clock, c.config.mpc.step, share, landings)
-    fill_arms(now, s, c, goals, landings, arms)
-    lean_goals(s, c, command, goals)
+    fill_goals(s, c, command)
+    fill_contacts(s.clock, s.horizon)
+    fill_arms(now, s, c)
+    lean_goals(s, c, command)
 
 
 @subroutine
 def plan_forces(now: Snapshot, s: Planner, c: Walk, command: Command, friction: float) -> bool:
     """Solve for the forces of the first node, while its feet stand; False without solution."""
-    state, goals, share = np.empty(12), np.empty((NODES, 12)), np.empty((NODES, 4))
-    arms, forces = np.empty((NODES, 4, 3)), np.empty((NODES, 4, 3))
-    look_ahead(now, s, c, command, state, goals, share, arms)
-    s.robot.mass, s.robot.gravity = c.mass + now.payload[0], c.gravity
-    mpc = c.config.mpc
-    outcome = solve_mpc(mpc, s.robot, friction, state, goals, share, arms, forces)
+    look_ahead(now, s, c, command)
+    h, mpc = s.horizon, c.config.mpc
+    h.mass, h.gravity, h.friction = c.mass + now.payload[0], c.gravity, friction
+    outcome = solve_mpc(mpc, h)
     for leg in range(4):
         for i in range(3):
-            stood = max(share[0, leg], mpc.least_share)
-            s.planned.f_world_feet[leg, i] = forces[0, leg, i] / stood
+            stood = max(h.share[0, leg], mpc.least_share)
+            s.planned.f_world_feet[leg, i] = h.forces[0, leg, i] / stood
     return outcome == SOLVED
 
 
@@ -257,13 +234,13 @@ def plan_forces(now: Snapshot, s: Planner, c: Walk, command: Command, friction: 
 def apply_force_plan(now: Snapshot, s: Planner, c: Walk, command: Command, target: Target) -> None:
     """Put the planned forces into a reference, with the accelerations that they make."""
     mpc = c.config.mpc
-    inertia_about_com(now, s.robot.inertia)
+    inertia_about_com(now, s.horizon.inertia)
     if s.time >= s.planned.next - TIE:
         if not plan_forces(now, s, c, command, min(mpc.friction, target.friction)):
             return
-        s.planned.next = s.time + mpc.interval
+        s.planned.next = s.time + INTERVAL
     system, mass, a = np.zeros((3, 4)), c.mass + now.payload[0], np.zeros(3)
-    system[:, :3] = s.robot.inertia
+    system[:, :3] = s.horizon.inertia
     for leg in range(4):
         if target.legs[leg] != STANCE:
             continue

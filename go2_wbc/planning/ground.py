@@ -8,15 +8,12 @@ they are off it is also what tells rough ground, on which feet are raised higher
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import Record
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, between, ranged
 
 GROUND_SHARE = 0.5
 """Share of a landing foot's height that goes into the estimate of the ground's height. A pitch that
@@ -28,41 +25,21 @@ MOST_SLOPE = 0.6
 """Greatest slope that is believed; no foot holds on a steeper one."""
 LEVEL_SLOPE = 0.05
 """Slope up to which the ground counts as level for the friction; from twice that on in full."""
-MOST_DELAY = 0.8
-"""Share of a swing after which it must go ahead at the latest."""
-
-
-@dataclass(frozen=True, slots=True)
-@ranged(
-    NOT_NEGATIVE,
-    slope_share=SHARE,
-    calming=SHARE,
-    stumble=POSITIVE,
-    delay=between(0.0, MOST_DELAY),
-)
-class GroundConfig:
-    """Numbers of the estimate, from a search on this robot in simulation.
-
-    Attributes:
-        slope_share: share of the slope that was found at a landing that is taken in.
-        follow: share of the slope by which the trunk is tilted.
-        smooth: distance [m] of a landing from the plane up to which the ground is smooth.
-        most_raise: greatest height [m] that is added to the swing's apex, of which there is as much
-            as the ground is rougher than that.
-        calming: share of the roughness that is left after a landing.
-        stumble: roughness [m] that a foot tells which is stopped in the middle of its swing.
-        delay: share of a swing, on the roughest ground, in which the foot only rises. At a step of
-            10 cm, feet that stood close to it rubbed along its face and stood on its edge: 4 of 40
-            runs fell, none with this.
-    """
-
-    slope_share: float = 0.3
-    follow: float = 0.7
-    smooth: float = 0.015
-    most_raise: float = 0.05
-    calming: float = 0.8
-    stumble: float = 0.06
-    delay: float = 0.4
+SLOPE_SHARE = 0.3
+"""Share of the slope that was found at a landing that is taken in."""
+FOLLOW = 0.7
+"""Share of the slope by which the trunk is tilted."""
+SMOOTH, MOST_RAISE = 0.015, 0.05
+"""Distance [m] of a landing from the plane up to which the ground is smooth. As much as it is
+rougher than that is added to the apex of a swing, the latter [m] at most."""
+CALMING = 0.8
+"""Share of the roughness that is left after a landing."""
+STUMBLE = 0.06
+"""Roughness [m] that a foot tells which is stopped in the middle of its swing."""
+DELAY = 0.4
+"""Share of a swing, on the roughest ground, in which the foot only rises. At a step of 10 cm, feet
+that stood close to it rubbed along its face and stood on its edge: 4 of 40 runs fell, none with
+this. It and the six before are from a search on this robot in simulation."""
 
 
 class Ground(Record):
@@ -100,25 +77,25 @@ def ground_at(g: Ground, x: float, y: float) -> float:
 
 
 @subroutine
-def apex_raise(g: Ground, c: GroundConfig) -> float:
+def apex_raise(g: Ground) -> float:
     """Height [m] by which a swing is higher than on smooth ground."""
-    return min(max(g.roughness - c.smooth, 0.0), c.most_raise)
+    return min(max(g.roughness - SMOOTH, 0.0), MOST_RAISE)
 
 
 @subroutine
-def delay(g: Ground, c: GroundConfig) -> float:
+def delay(g: Ground) -> float:
     """Share of a swing in which the foot only rises: none on smooth ground."""
-    return c.delay * apex_raise(g, c) / c.most_raise if c.most_raise > 0.0 else 0.0
+    return DELAY * apex_raise(g) / MOST_RAISE
 
 
 @subroutine
-def tilt(g: Ground, c: GroundConfig) -> tuple[float, float]:
+def tilt(g: Ground) -> tuple[float, float]:
     """Slope that the trunk follows."""
-    return c.follow * g.slope[0], c.follow * g.slope[1]
+    return FOLLOW * g.slope[0], FOLLOW * g.slope[1]
 
 
 @subroutine
-def level_friction(g: Ground, c: GroundConfig, friction: float, least: float) -> float:
+def level_friction(g: Ground, friction: float, least: float) -> float:
     """Coefficient of the upright cone that lies within that about the ground's normal.
 
     A foot on a slope of 15 deg and a coefficient of 0.65 slides when it is pushed ahead with 0.6 of
@@ -129,7 +106,7 @@ def level_friction(g: Ground, c: GroundConfig, friction: float, least: float) ->
     """
     steep = np.hypot(g.slope[0], g.slope[1])
     steep *= min(max(steep / LEVEL_SLOPE - 1.0, 0.0), 1.0)
-    if g.roughness > c.smooth:
+    if g.roughness > SMOOTH:
         return friction
     return max((friction - steep) / (1.0 + friction * steep), least)
 
@@ -166,9 +143,7 @@ def fitted_slope(g: Ground) -> tuple[float, float]:
 
 
 @subroutine
-def learn_ground(
-    g: Ground, c: GroundConfig, now: Snapshot, foot_radius: float, met: Bool[np.ndarray, "4"]
-) -> None:
+def learn_ground(g: Ground, now: Snapshot, foot_radius: float, met: Bool[np.ndarray, "4"]) -> None:
     """Take in where feet, of which some are ``met`` at this tick, have met the ground."""
     count, mean, most = 0, 0.0, 0.0
     for leg in range(4):
@@ -182,14 +157,14 @@ def learn_ground(
                 g.p_met[leg, i] = p[i]
     if count == 0:
         return
-    g.roughness = max(c.calming * g.roughness, most)
+    g.roughness = max(CALMING * g.roughness, most)
     g.height += GROUND_SHARE * mean / count
     a, b = fitted_slope(g)
-    g.slope[0] += c.slope_share * (a - g.slope[0])
-    g.slope[1] += c.slope_share * (b - g.slope[1])
+    g.slope[0] += SLOPE_SHARE * (a - g.slope[0])
+    g.slope[1] += SLOPE_SHARE * (b - g.slope[1])
 
 
 @subroutine
-def note_stumble(g: Ground, c: GroundConfig) -> None:
+def note_stumble(g: Ground) -> None:
     """Take in that a foot was stopped in its swing."""
-    g.roughness = max(g.roughness, c.stumble)
+    g.roughness = max(g.roughness, STUMBLE)

@@ -34,7 +34,7 @@ from go2_wbc.planning.ground import (
     note_stumble,
 )
 from go2_wbc.planning.pose import LEVEL, BodyPose, advance_pose
-from go2_wbc.planning.slip import Slip, observe_slip
+from go2_wbc.planning.slip import LEAST, MOST, Slip, observe_slip
 from go2_wbc.planning.swing import Swing, begin_swing, resume_swing, swing_foot
 from go2_wbc.planning.trunk import (
     Command,
@@ -168,7 +168,7 @@ def note_liftoffs(
     for leg in range(4):
         foot = s.feet[leg].contact
         if foot.was_stance and not stance[leg]:
-            begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground, c.config.ground)
+            begin_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground)
         if not stance[leg]:
             foot.is_awaited = False
             is_middle = abs(progress[leg] - 0.5) <= MID_SWING + TIE
@@ -179,13 +179,12 @@ def note_liftoffs(
             met[leg] = True
             foot.is_awaited = False
         foot.was_stance = stance[leg]
-    learn_ground(s.ground, c.config.ground, now, c.foot_radius, met)
+    learn_ground(s.ground, now, c.foot_radius, met)
     if stumbles.any():
-        note_stumble(s.ground, c.config.ground)
+        note_stumble(s.ground)
     for leg in range(4):
         if stumbles[leg]:
-            swing, p = s.feet[leg].swing, now.p_world_feet[leg]
-            resume_swing(swing, p, s.ground, c.config.ground, progress[leg])
+            resume_swing(s.feet[leg].swing, now.p_world_feet[leg], s.ground, progress[leg])
 
 
 @subroutine
@@ -249,15 +248,11 @@ def plan(
             progress[leg] = elapsed[leg] / (elapsed[leg] + remaining[leg])
         foot, p = s.feet[leg].contact, now.p_world_feet[leg]
         above = p[2] - c.foot_radius - ground_at(s.ground, p[0], p[1])
-        stands[leg] = follow_contact(
-            foot, c.config.contact, above, contact[leg], stance[leg], progress[leg], dt
-        )
-    observe_slip(s.slip, c.config.slip, now, contact, tau, stands, dt)
+        stands[leg] = follow_contact(foot, above, contact[leg], stance[leg], progress[leg], dt)
+    observe_slip(s.slip, now, contact, tau, stands, dt)
     note_liftoffs(now, s, c, contact, stance, progress)
-    target.friction = level_friction(
-        s.ground, c.config.ground, s.slip.friction, c.config.slip.least
-    )
-    fill_body(s.trunk, s.ground, c.config.ground, c.height, target)
+    target.friction = level_friction(s.ground, s.slip.friction, LEAST)
+    fill_body(s.trunk, s.ground, c.height, target)
     level(s.trunk, now, contact, s.is_stepping, dt, target)
     fill_feet(now, s, c, stance, stands, elapsed, remaining, target)
     target.q_joints[:] = now.q[7:]
@@ -287,7 +282,7 @@ class LocomotionPlanner:
             time=snapshot.state.time,
             trunk=Trunk(yaw=snapshot.state.yaw, position=snapshot.p_world_com[:2]),
             ground=ground_below(snapshot, self._model.foot_radius),
-            slip=Slip(friction=self._config.slip.most),
+            slip=Slip(friction=MOST),
             feet=feet,
             planned=PlannedForces(next=-np.inf),
         )

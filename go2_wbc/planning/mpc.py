@@ -29,18 +29,26 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from go2_wbc.algebra.active_set import SINGULAR, constrain, factorise, solve_factorised
-from go2_wbc.algebra.linear import solve_linear
+from go2_wbc.algebra.active_set import SINGULAR, constrain
+from go2_wbc.algebra.linear import factorise, solve_factorised, solve_linear
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Retired, ranged, retires
 
 NODES = 12
 """Nodes of the horizon."""
+STEP = 0.03
+"""Length [s] of a node."""
+INTERVAL = 0.01
+"""Time [s] from one solution to the next."""
 
 
 @dataclass(frozen=True, slots=True)
-@retires(enabled=Retired(True, "the forces of every gait are planned ahead"))
+@retires(
+    enabled=Retired(True, "the forces of every gait are planned ahead"),
+    step=STEP,
+    interval=INTERVAL,
+)
 @ranged(
     POSITIVE,
     angle_weights=NOT_NEGATIVE,
@@ -53,8 +61,6 @@ class MpcConfig:
     """Numbers of the MPC, from a search on this robot in simulation.
 
     Attributes:
-        step: length [s] of a node.
-        interval: time [s] from one solution to the next.
         angle_weights, position_weights: of the turn [1/rad^2] and the CoM's place [1/m^2].
         angular_weights, linear_weights: of their rates [s^2/rad^2], [s^2/m^2].
         force_weight: of a force [1/N^2]; above 0, or the forces are not unique.
@@ -71,8 +77,6 @@ class MpcConfig:
             feet that should have come down were 0.16 m high, and the robot fell onto them.
     """
 
-    step: float = 0.03
-    interval: float = 0.01
     angle_weights: tuple[float, float, float] = (20.0, 20.0, 20.0)
     position_weights: tuple[float, float, float] = (5.0, 5.0, 80.0)
     angular_weights: tuple[float, float, float] = (0.3, 0.3, 0.5)
@@ -87,12 +91,33 @@ class MpcConfig:
     throw_speed: float = 0.05
 
 
-class Robot(Record):
-    """The rigid body: mass [kg], gravity [m/s^2], inertia about the CoM, world axes [kg m^2]."""
+class Horizon(Record):
+    """What the MPC looks at, and the forces that it finds; the first axis of all is the node.
+
+    Pose is the turn [rad] and the CoM [m], rate are w [rad/s] and v [m/s], both in this order.
+
+    Attributes:
+        mass, gravity: of the rigid body [kg], [m/s^2].
+        inertia: about its CoM, world axes [kg m^2].
+        friction: mu of the friction pyramid.
+        state: pose and rate now.
+        goals: pose and rate wanted at the end of each node.
+        share: of each node that each foot stands.
+        landings: in how many strides each foot will have landed; at most 0 while it stands as now.
+        arms: from the CoM to the feet's contact points [m].
+        forces: mean forces [N] of the feet over each node.
+    """
 
     mass: float
     gravity: float
     inertia: Float[np.ndarray, "3 3"]
+    friction: float
+    state: Float[np.ndarray, "12"]
+    goals: Float[np.ndarray, "12 12"]
+    share: Float[np.ndarray, "12 4"]
+    landings: Float[np.ndarray, "12 4"]
+    arms: Float[np.ndarray, "12 4 3"]
+    forces: Float[np.ndarray, "12 4 3"]
 
 
 @subroutine
@@ -106,7 +131,7 @@ def weights_of(c: MpcConfig, axis: int) -> tuple[float, float]:
 @subroutine
 def couplings(c: MpcConfig, s: Float[np.ndarray, "nodes nodes 6"]) -> None:
     """Fill s_kl of the six axes: of the turn first, then of the way."""
-    dt = c.step
+    dt = STEP
     for axis in range(6):
         of_pose, of_rate = weights_of(c, axis)
         for k in range(NODES):
@@ -119,24 +144,15 @@ def couplings(c: MpcConfig, s: Float[np.ndarray, "nodes nodes 6"]) -> None:
 
 
 @subroutine
-def pulls(
-    c: MpcConfig,
-    gravity: float,
-    state: Float[np.ndarray, "12"],
-    goals: Float[np.ndarray, "nodes 12"],
-    pull: Float[np.ndarray, "nodes 6"],
-) -> None:
-    """Fill the cost's slope by an acceleration at each node, when no foot presses.
-
-    ``state`` holds pose and rate now, ``goals`` those wanted at the end of each node.
-    """
-    dt = c.step
+def pulls(c: MpcConfig, h: Horizon, pull: Float[np.ndarray, "nodes 6"]) -> None:
+    """Fill the cost's slope by an acceleration at each node, when no foot presses."""
+    dt, state, goals = STEP, h.state, h.goals
     pull[:] = 0.0
     for j in range(1, NODES + 1):
         t = j * dt
         for axis in range(6):
             of_pose, of_rate = weights_of(c, axis)
-            fall = -gravity if axis == 5 else 0.0
+            fall = -h.gravity if axis == 5 else 0.0
             rate = state[6 + axis] + fall * t
             pose = state[axis] + state[6 + axis] * t + fall * t * t / 2
             off = of_pose * (pose - goals[j - 1, axis])
@@ -179,22 +195,21 @@ def turning(
 @subroutine
 def assemble(
     c: MpcConfig,
-    robot: Robot,
+    h: Horizon,
     T: Float[np.ndarray, "count 3 3"],
     pull: Float[np.ndarray, "nodes 6"],
-    share: Float[np.ndarray, "nodes 4"],
     feet: Int[np.ndarray, "count 2"],
     H: Float[np.ndarray, "n n"],
     g: Float[np.ndarray, " n"],
 ) -> None:
     """Fill the lower triangle of H, and g."""
-    s, mass = np.empty((NODES, NODES, 6)), robot.mass
+    s, mass, share = np.empty((NODES, NODES, 6)), h.mass, h.share
     couplings(c, s)
     stood = 0.0
     for k in range(NODES):
         for leg in range(4):
             stood += share[k, leg]
-    usual = mass * robot.gravity * NODES / max(stood, 1.0)
+    usual = mass * h.gravity * NODES / max(stood, 1.0)
     for a in range(len(feet)):
         k, leg = feet[a, 0], feet[a, 1]
         for i in range(3):
@@ -216,9 +231,8 @@ def assemble(
 
 @subroutine
 def bound(
-    friction: float,
     force_max: float,
-    share: Float[np.ndarray, "nodes 4"],
+    h: Horizon,
     feet: Int[np.ndarray, "count 2"],
     C: Float[np.ndarray, "m n"],
     lower: Float[np.ndarray, " m"],
@@ -230,59 +244,39 @@ def bound(
             row = 5 * a + n
             C[row] = 0.0
             lower[row], upper[row] = -np.inf, 0.0
-            C[row, 3 * a + 2] = -friction
+            C[row, 3 * a + 2] = -h.friction
             if n < 4:
                 C[row, 3 * a + n // 2] = 1.0 - 2.0 * (n % 2)
         C[5 * a + 4, 3 * a + 2] = 1.0
         lower[5 * a + 4] = 0.0
-        upper[5 * a + 4] = force_max * share[feet[a, 0], feet[a, 1]]
+        upper[5 * a + 4] = force_max * h.share[feet[a, 0], feet[a, 1]]
 
 
 @subroutine
-def solve_mpc(
-    c: MpcConfig,
-    robot: Robot,
-    friction: float,
-    state: Float[np.ndarray, "12"],
-    goals: Float[np.ndarray, "nodes 12"],
-    share: Float[np.ndarray, "nodes 4"],
-    arms: Float[np.ndarray, "nodes 4 3"],
-    forces: Float[np.ndarray, "nodes 4 3"],
-) -> int:
-    """Fill the mean forces [N] of the feet over each node; returns the outcome.
-
-    Args:
-        c: weights and limits.
-        robot: as it is now.
-        friction: mu of the friction pyramid.
-        state: pose and rate: turn [rad], CoM [m], w [rad/s], v [m/s].
-        goals: the same wanted at the end of each node.
-        share: of each node that each foot stands.
-        arms: from the CoM to the feet's contact points [m].
-        forces: [N].
-    """
+def solve_mpc(c: MpcConfig, h: Horizon) -> int:
+    """Fill the forces of the horizon; returns the outcome."""
     system, places = np.zeros((3, 6)), np.empty((4 * NODES, 2), dtype=np.int64)
-    forces[:] = 0.0
+    h.forces[:] = 0.0
     for i in range(3):
-        system[i, :3] = robot.inertia[i]
+        system[i, :3] = h.inertia[i]
         system[i, 3 + i] = 1.0
     if not solve_linear(system, 3):
         return SINGULAR
     inverse = system[:, 3:].copy()
-    feet = places[: count_unknowns(c.least_share, share, places)]
+    feet = places[: count_unknowns(c.least_share, h.share, places)]
     n, rows = 3 * len(feet), 5 * len(feet)
     T, pull = np.empty((len(feet), 3, 3)), np.empty((NODES, 6))
     H, g, L, x = np.empty((n, n)), np.empty(n), np.empty((n, n)), np.empty(n)
-    turning(inverse, arms, feet, T)
-    pulls(c, robot.gravity, state, goals, pull)
-    assemble(c, robot, T, pull, share, feet, H, g)
+    turning(inverse, h.arms, feet, T)
+    pulls(c, h, pull)
+    assemble(c, h, T, pull, feet, H, g)
     if not factorise(H, L):
         return SINGULAR
     solve_factorised(L, g, x)
     C, lower, upper = np.empty((rows, n)), np.empty(rows), np.empty(rows)
-    bound(friction, c.force_max, share, feet, C, lower, upper)
-    outcome = constrain(L, np.empty((0, n)), np.empty(0), C, lower, upper, x, np.empty(rows))
+    bound(c.force_max, h, feet, C, lower, upper)
+    outcome = constrain(L, np.empty((0, n)), np.empty(0), C, lower, upper, x)
     for a in range(len(feet)):
         for i in range(3):
-            forces[feet[a, 0], feet[a, 1], i] = x[3 * a + i]
+            h.forces[feet[a, 0], feet[a, 1], i] = x[3 * a + i]
     return outcome

@@ -12,11 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.planning.command import finite_number
+from go2_wbc.records import Array3, Array3x3, Array4
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
 
@@ -42,7 +42,7 @@ class BodyPose:
             object.__setattr__(self, part.name, finite_number(part.name, getattr(self, part.name)))
 
     @property
-    def row(self) -> Float[np.ndarray, "4"]:
+    def row(self) -> Array4:
         """Height [m], roll, pitch, yaw [rad]."""
         return np.array([self.height, self.roll, self.pitch, self.yaw])
 
@@ -108,13 +108,7 @@ class PoseConfig:
 
 
 @subroutine
-def advance_pose(
-    pose: Float[np.ndarray, "4"],
-    rate: Float[np.ndarray, "4"],
-    c: PoseConfig,
-    asked: Float[np.ndarray, "4"],
-    dt: float,
-) -> None:
+def advance_pose(pose: Array4, rate: Array4, c: PoseConfig, asked: Array4, dt: float) -> None:
     """Bring a pose (height [m], roll, pitch, yaw [rad]) and its rate nearer to what is asked for.
 
     ``dt`` [s] is what passes.
@@ -128,7 +122,7 @@ def advance_pose(
 
 
 @subroutine
-def lean_rotation(pose: Float[np.ndarray, "4"], R: Float[np.ndarray, "3 3"]) -> None:
+def lean_rotation(pose: Array4, R: Array3x3) -> None:
     """Turn the rotation of a trunk that walks level by that of the pose: R Rz Ry Rx."""
     sr, cr = np.sin(pose[1]), np.cos(pose[1])
     sp, cp = np.sin(pose[2]), np.cos(pose[2])
@@ -141,13 +135,7 @@ def lean_rotation(pose: Float[np.ndarray, "4"], R: Float[np.ndarray, "3 3"]) -> 
 
 
 @subroutine
-def pose_turn(
-    yaw: float,
-    pose: Float[np.ndarray, "4"],
-    rate: Float[np.ndarray, "4"],
-    turn: Float[np.ndarray, "3"],
-    w: Float[np.ndarray, "3"],
-) -> None:
+def pose_turn(yaw: float, pose: Array4, rate: Array4, turn: Array3, w: Array3) -> None:
     """What roll, pitch and yaw of a pose add to a level trunk of that heading ``yaw`` [rad].
 
     Fills the turn [rad] from a level trunk that has the pose's yaw already (the quaternions of

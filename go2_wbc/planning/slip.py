@@ -22,56 +22,31 @@ while it does not touch, from twice the time after touchdown on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.algebra.vectors import cross, dot, plus_scaled, triple
 from go2_wbc.compilation import Foreign, subroutine
-from go2_wbc.errors import ConfigError
 from go2_wbc.records import Record
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
+SPEED, PATIENCE = 0.1, 0.004
+"""Speed [m/s] of the contact point, along the ground, above which a foot slides, and the time [s]
+for which it must. These numbers are from a search on this robot in simulation."""
+MASK = 0.02
+"""Time [s] after touchdown in which a foot may slide. At 3 m/s feet that hold slide longer."""
+STEEPNESS = 0.35
+"""Greatest ratio of the point's vertical speed to that: a foot that comes off the edge of a step
+says nothing of the friction."""
+TIME_CONSTANT, RECOVERY = 0.03, 0.1
+"""Time constant [s] of the fall, and rate [1/s] of the rise."""
+LEAST, MOST = 0.12, 0.6
+"""Bounds of the estimate; it begins at the latter."""
+HALF_SPEED = 0.5
+"""Speed [m/s] of a sliding contact point at which the ground bears half of the force along it that
+the torques make."""
 _TINY = 1e-9
 """Force [N], over a determinant, that stands in for none where one divides by it."""
-
-
-@dataclass(frozen=True, slots=True)
-@ranged(POSITIVE, patience=NOT_NEGATIVE, mask=NOT_NEGATIVE, recovery=NOT_NEGATIVE)
-class SlipConfig:
-    """Numbers of the estimate, from a search on this robot in simulation.
-
-    Attributes:
-        speed: of the contact point, along the ground [m/s], above which a foot slides.
-        patience: time [s] for which it must.
-        mask: time [s] after touchdown in which it may. At 3 m/s feet that hold slide longer.
-        steepness: greatest ratio of its vertical speed to that: a foot that comes off the edge of a
-            step says nothing of the friction.
-        time_constant: of the fall [s].
-        recovery: rate [1/s] of the rise.
-        least, most: bounds of the estimate; it begins at the latter.
-        half_speed: of a sliding contact point [m/s], at which the ground bears half of the force
-            along it that the torques make.
-    """
-
-    speed: float = 0.1
-    patience: float = 0.004
-    mask: float = 0.02
-    steepness: float = 0.35
-    time_constant: float = 0.03
-    recovery: float = 0.1
-    least: float = 0.12
-    most: float = 0.6
-    half_speed: float = 0.5
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for bounds without a range."""
-        if self.least > self.most:
-            raise ConfigError(
-                f"SlipConfig.least must be at most .most, got {self.least} and {self.most}"
-            )
 
 
 class Slip(Record):
@@ -109,7 +84,6 @@ def exerted_ratio(now: Snapshot, tau: Foreign[Float[np.ndarray, "12"]], leg: int
 @subroutine
 def observe_slip(
     slip: Slip,
-    c: SlipConfig,
     now: Snapshot,
     contact: Foreign[Bool[np.ndarray, "4"]],
     tau: Foreign[Float[np.ndarray, "12"]],
@@ -120,25 +94,25 @@ def observe_slip(
 
     ``contact`` are the feet in measured contact, ``tau`` [N m] the measured torques.
     """
-    slips, shown = False, c.most
+    slips, shown = False, MOST
     for leg in range(4):
         v_x, v_y, v_z = triple(now.v_world_contacts[leg])
         speed = np.hypot(v_x, v_y)
-        is_level = abs(v_z) <= c.steepness * speed
+        is_level = abs(v_z) <= STEEPNESS * speed
         loaded = slip.loaded[leg] + dt
         if not contact[leg]:
-            loaded = max(min(loaded, 2.0 * c.mask) - 2.0 * dt, 0.0)
+            loaded = max(min(loaded, 2.0 * MASK) - 2.0 * dt, 0.0)
         slip.loaded[leg] = loaded if stance[leg] else 0.0
-        may_slide = slip.loaded[leg] > c.mask
-        slides = may_slide and contact[leg] and speed > c.speed and is_level
+        may_slide = slip.loaded[leg] > MASK
+        slides = may_slide and contact[leg] and speed > SPEED and is_level
         if contact[leg] or not may_slide:
             slip.sliding[leg] = slip.sliding[leg] + dt if slides else 0.0
-        if slides and slip.sliding[leg] > c.patience:
+        if slides and slip.sliding[leg] > PATIENCE:
             slips = True
             ratio = exerted_ratio(now, tau, leg)
-            shown = min(shown, ratio / (1.0 + speed / c.half_speed))
+            shown = min(shown, ratio / (1.0 + speed / HALF_SPEED))
     if slips:
-        fall = min(max(shown, c.least) - slip.friction, 0.0)
-        slip.friction += fall * min(dt / c.time_constant, 1.0)
+        fall = min(max(shown, LEAST) - slip.friction, 0.0)
+        slip.friction += fall * min(dt / TIME_CONSTANT, 1.0)
     else:
-        slip.friction = min(slip.friction + c.recovery * dt, c.most)
+        slip.friction = min(slip.friction + RECOVERY * dt, MOST)

@@ -17,12 +17,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
 from go2_wbc.planning.gait_clock import Clock
-from go2_wbc.planning.ground import Ground, GroundConfig, apex_raise, delay
-from go2_wbc.records import Record
+from go2_wbc.planning.ground import Ground, apex_raise, delay
+from go2_wbc.records import Array3, Record
 from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
 TIE = 1e-9
@@ -66,25 +65,21 @@ class Swing(Record):
         begun: share of the gait's swing that had passed by then.
     """
 
-    start: Float[np.ndarray, "3"]
+    start: Array3
     raised: float
     delay: float
     begun: float
 
 
 @subroutine
-def begin_swing(
-    swing: Swing, p_foot: Float[np.ndarray, "3"], ground: Ground, c: GroundConfig
-) -> None:
+def begin_swing(swing: Swing, p_foot: Array3, ground: Ground) -> None:
     """A foot leaves the ground."""
     swing.start[:] = p_foot
-    swing.raised, swing.delay, swing.begun = apex_raise(ground, c), delay(ground, c), 0.0
+    swing.raised, swing.delay, swing.begun = apex_raise(ground), delay(ground), 0.0
 
 
 @subroutine
-def resume_swing(
-    swing: Swing, p_foot: Float[np.ndarray, "3"], ground: Ground, c: GroundConfig, progress: float
-) -> None:
+def resume_swing(swing: Swing, p_foot: Array3, ground: Ground, progress: float) -> None:
     """A foot has been stopped at ``progress``; it goes on from there, once in a swing.
 
     It is raised as high as the time allows that is left, and not higher for the ground: to lift it
@@ -92,7 +87,7 @@ def resume_swing(
     """
     if swing.begun == 0.0:
         swing.start[:] = p_foot
-        swing.raised, swing.delay, swing.begun = 0.0, delay(ground, c), progress
+        swing.raised, swing.delay, swing.begun = 0.0, delay(ground), progress
 
 
 @subroutine
@@ -107,12 +102,12 @@ def swing_foot(
     clock: Clock,
     c: SwingConfig,
     progress: float,
-    goal: Float[np.ndarray, "3"],
-    p: Float[np.ndarray, "3"],
-    v: Float[np.ndarray, "3"],
-    a: Float[np.ndarray, "3"],
+    goal: Array3,
+    p: Array3,
+    v: Array3,
+    a: Array3,
 ) -> None:
-    """Fill position, velocity and acceleration of the foot centre in the world.
+    """Fill position [m], velocity [m/s] and acceleration [m/s^2] of the foot centre in the world.
 
     Horizontally one cubic: it follows late changes of the goal better than minimum jerk, whose
     speed is gone sooner. Vertically two that meet, at rest, at the apex.
@@ -123,9 +118,6 @@ def swing_foot(
         c: apex and touchdown depth.
         progress: share of the gait's swing that has passed, 0 to 1.
         goal: where the foot shall touch down [m]; may change from call to call.
-        p: [m].
-        v: [m/s].
-        a: [m/s^2].
     """
     share = 1.0 - swing.begun
     progress = (progress - swing.begun) / share

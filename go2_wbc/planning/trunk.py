@@ -6,7 +6,7 @@ heading, so the command is integrated to a pose, which is held within reach (a l
 measured one: a robot that is held does not store up a way to jump afterwards.
 
 What sags under a load, and the lean that the joints' friction leaves, are integrated and taken out:
-``o' = rate * clip(error, -window, window)``, ``|o| <= limit`` (see ``CorrectionConfig``).
+``o' = rate * clip(error, -window, window)``, ``|o| <= limit`` (see ``planning.correction``).
 """
 
 from __future__ import annotations
@@ -14,26 +14,29 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.algebra.vectors import cross, rotation_by
+from go2_wbc.algebra.vectors import cross
 from go2_wbc.compilation import Foreign, subroutine
-from go2_wbc.planning.correction import CorrectionConfig, integrated
-from go2_wbc.planning.ground import Ground, GroundConfig, ground_at, tilt
+from go2_wbc.planning.correction import (
+    ANGLE_WINDOW,
+    POSITION_LIMIT,
+    POSITION_WINDOW,
+    RATE,
+    integrated,
+    turn_by,
+)
+from go2_wbc.planning.ground import Ground, ground_at, tilt
 from go2_wbc.planning.pose import lean_rotation, pose_turn
-from go2_wbc.records import Record
+from go2_wbc.records import Array3, Array4, Record
 from go2_wbc.reference import Target
 from go2_wbc.robot.snapshot import Snapshot
 
 SETTLED_COMMAND = 1e-3
 """Ramped velocity command [m/s, rad/s] below which it counts as arrived at zero."""
-_SAG = CorrectionConfig()
-SAG_RATE, SAG_WINDOW, SAG_LIMIT = _SAG.rate, _SAG.position_window, _SAG.position_limit
-"""How the sag under a load is taken out [1/s], [m], [m]."""
-READY_RATE, READY_WINDOW = _SAG.rate, _SAG.angle_window
-"""How the lean of a robot that stands ready is taken out [1/s], [rad]. The joints' friction leaves
-2.5 deg of a pose undone, and a payload that reaches farther than is believed leans it by 4 deg."""
 STRIDE_RATE, STRIDE_WINDOW = 1.0, 0.05
-"""The same in stride, slowly and whatever a push does: 6 kg that are believed 2 cm beside their
-place, as gravity is known to 1 deg, leaned a trot by 4 deg."""
+"""How the lean is taken out in stride [1/s], [rad], slowly and whatever a push does: 6 kg that are
+believed 2 cm beside their place, as gravity is known to 1 deg, leaned a trot by 4 deg. A robot that
+stands ready does it as a motion does: the joints' friction leaves 2.5 deg of a pose undone, and a
+payload that reaches farther than is believed leans it by 4 deg."""
 LEAN_LIMIT = 0.15
 """Greatest lean [rad] that is taken out."""
 
@@ -46,8 +49,8 @@ class Command(Record):
         pose: of the trunk: height [m], roll, pitch, yaw [rad]; see ``BodyPose``.
     """
 
-    velocity: Float[np.ndarray, "3"]
-    pose: Float[np.ndarray, "4"]
+    velocity: Array3
+    pose: Array4
 
 
 class Trunk(Record):
@@ -65,11 +68,11 @@ class Trunk(Record):
 
     yaw: float
     position: Float[np.ndarray, "2"]
-    velocity: Float[np.ndarray, "3"]
+    velocity: Array3
     height_offset: float
     lean_offset: Float[np.ndarray, "2"]
-    pose: Float[np.ndarray, "4"]
-    pose_rate: Float[np.ndarray, "4"]
+    pose: Array4
+    pose_rate: Array4
 
 
 @subroutine
@@ -102,13 +105,7 @@ def world_velocity(trunk: Trunk) -> tuple[float, float]:
 
 
 @subroutine
-def ramp(
-    velocity: Float[np.ndarray, "3"],
-    command: Command,
-    linear: float,
-    angular: float,
-    dt: float,
-) -> None:
+def ramp(velocity: Array3, command: Command, linear: float, angular: float, dt: float) -> None:
     """Bring a velocity nearer to the commanded one, by these accelerations [m/s^2], [rad/s^2]."""
     for i in range(3):
         most = (angular if i == 2 else linear) * dt
@@ -143,11 +140,11 @@ def correct_height(trunk: Trunk, now: Snapshot, height: float, dt: float) -> Non
     """Integrate the error from ``height`` [m], the pose's added: a payload makes it sag."""
     sag = height + trunk.pose[0] - now.p_world_com[2]
     offset = trunk.height_offset
-    trunk.height_offset = integrated(offset, sag, dt, SAG_RATE, SAG_WINDOW, SAG_LIMIT)
+    trunk.height_offset = integrated(offset, sag, dt, RATE, POSITION_WINDOW, POSITION_LIMIT)
 
 
 @subroutine
-def fill_body(trunk: Trunk, ground: Ground, c: GroundConfig, height: float, target: Target) -> None:
+def fill_body(trunk: Trunk, ground: Ground, height: float, target: Target) -> None:
     """The trunk's reference: along the ground, its CoM at ``height`` [m], with the pose."""
     target.is_com = True
     p, v, R = target.p_world, target.v_world, target.R_world_base
@@ -157,7 +154,7 @@ def fill_body(trunk: Trunk, ground: Ground, c: GroundConfig, height: float, targ
     v[0], v[1] = world_velocity(trunk)
     v[2] = ground.slope[0] * v[0] + ground.slope[1] * v[1] + trunk.pose_rate[0]
     cosine, sine = np.cos(trunk.yaw), np.sin(trunk.yaw)
-    a, b = tilt(ground, c)
+    a, b = tilt(ground)
     rise = a * cosine + b * sine
     length, steep = np.sqrt(1.0 + rise * rise), np.sqrt(1.0 + a * a + b * b)
     x = cosine / length, sine / length, rise / length
@@ -189,16 +186,10 @@ def level(
     """
     wanted, offset, R = target.R_world_base, trunk.lean_offset, now.R_world_base
     if is_stepping or (contact[0] and contact[1] and contact[2] and contact[3]):
-        rate = STRIDE_RATE if is_stepping else READY_RATE
-        window = STRIDE_WINDOW if is_stepping else READY_WINDOW
+        rate = STRIDE_RATE if is_stepping else RATE
+        window = STRIDE_WINDOW if is_stepping else ANGLE_WINDOW
         measured = R[0, 2], R[1, 2], R[2, 2]
         error = cross(measured, (wanted[0, 2], wanted[1, 2], wanted[2, 2]))
         for i in range(2):
             offset[i] = integrated(offset[i], error[i], dt, rate, window, LEAN_LIMIT)
-    turn, before = np.empty((3, 3)), wanted.copy()
-    rotation_by((offset[0], offset[1], 0.0), turn)
-    for i in range(3):
-        for k in range(3):
-            wanted[i, k] = (
-                turn[i, 0] * before[0, k] + turn[i, 1] * before[1, k] + turn[i, 2] * before[2, k]
-            )
+    turn_by((offset[0], offset[1], 0.0), wanted)

@@ -9,24 +9,35 @@ from jaxtyping import Float
 
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ConfigError
-from go2_wbc.planning.contact import ContactConfig, FootContact
+from go2_wbc.planning import contact, ground, slip
+from go2_wbc.planning.contact import FootContact
 from go2_wbc.planning.gait_clock import Cadence, Clock
-from go2_wbc.planning.ground import Ground, GroundConfig
-from go2_wbc.planning.mpc import MpcConfig, Robot
+from go2_wbc.planning.ground import Ground
+from go2_wbc.planning.mpc import Horizon, MpcConfig
 from go2_wbc.planning.pose import PoseConfig
-from go2_wbc.planning.slip import Slip, SlipConfig
+from go2_wbc.planning.slip import Slip
 from go2_wbc.planning.swing import Swing, SwingConfig
 from go2_wbc.planning.trunk import Trunk
 from go2_wbc.records import Record
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Retired, ranged, retires
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Retired, past_table, ranged, retires
 
 LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34
 """CoM heights [m] between which the legs can step."""
 
 
 @dataclass(frozen=True, slots=True)
-@retires(load_ramp=Retired(0.03, "LocomotionConfig.mpc.load_ramp counts"))
+@retires(
+    load_ramp=Retired(0.03, "LocomotionConfig.mpc.load_ramp counts"),
+    contact=past_table(contact, "earliest", "step"),
+    ground=past_table(
+        *(ground, "slope_share", "follow", "smooth", "most_raise", "calming", "stumble", "delay")
+    ),
+    slip=past_table(
+        *(slip, "speed", "patience", "mask", "steepness", "time_constant", "recovery", "least"),
+        *("most", "half_speed"),
+    ),
+)
 @ranged(
     POSITIVE,
     compression=NOT_NEGATIVE,
@@ -57,9 +68,6 @@ class LocomotionConfig:
         square_tolerance: distance [m] of a foot from below its hip at which the robot stands
             squarely enough to stop stepping.
         swing: shape of the swing.
-        slip: estimate of the friction.
-        contact: when measured contacts count.
-        ground: estimate of its slope and roughness.
         mpc: planning of the forces ahead.
         pose: how a new pose of the trunk is approached.
     """
@@ -79,9 +87,6 @@ class LocomotionConfig:
     capture_margin: float = 0.09
     square_tolerance: float = 0.02
     swing: SwingConfig = field(default_factory=SwingConfig)
-    slip: SlipConfig = field(default_factory=SlipConfig)
-    contact: ContactConfig = field(default_factory=ContactConfig)
-    ground: GroundConfig = field(default_factory=GroundConfig)
     mpc: MpcConfig = field(default_factory=MpcConfig)
     pose: PoseConfig = field(default_factory=PoseConfig)
 
@@ -165,7 +170,7 @@ class Planner(Record):
     Attributes:
         time: of the last tick [s].
         is_stepping: whether the gait is running.
-        robot: as the MPC sees it now.
+        horizon: what the MPC has looked at last.
     """
 
     time: float
@@ -176,4 +181,4 @@ class Planner(Record):
     slip: Slip
     feet: tuple[Foot, Foot, Foot, Foot]
     planned: PlannedForces
-    robot: Robot
+    horizon: Horizon

@@ -2,8 +2,36 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from go2_wbc.plant.base import Plant
+from go2_wbc.plant.mujoco.model import JointDynamics
 from go2_wbc.plant.mujoco.plant import MujocoPlant
-from go2_wbc.plant.mujoco.worlds import plant_in_world
+from go2_wbc.world import World
 
 __all__ = ["MujocoPlant", "Plant", "plant_in_world"]
+
+
+def plant_in_world(
+    world: World, *, seed: int = 0, initial_yaw: float = 0.0, initial_joint_noise: float = 0.0
+) -> MujocoPlant:
+    """A simulated robot in ``world``.
+
+    Args:
+        world: what is uncertain in it is drawn.
+        seed: of that, and of every other random number of the plant.
+        initial_yaw, initial_joint_noise: heading and spread of the joints at the start [rad].
+    """
+    own = world.sample(np.random.default_rng(seed))
+    return MujocoPlant(
+        friction=own.friction,
+        payload=own.payload,
+        payload_place=own.payload_place,
+        mass_scale=own.mass_scale,
+        joint_dynamics=JointDynamics().scaled(own.joint_friction),
+        sensors=own.sensors,
+        delay=own.delay,
+        seed=seed,
+        initial_yaw=initial_yaw,
+        initial_joint_noise=initial_joint_noise,
+    )

@@ -22,14 +22,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.curves import keyframes
+from go2_wbc.curves import Curve
 from go2_wbc.errors import PlantError, PlantTimeout
 from go2_wbc.legs import JOINT_NAMES, LEGS
 from go2_wbc.plant.base import Plant
 from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, RobotState
-from go2_wbc.validation import POSITIVE, ranged
 
 SPEEDS = (0.25, 0.5, 1.0, 1.5)
 """Joint speeds [rad/s]; the dry part shows at the low ones, the viscous part at the high ones."""
@@ -53,25 +52,14 @@ VISCOUS_SHARE = 0.75
 """Share of the viscous friction that is fed forward: too much of it puts power into the joint."""
 CERTAIN = 2.0
 """Standard errors by which the viscous friction might be less than was measured."""
-
-
-@dataclass(frozen=True, slots=True)
-@ranged(POSITIVE)
-class SweepConfig:
-    """How the joints are moved, and what counts as a measurement.
-
-    Attributes:
-        kp: stiffness [N m/rad] of the servo: dry friction of 1.4 N m holds it off by 1 deg.
-        kd: damping [N m s/rad] of the servo.
-        speed_tolerance: share by which a joint may miss the speed that it shall have.
-        misfit: difference [N m] between the measured friction and the straight line, root mean
-            square, beyond which the line says nothing.
-    """
-
-    kp: float = 80.0
-    kd: float = 3.0
-    speed_tolerance: float = 0.2
-    misfit: float = 0.1
+KP, KD = 80.0, 3.0
+"""Stiffness [N m/rad] and damping [N m s/rad] of the servo: dry friction of 1.4 N m holds it off by
+1 deg."""
+SPEED_TOLERANCE = 0.2
+"""Share by which a joint may miss the speed that it shall have."""
+MISFIT = 0.1
+"""Difference [N m] between the measured friction and the straight line, root mean square, beyond
+which the line says nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,9 +96,7 @@ class FrictionEstimate:
 
 
 def identify_friction(
-    plant: Plant,
-    config: SweepConfig | None = None,
-    on_progress: Callable[[float], None] = lambda _: None,
+    plant: Plant, on_progress: Callable[[float], None] = lambda _: None
 ) -> FrictionEstimate:
     """Move every joint of a robot that lies, and say what friction it has.
 
@@ -119,14 +105,13 @@ def identify_friction(
 
     Args:
         plant: lies on its belly with room of 0.5 m around it.
-        config: how the joints are moved.
         on_progress: is called with the share that is done, 0 to 1.
 
     Raises:
         PlantError: if the robot does not lie, a joint does not follow, a foot meets something, or
             the friction is no sum of a dry and a viscous part; or the plant's own.
     """
-    sweep = _Sweep(plant, config or SweepConfig())
+    sweep = _Sweep(plant)
     sweep.require_lying()
     measured = np.zeros((12, len(SPEEDS), 2))
     try:
@@ -142,18 +127,17 @@ def identify_friction(
         sweep.go_to(0.5, _all_legs(FOLDED))
     finally:
         sweep.go_limp()
-    return fitted(measured[:, :, 0], measured[:, :, 1], sweep.config.misfit)
+    return fitted(measured[:, :, 0], measured[:, :, 1])
 
 
 def fitted(
-    speeds: Float[np.ndarray, "12 n"], frictions: Float[np.ndarray, "12 n"], misfit: float
+    speeds: Float[np.ndarray, "12 n"], frictions: Float[np.ndarray, "12 n"]
 ) -> FrictionEstimate:
     """Dry and viscous friction of each joint, by least squares.
 
     Args:
         speeds: measured [rad/s], at least three for each joint.
         frictions: measured there [N m].
-        misfit: greatest root mean square [N m] of what the line leaves.
 
     Raises:
         PlantError: if the measurements of a joint lie on no line, or it has negative friction.
@@ -164,16 +148,16 @@ def fitted(
         values[:, joint] = np.linalg.lstsq(A, friction, rcond=None)[0]
         left = friction - A @ values[:, joint]
         off = float(np.sqrt(np.mean(left * left)))
-        if not off <= misfit:
+        if not off <= MISFIT:
             raise PlantError(
                 f"the friction of {JOINT_NAMES[joint]} is no sum of a dry and a viscous part: off "
-                f"by {off:.3f} N m, at most {misfit:g}; does the leg touch anything?"
+                f"by {off:.3f} N m, at most {MISFIT:g}; does the leg touch anything?"
             )
         variance = float(left @ left) / (len(speed) - 2)
         errors[:, joint] = np.sqrt(variance * np.diag(np.linalg.inv(A.T @ A)))
     for name, row, error in zip(("dry", "viscous"), values, errors, strict=True):
         joint = int(np.argmin(row + CERTAIN * error))
-        if row[joint] < -CERTAIN * error[joint] - misfit:
+        if row[joint] < -CERTAIN * error[joint] - MISFIT:
             raise PlantError(
                 f"the {name} friction of {JOINT_NAMES[joint]} came out as {row[joint]:.3f}, below "
                 "0: are the signs of the plant's torques and speeds right?"
@@ -185,8 +169,8 @@ def fitted(
 class _Sweep:
     """Moves the joints of one plant, tick by tick."""
 
-    def __init__(self, plant: Plant, config: SweepConfig) -> None:
-        self._plant, self.config = plant, config
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
         self._model = RobotModel()
         self._state: RobotState = plant.read()
         self._target = self._state.joint_positions.copy()
@@ -203,7 +187,7 @@ class _Sweep:
 
     def go_to(self, duration: float, target: Float[np.ndarray, "12"]) -> None:
         """Move all joints to ``target`` within ``duration`` seconds."""
-        curve = keyframes([0.0, duration], [self._target, target])
+        curve = Curve((0.0, duration), (self._target, target))
         for t in self._ticks(duration):
             point = curve.at(t)
             self._servo(point.value, point.rate)
@@ -252,7 +236,7 @@ class _Sweep:
         self, joints: np.ndarray, v: Float[np.ndarray, "4"], speed: float
     ) -> None:
         worst = int(np.abs(v - speed).argmax())
-        if abs(v[worst] - speed) > self.config.speed_tolerance * speed:
+        if abs(v[worst] - speed) > SPEED_TOLERANCE * speed:
             raise PlantError(
                 f"{JOINT_NAMES[joints[worst]]} moved at {v[worst]:.2f} rad/s instead of "
                 f"{speed:g}: is it free to move?"
@@ -269,7 +253,7 @@ class _Sweep:
         raise PlantTimeout(f"the plant's clock stands still at t={self._state.time:.3f} s")
 
     def _servo(self, q: Float[np.ndarray, "12"], v: Float[np.ndarray, "12"]) -> None:
-        self._plant.write(JointCommand.servo(q, v, self.config.kp, self.config.kd))
+        self._plant.write(JointCommand.servo(q, v, KP, KD))
         self._state = self._plant.read()
 
     def go_limp(self) -> None:

@@ -49,11 +49,19 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
 
+from go2_wbc.algebra.vectors import cross, triple
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.legs import LEGS
-from go2_wbc.records import Record, packed
+from go2_wbc.records import (
+    Array3,
+    Array3x3,
+    Array4x3,
+    Array18,
+    Array19,
+    Record,
+    packed,
+)
 from go2_wbc.robot.description import BASE_LINK
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.foot_odometry import Foot, Level, follow_foot, see_foot, see_ground, take_in_leg
@@ -61,7 +69,6 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, foot_places, leg_tab
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rest_detection import (
     TUMBLED,
-    Reading,
     Rest,
     begin_anew,
     is_at_rest,
@@ -115,7 +122,7 @@ class EstimatorNumbers:
 
     config: EstimatorConfig
     legs: Legs
-    p_base_imu: Float[np.ndarray, "3"]
+    p_base_imu: Array3
     foot_radius: float
     gravity: float
 
@@ -132,7 +139,7 @@ class EstimatorState(Record):
     """
 
     filter: Filter
-    gyro: Float[np.ndarray, "3"]
+    gyro: Array3
     rest: Rest
     level: Level
     feet: tuple[Foot, Foot, Foot, Foot]
@@ -148,20 +155,16 @@ def learning(x: Estimate, speed: float) -> float:
 @subroutine
 def report(
     x: Estimate,
-    reading: Reading,
-    w: Float[np.ndarray, "3"],
-    p_imu: Float[np.ndarray, "3"],
-    R: Float[np.ndarray, "3 3"],
-    q: Float[np.ndarray, "19"],
-    v: Float[np.ndarray, "18"],
+    reading: SensorReading,
+    w: Array3,
+    p_imu: Array3,
+    R: Array3x3,
+    q: Array19,
+    v: Array18,
 ) -> None:
     """Fill q (19,) and v (18,) of a ``RobotState`` from the motion of the IMU."""
     rotation_of_estimate(x, R)
-    turning = (
-        w[1] * p_imu[2] - w[2] * p_imu[1],
-        w[2] * p_imu[0] - w[0] * p_imu[2],
-        w[0] * p_imu[1] - w[1] * p_imu[0],
-    )
+    turning = cross(triple(w), triple(p_imu))
     for i in range(3):
         q[i], v[i], v[3 + i] = x.p[i], -turning[i], w[i]
         for k in range(3):
@@ -174,10 +177,11 @@ def report(
 @subroutine
 def follow_feet(
     s: EstimatorState,
-    reading: Reading,
+    reading: SensorReading,
+    dt: float,
     c: EstimatorNumbers,
-    w: Float[np.ndarray, "3"],
-    R: Float[np.ndarray, "3 3"],
+    w: Array3,
+    R: Array3x3,
     rests: bool,
 ) -> bool:
     """Let the legs measure, and move the feet on; returns whether some foot stands."""
@@ -190,7 +194,7 @@ def follow_feet(
         pressed = c.foot_radius - 0.5 * told.compliance * force
         q, u = reading.q_joints[joints], reading.v_joints[joints]
         see_foot(foot, c.legs.geometry[leg], q, u, c.p_base_imu, w, pressed, R)
-        age = follow_foot(f, foot, leg, force, reading.dt, vertical, rests, told)
+        age = follow_foot(f, foot, leg, force, dt, vertical, rests, told)
         see_ground(f, foot, leg, force, age, c.foot_radius, s.level, told)
         if foot.carries:
             is_carried = True
@@ -200,16 +204,17 @@ def follow_feet(
 @kernel
 def estimate(
     s: EstimatorState,
-    reading: Reading,
+    reading: SensorReading,
+    dt: float,
     c: EstimatorNumbers,
-    q: Float[np.ndarray, "19"],
-    v: Float[np.ndarray, "18"],
+    q: Array19,
+    v: Array18,
 ) -> int:
-    """Take in a reading, ``reading.dt`` seconds after the last one, and fill the robot's state.
+    """Take in a reading, ``dt`` seconds after the last one, and fill the robot's state.
 
     Returns whether the estimate has to begin anew, and why; see ``begin_anew``.
     """
-    f, told, dt, gravity = s.filter, c.config, reading.dt, c.gravity
+    f, told, gravity = s.filter, c.config, c.gravity
     x, P = f.x, f.P
     w, mean, R, noise = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty(ERROR)
     f.error[:] = 0.0
@@ -218,16 +223,16 @@ def estimate(
         mean[k] = 0.5 * (reading.gyro[k] + s.gyro[k]) - x.gyro_bias[k]
         s.gyro[k] = reading.gyro[k]
     process_noise(told, dt, noise)
-    rests = is_at_rest(x, s.rest, reading, gravity, told)
+    rests = is_at_rest(x, s.rest, reading, dt, gravity, told)
     predict(f, dt, mean, reading.accelerometer, gravity, R, noise)
     rotation_of_estimate(x, R)
     biases = slice(GYRO_BIAS, FEET)
     before, share_learnt = P[biases, biases].copy(), learning(x, told.learning_speed)
     s.level.doubt_time = max(s.level.doubt_time - dt, 0.0)
-    is_carried = follow_feet(s, reading, c, w, R, rests)
+    is_carried = follow_feet(s, reading, dt, c, w, R, rests)
     for leg in range(4):
         take_in_leg(f, s.feet[leg], leg, told)
-    is_lying = lies(x, s.rest, reading, is_carried, gravity, told)
+    is_lying = lies(x, s.rest, reading, dt, is_carried, gravity, told)
     if is_upset(s.rest, dt, is_lying, R) and not rests:
         share_learnt = 0.0
     if rests:
@@ -241,7 +246,7 @@ def estimate(
     for k in range(3):
         w[k] = reading.gyro[k] - x.gyro_bias[k]
     report(x, reading, w, c.p_base_imu, R, q, v)
-    return begin_anew(x, s.rest, reading, R, gravity, told)
+    return begin_anew(x, s.rest, reading, dt, R, gravity, told)
 
 
 class StateEstimator:
@@ -262,7 +267,9 @@ class StateEstimator:
         sizes = self._p_base_imu, model.foot_radius, model.gravity
         self._numbers = packed(EstimatorNumbers(self._config, leg_table(model), *sizes))
         self._time = -np.inf  # before the first reading
-        self._reading, self._state = Reading(), EstimatorState()
+        zeros = np.zeros(12)
+        reading = SensorReading(0.0, zeros[:3], zeros[:3], zeros, zeros, zeros, zeros[:4])
+        self._reading, self._state = packed(reading), EstimatorState()
         self._x, self._P = self._state.filter.x, self._state.filter.P
         self._x.quaternion[3] = 1.0
         self.watch = SensorWatch(model)
@@ -276,12 +283,11 @@ class StateEstimator:
         if not 0.0 <= step <= self._config.longest_step:
             self._begin(reading)
             step = 0.0
-        self._read(reading, step)
+        self._read(reading)
         q, v = np.empty(19), np.empty(18)
-        if off := estimate(self._state, self._reading, self._numbers, q, v):
+        if off := estimate(self._state, self._reading, step, self._numbers, q, v):
             self._forget(reading, keeps_height=off == TUMBLED)
-            self._reading.dt = 0.0
-            estimate(self._state, self._reading, self._numbers, q, v)
+            estimate(self._state, self._reading, 0.0, self._numbers, q, v)
         self._time = reading.time
         return RobotState(
             time=reading.time,
@@ -292,7 +298,7 @@ class StateEstimator:
             feet_in_contact=reading.foot_forces > self._config.contact_force,
         )
 
-    def _turn_back(self, turn: Float[np.ndarray, "3"]) -> None:
+    def _turn_back(self, turn: Array3) -> None:
         """Take back a turn [rad] in the base frame that was none, and doubt tilt and velocity."""
         R = pin.Quaternion(self._x.quaternion).toRotationMatrix() @ pin.exp3(-turn)
         self._x.quaternion[:] = pin.Quaternion(R).coeffs()
@@ -300,9 +306,8 @@ class StateEstimator:
             doubted = range(first, first + count)
             self._P[doubted, doubted] += deviation**2
 
-    def _read(self, reading: SensorReading, step: float) -> None:
+    def _read(self, reading: SensorReading) -> None:
         taken = self._reading
-        taken.dt = step
         taken.gyro[:], taken.accelerometer[:] = reading.gyro, reading.accelerometer
         taken.q_joints[:], taken.v_joints[:] = reading.q_joints, reading.v_joints
         taken.foot_forces[:] = reading.foot_forces
@@ -377,18 +382,14 @@ class StateEstimator:
         for foot in s.feet:
             foot.age = 0.0
 
-    def _feet(
-        self, reading: SensorReading, R: Float[np.ndarray, "3 3"]
-    ) -> Float[np.ndarray, "4 3"]:
+    def _feet(self, reading: SensorReading, R: Array3x3) -> Array4x3:
         """Places of the feet's centres [m] from the IMU, along the world's axes."""
         angles = reading.q_joints.reshape(4, 1, 3)
         places = [foot_places(leg, q) for leg, q in zip(self._geometry, angles, strict=True)]
         return (np.concatenate(places) - self._p_base_imu) @ R.T
 
 
-def _upright(
-    R: Float[np.ndarray, "3 3"], force: Float[np.ndarray, "3"]
-) -> Float[np.ndarray, "3 3"]:
+def _upright(R: Array3x3, force: Array3) -> Array3x3:
     """The orientation with the heading of ``R`` in which ``force`` points up."""
     up = force / np.linalg.norm(force)
     roll = np.arctan2(up[1], up[2])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from go2_wbc.errors import ConfigError
-from go2_wbc.validation import require_positive
+from go2_wbc.validation import POSITIVE, ranged
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
 class EstimatorConfig:
     """Standard deviations of what the filter is told, and when a foot counts as on the ground.
 
@@ -101,8 +102,7 @@ class EstimatorConfig:
     longest_step: float = 0.1
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is not positive, or forces the wrong way round."""
-        require_positive(self, *(f.name for f in fields(self)))
+        """Raise ConfigError for forces the wrong way round."""
         if self.trusted_force <= self.contact_force:
             raise ConfigError(
                 f"trusted_force must be above contact_force ({self.contact_force:g} N), "

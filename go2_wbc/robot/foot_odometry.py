@@ -17,11 +17,10 @@ a speed of its own, which is its part of Q.
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
 
-from go2_wbc.algebra.vectors import put
+from go2_wbc.algebra.vectors import put, turned
 from go2_wbc.compilation import subroutine
-from go2_wbc.records import Record
+from go2_wbc.records import Array3, Array3x3, Record
 from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.leg_kinematics import LegGeometry
 from go2_wbc.robot.state_filter import (
@@ -29,7 +28,6 @@ from go2_wbc.robot.state_filter import (
     THETA,
     VELOCITY,
     Filter,
-    put_turned,
     take_in,
     take_in_one,
 )
@@ -58,12 +56,12 @@ class Foot(Record):
     """
 
     age: float
-    place: Float[np.ndarray, "3"]
-    velocity: Float[np.ndarray, "3"]
-    rolling: Float[np.ndarray, "3"]
+    place: Array3
+    velocity: Array3
+    rolling: Array3
     speed: float
     carries: bool
-    variance: Float[np.ndarray, "3"]
+    variance: Array3
     height_off: float
 
 
@@ -83,12 +81,12 @@ class Level(Record):
 def see_foot(
     foot: Foot,
     leg: LegGeometry,
-    q: Float[np.ndarray, "3"],
-    u: Float[np.ndarray, "3"],
-    p_imu: Float[np.ndarray, "3"],
-    w: Float[np.ndarray, "3"],
+    q: Array3,
+    u: Array3,
+    p_imu: Array3,
+    w: Array3,
     radius: float,
-    R: Float[np.ndarray, "3 3"],
+    R: Array3x3,
 ) -> None:
     """Fill what a leg measures, along the world's axes.
 
@@ -108,10 +106,9 @@ def see_foot(
     dx += w[1] * z - w[2] * y
     dy += w[2] * x - w[0] * z
     dz = (width * c1 + down * s1) * u[0] - longer * c1 + w[0] * y - w[1] * x
-    put_turned(R, (x, y, z), foot.place)
-    put_turned(R, (-dx, -dy, -dz), foot.velocity)
-    put_turned(R, (w[0] + u[0], w[1] + c1 * bend, w[2] + s1 * bend), foot.rolling)
-    x, y, z = foot.rolling[0], foot.rolling[1], foot.rolling[2]
+    put(turned(R, (x, y, z)), foot.place)
+    put(turned(R, (-dx, -dy, -dz)), foot.velocity)
+    x, y, _ = turned(R, (w[0] + u[0], w[1] + c1 * bend, w[2] + s1 * bend))
     put((radius * y, -radius * x, 0.0), foot.rolling)  # w x (0, 0, r)
     foot.velocity[0] += foot.rolling[0]
     foot.velocity[1] += foot.rolling[1]
@@ -227,16 +224,11 @@ def take_in_leg(f: Filter, foot: Foot, leg: int, c: EstimatorConfig) -> None:
     and a mean of their product, which tilted a standing robot by a degree a minute.
     """
     x, s, m, variance = f.x, foot.place, foot.velocity, c.place**2
-    places, shares = np.empty(4, np.int64), np.empty(4)
+    places, shares, first = np.empty(4, np.int64), np.empty(4), FEET + 3 * leg
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         # R s = f - p - theta x R s; the k-th number of the product has those at i and j
-        places[0], places[1], places[2], places[3] = (
-            FEET + 3 * leg + k,
-            k,
-            THETA + i,
-            THETA + j,
-        )
+        places[0], places[1], places[2], places[3] = first + k, k, THETA + i, THETA + j
         shares[0], shares[1], shares[2], shares[3] = 1.0, -1.0, -s[j], s[i]
         off = s[k] - x.p_feet[leg, k] + x.p[k]
         take_in(f, places, shares, 4, off, variance)
@@ -246,4 +238,4 @@ def take_in_leg(f: Filter, foot: Foot, leg: int, c: EstimatorConfig) -> None:
             off = m[k] - x.v[k]
             take_in(f, places[1:], shares[1:], 3, off, foot.variance[k])
     if foot.height_off != np.inf:
-        take_in_one(f, FEET + 2 + 3 * leg, foot.height_off, c.height**2)
+        take_in_one(f, first + 2, foot.height_off, c.height**2)

@@ -25,9 +25,23 @@ from jaxtyping import Float
 from go2_wbc.errors import DescriptionError, IkError, ResidualRow
 from go2_wbc.geometry import convex_hull, support_margin
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS, Leg
+from go2_wbc.records import Array4x3, Array19
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 
+FOOT_WEIGHT, BODY_WEIGHT = 1e4, 1.0
+"""Of the soft foot positions and of the raised leg's joints, and of the trunk's height, against 1
+rad^2 of its orientation; own choice, as the following."""
+POSTURE_WEIGHT, DAMPING = 1e-4, 1e-6
+"""What pulls the standing legs towards the start, and so chooses among equal poses, and what keeps
+the QP of a step definite at singularities."""
+MAX_STEP, CONVERGED_STEP = 0.3, 1e-7
+"""Longest change [rad or m] of a coordinate in one step, and that below which it has converged."""
+MAX_ITERATIONS = 200
+"""Of each of the two phases."""
+POSITION_TOLERANCE, ANGLE_TOLERANCE, CONSTRAINT_TOLERANCE = 1e-4, 1e-3, 1e-5
+"""Largest error [m] of a foot or of the height, [rad] of the orientation and of a raised leg's
+joints, and violation [m, rad] of CoM margin and joint limits."""
 _BASE = "base"
 _ROBOTS: WeakKeyDictionary[RobotModel, placo.RobotWrapper] = WeakKeyDictionary()
 """PlaCo's robot of every living model for which a pose was solved; loading one takes 6 ms."""
@@ -46,7 +60,7 @@ class PoseTargets:
         joint_margin: least distance [rad] of every joint to its limits.
     """
 
-    p_world_feet: Float[np.ndarray, "4 3"]
+    p_world_feet: Array4x3
     rpy: tuple[float, float, float]
     height: float
     raised: Leg | None = None
@@ -62,36 +76,6 @@ class PoseTargets:
     def polygon(self) -> Float[np.ndarray, "k 2"]:
         """Points on the ground [m] that span the polygon for the CoM."""
         return self.p_world_feet[list(self.stance), :2]
-
-
-@dataclass(frozen=True, slots=True)
-class IkConfig:
-    """Numbers of the inverse kinematics. Own choice unless said otherwise.
-
-    Attributes:
-        foot_weight: of the soft foot positions, against 1 rad^2 of trunk orientation, and of the
-            raised leg's joints.
-        body_weight: of the soft trunk height and orientation.
-        posture_weight: pulls the standing legs towards ``q_start``; chooses among equal poses.
-        damping: of each step, keeps the QP definite at singularities.
-        max_step: longest change [rad or m] of a coordinate in one step.
-        converged_step: step [rad or m] below which the iteration has converged.
-        max_iterations: of each of the two phases.
-        position_tolerance: largest error [m] of a foot or of the height.
-        angle_tolerance: largest error [rad] of the orientation and of a raised leg's joints.
-        constraint_tolerance: largest violation [m, rad] of CoM margin and joint limits.
-    """
-
-    foot_weight: float = 1e4
-    body_weight: float = 1.0
-    posture_weight: float = 1e-4
-    damping: float = 1e-6
-    max_step: float = 0.3
-    converged_step: float = 1e-7
-    max_iterations: int = 200
-    position_tolerance: float = 1e-4
-    angle_tolerance: float = 1e-3
-    constraint_tolerance: float = 1e-5
 
 
 def load_placo_robot(model: RobotModel) -> placo.RobotWrapper:
@@ -123,12 +107,7 @@ def load_placo_robot(model: RobotModel) -> placo.RobotWrapper:
     return robot
 
 
-def solve_pose(
-    model: RobotModel,
-    targets: PoseTargets,
-    q_start: Float[np.ndarray, "19"],
-    config: IkConfig | None = None,
-) -> Float[np.ndarray, "19"]:
+def solve_pose(model: RobotModel, targets: PoseTargets, q_start: Array19) -> Array19:
     """The pose that meets ``targets``, found from ``q_start`` and as near to it as they allow.
 
     Only one thread at a time may solve with the same ``model``; see the module.
@@ -136,25 +115,24 @@ def solve_pose(
     Raises:
         IkError: if a target is missed by more than its tolerance; the message gives the table.
     """
-    config = config or IkConfig()
     robot = _ROBOTS.get(model)
     if robot is None:
         robot = _ROBOTS[model] = load_placo_robot(model)
     _limit_joints(robot, model, targets.joint_margin)
     robot.state.q = q_start
     robot.update_kinematics()
-    solver, exact_tasks = _formulate(robot, targets, q_start, config)
-    iterations, failure = _iterate(solver, robot, config)
+    solver, exact_tasks = _formulate(robot, targets, q_start)
+    iterations, failure = _iterate(solver, robot)
     if not failure:
         soft_q = np.array(robot.state.q)
         for task in exact_tasks:
             task.configure(task.name, "hard", 1.0)
-        more, failure = _iterate(solver, robot, config)
+        more, failure = _iterate(solver, robot)
         iterations += more
         if failure:
             robot.state.q = soft_q
     q = np.array(robot.state.q)
-    rows = _residuals(model, targets, q_start, q, config)
+    rows = _residuals(model, targets, q_start, q)
     missed = [(row, limit) for row, limit in rows if not row.norm <= limit]
     if missed:
         table = [f"  {r.name:<20} {r.norm:10.3g} {r.unit} (limit {at:g})" for r, at in missed]
@@ -170,10 +148,7 @@ def _limit_joints(robot: placo.RobotWrapper, model: RobotModel, margin: float) -
 
 
 def _formulate(
-    robot: placo.RobotWrapper,
-    targets: PoseTargets,
-    q_start: Float[np.ndarray, "19"],
-    config: IkConfig,
+    robot: placo.RobotWrapper, targets: PoseTargets, q_start: Array19
 ) -> tuple[placo.KinematicsSolver, list[placo.Task]]:
     """PlaCo's solver with every target soft, and the tasks to be made exact afterwards."""
     solver = placo.KinematicsSolver(robot)
@@ -181,19 +156,19 @@ def _formulate(
     exact: list[placo.Task] = []
     for leg in targets.stance:
         exact.append(solver.add_position_task(leg.foot, targets.p_world_feet[leg]))
-        exact[-1].configure(leg.foot, "soft", config.foot_weight)
+        exact[-1].configure(leg.foot, "soft", FOOT_WEIGHT)
     if targets.raised is not None:
         exact.append(_joints_task(solver, [targets.raised], q_start))
-        exact[-1].configure("raised leg", "soft", config.foot_weight)
+        exact[-1].configure("raised leg", "soft", FOOT_WEIGHT)
     orientation = solver.add_orientation_task(_BASE, rotation_from_rpy(*targets.rpy))
-    orientation.configure("orientation", "soft", config.body_weight)
+    orientation.configure("orientation", "soft", BODY_WEIGHT)
     height = solver.add_position_task(_BASE, np.array([0.0, 0.0, targets.height]))
     height.mask.set_axises("z")
-    height.configure("height", "soft", config.body_weight)
+    height.configure("height", "soft", BODY_WEIGHT)
     exact += [orientation, height]
     posture = _joints_task(solver, targets.stance, q_start)
-    posture.configure("posture", "soft", config.posture_weight)
-    solver.add_regularization_task(config.damping)
+    posture.configure("posture", "soft", POSTURE_WEIGHT)
+    solver.add_regularization_task(DAMPING)
     clockwise = list(convex_hull(targets.polygon)[::-1])
     polygon = solver.add_com_polygon_constraint(clockwise, targets.com_margin)
     polygon.configure("CoM polygon", "hard", 1.0)
@@ -201,7 +176,7 @@ def _formulate(
 
 
 def _joints_task(
-    solver: placo.KinematicsSolver, legs: Sequence[Leg], q: Float[np.ndarray, "19"]
+    solver: placo.KinematicsSolver, legs: Sequence[Leg], q: Array19
 ) -> placo.JointsTask:
     task = solver.add_joints_task()
     for leg in legs:
@@ -209,46 +184,40 @@ def _joints_task(
     return task
 
 
-def _iterate(
-    solver: placo.KinematicsSolver, robot: placo.RobotWrapper, config: IkConfig
-) -> tuple[int, str]:
+def _iterate(solver: placo.KinematicsSolver, robot: placo.RobotWrapper) -> tuple[int, str]:
     """Steps until converged; returns their number and why the QP failed, or an empty text."""
-    for iteration in range(config.max_iterations):
+    for iteration in range(MAX_ITERATIONS):
         try:
             step = solver.solve(False)
         except RuntimeError as error:
             return iteration, str(error)
         largest = float(np.abs(step).max())
-        step = step * min(1.0, config.max_step / max(largest, config.converged_step))
+        step = step * min(1.0, MAX_STEP / max(largest, CONVERGED_STEP))
         robot.state.q = pin.integrate(robot.model, robot.state.q, step)
         robot.update_kinematics()
-        if largest < config.converged_step:
+        if largest < CONVERGED_STEP:
             return iteration + 1, ""
-    return config.max_iterations, ""
+    return MAX_ITERATIONS, ""
 
 
 def _residuals(
-    model: RobotModel,
-    targets: PoseTargets,
-    q_start: Float[np.ndarray, "19"],
-    q: Float[np.ndarray, "19"],
-    config: IkConfig,
+    model: RobotModel, targets: PoseTargets, q_start: Array19, q: Array19
 ) -> list[tuple[ResidualRow, float]]:
     """How far ``q`` misses each target, with the tolerance."""
     com, feet = model.forward_kinematics(q)
-    joints, most = q[7:], config.position_tolerance
+    joints, most = q[7:], POSITION_TOLERANCE
     off = np.linalg.norm(feet - targets.p_world_feet, axis=1)
     rows = [(ResidualRow(FOOT_NAMES[leg], float(off[leg]), "m"), most) for leg in targets.stance]
     rows.append((ResidualRow("height", abs(float(q[2]) - targets.height), "m"), most))
     R_world_base = pin.Quaternion(q[3:7]).matrix()
     turn = float(np.linalg.norm(log_rotation(R_world_base.T @ rotation_from_rpy(*targets.rpy))))
-    rows.append((ResidualRow("orientation", turn, "rad"), config.angle_tolerance))
+    rows.append((ResidualRow("orientation", turn, "rad"), ANGLE_TOLERANCE))
     if targets.raised is not None:
         moved = float(np.abs(joints - q_start[7:])[targets.raised.joints].max())
-        rows.append((ResidualRow("raised joints", moved, "rad"), config.angle_tolerance))
+        rows.append((ResidualRow("raised joints", moved, "rad"), ANGLE_TOLERANCE))
     short = max(targets.com_margin - support_margin(targets.polygon, com[:2]), 0.0)
-    rows.append((ResidualRow("CoM margin short by", short, "m"), config.constraint_tolerance))
+    rows.append((ResidualRow("CoM margin short by", short, "m"), CONSTRAINT_TOLERANCE))
     least, greatest = model.q_lower + targets.joint_margin, model.q_upper - targets.joint_margin
     beyond = float(max((least - joints).max(), (joints - greatest).max(), 0.0))
-    rows.append((ResidualRow("joint limits beyond", beyond, "rad"), config.constraint_tolerance))
+    rows.append((ResidualRow("joint limits beyond", beyond, "rad"), CONSTRAINT_TOLERANCE))
     return rows

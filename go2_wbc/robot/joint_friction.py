@@ -22,16 +22,17 @@ from jaxtyping import Float
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.errors import ConfigError
 from go2_wbc.legs import JOINT_NAMES
-from go2_wbc.records import packed
+from go2_wbc.records import Array12, Array18, packed
 from go2_wbc.robot.motor import MotorModel, torque_range
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import require_not_negative, require_positive
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
 PerJoint = Annotated[tuple[float, ...], len(JOINT_NAMES)]
 """A number for each joint, in the order of ``JOINT_NAMES``."""
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(NOT_NEGATIVE, dry=NOT_NEGATIVE, viscous=NOT_NEGATIVE, transition=POSITIVE)
 class JointFriction:
     """What is fed forward against the friction of the joints.
 
@@ -58,9 +59,7 @@ class JointFriction:
     lookahead: float = 0.01
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_not_negative(self, "dry", "viscous", "lookahead")
-        require_positive(self, "transition")
+        """Raise ConfigError for another count of numbers than twelve."""
         for name in ("dry", "viscous"):
             count = len(getattr(self, name))
             if count != len(JOINT_NAMES):
@@ -78,9 +77,7 @@ class JointFriction:
         """The same for every leg: of hip, thigh and calf."""
         return JointFriction(dry=dry * 4, viscous=viscous * 4)
 
-    def torque(
-        self, v: Float[np.ndarray, "12"], a: Float[np.ndarray, "12"]
-    ) -> Float[np.ndarray, "12"]:
+    def torque(self, v: Array12, a: Array12) -> Array12:
         """What friction takes [N m] at joint speeds ``v`` [rad/s] and accelerations ``a`` to come.
 
         ``a`` is in rad/s^2.
@@ -100,9 +97,7 @@ class FrictionFeedForward:
     friction: JointFriction
     motor: MotorModel
 
-    def motor_torques(
-        self, snapshot: Snapshot, qdd: Float[np.ndarray, "18"], tau: Float[np.ndarray, "12"]
-    ) -> Float[np.ndarray, "12"]:
+    def motor_torques(self, snapshot: Snapshot, qdd: Array18, tau: Array12) -> Array12:
         """``tau`` [N m] and the friction at the acceleration ``qdd``."""
         motors = np.empty(12)
         fill_motor_torques(snapshot, packed(self), qdd, tau, motors)
@@ -121,8 +116,8 @@ def fill_motor_torques(
     now: Snapshot,
     feed: FrictionFeedForward,
     z: Float[np.ndarray, " n"],
-    tau: Float[np.ndarray, "12"],
-    motors: Float[np.ndarray, "12"],
+    tau: Array12,
+    motors: Array12,
 ) -> None:
     """Fill ``motors``: ``tau`` and the friction of the joints, within the motors' line.
 

@@ -29,10 +29,21 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.algebra.vectors import turned_back
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
-from go2_wbc.records import Record, packed
+from go2_wbc.records import (
+    Array3,
+    Array3x3,
+    Array4x3,
+    Array6,
+    ArrayNx3,
+    ArrayNx3x3,
+    ArrayNx12,
+    Record,
+    packed,
+)
 from go2_wbc.robot.model import LEG_AXES, RobotModel
 
 
@@ -47,7 +58,7 @@ class LegGeometry:
         calf: from the knee to the foot's centre [m].
     """
 
-    p_base_hip: Float[np.ndarray, "3"]
+    p_base_hip: Array3
     width: float
     thigh: float
     calf: float
@@ -133,7 +144,7 @@ def wrapped(angle: float) -> float:
 
 
 @subroutine
-def solve_leg(leg: LegGeometry, x: float, y: float, z: float, q: Float[np.ndarray, "3"]) -> float:
+def solve_leg(leg: LegGeometry, x: float, y: float, z: float, q: Array3) -> float:
     """Fill the three angles that bring a foot to a place in the base frame; returns the miss."""
     x, y, z = x - leg.p_base_hip[0], y - leg.p_base_hip[1], z - leg.p_base_hip[2]
     width, thigh, calf = leg.width, leg.thigh, leg.calf
@@ -143,10 +154,7 @@ def solve_leg(leg: LegGeometry, x: float, y: float, z: float, q: Float[np.ndarra
         down = -down
     reach = np.hypot(x, down)
     cosine = (reach * reach - thigh * thigh - calf * calf) / (2.0 * thigh * calf)
-    if cosine > 1.0:
-        cosine = 1.0
-    elif cosine < -1.0:
-        cosine = -1.0
+    cosine = min(max(cosine, -1.0), 1.0)
     knee = -np.arccos(cosine)
     swing = np.arctan2(-x, down)
     swing -= np.arctan2(calf * np.sin(knee), thigh + calf * np.cos(knee))
@@ -160,10 +168,7 @@ def solve_leg(leg: LegGeometry, x: float, y: float, z: float, q: Float[np.ndarra
 
 @kernel(nogil=True)
 def solve_legs(
-    leg: LegGeometry,
-    places: Float[np.ndarray, "n 3"],
-    q: Float[np.ndarray, "n 3"],
-    miss: Float[np.ndarray, " n"],
+    leg: LegGeometry, places: ArrayNx3, q: ArrayNx3, miss: Float[np.ndarray, " n"]
 ) -> None:
     """Fill angles and misses for foot centres in the base frame."""
     for i in range(len(places)):
@@ -171,7 +176,7 @@ def solve_legs(
 
 
 @subroutine
-def turns_of(q: Float[np.ndarray, "3"], turns: Float[np.ndarray, "6"]) -> None:
+def turns_of(q: Array3, turns: Array6) -> None:
     """Fill cosine and sine of the hip, of the thigh, and of thigh and calf together."""
     turns[0], turns[1] = np.cos(q[0]), np.sin(q[0])
     turns[2], turns[3] = np.cos(q[1]), np.sin(q[1])
@@ -179,7 +184,7 @@ def turns_of(q: Float[np.ndarray, "3"], turns: Float[np.ndarray, "6"]) -> None:
 
 
 @subroutine
-def turns_to(leg: LegGeometry, x: float, y: float, z: float, turns: Float[np.ndarray, "6"]) -> None:
+def turns_to(leg: LegGeometry, x: float, y: float, z: float, turns: Array6) -> None:
     """The same of the angles that ``solve_leg`` finds, without the angles: no more than roots."""
     x, y, z = x - leg.p_base_hip[0], y - leg.p_base_hip[1], z - leg.p_base_hip[2]
     width, thigh, calf = leg.width, leg.thigh, leg.calf
@@ -194,10 +199,7 @@ def turns_to(leg: LegGeometry, x: float, y: float, z: float, turns: Float[np.nda
     turns[0], turns[1] = (y * width - z * down) / length, (z * width + y * down) / length
     reach = np.sqrt(x * x + down * down)
     cosine = (reach * reach - thigh * thigh - calf * calf) / (2.0 * thigh * calf)
-    if cosine > 1.0:
-        cosine = 1.0
-    elif cosine < -1.0:
-        cosine = -1.0
+    cosine = min(max(cosine, -1.0), 1.0)
     sine = -np.sqrt(1.0 - cosine * cosine)
     if reach == 0.0:
         down, reach = 1.0, 1.0
@@ -211,9 +213,7 @@ def turns_to(leg: LegGeometry, x: float, y: float, z: float, turns: Float[np.nda
 
 
 @subroutine
-def weigh_leg(
-    links: Links, leg: int, turns: Float[np.ndarray, "6"], moment: Float[np.ndarray, "3"]
-) -> None:
+def weigh_leg(links: Links, leg: int, turns: Array6, moment: Array3) -> None:
     """Fill what a leg adds to the CoM in the base frame: its links' places by their shares.
 
     With x, y, y the axes of hip, thigh and calf, o_k the places of the joints on the links before
@@ -239,13 +239,7 @@ def weigh_leg(
 
 
 @subroutine
-def add_up(
-    links: Links,
-    moments: Float[np.ndarray, "4 3"],
-    R: Float[np.ndarray, "3 3"],
-    p: Float[np.ndarray, "3"],
-    com: Float[np.ndarray, "3"],
-) -> None:
+def add_up(links: Links, moments: Array4x3, R: Array3x3, p: Array3, com: Array3) -> None:
     """Fill the CoM in the world from the four legs' moments, at R and p of the base."""
     share, c = links.share[0], links.p_com[0]
     x, y, z = share * c[0], share * c[1], share * c[2]
@@ -257,11 +251,7 @@ def add_up(
 
 @kernel(nogil=True)
 def centres_of_mass(
-    links: Links,
-    p: Float[np.ndarray, "n 3"],
-    R: Float[np.ndarray, "n 3 3"],
-    joints: Float[np.ndarray, "n 12"],
-    com: Float[np.ndarray, "n 3"],
+    links: Links, p: ArrayNx3, R: ArrayNx3x3, joints: ArrayNx12, com: ArrayNx3
 ) -> None:
     """Fill the CoM in the world of every configuration."""
     moments, turns = np.empty((4, 3)), np.empty(6)
@@ -272,40 +262,27 @@ def centres_of_mass(
         add_up(links, moments, R[i], p[i], com[i])
 
 
-@subroutine
-def seen_from_base(
-    R: Float[np.ndarray, "3 3"],
-    p: Float[np.ndarray, "3"],
-    p_foot: Float[np.ndarray, "3"],
-    seen: Float[np.ndarray, "3"],
-) -> None:
-    """Fill a place of the world as the base at R and p sees it."""
-    d0, d1, d2 = p_foot[0] - p[0], p_foot[1] - p[1], p_foot[2] - p[2]
-    for k in range(3):
-        seen[k] = R[0, k] * d0 + R[1, k] * d1 + R[2, k] * d2
-
-
 @kernel(nogil=True)
 def settle(
-    wanted: Float[np.ndarray, "n 3"],
+    wanted: ArrayNx3,
     is_com: Bool[np.ndarray, " n"],
     raised: Bool[np.ndarray, "n 4"],
-    R: Float[np.ndarray, "n 3 3"],
+    R: ArrayNx3x3,
     p_feet: Float[np.ndarray, "n 4 3"],
     legs: Legs,
     links: Links,
     steps: int,
-    p: Float[np.ndarray, "n 3"],
-    joints: Float[np.ndarray, "n 12"],
+    p: ArrayNx3,
+    joints: ArrayNx12,
     miss: Float[np.ndarray, "n 4"],
-    com: Float[np.ndarray, "n 3"],
+    com: ArrayNx3,
 ) -> None:
     """Put every trunk where its CoM, or its base, is wanted, with standing feet in their places.
 
     ``p`` starts at the base's place and ends there, ``joints`` of raised legs stay; the others,
     ``miss`` and ``com`` are filled. In every step but the last, p <- p + (c* - c(p)).
     """
-    moments, turns, foot = np.empty((4, 3)), np.empty(6), np.empty(3)
+    moments, turns = np.empty((4, 3)), np.empty(6)
     for i in range(len(wanted)):
         for leg in range(4):
             if raised[i, leg]:
@@ -316,11 +293,13 @@ def settle(
             for leg in range(4):
                 if raised[i, leg]:
                     continue
-                seen_from_base(R[i], p[i], p_feet[i, leg], foot)
+                sizes, foot = legs.geometry[leg], p_feet[i, leg]
+                away = foot[0] - p[i, 0], foot[1] - p[i, 1], foot[2] - p[i, 2]
+                x, y, z = turned_back(R[i], away)  # as the base sees it
                 if step == steps:
                     angles = joints[i, 3 * leg : 3 * leg + 3]
-                    miss[i, leg] = solve_leg(legs.geometry[leg], foot[0], foot[1], foot[2], angles)
-                turns_to(legs.geometry[leg], foot[0], foot[1], foot[2], turns)
+                    miss[i, leg] = solve_leg(sizes, x, y, z, angles)
+                turns_to(sizes, x, y, z, turns)
                 weigh_leg(links, leg, turns, moments[leg])
             add_up(links, moments, R[i], p[i], com[i])
             if step < steps and is_com[i]:
@@ -337,18 +316,18 @@ class LegAngles:
         miss: (n,) distance [m] by which each place is out of the leg's reach; 0 within it.
     """
 
-    q: Float[np.ndarray, "n 3"]
+    q: ArrayNx3
     miss: Float[np.ndarray, " n"]
 
 
-def leg_angles(geometry: LegGeometry, p_base_foot: Float[np.ndarray, "n 3"]) -> LegAngles:
+def leg_angles(geometry: LegGeometry, p_base_foot: ArrayNx3) -> LegAngles:
     """Joint angles for foot centres (n, 3) in the base frame [m]; ``geometry`` is packed."""
     found = LegAngles(np.empty((len(p_base_foot), 3)), np.empty(len(p_base_foot)))
     solve_legs(geometry, np.ascontiguousarray(p_base_foot, float), found.q, found.miss)
     return found
 
 
-def foot_places(geometry: LegGeometry, q: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+def foot_places(geometry: LegGeometry, q: ArrayNx3) -> ArrayNx3:
     """Foot centres (n, 3) in the base frame [m] at joint angles (n, 3)."""
     hip, thigh, calf = q.T
     x = -geometry.thigh * np.sin(thigh) - geometry.calf * np.sin(thigh + calf)

@@ -6,16 +6,16 @@ quantity of the tick, by ``robot.rigid_body`` if the robot's legs turn about the
 
 from __future__ import annotations
 
+import hashlib
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from jaxtyping import Float
 
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES, LEGS
-from go2_wbc.records import layout_of
+from go2_wbc.records import Array3, Array4x3, Array12, Array18, Array19, layout_of
 from go2_wbc.robot.description import RobotDescription, find_description
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
@@ -30,6 +30,11 @@ ROTOR_ARMATURE = np.tile([0.0045, 0.0045, 0.0164], 4)
 """Reflected rotor inertia [kg m^2] per joint; same provenance as the plant's ``JointDynamics``."""
 LEG_AXES = ("JointModelRX", "JointModelRY", "JointModelRY")
 """What Pinocchio calls the joints of a leg: they turn about x, y and y."""
+FINGERPRINT_DECIMALS = 9
+"""Decimals of the numbers [SI units] that count: what a file was computed for stays the same robot
+if another Pinocchio rounds its last digits differently."""
+FINGERPRINT = 16
+"""Letters of a fingerprint."""
 HIP_LIMIT = 0.838
 """Published hip abduction limit [rad]; the URDF's 1.0472 is wider."""
 
@@ -57,7 +62,7 @@ class RobotModel:
         self,
         description: RobotDescription | None = None,
         *,
-        armature: Float[np.ndarray, "12"] = ROTOR_ARMATURE,
+        armature: Array12 = ROTOR_ARMATURE,
         foot_radius: float = FOOT_RADIUS,
         motor: str = TORQUE_SPEED,
         world: World | None = None,
@@ -202,24 +207,44 @@ class RobotModel:
             com_shift=com - bare,
         )
 
-    def center_of_mass(self, q: Float[np.ndarray, "19"]) -> Float[np.ndarray, "3"]:
+    def center_of_mass(self, q: Array19) -> Array3:
         """CoM in the world [m] at configuration ``q``."""
         return np.array(pin.centerOfMass(self.pin_model, self._data, q))
 
-    def forward_kinematics(
-        self, q: Float[np.ndarray, "19"]
-    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "4 3"]]:
+    def forward_kinematics(self, q: Array19) -> tuple[Array3, Array4x3]:
         """CoM (3,) and foot centres (4, 3) in the world [m] at configuration ``q``."""
         com = np.array(pin.centerOfMass(self.pin_model, self._data, q))
         pin.updateFramePlacements(self.pin_model, self._data)
         feet = np.array([self._data.oMf[f].translation for f in self._foot_frames])
         return com, feet
 
-    def inverse_dynamics(
-        self, q: Float[np.ndarray, "19"], v: Float[np.ndarray, "18"], a: Float[np.ndarray, "18"]
-    ) -> Float[np.ndarray, "18"]:
+    def inverse_dynamics(self, q: Array19, v: Array18, a: Array18) -> Array18:
         """Generalised force M(q) a + h(q, v) [N, N m]."""
         return np.array(pin.rnea(self.pin_model, self._data, q, v, a))
+
+
+def fingerprint(model: RobotModel) -> str:
+    """What tells the robot of ``model`` from others: masses, lengths, limits and motors.
+
+    Comments and order of its URDF, meshes and colours do not count.
+    """
+    pin_model = model.pin_model
+    feet = [pin_model.frames[pin_model.getFrameId(name)].placement for name in FOOT_NAMES]
+    numbers = [
+        *(placement.homogeneous for placement in pin_model.jointPlacements),
+        *(inertia.matrix() for inertia in pin_model.inertias),
+        *(placement.homogeneous for placement in feet),
+        pin_model.armature,
+        model.q_lower,
+        model.q_upper,
+        model.torque_limits,
+        model.speed_limits,
+        np.array([model.foot_radius, model.gravity]),
+    ]
+    digest = hashlib.sha256()
+    for array in numbers:
+        digest.update((np.round(array, FINGERPRINT_DECIMALS) + 0.0).tobytes())  # no -0
+    return digest.hexdigest()[:FINGERPRINT]
 
 
 def _burden(model: pin.Model, world: World) -> None:

@@ -27,13 +27,14 @@ Neither the battery's voltage, which moves the line, nor the windings' temperatu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.errors import ConfigError, unknown_name
+from go2_wbc.records import Array12, ArrayNx12, packed
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.state import JointCommand
 
@@ -57,9 +58,9 @@ class MotorModel:
         no_load_speed: speeds [rad/s] at which it is gone; infinite for an ideal motor.
     """
 
-    peak: Float[np.ndarray, "12"]
-    knee_speed: Float[np.ndarray, "12"]
-    no_load_speed: Float[np.ndarray, "12"]
+    peak: Array12
+    knee_speed: Array12
+    no_load_speed: Array12
 
     @staticmethod
     def named(name: str, description: RobotDescription) -> MotorModel:
@@ -71,24 +72,26 @@ class MotorModel:
         require_motor(name)
         speeds = np.array(description.speeds)
         zero_torque = speeds if name == TORQUE_SPEED else np.full(12, np.inf)
-        return MotorModel(np.array(description.efforts), KNEE_SHARE * speeds, zero_torque)
+        peak = np.array(description.efforts)
+        return packed(MotorModel(peak, KNEE_SHARE * speeds, zero_torque))
+
+    def with_peak(self, peak: Array12) -> MotorModel:
+        """The same line below other torque limits [N m]."""
+        return packed(MotorModel(peak, self.knee_speed, self.no_load_speed))
 
     def scaled(self, share: float) -> MotorModel:
         """The motors at ``share`` of their torque."""
-        return replace(self, peak=share * self.peak)
+        return self.with_peak(share * self.peak)
 
     def limits(
         self, v: Float[np.ndarray, "*n 12"]
     ) -> tuple[Float[np.ndarray, "*n 12"], Float[np.ndarray, "*n 12"]]:
         """(lower, upper) torque limits [N m] at velocities ``v`` [rad/s]; lower <= 0 <= upper."""
         lower, upper = np.empty(v.shape), np.empty(v.shape)
-        line = (self.peak, self.knee_speed, self.no_load_speed)
-        fill_limits(v.reshape(-1, 12), *line, lower.reshape(-1, 12), upper.reshape(-1, 12))
+        fill_limits(v.reshape(-1, 12), packed(self), lower.reshape(-1, 12), upper.reshape(-1, 12))
         return lower, upper
 
-    def torque(
-        self, command: JointCommand, q: Float[np.ndarray, "12"], v: Float[np.ndarray, "12"]
-    ) -> Float[np.ndarray, "12"]:
+    def torque(self, command: JointCommand, q: Array12, v: Array12) -> Array12:
         """Torques [N m] that the motors give for ``command`` at angles ``q`` and velocities ``v``.
 
         What a plant applies at every physics step; see ``drive``.
@@ -114,35 +117,28 @@ def require_motor(name: str) -> None:
 
 
 @subroutine
-def most_torque(v: float, peak: float, knee_speed: float, no_load_speed: float) -> float:
-    """The greatest torque of a motor at velocity ``v``; the least one is -most_torque(-v)."""
-    if not v > knee_speed:
+def most_torque(motor: MotorModel, n: int, v: float) -> float:
+    """The greatest torque of joint ``n`` at velocity ``v``; the least one is -most_torque(-v)."""
+    peak, knee = motor.peak[n], motor.knee_speed[n]
+    if not v > knee:
         return peak
-    return peak * max(1.0 - (v - knee_speed) / (no_load_speed - knee_speed), 0.0)
+    return peak * max(1.0 - (v - knee) / (motor.no_load_speed[n] - knee), 0.0)
 
 
 @subroutine
 def torque_range(motor: MotorModel, n: int, v: float) -> tuple[float, float]:
     """The least and the greatest torque of joint ``n`` at velocity ``v``."""
-    peak, knee, no_load = motor.peak[n], motor.knee_speed[n], motor.no_load_speed[n]
-    return -most_torque(-v, peak, knee, no_load), most_torque(v, peak, knee, no_load)
+    return -most_torque(motor, n, -v), most_torque(motor, n, v)
 
 
 @kernel
 def fill_limits(
-    v: Foreign[Float[np.ndarray, "n 12"]],
-    peak: Foreign[Float[np.ndarray, "12"]],
-    knee_speed: Foreign[Float[np.ndarray, "12"]],
-    no_load_speed: Foreign[Float[np.ndarray, "12"]],
-    lower: Float[np.ndarray, "n 12"],
-    upper: Float[np.ndarray, "n 12"],
+    v: Foreign[ArrayNx12], motor: MotorModel, lower: ArrayNx12, upper: ArrayNx12
 ) -> None:
-    """Fill the limits of ``MotorModel`` at many velocities."""
+    """Fill the limits at many velocities."""
     for i in range(len(v)):
         for n in range(12):
-            line = peak[n], knee_speed[n], no_load_speed[n]
-            lower[i, n] = -most_torque(-v[i, n], line[0], line[1], line[2])
-            upper[i, n] = most_torque(v[i, n], line[0], line[1], line[2])
+            lower[i, n], upper[i, n] = torque_range(motor, n, v[i, n])
 
 
 @kernel
@@ -153,7 +149,7 @@ def drive(
     qpos: Float[np.ndarray, " nq"],
     qvel: Float[np.ndarray, " nv"],
     ctrl: Float[np.ndarray, " nu"],
-    total: Float[np.ndarray, "12"],
+    total: Array12,
 ) -> None:
     """``MotorModel.torque`` now, into ctrl, and added to ``total``.
 
@@ -172,9 +168,9 @@ def drive(
 
 @kernel
 def note_peaks(
-    tau: Foreign[Float[np.ndarray, "12"]],
-    v: Foreign[Float[np.ndarray, "12"]],
-    v_before: Foreign[Float[np.ndarray, "12"]],
+    tau: Foreign[Array12],
+    v: Foreign[Array12],
+    v_before: Foreign[Array12],
     motor: MotorModel,
     peaks: Float[np.ndarray, "3 12"],
 ) -> None:

@@ -10,11 +10,10 @@ It is judged while enough is asked, and what is asked stays within what the moto
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.compilation import Foreign, kernel
 from go2_wbc.legs import JOINT_NAMES
-from go2_wbc.records import Record, packed
+from go2_wbc.records import Array12, Array18, Array19, Record, packed
 from go2_wbc.robot.motor import MotorModel, torque_range
 from go2_wbc.robot.state import JointCommand, PartFault, RobotState
 
@@ -36,22 +35,22 @@ class WatchedMotors(Record):
         weak_time: for how long the share has been too low [s].
     """
 
-    both: Float[np.ndarray, "12"]
-    asked: Float[np.ndarray, "12"]
-    weak_time: Float[np.ndarray, "12"]
+    both: Array12
+    asked: Array12
+    weak_time: Array12
 
 
 @kernel
 def watch_motors(
     s: WatchedMotors,
-    tau: Foreign[Float[np.ndarray, "12"]],
-    kp: Foreign[Float[np.ndarray, "12"]],
-    kd: Foreign[Float[np.ndarray, "12"]],
-    q_des: Foreign[Float[np.ndarray, "12"]],
-    v_des: Foreign[Float[np.ndarray, "12"]],
-    q: Foreign[Float[np.ndarray, "19"]],
-    v: Foreign[Float[np.ndarray, "18"]],
-    given: Foreign[Float[np.ndarray, "12"]],
+    tau: Foreign[Array12],
+    kp: Foreign[Array12],
+    kd: Foreign[Array12],
+    q_des: Foreign[Array12],
+    v_des: Foreign[Array12],
+    q: Foreign[Array19],
+    v: Foreign[Array18],
+    given: Foreign[Array12],
     motor: MotorModel,
     dt: float,
 ) -> int:

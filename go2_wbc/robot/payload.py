@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from go2_wbc.validation import require_finite, require_not_negative
+from go2_wbc.validation import FINITE, NOT_NEGATIVE, ranged
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(mass=NOT_NEGATIVE, place=FINITE)
 class Payload:
     """A point mass that is fixed to the trunk.
 
@@ -21,11 +22,6 @@ class Payload:
 
     mass: float = 0.0
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a mass that is negative, or a number that is not finite."""
-        require_not_negative(self, "mass")
-        require_finite(self, "place")
 
     @property
     def inertia(self) -> pin.Inertia:

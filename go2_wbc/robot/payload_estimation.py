@@ -23,21 +23,21 @@ shakes the robot, so m is the ratio of the forces, and the place is the lever of
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 
 from go2_wbc.algebra.linear import solve_linear
 from go2_wbc.algebra.vectors import cross, plus, plus_scaled, put, triple
 from go2_wbc.compilation import Foreign, kernel, subroutine
-from go2_wbc.records import V3, Record, packed
+from go2_wbc.records import V3, Array3, Array6, Array12, Array18, Record, packed
 from go2_wbc.robot.joint_friction import JointFriction, friction_torque
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import NO_PAYLOAD, Payload
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
-from go2_wbc.validation import require_between, require_positive, require_share
+from go2_wbc.validation import FINITE, POSITIVE, SHARE, between, ranged, require
 
 PERIOD = 0.02
 """Time [s] from one change of the belief to the next: much less than its response takes."""
@@ -46,6 +46,7 @@ NOTHING = 0.02
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE, release=SHARE, middle=FINITE)
 class PayloadConfig:
     """Numbers of the estimate of the payload.
 
@@ -93,11 +94,8 @@ class PayloadConfig:
     most_speed: tuple[float, float] = (1.5, 0.4)
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        others = {"enabled", "release", "middle"}
-        require_positive(self, *(f.name for f in fields(self) if f.name not in others))
-        require_share(self, "release")
-        require_between(self, -self.base_height, self.base_height, "middle")
+        """Raise ConfigError for a middle that is not in the robot."""
+        require(self, between(-self.base_height, self.base_height), "middle")
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,9 +122,9 @@ class PayloadWrench(Record):
         weight: of a unit of mass, by gravity and the base's acceleration [m/s^2].
     """
 
-    force: Float[np.ndarray, "3"]
-    moment: Float[np.ndarray, "3"]
-    weight: Float[np.ndarray, "3"]
+    force: Array3
+    moment: Array3
+    weight: Array3
 
 
 @subroutine
@@ -143,9 +141,7 @@ def can_feel(now: Snapshot, contact: Foreign[Bool[np.ndarray, "4"]], c: PayloadC
 
 
 @subroutine
-def forces_needed(
-    now: Snapshot, a: Float[np.ndarray, "18"], needed: Float[np.ndarray, "18"]
-) -> None:
+def forces_needed(now: Snapshot, a: Array18, needed: Array18) -> None:
     """Fill M a + h."""
     for i in range(18):
         needed[i] = now.bias[i]
@@ -155,12 +151,7 @@ def forces_needed(
 
 @subroutine
 def add_foot(
-    now: Snapshot,
-    leg: int,
-    tau: Foreign[Float[np.ndarray, "12"]],
-    c: PayloadNumbers,
-    needed: Float[np.ndarray, "18"],
-    left: Float[np.ndarray, "6"],
+    now: Snapshot, leg: int, tau: Foreign[Array12], c: PayloadNumbers, needed: Array18, left: Array6
 ) -> bool:
     """Add the wrench on the base of a foot's force to ``left``; False if the leg is singular."""
     J, system = now.J_contacts[leg], np.empty((3, 4))
@@ -179,7 +170,7 @@ def add_foot(
 
 
 @subroutine
-def weight_of_mass(now: Snapshot, a: Float[np.ndarray, "18"], gravity: float) -> V3:
+def weight_of_mass(now: Snapshot, a: Array18, gravity: float) -> V3:
     """Acceleration of the base, with gravity, in its own frame: what a unit of mass weighs."""
     v, w = triple(now.v[:3]), triple(now.v[3:6])
     moved = plus((a[0], a[1], a[2]), cross(w, v))
@@ -189,11 +180,11 @@ def weight_of_mass(now: Snapshot, a: Float[np.ndarray, "18"], gravity: float) ->
 @kernel
 def follow_wrench(
     now: Snapshot,
-    v_before: Foreign[Float[np.ndarray, "18"]],
-    tau: Foreign[Float[np.ndarray, "12"]],
+    v_before: Foreign[Array18],
+    tau: Foreign[Array12],
     contact: Foreign[Bool[np.ndarray, "4"]],
     dt: float,
-    place: Float[np.ndarray, "3"],
+    place: Array3,
     c: PayloadNumbers,
     mean: PayloadWrench,
 ) -> None:
@@ -231,7 +222,7 @@ def follow_wrench(
 
 
 @subroutine
-def approached(mean: Float[np.ndarray, "3"], share: float, value: V3) -> V3:
+def approached(mean: Array3, share: float, value: V3) -> V3:
     """A mean that has taken up this share of a value."""
     return (
         mean[0] + share * (value[0] - mean[0]),
@@ -257,7 +248,7 @@ class PayloadEstimator:
         self._payload, self._place = NO_PAYLOAD, np.zeros(3)
 
     @property
-    def felt(self) -> Float[np.ndarray, "3"]:
+    def felt(self) -> Array3:
         """Mass [kg], and first moment [kg m] about the middle, ahead and aside; before any doubt.
 
         For a robot that is lighter than its model the mass is negative.
@@ -313,14 +304,14 @@ class PayloadEstimator:
             self._payload = Payload(mass, (x + ahead / mass, y + aside / mass, z))
         self._place = np.array(self._payload.place)
 
-    def _is_credible(self, felt: Float[np.ndarray, "3"]) -> bool:
+    def _is_credible(self, felt: Array3) -> bool:
         c, share = self._config, self._config.release if self._is_believed else 1.0
         mass, ahead, aside = felt.tolist()
         least_ahead, least_aside = c.least_moment
         is_beside = bool(np.hypot(ahead / least_ahead, aside / least_aside) >= share)
         return mass >= share * (c.least_mass if is_beside else c.centred_mass)
 
-    def _within_reach(self, felt: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    def _within_reach(self, felt: Array3) -> Array3:
         mass = min(float(felt[0]), self._config.most_mass)
         most = mass * np.array(self._config.reach)
         return np.array([mass, *np.clip(felt[1:], -most, most)])

@@ -9,11 +9,12 @@ turning one feels beside the CoM. Each has to last: see ``EstimatorConfig``. To 
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Float
 
+from go2_wbc.algebra.vectors import dot, triple
 from go2_wbc.compilation import subroutine
-from go2_wbc.records import Record
+from go2_wbc.records import Array3, Array3x3, Array12, Record
 from go2_wbc.robot.estimator_config import EstimatorConfig
+from go2_wbc.robot.state import SensorReading
 from go2_wbc.robot.state_filter import GYRO_BIAS, VELOCITY, Estimate, Filter, take_in_one
 
 _SMOOTHING = 0.05
@@ -33,23 +34,6 @@ _RUNAWAY, _BIASES = 0.5, 5.0
 bias is then off 0."""
 
 
-class Reading(Record):
-    """What the filter takes of a ``SensorReading``.
-
-    Attributes:
-        dt: time [s] since the last one.
-
-    All others as there.
-    """
-
-    dt: float
-    gyro: Float[np.ndarray, "3"]
-    accelerometer: Float[np.ndarray, "3"]
-    q_joints: Float[np.ndarray, "12"]
-    v_joints: Float[np.ndarray, "12"]
-    foot_forces: Float[np.ndarray, "4"]
-
-
 class Rest(Record):
     """What is remembered of it.
 
@@ -62,7 +46,7 @@ class Rest(Record):
         tumbled: whether the robot has.
     """
 
-    joint_speeds: Float[np.ndarray, "12"]
+    joint_speeds: Array12
     still_time: float
     lying_time: float
     lost_time: float
@@ -71,38 +55,53 @@ class Rest(Record):
 
 
 @subroutine
+def squared(a: Array3, b: Array3) -> float:
+    """|a - b|^2."""
+    return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
+
+
+@subroutine
+def has_still_joints(rest: Rest, c: EstimatorConfig) -> bool:
+    """Whether the joints, smoothed, hardly move."""
+    speed = 0.0
+    for n in range(12):
+        speed += rest.joint_speeds[n] ** 2 / 12.0
+    return bool(speed < c.still_joints**2)
+
+
+@subroutine
 def is_at_rest(
-    x: Estimate, rest: Rest, reading: Reading, gravity: float, c: EstimatorConfig
+    x: Estimate, rest: Rest, reading: SensorReading, dt: float, gravity: float, c: EstimatorConfig
 ) -> bool:
     """Whether joints, gyro and accelerometer have read rest for long enough."""
-    speed, turning, force = 0.0, 0.0, 0.0
-    share = min(reading.dt / _SMOOTHING, 1.0)
+    share = min(dt / _SMOOTHING, 1.0)
     for n in range(12):
         rest.joint_speeds[n] += share * (reading.v_joints[n] - rest.joint_speeds[n])
-        speed += rest.joint_speeds[n] ** 2 / 12.0
-    for k in range(3):
-        turning += (reading.gyro[k] - x.gyro_bias[k]) ** 2
-        force += (reading.accelerometer[k] - x.force_bias[k]) ** 2
+    force = np.sqrt(squared(reading.accelerometer, x.force_bias))
     is_still = (
-        speed < c.still_joints**2
-        and turning < c.still_turning**2
-        and abs(np.sqrt(force) - gravity) < c.still_force
+        has_still_joints(rest, c)
+        and squared(reading.gyro, x.gyro_bias) < c.still_turning**2
+        and abs(force - gravity) < c.still_force
     )
-    rest.still_time = rest.still_time + reading.dt if is_still else 0.0
+    rest.still_time = rest.still_time + dt if is_still else 0.0
     return bool(rest.still_time >= c.still_time)
 
 
 @subroutine
 def lies(
-    x: Estimate, rest: Rest, reading: Reading, is_carried: bool, gravity: float, c: EstimatorConfig
+    x: Estimate,
+    rest: Rest,
+    reading: SensorReading,
+    dt: float,
+    is_carried: bool,
+    gravity: float,
+    c: EstimatorConfig,
 ) -> bool:
     """Whether something else than the feet has carried the robot for long enough."""
-    force, turning = 0.0, 0.0
-    for k in range(3):
-        force += (reading.accelerometer[k] - x.force_bias[k]) ** 2
-        turning += (reading.gyro[k] - x.gyro_bias[k]) ** 2
-    is_lying = not is_carried and np.sqrt(force) > _FLIGHT * gravity + _ARM * turning  # w^2 r
-    rest.lying_time = rest.lying_time + reading.dt if is_lying else 0.0
+    force = np.sqrt(squared(reading.accelerometer, x.force_bias))
+    turning = squared(reading.gyro, x.gyro_bias)
+    is_lying = not is_carried and force > _FLIGHT * gravity + _ARM * turning  # w^2 r
+    rest.lying_time = rest.lying_time + dt if is_lying else 0.0
     return bool(rest.lying_time >= c.lying_time)
 
 
@@ -110,8 +109,9 @@ def lies(
 def begin_anew(
     x: Estimate,
     rest: Rest,
-    reading: Reading,
-    R: Float[np.ndarray, "3 3"],
+    reading: SensorReading,
+    dt: float,
+    R: Array3x3,
     gravity: float,
     c: EstimatorConfig,
 ) -> int:
@@ -121,33 +121,29 @@ def begin_anew(
     told by the readings alone: an estimate that is lost has lost the biases, too. Jolts, as of legs
     that are drawn in, are taken off the time at rest.
     """
-    turning, force, upwards, speed, joints, most = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    gyro, accelerometer, nothing = reading.gyro, reading.accelerometer, np.zeros(3)
+    force, most = np.sqrt(squared(accelerometer, nothing)), 0.0
     for k in range(3):
-        turning += reading.gyro[k] ** 2
-        force += reading.accelerometer[k] ** 2
-        upwards += R[2, k] * reading.accelerometer[k]
-        speed += x.v[k] ** 2
         most = max(most, abs(x.gyro_bias[k]) / c.gyro_bias)
         most = max(most, abs(x.force_bias[k]) / c.accelerometer_bias)
-    for n in range(12):
-        joints += rest.joint_speeds[n] ** 2 / 12.0
-    force = np.sqrt(force)
+    upwards = dot(triple(R[2]), triple(accelerometer))
     if R[2, 2] < _OVER:
         rest.tumbled = True
-    moves = speed > _RUNAWAY**2 and joints < c.still_joints**2
+    moves = squared(x.v, nothing) > _RUNAWAY**2 and has_still_joints(rest, c)
     is_lost = moves or upwards < _UPRIGHT * force or most > _BIASES
     if not (is_lost or (rest.tumbled and R[2, 2] > _OVER)):
         rest.lost_time = 0.0
         return KNOWN
-    is_still = turning < c.still_turning**2 and abs(force - gravity) < c.still_force
-    rest.lost_time = max(rest.lost_time + (reading.dt if is_still else -reading.dt), 0.0)
+    is_turning = squared(gyro, nothing) >= c.still_turning**2
+    is_still = not is_turning and abs(force - gravity) < c.still_force
+    rest.lost_time = max(rest.lost_time + (dt if is_still else -dt), 0.0)
     if rest.lost_time < c.still_time:
         return KNOWN
     return LOST if is_lost else TUMBLED
 
 
 @subroutine
-def is_upset(rest: Rest, dt: float, is_lying: bool, R: Float[np.ndarray, "3 3"]) -> bool:
+def is_upset(rest: Rest, dt: float, is_lying: bool, R: Array3x3) -> bool:
     """Whether the robot lies or is tilted far, or has been until a moment ago."""
     is_down = is_lying or R[2, 2] < _OVER
     rest.upset_time = _CALM if is_down else max(rest.upset_time - dt, 0.0)
@@ -155,7 +151,7 @@ def is_upset(rest: Rest, dt: float, is_lying: bool, R: Float[np.ndarray, "3 3"])
 
 
 @subroutine
-def take_in_rest(f: Filter, reading: Reading, is_carried: bool, c: EstimatorConfig) -> None:
+def take_in_rest(f: Filter, reading: SensorReading, is_carried: bool, c: EstimatorConfig) -> None:
     """Take in that nothing moves: no velocity, and a gyro that reads its bias.
 
     Of a robot that its feet carry the gyro's bias is learnt by these: slow turns of its trunk read

@@ -34,7 +34,7 @@ from go2_wbc.algebra.vectors import (
     triple,
 )
 from go2_wbc.compilation import Foreign, kernel, subroutine
-from go2_wbc.records import V3, Record
+from go2_wbc.records import V3, Array4x3, Array12, Array18, Array19, Record
 from go2_wbc.robot.payload import Payload
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -70,8 +70,8 @@ class RigidBodies(Record):
     link_moment: Float[np.ndarray, "13 3"]
     link_inertia: Float[np.ndarray, "13 6"]
     p_joints: Float[np.ndarray, "12 3"]
-    p_calf_feet: Float[np.ndarray, "4 3"]
-    armature: Float[np.ndarray, "12"]
+    p_calf_feet: Array4x3
+    armature: Array12
     payload: Payload
 
 
@@ -175,13 +175,29 @@ def put_twice(M: Float[np.ndarray, "18 18"], i: int, k: int, value: float) -> No
 
 
 @subroutine
-def couple_to_base(now: Snapshot, n: int, mass: float, base: Axes, linear: V3, angular: V3) -> None:
-    """Fill what couples a joint to the base: the robot's momentum if it alone turns at 1 rad/s."""
-    velocity = along(base, linear)
+def couple_to_base(
+    now: Snapshot, n: int, mass: float, base: Axes, linear: V3, angular: V3, p_hip: V3
+) -> None:
+    """Fill what couples a joint to the base: the robot's momentum if it alone turns at 1 rad/s.
+
+    ``angular`` is given about the hip, along the base's axes.
+    """
+    velocity, angular = along(base, linear), plus(angular, cross(p_hip, linear))
     for i in range(3):
         put_twice(now.mass_matrix, i, n, linear[i])
         put_twice(now.mass_matrix, 3 + i, n, angular[i])
         now.J_com[i, n] = velocity[i] / mass
+
+
+@subroutine
+def turning_about_y(body: Body, p: V3) -> tuple[V3, V3, float]:
+    """Momentum, linear and angular, of a body that turns about y at 1 rad/s; and its inertia.
+
+    The angular one is about a point from which the body's joint is at ``p``.
+    """
+    _, h, (_, xy, _, yy, yz, _) = body
+    linear = (h[2], 0.0, -h[0])
+    return linear, plus((xy, yy, yz), cross(p, linear)), yy
 
 
 @subroutine
@@ -233,29 +249,19 @@ def composite_leg(robot: RigidBodies, now: Snapshot, n: int, base: Axes, leg: Le
     M, mass, armature = now.mass_matrix, robot.mass, robot.armature[n - 6 : n - 3]
     lower = joined(thigh, calf, p_calf)
     whole = joined(hip, lower, p_thigh)
-    _, h, (_, xy, _, yy, yz, _) = calf
-    linear = (h[2], 0.0, -h[0])
-    angular = plus((xy, yy, yz), cross(plus(p_thigh, p_calf), linear))
+    linear, angular, yy = turning_about_y(calf, plus(p_thigh, p_calf))
     M[n + 2, n + 2] = yy + armature[2]
     put_twice(M, n + 1, n + 2, yy + p_calf[2] * linear[0] - p_calf[0] * linear[2])
     put_twice(M, n, n + 2, angular[0])
-    linear = about_x(c, s, linear)
-    angular = plus(about_x(c, s, angular), cross(p_hip, linear))
-    couple_to_base(now, n + 2, mass, base, linear, angular)
-    _, h, (_, xy, _, yy, yz, _) = lower
-    linear = (h[2], 0.0, -h[0])
-    angular = plus((xy, yy, yz), cross(p_thigh, linear))
+    couple_to_base(now, n + 2, mass, base, about_x(c, s, linear), about_x(c, s, angular), p_hip)
+    linear, angular, yy = turning_about_y(lower, p_thigh)
     M[n + 1, n + 1] = yy + armature[1]
     put_twice(M, n, n + 1, angular[0])
-    linear = about_x(c, s, linear)
-    angular = plus(about_x(c, s, angular), cross(p_hip, linear))
-    couple_to_base(now, n + 1, mass, base, linear, angular)
+    couple_to_base(now, n + 1, mass, base, about_x(c, s, linear), about_x(c, s, angular), p_hip)
     whole = body_about_x(c, s, whole)
     _, h, (xx, xy, xz, _, _, _) = whole
     M[n, n] = xx + armature[0]
-    linear = (0.0, -h[2], h[1])
-    angular = plus((xx, xy, xz), cross(p_hip, linear))
-    couple_to_base(now, n, mass, base, linear, angular)
+    couple_to_base(now, n, mass, base, (0.0, -h[2], h[1]), (xx, xy, xz), p_hip)
     return whole
 
 
@@ -396,10 +402,7 @@ def fill_payload(robot: RigidBodies, now: Snapshot, base: Axes, moment: V3) -> N
 
 @kernel
 def fill_snapshot(
-    q: Foreign[Float[np.ndarray, "19"]],
-    v: Foreign[Float[np.ndarray, "18"]],
-    robot: RigidBodies,
-    now: Snapshot,
+    q: Foreign[Array19], v: Foreign[Array18], robot: RigidBodies, now: Snapshot
 ) -> None:
     """Fill a snapshot, from the measured q and v, for ``robot``."""
     now.q[:], now.v[:] = q, v

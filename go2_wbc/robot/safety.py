@@ -10,15 +10,15 @@ highest numbers that tell of a fall, of a robot that is to balance:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
 
 from go2_wbc.compilation import Foreign, kernel
+from go2_wbc.records import Array4, Array12, Array18, Array19
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import require_positive
+from go2_wbc.validation import POSITIVE, ranged
 
 TRUNK_UNDERSIDE = np.array(
     [
@@ -48,10 +48,7 @@ UNIT_TOLERANCE = 0.01
 
 @kernel
 def is_plausible(
-    q: Foreign[Float[np.ndarray, "19"]],
-    v: Foreign[Float[np.ndarray, "18"]],
-    tau: Foreign[Float[np.ndarray, "12"]],
-    forces: Foreign[Float[np.ndarray, "4"]],
+    q: Foreign[Array19], v: Foreign[Array18], tau: Foreign[Array12], forces: Foreign[Array4]
 ) -> bool:
     """Whether every number of a state is finite and the quaternion of ``q`` of length 1."""
     for values in (q, v, tau, forces):
@@ -78,6 +75,7 @@ def heights(now: Snapshot) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
 class SafetyConfig:
     """When to give up and go limp.
 
@@ -118,10 +116,6 @@ class SafetyConfig:
     stale_limit: float = 0.03
     qp_patience: int = 10
     grave_limit_time: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a limit that is not positive."""
-        require_positive(self, *(field.name for field in fields(self)))
 
     def greatest_tilt(self, *, is_astray: bool) -> float:
         """Tilt [rad] beyond which a robot has fallen: of two limits the lower one, if astray."""

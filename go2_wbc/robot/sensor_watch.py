@@ -18,6 +18,7 @@ number is taken for the one before. A healthy robot's readings leave as they cam
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -26,7 +27,7 @@ from jaxtyping import Float
 from go2_wbc.algebra.vectors import cross, plus_scaled, put, triple
 from go2_wbc.compilation import kernel, subroutine
 from go2_wbc.legs import FOOT_NAMES, JOINT_NAMES
-from go2_wbc.records import V3, Record, packed
+from go2_wbc.records import V3, Array3, Array3x3, Array4, Array12, Record, numbers_of, packed
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs, leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import PartFault, SensorReading
@@ -57,8 +58,11 @@ SETTLING_AND_LASTING = SETTLING + GYRO_LASTS
 """How long [s] an error has been there when it is found, more or less."""
 EXPLAINED = 0.3
 """Share of the feet's squared residual that an error of the gyro explains, if it is one."""
-CARRIED = 0.7
-"""Share of the robot's weight that its legs bear while it stands or walks."""
+CARRIED, UPRIGHT = 0.7, 0.85
+"""Share of the robot's weight that its legs bear while it stands or walks, and the cosine of its
+greatest tilt then: legs of one that lies or tumbles strike what they do not stand on."""
+CALM = 0.05
+"""Time [s] after which one that has come to its feet is judged by them."""
 STANDING = np.tile([0.0, 0.8, -1.6], 4)
 """Joint angles [rad] of a robot that stands, roughly."""
 FINER = 1.0 / 3.0
@@ -78,6 +82,7 @@ class WatchedSensors(Record):
         force: the last of each foot [N], as it was read.
         force_same: for how long it has been the very same [s].
         against: for how long a foot's force has contradicted the leg's torques [s].
+        stood: for how long its legs have carried it [s].
         turning, turned, residual: normal equations of the gyro's error, and the squared residual.
         gyro_off, gyro_time: the error that is taken off [rad/s], for how long there has been one.
         gyro, accelerometer: the last, as they were read.
@@ -88,27 +93,28 @@ class WatchedSensors(Record):
     """
 
     has_begun: float
-    q: Float[np.ndarray, "12"]
-    v: Float[np.ndarray, "12"]
-    shift: Float[np.ndarray, "12"]
-    dv: Float[np.ndarray, "12"]
-    same: Float[np.ndarray, "12"]
-    travel: Float[np.ndarray, "12"]
-    force: Float[np.ndarray, "4"]
-    force_same: Float[np.ndarray, "4"]
-    against: Float[np.ndarray, "4"]
-    turning: Float[np.ndarray, "3 3"]
-    turned: Float[np.ndarray, "3"]
+    q: Array12
+    v: Array12
+    shift: Array12
+    dv: Array12
+    same: Array12
+    travel: Array12
+    force: Array4
+    force_same: Array4
+    against: Array4
+    stood: float
+    turning: Array3x3
+    turned: Array3
     residual: float
-    gyro_off: Float[np.ndarray, "3"]
+    gyro_off: Array3
     gyro_time: float
-    gyro: Float[np.ndarray, "3"]
-    accelerometer: Float[np.ndarray, "3"]
-    gyro_jump: Float[np.ndarray, "3"]
+    gyro: Array3
+    accelerometer: Array3
+    gyro_jump: Array3
     tilt_is_off: float
-    stuck: Float[np.ndarray, "12"]
-    jumped: Float[np.ndarray, "12"]
-    force_is_wrong: Float[np.ndarray, "4"]
+    stuck: Array12
+    jumped: Array12
+    force_is_wrong: Array4
     gyro_is_off: float
 
 
@@ -142,19 +148,8 @@ class WatchNumbers:
         )
 
 
-class Sensed(Record):
-    """A reading, in a row: see ``SensorReading``."""
-
-    gyro: Float[np.ndarray, "3"]
-    accelerometer: Float[np.ndarray, "3"]
-    q: Float[np.ndarray, "12"]
-    v: Float[np.ndarray, "12"]
-    tau: Float[np.ndarray, "12"]
-    forces: Float[np.ndarray, "4"]
-
-
 @subroutine
-def take_last_for_nan(s: WatchedSensors, r: Sensed) -> None:
+def take_last_for_nan(s: WatchedSensors, r: SensorReading) -> None:
     """What is not a number becomes what it was."""
     for k in range(3):
         if not np.isfinite(r.gyro[k]):
@@ -162,26 +157,26 @@ def take_last_for_nan(s: WatchedSensors, r: Sensed) -> None:
         if not np.isfinite(r.accelerometer[k]):
             r.accelerometer[k] = s.accelerometer[k]
     for j in range(12):
-        if not np.isfinite(r.q[j]):
-            r.q[j] = s.q[j]
-        if not np.isfinite(r.v[j]):
-            r.v[j] = s.v[j]
+        if not np.isfinite(r.q_joints[j]):
+            r.q_joints[j] = s.q[j]
+        if not np.isfinite(r.v_joints[j]):
+            r.v_joints[j] = s.v[j]
         if not np.isfinite(r.tau[j]):
             r.tau[j] = 0.0
     for leg in range(4):
-        if not np.isfinite(r.forces[leg]):
-            r.forces[leg] = s.force[leg]
+        if not np.isfinite(r.foot_forces[leg]):
+            r.foot_forces[leg] = s.force[leg]
 
 
 @subroutine
-def watch_encoders(s: WatchedSensors, r: Sensed, dt: float) -> None:
+def watch_encoders(s: WatchedSensors, r: SensorReading, dt: float) -> None:
     """Take jumps off the angles, and notice what has stopped."""
     gain = 1.0 - np.exp(-dt / SMOOTHING)
     for j in range(12):
         first, turned = 3 * (j // 3), 0.0
         for k in range(first, first + 3):
-            turned += abs(r.q[k] - s.q[k]) if k != j else 0.0
-        if r.q[j] == s.q[j] and r.v[j] == s.v[j]:
+            turned += abs(r.q_joints[k] - s.q[k]) if k != j else 0.0
+        if r.q_joints[j] == s.q[j] and r.v_joints[j] == s.v[j]:
             s.same[j] += dt
             s.travel[j] += turned
         else:
@@ -189,13 +184,13 @@ def watch_encoders(s: WatchedSensors, r: Sensed, dt: float) -> None:
         if s.same[j] > STUCK_TIME and s.travel[j] > STUCK_TRAVEL:
             s.stuck[j] = 1.0
     for j in range(12):
-        jump = r.q[j] - s.q[j] - 0.5 * (r.v[j] + s.v[j]) * dt
+        jump = r.q_joints[j] - s.q[j] - 0.5 * (r.v_joints[j] + s.v[j]) * dt
         if abs(jump) > JUMP:
             s.shift[j] += jump
             s.jumped[j] = 1.0 if abs(s.shift[j]) > 0.5 * JUMP else 0.0
-        s.dv[j] += gain * ((r.v[j] - s.v[j]) / dt - s.dv[j])
-        s.q[j], s.v[j] = r.q[j], r.v[j]
-        r.q[j] -= s.shift[j]
+        s.dv[j] += gain * ((r.v_joints[j] - s.v[j]) / dt - s.dv[j])
+        s.q[j], s.v[j] = r.q_joints[j], r.v_joints[j]
+        r.q_joints[j] -= s.shift[j]
 
 
 @subroutine
@@ -244,18 +239,19 @@ def less_rolling(q: V3, u: V3, velocity: V3, w: V3, up: V3, radius: float) -> V3
 
 @subroutine
 def watch_force(
-    s: WatchedSensors, r: Sensed, leg: int, borne: float, carries: bool, dt: float
+    s: WatchedSensors, r: SensorReading, leg: int, borne: float, carries: bool, dt: float
 ) -> None:
     """Hold a foot's sensor against ``borne``, the force by the leg's torques [N]."""
-    force = r.forces[leg]
-    s.force_same[leg] = s.force_same[leg] + dt if force == s.force[leg] and force > UNFELT else 0.0
+    force = r.foot_forces[leg]
+    is_same = force == s.force[leg] and force > UNFELT and carries
+    s.force_same[leg] = s.force_same[leg] + dt if is_same else 0.0
     is_against = (force < UNFELT and borne > LOADED) or (force > SENSED and borne < FREE)
     s.against[leg] = s.against[leg] + dt if is_against and carries else 0.0
     s.force[leg] = force
     if s.against[leg] > FORCE_TIME or s.force_same[leg] > SAME_TIME:
         s.force_is_wrong[leg] = 1.0
     if s.force_is_wrong[leg] > 0.0:
-        r.forces[leg] = borne if borne > LOADED else 0.0
+        r.foot_forces[leg] = borne if borne > LOADED else 0.0
 
 
 @subroutine
@@ -294,7 +290,7 @@ def gyro_error(s: WatchedSensors) -> V3:
 
 
 @subroutine
-def watch_legs(s: WatchedSensors, r: Sensed, c: WatchNumbers, up: V3, dt: float) -> None:
+def watch_legs(s: WatchedSensors, r: SensorReading, c: WatchNumbers, up: V3, dt: float) -> None:
     """Hold the feet's forces against the legs' torques, and the gyro against feet that stand."""
     for i in range(3):
         s.gyro[i], s.accelerometer[i] = r.gyro[i], r.accelerometer[i]
@@ -303,13 +299,17 @@ def watch_legs(s: WatchedSensors, r: Sensed, c: WatchNumbers, up: V3, dt: float)
     places, speeds, borne = np.empty((4, 3)), np.empty((4, 3)), np.empty(4)
     for leg in range(4):
         j = slice(3 * leg, 3 * leg + 3)
-        q, v = triple(r.q[j]), triple(r.v[j])
+        q, v = triple(r.q_joints[j]), triple(r.v_joints[j])
         tau = triple(r.tau[j] - c.inertia[leg] @ s.dv[j])
         place, u, force = leg_motion(c.legs.geometry[leg], q, v, tau)
         borne[leg] = force[2]
         put(place, places[leg])
         put(less_rolling(q, v, u, w, up, c.foot_radius), speeds[leg])
-    carries = borne.sum() > CARRIED * c.weight
+    stands = borne.sum() > CARRIED * c.weight and up[2] > UPRIGHT
+    s.stood = s.stood + dt if stands else 0.0
+    if s.stood < CALM:
+        forget_turns(s, 0.0)
+    carries = s.stood > 0.0
     for leg in range(4):
         watch_force(s, r, leg, borne[leg], carries, dt)
     forget_turns(s, np.exp(-dt / SETTLING))
@@ -362,7 +362,11 @@ def judge_gyro(s: WatchedSensors, dt: float) -> None:
 
 @kernel
 def watch_sensors(
-    s: WatchedSensors, r: Sensed, c: WatchNumbers, quaternion: Float[np.ndarray, "4"], dt: float
+    s: WatchedSensors,
+    r: SensorReading,
+    c: WatchNumbers,
+    quaternion: Array4,
+    dt: float,
 ) -> None:
     """Judge a reading, ``dt`` seconds after the last one, and put it right.
 
@@ -375,7 +379,7 @@ def watch_sensors(
         watch_encoders(s, r, dt)
     else:
         s.has_begun = 1.0
-        s.q[:], s.v[:] = r.q, r.v
+        s.q[:], s.v[:] = r.q_joints, r.v_joints
     watch_legs(s, r, c, up, dt)
 
 
@@ -389,11 +393,13 @@ class SensorWatch:
     def __init__(self, model: RobotModel) -> None:
         """Watch ``model``'s robot."""
         self._numbers = packed(WatchNumbers.of(model))
-        self._sensed = Sensed()
+        zeros = np.zeros(12)
+        still = SensorReading(0.0, zeros[:3], zeros[:3], zeros, zeros, zeros, zeros[:4])
+        self._reading = packed(still)
         self.restart()
 
     @property
-    def misturned(self) -> Float[np.ndarray, "3"] | None:
+    def misturned(self) -> Array3 | None:
         """How far [rad] an error of the gyro, just found, has turned whoever believed it."""
         s = self._state
         return SETTLING_AND_LASTING * s.gyro_jump if s.tilt_is_off else None
@@ -404,29 +410,30 @@ class SensorWatch:
         self._flags = np.zeros(len(_PARTS))
         self.faults: tuple[PartFault, ...] = ()
 
-    def checked(self, reading: SensorReading, quaternion: Float[np.ndarray, "4"]) -> SensorReading:
+    def checked(self, reading: SensorReading, quaternion: Array4) -> SensorReading:
         """``reading`` as it should be, on a base that was last turned so (x y z w)."""
-        s, r, dt = self._state, self._sensed, reading.time - self._time
+        s, r, dt = self._state, self._reading, reading.time - self._time
         if not 0.0 < dt < LONGEST_STEP:
             s.has_begun, dt = 0.0, USUAL_STEP
         self._time = reading.time
         r.gyro[:], r.accelerometer[:] = reading.gyro, reading.accelerometer
-        r.q[:], r.v[:], r.tau[:] = reading.q_joints, reading.v_joints, reading.tau
-        r.forces[:] = reading.foot_forces
+        r.q_joints[:], r.v_joints[:], r.tau[:] = reading.q_joints, reading.v_joints, reading.tau
+        r.foot_forces[:] = reading.foot_forces
         watch_sensors(s, r, self._numbers, quaternion, dt)
         flags = s.row[_FLAGS]
         if flags.any() and (flags > self._flags).any():
             self._name(flags, reading.time)
-        row = r.row.copy()
+        row = numbers_of(r).copy()
         return SensorReading(reading.time, *(row[part] for part in _OF_READING))
 
     def _name(self, flags: Float[np.ndarray, "29"], time: float) -> None:
         new = np.flatnonzero(flags > self._flags)
         self._flags = np.maximum(flags, self._flags)
-        self.faults += tuple(PartFault(*_PARTS[k], time) for k in new)
+        self.faults += tuple(PartFault(*_PARTS[k], since=time) for k in new)
 
 
-_OF_READING = (slice(0, 3), slice(3, 6), slice(6, 18), slice(18, 30), slice(30, 42), slice(42, 46))
+_OF_READING = tuple(slice(first, last) for first, last in pairwise((1, 4, 7, 19, 31, 43, 47)))
+"""Where the arrays of a reading stand in its row."""
 _PARTS = (
     *((name, "reads the same while its leg moves", False) for name in JOINT_NAMES),
     *((name, "reads another angle than it turned to", True) for name in JOINT_NAMES),

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import CommandError
-from go2_wbc.records import Record
+from go2_wbc.records import Array3, Array3x3, Array4x3, Array18, Array19, Record
 from go2_wbc.robot.state import RobotState
 
 
@@ -40,24 +40,24 @@ class Snapshot(Record):
     __slots__ = ("state",)
 
     state: RobotState
-    q: Float[np.ndarray, "19"]
-    v: Float[np.ndarray, "18"]
-    R_world_base: Float[np.ndarray, "3 3"]
+    q: Array19
+    v: Array18
+    R_world_base: Array3x3
     mass_matrix: Float[np.ndarray, "18 18"]
-    bias: Float[np.ndarray, "18"]
-    p_world_com: Float[np.ndarray, "3"]
-    v_world_com: Float[np.ndarray, "3"]
+    bias: Array18
+    p_world_com: Array3
+    v_world_com: Array3
     J_com: Float[np.ndarray, "3 18"]
-    drift_com: Float[np.ndarray, "3"]
-    p_world_feet: Float[np.ndarray, "4 3"]
-    v_world_feet: Float[np.ndarray, "4 3"]
+    drift_com: Array3
+    p_world_feet: Array4x3
+    v_world_feet: Array4x3
     J_feet: Float[np.ndarray, "4 3 18"]
-    drift_feet: Float[np.ndarray, "4 3"]
+    drift_feet: Array4x3
     J_contacts: Float[np.ndarray, "4 3 18"]
-    drift_contacts: Float[np.ndarray, "4 3"]
-    v_world_contacts: Float[np.ndarray, "4 3"]
+    drift_contacts: Array4x3
+    v_world_contacts: Array4x3
     payload: Float[np.ndarray, "2"]
-    com_shift: Float[np.ndarray, "3"]
+    com_shift: Array3
 
     def __init__(self, state: RobotState, **parts: Float[np.ndarray, "..."]) -> None:
         """From the ``state`` and the other parts by name; what is left out is 0.

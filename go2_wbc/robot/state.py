@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.records import Array3, Array3x3, Array4, Array12, Array18, Array19
+
 
 @dataclass(frozen=True, slots=True)
 class RobotState:
@@ -25,19 +27,19 @@ class RobotState:
     """
 
     time: float
-    q: Float[np.ndarray, "19"]
-    v: Float[np.ndarray, "18"]
-    tau: Float[np.ndarray, "12"]
-    foot_forces: Float[np.ndarray, "4"]
+    q: Array19
+    v: Array18
+    tau: Array12
+    foot_forces: Array4
     feet_in_contact: Bool[np.ndarray, "4"]
 
     @property
-    def p_world_base(self) -> Float[np.ndarray, "3"]:
+    def p_world_base(self) -> Array3:
         """Position of the base in the world [m]."""
         return self.q[:3]
 
     @property
-    def R_world_base(self) -> Float[np.ndarray, "3 3"]:
+    def R_world_base(self) -> Array3x3:
         """Rotation from the base frame to the world."""
         x, y, z, w = self.q[3:7].tolist()
         return np.array(
@@ -49,7 +51,7 @@ class RobotState:
         )
 
     @property
-    def rpy(self) -> Float[np.ndarray, "3"]:
+    def rpy(self) -> Array3:
         """Roll, pitch, yaw [rad] of the base (R = Rz(yaw) Ry(pitch) Rx(roll))."""
         x, y, z, w = self.q[3:7].tolist()
         roll = math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
@@ -69,12 +71,12 @@ class RobotState:
         return math.acos(min(max(1 - 2 * (x * x + y * y), -1.0), 1.0))
 
     @property
-    def joint_positions(self) -> Float[np.ndarray, "12"]:
+    def joint_positions(self) -> Array12:
         """Joint angles [rad]."""
         return self.q[7:]
 
     @property
-    def joint_velocities(self) -> Float[np.ndarray, "12"]:
+    def joint_velocities(self) -> Array12:
         """Joint velocities [rad/s]."""
         return self.v[6:]
 
@@ -94,12 +96,12 @@ class SensorReading:
     """
 
     time: float
-    gyro: Float[np.ndarray, "3"]
-    accelerometer: Float[np.ndarray, "3"]
-    q_joints: Float[np.ndarray, "12"]
-    v_joints: Float[np.ndarray, "12"]
-    tau: Float[np.ndarray, "12"]
-    foot_forces: Float[np.ndarray, "4"]
+    gyro: Array3
+    accelerometer: Array3
+    q_joints: Array12
+    v_joints: Array12
+    tau: Array12
+    foot_forces: Array4
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,20 +179,18 @@ class JointCommand:
         kd: damping [N m s/rad].
     """
 
-    tau: Float[np.ndarray, "12"]
-    q_des: Float[np.ndarray, "12"]
-    v_des: Float[np.ndarray, "12"]
-    kp: Float[np.ndarray, "12"]
-    kd: Float[np.ndarray, "12"]
+    tau: Array12
+    q_des: Array12
+    v_des: Array12
+    kp: Array12
+    kd: Array12
 
-    def asked(
-        self, q: Float[np.ndarray, "12"], v: Float[np.ndarray, "12"]
-    ) -> Float[np.ndarray, "12"]:
+    def asked(self, q: Array12, v: Array12) -> Array12:
         """Torques [N m] asked for at angles ``q`` and velocities ``v``, before any limit."""
         return self.kp * (self.q_des - q) + self.tau + self.kd * (self.v_des - v)
 
     @staticmethod
-    def torque(tau: Float[np.ndarray, "12"]) -> JointCommand:
+    def torque(tau: Array12) -> JointCommand:
         """Pure torque: no stiffness, no damping."""
         return JointCommand(tau, _ZEROS, _ZEROS, _ZEROS, _ZEROS)
 
@@ -200,9 +200,7 @@ class JointCommand:
         return JointCommand(_ZEROS, _ZEROS, _ZEROS, _ZEROS, np.full(12, kd))
 
     @staticmethod
-    def servo(
-        q_des: Float[np.ndarray, "12"], v_des: Float[np.ndarray, "12"], kp: float, kd: float
-    ) -> JointCommand:
+    def servo(q_des: Array12, v_des: Array12, kp: float, kd: float) -> JointCommand:
         """A joint servo around a moving target."""
         return JointCommand(_ZEROS, q_des, v_des, np.full(12, kp), np.full(12, kd))
 

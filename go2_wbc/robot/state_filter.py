@@ -27,9 +27,9 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Float, Int
 
-from go2_wbc.algebra.vectors import rotation_of
+from go2_wbc.algebra.vectors import put, rotation_of, turned
 from go2_wbc.compilation import subroutine
-from go2_wbc.records import V3, Record, layout_of
+from go2_wbc.records import V3, Array3, Array3x3, Array4, Array4x3, Record, layout_of
 from go2_wbc.robot.estimator_config import EstimatorConfig
 
 
@@ -44,23 +44,23 @@ class Estimate(Record):
         p_feet: centres of the feet in the world [m].
     """
 
-    p: Float[np.ndarray, "3"]
-    v: Float[np.ndarray, "3"]
-    quaternion: Float[np.ndarray, "4"]
-    gyro_bias: Float[np.ndarray, "3"]
-    force_bias: Float[np.ndarray, "3"]
-    p_feet: Float[np.ndarray, "4 3"]
+    p: Array3
+    v: Array3
+    quaternion: Array4
+    gyro_bias: Array3
+    force_bias: Array3
+    p_feet: Array4x3
 
 
 class EstimateError(Record):
     """Its error, or its deviations; the places of its parts are those of rows and columns of P."""
 
-    p: Float[np.ndarray, "3"]
-    v: Float[np.ndarray, "3"]
-    theta: Float[np.ndarray, "3"]
-    gyro_bias: Float[np.ndarray, "3"]
-    force_bias: Float[np.ndarray, "3"]
-    p_feet: Float[np.ndarray, "4 3"]
+    p: Array3
+    v: Array3
+    theta: Array3
+    gyro_bias: Array3
+    force_bias: Array3
+    p_feet: Array4x3
 
 
 _, VELOCITY, THETA, GYRO_BIAS, FORCE_BIAS, FEET = (
@@ -89,7 +89,7 @@ class Filter(Record):
 
 
 @subroutine
-def turn(quaternion: Float[np.ndarray, "4"], by: V3, in_world: bool) -> None:
+def turn(quaternion: Array4, by: V3, in_world: bool) -> None:
     """Turn a quaternion by a rotation vector [rad] along the world's axes or its own."""
     a, b, c = by
     angle = np.sqrt(a * a + b * b + c * c)
@@ -107,14 +107,7 @@ def turn(quaternion: Float[np.ndarray, "4"], by: V3, in_world: bool) -> None:
 
 
 @subroutine
-def put_turned(R: Float[np.ndarray, "3 3"], a: V3, into: Float[np.ndarray, "3"]) -> None:
-    """Put R a into an array."""
-    for i in range(3):
-        into[i] = R[i, 0] * a[0] + R[i, 1] * a[1] + R[i, 2] * a[2]
-
-
-@subroutine
-def rotation_of_estimate(x: Estimate, R: Float[np.ndarray, "3 3"]) -> None:
+def rotation_of_estimate(x: Estimate, R: Array3x3) -> None:
     """Fill the rotation matrix of the trunk."""
     q = x.quaternion
     rotation_of(q[0], q[1], q[2], q[3], R)
@@ -133,13 +126,7 @@ def process_noise(c: EstimatorConfig, dt: float, noise: Float[np.ndarray, "27"])
 
 
 @subroutine
-def mix(
-    P: Covariance,
-    dt: float,
-    R: Float[np.ndarray, "3 3"],
-    force: Float[np.ndarray, "3"],
-    row: Float[np.ndarray, "3"],
-) -> None:
+def mix(P: Covariance, dt: float, R: Array3x3, force: Array3, row: Array3) -> None:
     """One side of F P F': adds to the rows of P what the errors of the state bring about.
 
     ``force`` is R a; ``row`` is work space.
@@ -163,10 +150,10 @@ def mix(
 def predict(
     f: Filter,
     dt: float,
-    w: Float[np.ndarray, "3"],
-    accelerometer: Float[np.ndarray, "3"],
+    w: Array3,
+    accelerometer: Array3,
     gravity: float,
-    R: Float[np.ndarray, "3 3"],
+    R: Array3x3,
     noise: Float[np.ndarray, "27"],
 ) -> None:
     """Move the estimate on by ``dt``: turned by w, driven by the accelerometer.
@@ -180,7 +167,7 @@ def predict(
     turn(x.quaternion, half, False)
     rotation_of_estimate(x, R)
     a, bias = accelerometer, x.force_bias
-    put_turned(R, (a[0] - bias[0], a[1] - bias[1], a[2] - bias[2]), force)
+    put(turned(R, (a[0] - bias[0], a[1] - bias[1], a[2] - bias[2])), force)
     for i in range(3):
         acceleration = force[i] - (gravity if i == 2 else 0.0)
         x.p[i] += dt * x.v[i] + 0.5 * dt * dt * acceleration

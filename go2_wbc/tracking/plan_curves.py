@@ -19,7 +19,7 @@ from jaxtyping import Float
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.records import packed
-from go2_wbc.reference import STANCE, Target, TrackedPoint
+from go2_wbc.reference import STANCE, Target
 
 CURVES = 30
 """How many curves a plan has."""
@@ -75,26 +75,17 @@ class PlanCurves:
         return target
 
 
-def standing_target(
-    point: TrackedPoint, body: Float[np.ndarray, "3 6"], least: float, greatest: float
-) -> Target:
-    """What is asked of a trunk over four feet that stand.
-
-    Args:
-        point: which point the first three components of ``body`` move.
-        body: x, y, z [m] and roll, pitch, yaw [rad], their rates, and their accelerations.
-        least, greatest: bounds [N] of the feet's normal forces.
-    """
-    target = Target()
-    stand(point is TrackedPoint.COM, body, least, greatest, target)
-    return target
-
-
 @kernel
 def stand(
     is_com: bool, body: Float[np.ndarray, "3 6"], least: float, greatest: float, target: Target
 ) -> None:
-    """Fill the reference of a trunk over four feet that stand."""
+    """Fill the reference of a trunk over four feet that stand.
+
+    Args:
+        is_com: whether the first three components of ``body`` move the CoM, else the base.
+        body: x, y, z [m] and roll, pitch, yaw [rad], their rates, and their accelerations.
+        least, greatest: bounds [N] of the feet's normal forces.
+    """
     target.is_com = is_com
     set_body(body[0], body[1], body[2], target)
     for leg in range(4):

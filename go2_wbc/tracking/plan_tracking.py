@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 from go2_wbc.algebra.vectors import rotation_vector
 from go2_wbc.compilation import Foreign, kernel, subroutine
 from go2_wbc.motion_plan import Footsteps
-from go2_wbc.planning.correction import Correction, CorrectionConfig, correct
+from go2_wbc.planning.correction import Correction, correct
 from go2_wbc.records import Record, packed
 from go2_wbc.reference import JOINTS, STANCE, Anchor, Reference, Target, sag_and_lean
 from go2_wbc.robot.snapshot import Snapshot
@@ -64,14 +64,8 @@ class Tracking(Record):
 class PlanTracker:
     """Turns a plan's references, one a tick, into what is tracked in the world."""
 
-    def __init__(
-        self,
-        anchor: Anchor,
-        footsteps: Footsteps | None = None,
-        config: CorrectionConfig | None = None,
-    ) -> None:
+    def __init__(self, anchor: Anchor, footsteps: Footsteps | None = None) -> None:
         """Follow a plan at ``anchor``, without correction at first."""
-        self._config = packed(config or CorrectionConfig())
         self._state = Tracking(landing=Landing.at(anchor))
         self._events, self._changes, self._load = np.zeros(0), np.zeros((0, 4, 3)), _NO_LOAD
         if footsteps is not None:
@@ -92,7 +86,7 @@ class PlanTracker:
         """
         target, contact = Target.of(plan.row.copy()), snapshot.state.feet_in_contact
         steps = contact, self._events, self._changes, self._load
-        follow(snapshot, t, dt, *steps, self._config, self._state, target)
+        follow(snapshot, t, dt, *steps, self._state, target)
         return Reference.of_row(target.row)
 
     @property
@@ -131,7 +125,6 @@ def follow(
     events: Foreign[Float[np.ndarray, " m"]],
     changes: Foreign[Float[np.ndarray, "m 4 3"]],
     load: StanceLoad,
-    c: CorrectionConfig,
     s: Tracking,
     target: Target,
 ) -> None:
@@ -146,7 +139,7 @@ def follow(
     error = np.empty(6)
     compare(now, target, error)
     note(now, error, s, target)
-    correct(now, error, dt if is_standing(target) else 0.0, c, s.correction, target)
+    correct(now, error, dt if is_standing(target) else 0.0, s.correction, target)
 
 
 @subroutine

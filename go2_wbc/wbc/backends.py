@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-
 import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import QpInfeasible
-from go2_wbc.records import packed
+from go2_wbc.records import Array30, packed
 from go2_wbc.reference import Target
 from go2_wbc.wbc.constraints import StanceFeetStill
 from go2_wbc.wbc.elimination import Reduction, reduce_equalities
@@ -16,50 +14,29 @@ from go2_wbc.wbc.problem import SIZE, Problem
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 
 
-class QpBackend(ABC):
-    """Solves an assembled problem."""
+def solve_full(problem: Problem, solver: str) -> Array30:
+    """The optimal decision z, by the QP in accelerations and stance forces, with its equalities.
 
-    def __init__(self, solver: str) -> None:
-        """Args: solver: name of a dense QP solver, see ``solvers``."""
-        self.solver = solver
-
-    @abstractmethod
-    def solve(self, problem: Problem) -> Float[np.ndarray, "30"]:
-        """The optimal decision vector z.
-
-        Raises:
-            QpInfeasible: with the residual table of the best unconstrained point.
-        """
+    Raises:
+        QpInfeasible: with the residual table of the best unconstrained point.
+    """
+    unknown = np.concatenate([np.ones(18, dtype=bool), np.repeat(problem.stance, 3)])
+    Z, z0 = np.eye(SIZE)[:, unknown], np.zeros(SIZE)
+    return _embed(problem, dense_qp(problem, Z, z0, with_equalities=True), Z, z0, solver)
 
 
-class FullBackend(QpBackend):
-    """The QP in accelerations and stance forces, with its equalities."""
-
-    def solve(self, problem: Problem) -> Float[np.ndarray, "30"]:
-        """The optimal decision vector z; see ``QpBackend.solve``."""
-        unknown = np.concatenate([np.ones(18, dtype=bool), np.repeat(problem.stance, 3)])
-        qp = dense_qp(problem, np.eye(SIZE)[:, unknown], np.zeros(SIZE), with_equalities=True)
-        return _embed(problem, qp, np.eye(SIZE)[:, unknown], np.zeros(SIZE), self.solver)
-
-
-class CondensedBackend(QpBackend):
-    """The QP in three unknowns per leg, equalities eliminated.
+def solve_condensed(problem: Problem, solver: str) -> Array30:
+    """The same by the QP in three unknowns per leg, equalities eliminated; in full if singular.
 
     With the solver "active_set" a tick is solved by ``condensed`` without assembling a problem.
     """
-
-    def solve(self, problem: Problem) -> Float[np.ndarray, "30"]:
-        """The optimal decision vector z; see ``QpBackend.solve``."""
-        reduction = eliminate_equalities(problem)
-        if reduction is None:
-            return FullBackend(self.solver).solve(problem)
-        Z, z0 = reduction
-        return _embed(problem, dense_qp(problem, Z, z0), Z, z0, self.solver)
+    reduction = eliminate_equalities(problem)
+    if reduction is None:
+        return solve_full(problem, solver)
+    return _embed(problem, dense_qp(problem, *reduction), *reduction, solver)
 
 
-def eliminate_equalities(
-    problem: Problem,
-) -> tuple[Float[np.ndarray, "30 12"], Float[np.ndarray, "30"]] | None:
+def eliminate_equalities(problem: Problem) -> tuple[Float[np.ndarray, "30 12"], Array30] | None:
     """Z and z0 such that z = Z u + z0 meets every equality (``elimination``); None if singular."""
     reduction, still = Reduction(), packed(problem.source(StanceFeetStill))
     target = Target.of(problem.reference.row)
@@ -69,11 +46,7 @@ def eliminate_equalities(
 
 
 def dense_qp(
-    problem: Problem,
-    Z: Float[np.ndarray, "30 n"],
-    z0: Float[np.ndarray, "30"],
-    *,
-    with_equalities: bool = False,
+    problem: Problem, Z: Float[np.ndarray, "30 n"], z0: Array30, *, with_equalities: bool = False
 ) -> DenseQp:
     """The QP in u for z = Z u + z0.
 
@@ -95,14 +68,10 @@ def dense_qp(
 
 
 def _embed(
-    problem: Problem,
-    qp: DenseQp,
-    Z: Float[np.ndarray, "30 n"],
-    z0: Float[np.ndarray, "30"],
-    solver: str,
-) -> Float[np.ndarray, "30"]:
+    problem: Problem, qp: DenseQp, Z: Float[np.ndarray, "30 n"], z0: Array30, solver: str
+) -> Array30:
     try:
-        return Z @ solve_dense_qp(qp, solver).x + z0
+        return Z @ solve_dense_qp(qp, solver) + z0
     except QpInfeasible as error:
         # H u = -g: the optimum without bounds, which tells best what asked for too much
         best = Z @ np.linalg.lstsq(qp.H, -qp.g, rcond=None)[0] + z0

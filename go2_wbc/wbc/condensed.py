@@ -13,46 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.algebra.active_set import (
-    SINGULAR,
-    SOLVED,
-    VIOLATION,
-    constrain,
-    factorise,
-    solve_factorised,
-)
+from go2_wbc.algebra.active_set import SINGULAR, SOLVED, VIOLATION, constrain
+from go2_wbc.algebra.linear import factorise, solve_factorised
 from go2_wbc.compilation import kernel, subroutine
-from go2_wbc.records import Record
+from go2_wbc.records import Array12, Array30, Record
 from go2_wbc.reference import STANCE, Target
 from go2_wbc.robot.joint_friction import FrictionFeedForward, fill_motor_torques
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.wbc.constraints import (
-    FrictionPyramid,
-    JointLimits,
-    Limits,
-    StanceFeetStill,
-    TorqueLimits,
-    fill_force_limits,
-    fill_joint_limits,
-    fill_torque_limits,
-)
+from go2_wbc.wbc.constraints import Constraints, Limits, fill_limits
 from go2_wbc.wbc.elimination import Reduction, decide, eliminate, expand
 from go2_wbc.wbc.inputs import are_valid
-from go2_wbc.wbc.tasks import (
-    LEG_ROWS,
-    TASK_ROWS,
-    BodyOrientation,
-    BodyPosition,
-    ForceRegularisation,
-    LegPosture,
-    SwingFoot,
-    TaskRows,
-    fill_body_orientation,
-    fill_body_position,
-    fill_forces,
-    fill_leg_posture,
-    fill_swing_feet,
-)
+from go2_wbc.wbc.tasks import LEG_ROWS, TASK_ROWS, BuiltInTasks, TaskRows, fill_tasks
 
 UNSUITED = 10
 """Outcome, beside those of ``active_set``: a singular leg, which is for the full QP, or numbers
@@ -63,17 +34,10 @@ MOST_ROWS = 44
 
 @dataclass(frozen=True, slots=True)
 class QpNumbers:
-    """The built-in tasks and the constraints of a whole-body controller."""
+    """What a whole-body controller is told of its robot."""
 
-    position: BodyPosition
-    orientation: BodyOrientation
-    swing: SwingFoot
-    posture: LegPosture
-    force: ForceRegularisation
-    still: StanceFeetStill
-    pyramid: FrictionPyramid
-    torque: TorqueLimits
-    joint: JointLimits
+    tasks: BuiltInTasks
+    constraints: Constraints
     friction: FrictionFeedForward
 
 
@@ -86,9 +50,9 @@ class Decision(Record):
         tau_motors: those that the motors are told [N m].
     """
 
-    z: Float[np.ndarray, "30"]
-    tau: Float[np.ndarray, "12"]
-    tau_motors: Float[np.ndarray, "12"]
+    z: Array30
+    tau: Array12
+    tau_motors: Array12
 
 
 class Workspace(Record):
@@ -107,30 +71,12 @@ class Workspace(Record):
     limits: Limits
     reduction: Reduction
     H: Float[np.ndarray, "12 12"]
-    g: Float[np.ndarray, "12"]
+    g: Array12
     L: Float[np.ndarray, "12 12"]
-    u: Float[np.ndarray, "12"]
+    u: Array12
     C: Float[np.ndarray, "44 12"]
     lower: Float[np.ndarray, "44"]
     upper: Float[np.ndarray, "44"]
-
-
-@subroutine
-def fill_tasks(now: Snapshot, target: Target, c: QpNumbers, rows: TaskRows) -> None:
-    """Fill the rows of all built-in tasks."""
-    fill_body_position(now, target, c.position, rows)
-    fill_body_orientation(now, target, c.orientation, rows)
-    fill_swing_feet(now, target, c.swing, rows)
-    fill_leg_posture(now, target, c.posture, rows)
-    fill_forces(now, target, c.force, rows)
-
-
-@subroutine
-def fill_limits(now: Snapshot, target: Target, c: QpNumbers, limits: Limits) -> None:
-    """Fill the rows of all inequalities."""
-    fill_force_limits(target, c.pyramid, limits)
-    fill_torque_limits(now, c.torque, limits)
-    fill_joint_limits(now, c.joint, limits)
 
 
 @subroutine
@@ -141,7 +87,7 @@ def add_row(
     b: float,
     weight: float,
     H: Float[np.ndarray, "12 12"],
-    g: Float[np.ndarray, "12"],
+    g: Array12,
 ) -> None:
     """Add weight |row (u, 1) - b|^2 / 2 to the cost; columns other than first to end are 0."""
     rest = weight * (row[12] - b)
@@ -156,10 +102,7 @@ def add_row(
 
 @subroutine
 def add_tasks(
-    rows: TaskRows,
-    base: Float[np.ndarray, "6 13"],
-    H: Float[np.ndarray, "12 12"],
-    g: Float[np.ndarray, "12"],
+    rows: TaskRows, base: Float[np.ndarray, "6 13"], H: Float[np.ndarray, "12 12"], g: Array12
 ) -> None:
     """Add the cost of the built-in tasks."""
     row = np.empty(13)
@@ -189,7 +132,7 @@ def add_extra_tasks(
     rows: Float[np.ndarray, "k 32"],
     affine: Float[np.ndarray, "30 13"],
     H: Float[np.ndarray, "12 12"],
-    g: Float[np.ndarray, "12"],
+    g: Array12,
 ) -> None:
     """Add the cost of a user's own tasks: A, b, weight."""
     row = np.empty(13)
@@ -202,7 +145,7 @@ def add_extra_tasks(
 
 
 @subroutine
-def fill_tau(limits: Limits, z: Float[np.ndarray, "30"], tau: Float[np.ndarray, "12"]) -> None:
+def fill_tau(limits: Limits, z: Array30, tau: Array12) -> None:
     """Fill the torques of a decision."""
     for n in range(12):
         first, row = 3 * (n // 3), limits.torques[n]
@@ -283,12 +226,12 @@ def bound_unknowns(target: Target, limits: Limits, w: Workspace) -> int:
 def solve_bounded(target: Target, w: Workspace) -> int:
     """Move u from the minimum without bounds to that within all; returns the outcome."""
     m = bound_unknowns(target, w.limits, w)
-    E, e, multipliers = np.empty((0, 12)), np.empty(0), np.empty(m)
-    return constrain(w.L, E, e, w.C[:m], w.lower[:m], w.upper[:m], w.u, multipliers)
+    E, e = np.empty((0, 12)), np.empty(0)
+    return constrain(w.L, E, e, w.C[:m], w.lower[:m], w.upper[:m], w.u)
 
 
 @kernel
-def solve_condensed(
+def solve_tick(
     now: Snapshot,
     target: Target,
     c: QpNumbers,
@@ -300,11 +243,11 @@ def solve_condensed(
 
     ``extra`` are rows of a user's own tasks: A, b, weight.
     """
-    if not are_valid(now, target) or not eliminate(now, target, c.still, w.reduction):
+    if not are_valid(now, target) or not eliminate(now, target, c.constraints.still, w.reduction):
         return UNSUITED
     w.H[:] = 0.0
     w.g[:] = 0.0
-    fill_tasks(now, target, c, w.tasks)
+    fill_tasks(now, target, c.tasks, w.tasks)
     add_tasks(w.tasks, w.reduction.base, w.H, w.g)
     if len(extra) > 0:
         expand(target, w.reduction)
@@ -312,7 +255,7 @@ def solve_condensed(
     if not factorise(w.H, w.L):
         return SINGULAR
     solve_factorised(w.L, w.g, w.u)
-    fill_limits(now, target, c, w.limits)
+    fill_limits(now, target, c.constraints, w.limits)
     decide(target, w.reduction, w.u, decision.z)
     fill_tau(w.limits, decision.z, decision.tau)
     outcome = SOLVED

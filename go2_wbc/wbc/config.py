@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
+from go2_wbc.records import Array3
 from go2_wbc.reference import LEAST_WEIGHT, MOST_WEIGHT
 from go2_wbc.robot.joint_friction import JointFriction
-from go2_wbc.validation import (
-    require_between,
-    require_not_negative,
-    require_positive,
-    require_share,
-)
-from go2_wbc.wbc.tasks import Gains
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Range, between, ranged
 
 WEIGHTS = (1e-3, 1e3)
 """Least and greatest weight of a task. At all 16 corners of these ranges four solvers agree within
@@ -20,8 +17,33 @@ WEIGHTS = (1e-3, 1e3)
 FORCE_WEIGHTS = (LEAST_WEIGHT, MOST_WEIGHT)
 """Least and greatest weight of the force regularisation, measured along."""
 
+WEIGHT = between(*WEIGHTS)
+WEIGHT_OR_NONE = Range(WEIGHT.what, lambda value: value == 0.0 or WEIGHT.holds(value))
+GREATEST_GAIN = 1e6
+"""(2 / dt)^2 [1/s^2] at 500 ticks a second: a loop with more than that swings itself up."""
+
 
 @dataclass(frozen=True, slots=True)
+@ranged(between(0.0, GREATEST_GAIN))
+class Gains:
+    """Proportional [1/s^2] and derivative [1/s] gain of a task, per axis."""
+
+    kp: tuple[float, float, float]
+    kd: tuple[float, float, float]
+
+    @staticmethod
+    def uniform(kp: float, kd: float) -> Gains:
+        """The same gain on three axes."""
+        return Gains((kp, kp, kp), (kd, kd, kd))
+
+    @property
+    def arrays(self) -> tuple[Array3, Array3]:
+        """kp and kd as arrays."""
+        return np.array(self.kp), np.array(self.kd)
+
+
+@dataclass(frozen=True, slots=True)
+@ranged(WEIGHT, limit_horizon=POSITIVE, friction=POSITIVE)
 class DynamicWbcConfig:
     """What is different for plans with flights or few feet; tuned on five seeds in simulation.
 
@@ -46,14 +68,21 @@ class DynamicWbcConfig:
     limit_horizon: float = 0.01
     friction: float = 0.475
 
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_positive(self, "limit_horizon", "friction")
-        weights = "position_weight", "orientation_weight", "swing_weight"
-        require_between(self, *WEIGHTS, *weights)
-
 
 @dataclass(frozen=True, slots=True)
+@ranged(
+    POSITIVE,
+    position_weight=WEIGHT_OR_NONE,
+    orientation_weight=WEIGHT_OR_NONE,
+    swing_weight=WEIGHT,
+    flight_weight=WEIGHT,
+    posture_weight=WEIGHT,
+    force_weight=between(*FORCE_WEIGHTS),
+    torque_share=SHARE,
+    speed_share=SHARE,
+    stance_damping=NOT_NEGATIVE,
+    joint_margin=NOT_NEGATIVE,
+)
 class WbcConfig:
     """Numbers of the whole-body controller.
 
@@ -108,16 +137,6 @@ class WbcConfig:
     joint_margin: float = 0.0
     joint_friction: JointFriction = field(default_factory=JointFriction)
     dynamic: DynamicWbcConfig = field(default_factory=DynamicWbcConfig)
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_positive(self, "friction", "braking", "limit_horizon")
-        require_share(self, "torque_share", "speed_share")
-        require_not_negative(self, "stance_damping", "joint_margin")
-        require_between(self, *FORCE_WEIGHTS, "force_weight")
-        require_between(self, *WEIGHTS, "swing_weight", "flight_weight", "posture_weight")
-        body = ("position_weight", "orientation_weight")
-        require_between(self, *WEIGHTS, *(name for name in body if getattr(self, name) != 0.0))
 
     @property
     def for_dynamics(self) -> WbcConfig:

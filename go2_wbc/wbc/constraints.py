@@ -18,10 +18,13 @@ from jaxtyping import Float
 
 from go2_wbc.algebra.vectors import plus_scaled, triple
 from go2_wbc.compilation import kernel, subroutine
-from go2_wbc.records import V3, Record, packed
+from go2_wbc.errors import ConfigError
+from go2_wbc.records import V3, Array6, Array12, Record, packed
 from go2_wbc.reference import STANCE, Reference, Target
+from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import MotorModel, torque_range
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.problem import FORCES, SIZE, Bounds, Rows
 
 _JOINT_SELECTION = np.eye(12, SIZE, 6)
@@ -66,11 +69,30 @@ class Limits(Record):
     forces_lower: Float[np.ndarray, "4 5"]
     forces_upper: Float[np.ndarray, "4 5"]
     torques: Float[np.ndarray, "12 12"]
-    torques_offset: Float[np.ndarray, "12"]
-    torques_lower: Float[np.ndarray, "12"]
-    torques_upper: Float[np.ndarray, "12"]
-    joints_lower: Float[np.ndarray, "12"]
-    joints_upper: Float[np.ndarray, "12"]
+    torques_offset: Array12
+    torques_lower: Array12
+    torques_upper: Array12
+    joints_lower: Array12
+    joints_upper: Array12
+
+
+class BaseRows(Record):
+    """The base's rows A z = b of M a + h = J' f."""
+
+    A: Float[np.ndarray, "6 30"]
+    b: Array6
+
+
+@kernel
+def fill_base_dynamics(now: Snapshot, rows: BaseRows) -> None:
+    """Fill force and moment balance of the whole robot in the base frame."""
+    for i in range(6):
+        for k in range(18):
+            rows.A[i, k] = now.mass_matrix[i, k]
+        for leg in range(4):
+            for k in range(3):
+                rows.A[i, 18 + 3 * leg + k] = -now.J_contacts[leg, k, i]
+        rows.b[i] = -now.bias[i]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,11 +103,10 @@ class FloatingBaseDynamics(Equality):
     unit = "N, N m"
 
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
-        """Six rows: force and moment balance of the whole robot in the base frame."""
-        A = np.empty((6, SIZE))
-        A[:, :18] = snapshot.mass_matrix[:6]
-        A[:, FORCES] = -snapshot.J_contacts[:, :, :6].reshape(12, 6).T
-        return Rows(A, -snapshot.bias[:6])
+        """Six rows, see ``fill_base_dynamics``."""
+        rows = BaseRows()
+        fill_base_dynamics(snapshot, rows)
+        return Rows(rows.A, rows.b)
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,9 +255,7 @@ def fill_torques(now: Snapshot, limits: Limits) -> None:
         limits.torques_offset[n] = now.bias[6 + n]
 
 
-def torque_map(
-    snapshot: Snapshot,
-) -> tuple[Float[np.ndarray, "12 30"], Float[np.ndarray, "12"]]:
+def torque_map(snapshot: Snapshot) -> tuple[Float[np.ndarray, "12 30"], Array12]:
     """(A, offset) such that the joint torques are A z + offset [N m].
 
     tau = M_j a + h_j - J_j' f, the rows of the joints j in M a + h = S' tau + J' f.
@@ -279,9 +298,9 @@ class JointLimits(Inequality):
         horizon: time [s] in which a bound on the velocity must be met.
     """
 
-    q_lower: Float[np.ndarray, "12"]
-    q_upper: Float[np.ndarray, "12"]
-    speed: Float[np.ndarray, "12"]
+    q_lower: Array12
+    q_upper: Array12
+    speed: Array12
     braking: float
     horizon: float
     name = "joint limits"
@@ -312,6 +331,42 @@ def fill_joint_limits(now: Snapshot, task: JointLimits, limits: Limits) -> None:
         slow = viable_speed(q - task.q_lower[n], -speed, braking, horizon)
         limits.joints_upper[n] = max((min(most, fast) - speed) / horizon, -braking)
         limits.joints_lower[n] = min((-min(most, slow) - speed) / horizon, braking)
+
+
+@dataclass(frozen=True, slots=True)
+class Constraints:
+    """All of them that have numbers."""
+
+    still: StanceFeetStill
+    pyramid: FrictionPyramid
+    torque: TorqueLimits
+    joint: JointLimits
+
+    @staticmethod
+    def of(c: WbcConfig, model: RobotModel, motor: MotorModel) -> Constraints:
+        """With the limits of a configuration, for a robot with these motors.
+
+        Raises:
+            ConfigError: for a margin that leaves a joint no range.
+        """
+        lower, upper = model.q_lower + c.joint_margin, model.q_upper - c.joint_margin
+        if (upper <= lower).any():
+            raise ConfigError(f"WbcConfig.joint_margin leaves no range: {c.joint_margin} rad")
+        speed = model.speed_limits * c.speed_share
+        return Constraints(
+            StanceFeetStill(c.stance_damping),
+            FrictionPyramid(c.friction, keeps_cone=c.keeps_cone),
+            TorqueLimits(motor),
+            JointLimits(lower, upper, speed, c.braking, c.limit_horizon),
+        )
+
+
+@subroutine
+def fill_limits(now: Snapshot, target: Target, c: Constraints, limits: Limits) -> None:
+    """Fill the rows of all inequalities."""
+    fill_force_limits(target, c.pyramid, limits)
+    fill_torque_limits(now, c.torque, limits)
+    fill_joint_limits(now, c.joint, limits)
 
 
 def friction_pyramid(mu: float) -> Float[np.ndarray, "5 3"]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -13,36 +13,21 @@ from jaxtyping import Float
 
 from go2_wbc.algebra.active_set import SOLVED
 from go2_wbc.errors import ConfigError, QpInfeasible, unknown_name
-from go2_wbc.records import layout_of, packed
+from go2_wbc.records import Array30, layout_of, packed
 from go2_wbc.reference import Reference
 from go2_wbc.robot.joint_friction import FrictionFeedForward
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.wbc.backends import CondensedBackend, FullBackend, QpBackend
-from go2_wbc.wbc.condensed import Decision, QpNumbers, Workspace, solve_condensed
+from go2_wbc.wbc.backends import solve_condensed, solve_full
+from go2_wbc.wbc.condensed import Decision, QpNumbers, Workspace, solve_tick
 from go2_wbc.wbc.config import WbcConfig
-from go2_wbc.wbc.constraints import (
-    Equality,
-    FloatingBaseDynamics,
-    FrictionPyramid,
-    Inequality,
-    JointLimits,
-    StanceFeetStill,
-    TorqueLimits,
-)
+from go2_wbc.wbc.constraints import Constraints, Equality, FloatingBaseDynamics, Inequality
 from go2_wbc.wbc.inputs import check_extra_tasks, check_inputs, check_problem, stacked
 from go2_wbc.wbc.problem import SIZE, Bounds, Problem
 from go2_wbc.wbc.relaxation import solve_relaxed
 from go2_wbc.wbc.solution import WbcSolution
 from go2_wbc.wbc.solvers import check_solver
-from go2_wbc.wbc.tasks import (
-    BodyOrientation,
-    BodyPosition,
-    ForceRegularisation,
-    LegPosture,
-    SwingFoot,
-    Task,
-)
+from go2_wbc.wbc.tasks import BuiltInTasks, Task
 
 
 class WholeBodyController:
@@ -76,31 +61,36 @@ class WholeBodyController:
         self.model = model
         self.config = config or WbcConfig()
         check_extra_tasks(extra_tasks)
-        self._numbers = c = packed(_numbers(model, self.config))
+        weight, motor = model.mass * model.gravity, model.motor.scaled(self.config.torque_share)
+        tasks = BuiltInTasks.of(self.config, weight)
+        limits = Constraints.of(self.config, model, motor)
+        friction = FrictionFeedForward(self.config.joint_friction, motor)
+        self._numbers = packed(QpNumbers(tasks, limits, friction))
+        self._friction = self._numbers.friction
         self._extra_tasks = tuple(extra_tasks)
-        built_in = (c.position, c.orientation, c.swing, c.posture, c.force)
+        t, c = self._numbers.tasks, self._numbers.constraints
+        built_in = (t.position, t.orientation, t.swing, t.posture, t.force)
         self.tasks: tuple[Task, ...] = (*built_in, *self._extra_tasks)
         self.equalities: tuple[Equality, ...] = (FloatingBaseDynamics(), c.still)
         self.inequalities: tuple[Inequality, ...] = (c.pyramid, c.torque, c.joint)
-        self._friction = c.friction
         self._workspace = Workspace()
         self.backend_name = backend
-        self._backend = self._make_backend(backend)
+        self._solver, self._solve = self._back_end(backend)
         self._is_compiled = backend == "condensed" and self.config.solver == "active_set"
         if extra_tasks and backend == "placo":
             raise ConfigError("the placo back end has tasks of its own and takes no extra ones")
 
-    def _make_backend(self, name: str) -> QpBackend:
+    def _back_end(self, name: str) -> tuple[str, Callable[[Problem], Array30]]:
+        """Which solver it has, and how it solves an assembled problem."""
         solver = check_solver(self.config.solver)
-        if name == "condensed":
-            return CondensedBackend(solver)
-        if name == "full":
-            return FullBackend(solver)
         if name == "placo":
-            from go2_wbc.wbc.placo_backend import PlacoBackend
+            from go2_wbc.wbc.placo_backend import SOLVER, PlacoBackend
 
-            return PlacoBackend(self.model, self.config)
-        raise ConfigError(unknown_name("WBC back end", name, ("condensed", "full", "placo")))
+            return SOLVER, PlacoBackend(self.model, self.config).solve
+        ours = {"condensed": solve_condensed, "full": solve_full}
+        if name not in ours:
+            raise ConfigError(unknown_name("WBC back end", name, (*ours, "placo")))
+        return solver, partial(ours[name], solver=solver)
 
     def formulate(self, snapshot: Snapshot, reference: Reference) -> Problem:
         """The QP of this tick."""
@@ -144,11 +134,11 @@ class WholeBodyController:
         if solution is not None:
             return solution
         start = time.perf_counter()  # thread_time costs a tenth of a tick on some machines
-        check_inputs(snapshot, reference, self._backend.solver)
+        check_inputs(snapshot, reference, self._solver)
         problem = self.formulate(snapshot, reference)
-        check_problem(problem, self._backend.solver)
+        check_problem(problem, self._solver)
         try:
-            z, is_relaxed = self._backend.solve(problem), False
+            z, is_relaxed = self._solve(problem), False
         except QpInfeasible as error:
             if not relax:
                 raise
@@ -160,7 +150,7 @@ class WholeBodyController:
         motors = self._friction.motor_torques(snapshot, solution.qdd, solution.tau)
         return replace(solution, tau_motors=motors)
 
-    def _relaxed(self, problem: Problem, error: QpInfeasible) -> Float[np.ndarray, "30"]:
+    def _relaxed(self, problem: Problem, error: QpInfeasible) -> Array30:
         try:
             return solve_relaxed(problem, self.config.solver)
         except QpInfeasible as contradiction:
@@ -173,7 +163,7 @@ class WholeBodyController:
 
     def solve_compiled(self, snapshot: Snapshot, reference: Reference) -> WbcSolution | None:
         """Solve one tick by the kernel; None if it is not used here or finds no solution."""
-        if not self._is_compiled:
+        if not self.is_compiled:
             return None
         start = time.perf_counter()
         extra = _NO_ROWS
@@ -184,7 +174,7 @@ class WholeBodyController:
         decision = Decision.of(np.empty(_DECISION))
         target: Any = reference  # has the row of a ``Target``
         work = self._workspace
-        outcome = solve_condensed(snapshot, target, self._numbers, extra, work, decision)
+        outcome = solve_tick(snapshot, target, self._numbers, extra, work, decision)
         if outcome != SOLVED:
             return None
         spent = time.perf_counter() - start
@@ -200,29 +190,3 @@ class WholeBodyController:
 
 
 _NO_ROWS, _DECISION = np.empty((0, SIZE + 2)), layout_of(Decision).size
-
-
-def _numbers(model: RobotModel, config: WbcConfig) -> QpNumbers:
-    if (model.q_upper - model.q_lower <= 2 * config.joint_margin).any():
-        raise ConfigError(f"WbcConfig.joint_margin leaves no range: {config.joint_margin} rad")
-    weight, motor = model.mass * model.gravity, model.motor.scaled(config.torque_share)
-    return QpNumbers(
-        position=BodyPosition(*config.body_position.arrays, weight, config.position_weight),
-        orientation=BodyOrientation(
-            *config.body_orientation.arrays, config.orientation_weight, config.flight_weight
-        ),
-        swing=SwingFoot(*config.swing_foot.arrays, config.swing_weight),
-        posture=LegPosture(*config.leg_posture.arrays, config.posture_weight),
-        force=ForceRegularisation(weight, config.force_weight),
-        still=StanceFeetStill(config.stance_damping),
-        pyramid=FrictionPyramid(config.friction, keeps_cone=config.keeps_cone),
-        torque=TorqueLimits(motor),
-        joint=JointLimits(
-            model.q_lower + config.joint_margin,
-            model.q_upper - config.joint_margin,
-            model.speed_limits * config.speed_share,
-            config.braking,
-            config.limit_horizon,
-        ),
-        friction=FrictionFeedForward(config.joint_friction, motor),
-    )

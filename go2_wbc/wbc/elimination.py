@@ -29,10 +29,10 @@ from jaxtyping import Float
 from go2_wbc.algebra.linear import solve_linear
 from go2_wbc.algebra.vectors import along, cross, triple
 from go2_wbc.compilation import kernel, subroutine
-from go2_wbc.records import Record
+from go2_wbc.records import Array12, Array30, Record
 from go2_wbc.reference import STANCE, Target
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.wbc.constraints import StanceFeetStill, left_over
+from go2_wbc.wbc.constraints import BaseRows, StanceFeetStill, fill_base_dynamics, left_over
 
 SINGULAR_DETERMINANT = 2e-4
 """|det J_l| [m^3] below which a leg counts as singular; 1.5e-2 in standing (own measurement).
@@ -46,10 +46,12 @@ class Reduction(Record):
 
     Attributes:
         legs: (3): the joints' accelerations of the stance legs, legs (a_b, 1).
+        dynamics: (1): the base's rows.
         base: (4): that of the base, a_b = base (u, 1).
         affine: the decision, z = affine (u, 1).
     """
 
+    dynamics: BaseRows
     legs: Float[np.ndarray, "12 7"]
     base: Float[np.ndarray, "6 13"]
     affine: Float[np.ndarray, "30 13"]
@@ -79,14 +81,14 @@ def reduce_leg(now: Snapshot, still: StanceFeetStill, leg: int, r: Reduction) ->
 
 
 @subroutine
-def press(now: Snapshot, leg: int, r: Reduction, system: Float[np.ndarray, "6 19"]) -> None:
+def press(leg: int, r: Reduction, system: Float[np.ndarray, "6 19"]) -> None:
     """What a leg that stands adds to (4)."""
-    J, c = now.J_contacts[leg], 3 * leg
+    A, c = r.dynamics.A, 3 * leg
     for i in range(6):
         for k in range(3):
-            system[i, 6 + c + k] = J[k, i]
+            system[i, 6 + c + k] = -A[i, 18 + c + k]
         for n in range(3):
-            share = now.mass_matrix[i, 6 + c + n]
+            share = A[i, 6 + c + n]
             for k in range(6):
                 system[i, k] += share * r.legs[c + n, k]
             system[i, 18] -= share * r.legs[c + n, 6]
@@ -95,20 +97,21 @@ def press(now: Snapshot, leg: int, r: Reduction, system: Float[np.ndarray, "6 19
 @subroutine
 def eliminate(now: Snapshot, target: Target, still: StanceFeetStill, r: Reduction) -> bool:
     """(3) and (4): fill ``legs`` and ``base``; False if a leg is singular."""
-    M = now.mass_matrix
+    fill_base_dynamics(now, r.dynamics)
+    A, b = r.dynamics.A, r.dynamics.b
     system = np.zeros((6, 19))  # a_b, u, 1
     for i in range(6):
-        system[i, 18] = -now.bias[i]
+        system[i, 18] = b[i]
         for k in range(6):
-            system[i, k] = M[i, k]
+            system[i, k] = A[i, k]
     for leg in range(4):
         c = 3 * leg
         if target.legs[leg] != STANCE:
             for i in range(6):
                 for k in range(3):
-                    system[i, 6 + c + k] = -M[i, 6 + c + k]
+                    system[i, 6 + c + k] = -A[i, 6 + c + k]
         elif reduce_leg(now, still, leg, r):
-            press(now, leg, r, system)
+            press(leg, r, system)
         else:
             return False
     if not solve_linear(system, 6):
@@ -141,9 +144,7 @@ def expand(target: Target, r: Reduction) -> None:
 
 
 @subroutine
-def decide(
-    target: Target, r: Reduction, u: Float[np.ndarray, "12"], z: Float[np.ndarray, "30"]
-) -> None:
+def decide(target: Target, r: Reduction, u: Array12, z: Array30) -> None:
     """Fill the decision z that the unknowns lead to."""
     for i in range(6):
         value = r.base[i, 12]

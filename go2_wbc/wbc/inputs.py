@@ -52,17 +52,16 @@ def check_inputs(snapshot: Snapshot, reference: Reference, solver: str) -> None:
         QpInfeasible: for the first number that is not finite, by name and place.
         CommandError: for an array that has another shape than it should, or holds no numbers.
     """
-    for index in _not_finite(snapshot.row):
+    for index in np.flatnonzero(~np.isfinite(snapshot.row)).tolist():
         name, place = layout_of(Snapshot).place(index)
         owner = "snapshot.state" if name in _IN_STATE else "snapshot"
-        raise _refused(solver, f"{owner}.{name}{place}", snapshot.row[index])
-    for index in _not_finite(reference.row):
+        raise QpInfeasible(solver, f"{owner}.{name}{place} is {snapshot.row[index]}")
+    for index in np.flatnonzero(~np.isfinite(reference.row)).tolist():
         name, place = layout_of(Target).place(index)
         value = reference.row[index]
-        is_open = {"normal_force_min": -np.inf, "normal_force_max": np.inf}.get(name) == value
-        if not is_open:
+        if {"normal_force_min": -np.inf, "normal_force_max": np.inf}.get(name) != value:
             owner = "reference.body" if name in _IN_BODY else "reference"
-            raise _refused(solver, f"{owner}.{name}{place}", value)
+            raise QpInfeasible(solver, f"{owner}.{name}{place} is {value}")
 
 
 def check_problem(problem: Problem, solver: str) -> None:
@@ -97,14 +96,6 @@ def stacked(rows: Sequence[Rows], sources: Sequence[Source]) -> Rows:
                 f"{np.shape(part.b)}, wanted are (k, {SIZE}) and (k,)"
             )
     return Rows(np.concatenate([r.A for r in rows]), np.concatenate([r.b for r in rows]))
-
-
-def _not_finite(row: Float[np.ndarray, " size"]) -> list[int]:
-    return np.flatnonzero(~np.isfinite(row)).tolist()
-
-
-def _refused(solver: str, what: str, value: float) -> QpInfeasible:
-    return QpInfeasible(solver, f"{what} is {value}")
 
 
 @subroutine

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.compilation import subroutine
+from go2_wbc.records import Array4
 from go2_wbc.reference import STANCE, Target
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -60,9 +61,7 @@ def share_load(
 
 
 @subroutine
-def plan_loads(
-    now: Snapshot, target: Target, weight_of_robot: float, loads: Float[np.ndarray, "4"]
-) -> None:
+def plan_loads(now: Snapshot, target: Target, weight_of_robot: float, loads: Array4) -> None:
     """Fill the load of each foot, over the mean, while the trunk does what is asked for.
 
     1 for a foot that does not stand. ``weight_of_robot`` [N] is without what it carries.

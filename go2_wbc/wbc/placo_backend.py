@@ -27,21 +27,27 @@ from __future__ import annotations
 
 import numpy as np
 import placo
-from jaxtyping import Float
 
 from go2_wbc.errors import QpInfeasible
 from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
+from go2_wbc.records import Array3, Array6, Array30
 from go2_wbc.reference import LegTask, Reference, TrackedPoint
 from go2_wbc.robot.inverse_kinematics import load_placo_robot
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import cross, log_rotation
+from go2_wbc.robot.rotations import log_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.robot.state import RobotState
-from go2_wbc.wbc.backends import QpBackend
-from go2_wbc.wbc.config import WbcConfig
+from go2_wbc.wbc.config import Gains, WbcConfig
 from go2_wbc.wbc.constraints import FrictionPyramid, JointLimits, TorqueLimits
 from go2_wbc.wbc.problem import ACCELERATION, FORCES, SIZE, Bounds, Problem
-from go2_wbc.wbc.tasks import BodyOrientation, ForceRegularisation, Gains
+from go2_wbc.wbc.tasks import (
+    BodyOrientation,
+    BodyPosition,
+    ForceRegularisation,
+    LegPosture,
+    SwingFoot,
+    Task,
+)
 
 REGULARISATION = 1e-12
 """Added by PlaCo to the diagonal of its Hessian; its default 1e-8 moves a force by 4 mN."""
@@ -50,7 +56,7 @@ _BASE = "base"
 _WORLD_ALIGNED = "local_world_aligned"
 
 
-class PlacoBackend(QpBackend):
+class PlacoBackend:
     """Solves the same QP through PlaCo; see the module's docstring for what is aligned how.
 
     One PlaCo solver is kept per contact mode (tasks of the legs and tracked point) seen so far.
@@ -58,14 +64,17 @@ class PlacoBackend(QpBackend):
 
     def __init__(self, model: RobotModel, config: WbcConfig) -> None:
         """Load the robot into PlaCo, with the armature and foot radius of ``model``."""
-        super().__init__(SOLVER)
         self._model = model
         self._config = config
         self._robot = load_placo_robot(model)
         self._modes: dict[tuple[tuple[LegTask, ...], TrackedPoint], _Mode] = {}
 
-    def solve(self, problem: Problem) -> Float[np.ndarray, "30"]:
-        """The optimal decision vector z; see ``QpBackend.solve``."""
+    def solve(self, problem: Problem) -> Array30:
+        """The optimal decision z.
+
+        Raises:
+            QpInfeasible: with the residual table of the best point without limits.
+        """
         reference = problem.reference
         key = (reference.legs, reference.body.point)
         if key not in self._modes:
@@ -93,28 +102,37 @@ class _Mode:
         self._robot, self._model, self._config = robot, model, config
         self._point = point
         self._stance = [leg for leg in LEGS if legs[leg] is LegTask.STANCE]
+        columns = [FORCES.start + 3 * leg + axis for leg in self._stance for axis in range(3)]
+        self._force_columns = columns
         self._solver = placo.DynamicsSolver(robot)
         self._solver.torque_cost = 0.0
         self._solver.problem.regularization = REGULARISATION
         self._solver.enable_torque_limits(True)
         for name, limit in zip(JOINT_NAMES, model.torque_limits, strict=True):
             self._solver.set_torque_limit(name, float(limit * config.torque_share))
-        self._position = self._add_position_task()
+        if point is TrackedPoint.COM:
+            self._position = self._solver.add_com_task(np.zeros(3))
+        else:
+            self._position = self._solver.add_position_task(_BASE, np.zeros(3))
         self._orientation = self._solver.add_orientation_task(_BASE, np.eye(3))
         self._pressing: list[placo.Contact] = []
         self._contacts = {leg: self._add_contact(leg) for leg in self._stance}
-        self._swing = {leg: self._add_swing(leg) for leg in LEGS if legs[leg] is LegTask.SWING}
-        self._posture = {leg: self._add_posture(leg) for leg in LEGS if legs[leg] is LegTask.JOINTS}
+        self._swing = {
+            leg: self._solver.add_position_task(leg.foot, np.zeros(3))
+            for leg in LEGS
+            if legs[leg] is LegTask.SWING
+        }
+        self._posture = {
+            leg: self._solver.add_joints_task() for leg in LEGS if legs[leg] is LegTask.JOINTS
+        }
+        self._soft: list[tuple[str, placo.Prioritized, type[Task]]] = [
+            ("position", self._position, BodyPosition),
+            ("orientation", self._orientation, BodyOrientation),
+            *((f"{leg.name} swing", task, SwingFoot) for leg, task in self._swing.items()),
+            *((f"{leg.name} posture", task, LegPosture) for leg, task in self._posture.items()),
+        ]
         self._solver.set_kp(0.0)
         self._solver.set_kd(0.0)
-
-    def _add_position_task(self) -> placo.DynamicsCoMTask | placo.DynamicsPositionTask:
-        if self._point is TrackedPoint.COM:
-            task = self._solver.add_com_task(np.zeros(3))
-        else:
-            task = self._solver.add_position_task(_BASE, np.zeros(3))
-        task.configure("position", "soft", self._config.position_weight)
-        return task
 
     def _add_contact(self, leg: Leg) -> placo.DynamicsPositionTask:
         task = self._solver.add_position_task(f"{leg.name}_contact", np.zeros(3))
@@ -122,16 +140,6 @@ class _Mode:
         contact = self._solver.add_unilateral_point_contact(task)
         contact.weight_tangentials = 0.0
         self._pressing.append(contact)
-        return task
-
-    def _add_swing(self, leg: Leg) -> placo.DynamicsPositionTask:
-        task = self._solver.add_position_task(leg.foot, np.zeros(3))
-        task.configure(f"{leg.name} swing", "soft", self._config.swing_weight)
-        return task
-
-    def _add_posture(self, leg: Leg) -> placo.DynamicsJointsTask:
-        task = self._solver.add_joints_task()
-        task.configure(f"{leg.name} posture", "soft", self._config.posture_weight)
         return task
 
     def update(self, problem: Problem) -> None:
@@ -146,8 +154,8 @@ class _Mode:
             self._place_contact(leg)
         self._robot.update_kinematics()
         self._update_body(state, reference)
-        weight = problem.source(BodyOrientation).weight_at(reference)
-        self._orientation.configure("orientation", "soft", weight)
+        for name, task, kind in self._soft:
+            task.configure(name, "soft", problem.source(kind).weight_at(reference))
         for leg in self._stance:
             self._update_contact(leg, state)
         for contact in self._pressing:
@@ -162,7 +170,15 @@ class _Mode:
                 reference.p_world_feet[leg] - p,
             )
         for leg, task in self._posture.items():
-            self._update_posture(leg, task, state, reference)
+            columns = leg.joints
+            desired = _acceleration(
+                self._config.leg_posture,
+                reference.a_joints[columns],
+                reference.v_joints[columns] - state.joint_velocities[columns],
+                reference.q_joints[columns] - state.joint_positions[columns],
+            )
+            for name, acceleration in zip(JOINT_NAMES[columns], desired, strict=True):
+                task.set_joint(name, 0.0, 0.0, float(acceleration))
 
     def _place_contact(self, leg: Leg) -> None:
         frames = self._robot.model.frames
@@ -195,27 +211,14 @@ class _Mode:
         velocity = self._velocity(f"{leg.name}_contact", state)
         w = velocity[3:]
         down = np.array([0.0, 0.0, -self._model.foot_radius])
-        centripetal = cross(w, cross(w, down))
+        centripetal = np.cross(w, np.cross(w, down))
         damping = self._config.stance_damping * velocity[:3]
         self._contacts[leg].ddtarget_world = centripetal - damping
 
-    def _update_posture(
-        self, leg: Leg, task: placo.DynamicsJointsTask, state: RobotState, reference: Reference
-    ) -> None:
-        columns = leg.joints
-        desired = _acceleration(
-            self._config.leg_posture,
-            reference.a_joints[columns],
-            reference.v_joints[columns] - state.joint_velocities[columns],
-            reference.q_joints[columns] - state.joint_positions[columns],
-        )
-        for name, acceleration in zip(JOINT_NAMES[columns], desired, strict=True):
-            task.set_joint(name, 0.0, 0.0, float(acceleration))
-
-    def _velocity(self, frame: str, state: RobotState) -> Float[np.ndarray, "6"]:
+    def _velocity(self, frame: str, state: RobotState) -> Array6:
         return self._robot.frame_jacobian(frame, _WORLD_ALIGNED) @ state.v
 
-    def solve(self, problem: Problem) -> Float[np.ndarray, "30"]:
+    def solve(self, problem: Problem) -> Array30:
         """z of PlaCo's QP with our rows added."""
         if not self._solver.solve(False).success:
             raise QpInfeasible(SOLVER, "tasks, friction and torque limits contradict each other")
@@ -234,10 +237,6 @@ class _Mode:
         z[self._force_columns] = x[18:]
         return z
 
-    @property
-    def _force_columns(self) -> list[int]:
-        return [FORCES.start + 3 * leg + axis for leg in self._stance for axis in range(3)]
-
     def _add_force_reference(self, problem: Problem) -> None:
         if not self._stance:
             return
@@ -254,16 +253,10 @@ class _Mode:
     def _add_bounds(self, problem: Problem) -> None:
         columns = [*range(18), *self._force_columns]
         snapshot, reference = problem.snapshot, problem.reference
-        joints = [
-            source.bounds(snapshot, reference)
-            for source in problem.sources
-            if isinstance(source, JointLimits)
-        ]
-        joints += [
-            _on_the_line(source, snapshot, reference)
-            for source in problem.sources
-            if isinstance(source, TorqueLimits)
-        ]
+        joints = (
+            problem.source(JointLimits).bounds(snapshot, reference),
+            _on_the_line(problem.source(TorqueLimits), snapshot, reference),
+        )
         normals = np.eye(len(columns))[[20 + 3 * i for i in range(len(self._stance))]]
         C = np.concatenate([*(bound.C[:, columns] for bound in joints), normals])
         least, greatest = reference.normal_force_min, reference.normal_force_max
@@ -284,16 +277,11 @@ def _on_the_line(limits: TorqueLimits, snapshot: Snapshot, reference: Reference)
     return Bounds(C, lower, np.where(greatest < limits.motor.peak, upper, np.inf))
 
 
-def _acceleration(
-    gains: Gains,
-    feed_forward: Float[np.ndarray, "3"],
-    rate_error: Float[np.ndarray, "3"],
-    error: Float[np.ndarray, "3"],
-) -> Float[np.ndarray, "3"]:
+def _acceleration(gains: Gains, feed_forward: Array3, rate_error: Array3, error: Array3) -> Array3:
     return feed_forward + np.asarray(gains.kd) * rate_error + np.asarray(gains.kp) * error
 
 
-def _without_limits(problem: Problem) -> Float[np.ndarray, "30"]:
+def _without_limits(problem: Problem) -> Array30:
     root = np.sqrt(problem.weights)
     A = np.concatenate([problem.equalities.A, root[:, None] * problem.tasks.A])
     b = np.concatenate([problem.equalities.b, root * problem.tasks.b])

@@ -22,6 +22,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.errors import ResidualRow
+from go2_wbc.records import Array30
 from go2_wbc.reference import Reference
 from go2_wbc.robot.snapshot import Snapshot
 
@@ -95,7 +96,7 @@ class Problem:
         """The task or constraint of a class."""
         return next(source for source in self.sources if isinstance(source, kind))
 
-    def residuals(self, z: Float[np.ndarray, "30"]) -> tuple[ResidualRow, ...]:
+    def residuals(self, z: Array30) -> tuple[ResidualRow, ...]:
         """How far ``z`` is from every task, and by how much it breaks every constraint."""
         value = self.bounds.C @ z
         excess = np.maximum(np.maximum(self.bounds.lower - value, value - self.bounds.upper), 0.0)

@@ -22,6 +22,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.errors import QpInfeasible, ResidualRow
+from go2_wbc.records import Array30
 from go2_wbc.wbc.problem import SIZE, Problem
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 
@@ -43,7 +44,7 @@ def is_grave(violations: Iterable[ResidualRow]) -> bool:
     return any(row.norm > LIMITS.get(row.name, np.inf) for row in violations)
 
 
-def solve_relaxed(problem: Problem, solver: str) -> Float[np.ndarray, "30"]:
+def solve_relaxed(problem: Problem, solver: str) -> Array30:
     """The decision z of the relaxed problem.
 
     Raises:
@@ -68,9 +69,9 @@ def solve_relaxed(problem: Problem, solver: str) -> Float[np.ndarray, "30"]:
     H[n:, n:] = SLACK_WEIGHT * np.eye(12)
     C, lower, upper = _relaxed_bounds(problem, unknown)
     hard = np.concatenate([E[base], np.zeros((6, 12))], axis=1)
-    solution = solve_dense_qp(DenseQp(H, g, C, lower, upper, hard, e[base]), solver)
+    x = solve_dense_qp(DenseQp(H, g, C, lower, upper, hard, e[base]), solver)
     z = np.zeros(SIZE)
-    z[unknown] = solution.x[:n]
+    z[unknown] = x[:n]
     return z
 
 

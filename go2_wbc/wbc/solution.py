@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import ResidualRow
-from go2_wbc.records import layout_of
+from go2_wbc.records import Array4x3, Array12, Array18, Array30, layout_of
 from go2_wbc.robot.state import JointCommand
 from go2_wbc.wbc.condensed import Decision
 from go2_wbc.wbc.constraints import torque_map
@@ -32,12 +32,12 @@ class WbcSolution:
         is_relaxed: whether constraints had to give way, see ``violations``.
     """
 
-    tau: Float[np.ndarray, "12"]
-    tau_motors: Float[np.ndarray, "12"]
+    tau: Array12
+    tau_motors: Array12
     solve_time: float
     backend: str
     _formulate: Callable[[], Problem]
-    _z: Float[np.ndarray, "30"]
+    _z: Array30
     is_relaxed: bool = False
 
     @staticmethod
@@ -52,12 +52,7 @@ class WbcSolution:
 
     @staticmethod
     def from_decision(
-        z: Float[np.ndarray, "30"],
-        problem: Problem,
-        solve_time: float,
-        backend: str,
-        *,
-        is_relaxed: bool = False,
+        z: Array30, problem: Problem, solve_time: float, backend: str, *, is_relaxed: bool = False
     ) -> WbcSolution:
         """Torques from the joint rows of M a + h = tau + J' f; no friction is fed forward."""
         A, offset = torque_map(problem.snapshot)
@@ -65,7 +60,7 @@ class WbcSolution:
         return WbcSolution(tau, tau, solve_time, backend, lambda: problem, z, is_relaxed)
 
     @property
-    def qdd(self) -> Float[np.ndarray, "18"]:
+    def qdd(self) -> Array18:
         """Generalised acceleration.
 
         Pinocchio's spatial base acceleration in the base frame [m/s^2, rad/s^2], then the joints
@@ -74,7 +69,7 @@ class WbcSolution:
         return self._z[ACCELERATION]
 
     @property
-    def forces(self) -> Float[np.ndarray, "4 3"]:
+    def forces(self) -> Array4x3:
         """Contact force [N] of each foot in the world frame; zero for legs in the air."""
         return self._z[FORCES].reshape(4, 3)
 

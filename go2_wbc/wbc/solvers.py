@@ -1,6 +1,6 @@
 """Dense QP solvers by name, all started fresh.
 
-active_set: our compiled dual active set (``kernels.active_set``), the default;
+active_set: our compiled dual active set (``algebra.active_set``), the default;
 daqp: dual active set (Arnström, Bemporad & Axehill, IEEE Trans. Autom. Control 67(8), 2022);
 quadprog: dual active set (Goldfarb & Idnani, Math. Programming 27, 1983); proxqp: proximal
 augmented Lagrangian (Bambade et al., RSS 2022).
@@ -37,22 +37,27 @@ class DenseQp:
     e: Float[np.ndarray, " k"] | None = None
 
     @property
+    def equalities(self) -> tuple[Float[np.ndarray, "k n"], Float[np.ndarray, " k"]]:
+        """E and e, of no rows if there are none."""
+        if self.E is None or self.e is None:
+            return np.empty((0, len(self.g))), np.empty(0)
+        return self.E, self.e
+
+    @property
     def is_valid(self) -> bool:
         """Whether every number is finite, open sides aside."""
-        parts = [part for part in (self.H, self.g, self.C, self.E, self.e) if part is not None]
         are_bounds = (self.lower < np.inf).all() and (self.upper > -np.inf).all()
+        parts = (self.H, self.g, self.C, *self.equalities)
         return bool(are_bounds) and all(np.isfinite(part).all() for part in parts)
 
     def is_met_by(self, x: Float[np.ndarray, " n"]) -> bool:
         """Whether ``x`` meets the constraints, with ``TOLERANCE`` relative to each bound."""
-        value, E = self.C @ x, self.E
+        value, (E, e) = self.C @ x, self.equalities
         is_inside = (value >= self.lower - TOLERANCE * (1 + np.abs(self.lower))) & (
             value <= self.upper + TOLERANCE * (1 + np.abs(self.upper))
         )
-        if E is None or self.e is None:
-            return bool(is_inside.all())
-        error = np.abs(E @ x - self.e)
-        return bool(is_inside.all() and (error <= TOLERANCE * (1 + np.abs(self.e))).all())
+        is_equal = np.abs(E @ x - e) <= TOLERANCE * (1 + np.abs(e))
+        return bool(is_inside.all() and is_equal.all())
 
     def one_sided(self) -> tuple[Float[np.ndarray, "r n"], Float[np.ndarray, " r"]]:
         """The inequality rows as G x <= h, infinite sides left out."""
@@ -60,21 +65,6 @@ class DenseQp:
         G = np.concatenate([self.C[up], -self.C[low]])
         h = np.concatenate([self.upper[up], -self.lower[low]])
         return G, h
-
-
-@dataclass(frozen=True, slots=True)
-class QpSolution:
-    """Minimiser and multipliers of a ``DenseQp``: H x + g + G'z + E'y = 0, z >= 0, z'(G x - h) = 0.
-
-    Attributes:
-        x: the minimiser.
-        inequality_multipliers: z, one per row of ``one_sided()``.
-        equality_multipliers: y, one per equality row.
-    """
-
-    x: Float[np.ndarray, " n"]
-    inequality_multipliers: Float[np.ndarray, " r"]
-    equality_multipliers: Float[np.ndarray, " k"]
 
 
 QPSOLVERS_OPTIONS: dict[str, dict[str, Any]] = {
@@ -120,8 +110,8 @@ def check_solver(name: str) -> str:
     return name
 
 
-def solve_dense_qp(qp: DenseQp, solver: str) -> QpSolution:
-    """Solve ``qp`` with the solver of that name.
+def solve_dense_qp(qp: DenseQp, solver: str) -> Float[np.ndarray, " n"]:
+    """The minimiser of ``qp``, by the solver of that name.
 
     Raises:
         QpInfeasible: if the problem holds a nan or an infinite number that is no open side, the
@@ -130,43 +120,31 @@ def solve_dense_qp(qp: DenseQp, solver: str) -> QpSolution:
     if not qp.is_valid:
         # ProxQP ponders over a nan for seconds, and a nan bound would count as an open side.
         raise QpInfeasible(solver, "the problem holds a nan or an infinite number")
+    solve = {"active_set": _by_active_set, "proxqp": _by_proxqp}.get(solver, _by_qpsolvers)
     try:
-        if solver == "active_set":
-            solution = _solve_by_active_set(qp)
-        elif solver == "proxqp":
-            solution = _solve_proxqp(qp)
-        else:
-            solution = _solve_by_qpsolvers(qp, solver)
+        x = solve(qp, solver)
     except (ValueError, RuntimeError) as error:
         raise QpInfeasible(solver, str(error)) from error
-    if solution is None or not np.isfinite(solution.x).all():
+    if x is None or not np.isfinite(x).all():
         raise QpInfeasible(solver, "no feasible point found")
-    if not qp.is_met_by(solution.x):
+    if not qp.is_met_by(x):
         raise QpInfeasible(solver, "what it returned breaks the constraints")
-    return solution
+    return x
 
 
-def _solve_by_active_set(qp: DenseQp) -> QpSolution:
+def _by_active_set(qp: DenseQp, solver: str) -> Float[np.ndarray, " n"]:
     from go2_wbc.algebra.active_set import MESSAGES, SOLVED, solve_qp
 
-    n, k = len(qp.g), 0 if qp.e is None else len(qp.e)
-    E, e = (np.empty((0, n)), np.empty(0)) if qp.E is None or qp.e is None else (qp.E, qp.e)
-    x, y = np.empty(n), np.empty(k + len(qp.lower))
-    arrays = (qp.H, qp.g, E, e, qp.C, qp.lower, qp.upper)
+    x = np.empty(len(qp.g))
+    arrays = (qp.H, qp.g, *qp.equalities, qp.C, qp.lower, qp.upper)
     H, g, E, e, C, lower, upper = (np.ascontiguousarray(array, float) for array in arrays)
-    outcome = solve_qp(H, g, E, e, C, lower, upper, x, y)
+    outcome = solve_qp(H, g, E, e, C, lower, upper, x)
     if outcome != SOLVED:
-        raise QpInfeasible("active_set", MESSAGES[outcome])
-    return QpSolution(x, _one_sided(qp, y[k:]), y[:k])
+        raise QpInfeasible(solver, MESSAGES[outcome])
+    return x
 
 
-def _one_sided(qp: DenseQp, multipliers: Float[np.ndarray, " m"]) -> Float[np.ndarray, " r"]:
-    """Multipliers of ``one_sided()`` from those of the rows, which are positive at ``upper``."""
-    up, low = np.isfinite(qp.upper), np.isfinite(qp.lower)
-    return np.concatenate([np.maximum(multipliers, 0.0)[up], np.maximum(-multipliers, 0.0)[low]])
-
-
-def _solve_by_qpsolvers(qp: DenseQp, solver: str) -> QpSolution | None:
+def _by_qpsolvers(qp: DenseQp, solver: str) -> Float[np.ndarray, " n"] | None:
     import qpsolvers
 
     G, h = qp.one_sided()
@@ -175,17 +153,13 @@ def _solve_by_qpsolvers(qp: DenseQp, solver: str) -> QpSolution | None:
         solution = qpsolvers.solve_problem(problem, solver, **QPSOLVERS_OPTIONS[solver])
     except qpsolvers.exceptions.QPError as error:
         raise QpInfeasible(solver, str(error)) from error
-    if not solution.found or solution.x is None:
-        return None
-    equality = solution.y if solution.y is not None else np.zeros(0)
-    return QpSolution(np.asarray(solution.x), np.asarray(solution.z), np.asarray(equality))
+    return solution.x if solution.found else None
 
 
-def _solve_proxqp(qp: DenseQp) -> QpSolution | None:
+def _by_proxqp(qp: DenseQp, _solver: str) -> Float[np.ndarray, " n"] | None:
     import proxsuite
 
-    equalities = 0 if qp.e is None else len(qp.e)
-    solver = proxsuite.proxqp.dense.QP(len(qp.g), equalities, len(qp.lower))
+    solver = proxsuite.proxqp.dense.QP(len(qp.g), len(qp.equalities[1]), len(qp.lower))
     settings = solver.settings
     settings.eps_abs, settings.eps_rel = PROXQP_EPS, 0.0
     settings.eps_primal_inf = settings.eps_dual_inf = PROXQP_EPS_INFEASIBLE
@@ -195,7 +169,5 @@ def _solve_proxqp(qp: DenseQp) -> QpSolution | None:
     upper = np.minimum(qp.upper, PROXQP_INFINITY)
     solver.init(qp.H, qp.g, qp.E, qp.e, qp.C, lower, upper, compute_preconditioner=False)
     solver.solve()
-    if solver.results.info.status != proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED:
-        return None
-    multipliers = _one_sided(qp, np.asarray(solver.results.z))
-    return QpSolution(np.array(solver.results.x), multipliers, np.array(solver.results.y))
+    is_solved = solver.results.info.status == proxsuite.proxqp.QPSolverOutput.PROXQP_SOLVED
+    return np.array(solver.results.x) if is_solved else None

@@ -13,22 +13,21 @@ three unknowns u of each leg: see ``TaskRows``. The joints of a standing leg are
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.algebra.vectors import rotation_vector
+from go2_wbc.algebra.vectors import cross, rotation_vector, triple, turned, turned_back
 from go2_wbc.compilation import kernel, subroutine
-from go2_wbc.records import V3, Record, packed
+from go2_wbc.records import V3, Array18, Record, packed
 from go2_wbc.reference import JOINTS, STANCE, SWING, Reference, Target
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import require_between
+from go2_wbc.wbc.config import Gains, WbcConfig
 from go2_wbc.wbc.loads import plan_loads
 from go2_wbc.wbc.problem import SIZE, Rows
 
-GREATEST_GAIN = 1e6
-"""(2 / dt)^2 [1/s^2] at 500 ticks a second: a loop with more than that swings itself up."""
 LARGEST_ERROR = 3.0
 """Orientation error [rad] beyond which its sine says little about it."""
 NO_ROTATION = 0.01
@@ -39,28 +38,6 @@ TASK_ROWS = 18
 """Of all built-in tasks: three each for the trunk's place, its attitude, and for every leg."""
 LEG_ROWS = 6
 """The first row of the first leg."""
-
-
-@dataclass(frozen=True, slots=True)
-class Gains:
-    """Proportional [1/s^2] and derivative [1/s] gain of a task, per axis."""
-
-    kp: tuple[float, float, float]
-    kd: tuple[float, float, float]
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a gain that is negative or above ``GREATEST_GAIN``."""
-        require_between(self, 0.0, GREATEST_GAIN, "kp", "kd")
-
-    @staticmethod
-    def uniform(kp: float, kd: float) -> Gains:
-        """The same gain on three axes."""
-        return Gains((kp, kp, kp), (kd, kd, kd))
-
-    @property
-    def arrays(self) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-        """kp and kd as arrays."""
-        return np.array(self.kp), np.array(self.kd)
 
 
 class Task(ABC):
@@ -92,8 +69,8 @@ class TaskRows(Record):
     """
 
     A: Float[np.ndarray, "18 18"]
-    b: Float[np.ndarray, "18"]
-    weight: Float[np.ndarray, "18"]
+    b: Array18
+    weight: Array18
 
     def of_decision(self, which: list[int], reference: Reference) -> Rows:
         """Some of the rows, as rows of the decision z."""
@@ -104,34 +81,37 @@ class TaskRows(Record):
         return Rows(A, self.b[which])
 
 
-def rows_of_legs(reference: Reference, kind: int) -> list[int]:
-    """The places of the rows of all legs that do this."""
-    legs = [leg for leg in range(4) if reference.legs[leg] == kind]
-    return [LEG_ROWS + 3 * leg + i for leg in legs for i in range(3)]
-
-
-@dataclass(frozen=True, slots=True)
-class BodyPosition(Task):
-    """Move the CoM or the base along the reference, in the world frame.
+class BuiltIn(Task):
+    """A task of ours, whose rows one compiled function fills.
 
     Attributes:
-        kp, kd: gains per axis of the world.
-        weight_of_robot: [N] without what it carries.
-        weight: of the task.
+        fill: that function, of snapshot, target, task and rows.
+        part: which rows it fills, or those of the legs that do this.
     """
 
-    kp: Float[np.ndarray, "3"]
-    kd: Float[np.ndarray, "3"]
-    weight_of_robot: float
-    weight: float = 1.0
-    name = "body position"
-    unit = "m/s^2"
+    fill: Callable[..., None]
+    part: range | int
 
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
-        """Three rows: the linear acceleration of the tracked point in the world."""
+        """Rows A z = b of this task now; ``fill`` says which."""
+        return self._filled(snapshot, reference).of_decision(self._places(reference), reference)
+
+    def _filled(self, snapshot: Snapshot, reference: Reference) -> TaskRows:
         rows = TaskRows()
-        fill_body_position(snapshot, Target.of(reference.row), packed(self), rows)
-        return rows.of_decision([0, 1, 2], reference)
+        self.fill(snapshot, Target.of(reference.row), packed(self), rows)
+        return rows
+
+    def _places(self, reference: Reference) -> list[int]:
+        if isinstance(self.part, range):
+            return list(self.part)
+        legs = [leg for leg in range(4) if reference.legs[leg] == self.part]
+        return [LEG_ROWS + 3 * leg + i for leg in legs for i in range(3)]
+
+
+@subroutine
+def desired(g: Gains, i: int, feed_forward: float, rate_error: float, error: float) -> float:
+    """The desired acceleration, by the law that the module gives."""
+    return feed_forward + g.kd[i] * rate_error + g.kp[i] * error
 
 
 @kernel
@@ -141,11 +121,8 @@ def fill_body_position(now: Snapshot, target: Target, task: BodyPosition, rows: 
     That of the CoM needs no Jacobian: it is the sum of the contact forces, by the mass, and
     gravity, which is what the base's first rows of M a + h = J'f say.
     """
-    R, v = now.R_world_base, now.v
-    x = v[4] * v[2] - v[5] * v[1]
-    y = v[5] * v[0] - v[3] * v[2]
-    z = v[3] * v[1] - v[4] * v[0]
-    mass = now.mass_matrix[0, 0]
+    R, v, mass = now.R_world_base, triple(now.v[:3]), now.mass_matrix[0, 0]
+    moving, turning = turned(R, v), turned(R, cross(triple(now.v[3:6]), v))
     for i in range(3):
         rows.A[i, :] = 0.0
         if target.is_com:
@@ -156,40 +133,29 @@ def fill_body_position(now: Snapshot, target: Target, task: BodyPosition, rows: 
                 if target.legs[leg] == STANCE:
                     rows.A[i, 6 + 3 * leg + i] = 1.0 / mass
         else:
-            position = now.q[i]
-            velocity = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
-            rest = R[i, 0] * x + R[i, 1] * y + R[i, 2] * z
+            position, velocity, rest = now.q[i], moving[i], turning[i]
             for n in range(3):
                 rows.A[i, n] = R[i, n]
-        desired = target.a_world[i] + task.kd[i] * (target.v_world[i] - velocity)
-        desired += task.kp[i] * (target.p_world[i] - position)
-        rows.b[i], rows.weight[i] = desired - rest, task.weight
+        off, late = target.p_world[i] - position, target.v_world[i] - velocity
+        rows.b[i] = desired(task.gains, i, target.a_world[i], late, off) - rest
+        rows.weight[i] = task.weight
 
 
 @dataclass(frozen=True, slots=True)
-class BodyOrientation(Task):
-    """Turn the base along the reference; the error is log(R^T R_des) in the base frame.
+class BodyPosition(BuiltIn):
+    """Move the CoM or the base along the reference, in the world frame.
 
-    While no foot stands, only the legs turn the base, by swinging the other way: ``flight_weight``
-    is the most that it weighs then. The reference may divide the weight.
+    Attributes:
+        gains: per axis of the world.
+        weight_of_robot: [N] without what it carries.
+        weight: of the task.
     """
 
-    kp: Float[np.ndarray, "3"]
-    kd: Float[np.ndarray, "3"]
-    weight: float = 10.0
-    flight_weight: float = 0.05
-    name = "body orientation"
-    unit = "rad/s^2"
-
-    def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
-        """Three rows: the angular acceleration in the base frame."""
-        rows = TaskRows()
-        fill_body_orientation(snapshot, Target.of(reference.row), packed(self), rows)
-        return rows.of_decision([3, 4, 5], reference)
-
-    def weight_at(self, reference: Reference) -> float:
-        """``weight`` less the reference's discount, and in flight at most ``flight_weight``."""
-        return float(orientation_weight(Target.of(reference.row), self))
+    gains: Gains
+    weight_of_robot: float
+    weight: float = 1.0
+    name, unit = "body position", "m/s^2"
+    fill, part = staticmethod(fill_body_position), range(3)
 
 
 @subroutine
@@ -226,34 +192,36 @@ def fill_body_orientation(
     now: Snapshot, target: Target, task: BodyOrientation, rows: TaskRows
 ) -> None:
     """The angular acceleration of the base."""
-    R, v, error = now.R_world_base, now.v, orientation_error(now, target)
+    R, g, error = now.R_world_base, task.gains, orientation_error(now, target)
     weight = orientation_weight(target, task)
+    wanted = turned_back(R, triple(target.dw_world))
     for i in range(3):
-        rate, desired = -v[3 + i], 0.0
+        rate = -now.v[3 + i]
         for n in range(3):
             rate += R[n, i] * target.w_world[n]
-            desired += R[n, i] * target.dw_world[n]
-        desired += task.kd[i] * rate + task.kp[i] * error[i]
         rows.A[3 + i, :] = 0.0
         rows.A[3 + i, 3 + i] = 1.0
-        rows.b[3 + i], rows.weight[3 + i] = desired, weight
+        rows.b[3 + i] = wanted[i] + (g.kd[i] * rate + g.kp[i] * error[i])
+        rows.weight[3 + i] = weight
 
 
 @dataclass(frozen=True, slots=True)
-class SwingFoot(Task):
-    """Move the foot centres of the swing legs along the reference, in the world frame."""
+class BodyOrientation(BuiltIn):
+    """Turn the base along the reference; the error is log(R^T R_des) in the base frame.
 
-    kp: Float[np.ndarray, "3"]
-    kd: Float[np.ndarray, "3"]
-    weight: float = 1.0
-    name = "swing feet"
-    unit = "m/s^2"
+    While no foot stands, only the legs turn the base, by swinging the other way: ``flight_weight``
+    is the most that it weighs then. The reference may divide the weight.
+    """
 
-    def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
-        """Three rows per swing leg: the linear acceleration of the foot centre."""
-        rows = TaskRows()
-        fill_swing_feet(snapshot, Target.of(reference.row), packed(self), rows)
-        return rows.of_decision(rows_of_legs(reference, SWING), reference)
+    gains: Gains
+    weight: float = 10.0
+    flight_weight: float = 0.05
+    name, unit = "body orientation", "rad/s^2"
+    fill, part = staticmethod(fill_body_orientation), range(3, 6)
+
+    def weight_at(self, reference: Reference) -> float:
+        """``weight`` less the reference's discount, and in flight at most ``flight_weight``."""
+        return float(orientation_weight(Target.of(reference.row), self))
 
 
 @kernel
@@ -262,53 +230,69 @@ def fill_swing_feet(now: Snapshot, target: Target, task: SwingFoot, rows: TaskRo
     for leg in range(4):
         if target.legs[leg] != SWING:
             continue
-        p, v = now.p_world_feet[leg], now.v_world_feet[leg]
         for i in range(3):
             n = LEG_ROWS + 3 * leg + i
-            J = now.J_feet[leg, i]
-            for k in range(6):
-                rows.A[n, k] = J[k]
-            for k in range(6 + 3 * leg, 9 + 3 * leg):
-                rows.A[n, k] = J[k]
-            desired = target.a_world_feet[leg, i] - now.drift_feet[leg, i]
-            desired += task.kd[i] * (target.v_world_feet[leg, i] - v[i])
-            desired += task.kp[i] * (target.p_world_feet[leg, i] - p[i])
-            rows.b[n], rows.weight[n] = desired, task.weight
+            for k in range(18):
+                rows.A[n, k] = now.J_feet[leg, i, k]
+            a = target.a_world_feet[leg, i] - now.drift_feet[leg, i]
+            late = target.v_world_feet[leg, i] - now.v_world_feet[leg, i]
+            off = target.p_world_feet[leg, i] - now.p_world_feet[leg, i]
+            rows.b[n], rows.weight[n] = desired(task.gains, i, a, late, off), task.weight
 
 
 @dataclass(frozen=True, slots=True)
-class LegPosture(Task):
-    """Move the joints of raised legs along the reference; free of leg singularities."""
+class SwingFoot(BuiltIn):
+    """Move the foot centres of the swing legs along the reference, in the world frame."""
 
-    kp: Float[np.ndarray, "3"]
-    kd: Float[np.ndarray, "3"]
+    gains: Gains
     weight: float = 1.0
-    name = "leg posture"
-    unit = "rad/s^2"
-
-    def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
-        """Three rows per joint-space leg: its joint accelerations."""
-        rows = TaskRows()
-        fill_leg_posture(snapshot, Target.of(reference.row), packed(self), rows)
-        return rows.of_decision(rows_of_legs(reference, JOINTS), reference)
+    name, unit = "swing feet", "m/s^2"
+    fill, part = staticmethod(fill_swing_feet), SWING
 
 
 @kernel
 def fill_leg_posture(now: Snapshot, target: Target, task: LegPosture, rows: TaskRows) -> None:
     """The accelerations of the joints of all legs that follow joint angles."""
-    for leg in range(4):
-        if target.legs[leg] != JOINTS:
-            continue
-        for i in range(3):
-            n = 3 * leg + i
-            desired = target.a_joints[n]
-            desired += task.kd[i] * (target.v_joints[n] - now.v[6 + n])
-            desired += task.kp[i] * (target.q_joints[n] - now.q[7 + n])
-            ask_unknown(rows, n, desired, task.weight)
+    for n in range(12):
+        if target.legs[n // 3] == JOINTS:
+            late, off = target.v_joints[n] - now.v[6 + n], target.q_joints[n] - now.q[7 + n]
+            wanted = desired(task.gains, n % 3, target.a_joints[n], late, off)
+            ask_unknown(rows, n, wanted, task.weight)
 
 
 @dataclass(frozen=True, slots=True)
-class ForceRegularisation(Task):
+class LegPosture(BuiltIn):
+    """Move the joints of raised legs along the reference; free of leg singularities."""
+
+    gains: Gains
+    weight: float = 1.0
+    name, unit = "leg posture", "rad/s^2"
+    fill, part = staticmethod(fill_leg_posture), JOINTS
+
+
+@kernel
+def fill_forces(now: Snapshot, target: Target, task: ForceRegularisation, rows: TaskRows) -> None:
+    """The forces of all feet that stand."""
+    loads, is_planned = np.ones(4), target.force_weight > 0.0
+    if not is_planned:
+        plan_loads(now, target, task.weight_of_robot, loads)
+    feet, weight = 0, task.weight_of_robot + now.payload[1]
+    for leg in range(4):
+        feet += int(target.legs[leg] == STANCE)
+    for n in range(12):
+        leg, i = n // 3, n % 3
+        if target.legs[leg] != STANCE:
+            continue
+        if is_planned:
+            ask_unknown(rows, n, target.f_world_feet[leg, i], target.force_weight)
+        elif i == 2:
+            ask_unknown(rows, n, weight / feet, task.weight)
+        else:
+            ask_unknown(rows, n, 0.0, task.weight / loads[leg])
+
+
+@dataclass(frozen=True, slots=True)
+class ForceRegularisation(BuiltIn):
     """Keep the contact forces near those of the reference, so that the optimum is unique.
 
     A reference without forces means an even share of the weight: around zero, a weight of 1e-3
@@ -319,17 +303,15 @@ class ForceRegularisation(Task):
 
     weight_of_robot: float
     weight: float = 1e-4
-    name = "force regularisation"
-    unit = "N"
+    name, unit = "force regularisation", "N"
+    fill, part = staticmethod(fill_forces), STANCE
 
     def rows(self, snapshot: Snapshot, reference: Reference) -> Rows:
         """Three rows per stance foot: its force, against weight / number of stance feet.
 
         Rows along the ground come times the root of the mean load over that of their foot.
         """
-        rows = TaskRows()
-        fill_forces(snapshot, Target.of(reference.row), packed(self), rows)
-        which = rows_of_legs(reference, STANCE)
+        rows, which = self._filled(snapshot, reference), self._places(reference)
         A, b = rows.of_decision(which, reference)
         scale = np.sqrt(rows.weight[which] / self.weight_at(reference))
         return Rows(scale[:, None] * A, scale * b)
@@ -339,35 +321,43 @@ class ForceRegularisation(Task):
         return reference.force_weight or self.weight
 
 
-@kernel
-def fill_forces(now: Snapshot, target: Target, task: ForceRegularisation, rows: TaskRows) -> None:
-    """The forces of all feet that stand."""
-    loads = np.ones(4)
-    if not target.force_weight > 0.0:
-        plan_loads(now, target, task.weight_of_robot, loads)
-    feet, weight = 0, task.weight_of_robot + now.payload[1]
-    for leg in range(4):
-        feet += int(target.legs[leg] == STANCE)
-    for leg in range(4):
-        if target.legs[leg] != STANCE:
-            continue
-        for i in range(3):
-            n = 3 * leg + i
-            if target.force_weight > 0.0:
-                ask_unknown(rows, n, target.f_world_feet[leg, i], target.force_weight)
-            elif i == 2:
-                ask_unknown(rows, n, weight / feet, task.weight)
-            else:
-                ask_unknown(rows, n, 0.0, task.weight / loads[leg])
-
-
 @subroutine
 def ask_unknown(rows: TaskRows, n: int, b: float, weight: float) -> None:
     """The row of an unknown that is wanted itself."""
-    row, leg = LEG_ROWS + n, n // 3
-    for k in range(6):
+    row = LEG_ROWS + n
+    for k in range(18):
         rows.A[row, k] = 0.0
-    for i in range(3):
-        rows.A[row, 6 + 3 * leg + i] = 0.0
     rows.A[row, 6 + n] = 1.0
     rows.b[row], rows.weight[row] = b, weight
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltInTasks:
+    """All of them."""
+
+    position: BodyPosition
+    orientation: BodyOrientation
+    swing: SwingFoot
+    posture: LegPosture
+    force: ForceRegularisation
+
+    @staticmethod
+    def of(c: WbcConfig, weight: float) -> BuiltInTasks:
+        """With the gains and weights of a configuration, for a robot of this weight [N]."""
+        return BuiltInTasks(
+            BodyPosition(c.body_position, weight, c.position_weight),
+            BodyOrientation(c.body_orientation, c.orientation_weight, c.flight_weight),
+            SwingFoot(c.swing_foot, c.swing_weight),
+            LegPosture(c.leg_posture, c.posture_weight),
+            ForceRegularisation(weight, c.force_weight),
+        )
+
+
+@subroutine
+def fill_tasks(now: Snapshot, target: Target, c: BuiltInTasks, rows: TaskRows) -> None:
+    """Fill the rows of all built-in tasks."""
+    fill_body_position(now, target, c.position, rows)
+    fill_body_orientation(now, target, c.orientation, rows)
+    fill_swing_feet(now, target, c.swing, rows)
+    fill_leg_posture(now, target, c.posture, rows)
+    fill_forces(now, target, c.force, rows)

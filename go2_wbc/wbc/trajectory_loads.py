@@ -10,15 +10,20 @@ base of forces along the world's axes, s what makes moments comparable, and e th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from go2_wbc.algebra.active_set import SOLVED, solve_qp
+from go2_wbc.algebra.linear import Square, Vector
+from go2_wbc.algebra.vectors import cross, triple, turned, turned_back
 from go2_wbc.compilation import kernel, subroutine
+from go2_wbc.records import Array3, Array3x3, Array4, Array6, Array12, ArrayNx3x3, ArrayNx12
 from go2_wbc.robot.leg_kinematics import LegGeometry, Legs
 from go2_wbc.wbc.loads import LEAST_PRESSURE, share_load
 
+Facets = Float[np.ndarray, "r 3"]
 LegPoints = Float[np.ndarray, "5 3"]
 """Of a leg, in the base frame: points of the axes of hip, thigh and calf, the contact, a foot's
 radius below the foot's centre, and the direction of the axes of thigh and calf."""
@@ -41,13 +46,38 @@ class LoadNumbers:
     foot_radius: float
 
 
+class LoadedFeet(NamedTuple):
+    """The feet that bear something at an instant, one after the other; there are k of them.
+
+    Attributes:
+        leg: of each.
+        share: of the load that each may bear.
+        load: what each is expected to bear, over their mean.
+        points: of all legs, see ``LegPoints``.
+        A: the wrench on the base of a force on each foot along each of the world's axes.
+        f: their forces [N].
+        missing: what these leave of the wrench.
+    """
+
+    leg: Int[np.ndarray, "4"]
+    share: Array4
+    load: Array4
+    points: Float[np.ndarray, "4 5 3"]
+    A: Float[np.ndarray, "6 12"]
+    f: Array12
+    missing: Array6
+
+
+@subroutine
+def room_for_feet() -> LoadedFeet:
+    """Of any number, nothing filled."""
+    leg, points, A = np.empty(4, dtype=np.int64), np.empty((4, 5, 3)), np.empty((6, 12))
+    return LoadedFeet(leg, np.empty(4), np.empty(4), points, A, np.empty(12), np.empty(6))
+
+
 @subroutine
 def fill_leg_points(
-    leg: LegGeometry,
-    q: Float[np.ndarray, "3"],
-    R: Float[np.ndarray, "3 3"],
-    radius: float,
-    points: LegPoints,
+    leg: LegGeometry, q: Array3, R: Array3x3, radius: float, points: LegPoints
 ) -> None:
     """Fill the points of a leg, whose trunk is at R in the world."""
     ch, sh = np.cos(q[0]), np.sin(q[0])
@@ -69,231 +99,147 @@ def fill_leg_points(
 
 
 @subroutine
-def fill_expected_loads(
-    points: Float[np.ndarray, "4 5 3"],
-    R: Float[np.ndarray, "3 3"],
-    wrench: Float[np.ndarray, "6"],
-    loaded: Int[np.ndarray, "4"],
-    shares: Float[np.ndarray, "4"],
-    c: LoadNumbers,
-    loads: Float[np.ndarray, " k"],
-) -> None:
-    """Fill the expected loads of the loaded feet, over their mean."""
-    k = len(loads)
+def gather(
+    feet: LoadedFeet, joints: Array12, R: Array3x3, load_share: Array4, legs: Legs, radius: float
+) -> int:
+    """Fill all but loads and forces; returns k."""
+    k = 0
+    for leg in range(4):
+        if load_share[leg] > 0.0:
+            feet.leg[k], feet.share[k] = leg, load_share[leg]
+            points = feet.points[leg]
+            fill_leg_points(legs.geometry[leg], joints[3 * leg : 3 * leg + 3], R, radius, points)
+            for axis in range(3):
+                along = triple(R[axis])
+                moment = cross(triple(points[3]), along)
+                for i in range(3):
+                    feet.A[i, 3 * k + axis], feet.A[3 + i, 3 * k + axis] = along[i], moment[i]
+            k += 1
+    return k
+
+
+@subroutine
+def expect_loads(feet: LoadedFeet, k: int, R: Array3x3, wrench: Array6, c: LoadNumbers) -> None:
+    """Fill the expected loads."""
     places, most = np.empty((k, 2)), np.empty(k)
-    F, N, depth = np.zeros(3), np.zeros(3), 0.0
-    for axis in range(3):
-        for m in range(3):
-            F[axis] += R[axis, m] * wrench[m]
-            N[axis] += R[axis, m] * wrench[3 + m]
+    F, N, depth = turned(R, triple(wrench[:3])), turned(R, triple(wrench[3:])), 0.0
     pressure = max(F[2], LEAST_PRESSURE * c.weight)
     for foot in range(k):
-        p = points[loaded[foot], 3]
-        for axis in range(2):
-            places[foot, axis] = R[axis, 0] * p[0] + R[axis, 1] * p[1] + R[axis, 2] * p[2]
-        depth -= (R[2, 0] * p[0] + R[2, 1] * p[1] + R[2, 2] * p[2]) / k
-        most[foot] = c.force_max * shares[foot] * k / pressure
+        x, y, z = turned(R, triple(feet.points[feet.leg[foot], 3]))
+        places[foot, 0], places[foot, 1] = x, y
+        depth -= z / k
+        most[foot] = c.force_max * feet.share[foot] * k / pressure
     x, y = -(N[1] + depth * F[0]) / pressure, (N[0] - depth * F[1]) / pressure
-    share_load(places, x, y, most, loads)
+    share_load(places, x, y, most, feet.load[:k])
 
 
 @subroutine
 def fill_cost(
-    A: Float[np.ndarray, "6 n"],
-    wrench: Float[np.ndarray, "6"],
-    shares: Float[np.ndarray, " k"],
-    loads: Float[np.ndarray, " k"],
-    scale: Float[np.ndarray, "6"],
-    c: LoadNumbers,
-    H: Float[np.ndarray, "n n"],
-    g: Float[np.ndarray, " n"],
+    feet: LoadedFeet, wrench: Array6, scale: Array6, c: LoadNumbers, H: Square, g: Vector
 ) -> None:
-    """Fill the cost x'Hx/2 + g'x of the forces x (3 k,) of k loaded feet."""
-    evenness, weight, n, total = c.evenness, c.weight, len(g), 0.0
-    for foot in range(len(shares)):
-        total += shares[foot]
+    """Fill the cost x'Hx/2 + g'x of the forces x (3 k,)."""
+    A, load, share, n, total = feet.A, feet.load, feet.share, len(g), 0.0
+    for foot in range(n // 3):
+        total += share[foot]
     for i in range(n):
-        g[i] = 0.0 if i % 3 < 2 else -evenness * weight * shares[i // 3] / total
+        g[i] = 0.0 if i % 3 < 2 else -c.evenness * c.weight * share[i // 3] / total
         for r in range(6):
             g[i] -= scale[r] * A[r, i] * scale[r] * wrench[r]
         for j in range(i + 1):
             value = 0.0
             if i == j:
-                value = evenness if i % 3 == 2 else evenness / loads[i // 3]
+                value = c.evenness if i % 3 == 2 else c.evenness / load[i // 3]
             for r in range(6):
                 value += scale[r] * A[r, i] * scale[r] * A[r, j]
             H[i, j], H[j, i] = value, value
 
 
 @subroutine
-def fill_bounds(
-    shares: Float[np.ndarray, " k"],
-    pyramid: Float[np.ndarray, "r 3"],
-    force_max: float,
-    C: Float[np.ndarray, "m n"],
-    lower: Float[np.ndarray, " m"],
-    upper: Float[np.ndarray, " m"],
-) -> None:
-    """Fill the rows of friction and normal force, which is the last of them, of the loaded feet."""
-    rows = len(pyramid)
-    for row in range(len(lower)):
-        foot, kind = row // rows, row % rows
-        for column in range(C.shape[1]):
-            C[row, column] = 0.0
-        for axis in range(3):
-            C[row, 3 * foot + axis] = pyramid[kind, axis]
-        lower[row] = -np.inf if kind < rows - 1 else 0.0
-        upper[row] = 0.0 if kind < rows - 1 else force_max * shares[foot]
-
-
-@subroutine
-def fill_wrench_columns(
-    points: LegPoints, R: Float[np.ndarray, "3 3"], foot: int, A: Float[np.ndarray, "6 12"]
-) -> None:
-    """Fill a foot's columns of A: the wrench on the base of a force along each world axis."""
-    p0, p1, p2 = points[3, 0], points[3, 1], points[3, 2]
-    for axis in range(3):
-        r0, r1, r2 = R[axis, 0], R[axis, 1], R[axis, 2]
-        column = 3 * foot + axis
-        A[0, column], A[1, column], A[2, column] = r0, r1, r2
-        A[3, column], A[4, column] = p1 * r2 - p2 * r1, p2 * r0 - p0 * r2
-        A[5, column] = p0 * r1 - p1 * r0
-
-
-@subroutine
-def take_from_torques(
-    points: LegPoints,
-    R: Float[np.ndarray, "3 3"],
-    f: Float[np.ndarray, "3"],
-    tau: Float[np.ndarray, "3"],
-) -> None:
-    """Take from a leg's torques what a force on its foot does to them."""
-    f0 = R[0, 0] * f[0] + R[1, 0] * f[1] + R[2, 0] * f[2]  # in the base frame
-    f1 = R[0, 1] * f[0] + R[1, 1] * f[1] + R[2, 1] * f[2]
-    f2 = R[0, 2] * f[0] + R[1, 2] * f[1] + R[2, 2] * f[2]
-    for joint in range(3):
-        a0, a1 = points[3, 0] - points[joint, 0], points[3, 1] - points[joint, 1]
-        a2 = points[3, 2] - points[joint, 2]
-        if joint == 0:
-            tau[0] -= a1 * f2 - a2 * f1
-        else:
-            tau[joint] -= points[4, 1] * (a2 * f0 - a0 * f2) + points[4, 2] * (a0 * f1 - a1 * f0)
-
-
-@subroutine
-def gather_loaded_feet(
-    joints: Float[np.ndarray, "12"],
-    R: Float[np.ndarray, "3 3"],
-    load_share: Float[np.ndarray, "4"],
-    legs: Legs,
-    radius: float,
-    points: Float[np.ndarray, "4 5 3"],
-    loaded: Int[np.ndarray, "4"],
-    shares: Float[np.ndarray, "4"],
-    A: Float[np.ndarray, "6 12"],
-) -> int:
-    """Fill the loaded feet's c, shares and columns of A; returns how many there are."""
-    k = 0
-    for leg in range(4):
-        if load_share[leg] > 0.0:
-            loaded[k], shares[k] = leg, load_share[leg]
-            fill_leg_points(
-                legs.geometry[leg], joints[3 * leg : 3 * leg + 3], R, radius, points[leg]
-            )
-            fill_wrench_columns(points[leg], R, k, A)
-            k += 1
-    return k
-
-
-@subroutine
 def solve_forces(
-    A: Float[np.ndarray, "6 n"],
-    wrench: Float[np.ndarray, "6"],
-    shares: Float[np.ndarray, " k"],
-    loads: Float[np.ndarray, " k"],
-    pyramid: Float[np.ndarray, "r 3"],
-    scale: Float[np.ndarray, "6"],
-    c: LoadNumbers,
-    x: Float[np.ndarray, " n"],
+    feet: LoadedFeet, k: int, wrench: Array6, facets: Facets, scale: Array6, c: LoadNumbers
 ) -> None:
-    """Fill the forces of the loaded feet; zeros if there are none."""
-    n, m = len(x), len(pyramid) * len(shares)
+    """Fill the forces, none if no loads are within the ``facets``, and what they leave.
+
+    The facets of a foot's force are those of friction and, the last one, its normal force.
+    """
+    n, rows, x = 3 * k, len(facets), feet.f[: 3 * k]
+    m = rows * k
     H, g, C, lower, upper = (
         np.empty((n, n)),
         np.empty(n),
-        np.empty((m, n)),
+        np.zeros((m, n)),
         np.empty(m),
         np.empty(m),
     )
-    fill_cost(A, wrench, shares, loads, scale, c, H, g)
-    fill_bounds(shares, pyramid, c.force_max, C, lower, upper)
-    if solve_qp(H, g, np.empty((0, n)), np.empty(0), C, lower, upper, x, np.empty(m)) != SOLVED:
+    for row in range(m):
+        foot, kind = row // rows, row % rows
+        is_friction = kind < rows - 1
+        for axis in range(3):
+            C[row, 3 * foot + axis] = facets[kind, axis]
+        lower[row] = -np.inf if is_friction else 0.0
+        upper[row] = 0.0 if is_friction else c.force_max * feet.share[foot]
+    if k > 0:
+        fill_cost(feet, wrench, scale, c, H, g)
+        if solve_qp(H, g, np.empty((0, n)), np.empty(0), C, lower, upper, x) != SOLVED:
+            x[:] = 0.0
+    for r in range(6):
+        feet.missing[r] = wrench[r]
         for j in range(n):
-            x[j] = 0.0
+            feet.missing[r] -= feet.A[r, j] * x[j]
 
 
 @subroutine
-def fill_missing_wrench(
-    A: Float[np.ndarray, "6 n"],
-    wrench: Float[np.ndarray, "6"],
-    x: Float[np.ndarray, " n"],
-    left: Float[np.ndarray, "6"],
-) -> None:
-    """Fill what the forces leave of the wrench."""
-    for r in range(6):
-        left[r] = wrench[r]
-        for j in range(len(x)):
-            left[r] -= A[r, j] * x[j]
+def take_from_torques(points: LegPoints, R: Array3x3, force: Array3, tau: Array3) -> None:
+    """Take from a leg's torques what a force on its foot does to them."""
+    f = turned_back(R, triple(force))
+    for joint in range(3):
+        p, o = points[3], points[joint]
+        x, y, z = cross((p[0] - o[0], p[1] - o[1], p[2] - o[2]), f)
+        tau[joint] -= x if joint == 0 else points[4, 1] * y + points[4, 2] * z
 
 
 @kernel(nogil=True)
 def share_loads(
-    joints: Float[np.ndarray, "n 12"],
-    R: Float[np.ndarray, "n 3 3"],
+    joints: ArrayNx12,
+    R: ArrayNx3x3,
     needed: Float[np.ndarray, "n 6"],
     load_share: Float[np.ndarray, "n 4"],
     legs: Legs,
-    pyramid: Float[np.ndarray, "r 3"],
-    scale: Float[np.ndarray, "6"],
+    pyramid: Facets,
+    scale: Array6,
     c: LoadNumbers,
     contact: Float[np.ndarray, "n 4 3"],
-    tau: Float[np.ndarray, "n 12"],
+    tau: ArrayNx12,
     missing: Float[np.ndarray, "n 2"],
 ) -> None:
     """Fill contact forces, torques, and what of force and moment the feet cannot give.
 
     ``needed``: the base's rows of M a + h. ``contact`` comes with zeros, ``tau`` with the joints'.
     """
-    points, loaded, shares = np.empty((4, 5, 3)), np.empty(4, dtype=np.int64), np.empty(4)
-    left, whole, loads = np.empty(6), np.empty((6, 12)), np.empty(4)
+    feet = room_for_feet()
     for i in range(len(joints)):
-        k = gather_loaded_feet(
-            joints[i], R[i], load_share[i], legs, c.foot_radius, points, loaded, shares, whole
-        )
-        n = 3 * k
-        A, x = whole[:, :n].copy(), np.zeros(n)
+        k = gather(feet, joints[i], R[i], load_share[i], legs, c.foot_radius)
         if k > 0:
-            fill_expected_loads(points, R[i], needed[i], loaded, shares, c, loads[:k])
-            solve_forces(A, needed[i], shares[:k], loads[:k], pyramid, scale, c, x)
+            expect_loads(feet, k, R[i], needed[i], c)
+        solve_forces(feet, k, needed[i], pyramid, scale, c)
         for foot in range(k):
-            leg, f = loaded[foot], x[3 * foot : 3 * foot + 3]
-            take_from_torques(points[leg], R[i], f, tau[i, 3 * leg : 3 * leg + 3])
-            for axis in range(3):
-                contact[i, leg, axis] = f[axis]
-        fill_missing_wrench(A, needed[i], x, left)
+            leg, f = feet.leg[foot], feet.f[3 * foot : 3 * foot + 3]
+            take_from_torques(feet.points[leg], R[i], f, tau[i, 3 * leg : 3 * leg + 3])
+            contact[i, leg, :] = f
+        left = feet.missing
         missing[i, 0] = np.sqrt(left[0] ** 2 + left[1] ** 2 + left[2] ** 2)
         missing[i, 1] = np.sqrt(left[3] ** 2 + left[4] ** 2 + left[5] ** 2)
 
 
 @kernel(nogil=True)
 def least_friction(
-    joints: Float[np.ndarray, "n 12"],
-    R: Float[np.ndarray, "n 3 3"],
+    joints: ArrayNx12,
+    R: ArrayNx3x3,
     needed: Float[np.ndarray, "n 6"],
     load_share: Float[np.ndarray, "n 4"],
     legs: Legs,
-    cone: Float[np.ndarray, "r 3"],
-    scale: Float[np.ndarray, "6"],
+    cone: Facets,
+    scale: Array6,
     c: LoadNumbers,
     highest: Float[np.ndarray, " n"],
     tolerance: float,
@@ -305,27 +251,22 @@ def least_friction(
     ``tolerance``: greatest part of the scaled wrench [N] that may be missing. By bisection: the
     forces that a coefficient allows are among those that a greater one does.
     """
-    points, loaded, shares = np.empty((4, 5, 3)), np.empty(4, dtype=np.int64), np.empty(4)
-    left, whole, facets, loads = np.empty(6), np.empty((6, 12)), cone.copy(), np.empty(4)
+    feet, facets = room_for_feet(), cone.copy()
     for i in range(len(joints)):
         low, high = 0.0, highest[i]
         if high == 0.0:
             continue
-        k = gather_loaded_feet(
-            joints[i], R[i], load_share[i], legs, c.foot_radius, points, loaded, shares, whole
-        )
-        A, x = whole[:, : 3 * k].copy(), np.zeros(3 * k)
+        k = gather(feet, joints[i], R[i], load_share[i], legs, c.foot_radius)
         if k > 0:
-            fill_expected_loads(points, R[i], needed[i], loaded, shares, c, loads[:k])
+            expect_loads(feet, k, R[i], needed[i], c)
         for _ in range(7 if k > 0 else 0):
             middle = 0.5 * (low + high)
             for facet in range(len(cone) - 1):
                 facets[facet, 2] = middle * cone[facet, 2]
-            solve_forces(A, needed[i], shares[:k], loads[:k], facets, scale, c, x)
-            fill_missing_wrench(A, needed[i], x, left)
+            solve_forces(feet, k, needed[i], facets, scale, c)
             missing = 0.0
             for r in range(6):
-                missing += (scale[r] * left[r]) ** 2
+                missing += (scale[r] * feet.missing[r]) ** 2
             if missing > tolerance * tolerance:
                 low = middle
             else:
@@ -335,8 +276,8 @@ def least_friction(
 
 @kernel(nogil=True)
 def accelerate(
-    joints: Float[np.ndarray, "n 12"],
-    R: Float[np.ndarray, "n 3 3"],
+    joints: ArrayNx12,
+    R: ArrayNx3x3,
     a: Float[np.ndarray, "n 18"],
     legs: Legs,
     radius: float,
@@ -346,26 +287,18 @@ def accelerate(
     points, J_a = np.empty((5, 3)), np.empty(3)
     for i in range(len(joints)):
         for leg in range(4):
-            fill_leg_points(
-                legs.geometry[leg], joints[i, 3 * leg : 3 * leg + 3], R[i], radius, points
-            )
+            q = joints[i, 3 * leg : 3 * leg + 3]
+            fill_leg_points(legs.geometry[leg], q, R[i], radius, points)
             p = points[3]
             for k in range(3):
                 m, n = (k + 1) % 3, (k + 2) % 3
                 J_a[k] = a[i, k] + a[i, 3 + m] * p[n] - a[i, 3 + n] * p[m]
             for joint in range(3):
-                rate = a[i, 6 + 3 * leg + joint]
-                u, v, w = 1.0, 0.0, 0.0
-                if joint > 0:
-                    u, v, w = points[4, 0], points[4, 1], points[4, 2]
-                a0, a1 = p[0] - points[joint, 0], p[1] - points[joint, 1]
-                a2 = p[2] - points[joint, 2]
-                J_a[0] += rate * (v * a2 - w * a1)
-                J_a[1] += rate * (w * a0 - u * a2)
-                J_a[2] += rate * (u * a1 - v * a0)
-            for axis in range(2):
-                row = R[i, axis]
-                feet[i, leg, axis] = row[0] * J_a[0] + row[1] * J_a[1] + row[2] * J_a[2]
+                axis, o = triple(points[4]) if joint > 0 else (1.0, 0.0, 0.0), points[joint]
+                turning = cross(axis, (p[0] - o[0], p[1] - o[1], p[2] - o[2]))
+                for k in range(3):
+                    J_a[k] += a[i, 6 + 3 * leg + joint] * turning[k]
+            feet[i, leg, 0], feet[i, leg, 1], _ = turned(R[i], triple(J_a))
 
 
 @kernel(nogil=True)

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 
-from go2_wbc.validation import require_not_negative, require_positive, require_share
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, ranged
 
 SOFT = 0.1
 """Share of the costs with which a start begins; see ``Weights.softened``."""
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(
+    SHARE,
+    friction=POSITIVE,
+    force_max=POSITIVE,
+    joint_margin=NOT_NEGATIVE,
+    knee_height=NOT_NEGATIVE,
+    clearance=NOT_NEGATIVE,
+)
 class PlanLimits:
     """What every plan keeps.
 
@@ -38,12 +46,6 @@ class PlanLimits:
     joint_margin: float = 0.03
     knee_height: float = 0.09
     clearance: float = 0.02
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_share(self, "torque_share", "end_share", "speed_share")
-        require_positive(self, "friction", "force_max")
-        require_not_negative(self, "joint_margin", "knee_height", "clearance")
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,7 @@ import numpy as np
 
 from go2_wbc.errors import MotionFileError
 from go2_wbc.files import checked_output, write_atomically
-from go2_wbc.robot.fingerprint import fingerprint
-from go2_wbc.robot.model import RobotModel
+from go2_wbc.robot.model import RobotModel, fingerprint
 from motions.dynamics.dynamic_trajectory import UNREADABLE
 from motions.language.clock import SAME
 from motions.plan.compiled_plan import CompiledPlan

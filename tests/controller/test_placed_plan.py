@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from controller.placed_plan import PlacedPlan
-from go2_wbc.curves import Segment
+from go2_wbc.curves import Curve
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording
@@ -26,7 +26,7 @@ WHERE = Anchor(np.array([0.3, -0.2, 0.01]), 0.7)
 def plans() -> list[MotionPlan]:
     """Of the CoM with a paw that is raised, and of the base with four feet on the ground."""
     line = Timeline(name="raise").body(pitch=deg(8), over=0.4).foot("FR", z=0.06, over=0.5)
-    way = Segment(np.zeros(6), np.array([0.02, 0.01, 0.28, 0.1, -0.2, 0.3]), 1.0)
+    way = Curve((0.0, 1.0), (np.zeros(6), np.array([0.02, 0.01, 0.28, 0.1, -0.2, 0.3])))
     lift = PosturePlan("lift", Posture.LIE, Posture.STAND, TrackedPoint.BASE, way)
     return [compile_timeline(line.home(over=0.5), RobotModel()), lift]
 

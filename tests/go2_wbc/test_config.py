@@ -68,6 +68,8 @@ def test_an_envelope_that_is_not_configured_is_the_careful_one_beside_hardware(
     [
         ("[locomotion.mpc]\nenabled = false", r"MpcConfig.enabled .*every gait are planned ahead"),
         ("[locomotion]\nload_ramp = 0.02", r"load_ramp .*LocomotionConfig\.mpc\.load_ramp counts"),
+        ("[locomotion.mpc]\nstep = 0.05", r"MpcConfig\.step .*: it is always 0\.03"),
+        ("[locomotion.slip]\nmost = 0.9", r"LocomotionConfig\.slip .*, most=0\.6, half_speed=0\.5"),
     ],
 )
 def test_a_retired_key_warns_and_changes_nothing(tmp_path: Path, text: str, message: str) -> None:
@@ -107,6 +109,8 @@ def test_one_half_of_a_nested_table_may_be_left_out(tmp_path: Path) -> None:
         ("[wbc.leg_posture]\nkd = [nan, 1, 1]", r"kd must be a finite number, got nan"),
         ("[estimator]\nforce = 9", r"estimator: unknown key 'force'; valid: .*contact_force"),
         ("[feasibility]\njolt = 'soft'", r"feasibility: jolt must be a finite number, got 'soft'"),
+        ("[locomotion.ground]\nsteep = 1", r"ground: unknown key 'steep'; valid: .*follow"),
+        ("[locomotion.contact]\nstep = 'a'", r"contact: step must be a finite number, got 'a'"),
         ("[safety]\nqp_patience = 2.5", r"qp_patience must be of type int, got 2\.5"),
         ("[safety]\nqp_patience = true", r"qp_patience must be of type int, got True"),
         ("backend = 1", r"backend must be of type str, got 1"),
@@ -191,10 +195,7 @@ def test_a_controller_takes_a_file_a_path_or_a_config(tmp_path: Path) -> None:
         ("[wbc]\nfriction = -0.6", "WbcConfig.friction must be positive, got -0.6"),
         ("[wbc]\ntorque_share = 1.5", "WbcConfig.torque_share must be above 0 and at most 1"),
         ("[wbc]\nswing_weight = -1", "swing_weight must be between 0.001 and 1000, got -1.0"),
-        (
-            "[wbc.swing_foot]\nkp = [1, -1, 1]",
-            r"kp must be between 0 and 1e\+06, got \(1.0, -1.0",
-        ),
+        ("[wbc.swing_foot]\nkp = [1, -1, 1]", r"kp must be between 0 and 1e\+06, got \(1.0, -1.0"),
         ("[locomotion]\nheight = 0", "LocomotionConfig.height must be positive"),
         ("[locomotion]\nnormal_force_max = 1\nnormal_force_min = 2", "must be below"),
         ("[locomotion.swing]\napex = 0", "SwingConfig.apex must be positive"),

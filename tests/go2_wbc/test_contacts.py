@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from go2_wbc.contacts import GAITS, TIE, ContactSchedule, Gait, Stride, find_gait, standing
@@ -26,15 +26,6 @@ GRID = 40
 shares = st.integers(1, GRID - 1).map(lambda n: n / GRID)
 offsets = st.tuples(*[st.integers(0, GRID - 1).map(lambda n: n / GRID)] * 4)
 gaits = st.builds(Gait, st.just("some"), st.floats(0.2, 1.0), shares, offsets)
-
-
-def change_times(schedule: ContactSchedule, until: float) -> list[float]:
-    period = schedule.period or np.inf
-    cycles = range(int(until / period) + 2) if np.isfinite(period) else range(1)
-    times = [
-        t + (0.0 if cycle == 0 else cycle * period) for cycle in cycles for t in schedule.times
-    ]
-    return [t for t in times if t < until]
 
 
 @given(gaits)
@@ -63,16 +54,6 @@ def test_each_foot_touches_down_at_its_offset_and_lifts_after_the_duty(gait: Gai
         assert schedule.at(touchdown).stance[leg]
         assert schedule.at(touchdown + gait.stance_time - BESIDE).stance[leg]
         assert not schedule.at(touchdown + gait.stance_time).stance[leg]
-
-
-@given(gaits, st.floats(0.0, 5.0), st.integers(1, 5))
-def test_a_gait_repeats_after_its_period(gait: Gait, t: float, cycles: int) -> None:
-    schedule = gait.schedule()
-    assume(all(abs(t - change) > BESIDE for change in change_times(schedule, t + 1.0)))
-    now, later = schedule.at(t), schedule.at(t + cycles * gait.period)
-    np.testing.assert_array_equal(now.stance, later.stance)
-    np.testing.assert_allclose(now.elapsed, later.elapsed, atol=ROUNDING)
-    np.testing.assert_allclose(now.remaining, later.remaining, atol=ROUNDING)
 
 
 @given(gaits, st.floats(0.0, 5.0))
@@ -136,13 +117,6 @@ def test_summed_control_periods_meet_every_event_of_a_minute_on_the_tick() -> No
         expected = schedule.modes[half_cycles % 2]
         np.testing.assert_array_equal(schedule.at(time).stance, expected, err_msg=f"{tick=}")
         time += TICK
-
-
-def test_the_trot_stands_on_diagonals_in_turn() -> None:
-    schedule = find_gait("trot").schedule()
-    np.testing.assert_array_equal(
-        schedule.modes, [[False, True, True, False], [True, False, False, True]]
-    )
 
 
 def test_standing_never_changes() -> None:
@@ -294,10 +268,3 @@ def test_a_gait_is_found_by_its_name_or_is_itself() -> None:
     mine = replace(GAITS["trot"], name="mine")
     assert find_gait("trot") is GAITS["trot"]
     assert find_gait(mine) is mine
-
-
-def test_a_schedule_that_ends_has_changed_never_before_and_changes_never_after() -> None:
-    schedule = ContactSchedule((0.0, 1.0), np.array([[1, 1, 1, 1], [1, 0, 1, 1]], dtype=bool))
-    assert np.isneginf(schedule.since[0]).all()
-    np.testing.assert_array_equal(schedule.until[0], [np.inf, 1.0, np.inf, np.inf])
-    np.testing.assert_array_equal(schedule.since[1], [-np.inf, 1.0, -np.inf, -np.inf])

@@ -1,13 +1,16 @@
-"""Curves: their derivatives, their ends, and what ``keyframes`` refuses."""
+"""Curves: their derivatives, their ends, and what is refused."""
 
 from __future__ import annotations
+
+import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from go2_wbc.curves import Curve, Ease, Segment, keyframes
+from go2_wbc.curves import Curve, Ease
 from go2_wbc.errors import CommandError
 
 STEP = 1e-5  # [s] of the central differences
@@ -21,7 +24,7 @@ SYMMETRIC = [*SMOOTH, Ease.LINEAR]
 def random_curve(seed: int, ease: Ease) -> Curve:
     rng = np.random.default_rng(seed)
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.3, 1.5, size=4))])
-    return keyframes([float(t) for t in times], list(rng.normal(size=(5, 6))), ease)
+    return Curve([float(t) for t in times], list(rng.normal(size=(5, 6))), ease)
 
 
 @pytest.mark.parametrize("ease", list(Ease))
@@ -29,9 +32,9 @@ def random_curve(seed: int, ease: Ease) -> Curve:
 def test_rate_and_acceleration_are_the_derivatives(ease: Ease, seed: int) -> None:
     curve = random_curve(seed, ease)
     rng = np.random.default_rng(100 + seed)
-    for segment, start in zip(curve.segments, curve.starts, strict=True):
+    for start, end in pairwise(curve.times):
         for share in rng.uniform(0.02, 0.98, size=8):
-            t = start + share * segment.duration
+            t = start + share * (end - start)
             before, now, after = (curve.at(t + d) for d in (-STEP, 0.0, STEP))
             slope = (after.value - before.value) / (2 * STEP)
             curvature = (after.value - 2 * now.value + before.value) / STEP**2
@@ -42,13 +45,13 @@ def test_rate_and_acceleration_are_the_derivatives(ease: Ease, seed: int) -> Non
 @pytest.mark.parametrize("ease", list(Ease))
 def test_every_key_is_passed_at_its_time(ease: Ease) -> None:
     times, values = [0.0, 0.4, 1.0, 2.5], list(np.random.default_rng(1).normal(size=(4, 3)))
-    curve = keyframes(times, values, ease)
+    curve = Curve(times, values, ease)
     for time, value in zip(times, values, strict=True):
         np.testing.assert_allclose(curve.at(time).value, value, atol=EXACT)
 
 
 def test_the_time_of_a_curve_counts_from_its_first_key() -> None:
-    curve = keyframes([5.0, 6.0], [np.zeros(1), np.ones(1)])
+    curve = Curve([5.0, 6.0], [np.zeros(1), np.ones(1)])
     assert curve.duration == 1.0
     assert curve.at(0.0).value[0] == 0.0
     assert curve.at(1.0).value[0] == 1.0
@@ -58,7 +61,7 @@ def test_the_time_of_a_curve_counts_from_its_first_key() -> None:
 @pytest.mark.parametrize("outside", [0.0, 1e-12, 10.0])
 def test_outside_its_duration_a_curve_rests_at_its_ends(ease: Ease, outside: float) -> None:
     curve = random_curve(7, ease)
-    first, last = curve.segments[0].start, curve.segments[-1].end
+    first, last = curve.values[0], curve.values[-1]
     for t, value in ((-outside, first), (curve.duration + outside, last)):
         point = curve.at(t)
         np.testing.assert_allclose(point.value, value, atol=EXACT)
@@ -77,14 +80,14 @@ def test_before_the_start_and_after_the_end_nothing_moves(ease: Ease) -> None:
 @pytest.mark.parametrize("ease", SMOOTH)
 def test_smooth_curves_come_to_rest_at_every_key(ease: Ease) -> None:
     curve = random_curve(9, ease)
-    for start in curve.starts[1:]:
+    for start in curve.times[1:-1]:
         for t in (start - 1e-9, start, start + 1e-9):
             np.testing.assert_allclose(curve.at(t).rate, 0.0, atol=1e-6)
 
 
 def test_minimum_jerk_also_starts_and_ends_without_acceleration() -> None:
     curve = random_curve(10, Ease.MINIMUM_JERK)
-    for start in curve.starts[1:]:
+    for start in curve.times[1:-1]:
         for t in (start - 1e-9, start + 1e-9):
             np.testing.assert_allclose(curve.at(t).acceleration, 0.0, atol=1e-5)
 
@@ -118,16 +121,9 @@ def test_hold_stays_until_its_end() -> None:
 
 
 def test_a_value_that_was_handed_out_at_rest_cannot_move_the_curve() -> None:
-    segment = Segment(np.zeros(2), np.ones(2), 1.0)
-    point = segment.at(0.5)
-    point.value[:] = 7.0
-    np.testing.assert_allclose(segment.at(0.5).value, 0.5)
-
-
-@pytest.mark.parametrize("duration", [0.0, -1.0, float("nan")])
-def test_a_segment_without_duration_is_refused(duration: float) -> None:
-    with pytest.raises(CommandError, match=r"duration must be > 0 s, got"):
-        Segment(np.zeros(1), np.ones(1), duration)
+    curve = Curve((0.0, 1.0), (np.zeros(2), np.ones(2)))
+    curve.at(0.5).value[:] = 7.0
+    np.testing.assert_allclose(curve.at(0.5).value, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -135,12 +131,12 @@ def test_a_segment_without_duration_is_refused(duration: float) -> None:
     [([], 0), ([0.0], 1), ([0.0, 1.0], 3), ([0.0, 1.0, 2.0], 2)],
     ids=["none", "one", "more values", "more times"],
 )
-def test_keyframes_need_two_times_and_as_many_values(times: list[float], count: int) -> None:
+def test_a_curve_needs_two_times_and_as_many_values(times: list[float], count: int) -> None:
     with pytest.raises(CommandError, match="two or more times and as many values"):
-        keyframes(times, [np.zeros(2)] * count)
+        Curve(times, [np.zeros(2)] * count)
 
 
-@pytest.mark.parametrize("times", [[0.0, 1.0, 1.0], [0.0, 2.0, 1.0], [0.0, float("nan"), 1.0]])
+@pytest.mark.parametrize("times", [[0.0, 1.0, 1.0], [0.0, 2.0, 1.0], [0.0, math.nan, 1.0]])
 def test_key_times_must_increase(times: list[float]) -> None:
     with pytest.raises(CommandError, match="duration must be > 0"):
-        keyframes(times, [np.zeros(2)] * 3)
+        Curve(times, [np.zeros(2)] * 3)

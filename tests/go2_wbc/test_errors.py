@@ -57,10 +57,6 @@ def test_the_drawn_tree_is_the_real_tree() -> None:
     assert drawn_tree() == real
 
 
-def test_every_error_is_caught_by_the_base_class() -> None:
-    assert all(issubclass(value, Go2WbcError) for value in exceptions().values())
-
-
 def test_a_wrong_command_is_also_a_value_error() -> None:
     assert issubclass(CommandError, ValueError)
 

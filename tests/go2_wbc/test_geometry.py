@@ -2,20 +2,13 @@
 
 from __future__ import annotations
 
-from random import Random
-
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from go2_wbc.geometry import (
-    convex_hull,
-    moving_support_margins,
-    support_margin,
-    support_margins,
-)
+from go2_wbc.geometry import convex_hull, moving_support_margins, support_margin, support_margins
 
 ROUNDING = 1e-9  # coordinates are at most 1 m
 SQUARE = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, -1.0], [-1.0, 1.0]])
@@ -76,25 +69,6 @@ def test_a_hull_runs_counter_clockwise_around_every_point(points: np.ndarray) ->
     hull = convex_hull(points)
     assume(area(hull) > 1e-6)
     assert all(support_margin(points, p) >= -ROUNDING for p in points)
-
-
-@given(clouds, places, st.randoms(use_true_random=False))
-def test_the_order_of_the_points_does_not_matter(
-    points: np.ndarray, p: np.ndarray, random: Random
-) -> None:
-    shuffled = points[random.sample(range(len(points)), len(points))]
-    assert support_margin(shuffled, p) == pytest.approx(support_margin(points, p), abs=ROUNDING)
-
-
-@given(clouds, places, angles, places)
-def test_moving_and_turning_everything_keeps_the_margin(
-    points: np.ndarray, p: np.ndarray, angle: float, shift: np.ndarray
-) -> None:
-    assume(area(convex_hull(points)) > 1e-3)
-    c, s = np.cos(angle), np.sin(angle)
-    R = np.array([[c, -s], [s, c]])
-    moved = support_margin(points @ R.T + shift, R @ p + shift)
-    assert moved == pytest.approx(support_margin(points, p), abs=1e-7)
 
 
 @given(clouds, places, places)

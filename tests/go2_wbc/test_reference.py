@@ -62,44 +62,12 @@ def test_placing_turns_every_vector_and_moves_every_point(anchor: Anchor) -> Non
     np.testing.assert_allclose(points(placed), expected, atol=10 * EXACT)
 
 
-@given(anchors)
-def test_placing_keeps_distances_and_orientations_rigid(anchor: Anchor) -> None:
-    placed = REFERENCE.placed(anchor)
-    moved, given_points = points(placed), points(REFERENCE)
-    np.testing.assert_allclose(
-        np.linalg.norm(moved - moved[0], axis=1),
-        np.linalg.norm(given_points - given_points[0], axis=1),
-        atol=10 * EXACT,
-    )
-    R = placed.body.R_world_base
-    np.testing.assert_allclose(R @ R.T, np.eye(3), atol=EXACT)
-    assert np.linalg.det(R) == pytest.approx(1.0)
-
-
-@given(anchors, anchors)
-def test_placing_twice_is_placing_once_at_the_composed_anchor(a: Anchor, b: Anchor) -> None:
-    composed = Anchor(b.p_world + yaw_rotation(b.yaw) @ a.p_world, a.yaw + b.yaw)
-    twice, once = REFERENCE.placed(a).placed(b), REFERENCE.placed(composed)
-    np.testing.assert_allclose(points(twice), points(once), atol=100 * EXACT)
-    np.testing.assert_allclose(vectors(twice), vectors(once), atol=10 * EXACT)
-
-
 def test_placing_leaves_legs_joints_and_force_bounds_alone() -> None:
     placed = REFERENCE.placed(Anchor(np.array([1.0, 2.0, 3.0]), 0.7))
     assert placed.legs == REFERENCE.legs
     assert placed.body.point is REFERENCE.body.point
     for name in ("q_joints", "v_joints", "a_joints", "normal_force_min", "normal_force_max"):
         np.testing.assert_array_equal(getattr(placed, name), getattr(REFERENCE, name))
-
-
-def test_the_velocity_of_a_placed_point_is_the_rate_of_its_position() -> None:
-    """Were one of the two left in the frame of the motion, they would disagree."""
-    anchor, dt = Anchor(np.array([1.0, -2.0, 0.1]), 2.1), 1e-6
-    start = REFERENCE.placed(anchor)
-    feet = REFERENCE.p_world_feet + dt * REFERENCE.v_world_feet
-    moved = anchor.p_world + feet @ yaw_rotation(anchor.yaw).T
-    rate = (moved - start.p_world_feet) / dt
-    np.testing.assert_allclose(start.v_world_feet, rate, atol=1e-8)
 
 
 def test_stance_names_the_legs_that_stand() -> None:

@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 
 from go2_wbc.errors import ConfigError
-from go2_wbc.plant import MujocoPlant, plant_in_world
-from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import JointCommand
 from go2_wbc.world import World
-from tests.engine_helpers import standing_q
 
 EXACT = 1e-9
 
@@ -95,40 +91,3 @@ def test_a_world_is_told_with_all_that_is_not_as_usual() -> None:
         if field.name != "payload_place":  # means nothing without a payload
             value = other.get(field.name, 1.25 if field.name == "mass_scale" else 0.375)
             assert str(replace(usual, **{field.name: value})) != str(usual), field.name
-
-
-def test_the_loaded_model_is_the_simulated_one() -> None:
-    world = World(payload=3.0, payload_place=(0.1, -0.05, 0.07), mass_scale=1.07)
-    plant, model = plant_in_world(world), RobotModel(world=world)
-    assert model.mass == pytest.approx(plant.total_mass, rel=EXACT)
-    q = standing_q()
-    plant.place(q)
-    com = plant.data.subtree_com[plant.model.body("base").id]
-    assert model.center_of_mass(q) == pytest.approx(com, abs=1e-8)
-
-
-def test_a_plant_has_the_friction_of_its_world() -> None:
-    usual = MujocoPlant()
-    plant = plant_in_world(World(friction=0.37, joint_friction=2.0))
-    assert plant.model.geom_friction[:, 0] == pytest.approx(0.37)
-    for name in ("dof_damping", "dof_frictionloss"):
-        own, other = getattr(plant.model, name), getattr(usual.model, name)
-        assert own[6:] == pytest.approx(2.0 * other[6:])
-
-
-def test_a_delayed_command_acts_later_and_a_saved_plant_keeps_what_waits() -> None:
-    plant = MujocoPlant(delay=0.006)
-    command = JointCommand.torque(np.full(12, 1.5))
-    acted = []
-    for _ in range(2):
-        plant.write(command)
-        acted.append(plant.read().tau.copy())
-    saved = plant.save()
-    for _ in range(2):
-        plant.write(command)
-        acted.append(plant.read().tau.copy())
-    assert not np.allclose(acted[1], 1.5)
-    assert np.allclose(acted[3], 1.5)
-    plant.restore(saved)
-    plant.write(command)
-    assert np.array_equal(plant.read().tau, acted[2])

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import angular_velocity_from_rpy, rotation_from_rpy, rpy_from_rotation
+from go2_wbc.robot.rotations import rotation_from_rpy, rpy_from_rotation
 from motions.batch_kinematics import (
     Wanted,
     _angular_rates,
@@ -17,6 +17,7 @@ from motions.batch_kinematics import (
 )
 from motions.plan.balance import nearest
 from motions.postures import standing_feet
+from tests.engine_helpers import angular_velocity_from_rpy
 
 COUNT = 300
 LEFT = 0.2  # share of the error that a step leaves at most; an eighth is usual

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from go2_wbc.curves import Ease, Segment
+from go2_wbc.curves import Curve, Ease
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import LegTask, TrackedPoint
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import angular_velocity_from_rpy, rotation_from_rpy
+from go2_wbc.robot.rotations import rotation_from_rpy
 from motions.postures import (
     LIE_POSE,
     NORMAL_FORCE_MAX,
@@ -23,6 +23,7 @@ from motions.postures import (
     rise,
     sit_down,
 )
+from tests.engine_helpers import angular_velocity_from_rpy
 
 # m; with 3 cm the leg's determinant is a third of that of a leg that still moves smoothly.
 LEAST_DROP = 0.03
@@ -81,7 +82,7 @@ def test_the_stance_in_which_a_rise_starts_is_the_one_that_was_given() -> None:
 def test_a_posture_asks_for_its_way_on_four_feet(point: TrackedPoint) -> None:
     rng = np.random.default_rng(4)
     start, end = rng.normal(size=(2, 6))
-    way = Segment(start, end, 0.7, Ease.CUBIC)
+    way = Curve((0.0, 0.7), (start, end), Ease.CUBIC)
     plan = PosturePlan("odd", Posture.LIE, Posture.SIT, point, way)
     for t in rng.uniform(-0.2, 0.9, size=200).tolist():
         asked, now = plan.at(t), way.at(t)

@@ -12,8 +12,7 @@ from controller.behaviours.walking import Walking
 from controller.walker import CHANGE_SHARE
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
-from go2_wbc.planning.envelopes import envelope_of
-from go2_wbc.planning.gait_choice import DWELL
+from go2_wbc.planning.envelopes import DWELL, envelope_of
 from go2_wbc.planning.gait_clock import time_between
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.plant import MujocoPlant

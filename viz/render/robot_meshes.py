@@ -12,8 +12,7 @@ import pinocchio as pin
 from jaxtyping import Float
 
 from go2_wbc.legs import FOOT_NAMES
-from go2_wbc.robot.description import find_description
-from go2_wbc.robot.mesh_file import read_mesh
+from go2_wbc.robot.description import find_description, read_mesh
 from viz.render.mesh import Surface, simplify, smooth_surface
 
 _CREASE = np.deg2rad(22.0)  # the files have lost their smoothing; 22 deg looks like it

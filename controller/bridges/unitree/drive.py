@@ -11,7 +11,7 @@ from controller.bridges.unitree.plant import UnitreePlant
 from controller.go2_controller import GO2Controller
 from go2_wbc.config import Config
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
-from go2_wbc.validation import require_finite, require_positive
+from go2_wbc.validation import FINITE, POSITIVE, ranged
 
 SETTLE: Final = 1.5
 """Time [s] of a trot before its speed is measured."""
@@ -22,16 +22,12 @@ REST: Final = 0.5
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(speed=FINITE, seconds=POSITIVE)
 class Trot:
     """How a trot is driven: speed [m/s], and time [s] at that speed."""
 
     speed: float = 0.5
     seconds: float = 4.0
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a time that is not positive or a speed that is not finite."""
-        require_positive(self, "seconds")
-        require_finite(self, "speed")
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from controller.bridges.unitree import messages
 from go2_wbc.errors import CommandError
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, RobotState
-from go2_wbc.validation import require_positive
+from go2_wbc.validation import POSITIVE, ranged
 
 _BOUNDS: Final = (
     ("kp", 0.0, messages.KP_MAX),
@@ -23,6 +23,7 @@ _BOUNDS: Final = (
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
 class GuardConfig:
     """When a command is softened, and when the robot is damped for good.
 
@@ -45,10 +46,6 @@ class GuardConfig:
     limp_time: float = 0.3
     lying_height: float = 0.16
     lying_tilt: float = 0.5
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is not positive."""
-        require_positive(self, *(field.name for field in fields(self)))
 
 
 def is_passive(command: JointCommand) -> bool:

@@ -37,14 +37,10 @@ def read_joints(
     """Fill q and v of a ``RobotState``.
 
     Args:
-        qpos: MuJoCo's positions.
-        qvel: its velocities.
         R: the base's orientation.
         base_q: where in ``qpos`` the free joint's numbers begin.
         base_v: where in ``qvel`` they do.
         places: where each joint's angle and velocity are, in the first two rows.
-        q: is filled.
-        v: is filled.
     """
     for i in range(3):
         q[i] = qpos[base_q + i]
@@ -75,13 +71,10 @@ def bin_forces(
     the normal force is the sum (MuJoCo's documentation, chapter Computation, "Contact").
 
     Args:
-        geoms: of each contact.
         addresses: of each contact, below 0 for one without force.
-        dimensions: of each contact.
         efc_force: forces of all constraints.
         codes: as in ``MujocoLayout``.
         is_elliptic: of the friction cones.
-        forces: is filled.
     """
     forces[:] = 0.0
     for contact in range(geoms.shape[0]):

@@ -200,10 +200,7 @@ def add_floor(spec: mujoco.MjSpec) -> None:
         grid = spec.add_material(name=_GRID, texrepeat=[2, 2], texuniform=True)
         grid.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = _GRID
     spec.worldbody.add_geom(
-        name=FLOOR,
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=list(_FLOOR_HALF_SIZE),
-        material=_GRID,
+        name=FLOOR, type=mujoco.mjtGeom.mjGEOM_PLANE, size=list(_FLOOR_HALF_SIZE), material=_GRID
     )
     spec.worldbody.add_light(pos=[0, 0, 5], dir=[0, 0, -1], castshadow=False)
 

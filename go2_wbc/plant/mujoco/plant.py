@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import logging
+import math
+from collections import deque
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -14,18 +18,10 @@ from go2_wbc.errors import ClosedError, CommandError, ConfigError, PlantError, u
 from go2_wbc.legs import LEGS
 from go2_wbc.plant.base import Plant
 from go2_wbc.plant.faults import Faults, InjectedFault
-from go2_wbc.plant.mujoco.commands import DelayedCommands
 from go2_wbc.plant.mujoco.contacts import Contacts, FootContacts, foot_contacts
-from go2_wbc.plant.mujoco.layout import (
-    LIMB_BIN,
-    ROBOT_BINS,
-    TRUNK_BIN,
-    bin_forces,
-    read_joints,
-)
+from go2_wbc.plant.mujoco.layout import LIMB_BIN, ROBOT_BINS, TRUNK_BIN, bin_forces, read_joints
 from go2_wbc.plant.mujoco.model import ACCELEROMETER, GYRO, ORIENTATION, JointDynamics
-from go2_wbc.plant.mujoco.pushes import Pushes
-from go2_wbc.plant.mujoco.saved import SavedPhysics
+from go2_wbc.plant.mujoco.pushes import Push, Pushes
 from go2_wbc.plant.mujoco.settling import LYING_DAMPING, settle
 from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
@@ -40,6 +36,21 @@ _logger = logging.getLogger(__name__)
 
 # N; a foot reads a contact above this. A standing foot carries about 40 N, so 1 N is "touching".
 FOOT_CONTACT_THRESHOLD = 1.0
+
+
+class SavedPhysics(NamedTuple):
+    """Everything that decides how a ``MujocoPlant`` goes on; see ``MujocoPlant.save``."""
+
+    integration: Float[np.ndarray, " n"]
+    ticks: int
+    pushes: tuple[Push, ...]
+    waiting: tuple[Float[np.ndarray, "5 12"], ...]
+    tau: Float[np.ndarray, "12"]
+    forces: Float[np.ndarray, "6"]
+    noise_state: Mapping[str, Any]
+    state: RobotState | None
+    imu: ImuSample | None
+    senses: Mapping[str, Any] | None
 
 
 class MujocoPlant(Plant):
@@ -134,7 +145,8 @@ class MujocoPlant(Plant):
         self._period, self._substeps = control_period, round(control_period / timestep)
         self._closed = False
         self._ticks = 0
-        self._commands = DelayedCommands(round(delay / control_period))
+        self._late, self._acting = round(delay / control_period), np.zeros((5, 12))
+        self._waiting: deque[Float[np.ndarray, "5 12"]] = deque()  # commands that do not act yet
         self._faults = Faults()
         self._pushes = Pushes(self._model, self._data, self._layout)
         # Views into MuJoCo's memory, made once because making them is slow.
@@ -228,11 +240,13 @@ class MujocoPlant(Plant):
             ClosedError: after ``close()``.
         """
         self._check_open()
-        accepted = self._commands.next(command)
+        self._waiting.append(_numbers_of(command))
+        if len(self._waiting) > self._late:
+            self._acting = self._waiting.popleft()
         model, data = self._model, self._data
         total, shares = np.zeros(12), self._faults.torque_shares(self.time)
         for remaining in range(self._substeps, 0, -1):
-            drive(accepted, *self._motors, total)
+            drive(self._acting, *self._motors, total)
             if shares is not None:
                 data.ctrl[self._layout.motors] *= shares
             self._pushes.apply()
@@ -363,7 +377,7 @@ class MujocoPlant(Plant):
             integration=integration,
             ticks=self._ticks,
             pushes=self._pushes.active,
-            waiting=self._commands.waiting,
+            waiting=tuple(self._waiting),
             tau=self._tau,
             forces=self._forces,
             noise_state=self._rng.bit_generator.state,
@@ -381,7 +395,7 @@ class MujocoPlant(Plant):
         self._warnings[:] = 0
         self._ticks = saved.ticks
         self._pushes.active = saved.pushes
-        self._commands.waiting = saved.waiting
+        self._waiting = deque(saved.waiting)
         self._tau, self._forces = saved.tau, saved.forces
         self._rng.bit_generator.state = dict(saved.noise_state)
         self._truth, self._state, self._imu = None, saved.state, saved.imu
@@ -441,3 +455,24 @@ class MujocoPlant(Plant):
         if np.count_nonzero(counts):
             raised = [mujoco.mju_warningText(int(i), 0) for i in np.flatnonzero(counts)]
             raise PlantError(f"physics failed at t={self.time:.3f} s: {'; '.join(raised)}")
+
+
+def _numbers_of(command: JointCommand) -> Float[np.ndarray, "5 12"]:
+    """The numbers of a command, in the order that the motors read.
+
+    Raises:
+        CommandError: if it has a value that is not finite, or an array of the wrong shape.
+    """
+    rows = [getattr(command, name) for name in _COMMANDED]
+    for name, row in zip(_COMMANDED, rows, strict=True):
+        if row.shape != (12,):
+            raise CommandError(f"command.{name} must have shape (12,), got {row.shape}")
+    numbers = np.array(rows, dtype=float)
+    if not math.isfinite(np.vdot(numbers, numbers)):  # cheap, but huge numbers overflow
+        for name, row in zip(_COMMANDED, rows, strict=True):
+            if not np.isfinite(row).all():
+                raise CommandError(f"command.{name} is not finite: {row}")
+    return numbers
+
+
+_COMMANDED = ("tau", "q_des", "v_des", "kp", "kd")

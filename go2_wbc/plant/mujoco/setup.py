@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -104,5 +104,5 @@ def prepare(setup: PlantSetup) -> tuple[mujoco.MjModel, MujocoLayout, MotorModel
         model.geom_friction[feet, 0] = setup.friction
         model.geom_priority[feet] = model.geom_priority.max() + 1
     layout = find_layout(spec, model, description.efforts)
-    motor = replace(MotorModel.named(setup.motor, description), peak=layout.torque_limits)
+    motor = MotorModel.named(setup.motor, description).with_peak(layout.torque_limits)
     return model, layout, motor

@@ -9,8 +9,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from go2_wbc.robot.description import RobotDescription
-from go2_wbc.robot.mesh_file import read_mesh
+from go2_wbc.robot.description import RobotDescription, read_mesh
 
 VISUAL_GROUP = 2  # MuJoCo's usual group of visual geoms; collision geoms go to 3, hidden at first
 COLLISION_GROUP = 3

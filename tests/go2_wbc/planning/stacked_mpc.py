@@ -7,28 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.planning.mpc import NODES, MpcConfig
-
-
-@dataclass(frozen=True, slots=True)
-class Horizon:
-    """What the MPC looks at: the trunk now, where it shall go, and the feet that can press.
-
-    Pose is the turn [rad] and the CoM [m], rate are w [rad/s] and v [m/s], both in this order.
-
-    Attributes:
-        state: pose and rate now.
-        goals: pose and rate wanted at the end of each node.
-        share: part of each node that each foot stands.
-        arms: from the CoM to the feet's contact points [m].
-        inertia: about the CoM, world axes [kg m^2].
-    """
-
-    state: Float[np.ndarray, "12"]
-    goals: Float[np.ndarray, "nodes 12"]
-    share: Float[np.ndarray, "nodes 4"]
-    arms: Float[np.ndarray, "nodes 4 3"]
-    inertia: Float[np.ndarray, "3 3"]
+from go2_wbc.planning.mpc import NODES, STEP, Horizon, MpcConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +34,11 @@ class ForceProgram:
         return forces
 
 
-def formulate(horizon: Horizon, config: MpcConfig, mass: float, gravity: float) -> ForceProgram:
-    """The QP of ``horizon`` for a robot of ``mass`` [kg] under ``gravity`` [m/s^2]."""
+def formulate(horizon: Horizon, config: MpcConfig) -> ForceProgram:
+    """The QP of ``horizon``."""
     pressing = horizon.share >= config.least_share
     feet = tuple((k, leg) for k in range(NODES) for leg in range(4) if pressing[k, leg])
-    free, response = _response(horizon, config, mass, gravity, feet)
+    free, response = _response(horizon, feet)
     error = free - horizon.goals
     weights = np.concatenate(
         [
@@ -70,10 +49,10 @@ def formulate(horizon: Horizon, config: MpcConfig, mass: float, gravity: float) 
         ]
     )
     S, Q = response.reshape(12 * NODES, -1), np.tile(weights, NODES)
-    usual = mass * gravity * NODES / max(float(horizon.share.sum()), 1.0)
+    usual = horizon.mass * horizon.gravity * NODES / max(float(horizon.share.sum()), 1.0)
     prior = np.zeros(3 * len(feet))
     prior[2::3] = [usual * horizon.share[foot] for foot in feet]
-    mu = config.friction
+    mu = horizon.friction
     pyramid = np.array([[1, 0, -mu], [-1, 0, -mu], [0, 1, -mu], [0, -1, -mu], [0, 0, 1]])
     most = [config.force_max * horizon.share[foot] for foot in feet]
     return ForceProgram(
@@ -87,18 +66,14 @@ def formulate(horizon: Horizon, config: MpcConfig, mass: float, gravity: float) 
 
 
 def _response(
-    horizon: Horizon,
-    config: MpcConfig,
-    mass: float,
-    gravity: float,
-    feet: tuple[tuple[int, int], ...],
+    horizon: Horizon, feet: tuple[tuple[int, int], ...]
 ) -> tuple[Float[np.ndarray, "nodes 12"], Float[np.ndarray, "nodes 12 n"]]:
     """State at the end of each node without any force, and how it answers to the unknowns."""
-    dt, eye = config.step, np.eye(6)
+    dt, eye = STEP, np.eye(6)
     A = np.block([[eye, dt * eye], [np.zeros((6, 6)), eye]])
     B = np.concatenate([dt**2 / 2 * eye, dt * eye])
     inverse = np.linalg.inv(horizon.inertia)
-    fall = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -gravity])
+    fall = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -horizon.gravity])
     x, S = horizon.state, np.zeros((12, 3 * len(feet)))
     free, response = np.empty((NODES, 12)), np.empty((NODES, *S.shape))
     for k in range(NODES):
@@ -107,7 +82,9 @@ def _response(
             if node == k:
                 r = horizon.arms[k, leg]
                 turn = inverse @ np.cross(r, np.eye(3)).T
-                accelerations[:, 3 * n : 3 * n + 3] = np.concatenate([turn, np.eye(3) / mass])
+                accelerations[:, 3 * n : 3 * n + 3] = np.concatenate(
+                    [turn, np.eye(3) / horizon.mass]
+                )
         x, S = A @ x + B @ fall, A @ S + B @ accelerations
         free[k], response[k] = x, S
     return free, response

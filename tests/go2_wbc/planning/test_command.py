@@ -80,9 +80,6 @@ def test_every_kind_of_real_number_becomes_a_float(unchecked: ModuleType, value:
 @given(commands)
 def test_only_the_command_of_three_zeros_asks_the_robot_to_stay(command: VelocityCommand) -> None:
     assert command.is_zero == (not components(command).any())
-
-
-def test_the_zero_command_is_zero() -> None:
     assert ZERO_COMMAND.is_zero
 
 
@@ -118,12 +115,6 @@ def test_clipping_keeps_the_direction_and_uses_the_whole_envelope(
     np.testing.assert_allclose(clipped / np.linalg.norm(clipped), unit, atol=ROUNDING)
 
 
-def test_backwards_has_its_own_bound() -> None:
-    envelope = VelocityEnvelope(forward=2.0, backward=0.5)
-    assert envelope.clip(VelocityCommand(9.0)).linear_x == pytest.approx(2.0)
-    assert envelope.clip(VelocityCommand(-9.0)).linear_x == pytest.approx(-0.5)
-
-
 def test_clipping_keeps_the_direction_of_the_greatest_numbers_there_are() -> None:
     greatest = sys.float_info.max
     clipped = VelocityEnvelope().clip(VelocityCommand(greatest, -greatest, greatest))
@@ -135,11 +126,7 @@ def test_a_share_of_the_envelope_scales_every_bound() -> None:
     half = VelocityEnvelope().scaled(0.5)
     whole = VelocityEnvelope()
     assert half == VelocityEnvelope(
-        whole.forward / 2,
-        whole.backward / 2,
-        whole.lateral / 2,
-        whole.turning / 2,
-        whole.curve / 4,
+        whole.forward / 2, whole.backward / 2, whole.lateral / 2, whole.turning / 2, whole.curve / 4
     )
 
 

@@ -8,15 +8,9 @@ import numpy as np
 import pytest
 
 from go2_wbc.contacts import GAITS, ContactPhase
-from go2_wbc.planning.contact import (
-    ContactConfig,
-    FootContact,
-    follow_contact,
-    loaded_time,
-)
+from go2_wbc.planning.contact import EARLIEST, FootContact, follow_contact, loaded_time
 
 TROT, TICK, RAMP = GAITS["trot"].schedule(), 0.002, 0.03
-CONFIG = ContactConfig()
 SWING = GAITS["trot"].swing_time
 
 
@@ -44,15 +38,13 @@ def feet(until: float, *, touching: bool, above: float) -> Feet:
         found.phase = TROT.at(tick * TICK)
         for leg, foot in enumerate(found.feet):
             planned, progress = found.phase.stance[leg], found.phase.progress[leg]
-            found.stance[leg] = follow_contact(
-                foot, CONFIG, above, touching, planned, progress, TICK
-            )
+            found.stance[leg] = follow_contact(foot, above, touching, planned, progress, TICK)
     return found
 
 
 @pytest.mark.parametrize(
     ("touching", "above", "share"),
-    [(True, 0.0, 0.9), (False, 0.05, 0.9), (True, 0.05, CONFIG.earliest - 0.1)],
+    [(True, 0.0, 0.9), (False, 0.05, 0.9), (True, 0.05, EARLIEST - 0.1)],
     ids=["on the ground", "in the air", "too soon"],
 )
 def test_feet_stand_when_it_is_planned(touching: bool, above: float, share: float) -> None:
@@ -66,7 +58,7 @@ def test_feet_stand_when_it_is_planned(touching: bool, above: float, share: floa
 def test_a_foot_that_finds_a_step_late_in_its_swing_stands_from_then_on() -> None:
     contacts = feet(0.8 * SWING, touching=True, above=0.05)
     assert contacts.stance.all()
-    begun = (0.8 - CONFIG.earliest) * SWING
+    begun = (0.8 - EARLIEST) * SWING
     share = contacts.load_share[~contacts.phase.stance]
     np.testing.assert_allclose(share, begun / RAMP, atol=2 * TICK / RAMP)
 

@@ -9,8 +9,17 @@ import pytest
 
 from go2_wbc.contacts import GAITS, Gait
 from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand, VelocityEnvelope
-from go2_wbc.planning.envelopes import FULL, TROT, envelope_of, measured_envelopes
-from go2_wbc.planning.gait_choice import DOWN, DWELL, LADDER, UP, GaitChoice
+from go2_wbc.planning.envelopes import (
+    DOWN,
+    DWELL,
+    FULL,
+    LADDER,
+    TROT,
+    UP,
+    GaitChoice,
+    envelope_of,
+    measured_envelopes,
+)
 
 TICK = 0.02
 RATE = 1.5 * TICK  # m/s in a tick

@@ -8,7 +8,6 @@ from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.force_mpc import excess_velocity, look_ahead
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
-from go2_wbc.planning.mpc import NODES
 from go2_wbc.planning.trunk import Trunk
 from go2_wbc.planning.walk import Planner, Walk
 from tests.go2_wbc.planning.squared import MODEL, at, moving, resting
@@ -25,12 +24,11 @@ def test_feet_of_a_thrown_robot_come_down_below_it() -> None:
     for tick in range(30):
         thrown = at(moving(resting(), np.array([3.7, 0.0, 0.0])), 0.01 * tick)
         planner.update(thrown, COMMAND)
-    state, goals, share = np.empty(12), np.empty((NODES, 12)), np.empty((NODES, 4))
-    arms, told = np.empty((NODES, 4, 3)), (planner._state, planner._walk, planner._command)
-    look_ahead(thrown, *told, state, goals, share, arms)
-    presses = share >= CONFIG.mpc.least_share
+    look_ahead(thrown, planner._state, planner._walk, planner._command)
+    seen = planner._state.horizon
+    presses = seen.share >= CONFIG.mpc.least_share
     assert presses.any(axis=0).all()
-    assert np.linalg.norm(arms[presses][:, :2], axis=1).max() <= FARTHEST
+    assert np.linalg.norm(seen.arms[presses][:, :2], axis=1).max() <= FARTHEST
 
 
 def test_within_the_margin_the_wanted_way_counts() -> None:

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from go2_wbc.planning.ground import (
+    DELAY,
+    MOST_RAISE,
     MOST_SLOPE,
+    SMOOTH,
+    STUMBLE,
     Ground,
-    GroundConfig,
     apex_raise,
     carry_ground,
     delay,
@@ -22,7 +25,6 @@ from go2_wbc.robot.snapshot import Snapshot
 from tests import engine_helpers as helpers
 
 MODEL = helpers.symmetric_model()
-CONFIG = GroundConfig()
 SLOPE = np.array([0.2, -0.1])
 EXACT = 1e-12
 
@@ -41,7 +43,7 @@ def plane(snapshot: Snapshot) -> Ground:
 
 def learn(ground: Ground, feet: np.ndarray, met: np.ndarray) -> None:
     here = on_plane(np.zeros(2)).replaced(p_world_feet=feet)
-    learn_ground(ground, CONFIG, here, MODEL.foot_radius, met)
+    learn_ground(ground, here, MODEL.foot_radius, met)
 
 
 def test_the_plane_at_first_is_that_through_the_feet() -> None:
@@ -72,17 +74,17 @@ def test_it_is_carried_along_with_the_robot() -> None:
 @pytest.mark.parametrize("friction", [0.3, 0.6])
 def test_an_upright_cone_lies_within_that_about_the_normal_of_a_slope(friction: float) -> None:
     ground = plane(on_plane(SLOPE))
-    level = level_friction(ground, CONFIG, friction, 0.01)
+    level = level_friction(ground, friction, 0.01)
     around = np.linspace(0.0, 2.0 * np.pi, 3600)
     forces = np.column_stack([level * np.cos(around), level * np.sin(around), np.ones(3600)])
     normal = np.array([-SLOPE[0], -SLOPE[1], 1.0]) / np.sqrt(1.0 + SLOPE @ SLOPE)
     into = forces @ normal
     along = np.linalg.norm(forces - into[:, None] * normal, axis=1)
     assert (along / into).max() == pytest.approx(friction, abs=1e-5)
-    assert level_friction(ground, CONFIG, 0.1, 0.12) == 0.12
+    assert level_friction(ground, 0.1, 0.12) == 0.12
     learn(ground, on_plane(SLOPE, 0.5).p_world_feet, np.ones(4, dtype=bool))
-    assert level_friction(ground, CONFIG, friction, 0.01) == pytest.approx(friction)  # as on stairs
-    assert level_friction(plane(on_plane(np.zeros(2))), CONFIG, friction, 0.01) == friction
+    assert level_friction(ground, friction, 0.01) == pytest.approx(friction)  # as on stairs
+    assert level_friction(plane(on_plane(np.zeros(2))), friction, 0.01) == friction
 
 
 def test_feet_that_land_on_another_plane_turn_it_there() -> None:
@@ -99,14 +101,12 @@ def test_a_step_raises_the_swing_for_a_while_and_smooth_ground_does_not() -> Non
     snapshot = on_plane(np.zeros(2))
     ground, front_left = plane(snapshot), np.array([True, False, False, False])
     learn(ground, snapshot.p_world_feet, front_left)
-    assert apex_raise(ground, CONFIG) == 0.0
+    assert apex_raise(ground) == 0.0
     learn(ground, snapshot.p_world_feet + [0.0, 0.0, 0.05], front_left)
-    assert apex_raise(ground, CONFIG) == pytest.approx(0.05 - CONFIG.smooth)
-    note_stumble(ground, CONFIG)
-    assert apex_raise(ground, CONFIG) == pytest.approx(CONFIG.stumble - CONFIG.smooth)
-    assert delay(ground, CONFIG) == pytest.approx(
-        CONFIG.delay * apex_raise(ground, CONFIG) / CONFIG.most_raise
-    )
+    assert apex_raise(ground) == pytest.approx(0.05 - SMOOTH)
+    note_stumble(ground)
+    assert apex_raise(ground) == pytest.approx(STUMBLE - SMOOTH)
+    assert delay(ground) == pytest.approx(DELAY * apex_raise(ground) / MOST_RAISE)
     for _ in range(20):
         learn(ground, snapshot.p_world_feet, np.ones(4, dtype=bool))
-    assert apex_raise(ground, CONFIG) == 0.0
+    assert apex_raise(ground) == 0.0

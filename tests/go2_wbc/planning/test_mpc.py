@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from go2_wbc.algebra.active_set import SINGULAR, SOLVED
 from go2_wbc.compilation import kernel
-from go2_wbc.planning.mpc import NODES, MpcConfig, Robot, solve_mpc
+from go2_wbc.planning.mpc import NODES, Horizon, MpcConfig, solve_mpc
 from go2_wbc.records import packed
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
-from tests.go2_wbc.planning.stacked_mpc import Horizon, formulate
+from tests.go2_wbc.planning.stacked_mpc import formulate
 
 MASS, GRAVITY = 15.7, 9.79
 AGREEMENT = 1e-4  # [N] between two solvers, of forces up to 250 N; measured 4e-6
 IDENTITY = 1e-9
 ODD = MpcConfig(
-    step=0.027,
     angle_weights=(21.0, 17.0, 11.0),
     position_weights=(5.0, 6.0, 83.0),
     angular_weights=(0.3, 0.4, 0.5),
@@ -30,6 +27,7 @@ ODD = MpcConfig(
 )
 """No two numbers alike, so that one in another's place is seen."""
 HIPS = np.array([[0.19, 0.14], [0.19, -0.14], [-0.19, 0.14], [-0.19, -0.14]])
+BELOW = np.tile(np.column_stack([HIPS, np.full(4, -0.3)]), (NODES, 1, 1))
 
 
 def random_horizon(rng: np.random.Generator, haste: float) -> Horizon:
@@ -45,6 +43,8 @@ def random_horizon(rng: np.random.Generator, haste: float) -> Horizon:
         share=share,
         arms=arms,
         inertia=np.diag([0.13, 0.35, 0.4]) + half @ half.T,
+        mass=MASS,
+        gravity=GRAVITY,
     )
 
 
@@ -52,11 +52,9 @@ compiled = kernel(solve_mpc)
 
 
 def solved(config: MpcConfig, horizon: Horizon) -> tuple[int, np.ndarray]:
-    forces = np.full((NODES, 4, 3), np.nan)
-    robot = Robot(mass=MASS, gravity=GRAVITY, inertia=horizon.inertia)
-    state, goals, share, arms = horizon.state, horizon.goals, horizon.share, horizon.arms
-    given = packed(config), robot, config.friction, state, goals, share, arms
-    return compiled(*given, forces), forces
+    horizon.friction = config.friction
+    horizon.forces[:] = np.nan
+    return compiled(packed(config), horizon), horizon.forces
 
 
 @pytest.mark.parametrize("config", [MpcConfig(), ODD], ids=["default", "odd"])
@@ -65,10 +63,10 @@ def test_forces_are_those_of_the_stacked_program(config: MpcConfig) -> None:
     bounded = 0
     for index in range(24):
         horizon = random_horizon(rng, haste=(0.3, 1.0, 3.0)[index % 3])
-        program = formulate(horizon, config, MASS, GRAVITY)
-        qp = DenseQp(program.H, program.g, program.C, program.lower, program.upper)
-        theirs = program.forces(solve_dense_qp(qp, "daqp").x)
         outcome, ours = solved(config, horizon)
+        program = formulate(horizon, config)
+        qp = DenseQp(program.H, program.g, program.C, program.lower, program.upper)
+        theirs = program.forces(solve_dense_qp(qp, "daqp"))
         assert outcome == SOLVED
         np.testing.assert_allclose(ours, theirs, atol=AGREEMENT, rtol=0)
         free = program.forces(np.linalg.solve(program.H, -program.g))
@@ -89,11 +87,8 @@ def test_forces_keep_the_friction_pyramid_and_their_bounds() -> None:
 
 
 def test_a_body_at_rest_where_it_shall_be_is_held_by_its_weight() -> None:
-    horizon = replace(
-        random_horizon(np.random.default_rng(32), haste=0.0),
-        share=np.ones((NODES, 4)),
-        arms=np.tile(np.column_stack([HIPS, np.full(4, -0.3)]), (NODES, 1, 1)),
-    )
+    horizon = random_horizon(np.random.default_rng(32), haste=0.0)
+    horizon.share[:], horizon.arms[:] = 1.0, BELOW
     outcome, f = solved(MpcConfig(), horizon)
     assert outcome == SOLVED
     np.testing.assert_allclose(f[..., 2], MASS * GRAVITY / 4, atol=1e-6)
@@ -101,11 +96,10 @@ def test_a_body_at_rest_where_it_shall_be_is_held_by_its_weight() -> None:
 
 
 def test_forces_are_planned_before_a_flight_to_be_at_the_goal_after_it() -> None:
-    share = np.ones((NODES, 4))
-    share[4:8] = 0.0
     rest = random_horizon(np.random.default_rng(33), haste=0.0)
-    arms = np.tile(np.column_stack([HIPS, np.full(4, -0.3)]), (NODES, 1, 1))
-    outcome, f = solved(MpcConfig(), replace(rest, share=share, arms=arms))
+    rest.share[:], rest.arms[:] = 1.0, BELOW
+    rest.share[4:8] = 0.0
+    outcome, f = solved(MpcConfig(), rest)
     assert outcome == SOLVED
     assert not f[4:8].any()
     assert f[:4, :, 2].sum(axis=1).mean() > 1.2 * MASS * GRAVITY
@@ -113,8 +107,9 @@ def test_forces_are_planned_before_a_flight_to_be_at_the_goal_after_it() -> None
 
 def test_a_horizon_without_any_foot_and_one_without_inertia_are_told() -> None:
     horizon = random_horizon(np.random.default_rng(34), haste=1.0)
-    outcome, f = solved(MpcConfig(), replace(horizon, share=np.zeros((NODES, 4))))
+    horizon.share[:] = 0.0
+    outcome, f = solved(MpcConfig(), horizon)
     assert outcome == SOLVED
     assert not f.any()
-    outcome, _ = solved(MpcConfig(), replace(horizon, inertia=np.zeros((3, 3))))
-    assert outcome == SINGULAR
+    horizon.inertia[:] = 0.0
+    assert solved(MpcConfig(), horizon)[0] == SINGULAR

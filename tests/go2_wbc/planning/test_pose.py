@@ -12,16 +12,9 @@ from hypothesis import strategies as st
 
 from go2_wbc.contacts import GAITS
 from go2_wbc.errors import CommandError, ConfigError
-from go2_wbc.planning.command import ZERO_COMMAND, VelocityCommand
+from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.planning.locomotion import LocomotionConfig, LocomotionPlanner
-from go2_wbc.planning.pose import (
-    LEVEL,
-    BodyPose,
-    PoseConfig,
-    PoseEnvelope,
-    advance_pose,
-    pose_turn,
-)
+from go2_wbc.planning.pose import LEVEL, BodyPose, PoseConfig, PoseEnvelope, advance_pose, pose_turn
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy, yaw_rotation
@@ -140,12 +133,3 @@ def test_the_reference_of_a_walking_robot_arrives_at_the_pose_and_the_feet_stay(
     turned = level.body.R_world_base.T @ leaning.body.R_world_base
     np.testing.assert_allclose(turned, rotation_from_rpy(0.1, 0.12, 0.2), atol=ARRIVED)
     assert planners[1].heading == pytest.approx(planners[0].heading, abs=1e-6)
-
-
-def test_without_a_pose_the_trunk_is_level() -> None:
-    model = RobotModel()
-    planner = LocomotionPlanner(model, GAITS["trot"], LocomotionConfig())
-    start = model.snapshot(state_of(standing_q()))
-    planner.start(start)
-    reference = planner.update(model.snapshot(state_of(standing_q(), time=TICK)), ZERO_COMMAND)
-    np.testing.assert_allclose(reference.body.R_world_base, np.eye(3), atol=EXACT)

@@ -7,13 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from go2_wbc.errors import ConfigError
-from go2_wbc.planning.slip import Slip, SlipConfig, exerted_ratio, observe_slip
+from go2_wbc.planning.slip import (
+    HALF_SPEED,
+    LEAST,
+    MASK,
+    MOST,
+    RECOVERY,
+    SPEED,
+    Slip,
+    exerted_ratio,
+    observe_slip,
+)
 from go2_wbc.robot.snapshot import Snapshot
 from tests import engine_helpers as helpers
 
 MODEL = helpers.symmetric_model()
-CONFIG = SlipConfig()
 TICK = 0.002
 STANCE = np.ones(4, dtype=bool)
 PRESSURE = 40.0  # N on each foot
@@ -35,11 +43,11 @@ def sliding(
 
 def look(slip: Slip, snapshot: Snapshot) -> None:
     state = snapshot.state
-    observe_slip(slip, CONFIG, snapshot, state.feet_in_contact, state.tau, STANCE, TICK)
+    observe_slip(slip, snapshot, state.feet_in_contact, state.tau, STANCE, TICK)
 
 
 def after(snapshot: Snapshot, seconds: float) -> Slip:
-    slip = Slip(friction=CONFIG.most)
+    slip = Slip(friction=MOST)
     for _ in range(round(seconds / TICK)):
         look(slip, snapshot)
     return slip
@@ -47,7 +55,7 @@ def after(snapshot: Snapshot, seconds: float) -> Slip:
 
 def test_a_foot_that_slides_lowers_the_friction_to_the_least() -> None:
     assert after(sliding(0.3), 0.1).friction < 0.2
-    assert CONFIG.least <= after(sliding(0.3), 1.0).friction < CONFIG.least + 1e-3
+    assert LEAST <= after(sliding(0.3), 1.0).friction < LEAST + 1e-3
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.3, 1.4])
@@ -59,13 +67,13 @@ def test_the_ratio_is_that_of_the_forces_that_the_torques_make(ratio: float) -> 
 
 
 def test_the_friction_falls_to_what_the_foot_shows_and_no_further() -> None:
-    shown = 0.4 / (1.0 + 0.2 / CONFIG.half_speed)
+    shown = 0.4 / (1.0 + 0.2 / HALF_SPEED)
     assert after(sliding(0.2, ratio=0.4), 1.0).friction == pytest.approx(shown, abs=1e-6)
 
 
 def test_a_foot_that_slides_under_a_great_force_leaves_it() -> None:
     """The trot fell at pushes, for want of the force that its overloaded feet still gave."""
-    assert after(sliding(0.15, ratio=0.9), 0.2).friction == CONFIG.most
+    assert after(sliding(0.15, ratio=0.9), 0.2).friction == MOST
 
 
 def test_the_foot_that_shows_least_counts() -> None:
@@ -74,31 +82,31 @@ def test_the_foot_that_shows_least_counts() -> None:
     tau = snapshot.state.tau.copy()
     tau[:3] = sliding(0.2, ratio=0.1).state.tau[:3]
     both = snapshot.replaced(state=replace(snapshot.state, tau=tau), v_world_contacts=v)
-    assert after(both, 1.0).friction == pytest.approx(CONFIG.least, abs=1e-6)
+    assert after(both, 1.0).friction == pytest.approx(LEAST, abs=1e-6)
 
 
 def test_a_foot_that_does_not_press_on_the_ground_leaves_it() -> None:
     snapshot = sliding(0.3, ratio=0.2)
     lifts = replace(snapshot.state, tau=2 * snapshot.bias[6:] - snapshot.state.tau)
-    assert after(snapshot.replaced(state=lifts), 0.2).friction == CONFIG.most
+    assert after(snapshot.replaced(state=lifts), 0.2).friction == MOST
 
 
 @pytest.mark.parametrize(
     "snapshot",
-    [sliding(0.9 * CONFIG.speed), sliding(0.3, touches=False), sliding(0.3, 0.3)],
+    [sliding(0.9 * SPEED), sliding(0.3, touches=False), sliding(0.3, 0.3)],
     ids=["slow", "in the air", "off an edge"],
 )
 def test_a_foot_that_does_not_slide_on_the_ground_leaves_it(snapshot: Snapshot) -> None:
-    assert after(snapshot, 0.2).friction == CONFIG.most
+    assert after(snapshot, 0.2).friction == MOST
 
 
 def test_a_foot_may_slide_just_after_touchdown() -> None:
-    assert after(sliding(0.3), CONFIG.mask).friction == CONFIG.most
+    assert after(sliding(0.3), MASK).friction == MOST
 
 
 def test_a_foot_that_chatters_while_it_slides_has_not_come_down_anew() -> None:
     """On sensors the trot fell on a friction of 0.2: the estimate stayed at 0.44."""
-    slip, slides = Slip(friction=CONFIG.most), sliding(0.3)
+    slip, slides = Slip(friction=MOST), sliding(0.3)
     for tick in range(100):
         is_lost = tick > 15 and tick % 8 >= 5
         look(slip, sliding(0.3, touches=False) if is_lost else slides)
@@ -106,14 +114,14 @@ def test_a_foot_that_chatters_while_it_slides_has_not_come_down_anew() -> None:
 
 
 def test_a_foot_that_was_off_for_long_comes_down_anew() -> None:
-    slip, slides = Slip(friction=CONFIG.most), sliding(0.3)
-    for _ in range(round(CONFIG.mask / TICK)):
+    slip, slides = Slip(friction=MOST), sliding(0.3)
+    for _ in range(round(MASK / TICK)):
         look(slip, slides)
-    for _ in range(round(2.0 * CONFIG.mask / TICK)):
+    for _ in range(round(2.0 * MASK / TICK)):
         look(slip, sliding(0.3, touches=False))
-    for _ in range(round(CONFIG.mask / TICK)):
+    for _ in range(round(MASK / TICK)):
         look(slip, slides)
-    assert slip.friction == CONFIG.most
+    assert slip.friction == MOST
 
 
 def test_the_friction_comes_back_slowly() -> None:
@@ -121,9 +129,4 @@ def test_the_friction_comes_back_slowly() -> None:
     low = slip.friction
     for _ in range(500):
         look(slip, sliding(0.0))
-    assert slip.friction == pytest.approx(low + CONFIG.recovery, abs=1e-6)
-
-
-def test_bounds_that_cross_are_refused() -> None:
-    with pytest.raises(ConfigError, match=r"least.*0\.5 and 0\.4"):
-        SlipConfig(least=0.5, most=0.4)
+    assert slip.friction == pytest.approx(low + RECOVERY, abs=1e-6)

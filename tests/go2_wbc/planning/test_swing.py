@@ -113,13 +113,6 @@ def test_a_foot_that_waits_rises_first_and_then_moves_as_any_other(delay: float)
             np.testing.assert_allclose(found[:2], expected[:2], atol=1e-9)
 
 
-def test_a_goal_that_moves_late_is_still_reached() -> None:
-    start, goal, late = np.zeros(3), np.array([0.1, 0.0, 0.0]), np.array([0.14, 0.03, 0.01])
-    assert not np.allclose(swing(start, goal, 0.9)[0], swing(start, late, 0.9)[0])
-    p, _, _ = swing(start, late, LAST)
-    np.testing.assert_allclose(p[:2], late[:2], atol=1e-9)
-
-
 @pytest.mark.parametrize(("apex", "expected"), [(0.04, 0.04), (0.5, SwingConfig().apex)])
 def test_a_gait_may_swing_lower_than_the_others_but_not_higher(
     apex: float, expected: float

@@ -7,7 +7,7 @@ import pytest
 
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.force_mpc import fill_goals
-from go2_wbc.planning.ground import Ground, GroundConfig
+from go2_wbc.planning.ground import FOLLOW, Ground
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.planning.mpc import NODES
 from go2_wbc.planning.trunk import Command, Trunk, fill_body
@@ -17,13 +17,12 @@ from go2_wbc.robot.rotations import log_rotation, yaw_rotation
 from tests.go2_wbc.planning.squared import MODEL
 
 SLOPE = np.array([0.2, -0.1])
-ALONG = GroundConfig(follow=1.0)
 EXACT = 1e-12
 
 
 def attitude(yaw: float, slope: np.ndarray) -> np.ndarray:
     target = Target()
-    fill_body(Trunk(yaw=yaw), Ground(slope=slope), ALONG, 0.3, target)
+    fill_body(Trunk(yaw=yaw), Ground(slope=slope / FOLLOW), 0.3, target)
     return target.R_world_base
 
 
@@ -37,9 +36,9 @@ def test_a_trunk_on_a_slope_keeps_its_heading_and_has_its_normal_up() -> None:
 
 @pytest.mark.parametrize("slope", [(0.0, 0.3), (0.3, 0.0)])
 def test_the_turn_that_is_planned_for_is_that_of_the_slope(slope: tuple[float, float]) -> None:
-    config, goals = LocomotionConfig(ground=ALONG), np.empty((NODES, 12))
-    walk = Walk.of(MODEL, GAITS["trot"], config)
-    fill_goals(Planner(ground=Ground(slope=np.array(slope))), walk, Command(), goals)
+    walk = Walk.of(MODEL, GAITS["trot"], LocomotionConfig())
+    planner = Planner(ground=Ground(slope=np.array(slope) / FOLLOW))
+    fill_goals(planner, walk, Command())
     turn = log_rotation(attitude(0.0, np.array(slope)))
-    np.testing.assert_allclose(goals[:, :3], np.tile(turn, (NODES, 1)), atol=EXACT)
+    np.testing.assert_allclose(planner.horizon.goals[:, :3], np.tile(turn, (NODES, 1)), atol=EXACT)
     assert np.linalg.norm(turn) == pytest.approx(np.arctan(0.3))

@@ -77,7 +77,7 @@ def test_the_friction_of_every_joint_is_found(
 
 def test_a_straight_line_is_found_exactly_and_written_for_the_configuration(tmp_path: Path) -> None:
     dry, viscous = 0.1 + 0.1 * ANY, 0.05 * ANY
-    found = fitted(SPEEDS, dry + viscous * SPEEDS, misfit=0.1)
+    found = fitted(SPEEDS, dry + viscous * SPEEDS)
     np.testing.assert_allclose(found.dry, dry.ravel(), atol=1e-9)
     np.testing.assert_allclose(found.viscous, viscous.ravel(), atol=1e-9)
     path = tmp_path / "friction.toml"
@@ -102,14 +102,14 @@ def test_friction_that_is_no_straight_line_is_refused_by_name() -> None:
     friction = 0.2 + 0.1 * SPEEDS
     friction[5] = [1.0, 0.2, 1.5, 0.1]
     with pytest.raises(PlantError, match=r"FR_calf_joint is no sum of a dry and a viscous part"):
-        fitted(SPEEDS, friction, misfit=0.1)
+        fitted(SPEEDS, friction)
 
 
 def test_friction_that_drives_a_joint_is_refused() -> None:
     friction = np.full((12, 4), 0.2)
     friction[7] = -1.0
     with pytest.raises(PlantError, match=r"dry friction of RL_thigh_joint .* -1\.000, below 0"):
-        fitted(SPEEDS, friction, misfit=0.1)
+        fitted(SPEEDS, friction)
 
 
 def test_a_robot_that_stands_is_refused() -> None:

@@ -10,10 +10,10 @@ from controller import GO2Controller
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.plant.sensors import EXACT, SensorNoise
-from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
+from go2_wbc.robot.estimator import EstimatorConfig, StateEstimator
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state_filter import Estimate
-from tests.engine_helpers import STAND_JOINTS
+from tests.engine_helpers import standing_reading
 
 P_BASE_IMU = np.array([-0.02557, 0.0, 0.04232])  # m; the URDF's imu_joint
 GYRO_READING = np.array([0.4, -0.3, 0.5])
@@ -32,9 +32,7 @@ def base(x: Estimate, error: np.ndarray, gyro: np.ndarray) -> tuple[np.ndarray, 
 
 def test_the_covariance_of_the_base_is_that_of_the_errors_of_the_filter() -> None:
     rng, estimator = np.random.default_rng(3), StateEstimator(RobotModel())
-    up = np.array([0.0, 0.0, 9.81])
-    rest = np.zeros(12)
-    estimator.update(SensorReading(0.0, GYRO_READING, up, STAND_JOINTS, rest, rest, np.zeros(4)))
+    estimator.update(standing_reading(gyro=GYRO_READING, foot_forces=np.zeros(4)))
     saved = estimator.save()
     root = rng.normal(size=(27, 27))
     P, x = saved["state"].filter.P, saved["state"].filter.x

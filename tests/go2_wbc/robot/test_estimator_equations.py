@@ -252,7 +252,7 @@ def test_compiled_is_plain(case: str) -> None:
     estimator, given = StateEstimator(RobotModel(), CONFIG), readings(case)
     for reading in given[:20]:
         estimator.update(reading)
-    estimator._read(given[20], STEP)
+    estimator._read(given[20])
     made = np.empty(19), np.empty(18)
-    kept = estimator._state, estimator._reading, estimator._numbers
+    kept = estimator._state, estimator._reading, STEP, estimator._numbers
     assert_plain_is_compiled(estimate, *kept, *made)

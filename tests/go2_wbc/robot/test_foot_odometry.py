@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from go2_wbc.legs import FOOT_NAMES, LEGS, Leg
+from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.estimator import IMU_FRAME, EstimatorConfig, SensorReading, StateEstimator
 from go2_wbc.robot.foot_odometry import (
     LEAST_TRUST,
@@ -21,17 +21,14 @@ from go2_wbc.robot.foot_odometry import (
     Level,
     follow_foot,
     height_off,
-    see_foot,
     see_ground,
-    slip_factor,
-    take_in_leg,
 )
 from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from go2_wbc.robot.state import RobotState
-from go2_wbc.robot.state_filter import FEET, THETA, VELOCITY, Filter
-from tests.engine_helpers import STAND_JOINTS, state_of
+from go2_wbc.robot.state_filter import FEET, Filter
+from tests.engine_helpers import state_of
 
 TICK, COUNT = 0.002, 700  # s; of readings
 STANDING = 0.4  # s
@@ -85,24 +82,22 @@ def state_at(t: float, joints: np.ndarray, model: RobotModel) -> RobotState:
     return state_of(q, v, t)
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
+MODEL = RobotModel()
 
 
 @pytest.fixture(scope="module")
-def motion(model: RobotModel) -> Motion:
-    data = model.pin_model.createData()
-    pin.forwardKinematics(model.pin_model, data, pin.neutral(model.pin_model))
-    frame = model.pin_model.getFrameId(IMU_FRAME)
-    p_base_imu = np.array(pin.updateFramePlacement(model.pin_model, data, frame).translation)
-    p_feet = model.p_base_feet_nominal.copy()
-    p_feet[:, 2] = model.foot_radius - pose(0.0)[0][2]
-    places = [leg_angles(LegGeometry.of(model, leg), p_feet[leg][None]).q[0] for leg in LEGS]
+def motion() -> Motion:
+    data = MODEL.pin_model.createData()
+    pin.forwardKinematics(MODEL.pin_model, data, pin.neutral(MODEL.pin_model))
+    frame = MODEL.pin_model.getFrameId(IMU_FRAME)
+    p_base_imu = np.array(pin.updateFramePlacement(MODEL.pin_model, data, frame).translation)
+    p_feet = MODEL.p_base_feet_nominal.copy()
+    p_feet[:, 2] = MODEL.foot_radius - pose(0.0)[0][2]
+    places = [leg_angles(LegGeometry.of(MODEL, leg), p_feet[leg][None]).q[0] for leg in LEGS]
     joints, readings, states = np.concatenate(places), [], []
     for t in TICK * np.arange(COUNT):
-        state = state_at(t, joints, model)
-        halfway = state_at(t + TICK / 2, joints + TICK / 2 * state.joint_velocities, model)
+        state = state_at(t, joints, MODEL)
+        halfway = state_at(t + TICK / 2, joints + TICK / 2 * state.joint_velocities, MODEL)
         forces = np.full(4, 50.0)
         forces[IN_THE_AIR] = 0.0
         readings.append(
@@ -121,10 +116,8 @@ def motion(model: RobotModel) -> Motion:
     return Motion(readings, states)
 
 
-def test_place_and_speed_of_an_exactly_known_motion_are_found(
-    motion: Motion, model: RobotModel
-) -> None:
-    estimator = StateEstimator(model, EstimatorConfig(compliance=1e-9))
+def test_place_and_speed_of_an_exactly_known_motion_are_found(motion: Motion) -> None:
+    estimator = StateEstimator(MODEL, EstimatorConfig(compliance=1e-9))
     found = [estimator.update(reading) for reading in motion.readings]
     off_v = np.array([a.v - b.v for a, b in zip(found, motion.states, strict=True)])
     off_q = np.array([a.q - b.q for a, b in zip(found, motion.states, strict=True)])
@@ -136,38 +129,15 @@ def test_place_and_speed_of_an_exactly_known_motion_are_found(
     assert np.abs(off_q[:, 7:]).max() < 1e-12
 
 
-def test_what_needs_no_estimate_is_passed_on(motion: Motion, model: RobotModel) -> None:
+def test_what_needs_no_estimate_is_passed_on(motion: Motion) -> None:
     reading = motion.readings[7]
     forces = np.array([0.0, CONTACT_FORCE, CONTACT_FORCE + 0.01, 40.0])
     scaled = replace(reading, foot_forces=forces)
-    state = StateEstimator(model).update(scaled)
+    state = StateEstimator(MODEL).update(scaled)
     assert state.time == reading.time
     assert state.tau.tolist() == reading.tau.tolist()
     assert state.foot_forces.tolist() == forces.tolist()
     assert state.feet_in_contact.tolist() == [False, False, True, True]
-
-
-@pytest.mark.parametrize("leg", LEGS)
-def test_a_leg_measures_what_pinocchio_computes(model: RobotModel, leg: Leg) -> None:
-    rng, robot = np.random.default_rng(int(leg)), model.pin_model
-    data, frame = robot.createData(), robot.getFrameId(FOOT_NAMES[leg])
-    w, p_imu, radius = rng.normal(size=3), rng.normal(scale=0.05, size=3), 0.02
-    R = rotation_from_rpy(0.3, -0.2, 0.9)
-    joints, rates = STAND_JOINTS + 0.3 * rng.normal(size=12), rng.normal(size=12)
-    q = np.concatenate([np.zeros(6), [1.0], joints])
-    pin.forwardKinematics(robot, data, q, np.concatenate([np.zeros(3), w, rates]))
-    place = np.array(pin.updateFramePlacement(robot, data, frame).translation)
-    motion = pin.getFrameVelocity(robot, data, frame, pin.LOCAL_WORLD_ALIGNED)
-    foot = Foot()
-    given = (joints[leg.joints], rates[leg.joints], p_imu, w, radius, R)
-    see_foot(foot, LegGeometry.of(model, leg), *given)
-    own = motion.linear - np.cross(w, place)
-    rolling = np.cross(R @ motion.angular, [0.0, 0.0, radius])
-    velocity = rolling - R @ (motion.linear - np.cross(w, p_imu))
-    np.testing.assert_allclose(foot.place, R @ (place - p_imu), atol=1e-12)
-    np.testing.assert_allclose(foot.rolling, rolling, atol=1e-12)
-    np.testing.assert_allclose(foot.velocity, velocity, atol=1e-12)
-    assert foot.speed == pytest.approx(np.hypot(own[0], own[1]))
 
 
 C = EstimatorConfig()
@@ -178,15 +148,6 @@ def unsure() -> Filter:
     f.P[:] = np.diag(np.arange(1.0, 28.0) ** 2 * 1e-4)
     f.x.v[:] = 0.1, -0.2, 0.3
     return f
-
-
-def test_a_foot_whose_velocity_is_odd_counts_less() -> None:
-    f, foot = unsure(), Foot(velocity=[0.1, -0.2, 0.3], variance=[0.01, 0.02, 0.03])
-    assert slip_factor(f, foot, 3.0) == 1.0
-    foot.velocity[:] += 3.0, -2.0, 1.0
-    spread = np.diag(f.P)[VELOCITY : VELOCITY + 3] + foot.variance
-    chi = (np.array([9.0, 4.0, 1.0]) / spread).sum()
-    assert slip_factor(f, foot, 3.0) == pytest.approx(chi / 9.0)
 
 
 @pytest.mark.parametrize(
@@ -255,30 +216,3 @@ def test_the_ground_is_looked_at_once_when_a_foot_has_settled(
     see_ground(f, foot, 1, force, before * C.touchdown_time, radius, level, C)
     ground = 0.024 - radius + C.compliance * force
     assert foot.height_off == (pytest.approx(0.004 - ground) if looks else np.inf)
-
-
-@pytest.mark.parametrize(("stands", "settled"), [(True, True), (True, False), (False, True)])
-@pytest.mark.parametrize("leg", LEGS)
-def test_what_a_leg_tells_is_taken_in_as_by_its_matrices(
-    leg: Leg, *, stands: bool, settled: bool
-) -> None:
-    rng, f, one = np.random.default_rng(3), Filter(), np.eye(3)
-    f.x.row[:] = rng.normal(size=len(f.x.row))
-    root = rng.normal(size=(27, 27))
-    f.P[:] = root @ root.T / 27
-    variance = [0.01, 0.02, 0.4] if stands else [0.0, 0.0, 0.0]
-    foot = Foot(place=rng.normal(size=3), velocity=rng.normal(size=3), variance=variance)
-    foot.height_off = 0.013 if settled else np.inf
-    H = np.zeros((7, 27))
-    p, v, theta, own = (slice(n, n + 3) for n in (0, VELOCITY, THETA, FEET + 3 * leg))
-    H[:3, p], H[:3, theta], H[:3, own] = -one, pin.skew(foot.place), one
-    H[3:6, v], H[3:6, theta], H[6, own.stop - 1] = one, pin.skew(f.x.v), 1.0
-    off = np.concatenate([foot.place - f.x.p_feet[leg] + f.x.p, foot.velocity - f.x.v, [0.013]])
-    told = np.repeat([True, stands, settled], [3, 3, 1])
-    noise = np.array([*[C.place**2] * 3, *variance, C.height**2])
-    H, off, noise = H[told], off[told], noise[told]
-    K = f.P @ H.T @ np.linalg.inv(H @ f.P @ H.T + np.diag(noise))
-    error, P = K @ off, f.P - K @ H @ f.P
-    take_in_leg(f, foot, leg, C)
-    np.testing.assert_allclose(f.error, error, atol=1e-8)
-    np.testing.assert_allclose(f.P, P, atol=1e-8)

@@ -32,12 +32,6 @@ def turning(state: RobotState, rng: np.random.Generator) -> RobotState:
     return replace(state, v=np.concatenate([state.v[:6], speeds]))
 
 
-def test_friction_opposes_the_motion_and_is_fed_forward_with_it() -> None:
-    v = np.array([5.0, -5.0] * 6)
-    expected = np.sign(v) * np.array(ODD.dry) + np.array(ODD.viscous) * v
-    np.testing.assert_allclose(ODD.torque(v, np.zeros(12)), expected, atol=1e-9)
-
-
 def test_a_joint_at_rest_gets_friction_only_if_it_shall_move() -> None:
     friction, rest = JointFriction(), np.zeros(12)
     assert not friction.torque(rest, rest).any()

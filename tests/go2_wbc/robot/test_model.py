@@ -12,7 +12,14 @@ import pytest
 from go2_wbc.errors import DescriptionError
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.description import find_description
-from go2_wbc.robot.model import FOOT_RADIUS, HIP_LIMIT, ROTOR_ARMATURE, RobotModel
+from go2_wbc.robot.model import (
+    FINGERPRINT,
+    FOOT_RADIUS,
+    HIP_LIMIT,
+    ROTOR_ARMATURE,
+    RobotModel,
+    fingerprint,
+)
 from tests.engine_helpers import random_state
 
 EXACT = 1e-12  # rounding of numbers of order one
@@ -20,9 +27,7 @@ MESH_TOLERANCE = 1e-3  # [m]; the fitted sphere has 22.9 mm and sits 2.6 mm behi
 GO2_MASS = 16.085  # [kg] the sum over the URDF's links
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
+MODEL = RobotModel()
 
 
 def installed_urdf() -> str:
@@ -35,22 +40,22 @@ def described(tmp_path: Path, text: str) -> RobotModel:
     return RobotModel(find_description(path))
 
 
-def test_mass_and_gravity_are_the_robots(model: RobotModel) -> None:
+def test_mass_and_gravity_are_the_robots() -> None:
     links = re.findall(r'<mass\s+value="([^"]+)"', installed_urdf())
-    assert model.mass == pytest.approx(sum(map(float, links)), abs=1e-9)
-    assert model.mass == pytest.approx(GO2_MASS, abs=1e-3)
-    assert model.gravity == 9.81
+    assert MODEL.mass == pytest.approx(sum(map(float, links)), abs=1e-9)
+    assert MODEL.mass == pytest.approx(GO2_MASS, abs=1e-3)
+    assert MODEL.gravity == 9.81
 
 
-def test_the_limits_are_the_tighter_of_urdf_and_published_ones(model: RobotModel) -> None:
+def test_the_limits_are_the_tighter_of_urdf_and_published_ones() -> None:
     robot = pin.buildModelFromUrdf(str(find_description().urdf_path), pin.JointModelFreeFlyer())
     lower, upper = robot.lowerPositionLimit[7:], robot.upperPositionLimit[7:]
     hips, others = np.arange(12) % 3 == 0, np.arange(12) % 3 != 0
     assert (np.abs([lower[hips], upper[hips]]) > HIP_LIMIT).all()
-    np.testing.assert_array_equal(model.q_lower[hips], -HIP_LIMIT)
-    np.testing.assert_array_equal(model.q_upper[hips], HIP_LIMIT)
-    np.testing.assert_array_equal(model.q_lower[others], lower[others])
-    np.testing.assert_array_equal(model.q_upper[others], upper[others])
+    np.testing.assert_array_equal(MODEL.q_lower[hips], -HIP_LIMIT)
+    np.testing.assert_array_equal(MODEL.q_upper[hips], HIP_LIMIT)
+    np.testing.assert_array_equal(MODEL.q_lower[others], lower[others])
+    np.testing.assert_array_equal(MODEL.q_upper[others], upper[others])
 
 
 def test_a_urdf_with_tighter_hips_keeps_them(tmp_path: Path) -> None:
@@ -59,39 +64,39 @@ def test_a_urdf_with_tighter_hips_keeps_them(tmp_path: Path) -> None:
     np.testing.assert_array_equal(narrow.q_lower[0::3], -0.5)
 
 
-def test_torque_and_speed_limits_are_the_descriptions(model: RobotModel) -> None:
-    np.testing.assert_allclose(model.torque_limits, model.description.efforts)
-    np.testing.assert_allclose(model.speed_limits, model.description.speeds)
+def test_torque_and_speed_limits_are_the_descriptions() -> None:
+    np.testing.assert_allclose(MODEL.torque_limits, MODEL.description.efforts)
+    np.testing.assert_allclose(MODEL.speed_limits, MODEL.description.speeds)
 
 
-def test_the_hips_and_nominal_feet_lie_symmetrically_below_the_trunk(model: RobotModel) -> None:
+def test_the_hips_and_nominal_feet_lie_symmetrically_below_the_trunk() -> None:
     q = np.concatenate([np.zeros(6), [1.0], np.zeros(12)])
-    _, feet = model.forward_kinematics(q)
-    np.testing.assert_allclose(model.p_base_feet_nominal[:, :2], feet[:, :2], atol=1e-9)
+    _, feet = MODEL.forward_kinematics(q)
+    np.testing.assert_allclose(MODEL.p_base_feet_nominal[:, :2], feet[:, :2], atol=1e-9)
     mirror = [leg.mirror for leg in LEGS]
-    for points in (model.p_base_hips, model.p_base_feet_nominal):
+    for points in (MODEL.p_base_hips, MODEL.p_base_feet_nominal):
         np.testing.assert_allclose(points[mirror], points * [1.0, -1.0, 1.0], atol=EXACT)
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_forward_kinematics_is_pinocchios(model: RobotModel, seed: int) -> None:
-    robot, q = model.pin_model, random_state(np.random.default_rng(seed)).q
+def test_forward_kinematics_is_pinocchios(seed: int) -> None:
+    robot, q = MODEL.pin_model, random_state(np.random.default_rng(seed)).q
     data = robot.createData()
     pin.framesForwardKinematics(robot, data, q)
-    com, feet = model.forward_kinematics(q)
+    com, feet = MODEL.forward_kinematics(q)
     np.testing.assert_allclose(com, pin.centerOfMass(robot, data, q), atol=EXACT)
     for name, foot in zip(FOOT_NAMES, feet, strict=True):
         np.testing.assert_allclose(foot, data.oMf[robot.getFrameId(name)].translation, atol=EXACT)
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_inverse_dynamics_is_the_equation_of_motion(model: RobotModel, seed: int) -> None:
+def test_inverse_dynamics_is_the_equation_of_motion(seed: int) -> None:
     rng = np.random.default_rng(seed)
     state = random_state(rng)
     a = rng.normal(size=18)
-    snapshot = model.snapshot(state)
+    snapshot = MODEL.snapshot(state)
     expected = snapshot.mass_matrix @ a + snapshot.bias
-    np.testing.assert_allclose(model.inverse_dynamics(state.q, state.v, a), expected, atol=1e-9)
+    np.testing.assert_allclose(MODEL.inverse_dynamics(state.q, state.v, a), expected, atol=1e-9)
 
 
 def test_the_rotors_add_their_inertia_to_the_diagonal_of_the_joints_only() -> None:
@@ -102,12 +107,12 @@ def test_the_rotors_add_their_inertia_to_the_diagonal_of_the_joints_only() -> No
     np.testing.assert_allclose(geared - bare, expected, atol=EXACT)
 
 
-def test_the_foot_mesh_is_nearly_a_sphere_of_the_foot_radius(model: RobotModel) -> None:
+def test_the_foot_mesh_is_nearly_a_sphere_of_the_foot_radius() -> None:
     meshes = pin.buildGeomFromUrdf(
-        model.pin_model,
-        str(model.description.urdf_path),
+        MODEL.pin_model,
+        str(MODEL.description.urdf_path),
         pin.GeometryType.COLLISION,
-        package_dirs=[str(path) for path in model.description.package_dirs],
+        package_dirs=[str(path) for path in MODEL.description.package_dirs],
     )
     feet = [mesh for mesh in meshes.geometryObjects if mesh.name.rsplit("_", 1)[0] in FOOT_NAMES]
     assert len(feet) == len(LEGS)
@@ -118,7 +123,7 @@ def test_the_foot_mesh_is_nearly_a_sphere_of_the_foot_radius(model: RobotModel) 
         )[0]
         centre, radius = sphere[:3], np.sqrt(sphere[3] + sphere[:3] @ sphere[:3])
         assert radius == pytest.approx(FOOT_RADIUS, abs=MESH_TOLERANCE)
-        frame = model.pin_model.frames[model.pin_model.getFrameId(mesh.name.rsplit("_", 1)[0])]
+        frame = MODEL.pin_model.frames[MODEL.pin_model.getFrameId(mesh.name.rsplit("_", 1)[0])]
         offset = frame.placement.actInv(mesh.placement.act(centre))
         np.testing.assert_allclose(offset, 0.0, atol=3 * MESH_TOLERANCE)
 
@@ -145,3 +150,26 @@ def test_a_urdf_that_pinocchio_cannot_read_is_refused_with_its_path(tmp_path: Pa
     broken = installed_urdf().replace('<parent link="FL_hip"', '<parent link="nothing"')
     with pytest.raises(DescriptionError, match=r"cannot read the URDF .*robot\.urdf"):
         described(tmp_path, broken)
+
+
+def changed(mass: float) -> RobotModel:
+    model = RobotModel()
+    model.pin_model.inertias[1].mass += mass
+    return model
+
+
+def test_models_of_the_same_robot_have_the_same_fingerprint() -> None:
+    own = fingerprint(RobotModel())
+    assert len(own) == FINGERPRINT
+    assert own == fingerprint(RobotModel())
+    assert own == fingerprint(changed(1e-12))  # as another library's rounding does
+
+
+def test_another_mass_rotor_or_foot_is_another_robot() -> None:
+    models = [
+        RobotModel(),
+        changed(1e-3),
+        RobotModel(armature=np.full(12, 0.01)),
+        RobotModel(foot_radius=0.023),
+    ]
+    assert len({fingerprint(model) for model in models}) == len(models)

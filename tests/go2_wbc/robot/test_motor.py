@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from go2_wbc.errors import ConfigError
 from go2_wbc.records import packed
@@ -16,7 +14,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.motor import KNEE_SHARE, LEAST_SHARE, MOTORS, MotorModel, drive, note_peaks
 from go2_wbc.robot.state import JointCommand
 
-MODEL, IDEAL = RobotModel(), RobotModel(motor="ideal")
+MODEL = RobotModel()
 LINE = MODEL.motor
 SPEEDS = np.linspace(-1.3, 1.3, 2601)[:, None] * MODEL.speed_limits
 """(n, 12) velocities of every joint, beyond the speed without load on both sides."""
@@ -24,8 +22,6 @@ ROUNDING = 1e-9
 
 COUNT = 1000
 EXACT = 1e-12  # N m; sums in another order
-
-shares = st.floats(-2.0, 2.0)
 
 
 def line(motor: MotorModel, v: np.ndarray) -> np.ndarray:
@@ -52,46 +48,6 @@ def test_limits_have_the_shape_of_the_velocities() -> None:
     np.testing.assert_array_equal(upper[1, 2, 3], LINE.limits(SPEEDS[23])[1])
 
 
-@given(shares)
-def test_no_torque_is_always_within_the_limits(share: float) -> None:
-    """A motor must not make the whole-body QP infeasible: falling limp stays allowed."""
-    lower, upper = LINE.limits(share * MODEL.speed_limits)
-    assert (lower <= 0.0).all()
-    assert (upper >= 0.0).all()
-
-
-@given(shares)
-def test_the_limits_of_the_other_direction_are_the_mirror_image(share: float) -> None:
-    v = share * MODEL.speed_limits
-    lower, upper = LINE.limits(v)
-    mirrored_lower, mirrored_upper = LINE.limits(-v)
-    np.testing.assert_array_equal(lower, -mirrored_upper)
-    np.testing.assert_array_equal(upper, -mirrored_lower)
-
-
-@given(shares)
-def test_a_braking_motor_keeps_its_peak(share: float) -> None:
-    lower, upper = LINE.limits(abs(share) * MODEL.speed_limits)
-    np.testing.assert_array_equal(lower, -LINE.peak)
-    assert (upper <= LINE.peak).all()
-
-
-def test_the_line_falls_without_a_jump() -> None:
-    _, upper = LINE.limits(SPEEDS)
-    steps, widths = np.diff(upper, axis=0), np.diff(SPEEDS, axis=0)
-    slope = LINE.peak / (LINE.no_load_speed - LINE.knee_speed)
-    assert (steps <= 0.0).all()
-    assert (steps >= -slope * widths - ROUNDING).all()
-
-
-def test_the_line_is_full_up_to_the_knee_and_gone_without_load() -> None:
-    np.testing.assert_array_equal(LINE.limits(LINE.knee_speed)[1], LINE.peak)
-    middle = (LINE.knee_speed + LINE.no_load_speed) / 2
-    np.testing.assert_allclose(LINE.limits(middle)[1], LINE.peak / 2)
-    np.testing.assert_array_equal(LINE.limits(LINE.no_load_speed)[1], np.zeros(12))
-    np.testing.assert_array_equal(LINE.limits(1.5 * LINE.no_load_speed)[1], np.zeros(12))
-
-
 def test_no_motor_gives_more_power_than_at_half_its_speed_without_load() -> None:
     _, upper = LINE.limits(SPEEDS)
     most = LINE.limits(LINE.no_load_speed / 2)[1] * LINE.no_load_speed / 2
@@ -110,12 +66,6 @@ def test_the_calf_is_the_hips_motor_behind_a_linkage() -> None:
     """The module's docstring says so: the ratio of torques is that of speeds."""
     by_torque, by_speed = LINE.peak[2] / LINE.peak[0], LINE.no_load_speed[0] / LINE.no_load_speed[2]
     assert by_torque == pytest.approx(by_speed, rel=1e-3)
-
-
-def test_an_ideal_motor_gives_its_peak_at_every_speed() -> None:
-    lower, upper = IDEAL.motor.limits(SPEEDS)
-    assert (lower == -LINE.peak).all()
-    assert (upper == LINE.peak).all()
 
 
 def test_a_share_scales_the_whole_line() -> None:

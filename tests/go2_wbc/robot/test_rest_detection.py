@@ -11,13 +11,13 @@ from jaxtyping import Float
 
 from benchmarks.balance import dropped
 from controller import GO2Controller
+from go2_wbc.records import packed
 from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rest_detection import (
     KNOWN,
     LOST,
     TUMBLED,
-    Reading,
     Rest,
     begin_anew,
     is_at_rest,
@@ -27,7 +27,7 @@ from go2_wbc.robot.rest_detection import (
 )
 from go2_wbc.robot.state import RobotState
 from go2_wbc.robot.state_filter import GYRO_BIAS, THETA, VELOCITY, Estimate, Filter
-from tests.engine_helpers import STAND_JOINTS
+from tests.engine_helpers import standing_reading
 
 STEP = 0.002  # s
 ON_BACK = pin.rpy.rpyToMatrix(2.5, -0.3, 0.0)
@@ -41,8 +41,7 @@ def resting(
 ) -> SensorReading:
     """What a robot reads that does not move."""
     felt = R.T @ [0.0, 0.0, 9.81] + [jolt, 0.0, 0.0]
-    loads = np.full(4, forces)
-    return SensorReading(time, np.zeros(3), felt, STAND_JOINTS, np.zeros(12), np.zeros(12), loads)
+    return standing_reading(time, accelerometer=felt, foot_forces=np.full(4, forces))
 
 
 def tilt_between(state: RobotState, R: Float[np.ndarray, "3 3"]) -> float:
@@ -140,12 +139,14 @@ CARRYING = 0.5 * G
 
 def read(
     gyro: float = 0.0, force: float = G, rate: float = 0.0, over: float = 0.0
-) -> tuple[Estimate, Rest, Reading]:
+) -> tuple[Estimate, Rest, SensorReading]:
     """An estimate with biases, and a reading that turns and moves by this much beyond them."""
     x = Estimate(gyro_bias=[0.01, -0.02, 0.0], force_bias=[0.02, 0.0, 0.05])
-    taken = Reading(dt=DT, gyro=x.gyro_bias + [0.0, gyro, 0.0], v_joints=np.full(12, rate))
-    taken.accelerometer[:] = x.force_bias + [force * np.sin(over), 0.0, force * np.cos(over)]
-    return x, Rest(joint_speeds=np.full(12, rate)), taken
+    rates, felt = np.full(12, rate), [force * np.sin(over), 0.0, force * np.cos(over)]
+    taken = standing_reading(
+        gyro=x.gyro_bias + [0.0, gyro, 0.0], accelerometer=x.force_bias + felt, v_joints=rates
+    )
+    return x, Rest(joint_speeds=rates.copy()), packed(taken)
 
 
 @pytest.mark.parametrize(
@@ -163,18 +164,17 @@ def read(
 def test_at_rest_is_what_has_not_moved_for_a_while(*, kwargs: dict, rests: bool) -> None:
     x, rest, taken = read(**kwargs)
     rest.still_time = C.still_time - 1.5 * DT
-    assert not is_at_rest(x, rest, taken, G, C)
-    assert is_at_rest(x, rest, taken, G, C) is rests
+    assert not is_at_rest(x, rest, taken, DT, G, C)
+    assert is_at_rest(x, rest, taken, DT, G, C) is rests
     assert (rest.still_time > 0.0) == rests
 
 
 def test_speeds_of_joints_are_smoothed() -> None:
     x, rest, taken = read()
     taken.v_joints[:] = 1.0
-    is_at_rest(x, rest, taken, G, C)
+    is_at_rest(x, rest, taken, DT, G, C)
     np.testing.assert_allclose(rest.joint_speeds, DT / 0.05)
-    taken.dt = 1.0
-    is_at_rest(x, rest, taken, G, C)
+    is_at_rest(x, rest, taken, 1.0, G, C)
     np.testing.assert_allclose(rest.joint_speeds, 1.0)
 
 
@@ -193,8 +193,8 @@ def test_who_lies_feels_gravity_and_no_foot(
 ) -> None:
     x, rest, taken = read(gyro, force)
     rest.lying_time = C.lying_time - 1.5 * DT
-    assert not lies(x, rest, taken, is_carried, G, C)
-    assert lies(x, rest, taken, is_carried, G, C) is is_lying
+    assert not lies(x, rest, taken, DT, is_carried, G, C)
+    assert lies(x, rest, taken, DT, is_carried, G, C) is is_lying
     assert (rest.lying_time > 0.0) == is_lying
 
 
@@ -239,8 +239,8 @@ def test_when_an_estimate_begins_anew(*, what: dict, found: int) -> None:
     taken.gyro[:] = 0.0
     R = pin.rpy.rpyToMatrix(np.radians(what.get("roll", 0.0)), 0.0, 0.0)
     rest.lost_time = C.still_time - 1.5 * DT
-    assert begin_anew(x, rest, taken, R, G, C) == KNOWN
-    assert begin_anew(x, rest, taken, R, G, C) == found
+    assert begin_anew(x, rest, taken, DT, R, G, C) == KNOWN
+    assert begin_anew(x, rest, taken, DT, R, G, C) == found
     assert rest.tumbled == ("tumbled" in what or "roll" in what)
     assert (rest.lost_time == 0.0) == (found == KNOWN)
 
@@ -260,7 +260,7 @@ def test_who_is_shaken_is_found_later(gyro: float, force: float, way: int) -> No
     x, rest, taken = read(gyro, force)
     x.v[0], rest.lost_time = 1.0, C.still_time + 10 * DT
     taken.gyro[:], taken.accelerometer[:] = (0.0, gyro, 0.0), (0.0, 0.0, force)
-    assert begin_anew(x, rest, taken, np.eye(3), G, C) == LOST
+    assert begin_anew(x, rest, taken, DT, np.eye(3), G, C) == LOST
     assert rest.lost_time == pytest.approx(C.still_time + (10 + way) * DT)
 
 

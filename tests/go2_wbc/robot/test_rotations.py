@@ -10,9 +10,6 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from go2_wbc.robot.rotations import (
-    angular_velocity_from_rpy,
-    cross,
-    exp_rotation,
     log_rotation,
     quaternions_from_rpy,
     rotation_from_rpy,
@@ -52,7 +49,6 @@ def test_the_logarithm_is_axis_times_angle_and_undone_by_exp(seed: int) -> None:
     angle = rng.uniform(0.0, 3.1)
     R = pin.AngleAxis(angle, axis).matrix()
     np.testing.assert_allclose(log_rotation(R), angle * axis, atol=1e-10)
-    np.testing.assert_allclose(exp_rotation(angle * axis), R, atol=EXACT)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -67,27 +63,6 @@ def test_near_the_target_the_error_shrinks_at_the_relative_angular_velocity(seed
 
     rate = (error(STEP) - error(-STEP)) / (2 * STEP)
     np.testing.assert_allclose(rate, w_des - w, atol=DIFFERENCE)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_angular_velocity_and_acceleration_are_the_derivatives_of_the_rotation(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    rpy, rate, acceleration = random_angles(rng), rng.normal(size=3), rng.normal(size=3)
-
-    def at(t: float) -> tuple[np.ndarray, np.ndarray]:
-        return rpy + rate * t + acceleration * t * t / 2, rate + acceleration * t
-
-    w, dw = angular_velocity_from_rpy(rpy, rate, acceleration)
-    before, after = (rotation_from_rpy(*at(t)[0]) for t in (-STEP, STEP))
-    np.testing.assert_allclose(w, log_rotation(after @ before.T) / (2 * STEP), atol=DIFFERENCE)
-    w_before, w_after = (angular_velocity_from_rpy(*at(t), acceleration)[0] for t in (-STEP, STEP))
-    np.testing.assert_allclose(dw, (w_after - w_before) / (2 * STEP), atol=DIFFERENCE)
-
-
-@pytest.mark.parametrize("seed", SEEDS)
-def test_the_fast_cross_product_is_numpys(seed: int) -> None:
-    a, b = np.random.default_rng(seed).normal(size=(2, 3))
-    np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
 
 
 @given(st.floats(-100.0, 100.0))

@@ -32,9 +32,7 @@ FOLDED_LEG = (0.0, 1.36, -2.72)
 NEARLY_FOLDED_LEG = (0.0, 1.31, -2.64)
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
+MODEL = RobotModel()
 
 
 @pytest.fixture
@@ -91,17 +89,17 @@ def clearance(snapshot: Snapshot, ground: float) -> float:
     return float((snapshot.q[2] + TRUNK_UNDERSIDE @ R[2]).min()) - ground
 
 
-def test_heights_are_over_the_lowest_foot(model: RobotModel) -> None:
+def test_heights_are_over_the_lowest_foot() -> None:
     rng = np.random.default_rng(11)
     for _ in range(50):
-        snapshot = model.snapshot(random_state(rng))
+        snapshot = MODEL.snapshot(random_state(rng))
         lowest = float(snapshot.p_world_feet[:, 2].min())
         expected = (snapshot.q[2] - lowest, clearance(snapshot, lowest - FOOT_RADIUS))
         assert heights(snapshot) == pytest.approx(expected, abs=1e-12)
 
 
-def test_a_standing_robot_has_not_fallen(falls: FallDetector, model: RobotModel) -> None:
-    snapshot = standing(model)
+def test_a_standing_robot_has_not_fallen(falls: FallDetector) -> None:
+    snapshot = standing(MODEL)
     assert falls.reason(snapshot, 0.0, 0.0, may_lie=False) is None
     assert clearance(snapshot, 0.0) == pytest.approx(0.3 - 0.107, abs=1e-6)
 
@@ -118,57 +116,47 @@ CONFIG = SafetyConfig()
     ],
 )
 def test_a_tilted_trunk_is_a_fall_at_once(
-    falls: FallDetector,
-    model: RobotModel,
-    *,
-    lean: float,
-    may_lie: bool,
-    limit: float,
-    degrees: int,
+    falls: FallDetector, *, lean: float, may_lie: bool, limit: float, degrees: int
 ) -> None:
-    assert falls.reason(tilted(model, limit - 0.01), 0.0, lean, may_lie=may_lie) is None
-    reason = falls.reason(tilted(model, limit + 0.01), 0.0, lean, may_lie=may_lie)
+    assert falls.reason(tilted(MODEL, limit - 0.01), 0.0, lean, may_lie=may_lie) is None
+    reason = falls.reason(tilted(MODEL, limit + 0.01), 0.0, lean, may_lie=may_lie)
     assert reason == f"fell at t=0.00 s: roll {degrees} deg, pitch 0 deg"
 
 
-def test_a_tilt_limit_that_was_lowered_holds_for_a_robot_that_is_astray_too(
-    model: RobotModel,
-) -> None:
+def test_a_tilt_limit_that_was_lowered_holds_for_a_robot_that_is_astray_too() -> None:
     config = SafetyConfig(tilt_limit=0.5)
-    lean, snapshot = 0.6 * config.lean_limit, tilted(model, 0.51)
+    lean, snapshot = 0.6 * config.lean_limit, tilted(MODEL, 0.51)
     assert FallDetector(config).reason(snapshot, 0.0, lean, may_lie=False)
 
 
-def test_a_trunk_on_the_ground_is_a_fall_after_the_limit(
-    falls: FallDetector, model: RobotModel
-) -> None:
+def test_a_trunk_on_the_ground_is_a_fall_after_the_limit(falls: FallDetector) -> None:
     limit = SafetyConfig().touch_limit
     first = None
     for time in np.arange(1.0, 1.5, TICK).tolist():
-        reason = falls.reason(on_the_belly(model, time), 0.0, 0.0, may_lie=False)
+        reason = falls.reason(on_the_belly(MODEL, time), 0.0, 0.0, may_lie=False)
         first = time if reason and first is None else first
     assert first == pytest.approx(1.0 + limit, abs=1.5 * TICK)
 
 
 @pytest.mark.parametrize(("lean", "has_fallen"), [(0.0, False), (0.4, True)])
 def test_a_robot_aslant_touches_the_ground_from_further_above(
-    falls: FallDetector, model: RobotModel, *, lean: float, has_fallen: bool
+    falls: FallDetector, *, lean: float, has_fallen: bool
 ) -> None:
     # Its nose lay on the ground, which feet that press into it and a degree put 1 to 2 cm below.
-    snapshot, reason = standing(model), None
+    snapshot, reason = standing(MODEL), None
     for time in (0.0, 0.09, 0.12):
-        snapshot = on_the_belly(model, time, NEARLY_FOLDED_LEG)
+        snapshot = on_the_belly(MODEL, time, NEARLY_FOLDED_LEG)
         reason = falls.reason(snapshot, 0.0, lean, may_lie=False)
-    ground = snapshot.p_world_feet[:, 2].min() - model.foot_radius
+    ground = snapshot.p_world_feet[:, 2].min() - MODEL.foot_radius
     assert 0.015 < clearance(snapshot, ground) < 0.025
     assert (reason is not None) is has_fallen
 
 
-def test_touches_that_end_in_between_are_stumbles(falls: FallDetector, model: RobotModel) -> None:
+def test_touches_that_end_in_between_are_stumbles(falls: FallDetector) -> None:
     limit = SafetyConfig().touch_limit
     for time in np.arange(0.0, 1.0, 0.8 * limit).tolist():
-        assert falls.reason(on_the_belly(model, time), 0.0, 0.0, may_lie=False) is None
-        assert falls.reason(standing(model, time + 0.01), 0.0, 0.0, may_lie=False) is None
+        assert falls.reason(on_the_belly(MODEL, time), 0.0, 0.0, may_lie=False) is None
+        assert falls.reason(standing(MODEL, time + 0.01), 0.0, 0.0, may_lie=False) is None
 
 
 @pytest.mark.parametrize(
@@ -181,43 +169,36 @@ def test_touches_that_end_in_between_are_stumbles(falls: FallDetector, model: Ro
     ],
 )
 def test_a_trunk_that_bounces_off_the_ground_has_fallen_unless_it_rises(
-    falls: FallDetector,
-    model: RobotModel,
-    touch: float,
-    sag: float,
-    lean: float,
-    falls_at: float | None,
+    falls: FallDetector, touch: float, sag: float, lean: float, falls_at: float | None
 ) -> None:
     # Thrown up by a push, it struck the ground for 0.06 s and was said to stand for 0.28 s.
     # A trot that withstood a hard push had grazed it.
     first = None
     for time in np.arange(1.0, 1.2, TICK).tolist():
         posture = on_the_belly if time < 1.0 + touch else standing
-        reason = falls.reason(posture(model, time), sag, lean, may_lie=False)
+        reason = falls.reason(posture(MODEL, time), sag, lean, may_lie=False)
         first = time if reason and first is None else first
     assert first == (None if falls_at is None else pytest.approx(falls_at, abs=1.5 * TICK))
 
 
-def test_where_the_belly_may_be_down_it_may_lie_for_ever(
-    falls: FallDetector, model: RobotModel
-) -> None:
+def test_where_the_belly_may_be_down_it_may_lie_for_ever(falls: FallDetector) -> None:
     for time in np.arange(0.0, 2.0, 0.1).tolist():
-        assert falls.reason(on_the_belly(model, time), 0.5, 0.0, may_lie=True) is None
-    assert falls.reason(on_the_belly(model, 2.0), 0.5, 0.0, may_lie=False) is None
+        assert falls.reason(on_the_belly(MODEL, time), 0.5, 0.0, may_lie=True) is None
+    assert falls.reason(on_the_belly(MODEL, 2.0), 0.5, 0.0, may_lie=False) is None
 
 
 def test_a_trunk_far_below_where_it_should_be_is_a_fall_after_the_limit(
-    falls: FallDetector, model: RobotModel
+    falls: FallDetector,
 ) -> None:
     config = SafetyConfig()
     sag, just_less = config.sink_limit + 0.01, config.sink_limit - 0.01
-    assert falls.reason(standing(model, 0.0), sag, 0.0, may_lie=False) is None
-    assert falls.reason(standing(model, 0.2), just_less, 0.0, may_lie=False) is None
-    assert falls.reason(standing(model, 0.3), sag, 0.0, may_lie=False) is None
+    assert falls.reason(standing(MODEL, 0.0), sag, 0.0, may_lie=False) is None
+    assert falls.reason(standing(MODEL, 0.2), just_less, 0.0, may_lie=False) is None
+    assert falls.reason(standing(MODEL, 0.3), sag, 0.0, may_lie=False) is None
     assert (
-        falls.reason(standing(model, 0.3 + config.sink_limit_time), sag, 0.0, may_lie=False) is None
+        falls.reason(standing(MODEL, 0.3 + config.sink_limit_time), sag, 0.0, may_lie=False) is None
     )
-    late = standing(model, 0.31 + config.sink_limit_time)
+    late = standing(MODEL, 0.31 + config.sink_limit_time)
     reason = falls.reason(late, sag, 0.0, may_lie=False)
     assert reason == "fell at t=0.61 s: trunk 13 cm below where it should be"
     falls.begin()
@@ -226,16 +207,16 @@ def test_a_trunk_far_below_where_it_should_be_is_a_fall_after_the_limit(
 
 @pytest.mark.parametrize("may_lie", [False, True])
 def test_a_trunk_that_leans_from_where_it_should_be_is_a_fall_after_the_limit(
-    falls: FallDetector, model: RobotModel, *, may_lie: bool
+    falls: FallDetector, *, may_lie: bool
 ) -> None:
     config = SafetyConfig()
     lean, just_less = config.lean_limit + 0.01, config.lean_limit - 0.01
     for time in np.arange(0.0, 1.0, 0.1).tolist():
-        assert falls.reason(standing(model, time), 0.0, just_less, may_lie=may_lie) is None
-    assert falls.reason(standing(model, 1.0), 0.0, lean, may_lie=may_lie) is None
-    assert falls.reason(standing(model, 1.2), 0.0, just_less, may_lie=may_lie) is None
-    assert falls.reason(standing(model, 1.3), 0.0, lean, may_lie=may_lie) is None
-    late = standing(model, 1.31 + config.lean_limit_time)
+        assert falls.reason(standing(MODEL, time), 0.0, just_less, may_lie=may_lie) is None
+    assert falls.reason(standing(MODEL, 1.0), 0.0, lean, may_lie=may_lie) is None
+    assert falls.reason(standing(MODEL, 1.2), 0.0, just_less, may_lie=may_lie) is None
+    assert falls.reason(standing(MODEL, 1.3), 0.0, lean, may_lie=may_lie) is None
+    late = standing(MODEL, 1.31 + config.lean_limit_time)
     reason = falls.reason(late, 0.0, lean, may_lie=may_lie)
     assert reason == "fell at t=1.61 s: trunk tilted 30 deg from where it should be"
     falls.begin()
@@ -269,7 +250,7 @@ def test_a_quaternion_must_be_of_length_one() -> None:
         assert is_plausible(q, state.v, state.tau, state.foot_forces) is expected
 
 
-def test_compiled_is_plain(model: RobotModel) -> None:
+def test_compiled_is_plain() -> None:
     state = random_state(np.random.default_rng(14))
-    assert_plain_is_compiled(heights, model.snapshot(state))
+    assert_plain_is_compiled(heights, MODEL.snapshot(state))
     assert_plain_is_compiled(is_plausible, state.q, state.v, state.tau, state.foot_forces)

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from go2_wbc.algebra.vectors import triple
 from go2_wbc.compilation import plain
 from go2_wbc.legs import FOOT_NAMES
 from go2_wbc.robot.leg_kinematics import leg_table
@@ -19,6 +20,7 @@ MODEL = RobotModel()
 STANDING = np.tile([0.05, 0.8, -1.6], 4)
 LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
 DT = 0.002
+ZERO = (0.0, 0.0, 0.0)
 
 
 def standing_torques() -> np.ndarray:
@@ -26,9 +28,9 @@ def standing_torques() -> np.ndarray:
     geometry = leg_table(MODEL).geometry
     columns = []
     for leg in range(4):
-        q = tuple(STANDING[3 * leg : 3 * leg + 3])
+        q = triple(STANDING[3 * leg : 3 * leg + 3])
         unit = np.eye(3)
-        forces = [plain(leg_motion)(geometry[leg], q, (0.0,) * 3, tuple(e))[2] for e in unit]
+        forces = [plain(leg_motion)(geometry[leg], q, ZERO, triple(e))[2] for e in unit]
         weight = np.array([0.0, 0.0, 0.25 * MODEL.mass * MODEL.gravity])
         columns.append(np.linalg.solve(np.array(forces).T, weight))
     return np.concatenate(columns)
@@ -69,7 +71,7 @@ def test_a_legs_motion_and_force_are_pinocchios(leg: int) -> None:
         pin.computeJointJacobians(model, data, q)
         pin.updateFramePlacements(model, data)
         J = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3, 6:][:, joints]
-        given = (tuple(q[7:][joints]), tuple(v[6:][joints]), tuple(tau[joints]))
+        given = (triple(q[7:][joints]), triple(v[6:][joints]), triple(tau[joints]))
         place, u, force = plain(leg_motion)(leg_table(MODEL).geometry[leg], *given)
         assert place == pytest.approx(data.oMf[frame].translation, abs=1e-6)
         assert u == pytest.approx(J @ v[6:][joints], abs=1e-5)
@@ -79,7 +81,7 @@ def test_a_legs_motion_and_force_are_pinocchios(leg: int) -> None:
 def test_a_foot_that_rolls_has_the_velocity_of_the_point_that_touches() -> None:
     """A calf that turns about y by 2 rad/s rolls its foot's centre ahead by 2 r."""
     moved = plain(less_rolling)(
-        (0.0, 0.8, -1.6), (0.0, 3.0, -1.0), (0.04, 0.0, 0.0), (0.0,) * 3, (0.0, 0.0, 1.0), 0.02
+        (0.0, 0.8, -1.6), (0.0, 3.0, -1.0), (0.04, 0.0, 0.0), ZERO, (0.0, 0.0, 1.0), 0.02
     )
     assert moved == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
 
@@ -154,11 +156,9 @@ def test_a_robot_that_turns_has_a_sound_gyro() -> None:
     for k in range(300):
         v = np.zeros(12)
         for leg in range(4):
-            q = tuple(STANDING[3 * leg : 3 * leg + 3])
-            place = np.array(plain(leg_motion)(legs[leg], q, (0.0,) * 3, (0.0,) * 3)[0])
-            J = np.array(
-                [plain(leg_motion)(legs[leg], q, tuple(e), (0.0,) * 3)[1] for e in np.eye(3)]
-            ).T
+            q = triple(STANDING[3 * leg : 3 * leg + 3])
+            place = np.array(plain(leg_motion)(legs[leg], q, ZERO, ZERO)[0])
+            J = np.array([plain(leg_motion)(legs[leg], q, triple(e), ZERO)[1] for e in np.eye(3)]).T
             v[3 * leg : 3 * leg + 3] = np.linalg.solve(J, -np.cross(w, place))
         turning.append(reading(k, gyro=w, v_joints=v))
     _, faults = watched(*turning)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from go2_wbc.reference import LegTask, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.tracking.plan_curves import PlanCurves, StanceLoad, sample, stand, standing_target
+from go2_wbc.tracking.plan_curves import PlanCurves, StanceLoad, sample, stand
 from motions import compile_motion
 from motions.plan.compiled_plan import CompiledPlan
 from tests.compiled import assert_plain_is_compiled
@@ -141,7 +141,8 @@ def test_a_plan_asks_for_its_curves_and_contacts(name: str) -> None:
 @pytest.mark.parametrize("point", TrackedPoint)
 def test_a_trunk_over_four_feet(point: TrackedPoint) -> None:
     body = np.random.default_rng(4).normal(size=(3, 6))
-    target = standing_target(point, body, 3.0, 300.0)
+    target = Target()
+    stand(point is TrackedPoint.COM, body, 3.0, 300.0, target)
     assert target.is_com == (point is TrackedPoint.COM)
     np.testing.assert_array_equal([target.p_world, target.v_world, target.a_world], body[:, :3])
     attitude = Rotation.from_euler("ZYX", body[0, 5:2:-1]).as_matrix()

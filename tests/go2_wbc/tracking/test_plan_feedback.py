@@ -11,7 +11,7 @@ import pytest
 from go2_wbc.motion_plan import PlanFeedback
 from go2_wbc.reference import Anchor, LegTask, Reference
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.rotations import exp_rotation, yaw_rotation
+from go2_wbc.robot.rotations import yaw_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.tracking.plan_feedback import acceleration_of, fed_back, state_error
 from tests.engine_helpers import holding_reference, random_state
@@ -74,7 +74,7 @@ def test_what_is_asked_of_the_trunk_is_what_the_gains_ask_and_no_other_feedback(
     shifted = replace(
         reference.body,
         p_world=reference.body.p_world + 0.02,
-        R_world_base=reference.body.R_world_base @ exp_rotation(np.full(3, 0.1)),
+        R_world_base=reference.body.R_world_base @ pin.exp3(np.full(3, 0.1)),
     )
     asked = fed_back(
         replace(reference, body=shifted), planned(snapshot, off, gains), ANCHOR, snapshot

@@ -16,7 +16,9 @@ from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task
-from tests.engine_helpers import ST, SW, cases, holding_reference, standing_q, state_of
+from tests.engine_helpers import ST, SW, cases, standing
+
+MODEL = RobotModel()
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +36,9 @@ class HipAcceleration(Task):
 
 @pytest.mark.parametrize("backend", ["condensed", "full"])
 def test_a_task_of_ones_own_is_followed_and_audited(backend: str) -> None:
-    model = RobotModel()
-    snapshot = model.snapshot(state_of(standing_q()))
-    reference = holding_reference(snapshot, (SW, ST, ST, ST))
+    snapshot, reference = standing(MODEL, (SW, ST, ST, ST))
     for wanted in (-20.0, 20.0):
-        wbc = WholeBodyController(model, backend, extra_tasks=[HipAcceleration(wanted)])
+        wbc = WholeBodyController(MODEL, backend, extra_tasks=[HipAcceleration(wanted)])
         solution = wbc.solve(snapshot, reference)
         assert solution.qdd[6] == pytest.approx(wanted, abs=0.01)
         assert any(row.name == "hip" and row.norm < 0.01 for row in solution.residuals)
@@ -68,10 +68,9 @@ class ForSlippery(HipAcceleration):
 
 
 def test_a_compiled_task_is_followed_like_one_in_numpy() -> None:
-    model = RobotModel()
-    for snapshot, reference in cases(model, 26, seed=41):
+    for snapshot, reference in cases(MODEL, 26, seed=41):
         plain, compiled = (
-            WholeBodyController(model, extra_tasks=[kind(3.0, weight=1.0)])
+            WholeBodyController(MODEL, extra_tasks=[kind(3.0, weight=1.0)])
             for kind in (HipAcceleration, CompiledHipAcceleration)
         )
         expected = plain.solve(snapshot, reference, relax=True)
@@ -81,10 +80,8 @@ def test_a_compiled_task_is_followed_like_one_in_numpy() -> None:
 
 @pytest.mark.parametrize("backend", ["condensed", "full"])
 def test_a_weight_that_the_reference_decides_is_asked_by_every_back_end(backend: str) -> None:
-    model = RobotModel()
-    snapshot = model.snapshot(state_of(standing_q()))
-    reference = holding_reference(snapshot, (SW, ST, ST, ST))
-    wbc = WholeBodyController(model, backend, extra_tasks=[ForSlippery(20.0)])
+    snapshot, reference = standing(MODEL, (SW, ST, ST, ST))
+    wbc = WholeBodyController(MODEL, backend, extra_tasks=[ForSlippery(20.0)])
     assert abs(wbc.solve(snapshot, reference).qdd[6]) < 1.0
     slippery = replace(reference, friction=0.3)
     assert wbc.solve(snapshot, slippery).qdd[6] == pytest.approx(20.0, abs=0.01)
@@ -92,4 +89,4 @@ def test_a_weight_that_the_reference_decides_is_asked_by_every_back_end(backend:
 
 def test_placo_refuses_tasks_that_it_could_not_follow() -> None:
     with pytest.raises(ConfigError, match="takes no extra"):
-        WholeBodyController(RobotModel(), "placo", extra_tasks=[HipAcceleration(0.0)])
+        WholeBodyController(MODEL, "placo", extra_tasks=[HipAcceleration(0.0)])

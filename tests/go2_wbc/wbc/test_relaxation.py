@@ -17,14 +17,14 @@ from go2_wbc.wbc.relaxation import LIMITS, is_grave, solve_relaxed
 from go2_wbc.wbc.solution import WbcSolution
 from tests.engine_helpers import (
     MODES,
-    holding_reference,
     motion_error,
     random_reference,
     random_state,
-    standing_q,
+    standing,
     state_of,
 )
 
+MODEL = RobotModel()
 ROUNDING = 1e-6  # [N, N m] of forces up to 250
 HARD = ("base dynamics", "torque limits")
 SOLVER_AGREEMENT = 1e-3  # [N m] between two solvers of a problem with weights 1e-4 to 100
@@ -34,34 +34,33 @@ def violation(solution: WbcSolution, name: str) -> float:
     return next(row.norm for row in solution.violations if row.name == name)
 
 
-def battered(model: RobotModel, index: int) -> tuple[Snapshot, Reference]:
+def battered(index: int) -> tuple[Snapshot, Reference]:
     """A robot in the middle of a tumble: fast joints, some at their stops, any contact mode."""
     rng = np.random.default_rng(index)
     state = random_state(rng, tilt=0.6)
     q, v = state.q.copy(), 6.0 * state.v
     at_stop = rng.random(12) < 0.2
-    q[7:][at_stop] = np.where(rng.random(12) < 0.5, model.q_lower, model.q_upper)[at_stop]
-    snapshot = model.snapshot(state_of(q, v))
+    q[7:][at_stop] = np.where(rng.random(12) < 0.5, MODEL.q_lower, MODEL.q_upper)[at_stop]
+    snapshot = MODEL.snapshot(state_of(q, v))
     return snapshot, random_reference(snapshot, MODES[index % len(MODES)], 15.0, rng)
 
 
-def contradiction(model: RobotModel) -> tuple[Snapshot, Reference]:
+def contradiction() -> tuple[Snapshot, Reference]:
     """A state in which stance feet, joint limits and forces leave no solution."""
-    wbc = WholeBodyController(model)
-    battered_cases = (battered(model, index) for index in range(390))
+    wbc = WholeBodyController(MODEL)
+    battered_cases = (battered(index) for index in range(390))
     return next(c for c in battered_cases if wbc.solve(*c, relax=True).is_relaxed)
 
 
 def test_a_tumbling_robot_always_gets_an_answer_that_physics_and_motors_allow() -> None:
-    model = RobotModel()
-    wbc = WholeBodyController(model)
+    wbc = WholeBodyController(MODEL)
     relaxed = 0
     for index in range(390):
-        snapshot, reference = battered(model, index)
+        snapshot, reference = battered(index)
         solution = wbc.solve(snapshot, reference, relax=True)
         relaxed += solution.is_relaxed
         assert np.isfinite(solution.tau).all()
-        assert (np.abs(solution.tau) <= model.torque_limits + ROUNDING).all()
+        assert (np.abs(solution.tau) <= MODEL.torque_limits + ROUNDING).all()
         assert motion_error(snapshot, solution) < ROUNDING
         forces = solution.forces[reference.stance]
         assert (np.abs(forces[:, :2]) <= 0.6 * forces[:, 2:] + ROUNDING).all()
@@ -71,9 +70,8 @@ def test_a_tumbling_robot_always_gets_an_answer_that_physics_and_motors_allow() 
 
 @pytest.mark.parametrize("backend", ["condensed", "full"])
 def test_a_contradiction_is_no_reason_to_give_up(backend: str) -> None:
-    model = RobotModel()
-    snapshot, reference = contradiction(model)
-    wbc = WholeBodyController(model, backend)
+    snapshot, reference = contradiction()
+    wbc = WholeBodyController(MODEL, backend)
     with pytest.raises(QpInfeasible):
         wbc.solve(snapshot, reference)
     solution = wbc.solve(snapshot, reference, relax=True)
@@ -84,10 +82,8 @@ def test_a_contradiction_is_no_reason_to_give_up(backend: str) -> None:
 
 
 def test_where_the_hard_problem_has_a_solution_it_is_taken() -> None:
-    model = RobotModel()
-    snapshot = model.snapshot(state_of(standing_q()))
-    reference = holding_reference(snapshot)
-    wbc = WholeBodyController(model)
+    snapshot, reference = standing(MODEL)
+    wbc = WholeBodyController(MODEL)
     relaxed = wbc.solve(snapshot, reference, relax=True)
     assert not relaxed.is_relaxed
     np.testing.assert_array_equal(relaxed.tau, wbc.solve(snapshot, reference).tau)
@@ -96,11 +92,10 @@ def test_where_the_hard_problem_has_a_solution_it_is_taken() -> None:
 
 @pytest.mark.parametrize("solver", ["daqp", "quadprog"])
 def test_other_solvers_find_the_same_relaxed_answer(solver: str) -> None:
-    model = RobotModel()
-    wbc = WholeBodyController(model)
+    wbc = WholeBodyController(MODEL)
     compared = 0
     for index in range(130):
-        case = battered(model, index)
+        case = battered(index)
         if not wbc.solve(*case, relax=True).is_relaxed:
             continue
         problem = wbc.formulate(*case)
@@ -114,18 +109,16 @@ def test_other_solvers_find_the_same_relaxed_answer(solver: str) -> None:
 
 
 def test_a_robot_too_weak_to_stand_sinks_within_its_torques_and_that_is_grave() -> None:
-    model = RobotModel()
-    snapshot = model.snapshot(state_of(standing_q()))
-    wbc = WholeBodyController(model, config=WbcConfig(torque_share=0.02))
-    reference = replace(holding_reference(snapshot), normal_force_min=np.full(4, 30.0))
+    snapshot, reference = standing(MODEL)
+    wbc = WholeBodyController(MODEL, config=WbcConfig(torque_share=0.02))
+    reference = replace(reference, normal_force_min=np.full(4, 30.0))
     solution = wbc.solve(snapshot, reference, relax=True)
     assert solution.is_relaxed
-    assert (np.abs(solution.tau) <= 0.02 * model.torque_limits + ROUNDING).all()
+    assert (np.abs(solution.tau) <= 0.02 * MODEL.torque_limits + ROUNDING).all()
 
 
 def test_grave_is_what_lies_beyond_the_documented_limits() -> None:
-    model = RobotModel()
-    solution = WholeBodyController(model).solve(*contradiction(model), relax=True)
+    solution = WholeBodyController(MODEL).solve(*contradiction(), relax=True)
     for name, limit in LIMITS.items():
         rows = [replace(row, norm=0.0) for row in solution.violations]
         assert not is_grave(rows)

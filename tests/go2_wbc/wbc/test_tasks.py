@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from go2_wbc.legs import LEGS
 from go2_wbc.reference import LegTask, Reference, Target, TrackedPoint
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload import Payload
-from go2_wbc.robot.rotations import exp_rotation, log_rotation
+from go2_wbc.robot.rotations import log_rotation
 from go2_wbc.robot.snapshot import Snapshot
 from go2_wbc.wbc.loads import plan_loads
 from go2_wbc.wbc.tasks import (
@@ -92,7 +93,7 @@ def test_body_position_compares_the_points_acceleration_with_the_law(
         rate = (ends[1] - ends[0]) / (2 * STEP)
     wanted = target.a_world + KD * (target.v_world - v) + KP * (target.p_world - p)
     weight = MODEL.mass * MODEL.gravity
-    found = residual(BodyPosition(KP, KD, weight), snapshot, reference, z)
+    found = residual(BodyPosition(GAINS, weight), snapshot, reference, z)
     np.testing.assert_allclose(found, rate - wanted, atol=DIFFERENCE)
 
 
@@ -106,7 +107,7 @@ def test_body_orientation_compares_the_angular_acceleration_in_base_axes(seed: i
     error = log_rotation(R.T @ target.R_world_base)
     w = R @ snapshot.state.v[3:6]
     wanted = R.T @ target.dw_world + KD * (R.T @ (target.w_world - w)) + KP * error
-    found = residual(BodyOrientation(KP, KD), snapshot, reference, z)
+    found = residual(BodyOrientation(GAINS), snapshot, reference, z)
     np.testing.assert_allclose(found, rate - wanted, atol=DIFFERENCE)
 
 
@@ -116,7 +117,7 @@ def test_the_attitudes_error_is_the_logarithm_up_to_a_turn_by_pi(seed: int, angl
     snapshot, reference, _ = scene(seed)
     axis = np.random.default_rng(seed).normal(size=3)
     turn = angle * axis / np.linalg.norm(axis)
-    R_des = snapshot.R_world_base @ exp_rotation(turn)
+    R_des = snapshot.R_world_base @ pin.exp3(turn)
     reference = replace(reference, body=replace(reference.body, R_world_base=R_des))
     error = orientation_error(snapshot, Target.of(reference.row))
     np.testing.assert_allclose(error, turn, atol=LOGARITHM)
@@ -135,7 +136,7 @@ def test_a_payload_falls_with_the_robot() -> None:
         + KD * (target.v_world - snapshot.v_world_com)
         + KP * (target.p_world - snapshot.p_world_com)
     )
-    task = BodyPosition(KP, KD, MODEL.mass * MODEL.gravity)
+    task = BodyPosition(GAINS, MODEL.mass * MODEL.gravity)
     np.testing.assert_allclose(residual(task, snapshot, reference, z), a_com - wanted, atol=1e-9)
 
 
@@ -154,11 +155,11 @@ def test_a_trunk_turned_away_is_turned_back(axis: int) -> None:
     turn = 0.1 * np.eye(3)[axis]
     away = replace(
         reference.body,
-        R_world_base=snapshot.R_world_base @ exp_rotation(-turn),
+        R_world_base=snapshot.R_world_base @ pin.exp3(-turn),
         w_world=snapshot.R_world_base @ snapshot.state.v[3:6],
         dw_world=np.zeros(3),
     )
-    rows = BodyOrientation(KP, KD).rows(snapshot, replace(reference, body=away))
+    rows = BodyOrientation(GAINS).rows(snapshot, replace(reference, body=away))
     np.testing.assert_allclose(rows.b, -KP * turn, atol=EXACT)
 
 
@@ -166,10 +167,10 @@ def test_in_flight_the_attitude_weighs_less_than_the_feet_that_turn_it() -> None
     """It weighed ten times as much, and feet landed 0.1 m behind their footholds."""
     _, reference, _ = scene(1)
     flying = replace(reference, legs=(LegTask.SWING,) * 4)
-    task = BodyOrientation(KP, KD, weight=10.0, flight_weight=0.05)
+    task = BodyOrientation(GAINS, weight=10.0, flight_weight=0.05)
     assert task.weight_at(reference) == 10.0
     assert task.weight_at(flying) == 0.05
-    assert BodyOrientation(KP, KD, weight=0.0).weight_at(flying) == 0.0, "a task that is off"
+    assert BodyOrientation(GAINS, weight=0.0).weight_at(flying) == 0.0, "a task that is off"
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -182,7 +183,7 @@ def test_swing_feet_compare_the_foot_centres_acceleration_with_the_law(seed: int
         + KD * (reference.v_world_feet - snapshot.v_world_feet)
         + KP * (reference.p_world_feet - snapshot.p_world_feet)
     )
-    found = residual(SwingFoot(KP, KD), snapshot, reference, z).reshape(-1, 3)
+    found = residual(SwingFoot(GAINS), snapshot, reference, z).reshape(-1, 3)
     np.testing.assert_allclose(found, (rate - wanted)[[1, 3]], atol=DIFFERENCE)
 
 
@@ -195,7 +196,7 @@ def test_leg_posture_compares_joint_accelerations_with_the_law(seed: int) -> Non
         + np.tile(KD, 4) * (reference.v_joints - state.joint_velocities)
         + np.tile(KP, 4) * (reference.q_joints - state.joint_positions)
     )
-    found = residual(LegPosture(KP, KD), snapshot, reference, z)
+    found = residual(LegPosture(GAINS), snapshot, reference, z)
     np.testing.assert_allclose(found, (z[6:18] - wanted)[6:9], atol=EXACT)
 
 
@@ -228,7 +229,7 @@ def test_planned_forces_and_their_weight_take_the_place_of_the_even_share(legs: 
 
 def test_a_discount_divides_the_weight_of_the_attitude() -> None:
     _, reference, _ = scene(0)
-    task = BodyOrientation(np.ones(3), np.ones(3), weight=10.0, flight_weight=3.0)
+    task = BodyOrientation(Gains.uniform(1.0, 1.0), weight=10.0, flight_weight=3.0)
     discounted = replace(reference, orientation_discount=4.0)
     assert (task.weight_at(reference), task.weight_at(discounted)) == (10.0, 2.0)
     flying = replace(discounted, legs=(SW,) * 4, orientation_discount=1.0)
@@ -239,7 +240,7 @@ def test_a_discount_divides_the_weight_of_the_attitude() -> None:
 def test_each_leg_has_rows_in_the_task_it_is_given_and_in_no_other(legs: tuple) -> None:
     snapshot, reference, _ = scene(0)
     reference = replace(reference, legs=legs)
-    tasks = {SW: SwingFoot(KP, KD), JO: LegPosture(KP, KD), ST: ForceRegularisation(160.0)}
+    tasks = {SW: SwingFoot(GAINS), JO: LegPosture(GAINS), ST: ForceRegularisation(160.0)}
     for kind, task in tasks.items():
         rows = task.rows(snapshot, reference)
         assert rows.A.shape == (3 * legs.count(kind), 30)

@@ -84,9 +84,7 @@ def optimum(
     upper = np.zeros((k, 5))
     upper[:, 4] = 400.0 * shares
     lower = np.tile([-np.inf] * 4 + [0.0], k)
-    return solve_dense_qp(
-        DenseQp(H, g, np.kron(np.eye(k), PYRAMID), lower, upper.ravel()), "daqp"
-    ).x
+    return solve_dense_qp(DenseQp(H, g, np.kron(np.eye(k), PYRAMID), lower, upper.ravel()), "daqp")
 
 
 def test_forces_are_the_optimum_and_torques_what_they_leave() -> None:

@@ -159,7 +159,7 @@ def shared(
         upper = np.zeros((len(legs), 5))
         upper[:, 4] = NORMAL_FORCE_MAX * shares
         try:
-            x = solve_dense_qp(DenseQp(H, g, C, lower, upper.ravel()), "daqp").x
+            x = solve_dense_qp(DenseQp(H, g, C, lower, upper.ravel()), "daqp")
         except QpInfeasible:
             x = np.zeros(3 * len(legs))
         forces[legs] = x.reshape(-1, 3)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -25,18 +24,6 @@ from tests.go2_wbc.plant.helpers import GRAVITY, STAND, fly, stand_up
 STATIC_TOLERANCE = 5e-3
 # Identities that hold exactly for the integrator; rounding of sums of numbers of order one.
 EXACT = 1e-9
-
-
-@pytest.fixture
-def plant() -> Iterator[MujocoPlant]:
-    plant = MujocoPlant()
-    yield plant
-    plant.close()
-
-
-@pytest.fixture(scope="module")
-def robot() -> pin.Model:
-    return pin.buildModelFromUrdf(str(find_description().urdf_path), pin.JointModelFreeFlyer())
 
 
 class TestMujocoPlantContract(PlantContract):
@@ -106,13 +93,6 @@ def test_a_wrong_setting_is_refused_by_name(settings: dict[str, Any], word: str)
 
 
 # --- motors -----------------------------------------------------------------------------------
-
-
-def test_torques_are_clipped_to_the_urdfs_efforts(plant: MujocoPlant) -> None:
-    fly(plant)
-    signs = np.where(np.arange(12) % 2, 1.0, -1.0)
-    plant.write(JointCommand.torque(1000.0 * signs))
-    assert np.array_equal(plant.read().tau, signs * np.tile([23.7, 23.7, 45.43], 4))
 
 
 def spinning(share: float, motor: str = TORQUE_SPEED) -> tuple[MujocoPlant, np.ndarray]:
