@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import pickle
 from abc import ABC, abstractmethod
+from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar, final
 
 Item = TypeVar("Item")
 
@@ -52,6 +54,34 @@ class Ended(Generic[Item]):
     item: Item
     value: Any = None
     failure: Failure | None = None
+
+
+@final
+class Trials(Generic[Item]):
+    """The items of a run, by their numbers: what is to be sent, and how often it was.
+
+    Attributes:
+        pickled: the items, to be sent.
+        waiting: those that no process has.
+    """
+
+    def __init__(self, items: Sequence[Item], attempts: int) -> None:
+        """All wait; one whose process dies is tried ``attempts`` times."""
+        self.pickled = [pickle.dumps(item) for item in items]
+        self.waiting = deque(range(len(items)))
+        self._items, self._attempts, self._deaths = items, attempts, Counter[int]()
+
+    def ended(self, number: int, answer: bytes) -> Ended[Item]:
+        """What came of an item, as ``worker.answer`` says it."""
+        return Ended(self._items[number], *pickle.loads(answer))
+
+    def died(self, number: int, why: str) -> Ended[Item] | None:
+        """What came of an item whose process has died; None if it is to be tried again."""
+        self._deaths[number] += 1
+        if self._deaths[number] < self._attempts:
+            return None
+        text = f"its process died {self._attempts} times: {why}"
+        return Ended(self._items[number], failure=Failure(text, has_died=True))
 
 
 class Engine(ABC):

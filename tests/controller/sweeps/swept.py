@@ -73,12 +73,6 @@ def process(seed: int) -> dict[str, object]:
     return {"pid": os.getpid(), "parent": os.getppid()}
 
 
-def has_kernels() -> bool:
-    """Whether the planner's are loaded already, not only the module that has them."""
-    planner = sys.modules.get("go2_wbc.planning.locomotion")
-    return planner is not None and "compiled" in vars(planner.plan)
-
-
 def surroundings(seed: int) -> dict[str, object]:
     """What a worker has from its parent, and the threads of the process that has forked it."""
     status = Path(f"/proc/{os.getppid()}/status").read_text()
@@ -87,7 +81,6 @@ def surroundings(seed: int) -> dict[str, object]:
         "variable": os.environ.get("GO2_WBC_TEST_VARIABLE", ""),
         "place": sys.path[-1],
         "robot": "pinocchio" in sys.modules,
-        "kernels": has_kernels(),
         "threads": int(status.partition("Threads:")[2].split()[0]),
         "number": float(np.random.random()),  # noqa: NPY002 - nobody has seeded it
     }

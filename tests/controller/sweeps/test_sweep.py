@@ -201,7 +201,9 @@ def test_workers_end_with_a_parent_that_was_killed(out: Path) -> None:
         f"sweep(swept.wait_for_ever, 4, workers=2, out={str(out)!r})"
     )
     process = running([sys.executable, "-c", code])
-    wait_until(lambda: len(descendants(process.pid)) == 3)  # two workers and what forks them
+    wait_until(
+        lambda: len(descendants(process.pid)) == 4
+    )  # two workers, what forks them, and its tracker
     started = descendants(process.pid)
     os.kill(process.pid, signal.SIGKILL)
     process.wait(HANG_GUARD)
