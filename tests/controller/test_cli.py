@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-import importlib
 import os
 import subprocess
 import sys
@@ -14,14 +12,14 @@ from types import ModuleType
 import pytest
 
 from controller.cli import main as cli
-from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.common import ExitCode
 from go2_wbc import errors
 
 ROOT = Path(__file__).resolve().parents[2]
 COLUMNS = 80
 HEAVY = {"numpy", "pinocchio", "placo", "mujoco", "meshcat", "proxsuite", "jaxtyping", "qpsolvers"}
 
-Action = Callable[[argparse.Namespace], int]
+Action = Callable[[], int]
 
 
 @pytest.fixture
@@ -29,11 +27,8 @@ def act(monkeypatch: pytest.MonkeyPatch) -> Callable[[Action], None]:
     """Installs a subcommand ``act`` that does what the test says."""
 
     def install(action: Action) -> None:
-        def register(subparsers: Subparsers) -> None:
-            add_parser(subparsers, "act", "Act.", examples="go2-wbc act")
-
         module = ModuleType("fake_act")
-        module.__dict__.update(register=register, run=action)
+        module.__dict__.update(run=action)
         monkeypatch.setitem(sys.modules, "fake_act", module)
         entries = (*cli.COMMANDS, cli.Command("act", "fake_act", "act"))
         monkeypatch.setattr(cli, "COMMANDS", entries)
@@ -42,10 +37,19 @@ def act(monkeypatch: pytest.MonkeyPatch) -> Callable[[Action], None]:
 
 
 def failing(error: BaseException) -> Action:
-    def action(_args: argparse.Namespace) -> int:
+    def action() -> int:
         raise error
 
     return action
+
+
+def one() -> int:
+    """Do something.
+
+    Examples:
+        go2-wbc act
+    """
+    return 1
 
 
 def run_process(*arguments: str, stdout: int = subprocess.PIPE) -> subprocess.CompletedProcess[str]:
@@ -73,11 +77,10 @@ def test_help_lists_every_command_with_examples_in_80_columns(
 
 
 @pytest.mark.parametrize("command", cli.COMMANDS, ids=lambda command: command.name)
-def test_every_command_has_its_module_and_a_help_with_examples(
+def test_every_command_has_a_help_with_examples(
     command: cli.Command, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", str(COLUMNS))
-    assert callable(importlib.import_module(command.module).run)
     assert cli.main([command.name, "--help"]) == ExitCode.OK
     out = capsys.readouterr().out
     assert out.startswith(f"usage: go2-wbc {command.name}")
@@ -122,7 +125,7 @@ def test_wrong_usage_exits_with_2(argv: list[str], capsys: pytest.CaptureFixture
 
 
 def test_the_exit_code_of_a_command_is_passed_on(act: Callable[[Action], None]) -> None:
-    act(lambda _args: 1)
+    act(one)
     assert cli.main(["act"]) == 1
     assert cli.main(["--verbose", "act"]) == 1
 

@@ -71,7 +71,7 @@ def test_without_playing_the_moves_and_their_times_are_told(
     [
         (["--moves", "moonwalk"], ExitCode.USAGE, "unknown move 'moonwalk'; valid: bob"),
         (["--html", "dance.txt"], ExitCode.USAGE, "valid: .html"),
-        (["--seed", "-1"], ExitCode.USAGE, "must be 0 or more"),
+        (["--seed", "-1"], ExitCode.USAGE, "must be a whole number of 0 or more"),
     ],
 )
 def test_what_cannot_be_danced_is_said(

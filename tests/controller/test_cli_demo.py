@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
@@ -14,10 +13,11 @@ import numpy as np
 import pytest
 
 import viz
-from controller.cli import demo, demo_run, main
+from controller.cli import demo, main
 from controller.cli.common import ExitCode
 from controller.cli.main import high_five_demo
 from controller.demo import run_demo
+from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError, PlantTimeout
 from tests.controller.fake_go2 import FakeGo2
 
@@ -25,19 +25,13 @@ ROOT = Path(__file__).resolve().parents[2]
 NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
-def parsed(*options: str) -> argparse.Namespace:
-    parser = argparse.ArgumentParser()
-    demo.register(parser.add_subparsers())
-    return parser.parse_args(["demo", *options])
-
-
 @pytest.fixture
 def pretend(monkeypatch: pytest.MonkeyPatch) -> Callable[[FakeGo2], None]:
     """Lets the command drive a fake robot and draw nothing."""
 
     def install(go2: FakeGo2) -> None:
-        monkeypatch.setattr(demo_run, "GO2Controller", lambda **_options: go2)
-        monkeypatch.setattr(demo_run, "MujocoPlant", lambda *_args, **_options: None)
+        monkeypatch.setattr("controller.go2_controller.GO2Controller", lambda **_options: go2)
+        monkeypatch.setattr("go2_wbc.plant.MujocoPlant", lambda *_args, **_options: None)
 
     return install
 
@@ -145,7 +139,7 @@ def test_an_unwritable_place_is_an_error_before_the_run(
     def start(**_options: object) -> FakeGo2:
         raise AssertionError("the run has started")
 
-    monkeypatch.setattr(demo_run, "GO2Controller", start)
+    monkeypatch.setattr("controller.go2_controller.GO2Controller", start)
     file = tmp_path / "file"
     file.write_text("mine", encoding="utf-8")
     out = file if place == "a file" else file / "folder"
@@ -175,15 +169,15 @@ def test_options_reach_plant_controller_and_engine(
 ) -> None:
     seen: dict[str, object] = {}
     monkeypatch.setattr(
-        demo_run, "MujocoPlant", lambda mjcf, **options: seen.update(options, mjcf=mjcf)
+        "go2_wbc.plant.MujocoPlant", lambda mjcf, **options: seen.update(options, mjcf=mjcf)
     )
 
     def start(**options: object) -> FakeGo2:
         seen.update(options)
         return FakeGo2()
 
-    monkeypatch.setattr(demo_run, "GO2Controller", start)
-    monkeypatch.setattr(demo_run, "_has_display", lambda: True)  # no reason to open a viewer
+    monkeypatch.setattr("controller.go2_controller.GO2Controller", start)
+    monkeypatch.setattr(demo, "_has_display", lambda: True)  # no reason to open a viewer
     file = tmp_path / "mine.toml"
     file.write_text("[locomotion]\nheight = 0.27\n", encoding="utf-8")
     options = "--seed 3 --friction 0.4 --mass-scale 1.2 --realtime --backend full --solver proxqp"
@@ -192,9 +186,9 @@ def test_options_reach_plant_controller_and_engine(
     )
     config = seen["config"]
     assert (seen["seed"], seen["friction"], seen["mass_scale"]) == (3, 0.4, 1.2)
-    assert seen["initial_joint_noise"] == demo_run.START_NOISE
+    assert seen["initial_joint_noise"] == demo.START_NOISE
     assert (seen["realtime"], seen["viewer"], seen["mjcf"]) == (True, False, None)
-    assert isinstance(config, demo_run.Config)
+    assert isinstance(config, Config)
     assert (config.backend, config.wbc.solver, config.locomotion.height) == ("full", "proxqp", 0.27)
 
 
@@ -202,8 +196,8 @@ def test_without_a_seed_the_robot_starts_exactly(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen: dict[str, object] = {}
-    monkeypatch.setattr(demo_run, "MujocoPlant", lambda *_args, **options: seen.update(options))
-    monkeypatch.setattr(demo_run, "GO2Controller", lambda **_options: FakeGo2())
+    monkeypatch.setattr("go2_wbc.plant.MujocoPlant", lambda *_args, **options: seen.update(options))
+    monkeypatch.setattr("controller.go2_controller.GO2Controller", lambda **_options: FakeGo2())
     main.main(["demo", "--no-media", "--out", str(tmp_path)])
     assert seen["initial_joint_noise"] == 0.0
 
@@ -251,11 +245,6 @@ def test_the_script_of_the_course_is_the_same_command(
     assert capsys.readouterr().out.startswith("usage: go2-wbc demo")
 
 
-def test_the_defaults_are_headless_and_as_fast_as_the_cpu() -> None:
-    args = parsed()
-    assert (args.viewer, args.realtime, args.no_media) == (False, False, False)
-
-
 # --- the filmstrip ------------------------------------------------------------------------------
 
 
@@ -267,7 +256,7 @@ def test_the_filmstrip_shows_sitting_swinging_and_the_raised_paw() -> None:
     inside = np.abs(recording.time - forward.start - 1.0) < 0.1
     stance[inside] = (True, False, False, True)
     recording.stance[:] = stance
-    times = demo_run.filmstrip_times(report, recording)
+    times = demo.filmstrip_times(report, recording)
     assert times is not None
     rows = [int(np.abs(recording.time - recording.time[0] - t).argmin()) for t in times]
     sit = report.steps[1]
@@ -278,13 +267,13 @@ def test_the_filmstrip_shows_sitting_swinging_and_the_raised_paw() -> None:
 
 def test_a_run_without_these_moments_leaves_the_choice_to_the_filmstrip() -> None:
     go2 = FakeGo2(falls_in="walk")
-    assert demo_run.filmstrip_times(run_demo(go2), go2.recording()) is None
+    assert demo.filmstrip_times(run_demo(go2), go2.recording()) is None
 
 
 def test_a_file_in_the_way_of_the_folder_is_named(tmp_path: Path) -> None:
     (tmp_path / "x").touch()
     with pytest.raises(ConfigError, match="it is a file"):
-        demo_run.checked_paths(tmp_path / "x")
+        demo.checked_paths(tmp_path / "x")
 
 
 # --- the real thing -----------------------------------------------------------------------------

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from controller.cli import motion_preview_run
+from controller.cli import motion_preview
 from controller.cli.common import ExitCode
 from controller.cli.main import main
 from controller.cli.motion_args import MotionSource
 from go2_wbc.errors import CommandError
-from motions import Timeline
+from motions import FeasibilityChecker, Timeline
 from tests.live_preview import BROKEN, GOOD, TOO_HIGH, LivePreview
 from tests.viz.page_reader import read_data
 from viz.replay.html_page import PAGE_LIMIT
@@ -104,7 +104,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(
     def work(*_: object) -> None:
         pytest.fail("the check ran first")
 
-    monkeypatch.setattr(motion_preview_run.FeasibilityChecker, "evaluate", work)
+    monkeypatch.setattr(FeasibilityChecker, "evaluate", work)
     (tmp_path / "file").write_text("")
     target = tmp_path / "file" / "bow.html"
     assert main(["preview", "bow", "--html", str(target)]) == ExitCode.USAGE
@@ -190,9 +190,9 @@ def test_a_browser_is_opened_where_there_is_a_screen(
     def interrupt(_seconds: float) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(motion_preview_run, "display_problem", lambda: problem)
-    monkeypatch.setattr(motion_preview_run.webbrowser, "open", opened.append)
-    monkeypatch.setattr(motion_preview_run.time, "sleep", interrupt)
+    monkeypatch.setattr("go2_wbc.plant.mujoco.viewer.display_problem", lambda: problem)
+    monkeypatch.setattr(motion_preview.webbrowser, "open", opened.append)
+    monkeypatch.setattr(motion_preview.time, "sleep", interrupt)
     assert main(["preview", "bow", "--port", "0", *arguments]) == ExitCode.OK
     first, verdict = capsys.readouterr().out.splitlines()
     assert first.startswith("bow: http://127.0.0.1:")
