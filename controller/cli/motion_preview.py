@@ -115,7 +115,7 @@ class _Show:
     def content(self, checked: CheckedMotion) -> ReplayContent:
         """The plan with its verdict and the certificate."""
         from controller.report_view import planned
-        from controller.sweeps.certificate_view import with_certificate
+        from controller.sweeps.certify import with_certificate
 
         content = planned(checked)
         if self._certificate is None:

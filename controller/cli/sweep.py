@@ -217,7 +217,7 @@ def _write_page(
 ) -> None:
     """The plan with the verdict on it in ``world``, its chance and the certificate."""
     from controller.report_view import planned
-    from controller.sweeps.certificate_view import with_certificate
+    from controller.sweeps.certify import with_certificate
     from motions import FeasibilityChecker
     from viz import export_html
 
@@ -245,7 +245,7 @@ def replay_command(
         go2-wbc sweep high_five --n 200
         go2-wbc replay out/sweeps/high_five.sqlite 17 --html seed_17.html
     """
-    from controller.sweeps.replay import replay
+    from controller.sweeps.motion_study import replay
     from viz import export_html
 
     with ProgressLine() as line:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 from abc import ABC, abstractmethod
 from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar, final
 
@@ -56,6 +56,10 @@ class Ended(Generic[Item]):
     failure: Failure | None = None
 
 
+Ends = Generator[Ended[Item], None, None]
+"""What came of items, in the order in which they end; closing it ends the processes."""
+
+
 @final
 class Trials(Generic[Item]):
     """The items of a run, by their numbers: what is to be sent, and how often it was.
@@ -88,10 +92,8 @@ class Engine(ABC):
     """Runs a function over items in processes of its own, each of which is done exactly once."""
 
     @abstractmethod
-    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[Ended[Item]]:
-        """What came of each item, in the order in which they end.
-
-        Closing the iterator ends the processes.
+    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Ends[Item]:
+        """What came of each item.
 
         Args:
             function: is pickled, and called in other processes.

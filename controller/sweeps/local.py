@@ -17,7 +17,7 @@ from multiprocessing import connection, resource_tracker
 from types import ModuleType
 from typing import Any, final
 
-from controller.sweeps.engine import ONE_THREAD, Ended, Engine, Item, Trials
+from controller.sweeps.engine import ONE_THREAD, Ends, Engine, Item, Trials
 from controller.sweeps.worker import order_of, serve
 
 ATTEMPTS = 2
@@ -45,7 +45,7 @@ class LocalEngine(Engine):
         """Use at most ``workers`` processes at a time."""
         self._workers = workers
 
-    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[Ended[Item]]:
+    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Ends[Item]:
         """What came of each item; see ``Engine.run``."""
         trials, order = Trials(items, ATTEMPTS), order_of(function)
         busy: dict[Worker, int] = {}

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, final
 
-from controller.sweeps.engine import ONE_THREAD, Ended, Engine, Item, Trials
+from controller.sweeps.engine import ONE_THREAD, Ends, Engine, Item, Trials
 from controller.sweeps.local import processors
 from controller.sweeps.worker import answer, order_of
 from go2_wbc.errors import MissingDependency, SweepError
@@ -54,7 +54,7 @@ class RayEngine(Engine):
         self._address = address or os.environ.get("RAY_ADDRESS") or None
         _ray(QUIET if self._address else QUIET | ON_LOOPBACK)
 
-    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[Ended[Item]]:
+    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Ends[Item]:
         """What came of each item; see ``Engine.run``.
 
         Raises:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from controller.sweeps.engine import Ended, Engine, Failure
+from controller.sweeps.engine import Engine, Failure
 from controller.sweeps.identity import digest
 from controller.sweeps.local import LocalEngine, processors
 from controller.sweeps.rows import SEED, Columns, Row
 from controller.sweeps.sweep_file import SweepFile
-from controller.sweeps.targets import Target, about_of, job_of, target_of
+from controller.sweeps.targets import about_of, job_of, target_of
 from go2_wbc.errors import CommandError, SweepError, unknown_name
 
 FOLDER = Path("out/sweeps")
@@ -127,7 +127,7 @@ def sweep(
         left = [seed for seed in seeds if seed not in known.all]
         progress = _Meter(len(seeds), len(left), on_progress)
         progress.tell(None)
-        with closing(_run(runner, target, [] if known.are_enough else left)) as ends:
+        with closing(runner.run(job_of(target), [] if known.are_enough else left)) as ends:
             for ended in ends:
                 if ended.failure is None:
                     rows.add(ended.item, ended.value)
@@ -183,11 +183,6 @@ def engine_of(name: str, workers: int | None, address: str | None = None) -> Eng
     if address is not None:
         raise CommandError("an address is that of a Ray cluster: choose the engine ray")
     return LocalEngine(workers or processors())
-
-
-def _run(engine: Engine, target: Target, seeds: Sequence[int]) -> Generator[Ended[int], None, None]:
-    """What comes of each seed; closing it ends the workers."""
-    yield from engine.run(job_of(target), seeds)
 
 
 class _FirstRows:

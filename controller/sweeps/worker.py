@@ -15,7 +15,7 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache, lru_cache
 from multiprocessing.connection import Connection
@@ -69,13 +69,8 @@ def _keep_the_rest() -> None:
 def _ordered(order: bytes) -> Callable[[Any], Any]:
     """The function of an order: unpickled once, so that what it keeps is kept."""
     path, function = pickle.loads(order)
-    follow(path)
+    sys.path += [place for place in path if place not in sys.path]  # after one's own
     return pickle.loads(function)
-
-
-def follow(path: Sequence[str]) -> None:
-    """Find modules where the parent does, after the places of one's own."""
-    sys.path += [place for place in path if place not in sys.path]
 
 
 def serve(pipe: Connection, order: bytes, environment: Mapping[str, str]) -> None:

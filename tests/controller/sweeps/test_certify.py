@@ -16,8 +16,7 @@ from controller import Certificate, certify, sweep
 from controller.cli.common import ExitCode
 from controller.cli.main import main
 from controller.report_view import planned
-from controller.sweeps.certificate_view import certified_rate, with_certificate
-from controller.sweeps.certify import read_certificate
+from controller.sweeps.certify import certified_rate, read_certificate, with_certificate
 from controller.sweeps.motion_study import world_of
 from controller.sweeps.rows import Row
 from go2_wbc import World

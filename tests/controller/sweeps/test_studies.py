@@ -145,7 +145,7 @@ def test_a_row_that_is_not_there_is_told(
 
 
 def test_only_motions_are_replayed(tmp_path: Path) -> None:
-    from controller.sweeps.replay import replay
+    from controller.sweeps.motion_study import replay
 
     result = sweep(swept.trial, 1, workers=1, out=tmp_path / "rows.sqlite")
     with pytest.raises(CommandError, match="only motions are replayed"):
