@@ -14,8 +14,9 @@ from controller.cli import doctor
 from controller.cli.common import PROGRAM, ExitCode
 from controller.cli.doctor import Finding, ImportProbe, Status
 from go2_wbc.errors import DescriptionError
+from tests.controller.conftest import Run
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 INSIDE = str(Path(sys.prefix) / "lib" / "placo.so")
 BOUNDS = ">=0.10.2,<0.11"
 HEALTHY = Finding("Python", "python", Status.OK, "3.11.7")
@@ -34,14 +35,11 @@ def test_the_environment_of_these_tests_is_healthy() -> None:
     assert {"pin", "placo", "mujoco", "placo + pin", "URDF", "SRDF", "daqp"} <= subjects
 
 
-def test_a_module_that_imports_is_found_where_it_lies() -> None:
-    probe = doctor.probe_imports(["json"])["json"]
-    assert probe.error == ""
-    assert Path(probe.file).name == "__init__.py"
-
-
-def test_qpsolvers_names_its_solvers() -> None:
-    assert "daqp" in doctor.probe_imports(["qpsolvers"])["qpsolvers"].solvers
+def test_a_module_that_imports_is_found_where_it_lies_and_qpsolvers_names_its_solvers() -> None:
+    probes = doctor.probe_imports(["json", "qpsolvers"])
+    assert probes["json"].error == ""
+    assert Path(probes["json"].file).name == "__init__.py"
+    assert "daqp" in probes["qpsolvers"].solvers
 
 
 @pytest.mark.parametrize(
@@ -119,16 +117,14 @@ def test_the_requirements_of_an_absent_package_are_empty() -> None:
 # --- illnesses ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("version", "status"), [((3, 10, 9), "PROBLEM"), ((3, 14, 0), "PROBLEM")])
-def test_a_python_without_wheels_is_a_problem(version: tuple[int, ...], status: str) -> None:
+@pytest.mark.parametrize(
+    ("version", "is_fine"),
+    [((3, 10, 9), False), ((3, 11, 0), True), ((3, 13, 9), True), ((3, 14, 0), False)],
+)
+def test_a_python_without_wheels_is_a_problem(version: tuple[int, ...], *, is_fine: bool) -> None:
     finding = doctor.judge_python(version, "Linux")
-    assert finding.status.value == status
-    assert "make PYTHON=" in finding.remedy
-
-
-@pytest.mark.parametrize("version", [(3, 11, 0), (3, 12, 1), (3, 13, 9)])
-def test_a_supported_python_is_fine(version: tuple[int, ...]) -> None:
-    assert doctor.judge_python(version, "Linux").status is Status.OK
+    assert finding.status is (Status.OK if is_fine else Status.PROBLEM)
+    assert ("make PYTHON=" in finding.remedy) is not is_fine
 
 
 @pytest.mark.parametrize(
@@ -221,22 +217,18 @@ def test_a_missing_display_is_a_note_and_never_a_problem(
 )
 def test_the_verdict_and_the_exit_code_follow_the_problems(
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    run: Run,
     findings: list[Finding],
     code: ExitCode,
     verdict: str,
 ) -> None:
     monkeypatch.setattr(doctor, "examine", lambda: findings)
-    assert doctor.run(json=False) == code
-    assert capsys.readouterr().out.splitlines()[-1] == verdict
+    assert run("doctor", code=code).out.splitlines()[-1] == verdict
 
 
-def test_json_says_the_same(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_json_says_the_same(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
     monkeypatch.setattr(doctor, "examine", lambda: [HEALTHY, ILL])
-    assert doctor.run(json=True) == ExitCode.FAILED
-    report = json.loads(capsys.readouterr().out)
+    report = json.loads(run("doctor", "--json", code=ExitCode.FAILED).out)
     assert report["ok"] is False
     assert [item["status"] for item in report["findings"]] == ["ok", "problem"]
     assert report["findings"][1]["remedy"] == ILL.remedy

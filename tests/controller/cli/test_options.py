@@ -69,24 +69,6 @@ def test_what_is_given_is_of_the_type_that_is_annotated() -> None:
     assert called(*words.split()) == [*expected, Part(first_seed=5), True]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("--out f", "the following arguments are required: MOTION"),
-        ("bow", "the following arguments are required: --out"),
-        ("bow --out f --n 3", "argument --n: must be an even number, got '3'"),
-        ("bow --out f --n x", "argument --n: must be an even number, got 'x'"),
-        ("bow --out f --kind c", "argument --kind: invalid choice: 'c' (choose from 'a', 'b')"),
-    ],
-)
-def test_what_is_not_valid_is_told(
-    words: str, message: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(SystemExit):
-        called(*words.split())
-    assert message in capsys.readouterr().err
-
-
 def test_the_docstring_is_the_help(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
