@@ -20,7 +20,7 @@ from controller.cli.main import high_five_demo
 from controller.demo import run_demo
 from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError, PlantTimeout
-from tests.controller.conftest import Run, Said
+from tests.controller.cli.conftest import Run, Said
 from tests.controller.fake_go2 import FakeGo2
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -14,7 +14,7 @@ from controller.cli import doctor
 from controller.cli.common import PROGRAM, ExitCode
 from controller.cli.doctor import Finding, ImportProbe, Status
 from go2_wbc.errors import DescriptionError
-from tests.controller.conftest import Run
+from tests.controller.cli.conftest import Run
 
 ROOT = Path(__file__).resolve().parents[3]
 INSIDE = str(Path(sys.prefix) / "lib" / "placo.so")

@@ -13,7 +13,7 @@ from controller.cli.common import ExitCode
 from go2_wbc.config import load_config
 from go2_wbc.plant import MujocoPlant, Plant, friction_identification
 from go2_wbc.plant.friction_identification import FrictionEstimate
-from tests.controller.conftest import Run
+from tests.controller.cli.conftest import Run
 
 FOUND = FrictionEstimate(
     np.linspace(0.1, 1.2, 12), np.linspace(0.0, 2.0, 12), np.full(12, 0.01), np.full(12, 0.02)

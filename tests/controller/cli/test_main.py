@@ -15,7 +15,7 @@ import pytest
 from controller.cli import main as cli
 from controller.cli.common import ExitCode
 from go2_wbc import errors
-from tests.controller.conftest import Run
+from tests.controller.cli.conftest import Run
 from tests.controller.sweeps import swept
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -15,7 +15,7 @@ from controller.cli.common import ExitCode
 from controller.cli.motion_args import MotionSource
 from go2_wbc.errors import CommandError
 from motions import FeasibilityChecker, Timeline
-from tests.controller.conftest import Run
+from tests.controller.cli.conftest import Run
 from tests.live_preview import BROKEN, GOOD, TOO_HIGH, LivePreview
 from tests.viz.page_reader import read_data
 from viz.replay.html_page import PAGE_LIMIT

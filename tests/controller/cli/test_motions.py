@@ -15,7 +15,7 @@ from controller.cli.motion_args import meant
 from go2_wbc.errors import PlantError
 from go2_wbc.world import World
 from motions import load_plan, motion_names
-from tests.controller.conftest import Run
+from tests.controller.cli.conftest import Run
 from tests.viz.page_reader import read_data
 
 CLUMSY = '''

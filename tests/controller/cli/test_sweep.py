@@ -12,7 +12,7 @@ import pytest
 
 from controller.cli.common import ExitCode
 from controller.sweeps import read_sweep
-from tests.controller.conftest import Run
+from tests.controller.cli.conftest import Run
 from tests.controller.sweeps import swept
 
 WIDTH = 80

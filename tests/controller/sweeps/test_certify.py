@@ -23,7 +23,7 @@ from go2_wbc import World
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.world import DOUBTFUL
 from motions import FeasibilityChecker, Timeline, deg
-from tests.controller.conftest import Run, Said
+from tests.controller.cli.conftest import Run, Said
 from tests.controller.sweeps import swept
 from tests.viz.page_reader import read_data
 

@@ -22,7 +22,7 @@ from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline
-from tests.controller.conftest import Run
+from tests.controller.cli.conftest import Run
 from tests.controller.sweeps import swept
 from tests.viz.page_reader import read_data
 
