@@ -106,6 +106,7 @@ def unitree_drive(
     stale_limit: Annotated[
         float, "S", "damp after this time without lowstate, default %(default)s"
     ] = 0.03,
+    config: Numbers = None,
     json: Annotated[bool, "print a JSON line per step"] = False,
 ) -> int:
     """Drive a Go2, or go2-wbc unitree-sim, step by step with this project's controller.
@@ -117,12 +118,13 @@ def unitree_drive(
         go2-wbc unitree-drive --interface lo --domain 1 --i-have-the-remote-in-hand
         go2-wbc unitree-drive --interface eth0 --json --i-have-the-remote-in-hand
     """
+    from controller.arguments import config as read_config
     from controller.bridges.unitree.drive import Trot, check_steps, drive
     from controller.bridges.unitree.guards import GuardConfig
     from controller.bridges.unitree.plant import UnitreePlant
 
     check_steps([*steps])
-    trot = Trot(speed, seconds)
+    trot, numbers = Trot(speed, seconds), read_config(config)
     plant = UnitreePlant(
         interface,
         domain,
@@ -130,10 +132,11 @@ def unitree_drive(
         guards=GuardConfig(
             stale_limit=stale_limit, hang_limit=max(stale_limit, GuardConfig().hang_limit)
         ),
+        estimator=numbers.estimator,
     )
     done = True
     with closing(plant):
-        for step in drive(plant, [*steps], trot):
+        for step in drive(plant, [*steps], trot, numbers):
             _tell(step, as_json=json)
             done = done and step.ok
     return ExitCode.OK if done else ExitCode.FAILED
