@@ -145,10 +145,11 @@ def examine() -> list[Finding]:
     for name, module in modules.items():
         probe = probes[module] if module else ImportProbe()
         findings.append(judge_library(name, versions[name], bounds[name], probe))
+    placo, pin = versions.get("placo"), versions.get("pin")
     pairing = requirements_of("placo").get("pin", "")
-    findings += judge_pairing(versions["placo"], versions["pin"], pairing, bounds.get("placo", ""))
+    findings += judge_pairing(placo, pin, pairing, bounds.get("placo", ""))
     findings += judge_robot_files(bounds.get("example-robot-data", ""))
-    findings += judge_solvers(probes["qpsolvers"].solvers, bounds)
+    findings += judge_solvers(probes.get("qpsolvers", ImportProbe()).solvers, bounds)
     findings += [judge_extra(name, installed_version(EXTRAS[name][0])) for name in EXTRAS]
     findings.append(judge_display(sys.platform, os.environ))
     return findings + judge_ros2(versions, probes)

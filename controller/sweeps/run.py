@@ -15,7 +15,7 @@ from controller.sweeps.identity import digest
 from controller.sweeps.local import LocalEngine, processors
 from controller.sweeps.rows import SEED, Columns, Row
 from controller.sweeps.sweep_file import SweepFile
-from controller.sweeps.targets import about_of, job_of, target_of
+from controller.sweeps.targets import target_of
 from go2_wbc.errors import CommandError, SweepError, unknown_name
 
 FOLDER = Path("out/sweeps")
@@ -122,12 +122,12 @@ def sweep(
     if fresh:
         remove_sweep(file)
     seeds, first, start = range(first_seed, first_seed + n), list[Row](), time.monotonic()
-    with SweepFile(file, about_of(target)) as rows:
+    with SweepFile(file, target.all_about) as rows:
         known = {int(row[SEED]): row for row in rows.rows(seeds)}
         left = [seed for seed in seeds if seed not in known]
         are_enough = _are_enough(first, seeds, known, is_enough)
         on_progress(Progress(n - len(left), n, 0.0))
-        with closing(runner.run(job_of(target), [] if are_enough else left)) as ends:
+        with closing(runner.run(target.job, [] if are_enough else left)) as ends:
             for count, ended in enumerate(ends, 1):
                 if ended.failure is None:
                     rows.add(ended.item, ended.value)

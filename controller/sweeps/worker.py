@@ -59,10 +59,8 @@ def _tidy_up() -> None:
     _keep_the_rest()
 
 
-@cache
-def _keep_the_rest() -> None:
-    """What the first item has imported and kept is not looked through again: that takes long."""
-    gc.freeze()
+_keep_the_rest = cache(gc.freeze)
+"""What the first item has imported and kept is not looked through again: that takes long."""
 
 
 @lru_cache(maxsize=1)

@@ -155,7 +155,7 @@ def test_no_command_shows_the_help_as_a_usage_error(run: Run) -> None:
         ("preview levitate --no-open", USAGE, "unknown motion 'levitate'; valid: beckon"),
         ("sweep no_such", USAGE, "unknown motion 'no_such'"),
         (f"sweep {TRIAL} --n 0", USAGE, "n must be a whole number, at least 1, got 0"),
-        (f"sweep {TRIAL} --engine dask", USAGE, "unknown engine 'dask'"),
+        (f"sweep {TRIAL} --engine dask", USAGE, "unknown engine 'dask'; valid: local, ray"),
         (f"sweep {TRIAL} --out rows.txt", USAGE, "valid: .sqlite, .db"),
         (f"sweep {TRIAL} --export rows.xlsx", USAGE, "valid: .csv, .parquet"),
         (f"sweep {TRIAL} --plot rows.jpg", USAGE, "valid: .svg, .png, .pdf"),

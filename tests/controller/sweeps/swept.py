@@ -6,6 +6,7 @@ import math
 import os
 import re
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -110,5 +111,13 @@ def no_row(seed: int) -> object:
     return [seed]
 
 
-def other_names(seed: int) -> dict[str, object]:
-    return {"a": 1.0} if seed else {"b": 1.0}
+def python(*words: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Runs Python anew."""
+    return subprocess.run(
+        [sys.executable, *words],
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )

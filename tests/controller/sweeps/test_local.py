@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import pickle
 import signal
-import subprocess
 import sys
 import threading
 from collections.abc import Callable
@@ -83,9 +82,7 @@ def test_the_module_that_sweeps_is_not_run_again_in_its_workers(tmp_path: Path) 
         f"rows = sweep('{swept.__file__}:trial', 2, workers=1, out='rows.sqlite').rows\n"
         "print(len(rows), 'rows')\n"
     )
-    done = subprocess.run(
-        [sys.executable, script.name], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = swept.python(script.name, folder=tmp_path)
     assert (done.stdout, done.stderr) == ("2 rows\n", "")
 
 
@@ -96,15 +93,7 @@ def test_a_fork_server_with_another_order_of_sets_is_told(tmp_path: Path) -> Non
         "from controller import sweep\n"
         f"sweep('{swept.__file__}:trial', 1, workers=1, out='rows.sqlite')"
     )
-    environment = {**os.environ, "PYTHONHASHSEED": "random"}
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = swept.python("-c", code, folder=tmp_path, PYTHONHASHSEED="random")
     assert done.returncode == 1
     assert "sets in random order: sweep first" in done.stderr
 
