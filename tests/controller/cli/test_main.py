@@ -143,6 +143,7 @@ def test_no_command_shows_the_help_as_a_usage_error(run: Run) -> None:
         ("demo --seed 1.5", USAGE, "--seed: must be a whole number of 0 or more, got '1.5'"),
         ("demo --backend magic", USAGE, "--backend: invalid choice: 'magic'"),
         ("demo --solver magic", USAGE, "--solver: invalid choice: 'magic'"),
+        ("export wave", USAGE, "the following arguments are required: --out"),
         ("export wave --out wave.txt", USAGE, "valid: .csv, .npz"),
         ("identify-friction --mjcf my_go2.xml --interface lo", USAGE, "not both"),
         ("new 'two words'", USAGE, "must be a Python name"),
