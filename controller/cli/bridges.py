@@ -70,7 +70,7 @@ def unitree_sim(
         go2-wbc unitree-sim --domain 5 --sensors noisy
         go2-wbc unitree-sim --mjcf my_scene.xml --interface eth0
     """
-    from controller.bridges.unitree.extra import require_dds
+    from controller.bridges.unitree import require_dds
 
     require_dds()
     from controller.bridges.unitree.simulator import SimulatorSettings, UnitreeSimulator
