@@ -54,7 +54,7 @@ test-unitree: $(VENV)/.stamp-unitree $(VENV)/.stamp-models ## what needs other p
 
 test-cluster: $(VENV)/.stamp-cluster ## the tests of sweeps, on a Ray cluster of two nodes too
 	GO2_WBC_REQUIRE_CLUSTER=1 \
-	$(BIN)/python -m pytest -n 0 tests/controller/sweeps tests/controller/test_cli_sweep.py $(ARGS)
+	$(BIN)/python -m pytest -n 0 tests/controller/sweeps tests/controller/cli/test_sweep.py $(ARGS)
 
 test-dist: $(VENV)/.stamp-dev ## build wheel and sdist, use each in an empty environment
 	tests/distribution.sh $(BIN)/python

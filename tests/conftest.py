@@ -31,7 +31,7 @@ LONGEST = tuple(
         "viz/replay/test_plan_browser.py",
         "viz/replay/test_live_browser.py",
         "viz/replay/test_browser.py",
-        "controller/test_cli_demo.py",
+        "controller/cli/test_demo.py",
         "scenarios/test_always_an_answer.py",
         "scenarios/test_recovery.py",
         "scenarios/test_joint_friction.py",

@@ -2,89 +2,67 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from controller.cli.common import ExitCode, Subparsers, add_parser, print_json, shown_path
-from controller.cli.motion_run import teller
+from controller.cli.common import ExitCode, print_json, shown_path
+from controller.cli.motion_run import getting_ready
+from controller.cli.options import Html, Json, whole
 from controller.cli.progress import ProgressLine
 
 if TYPE_CHECKING:
     from motions import CheckedMotion, FeasibilityChecker
     from motions.music import Beats, Dance, DancedAccents
 
-EXAMPLES = """
-go2-wbc dance song.wav
-go2-wbc dance song.wav --seed 3 --html dance.html
-go2-wbc dance song.wav --moves nod sway twist tap_FR
-go2-wbc dance song.wav --no-play --json    its moves and their times
-"""
 
+def run(
+    song: Annotated[Path, "SONG", "a WAV, FLAC, OGG or MP3 file"],
+    *,
+    seed: Annotated[int, "N", "another seed is another dance", whole] = 0,
+    moves: Annotated[tuple[str, ...], "NAME", "only these; a wrong name lists all"] = (),
+    no_play: Annotated[bool, "compose and check it only"] = False,
+    html: Annotated[Html, "write a 3D replay page with the music"] = None,
+    json: Json = False,
+) -> int:
+    """Find the beats of a song, compose a dance on them, check it, and play it in MuJoCo.
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``dance``."""
-    parser = add_parser(
-        subparsers,
-        "dance",
-        "Find the beats of a song, compose a dance on them, check it, play it in\n"
-        "MuJoCo, and print how well it was on the beat. Needs the extra [music].\n"
-        "Exit code 0 if it was done, 1 if it is infeasible or was not done.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument("song", metavar="SONG", type=Path, help="a WAV, FLAC, OGG or MP3 file")
-    parser.add_argument(
-        "--seed", metavar="N", type=_seed, default=0, help="another seed is another dance"
-    )
-    parser.add_argument(
-        "--moves", metavar="NAME", nargs="+", default=[], help="only these; a wrong name lists all"
-    )
-    parser.add_argument("--no-play", action="store_true", help="compose and check it only")
-    parser.add_argument(
-        "--html", metavar="FILE", type=Path, help="write a 3D replay page with the music"
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    It prints how well the dance was on the beat. Needs the extra [music]. Exit code 0 if it was
+    done, 1 if it is infeasible or was not done.
 
-
-def _seed(text: str) -> int:
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"must be 0 or more, got {value}")
-    return value
-
-
-def run(args: argparse.Namespace) -> int:
-    """Find the beats, compose, check, play, print."""
+    Examples:
+        go2-wbc dance song.wav
+        go2-wbc dance song.wav --seed 3 --html dance.html
+        go2-wbc dance song.wav --moves nod sway twist tap_FR
+        go2-wbc dance song.wav --no-play --json    its moves and their times
+    """
     from controller.report_view import planned
-    from go2_wbc.files import checked_output
     from motions import FeasibilityChecker
     from motions.music import beats, feasible_dance
-    from viz import HTML_SUFFIXES, export_html
+    from viz import export_html
 
-    target = None if args.html is None else checked_output(args.html, HTML_SUFFIXES)
-    with ProgressLine(is_quiet=args.json) as line:
-        line.update(0.0, f"listening to {args.song.name}")
-        found = beats(args.song)
+    with ProgressLine(is_quiet=json) as line:
+        line.update(0.0, f"listening to {song.name}")
+        found = beats(song)
         line.update(0.1, "composing")
         checker = FeasibilityChecker(progress=line.solving)
-        dance, checked = feasible_dance(found, args.seed, checker, args.moves)
-        told = _told(args.song, found, dance)
-        if args.no_play:
+        dance, checked = feasible_dance(found, seed, checker, moves)
+        told = _told(song, found, dance)
+        if no_play:
             content, ok = planned(checked), True
         else:
             content, measured = _played(dance, checked, checker, line)
             told |= measured
             ok = bool(measured["ok"])
-        if target is not None:
-            shown = replace(content, beats=tuple(found.times.tolist()), sound=_music(args.song))
-            export_html(shown, target, title=dance.timeline.name)
-    if args.json:
+        if html is not None:
+            shown = replace(content, beats=tuple(found.times.tolist()), sound=_music(song))
+            export_html(shown, html, title=dance.timeline.name)
+    if json:
         print_json(told)
     else:
         _print(told)
-        if target is not None:
-            print(f"3D replay, offline: {shown_path(target)}")
+        if html is not None:
+            print(f"3D replay, offline: {shown_path(html)}")
     return ExitCode.OK if ok else ExitCode.FAILED
 
 
@@ -92,21 +70,13 @@ def _played(
     dance: Dance, checked: CheckedMotion, checker: FeasibilityChecker, line: ProgressLine
 ) -> tuple[Any, dict[str, Any]]:
     """What to show of the run, and what was measured."""
-    from contextlib import closing
-
-    from controller.go2_controller import GO2Controller
     from controller.motion_measurement import during_motion, measure_motion
     from controller.report_view import performed
-    from go2_wbc.errors import PlantError
     from go2_wbc.plant import MujocoPlant
-    from go2_wbc.plant.mujoco.ground_truth import GroundTruth
     from motions.music import danced
 
     plan = checked.plan
-    with closing(GroundTruth(MujocoPlant())) as truth, GO2Controller(plant=truth) as go2:
-        truth.on_tick = teller(line, truth.control_period, plan.name, plan.duration)
-        if not go2.stand() or truth.fall():
-            raise PlantError(f"the robot did not get ready: {go2.last_outcome.reason}")
+    with getting_ready(plan, MujocoPlant(), line) as (go2, truth):
         result = measure_motion(go2, truth, plan, checker.model)
         heard = danced(during_motion(go2, truth, plan.name), dance)
         content = performed(checked, go2.recording(), checker.model)

@@ -1,83 +1,137 @@
-"""``go2-wbc demo``: its options. What it does is in ``demo_run``, which imports the robot."""
+"""``go2-wbc demo``: stand, sit, walk, turn, high five; the report and the files that it leaves."""
 
 from __future__ import annotations
 
-import argparse
+import io
+import json
 import sys
-from itertools import count
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from itertools import count, groupby
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
-from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
+import numpy as np
+from jaxtyping import Int
 
-EXAMPLES = """
-go2-wbc demo                         headless; table, replay page, animation
-go2-wbc demo --no-media --json       figures only, for a program to read
-go2-wbc demo --viewer --realtime     watch it live in MuJoCo's window
-go2-wbc demo --friction 0.4 --mass-scale 1.2 --seed 3
-go2-wbc demo --backend placo --solver proxqp
-go2-wbc demo --ros2                  on the robot of `go2-wbc ros2 --realtime`
-"""
-DEFAULT_FOLDER = Path("out/demo")
+import viz  # what is named viz.X below is imported when something is drawn
+from controller.cli.common import ExitCode, print_json, shown_path
+from controller.cli.demo_table import render, render_steps
+from controller.cli.options import Mjcf, Numbers, reader, whole
+from controller.cli.progress import ProgressLine
+from go2_wbc.errors import ConfigError
+from go2_wbc.files import checked_output, write_atomically
+
+if TYPE_CHECKING:
+    from controller.demo.report import DemoReport
+    from controller.demo.run import DemoProgress
+    from controller.go2_controller import GO2Controller
+    from go2_wbc.recording import Recording
+
 BACKENDS = ("condensed", "full", "placo")
 SOLVERS = ("active_set", "daqp", "proxqp", "quadprog")
+START_NOISE = 0.05
+"""Standard deviation [rad] of the joint angles from which the robot starts with ``--seed``."""
+TITLE = "Go2: stand, sit, walk, turn, high five"
+FILES: Mapping[str, str] = {
+    "demo.npz": "recording (NumPy)",
+    "report.json": "report",
+    "demo.html": "3D replay, offline",
+    "demo.png": "filmstrip",
+    "demo.webp": "animation",
+}
+"""The files that are left, the last three only with media, and what each holds."""
+_positive = reader(float, lambda value: 0.0 < value < float("inf"), "a positive number")
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``demo``."""
-    parser = add_parser(
-        subparsers,
-        "demo",
-        "Stand, sit, walk, turn, high five and sit in MuJoCo; then print what was\n"
-        "measured and write an offline 3D replay and pictures. Exit code 0 if every\n"
-        "step was done, 1 if one was not, 3 if something broke.",
-        examples=EXAMPLES,
-    )
-    output = parser.add_argument_group("output")
-    output.add_argument(
-        "--out", metavar="DIR", type=Path, default=DEFAULT_FOLDER, help="default: %(default)s"
-    )
-    output.add_argument("--no-media", action="store_true", help="no page and no pictures")
-    output.add_argument("--json", action="store_true", help="print JSON instead of the table")
-    output.add_argument("--viewer", action="store_true", help="also open MuJoCo's window")
-    output.add_argument("--realtime", action="store_true", help="at the pace of the wall clock")
-    ros2 = parser.add_argument_group("over ROS 2")
-    ros2.add_argument(
-        "--ros2", action="store_true", help="on a robot that `go2-wbc ros2` serves elsewhere"
-    )
-    ros2.add_argument(
-        "--namespace", metavar="NAME", default="robot1", help="its name, default %(default)s"
-    )
-    robot = parser.add_argument_group("robot and world")
-    robot.add_argument(
-        "--seed",
-        metavar="N",
-        type=_whole,
-        help="start from joint angles that this seed draws (default: exact ones)",
-    )
-    robot.add_argument("--friction", metavar="MU", type=_positive, help="of the feet, default 0.8")
-    robot.add_argument(
-        "--mass-scale", metavar="X", type=_positive, default=1.0, help="factor on all masses"
-    )
-    robot.add_argument("--mjcf", metavar="FILE", type=Path, help="your own Go2 model or scene")
-    control = parser.add_argument_group("controller")
-    control.add_argument("--config", metavar="FILE", type=Path, help="TOML with other numbers")
-    control.add_argument("--backend", choices=BACKENDS, help="whole-body back end")
-    control.add_argument("--solver", choices=SOLVERS, help="QP solver")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Output:
+    """What a run leaves and shows."""
+
+    out: Annotated[Path, "DIR", "default: %(default)s"] = Path("out/demo")
+    no_media: Annotated[bool, "no page and no pictures"] = False
+    json: Annotated[bool, "print JSON instead of the table"] = False
+    viewer: Annotated[bool, "also open MuJoCo's window"] = False
+    realtime: Annotated[bool, "at the pace of the wall clock"] = False
 
 
-def run(args: argparse.Namespace) -> int:
-    """Run the demo, print the report, write the files."""
-    if args.ros2:
-        return _run_over_ros(args)
-    from controller.cli.demo_run import run_demo_command
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robot:
+    """The simulated robot and its world; None is the usual."""
 
-    return run_demo_command(args)
+    seed: Annotated[
+        int | None, "N", "start from joint angles that this seed draws (default: exact ones)", whole
+    ] = None
+    friction: Annotated[float | None, "MU", "of the feet, default 0.8", _positive] = None
+    mass_scale: Annotated[float, "X", "factor on all masses", _positive] = 1.0
+    mjcf: Mjcf = None
 
 
-def _run_over_ros(args: argparse.Namespace) -> int:
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Control:
+    """What controls the robot; None is the usual."""
+
+    config: Numbers = None
+    backend: Annotated[str | None, BACKENDS, "whole-body back end"] = None
+    solver: Annotated[str | None, SOLVERS, "QP solver"] = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Elsewhere:
+    """The robot of another process."""
+
+    ros2: Annotated[bool, "on a robot that `go2-wbc ros2` serves elsewhere"] = False
+    namespace: Annotated[str, "NAME", "its name, default %(default)s"] = "robot1"
+
+
+def run(
+    *,
+    output: Annotated[Output, "output"],
+    elsewhere: Annotated[Elsewhere, "over ROS 2"],
+    robot: Annotated[Robot, "robot and world"],
+    control: Annotated[Control, "controller"],
+) -> int:
+    """Stand, sit, walk, turn, high five and sit in MuJoCo; then print what was measured.
+
+    It leaves an offline 3D replay and pictures. Exit code 0 if every step was done, 1 if one was
+    not, 3 if something broke.
+
+    Examples:
+        go2-wbc demo                         headless; table, replay page, animation
+        go2-wbc demo --no-media --json       figures only, for a program to read
+        go2-wbc demo --viewer --realtime     watch it live in MuJoCo's window
+        go2-wbc demo --friction 0.4 --mass-scale 1.2 --seed 3
+        go2-wbc demo --backend placo --solver proxqp
+        go2-wbc demo --ros2                  on the robot of `go2-wbc ros2 --realtime`
+    """
+    if elsewhere.ros2:
+        return _run_over_ros(elsewhere.namespace, as_json=output.json)
+    paths = checked_paths(output.out)  # before the run: its results must not be lost
+    report, recording = _perform(output, robot, control)
+    given = {**asdict(robot), **asdict(control), "realtime": output.realtime}
+    settings = {name: str(v) if isinstance(v, Path) else v for name, v in given.items()}
+    values = {**report.as_dict(), "settings": settings}
+    if output.json:
+        print_json(values)
+    else:
+        print(render(report, sys.stdout.encoding), end="\n\n", flush=True)
+    try:
+        _write_data(recording, values, paths)
+        if not output.no_media:
+            _write_media(recording, report, paths)
+    except ConfigError as error:  # the disk or the size: no fault of the caller's usage
+        print(f"go2-wbc: {error}", file=sys.stderr)
+        return ExitCode.RUNTIME
+    if not output.json:
+        for path in paths[:2] if output.no_media else paths:
+            size = f"{path.stat().st_size / 1000:>6.0f} kB"
+            print(f"  {FILES[path.name]:<20}{size}  {shown_path(path)}")
+    return ExitCode.OK if report.ok else ExitCode.FAILED
+
+
+def _run_over_ros(namespace: str, *, as_json: bool) -> int:
     """Run the demo on a robot that another process serves, print the steps."""
     from controller.bridges.ros2.demo import run_ros_demo
-    from controller.cli.demo_table import render_steps
     from controller.cli.progress import ProgressLine
     from controller.demo.report import DemoReport
     from controller.demo.steps import DEMO_STEPS
@@ -85,13 +139,13 @@ def _run_over_ros(args: argparse.Namespace) -> int:
     number = count(1)
     with ProgressLine() as line:
         results = run_ros_demo(
-            args.namespace,
+            namespace,
             lambda step: line.done(
                 f"{next(number)}/{len(DEMO_STEPS)} {step.label}: {step.verdict}"
             ),
         )
     ok = all(step.ok for step in results)
-    if args.json:
+    if as_json:
         print_json({"ok": ok, "steps": DemoReport.steps_as_dicts(results)})
     else:
         print(render_steps(results, sys.stdout.encoding))
@@ -99,17 +153,116 @@ def _run_over_ros(args: argparse.Namespace) -> int:
     return ExitCode.OK if ok else ExitCode.FAILED
 
 
-def _whole(text: str) -> int:
-    if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"must be a whole number of 0 or more, got {text!r}")
-    return int(text)
+def checked_paths(folder: Path) -> list[Path]:
+    """The paths of ``FILES`` in ``folder``, which is created.
+
+    Raises:
+        ConfigError: if one of them could not be written.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise ConfigError(f"cannot write into {folder}: it is a file, give a folder")
+    return [checked_output(folder / name, (Path(name).suffix,)) for name in FILES]
 
 
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = 0.0
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"must be a positive number, got {text!r}")
-    return value
+def _perform(output: Output, robot: Robot, control: Control) -> tuple[DemoReport, Recording]:
+    from controller.demo.run import run_demo
+
+    with ProgressLine() as line:
+
+        def show(progress: DemoProgress) -> None:
+            place = f"{progress.index + 1}/{progress.count} {progress.label}"
+            if progress.result is None:
+                line.update(progress.index / progress.count, place)
+            else:
+                line.done(f"{place}: {progress.result.verdict}")
+
+        line.update(0.0, "loading the robot")
+        with _controller(output, robot, control) as go2:
+            report = run_demo(go2, show)
+            return report, go2.recording()
+
+
+def _controller(output: Output, robot: Robot, control: Control) -> GO2Controller:
+    from controller.go2_controller import GO2Controller
+    from go2_wbc.config import Config, load_config
+    from go2_wbc.plant import MujocoPlant
+
+    config = Config() if control.config is None else load_config(control.config)
+    if control.backend is not None:
+        config = replace(config, backend=control.backend)
+    if control.solver is not None:
+        config = replace(config, wbc=replace(config.wbc, solver=control.solver))
+    viewer = output.viewer and _has_display()
+    plant = MujocoPlant(
+        robot.mjcf,
+        friction=robot.friction,
+        mass_scale=robot.mass_scale,
+        seed=robot.seed or 0,
+        initial_joint_noise=0.0 if robot.seed is None else START_NOISE,
+        motor=config.motor,
+        visuals=viewer,
+    )
+    return GO2Controller(plant=plant, realtime=output.realtime, viewer=viewer, config=config)
+
+
+def _has_display() -> bool:
+    from go2_wbc.plant.mujoco.viewer import display_problem
+
+    problem = display_problem()
+    if problem is not None:
+        reason = problem.split(" (")[0]
+        print(f"go2-wbc: no viewer: {reason}; going on without it", file=sys.stderr)
+    return problem is None
+
+
+def _write_data(recording: Recording, values: Mapping[str, object], paths: list[Path]) -> None:
+    """The arrays, which ``numpy.load`` reads back by field name, and the report."""
+    stream = io.BytesIO()
+    names = [field.name for field in fields(recording)]
+    arrays: dict[str, Any] = {name: np.asarray(getattr(recording, name)) for name in names}
+    np.savez_compressed(stream, **arrays)
+    write_atomically(paths[0], stream.getvalue())
+    write_atomically(paths[1], (json.dumps(values, indent=2) + "\n").encode())
+
+
+def _write_media(recording: Recording, report: DemoReport, paths: list[Path]) -> None:
+    """Page, filmstrip and animation; the animation takes by far the longest."""
+    _, _, page, filmstrip, animation = paths
+    with ProgressLine() as line:
+        line.update(0.0, f"drawing {page.name}")
+        viz.export_html(recording, page, title=TITLE)
+        line.update(0.1, f"drawing {filmstrip.name}")
+        viz.export_filmstrip(recording, filmstrip, times=filmstrip_times(report, recording))
+        viz.export_animation(
+            recording,
+            animation,
+            progress=lambda share: line.update(0.2 + 0.8 * share, f"drawing {animation.name}"),
+        )
+
+
+def filmstrip_times(report: DemoReport, recording: Recording) -> list[float] | None:
+    """Seconds after the start at which the robot sits, swings two legs, and holds its paw up.
+
+    None if the run has no such moments; the filmstrip then chooses for itself.
+    """
+    steps = {step.name: step for step in report.steps}
+    if not {"sit", "forward", "high_five"} <= steps.keys():
+        return None
+
+    def rows_of(name: str) -> Int[np.ndarray, " k"]:
+        since = recording.time - steps[name].start
+        return np.flatnonzero((since > 0.0) & (since < steps[name].duration))
+
+    sitting = rows_of("sit")
+    swinging = _longest_mode(recording, rows_of("forward"), feet=2)
+    raising = _longest_mode(recording, rows_of("high_five"), feet=3)
+    if not (len(sitting) and len(swinging) and len(raising)):
+        return None
+    rows = (sitting[-1], swinging[len(swinging) // 2], raising[len(raising) // 2])
+    return [float(recording.time[row] - recording.time[0]) for row in rows]
+
+
+def _longest_mode(recording: Recording, rows: Int[np.ndarray, " k"], feet: int) -> list[int]:
+    """The longest run of ``rows`` in which the same ``feet`` feet are in stance."""
+    modes = groupby(rows.tolist(), key=lambda row: recording.stance[row].tolist())
+    return max((list(run) for mode, run in modes if sum(mode) == feet), key=len, default=[])

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from controller.demo.report import DemoReport, DemoTotals, Measurement, StepResult
+if TYPE_CHECKING:
+    from controller.demo.report import DemoReport, DemoTotals, Measurement, StepResult
 
 WIDTH = 80
 _HEADER = f"     {'step':<21}{'time':>7}  {'figure':<23}{'asked':>9}{'measured':>9}"

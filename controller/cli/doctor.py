@@ -1,64 +1,47 @@
 """``go2-wbc doctor``: what is installed, what is missing, and the command that installs it.
 
 Each ``judge_...`` looks at one thing. ``version`` is the installed one, ``bounds`` are the versions
-that this project asks for, and a ``probe`` says how the import of a module went.
+that this project asks for, and a ``probe`` says how the import of a module went, in a process of
+its own: a library that crashes the interpreter, or takes the wrong shared object with it, is a
+finding and not the end of the program.
 """
 
 from __future__ import annotations
 
-import argparse
+import importlib.metadata
+import json
 import os
 import platform
+import signal
 import site
+import subprocess
 import sys
 import textwrap
+import tomllib
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from enum import Enum
 from itertools import groupby
 from pathlib import Path
+from typing import Annotated
 
-from controller.cli.common import (
-    PROGRAM,
-    ExitCode,
-    Subparsers,
-    add_parser,
-    installed_version,
-    print_json,
-)
-from controller.cli.probes import ImportProbe, probe_imports, requirements_of, satisfies
+from packaging.requirements import Requirement
+from packaging.specifiers import SpecifierSet
+
+from controller.cli.common import PROGRAM, ExitCode, installed_version, print_json
 from go2_wbc.errors import DescriptionError
 
-EXAMPLES = """
-go2-wbc doctor
-go2-wbc doctor --json
-"""
 WIDTH = 80
 OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)
-LIBRARIES: Mapping[str, str | None] = {
+MODULES: Mapping[str, str | None] = {
     "pin": "pinocchio",
-    "placo": "placo",
-    "coal": "coal",
-    "scipy": "scipy",
-    "mujoco": "mujoco",
-    "numpy": "numpy",
-    "proxsuite": "proxsuite",
-    "qpsolvers": "qpsolvers",
-    "daqp": "daqp",
-    "quadprog": "quadprog",
-    "numba": "numba",
-    "llvmlite": "llvmlite",
-    "meshcat": "meshcat",
-    "matplotlib": "matplotlib",
-    "jaxtyping": "jaxtyping",
-    "packaging": "packaging",
     "pillow": "PIL",
-    "trimesh": "trimesh",
     "pycollada": "collada",
     "example-robot-data": None,
 }
-"""Every library that is needed and the module that it brings; ``None`` is data only."""
+"""The modules of libraries that have other names than these; ``None`` is data only."""
 ROS2: Mapping[str, str] = {
     "ros-rclpy": "rclpy",
     "ros-rmw-fastrtps-cpp": "rclpy",
@@ -83,6 +66,18 @@ NEEDED_SOLVERS: Mapping[str, str] = {"daqp": "daqp", "proxqp": "proxsuite", "qua
 """The QP solvers that the project uses, and the package that brings each."""
 
 
+IMPORT_TIME_LIMIT = 60.0
+"""Seconds after which an import counts as hung; the slowest takes 1 s on a laptop."""
+
+_PROBE = """
+import importlib, json, sys
+module = importlib.import_module(sys.argv[1])
+solvers = getattr(module, "available_solvers", [])
+print(json.dumps({"file": getattr(module, "__file__", None) or "", "solvers": solvers}))
+"""
+_SIGNALS = {number.value: number.name for number in signal.Signals}
+
+
 class Status(Enum):
     """How a finding bears on the installation: with a problem the project does not work."""
 
@@ -102,23 +97,33 @@ class Finding:
     remedy: str = ""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``doctor``."""
-    parser = add_parser(
-        subparsers,
-        "doctor",
-        "Check this installation: versions, robot files, QP solvers, display.\n"
-        "Exit code 0 if all that is needed is here, 1 otherwise.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON for a program to read")
+@dataclass(frozen=True, slots=True)
+class ImportProbe:
+    """How the import of a module went.
+
+    Attributes:
+        error: why it failed, in one line; empty if it worked.
+        file: the file that was imported.
+        solvers: the QP solvers that the module offers, if it is ``qpsolvers``.
+    """
+
+    error: str = ""
+    file: str = ""
+    solvers: tuple[str, ...] = ()
 
 
-def run(args: argparse.Namespace) -> int:
-    """Examine the installation and print the findings."""
+def run(*, json: Annotated[bool, "print JSON for a program to read"] = False) -> int:
+    """Check this installation: versions, robot files, QP solvers, display.
+
+    Exit code 0 if all that is needed is here, 1 otherwise.
+
+    Examples:
+        go2-wbc doctor
+        go2-wbc doctor --json
+    """
     findings = examine()
     problems = [finding for finding in findings if finding.status is Status.PROBLEM]
-    if args.json:
+    if json:
         rows = [asdict(item) | {"status": item.status.value.lower()} for item in findings]
         print_json({"ok": not problems, "findings": rows})
     else:
@@ -128,21 +133,23 @@ def run(args: argparse.Namespace) -> int:
 
 def examine() -> list[Finding]:
     """Everything that can be said about this installation."""
-    versions = {name: installed_version(name) for name in (*LIBRARIES, *ROS2)}
-    ros2 = {module for name, module in ROS2.items() if versions[name] is not None}
-    probes = probe_imports({module for module in LIBRARIES.values() if module} | ros2)
     bounds = requirements_of(PROGRAM)
+    versions = {name: installed_version(name) for name in (*bounds, *ROS2)}
+    modules = {name: MODULES.get(name, name) for name in bounds}
+    ros2 = {module for name, module in ROS2.items() if versions[name] is not None}
+    probes = probe_imports({module for module in modules.values() if module} | ros2)
     findings = [
         judge_python(sys.version_info[:3], platform.platform()),
         _judge_project(installed_version(PROGRAM)),
     ]
-    for name, module in LIBRARIES.items():
+    for name, module in modules.items():
         probe = probes[module] if module else ImportProbe()
-        findings.append(judge_library(name, versions[name], bounds.get(name, ""), probe))
+        findings.append(judge_library(name, versions[name], bounds[name], probe))
+    placo, pin = versions.get("placo"), versions.get("pin")
     pairing = requirements_of("placo").get("pin", "")
-    findings += judge_pairing(versions["placo"], versions["pin"], pairing, bounds.get("placo", ""))
+    findings += judge_pairing(placo, pin, pairing, bounds.get("placo", ""))
     findings += judge_robot_files(bounds.get("example-robot-data", ""))
-    findings += judge_solvers(probes["qpsolvers"].solvers, bounds)
+    findings += judge_solvers(probes.get("qpsolvers", ImportProbe()).solvers, bounds)
     findings += [judge_extra(name, installed_version(EXTRAS[name][0])) for name in EXTRAS]
     findings.append(judge_display(sys.platform, os.environ))
     return findings + judge_ros2(versions, probes)
@@ -319,3 +326,65 @@ def _rows(finding: Finding) -> list[str]:
         break_on_hyphens=False,
     )
     return [*rows, f"           -> {finding.remedy}"] if finding.remedy else rows
+
+
+# --- what is asked --------------------------------------------------------------------------------
+
+
+def probe_imports(modules: Collection[str]) -> dict[str, ImportProbe]:
+    """Import each module in a process of its own, all at the same time."""
+    with ThreadPoolExecutor(max(len(modules), 1)) as pool:
+        return dict(zip(modules, pool.map(_probe, modules), strict=True))
+
+
+def _probe(module: str) -> ImportProbe:
+    command = [sys.executable, "-P", "-c", _PROBE, module]
+    try:
+        done = subprocess.run(
+            command,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=IMPORT_TIME_LIMIT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return ImportProbe(error=f"the import did not end within {IMPORT_TIME_LIMIT:g} s")
+    if done.returncode < 0:
+        name = _SIGNALS.get(-done.returncode, f"signal {-done.returncode}")
+        return ImportProbe(error=f"the import crashed ({name})")
+    if done.returncode > 0:
+        lines = done.stderr.strip().splitlines() or [f"exit code {done.returncode}"]
+        return ImportProbe(error=lines[-1])
+    answer = json.loads(done.stdout.splitlines()[-1])
+    return ImportProbe(file=answer["file"], solvers=tuple(answer["solvers"]))
+
+
+def requirements_of(distribution: str) -> Mapping[str, str]:
+    """Version bounds that a package puts on its dependencies, by name, without its extras.
+
+    Empty for a package that is not installed, if it is not this one.
+    """
+    try:
+        rows = importlib.metadata.requires(distribution) or []
+    except importlib.metadata.PackageNotFoundError:
+        here = Path(__file__).parents[2] / "pyproject.toml"
+        if distribution != PROGRAM or not here.is_file():
+            return {}
+        rows = tomllib.loads(here.read_text(encoding="utf-8"))["project"]["dependencies"]
+    return parse_requirements(rows)
+
+
+def parse_requirements(rows: Iterable[str]) -> dict[str, str]:
+    """``["placo<0.11,>=0.10.2", ...]`` as ``{"placo": "<0.11,>=0.10.2", ...}``, without extras."""
+    found = [Requirement(row) for row in rows]
+    return {
+        item.name: str(item.specifier)
+        for item in found
+        if item.marker is None or item.marker.evaluate({"extra": ""})
+    }
+
+
+def satisfies(version: str, bounds: str) -> bool:
+    """Whether ``version``, pre-releases included, lies within ``bounds`` (PEP 440)."""
+    return SpecifierSet(bounds).contains(version, prereleases=True)

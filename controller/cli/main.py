@@ -1,9 +1,9 @@
 """``go2-wbc``: finds the subcommand, runs it, and turns errors into messages and exit codes.
 
-A subcommand is a module with ``register(subparsers)`` and ``run(args) -> int``, and a line in
+A subcommand is a function whose parameters are its options (see ``options``), and a line in
 ``COMMANDS``. Only the module that was asked for is imported: help is quick, and a broken library
 cannot keep ``doctor`` from starting. ``run_program`` does the same for a program with other
-subcommands.
+subcommands, whose modules may make their own parser: ``register(subparsers)``, and ``run(args)``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from controller.cli.common import PROGRAM, ExitCode, examples_epilog, installed_version
+from controller.cli.common import PROGRAM, ExitCode, Subparsers, examples_epilog, installed_version
+from controller.cli.options import add_command
 from go2_wbc.errors import (
     CommandError,
     ConfigError,
@@ -31,33 +32,50 @@ from go2_wbc.errors import (
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A subcommand: its name, the module that runs it, and its line in the list."""
+    """A subcommand.
+
+    Attributes:
+        name: what is typed.
+        place: ``MODULE:FUNCTION`` of what it runs; the function is ``run`` if none is named.
+        summary: its line in the list.
+    """
 
     name: str
-    module: str
+    place: str
     summary: str
 
+    def add_to(self, subparsers: Subparsers) -> None:
+        """Import it, and add its parser."""
+        place, _, name = self.place.partition(":")
+        module = importlib.import_module(place)
+        if (register := getattr(module, "register", None)) is None:
+            add_command(subparsers, self.name, getattr(module, name or "run"))
+            return
+        register(subparsers)
+        subparsers.choices[self.name].set_defaults(run=module.run)
 
-COMMANDS: tuple[Command, ...] = (
-    Command("certify", "controller.cli.certify", "how often a motion is done in random worlds"),
-    Command("check", "controller.cli.motion_check", "can the robot do this motion?"),
-    Command("dance", "controller.cli.dance", "a dance on the beats of a song"),
-    Command("demo", "controller.cli.demo", "stand, sit, walk, turn, high five; measured, in 3D"),
-    Command("doctor", "controller.cli.doctor", "check this installation, say what is missing"),
-    Command("export", "controller.cli.motion_export", "a motion's trajectory as NumPy or CSV"),
-    Command(
-        "identify-friction", "controller.cli.identify_friction", "measure the joints' friction"
-    ),
-    Command("list", "controller.cli.motion_list", "the motions, and what can be set"),
-    Command("new", "controller.cli.motion_new", "write a small motion to start from"),
-    Command("preview", "controller.cli.motion_preview", "watch a motion, live in the browser"),
-    Command("replay", "controller.cli.replay", "a row of a motion's sweep, run again and shown"),
-    Command("ros2", "controller.cli.ros2", "the simulated robot as a ROS 2 node"),
-    Command("run", "controller.cli.motion_run", "check a motion, then play it in MuJoCo"),
-    Command("sweep", "controller.cli.sweep", "a motion, a gait or a function over many seeds"),
-    Command("teleop", "controller.cli.teleop", "drive the robot with the keyboard"),
-    Command("unitree-drive", "controller.cli.unitree_drive", "drive a Go2 through its low level"),
-    Command("unitree-sim", "controller.cli.unitree_sim", "simulate a Go2 for Unitree's SDK"),
+
+COMMANDS = tuple(
+    Command(name, f"controller.cli.{place}", summary)
+    for name, place, summary in (
+        ("certify", "sweep:certify_command", "how often a motion is done in random worlds"),
+        ("check", "motions:check", "can the robot do this motion?"),
+        ("dance", "dance", "a dance on the beats of a song"),
+        ("demo", "demo", "stand, sit, walk, turn, high five; measured, in 3D"),
+        ("doctor", "doctor", "check this installation, say what is missing"),
+        ("export", "motions:export", "a motion's trajectory as NumPy or CSV"),
+        ("identify-friction", "identify_friction", "measure the joints' friction"),
+        ("list", "motions:list_motions", "the motions, and what can be set"),
+        ("new", "motions:new", "write a small motion to start from"),
+        ("preview", "motion_preview", "watch a motion, live in the browser"),
+        ("replay", "sweep:replay_command", "a row of a motion's sweep, run again and shown"),
+        ("ros2", "bridges:ros2", "the simulated robot as a ROS 2 node"),
+        ("run", "motion_run", "check a motion, then play it in MuJoCo"),
+        ("sweep", "sweep:sweep_command", "a motion, a gait or a function over many seeds"),
+        ("teleop", "teleop", "drive the robot with the keyboard"),
+        ("unitree-drive", "bridges:unitree_drive", "drive a Go2 through its low level"),
+        ("unitree-sim", "bridges:unitree_sim", "simulate a Go2 for Unitree's SDK"),
+    )
 )
 
 EXAMPLES = """
@@ -164,9 +182,7 @@ def build_parser(program: Program, requested: str | None) -> argparse.ArgumentPa
     subparsers = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
     for command in program.commands:
         if command.name == requested:
-            module = importlib.import_module(command.module)
-            module.register(subparsers)
-            parser.set_defaults(run=module.run)
+            command.add_to(subparsers)
         else:
             subparsers.add_parser(command.name, help=command.summary)
     return parser

@@ -2,61 +2,28 @@
 
 from __future__ import annotations
 
-import argparse
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, TypeVar
 
 from go2_wbc.errors import CommandError, unknown_name
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from go2_wbc.world import World
     from motions import CompiledPlan, FeasibilityReport, Motion, Timeline
     from motions.authoring import Parameter, Value
+
+    T = TypeVar("T", Motion, Timeline | CompiledPlan)
 
 SAVED_MOTION, SAVED_PLAN = ".json", ".plan"
 """Endings of the files that ``save_motion`` and ``save_plan`` write."""
 MOTION_HELP = "a name of the library, FILE.py[:NAME], or a saved FILE.json or FILE.plan"
+MotionWord = Annotated[str, "MOTION", MOTION_HELP]
+Settings = Annotated[Sequence[str], "NAME=VALUE", "a parameter of the motion; see `go2-wbc list`"]
+Friction = Annotated[float | None, "MU", "of feet and floor"]
+Payload = Annotated[float | None, "KG", "extra mass on the trunk"]
 
 
-def add_motion(parser: argparse.ArgumentParser, *, many: bool = False) -> None:
-    """Add the argument for one motion, or any number, and the option for parameters."""
-    number = "*" if many else None
-    parser.add_argument("motion", metavar="MOTION", nargs=number, help=MOTION_HELP)
-    add_values(parser)
-
-
-def add_values(parser: argparse.ArgumentParser) -> None:
-    """Add the option for parameters of a motion."""
-    parser.add_argument(
-        "--set",
-        metavar="NAME=VALUE",
-        action="append",
-        default=[],
-        dest="values",
-        help="a parameter of the motion; see `go2-wbc list`",
-    )
-
-
-def add_world(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say in which world a motion is done."""
-    parser.add_argument("--friction", metavar="MU", type=float, help="of feet and floor")
-    parser.add_argument("--payload", metavar="KG", type=float, help="extra mass on the trunk")
-
-
-def world_of(args: argparse.Namespace, usual: World | None = None) -> World:
-    """The world that the options say; what they do not, is as in ``usual``.
-
-    Raises:
-        ConfigError: if it is out of range.
-    """
-    from go2_wbc.world import World
-
-    return World.of(args.friction, args.payload, usual)
-
-
-def meant(words: list[str], settings: list[str]) -> list[Timeline | CompiledPlan]:
+def meant(words: Sequence[str], settings: Sequence[str]) -> list[Timeline | CompiledPlan]:
     """The motions, or saved plans, that are meant; the whole library if there is no word.
 
     Raises:
@@ -71,11 +38,14 @@ def meant(words: list[str], settings: list[str]) -> list[Timeline | CompiledPlan
     return [line for word in words or motion_names() for line in _meant_by(word, values)]
 
 
-def the_motion(word: str, settings: list[str]) -> Timeline | CompiledPlan:
+def the_motion(word: str, settings: Sequence[str]) -> Timeline | CompiledPlan:
     """The one motion or plan that is meant; raises as ``meant``, and CommandError for several."""
-    found = meant([word], settings)
+    return _only(word, meant([word], settings))
+
+
+def _only(word: str, found: Sequence[T]) -> T:
     if len(found) > 1:
-        names = ", ".join(line.name for line in found)
+        names = ", ".join(motion.name for motion in found)
         raise CommandError(f"{word} has several motions, choose FILE.py:NAME: {names}")
     return found[0]
 
@@ -126,7 +96,7 @@ class MotionSource:
             motion has none.
     """
 
-    def __init__(self, word: str, settings: list[str]) -> None:
+    def __init__(self, word: str, settings: Sequence[str]) -> None:
         """Find the one motion that is meant; raises as ``the_motion``."""
         is_saved = word.endswith((SAVED_MOTION, SAVED_PLAN))
         own = word if is_saved else word.partition(":")[0]
@@ -148,17 +118,14 @@ class MotionSource:
 
         if self._is_saved:
             return the_motion(self._word, self._settings)
-        found = motions_of(self._word)
-        if len(found) > 1:
-            names = ", ".join(motion.name for motion in found)
-            raise CommandError(f"{self._word} has several motions, choose FILE.py:NAME: {names}")
-        parameters = {parameter.name: parameter for parameter in found[0].parameters}
+        motion = _only(self._word, motions_of(self._word))
+        parameters = {parameter.name: parameter for parameter in motion.parameters}
         chosen = {name: value for name, value in self._chosen.items() if name in parameters}
         values = {**parse_values(self._settings), **chosen}
         self.parameters = {
             item: values.get(name, item.default) for name, item in parameters.items()
         }
-        return found[0](**values)
+        return motion(**values)
 
     def choose(self, values: dict[str, Value]) -> None:
         """Take other values for parameters; any thread may call."""

@@ -1,121 +1,89 @@
-"""``go2-wbc sweep``: a motion, a gait, a push or a function over many seeds, in many processes."""
+"""Over many seeds: ``go2-wbc sweep``, ``certify`` and ``replay``."""
 
 from __future__ import annotations
 
-import argparse
+from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from controller.cli.common import ExitCode, Subparsers, add_parser, print_json, shown_path
-from controller.cli.motion_args import add_values, the_motion
+from controller.cli.common import ExitCode, print_json, shown_path
+from controller.cli.motion_args import Friction, MotionWord, Payload, Settings, the_motion
+from controller.cli.options import Html, Json, plot_file
 from controller.cli.progress import ProgressLine
+from go2_wbc.errors import CommandError
 
 if TYPE_CHECKING:
+    from controller.sweeps.certify import Certificate
     from controller.sweeps.run import Progress, SweepResult
     from controller.sweeps.summary import Summary
+    from go2_wbc.world import World
+    from motions import CompiledPlan, Timeline
 
 LINES = 20
 """How often progress is told where no line can be rewritten."""
-EXAMPLES = """
-go2-wbc sweep high_five --n 200
-go2-wbc sweep gait:trot@0.5 --n 100 --workers 2 --plot trot.svg
-go2-wbc sweep push:12 --n 300 --export pushes.csv
-go2-wbc sweep my_study.py:trial --n 1000 --out study.sqlite
-go2-wbc sweep my_study.py:trial --n 9000 --engine ray --address auto
-"""
 WHAT = """a motion: name of the library, FILE.py[:NAME], FILE.json, FILE.plan;
 gait:NAME[@VX[,VY[,WZ]]]; push:IMPULSE[@SPEED] (N s, m/s); or a
 function (seed) -> row: FILE.py:NAME, MODULE:NAME"""
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``sweep``."""
-    parser = add_parser(
-        subparsers,
-        "sweep",
-        "Run something over many seeds, keep every row in an SQLite file as it is\n"
-        "finished, and print rates and means with their 95 % intervals. The same\n"
-        "command goes on after an interruption. The rows depend on the seeds only,\n"
-        "not on the number or kind of workers. Exit code 0 if every seed gave a row,\n"
-        "1 if some did not.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument("what", metavar="WHAT", help=WHAT)
-    parser.add_argument("--n", metavar="N", type=int, default=1000, help="seeds, default 1000")
-    add_runs(parser)
-    parser.add_argument(
-        "--keep-going", action="store_true", help="a seed that fails does not end the sweep"
-    )
-    add_values(parser)
-    parser.add_argument(
-        "--export", metavar="FILE", nargs="+", type=Path, default=[], help=".csv or .parquet"
-    )
-    parser.add_argument("--plot", metavar="FILE", type=Path, help=".svg, .png or .pdf")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Runs:
+    """Which seeds run where, and where rows are kept: see ``controller.sweep``."""
+
+    first_seed: Annotated[int, "K", "the first of them, default 0"] = 0
+    workers: Annotated[int | None, "N", "processes, default: all processors"] = None
+    engine: Annotated[str, "NAME", "local (default) or ray: many machines"] = "local"
+    address: Annotated[str | None, "of the Ray cluster, default: one of this machine"] = None
+    out: Annotated[Path | None, "FILE", "keep the rows here, default: in out/sweeps"] = None
+    fresh: Annotated[bool, "begin anew, do not go on"] = False
 
 
-def add_runs(parser: argparse.ArgumentParser) -> None:
-    """Add the options that say which seeds run where, and where rows are kept."""
-    parser.add_argument(
-        "--first-seed", metavar="K", type=int, default=0, help="the first of them, default 0"
-    )
-    parser.add_argument(
-        "--workers", metavar="N", type=int, help="processes, default: all processors"
-    )
-    parser.add_argument(
-        "--engine", metavar="NAME", default="local", help="local (default) or ray: many machines"
-    )
-    parser.add_argument("--address", help="of the Ray cluster, default: one of this machine")
-    parser.add_argument(
-        "--out", metavar="FILE", type=Path, help="keep the rows here, default: in out/sweeps"
-    )
-    parser.add_argument("--fresh", action="store_true", help="begin anew, do not go on")
+def sweep_command(
+    what: Annotated[str, "WHAT", WHAT],
+    *,
+    n: Annotated[int, "N", "seeds, default 1000"] = 1000,
+    runs: Runs,
+    keep_going: Annotated[bool, "a seed that fails does not end the sweep"] = False,
+    set: Settings = (),
+    export: Annotated[tuple[Path, ...], "FILE", ".csv or .parquet"] = (),
+    plot: Annotated[Path | None, "FILE", ".svg, .png or .pdf", plot_file] = None,
+    json: Json = False,
+) -> int:
+    """Run something over many seeds, and keep every row in an SQLite file as it is finished.
 
+    It prints rates and means with their 95 % intervals. The same command goes on after an
+    interruption. The rows depend on the seeds only, not on the number or kind of workers. Exit code
+    0 if every seed gave a row, 1 if some did not.
 
-def run(args: argparse.Namespace) -> int:
-    """Run the sweep, print the summary, write what was asked for."""
+    Examples:
+        go2-wbc sweep high_five --n 200
+        go2-wbc sweep gait:trot@0.5 --n 100 --workers 2 --plot trot.svg
+        go2-wbc sweep push:12 --n 300 --export pushes.csv
+        go2-wbc sweep my_study.py:trial --n 1000 --out study.sqlite
+        go2-wbc sweep my_study.py:trial --n 9000 --engine ray --address auto
+    """
     from controller.sweeps.export import export_rows, require_exporter
     from controller.sweeps.run import sweep
     from controller.sweeps.summary import summarise
-    from go2_wbc.files import checked_output
-    from viz import PLOT_SUFFIXES
+    from controller.sweeps.targets import motion_target
 
-    for path in args.export:
+    for path in export:
         require_exporter(path)
-    if args.plot is not None:
-        checked_output(args.plot, PLOT_SUFFIXES)
     with ProgressLine() as line:
         line.update(0.0, "starting")
-        result = sweep(
-            _target(args),
-            args.n,
-            first_seed=args.first_seed,
-            workers=args.workers,
-            engine=args.engine,
-            address=args.address,
-            out=args.out,
-            fresh=args.fresh,
-            keep_going=args.keep_going,
-            on_progress=lambda progress: tell(line, progress),
-        )
+        target = motion_target(the_motion(what, set), " ".join([what, *set])) if set else what
+        progress = partial(tell, line)
+        result = sweep(target, n, keep_going=keep_going, on_progress=progress, **asdict(runs))
     summary = summarise(result.rows, result.columns)
-    written = [export_rows(result, path) for path in args.export]
-    if args.plot is not None:
-        written.append(_plot(result, summary, args.plot))
-    if args.json:
+    written = [export_rows(result, path) for path in export]
+    if plot is not None:
+        written.append(_plot(result, summary, plot))
+    if json:
         print_json(_as_dict(result, summary, written))
     else:
         _print(result, summary, written)
     return ExitCode.FAILED if result.failures else ExitCode.OK
-
-
-def _target(args: argparse.Namespace) -> object:
-    """What is swept; a motion with the parameters that were chosen."""
-    from controller.sweeps.targets import motion_target
-
-    if not args.values:
-        return args.what
-    return motion_target(the_motion(args.what, args.values), " ".join([args.what, *args.values]))
 
 
 def tell(line: ProgressLine, progress: Progress) -> None:
@@ -183,3 +151,118 @@ def _print(result: SweepResult, summary: Summary, written: list[Path]) -> None:
     print(f"rows: {shown_path(result.path)}")
     for path in written:
         print(f"wrote {shown_path(path)}")
+
+
+# --- certify --------------------------------------------------------------------------------------
+
+
+def certify_command(
+    motion: MotionWord,
+    *,
+    set: Settings = (),
+    n: Annotated[int, "N", "runs, default %(default)s"] = 200,
+    friction: Friction = None,
+    payload: Payload = None,
+    width: Annotated[
+        float | None, "SHARE", "end early once the interval is no wider than this, such as 0.05"
+    ] = None,
+    at_least: Annotated[
+        float | None, "RATE", "the lower end of the interval must reach this, such as 0.95"
+    ] = None,
+    runs: Runs,
+    html: Annotated[Html, "write the 3D page of the plan with all this"] = None,
+    json: Json = False,
+) -> int:
+    """Play a motion in many random worlds in MuJoCo, and say how often it is done.
+
+    Friction, mass, heading and start differ. It prints the 95 % interval of the rate
+    (Clopper-Pearson) and the worst runs. Exit code 1 if the rate is below --at-least.
+
+    Examples:
+        go2-wbc certify high_five
+        go2-wbc certify my_motion.py:bow --at-least 0.95
+        go2-wbc certify bow --friction 0.4 --payload 3
+        go2-wbc certify jump_up --n 1000 --width 0.05
+        go2-wbc certify wave --set times=5 --json
+        go2-wbc certify high_five --html high_five.html
+    """
+    from controller.sweeps.certify import certify
+    from go2_wbc.world import DOUBTFUL, World
+
+    if at_least is not None and not 0.0 < at_least < 1.0:
+        raise CommandError(f"--at-least must be between 0 and 1, got {at_least:g}")
+    meant, world = the_motion(motion, set), World.of(friction, payload, DOUBTFUL)
+    with ProgressLine() as line:
+        line.update(0.0, "starting")
+        progress = partial(tell, line)
+        found = certify(meant, n, world=world, width=width, on_progress=progress, **asdict(runs))
+        if html is not None:
+            line.update(1.0, "writing the page")
+            _write_page(meant, found, html, world)
+    if json:
+        print_json(found.as_dict())
+    else:
+        print(found.table())
+        print(f"rows: {shown_path(found.path)}")
+        if html is not None:
+            print(f"3D page, offline: {shown_path(html)}")
+    is_enough = at_least is None or found.meets(at_least)
+    if not is_enough and not json:
+        print(f"below {at_least:g}: the interval begins at {found.interval[0]:.3f}")
+    return ExitCode.OK if is_enough else ExitCode.FAILED
+
+
+def _write_page(
+    motion: Timeline | CompiledPlan, certificate: Certificate, page: Path, world: World
+) -> None:
+    """The plan with the verdict on it in ``world``, its chance and the certificate."""
+    from controller.report_view import planned
+    from controller.sweeps.certify import with_certificate
+    from motions import FeasibilityChecker
+    from viz import export_html
+
+    checked = FeasibilityChecker(world=world).evaluate(motion)
+    content = with_certificate(planned(checked), certificate, checked.plan)
+    export_html(content, page, title=certificate.motion)
+
+
+# --- replay ---------------------------------------------------------------------------------------
+
+
+def replay_command(
+    file: Annotated[Path, "FILE", "of `go2-wbc sweep`"],
+    row: Annotated[int, "ROW", "the seed of the row"],
+    *,
+    html: Html = None,
+    json: Json = False,
+) -> int:
+    """Run a row of a motion's sweep again, in the world of its seed, and say what came of it.
+
+    It writes a 3D page of the run, the plan as a ghost. Exit code 0 if it gave the row that is
+    kept, 1 if it gave another one (another version, or kind of processor).
+
+    Examples:
+        go2-wbc sweep high_five --n 200
+        go2-wbc replay out/sweeps/high_five.sqlite 17 --html seed_17.html
+    """
+    from controller.sweeps.motion_study import replay
+    from viz import export_html
+
+    with ProgressLine() as line:
+        line.update(0.0, "running it again")
+        shown = replay(file, row)
+        if html is not None:
+            line.update(0.9, "writing the page")
+            export_html(shown.content, html, title=shown.title)
+    if json:
+        print_json({"row": dict(shown.row), "differences": list(shown.differences)})
+    else:
+        print(shown.title)
+        print("-" * 80)
+        for name, value in shown.row.items():
+            mark = "   another than in the file" if name in shown.differences else ""
+            print(f"  {name:<20.20}{value!s:.30}{mark}")
+        print("-" * 80)
+        if html is not None:
+            print(f"3D replay, offline: {shown_path(html)}")
+    return ExitCode.FAILED if shown.differences else ExitCode.OK

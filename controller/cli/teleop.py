@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import select
 import shutil
 import sys
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from controller.cli.common import ExitCode, Subparsers, add_parser
+from controller.cli.common import ExitCode
+from controller.cli.options import Mjcf, Numbers
 from go2_wbc.errors import CommandError
 from go2_wbc.world import SENSORS
 
@@ -20,52 +19,43 @@ if TYPE_CHECKING:
     from controller.gamepad import Gamepad
     from controller.teleop import Teleop
 
-EXAMPLES = """
-go2-wbc teleop                 headless: a line tells what the robot does
-go2-wbc teleop --viewer        watch it in MuJoCo's window
-go2-wbc teleop --sensors imu   drive it on what a robot's own sensors tell
-"""
 REFRESH = 0.1
 """Time [s] between two looks at the keyboard and the robot."""
 _CLEAR_LINE = "\r\x1b[2K"
 
 
-def register(subparsers: Subparsers) -> None:
-    """Add the options of ``teleop``."""
-    parser = add_parser(
-        subparsers,
-        "teleop",
-        "Drive the robot in MuJoCo with keyboard or gamepad, at the wall clock's pace.",
-        examples=EXAMPLES,
-    )
-    parser.add_argument("--viewer", action="store_true", help="also open MuJoCo's window")
-    parser.add_argument("--keyboard", action="store_true", help="look for no gamepad")
-    parser.add_argument(
-        "--sensors", choices=SENSORS, default="ideal", help="what its state comes from"
-    )
-    parser.add_argument("--mjcf", metavar="FILE", type=Path, help="your own Go2 model or scene")
-    parser.add_argument("--config", metavar="FILE", type=Path, help="TOML with other numbers")
+def run(
+    *,
+    viewer: Annotated[bool, "also open MuJoCo's window"] = False,
+    keyboard: Annotated[bool, "look for no gamepad"] = False,
+    sensors: Annotated[str, SENSORS, "what its state comes from"] = "ideal",
+    mjcf: Mjcf = None,
+    config: Numbers = None,
+) -> int:
+    """Drive the robot in MuJoCo with keyboard or gamepad, at the wall clock's pace.
 
+    The last key, or Ctrl-C, ends it; the robot ends limp.
 
-def run(args: argparse.Namespace) -> int:
-    """Read keys until the last one, or Ctrl-C; the robot ends limp."""
+    Examples:
+        go2-wbc teleop                 headless: a line tells what the robot does
+        go2-wbc teleop --viewer        watch it in MuJoCo's window
+        go2-wbc teleop --sensors imu   drive it on what a robot's own sensors tell
+    """
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise CommandError("teleop reads keys from a terminal; standard input or output is none")
-    from controller.arguments import config
+    from controller.arguments import config as read_config
     from controller.gamepad import LEGEND, find_gamepad
     from controller.go2_controller import GO2Controller
     from controller.teleop import Teleop, keys_help
     from go2_wbc.plant import MujocoPlant
 
-    pad, said = (None, "keys only") if args.keyboard else find_gamepad()
+    pad, said = (None, "keys only") if keyboard else find_gamepad()
     print(keys_help(), said, *([] if pad is None else [LEGEND]), sep="\n")
-    numbers = config(args.config).beside_hardware
-    simulator = MujocoPlant(
-        args.mjcf, motor=numbers.motor, sensors=args.sensors, estimator=numbers.estimator
-    )
+    numbers = read_config(config).beside_hardware
+    simulator = MujocoPlant(mjcf, motor=numbers.motor, sensors=sensors, estimator=numbers.estimator)
     with (
         closing(simulator) as plant,
-        GO2Controller(plant=plant, realtime=True, viewer=args.viewer, config=numbers) as go2,
+        GO2Controller(plant=plant, realtime=True, viewer=viewer, config=numbers) as go2,
     ):
         teleop = Teleop(go2)
         try:

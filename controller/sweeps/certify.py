@@ -11,23 +11,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from controller.sweeps.identity import digest, identity
 from controller.sweeps.rows import SEED, Row
 from controller.sweeps.run import Progress, SweepResult, read_sweep, sweep
-from controller.sweeps.summary import CONFIDENCE, rate_interval
+from controller.sweeps.summary import CONFIDENCE, finite, rate_interval
 from controller.sweeps.targets import motion_target
 from go2_wbc.errors import CommandError
 from go2_wbc.world import World
+
+if TYPE_CHECKING:
+    from go2_wbc.motion_plan import MotionPlan
+    from viz.content import CertifiedRate, ReplayContent
 
 RUNS = 200
 WORST = 5
 """How many of the worst runs are named."""
 FEWEST = 20
 """Runs before which nothing ends early."""
+_HOLDS_FOR = ("version", "code", "plan", "libraries", "python")
+"""What a page names of a certificate's ``about``, besides its world."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +97,7 @@ class Certificate:
             "rate": self.rate,
             "interval": list(self.interval),
             "confidence": CONFIDENCE,
-            "worst": [{name: _finite(value) for name, value in row.items()} for row in self.worst],
+            "worst": [{name: finite(value) for name, value in row.items()} for row in self.worst],
             "about": dict(self.about),
             "file": str(self.path),
         }
@@ -198,5 +205,47 @@ def told(row: Row) -> str:
     )
 
 
-def _finite(value: object) -> object:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+# --- on a page ------------------------------------------------------------------------------------
+
+
+def with_certificate(
+    content: ReplayContent, certificate: Certificate, plan: MotionPlan
+) -> ReplayContent:
+    """``content``, whose verdict is on ``plan``, with the certificate beside that verdict."""
+    if content.verdict is None:
+        return content
+    certified = certified_rate(certificate, plan)
+    return replace(content, verdict=replace(content.verdict, certified=certified))
+
+
+def certified_rate(certificate: Certificate, plan: MotionPlan) -> CertifiedRate:
+    """A certificate as ``viz`` takes it, and why it does not hold for ``plan`` as it is now."""
+    from controller.sweeps.motion_study import world_of
+    from viz.content import CertifiedRate, CertifiedRun
+
+    def run(row: Row) -> CertifiedRun:
+        conditions = f"friction {row['friction']:.2f}, mass {row['mass_scale']:.2f}"
+        return CertifiedRun(int(row[SEED]), conditions, bool(row["done"]), told(row))
+
+    about = certificate.about
+    return CertifiedRate(
+        n=certificate.n,
+        done=certificate.done,
+        interval=certificate.interval,
+        confidence=CONFIDENCE,
+        world=str(world_of(about["world"])),
+        worst=tuple(map(run, certificate.worst)),
+        versions={name: about[name] for name in _HOLDS_FOR if name in about},
+        outdated=_outdated(about, plan),
+    )
+
+
+def _outdated(about: Mapping[str, str], plan: MotionPlan) -> str:
+    """What has changed since the runs; empty if nothing has."""
+    from controller.sweeps.motion_study import archive_of
+    from motions import CompiledPlan
+
+    own = digest(archive_of(plan)) if isinstance(plan, CompiledPlan) else ""
+    now = {"plan": own, **identity()}
+    other = [name for name in now if now[name] != about.get(name)]
+    return f"Of another {', '.join(other)} than this: certify it again." if other else ""

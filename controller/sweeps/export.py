@@ -7,7 +7,7 @@ import io
 from pathlib import Path
 from typing import Any
 
-from controller.sweeps.rows import SEED, Columns
+from controller.sweeps.rows import SEED
 from controller.sweeps.run import SweepResult
 from go2_wbc.errors import MissingDependency
 from go2_wbc.files import checked_output, write_atomically
@@ -39,13 +39,9 @@ def require_exporter(path: Path | str) -> None:
         _pyarrow()
 
 
-def _columns(result: SweepResult) -> Columns:
-    return {SEED: "int", **result.columns}
-
-
 def _csv(result: SweepResult) -> bytes:
     text = io.StringIO(newline="")
-    table = csv.DictWriter(text, list(_columns(result)))
+    table = csv.DictWriter(text, [SEED, *result.columns])
     table.writeheader()
     table.writerows(result.rows)  # a float as its shortest text, which reads back as it was
     return text.getvalue().encode()
@@ -59,7 +55,8 @@ def _parquet(result: SweepResult) -> bytes:
         "bool": pyarrow.bool_(),
         "str": pyarrow.string(),
     }
-    schema = pyarrow.schema([(name, kinds[kind]) for name, kind in _columns(result).items()])
+    columns = {SEED: "int", **result.columns}
+    schema = pyarrow.schema([(name, kinds[kind]) for name, kind in columns.items()])
     stream = io.BytesIO()
     parquet.write_table(pyarrow.Table.from_pylist(result.rows, schema=schema), stream)
     return stream.getvalue()

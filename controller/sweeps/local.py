@@ -1,24 +1,29 @@
-"""Workers on this machine: each a process of its own, with one thread for its BLAS."""
+"""Workers on this machine: each a process of its own, with one thread for its BLAS.
+
+On Linux they are forked by ``multiprocessing``'s fork server, which has loaded the robot: it takes
+the time of one start, its workers next to none, and later sweeps of a process are under way at
+once. Where a fork is not safe (macOS) or unknown (Windows), every worker is started anew.
+"""
 
 from __future__ import annotations
 
+import multiprocessing
 import os
-import pickle
+import signal
 import sys
-import threading
-from collections import Counter, deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
-from functools import partial
-from queue import SimpleQueue
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from multiprocessing import connection, resource_tracker
+from types import ModuleType
 from typing import Any, final
 
-from controller.sweeps.engine import Ended, Engine, Failure, Item
-from controller.sweeps.processes import start_process
-from controller.sweeps.worker import modules_of, order_of, read_message, write_message
+from controller.sweeps.engine import ONE_THREAD, Ends, Engine, Item, Trials
+from controller.sweeps.worker import order_of, serve
 
 ATTEMPTS = 2
 """How often an item is tried whose worker dies: the first time it may have been anything."""
+LOADED = ("controller.sweeps.motion_study",)
+"""What the fork server loads: with it the robot, the simulator and the motions."""
 
 
 def processors() -> int:
@@ -40,91 +45,104 @@ class LocalEngine(Engine):
         """Use at most ``workers`` processes at a time."""
         self._workers = workers
 
-    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[Ended[Item]]:
+    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Ends[Item]:
         """What came of each item; see ``Engine.run``."""
-        pickled = [pickle.dumps(item) for item in items]
-        modules = modules_of(pickle.dumps(function), *pickled[:1])
-        pool = _Pool(partial(_Worker, modules, order_of(function)), pickled, self._workers)
+        trials, order = Trials(items, ATTEMPTS), order_of(function)
+        busy: dict[Worker, int] = {}
         try:
-            while not pool.is_done:
-                for number, value, failure in pool.wait():
-                    yield Ended(items[number], value, failure)
+            while trials.waiting or busy:
+                while trials.waiting and len(busy) < self._workers:
+                    _give(Worker(order), trials, busy)
+                for worker in _with_news(busy):
+                    number, answer = busy.pop(worker), worker.answer()
+                    if answer is not None:
+                        _give(worker, trials, busy)  # before the caller takes its time
+                        yield trials.ended(number, answer)
+                    elif (ended := trials.died(number, worker.end())) is not None:
+                        yield ended
+                    else:
+                        trials.waiting.appendleft(number)
         finally:
-            pool.close()
+            for worker in busy:
+                worker.end()
 
 
-class _Pool:
-    """Some workers, and which of them does which item."""
-
-    def __init__(
-        self, start: Callable[[_Answers], _Worker], items: Sequence[bytes], size: int
-    ) -> None:
-        self._start, self._items, self._size = start, items, size
-        self._waiting, self._deaths = deque(range(len(items))), Counter[int]()
-        self._busy: dict[_Worker, int] = {}
-        self._answers: _Answers = SimpleQueue()
-
-    @property
-    def is_done(self) -> bool:
-        return not (self._waiting or self._busy)
-
-    def wait(self) -> Iterator[tuple[int, Any, Failure | None]]:
-        """Until a worker says something: the item that has ended by it, if one has."""
-        while self._waiting and len(self._busy) < self._size:
-            self._give(self._start(self._answers))
-        worker, message = self._answers.get()
-        number = self._busy.pop(worker, None)
-        if number is None:  # a worker has ended that had nothing left to do
-            return
-        if isinstance(message, bytes):
-            self._give(worker)  # before the caller takes its time with the value
-            yield number, *pickle.loads(message)
-            return
-        self._deaths[number] += 1
-        if self._deaths[number] < ATTEMPTS:
-            self._waiting.appendleft(number)
-            return
-        text = f"its process died {ATTEMPTS} times: {message}"
-        yield number, None, Failure(text, has_died=True)
-
-    def close(self) -> None:
-        for worker in self._busy:
-            worker.end()
-
-    def _give(self, worker: _Worker) -> None:
-        if not self._waiting:
-            worker.end()
-            return
-        self._busy[worker] = self._waiting.popleft()
-        worker.give(self._items[self._busy[worker]])
+def _give(worker: Worker, trials: Trials[Any], busy: dict[Worker, int]) -> None:
+    """Have a worker do what waits, or end it."""
+    if not trials.waiting:
+        worker.end()
+        return
+    busy[worker] = trials.waiting.popleft()
+    worker.give(trials.pickled[busy[worker]])
 
 
-class _Worker:
-    """A worker process, and the thread that listens to it."""
+def _with_news(workers: Collection[Worker]) -> list[Worker]:
+    """Those that have answered or ended, at least one."""
+    ready = connection.wait([handle for worker in workers for handle in worker.handles])
+    return [worker for worker in workers if any(handle in ready for handle in worker.handles)]
 
-    def __init__(self, modules: Sequence[str], order: bytes, answers: _Answers) -> None:
-        self._process = start_process(modules)
-        self.give(order)
-        self._listener = threading.Thread(
-            target=self._listen, args=(answers,), name="worker", daemon=True
-        )
-        self._listener.start()
 
-    def give(self, message: bytes) -> None:
-        """Send the order, or an item; if the worker has died, the listener tells."""
-        with suppress(OSError, ValueError):  # a pipe that is broken, or closed
-            write_message(self._process.stdin, message)
+@final
+class Worker:
+    """A process that calls one function, item by item, until it is ended.
 
-    def end(self) -> None:
-        """End it at once."""
+    Attributes:
+        handles: one is ready, for ``multiprocessing.connection.wait``, when it has answered or has
+            ended.
+    """
+
+    def __init__(self, order: bytes) -> None:
+        """Start it, in the folder and environment of this process; ``order`` is its function."""
+        context = multiprocessing.get_context("forkserver" if sys.platform == "linux" else "spawn")
+        self._pipe, its_end = context.Pipe()
+        arguments = (its_end, order, {**os.environ, **ONE_THREAD})
+        self._process = context.Process(target=serve, args=arguments, name="worker")
+        with its_end, _start():
+            self._process.start()
+        self.handles = (self._pipe, self._process.sentinel)
+
+    def give(self, item: bytes) -> None:
+        """Send an item; if the worker has died, ``answer`` tells."""
+        with suppress(OSError):
+            self._pipe.send_bytes(item)
+
+    def answer(self) -> bytes | None:
+        """What came of the item; None if the worker has ended."""
+        with suppress(EOFError, OSError):
+            if self._pipe.poll():
+                return self._pipe.recv_bytes()
+        return None
+
+    def end(self) -> str:
+        """End it at once, if it has not; how it has ended."""
+        self._pipe.close()
         self._process.kill()
-        self._listener.join()
-
-    def _listen(self, answers: _Answers) -> None:
-        while (message := read_message(self._process.stdout)) is not None:
-            answers.put((self, message))
-        answers.put((self, self._process.close()))
+        self._process.join()
+        code = self._process.exitcode or 0
+        self._process.close()
+        return f"exit code {code}" if code >= 0 else f"killed by {signal.Signals(-code).name}"
 
 
-_Answers = SimpleQueue[tuple[_Worker, bytes | str]]
-"""What workers say, or how they ended."""
+@contextmanager
+def _start() -> Iterator[None]:
+    """While a worker starts, and with the first one the fork server.
+
+    The server finds the modules that this process does, and has the environment of a worker: some
+    of it is heeded by an interpreter that starts only. The main module of this process is hidden,
+    which a worker would run again. Ctrl-C has to wait: the server would end with a traceback.
+    """
+    multiprocessing.set_forkserver_preload(list(LOADED))
+    resource_tracker.ensure_running()  # it lets Ctrl-C in again when it starts
+    main, before = sys.modules["__main__"], dict(os.environ)
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    sys.modules["__main__"] = ModuleType("__main__")
+    own = {**ONE_THREAD, "PYTHONPATH": os.pathsep.join(sys.path)}
+    os.environ.update(own)
+    try:
+        yield
+    finally:
+        for name in own:
+            del os.environ[name]
+        os.environ.update(before)
+        sys.modules["__main__"] = main
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)

@@ -7,14 +7,12 @@ Without an address a cluster of this machine is started, which listens on the lo
 from __future__ import annotations
 
 import os
-import pickle
 import socket
-from collections import Counter, deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, final
 
-from controller.sweeps.engine import ONE_THREAD, Ended, Engine, Failure, Item
+from controller.sweeps.engine import ONE_THREAD, Ends, Engine, Item, Trials
 from controller.sweeps.local import processors
 from controller.sweeps.worker import answer, order_of
 from go2_wbc.errors import MissingDependency, SweepError
@@ -56,7 +54,7 @@ class RayEngine(Engine):
         self._address = address or os.environ.get("RAY_ADDRESS") or None
         _ray(QUIET if self._address else QUIET | ON_LOOPBACK)
 
-    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Iterator[Ended[Item]]:
+    def run(self, function: Callable[[Item], Any], items: Sequence[Item]) -> Ends[Item]:
         """What came of each item; see ``Engine.run``.
 
         Raises:
@@ -65,12 +63,27 @@ class RayEngine(Engine):
         if not items:
             return
         with self._connected() as ray:
-            tasks = _Tasks(ray, order_of(function), [pickle.dumps(item) for item in items])
-            processors_there = int(ray.cluster_resources().get("CPU", 1))
-            size = self._workers or max(QUEUED * processors_there, 1)
-            while tasks.fill(size):
-                for number, value, failure in tasks.wait():
-                    yield Ended(items[number], value, failure)
+            order = ray.put(order_of(function))
+            call = ray.remote(num_cpus=1, max_retries=0, runtime_env={"env_vars": ONE_THREAD})(
+                answer
+            )
+            trials, running = Trials(items, ATTEMPTS), dict[Any, int]()
+            there = int(ray.cluster_resources().get("CPU", 1))
+            size = self._workers or max(QUEUED * there, 1)
+            while trials.waiting or running:
+                while trials.waiting and len(running) < size:
+                    number = trials.waiting.popleft()
+                    running[call.remote(order, trials.pickled[number])] = number
+                (task,), _ = ray.wait(list(running), num_returns=1)
+                number = running.pop(task)
+                try:
+                    yield trials.ended(number, ray.get(task))
+                except ray.exceptions.RayError as error:
+                    why = f"{type(error).__name__}: {error}".partition("\n")[0]
+                    if (ended := trials.died(number, why)) is not None:
+                        yield ended
+                    else:
+                        trials.waiting.append(number)
 
     @contextmanager
     def _connected(self) -> Iterator[Any]:
@@ -93,42 +106,6 @@ class RayEngine(Engine):
             yield ray
         finally:
             ray.shutdown()
-
-
-class _Tasks:
-    """The items that the cluster has, and those that it will get."""
-
-    def __init__(self, ray: Any, order: bytes, items: Sequence[bytes]) -> None:  # noqa: ANN401
-        self._ray, self._items = ray, items
-        self._order = ray.put(order)
-        self._waiting, self._deaths = deque(range(len(items))), Counter[int]()
-        self._running: dict[Any, int] = {}
-        self._call = ray.remote(
-            num_cpus=1, max_retries=0, runtime_env={"env_vars": ONE_THREAD}
-        )(answer)  # fmt: skip
-
-    def fill(self, size: int) -> bool:
-        """Let the cluster have ``size`` items; whether it has any."""
-        while self._waiting and len(self._running) < size:
-            number = self._waiting.popleft()
-            self._running[self._call.remote(self._order, self._items[number])] = number
-        return bool(self._running)
-
-    def wait(self) -> Iterator[tuple[int, Any, Failure | None]]:
-        """The items that have ended since, at least one unless a process has died."""
-        done, _ = self._ray.wait(list(self._running), num_returns=1)
-        for task in done:
-            number = self._running.pop(task)
-            try:
-                yield number, *pickle.loads(self._ray.get(task))
-            except self._ray.exceptions.RayError as error:
-                self._deaths[number] += 1
-                if self._deaths[number] < ATTEMPTS:
-                    self._waiting.append(number)
-                    continue
-                why = f"{type(error).__name__}: {error}".partition("\n")[0]
-                text = f"its process died {ATTEMPTS} times: {why}"
-                yield number, None, Failure(text, has_died=True)
 
 
 def _require_listener(address: str) -> None:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from controller.sweeps.engine import Ended, Engine, Failure
+from controller.sweeps.engine import Engine, Failure
 from controller.sweeps.identity import digest
 from controller.sweeps.local import LocalEngine, processors
 from controller.sweeps.rows import SEED, Columns, Row
 from controller.sweeps.sweep_file import SweepFile
-from controller.sweeps.targets import Target, about_of, job_of, target_of
+from controller.sweeps.targets import target_of
 from go2_wbc.errors import CommandError, SweepError, unknown_name
 
 FOLDER = Path("out/sweeps")
@@ -121,25 +121,45 @@ def sweep(
     file = FOLDER / f"{_slug(target.name)}.sqlite" if out is None else Path(out)
     if fresh:
         remove_sweep(file)
-    seeds = range(first_seed, first_seed + n)
-    with SweepFile(file, about_of(target)) as rows:
-        known = _FirstRows(seeds, {int(row[SEED]): row for row in rows.rows(seeds)}, is_enough)
-        left = [seed for seed in seeds if seed not in known.all]
-        progress = _Meter(len(seeds), len(left), on_progress)
-        progress.tell(None)
-        with closing(_run(runner, target, [] if known.are_enough else left)) as ends:
-            for ended in ends:
+    seeds, first, start = range(first_seed, first_seed + n), list[Row](), time.monotonic()
+    with SweepFile(file, target.all_about) as rows:
+        known = {int(row[SEED]): row for row in rows.rows(seeds)}
+        left = [seed for seed in seeds if seed not in known]
+        are_enough = _are_enough(first, seeds, known, is_enough)
+        on_progress(Progress(n - len(left), n, 0.0))
+        with closing(runner.run(target.job, [] if are_enough else left)) as ends:
+            for count, ended in enumerate(ends, 1):
                 if ended.failure is None:
                     rows.add(ended.item, ended.value)
-                    known.add(ended.item, ended.value)
+                    known[ended.item] = ended.value
                 else:
                     rows.add_failure(ended.item, ended.failure.text)
                     if not keep_going:
                         raise SweepError(_told(ended.item, ended.failure, rows))
-                progress.tell(ended.failure)
-                if known.are_enough:
+                rate = count / max(time.monotonic() - start, math.ulp(1.0))
+                on_progress(Progress(n - len(left) + count, n, rate, ended.failure))
+                if are_enough := _are_enough(first, seeds, known, is_enough):
                     break
-        return _result(rows, known.seeds)
+        return _result(rows, seeds[: len(first)] if are_enough else seeds)
+
+
+def _are_enough(
+    first: list[Row],
+    seeds: Sequence[int],
+    known: Mapping[int, Row],
+    is_enough: Callable[[Sequence[Row]], bool] | None,
+) -> bool:
+    """Whether the rows of the first seeds, as far as there is no gap, are enough.
+
+    ``first`` are those that were not; it is added to, until they are.
+    """
+    for seed in seeds[len(first) :]:
+        if is_enough is None or seed not in known:
+            return False
+        first.append(known[seed])
+        if is_enough(first):
+            return True
+    return False
 
 
 def read_sweep(path: Path | str) -> SweepResult:
@@ -183,57 +203,6 @@ def engine_of(name: str, workers: int | None, address: str | None = None) -> Eng
     if address is not None:
         raise CommandError("an address is that of a Ray cluster: choose the engine ray")
     return LocalEngine(workers or processors())
-
-
-def _run(engine: Engine, target: Target, seeds: Sequence[int]) -> Generator[Ended[int], None, None]:
-    """What comes of each seed; closing it ends the workers."""
-    yield from engine.run(job_of(target), seeds)
-
-
-class _FirstRows:
-    """The rows of the first seeds, as far as there is no gap, and whether they are enough.
-
-    Attributes:
-        all: every row, by its seed.
-        seeds: that the result is about: all, or the fewest that are enough.
-        are_enough: whether the sweep may end.
-    """
-
-    def __init__(
-        self, seeds: range, rows: dict[int, Row], is_enough: Callable[[Sequence[Row]], bool] | None
-    ) -> None:
-        self.all, self.seeds, self.are_enough = rows, seeds, False
-        self._first, self._is_enough = list[Row](), is_enough
-        self._look()
-
-    def add(self, seed: int, row: Row) -> None:
-        self.all[seed] = row
-        self._look()
-
-    def _look(self) -> None:
-        while self._is_enough is not None and not self.are_enough:
-            if (count := len(self._first)) == len(self.seeds):
-                return
-            if (row := self.all.get(self.seeds[count])) is None:
-                return
-            self._first.append(row)
-            if self._is_enough(self._first):
-                self.are_enough, self.seeds = True, self.seeds[: count + 1]
-
-
-class _Meter:
-    """Counts what has ended, and how fast."""
-
-    def __init__(self, total: int, left: int, listener: Callable[[Progress], None]) -> None:
-        self._total, self._left, self._listener = total, left, listener
-        self._ended, self._start = -1, time.monotonic()
-
-    def tell(self, failure: Failure | None) -> None:
-        self._ended += 1
-        elapsed = time.monotonic() - self._start
-        rate = self._ended / elapsed if elapsed > 0.0 else 0.0
-        done = self._total - self._left + self._ended
-        self._listener(Progress(done, self._total, rate, failure))
 
 
 def _result(rows: SweepFile, seeds: Sequence[int] | None) -> SweepResult:

@@ -7,7 +7,9 @@ gets up. A robot that fails is a row, too: it says why, and what was not measure
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -43,24 +45,12 @@ class GaitStudy:
 
     def __call__(self, seed: int) -> Row:
         """Velocity errors [m/s], [rad/s] over 5 s, loads as shares of the limits."""
-        trial = Trial(seed)
-        row: dict[str, Value] = {
-            "ok": False,
-            "fall": "",
-            "speed_error": math.nan,
-            "side_error": math.nan,
-        }
-        row |= {"turn_error": math.nan, "speed_ripple": math.nan, "torque": math.nan}
-        try:
-            with TrialRobot(trial) as robot:
-                set_off(robot, self.gait, self.command)
-                robot.wait(START_TIME + WINDOW)
-                row |= self._measured(robot)
-        except (TrialFailed, Go2WbcError) as error:
-            row["fall"] = str(error)
-        return {**_world(trial), **row}
+        names = ("speed_error", "side_error", "turn_error", "speed_ripple", "torque")
+        return _row(Trial(seed), dict.fromkeys(names, math.nan), self._measured)
 
     def _measured(self, robot: TrialRobot) -> Row:
+        set_off(robot, self.gait, self.command)
+        robot.wait(START_TIME + WINDOW)
         recorded = robot.truth.recording()
         window = recorded.since(recorded.time[0] + START_TIME)
         ahead, left = window.com_velocity[:, 0], window.com_velocity[:, 1]
@@ -89,21 +79,10 @@ class PushStudy:
 
     def __call__(self, seed: int) -> Row:
         """Whether it stayed up, where the push came from, how far [m] and fast [m/s] it went."""
-        trial = Trial(seed)
         angle, phase = np.random.default_rng([_STREAM, seed]).random(2) * (2.0 * math.pi, 1.0)
-        row: dict[str, Value] = {
-            "ok": False,
-            "fall": "",
-            "angle": float(angle),
-            "phase": float(phase),
-        }
-        row |= {"distance": math.nan, "speed_error": math.nan}
-        try:
-            with TrialRobot(trial) as robot:
-                row |= self._pushed(robot, float(angle), float(phase))
-        except (TrialFailed, Go2WbcError) as error:
-            row["fall"] = str(error)
-        return {**_world(trial), **row}
+        drawn = {"angle": float(angle), "phase": float(phase)}
+        empty = {**drawn, "distance": math.nan, "speed_error": math.nan}
+        return _row(Trial(seed), empty, partial(self._pushed, **drawn))
 
     def _pushed(self, robot: TrialRobot, angle: float, phase: float) -> Row:
         period = GAITS["trot"].period
@@ -138,6 +117,13 @@ def set_off(robot: TrialRobot, gait: str, command: VelocityCommand) -> None:
     robot.truth.clear()
 
 
-def _world(trial: Trial) -> Row:
-    """What the seed has drawn."""
-    return {"friction": trial.friction, "mass_scale": trial.mass_scale}
+def _row(trial: Trial, empty: Row, measured: Callable[[TrialRobot], Row]) -> Row:
+    """What the seed has drawn, and what is measured; of a robot that fails why, and ``empty``."""
+    row: dict[str, Value] = {"friction": trial.friction, "mass_scale": trial.mass_scale}
+    row |= {"ok": False, "fall": "", **empty}
+    try:
+        with TrialRobot(trial) as robot:
+            row |= measured(robot)
+    except (TrialFailed, Go2WbcError) as error:
+        row["fall"] = str(error)
+    return row

@@ -94,7 +94,7 @@ class Summary:
             "n": self.n,
             "rates": [{**asdict(item), "rate": item.rate} for item in self.rates],
             "spreads": [
-                {name: _finite(value) for name, value in asdict(item).items()}
+                {name: finite(value) for name, value in asdict(item).items()}
                 for item in self.spreads
             ],
             "words": [asdict(item) for item in self.words],
@@ -159,7 +159,8 @@ def _words(name: str, values: list) -> Words:
     return Words(name, counts.total(), len(counts), commonest[0] if commonest else None)
 
 
-def _finite(value: object) -> object:
+def finite(value: object) -> object:
+    """``value`` for JSON; None where it is not finite."""
     if isinstance(value, tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value

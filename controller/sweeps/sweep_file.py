@@ -11,8 +11,9 @@ from __future__ import annotations
 import math
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from controller.sweeps.rows import SEED, Columns, Row, Value, columns_of, joined
 from go2_wbc.errors import ConfigError, SweepError
@@ -78,13 +79,12 @@ class SweepFile:
             raise
 
     def _opened(self, about: About | None) -> About:
-        with self._told():
-            if not self._header("page_count") and about is not None:
-                self._begin(about)
-            self._require_format()
-            self._base.execute("PRAGMA journal_mode = WAL")
-            self._base.execute("PRAGMA synchronous = NORMAL")
-            found: dict[str, str | bytes] = dict(self._base.execute("SELECT * FROM about"))
+        if not self._header("page_count") and about is not None:
+            self._begin(about)
+        self._require_format()
+        self._all("PRAGMA journal_mode = WAL")
+        self._all("PRAGMA synchronous = NORMAL")
+        found: dict[str, str | bytes] = dict(self._all("SELECT * FROM about"))
         if about is not None and (other := _differences(found, about)):
             raise ConfigError(
                 f"{self.path} holds rows that depend on something else ({'; '.join(other)}): "
@@ -93,7 +93,7 @@ class SweepFile:
         return found
 
     def _begin(self, about: About) -> None:
-        with self._transaction():
+        with self._told(), self._transaction():
             for statement in _TABLES:
                 self._base.execute(statement)
             self._base.executemany("INSERT OR IGNORE INTO about VALUES (?, ?)", about.items())
@@ -137,30 +137,26 @@ class SweepFile:
         Raises:
             SweepError: if the disk refuses.
         """
-        with self._told():
-            self._base.execute("INSERT OR REPLACE INTO failures VALUES (?, ?)", [seed, text])
+        self._all("INSERT OR REPLACE INTO failures VALUES (?, ?)", seed, text)
 
     # --- reading --------------------------------------------------------------------------
 
     @property
     def columns(self) -> Columns:
         """Names and kinds of the values; empty before the first row."""
-        with self._told():
-            return dict(self._base.execute("SELECT name, kind FROM columns ORDER BY place"))
+        return dict(self._all("SELECT name, kind FROM columns ORDER BY place"))
 
     @property
     def finished(self) -> set[int]:
         """Seeds whose rows are there."""
-        if not self.columns:
-            return set()
-        with self._told():
-            return {seed for (seed,) in self._base.execute(f"SELECT {SEED} FROM rows")}
+        return (
+            {seed for (seed,) in self._all(f"SELECT {SEED} FROM rows")} if self.columns else set()
+        )
 
     @property
     def failures(self) -> dict[int, str]:
         """Why seeds gave no row."""
-        with self._told():
-            return dict(self._base.execute("SELECT seed, text FROM failures ORDER BY seed"))
+        return dict(self._all("SELECT seed, text FROM failures ORDER BY seed"))
 
     def rows(self, seeds: Iterable[int] | None = None) -> list[Row]:
         """The rows in the order of their seeds, which each has as its first value."""
@@ -169,16 +165,11 @@ class SweepFile:
             return []
         wanted = None if seeds is None else frozenset(seeds)
         names = ", ".join(map(_quoted, columns))
-        with self._told():
-            found = self._base.execute(f"SELECT {names} FROM rows ORDER BY {SEED}")
-            return [
-                {
-                    name: _read(value, columns[name])
-                    for name, value in zip(columns, row, strict=True)
-                }
-                for row in found
-                if wanted is None or row[0] in wanted
-            ]
+        return [
+            {name: _read(value, columns[name]) for name, value in zip(columns, row, strict=True)}
+            for row in self._all(f"SELECT {names} FROM rows ORDER BY {SEED}")
+            if wanted is None or row[0] in wanted
+        ]
 
     def close(self) -> None:
         """Fold the log into the file and end; idempotent."""
@@ -193,10 +184,14 @@ class SweepFile:
 
     # --- SQLite ---------------------------------------------------------------------------
 
+    def _all(self, statement: str, *values: Value) -> list[Any]:
+        """The rows that a statement gives."""
+        with self._told():
+            return self._base.execute(statement, values).fetchall()
+
     def _header(self, name: str) -> int:
         """A number in the header of the file."""
-        with closing(self._base.execute(f"PRAGMA {name}")) as found:
-            return found.fetchone()[0]
+        return self._all(f"PRAGMA {name}")[0][0]
 
     @contextmanager
     def _transaction(self) -> Iterator[None]:

@@ -42,6 +42,16 @@ class Target:
     function: Callable[[int], object]
     about: Mapping[str, str | bytes] = field(default_factory=dict)
 
+    @property
+    def job(self) -> Job:
+        """What workers call."""
+        return Job(self.function, own_code())
+
+    @property
+    def all_about(self) -> dict[str, str | bytes]:
+        """All that its rows depend on besides the seed."""
+        return {"what": self.name, **self.about, **identity()}
+
 
 @dataclass(frozen=True, slots=True)
 class Job:
@@ -255,13 +265,3 @@ def _numbers(word: str, text: str, most: int) -> list[float]:
     if len(values) > most:
         raise CommandError(f"{word}: at most {most} numbers, got {len(values)}; valid: {FORMS}")
     return values
-
-
-def about_of(target: Target) -> dict[str, str | bytes]:
-    """All that the rows of a target depend on besides the seed, by name."""
-    return {"what": target.name, **target.about, **identity()}
-
-
-def job_of(target: Target) -> Job:
-    """What workers call."""
-    return Job(target.function, own_code())

@@ -1,83 +1,35 @@
 """A worker: a process that takes a function and items from its parent, and answers each.
 
-Messages are lengths and pickles, over the standard streams. What the function prints goes to
-standard error. When the parent ends, however it came, so does the worker, at once.
+What the function prints goes to standard error. When the parent ends, however it came, so does the
+worker, at once.
 """
 
 from __future__ import annotations
 
 import gc
-import io
 import logging
+import multiprocessing
 import os
 import pickle
 import signal
-import struct
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache, lru_cache
+from multiprocessing.connection import Connection
 from pathlib import Path
-from queue import SimpleQueue
-from typing import IO, Any
+from typing import Any
 
 from controller.sweeps.engine import Failure
-from controller.sweeps.identity import SOURCES
 
 _HERE = Path(__file__).parent
-_LENGTH = struct.Struct("<Q")
-_OURS = (*SOURCES, "benchmarks")
-"""Packages that stay what they are while a process runs: those of users may be edited."""
-
-
-def write_message(stream: IO[bytes], content: bytes) -> None:
-    """Send a message, at once."""
-    stream.write(_LENGTH.pack(len(content)) + content)
-    stream.flush()
-
-
-def read_message(stream: IO[bytes]) -> bytes | None:
-    """The next message; None if there is none, or not all of it: the other end has gone."""
-    head = stream.read(_LENGTH.size)
-    if len(head) < _LENGTH.size:
-        return None
-    (length,) = _LENGTH.unpack(head)
-    content = stream.read(length)
-    return content if len(content) == length else None
 
 
 def order_of(function: Callable[[Any], Any]) -> bytes:
     """The message that tells a worker what to call, and where to look for it."""
     return pickle.dumps((sys.path, pickle.dumps(function)))
-
-
-def modules_of(*pickled: bytes) -> tuple[str, ...]:
-    """Modules of this project in which a worker will look for what these pickles name."""
-    found = dict[str, None]()
-    for content in pickled:
-        _Reader(content, found).load()
-    return tuple(name for name in found if name.partition(".")[0] in _OURS)
-
-
-class _Reader(pickle.Unpickler):
-    """Notes the modules that a pickle names."""
-
-    def __init__(self, content: bytes, found: dict[str, None]) -> None:
-        super().__init__(io.BytesIO(content))
-        self._found = found
-
-    def find_class(self, module_name: str, global_name: str) -> Any:  # noqa: ANN401 - anything
-        self._found[module_name] = None
-        return super().find_class(module_name, global_name)
-
-
-def cause_of(code: int) -> str:
-    """What an exit code of ``subprocess`` says."""
-    with suppress(ValueError):
-        return f"killed by {signal.Signals(-code).name}"
-    return f"exit code {code}"
 
 
 def answer(order: bytes, item: bytes) -> bytes:
@@ -107,38 +59,43 @@ def _tidy_up() -> None:
     _keep_the_rest()
 
 
-@cache
-def _keep_the_rest() -> None:
-    """What the first item has imported and kept is not looked through again: that takes long."""
-    gc.freeze()
+_keep_the_rest = cache(gc.freeze)
+"""What the first item has imported and kept is not looked through again: that takes long."""
 
 
 @lru_cache(maxsize=1)
 def _ordered(order: bytes) -> Callable[[Any], Any]:
     """The function of an order: unpickled once, so that what it keeps is kept."""
     path, function = pickle.loads(order)
-    follow(path)
+    sys.path += [place for place in path if place not in sys.path]  # after one's own
     return pickle.loads(function)
 
 
-def follow(path: Sequence[str]) -> None:
-    """Find modules where the parent does, after the places of one's own."""
-    sys.path += [place for place in path if place not in sys.path]
+def serve(pipe: Connection, order: bytes, environment: Mapping[str, str]) -> None:
+    """Answer what comes through ``pipe``, as a process that was started anew with ``environment``.
 
-
-def main() -> None:
-    """Answer what comes in until the parent closes the stream."""
-    source, sink = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    Until the parent closes the pipe, or ends.
+    """
+    if sys.flags.hash_randomization:
+        sys.exit(
+            "multiprocessing's fork server runs already, with sets in random order: sweep first"
+        )
+    gc.freeze()  # the collector passes over what was loaded before the fork, which is shared
+    os.setpgid(0, 0)  # out of reach of Ctrl-C, which was put off for the start
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    threading.Thread(target=_end_with_parent, name="parent", daemon=True).start()
     os.dup2(2, 1)
+    os.environ.clear()
+    os.environ.update(environment)
     logging.getLogger().addHandler(logging.NullHandler())  # a fall is told by its row
-    items: SimpleQueue[bytes] = SimpleQueue()
-    threading.Thread(target=_receive, args=(source, items), name="parent", daemon=True).start()
-    order = items.get()
-    while True:
-        write_message(sink, answer(order, items.get()))
+    if (random := sys.modules.get("numpy.random")) is not None:
+        random.seed()  # Python's own numbers are seeded anew by a fork
+    with suppress(EOFError):
+        while True:
+            pipe.send_bytes(answer(order, pipe.recv_bytes()))
 
 
-def _receive(source: IO[bytes], items: SimpleQueue[bytes]) -> None:
-    while (content := read_message(source)) is not None:
-        items.put(content)
-    os._exit(0)
+def _end_with_parent() -> None:
+    if (parent := multiprocessing.parent_process()) is not None:
+        parent.join()
+        os._exit(0)

@@ -112,9 +112,8 @@ def write_api_pages(app: Sphinx) -> None:
 
 def help_of(name: str) -> str:
     """The help of a subcommand of ``go2-wbc``, 80 columns wide."""
-    module = import_module({command.name: command.module for command in COMMANDS}[name])
     subparsers = argparse.ArgumentParser(PROGRAM).add_subparsers()
-    module.register(subparsers)
+    {command.name: command for command in COMMANDS}[name].add_to(subparsers)
     with mock.patch.dict(os.environ, {"COLUMNS": "80"}):
         return subparsers.choices[name].format_help()
 

@@ -17,7 +17,7 @@ from tests.mutation.runner import Outcome, Sandbox, nearest_tests
 ROOT = Path(__file__).resolve().parent.parent.parent
 PACKAGES: tuple[str, ...] = ("go2_wbc", "motions", "viz", "controller")
 # Not mutated: their tests need ROS 2 or DDS.
-LEFT_OUT = ("controller/bridges", "controller/cli/ros2", "controller/cli/unitree")
+LEFT_OUT = ("controller/bridges", "controller/cli/bridges")
 EQUIVALENT = Path(__file__).with_name("equivalent.toml")
 # Fast tests that take long or need a browser; they run with the whole suite only.
 LATE = ("test_seeded_faults.py", "test_pytest_plugin.py", "test_*browser.py")

@@ -6,6 +6,7 @@ import math
 import os
 import re
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -73,12 +74,6 @@ def process(seed: int) -> dict[str, object]:
     return {"pid": os.getpid(), "parent": os.getppid()}
 
 
-def has_kernels() -> bool:
-    """Whether the planner's are loaded already, not only the module that has them."""
-    planner = sys.modules.get("go2_wbc.planning.locomotion")
-    return planner is not None and "compiled" in vars(planner.plan)
-
-
 def surroundings(seed: int) -> dict[str, object]:
     """What a worker has from its parent, and the threads of the process that has forked it."""
     status = Path(f"/proc/{os.getppid()}/status").read_text()
@@ -87,7 +82,6 @@ def surroundings(seed: int) -> dict[str, object]:
         "variable": os.environ.get("GO2_WBC_TEST_VARIABLE", ""),
         "place": sys.path[-1],
         "robot": "pinocchio" in sys.modules,
-        "kernels": has_kernels(),
         "threads": int(status.partition("Threads:")[2].split()[0]),
         "number": float(np.random.random()),  # noqa: NPY002 - nobody has seeded it
     }
@@ -117,5 +111,13 @@ def no_row(seed: int) -> object:
     return [seed]
 
 
-def other_names(seed: int) -> dict[str, object]:
-    return {"a": 1.0} if seed else {"b": 1.0}
+def python(*words: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Runs Python anew."""
+    return subprocess.run(
+        [sys.executable, *words],
+        cwd=folder,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )

@@ -6,37 +6,35 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from controller import Certificate, certify, sweep
 from controller.cli.common import ExitCode
-from controller.cli.main import main
 from controller.report_view import planned
-from controller.sweeps.certificate_view import certified_rate, with_certificate
-from controller.sweeps.certify import read_certificate
+from controller.sweeps.certify import certified_rate, read_certificate, with_certificate
 from controller.sweeps.motion_study import world_of
 from controller.sweeps.rows import Row
 from go2_wbc import World
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.world import DOUBTFUL
 from motions import FeasibilityChecker, Timeline, deg
+from tests.controller.cli.conftest import Run, Said
 from tests.controller.sweeps import swept
 from tests.viz.page_reader import read_data
 
 ROOT = Path(__file__).resolve().parents[3]
 BOW = Timeline(name="bow").body(pitch=deg(8), over=0.4).home(over=0.4)
-LEAP = Timeline(name="leap").body(y=0.12, over=0.1).body(y=-0.12, over=0.1).home(over=0.1)
-"""Asks for far more than friction gives."""
 MOTIONS = '''
 from motions import Timeline, deg, motion
 
 @motion
 def leap() -> Timeline:
-    """Leap: more than friction gives."""
+    """Leap: far more than friction gives."""
     return Timeline().body(y=0.12, over=0.1).body(y=-0.12, over=0.1).home(over=0.1)
 '''
 TESTS = """
@@ -82,14 +80,6 @@ def test_finished_runs_are_not_repeated_and_one_worker_gives_the_same(
     assert again == bows
     alone = certify(BOW, 2, workers=1, out=tmp_path / "one.sqlite")
     assert set(map(str, alone.worst)) <= set(map(str, bows.worst))
-
-
-def test_what_physics_does_not_give_is_counted_and_named(tmp_path: Path) -> None:
-    found = certify(LEAP, 2, out=tmp_path / "rows.sqlite")
-    assert (found.done, found.rate) == (0, 0.0)
-    assert not found.meets(0.1)
-    assert all("trunk" in str(row["harm"]) for row in found.worst)
-    assert not any(row["done"] for row in found.worst)
 
 
 def test_runs_are_in_samples_of_the_world_that_is_stated(tmp_path: Path) -> None:
@@ -145,22 +135,27 @@ def test_what_holds_no_runs_of_a_motion_is_no_certificate(tmp_path: Path) -> Non
         read_certificate(tmp_path / "none.sqlite")
 
 
-def test_certify_and_preview_write_pages_with_the_certificate(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.fixture
+def certify_leap(tmp_path: Path, run: Run) -> Callable[..., Said]:
+    """``go2-wbc certify`` of the leap, whose file is kept."""
     (tmp_path / "mine.py").write_text(MOTIONS, encoding="utf-8")
-    word, rows = f"{tmp_path / 'mine.py'}:leap", str(tmp_path / "rows.sqlite")
-    page, other = tmp_path / "leap.html", tmp_path / "preview.html"
-    assert main(["certify", word, "--n", "1", "--out", rows, "--html", str(page)]) == ExitCode.OK
-    assert "leap.html" in capsys.readouterr().out
-    assert main(["preview", word, "--certificate", rows, "--html", str(other)]) == ExitCode.FAILED
+    return partial(
+        run, "certify", f"{tmp_path / 'mine.py'}:leap", "--out", tmp_path / "rows.sqlite"
+    )
+
+
+def test_certify_and_preview_write_pages_with_the_certificate(
+    certify_leap: Callable[..., Said], tmp_path: Path, run: Run
+) -> None:
+    page, other, rows = (tmp_path / name for name in ("leap.html", "preview.html", "rows.sqlite"))
+    assert "leap.html" in certify_leap("--n", 1, "--html", page).out
+    words = ("preview", f"{tmp_path / 'mine.py'}:leap", "--certificate", rows, "--html", other)
+    run(*words, code=ExitCode.FAILED)
     for file in (page, other):
         header, _ = read_data(file.read_text(encoding="utf-8"))
         assert header["verdict"]["certified"]["n"] == 1
         assert header["verdict"]["certified"]["outdated"] == ""
         assert header["verdict"]["world"] == str(DOUBTFUL)
-    words = ["certify", word, "--n", "1", "--out", rows, "--html", str(tmp_path / "page.txt")]
-    assert main(words) == ExitCode.USAGE
 
 
 @pytest.mark.parametrize("width", [0.0, 1.5, -0.1])
@@ -169,18 +164,14 @@ def test_a_width_that_is_none_is_refused(width: float, tmp_path: Path) -> None:
         certify(BOW, 2, width=width, out=tmp_path / "rows.sqlite")
 
 
-def test_the_command_fails_below_the_rate_that_is_asked_for(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_what_physics_does_not_give_is_named_and_fails_below_the_rate_that_is_asked_for(
+    certify_leap: Callable[..., Said],
 ) -> None:
-    (tmp_path / "mine.py").write_text(MOTIONS, encoding="utf-8")
-    words = ["certify", f"{tmp_path / 'mine.py'}:leap", "--n", "2"]
-    words += ["--out", str(tmp_path / "rows.sqlite")]
-    assert main(words) == ExitCode.OK
-    assert "leap: done in 0 of 2 runs" in capsys.readouterr().out
-    assert main([*words, "--at-least", "0.5", "--json"]) == ExitCode.FAILED
-    assert json.loads(capsys.readouterr().out)["done"] == 0
-    assert main([*words, "--at-least", "95"]) == ExitCode.USAGE
-    assert main([*words, "--friction", "9"]) == ExitCode.USAGE
+    assert "leap: done in 0 of 2 runs" in certify_leap("--n", 2).out
+    told = certify_leap("--n", 2, "--at-least", 0.5, "--json", code=ExitCode.FAILED)
+    certificate = json.loads(told.out)
+    assert (certificate["done"], certificate["rate"]) == (0, 0.0)
+    assert all("trunk" in row["harm"] and not row["done"] for row in certificate["worst"])
 
 
 def test_the_marker_requires_a_rate_and_says_what_is_missing(tmp_path: Path) -> None:

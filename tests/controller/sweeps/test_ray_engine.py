@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 import pytest
 
 from controller import sweep
-from controller.sweeps import Progress
+from controller.sweeps import Progress, SweepResult
 from controller.sweeps.ray_engine import ON_LOOPBACK, QUIET
 from go2_wbc.errors import SweepError
 from tests.controller.sweeps import swept
@@ -43,8 +44,15 @@ def cluster() -> Iterator[Any]:
         nodes.shutdown()
 
 
+@pytest.fixture
+def ray_sweep(cluster: Any, tmp_path: Path) -> Callable[..., SweepResult]:  # noqa: ANN401
+    """Sweeps on the cluster."""
+    return partial(sweep, engine="ray", address=cluster.address, out=tmp_path / "ray.sqlite")
+
+
 def test_rows_are_those_of_local_workers_also_if_a_node_is_killed(
     cluster: Any,  # noqa: ANN401 - Ray's own, which is untyped
+    ray_sweep: Callable[..., SweepResult],
     tmp_path: Path,
 ) -> None:
     """The node is killed with ``kill -9``, its running item with it, after ten rows."""
@@ -54,14 +62,7 @@ def test_rows_are_those_of_local_workers_also_if_a_node_is_killed(
         if progress.done >= 10 and victims:
             cluster.remove_node(victims.pop(), allow_graceful=False)
 
-    there = sweep(
-        swept.slow,
-        n,
-        engine="ray",
-        address=cluster.address,
-        out=tmp_path / "ray.sqlite",
-        on_progress=kill,
-    )
+    there = ray_sweep(swept.slow, n, on_progress=kill)
     here = sweep(swept.slow, n, workers=2, out=tmp_path / "local.sqlite")
     assert not victims
     assert there.rows == here.rows
@@ -70,35 +71,21 @@ def test_rows_are_those_of_local_workers_also_if_a_node_is_killed(
 
 
 def test_a_function_that_raises_or_kills_its_process_is_told(
-    cluster: Any,  # noqa: ANN401
-    tmp_path: Path,
+    ray_sweep: Callable[..., SweepResult],
 ) -> None:
-    out = tmp_path / "rows.sqlite"
     with pytest.raises(SweepError, match="seed 5: ValueError: five is too much"):
-        sweep(swept.raise_on_5, 8, engine="ray", address=cluster.address, out=out)
-    result = sweep(
-        swept.raise_on_5, 8, engine="ray", address=cluster.address, out=out, keep_going=True
-    )
+        ray_sweep(swept.raise_on_5, 8)
+    result = ray_sweep(swept.raise_on_5, 8, keep_going=True)
     assert (len(result.rows), list(result.failures)) == (7, [5])
-    dead = sweep(
-        swept.die_on_5,
-        8,
-        engine="ray",
-        address=cluster.address,
-        out=tmp_path / "dead.sqlite",
-        keep_going=True,
-    )
+    dead = ray_sweep(swept.die_on_5, 8, keep_going=True, fresh=True)
     assert len(dead.rows) == 7
     assert "its process died 4 times" in dead.failures[5]
 
 
 def test_workers_of_ray_have_the_environment_of_local_ones(
-    cluster: Any,  # noqa: ANN401
-    tmp_path: Path,
+    ray_sweep: Callable[..., SweepResult],
 ) -> None:
-    (row,) = sweep(
-        swept.threads, 1, engine="ray", address=cluster.address, out=tmp_path / "rows.sqlite"
-    ).rows
+    (row,) = ray_sweep(swept.threads, 1).rows
     assert (row["blas"], row["hash"]) == ("1", "0")
 
 

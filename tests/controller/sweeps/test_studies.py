@@ -10,8 +10,7 @@ import pytest
 
 from controller import sweep
 from controller.cli.common import ExitCode
-from controller.cli.main import main
-from controller.sweeps.motion_study import MotionStudy, archive_of
+from controller.sweeps.motion_study import MotionStudy, archive_of, replay
 from controller.sweeps.rows import Row, row_of
 from controller.sweeps.run import SweepResult
 from controller.sweeps.studies import GaitStudy, PushStudy
@@ -23,6 +22,7 @@ from go2_wbc.errors import CommandError
 from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.robot.model import RobotModel
 from motions import CompiledPlan, Timeline, compile_timeline
+from tests.controller.cli.conftest import Run
 from tests.controller.sweeps import swept
 from tests.viz.page_reader import read_data
 
@@ -110,12 +110,11 @@ def test_a_small_push_is_survived_and_a_monstrous_one_is_not() -> None:
 
 
 def test_a_row_is_replayed_to_the_last_bit_and_shown(
-    dips: SweepResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    dips: SweepResult, tmp_path: Path, run: Run
 ) -> None:
     page = tmp_path / "page.html"
-    code = main(["replay", str(dips.path), "1", "--html", str(page), "--json"])
-    told = json.loads(capsys.readouterr().out)
-    assert (code, told["differences"]) == (ExitCode.OK, [])
+    told = json.loads(run("replay", dips.path, 1, "--html", page, "--json").out)
+    assert told["differences"] == []
     assert told["row"] == dips.rows[1]
     text = page.read_text(encoding="utf-8")
     header, arrays = read_data(text)
@@ -126,27 +125,21 @@ def test_a_row_is_replayed_to_the_last_bit_and_shown(
 
 @pytest.mark.slow
 def test_a_row_that_has_become_another_one_is_told(
-    dips: SweepResult, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    dips: SweepResult, tmp_path: Path, run: Run
 ) -> None:
     with SweepFile(dips.path) as file, SweepFile(tmp_path / "b.db", file.about) as other:
         row: Row = {name: value for name, value in file.rows([0])[0].items() if name != "seed"}
         other.add(0, {**row, "slip": math.nextafter(float(row["slip"]), 1.0)})
-    assert main(["replay", str(tmp_path / "b.db"), "0"]) == ExitCode.FAILED
-    (marked,) = [line for line in capsys.readouterr().out.splitlines() if "another" in line]
+    text = run("replay", tmp_path / "b.db", 0, code=ExitCode.FAILED).out
+    (marked,) = [line for line in text.splitlines() if "another" in line]
     assert marked.split()[0] == "slip"
 
 
-@pytest.mark.parametrize(("row", "message"), [("99", "no row of seed 99; it has 0 to 2")])
-def test_a_row_that_is_not_there_is_told(
-    row: str, message: str, dips: SweepResult, capsys: pytest.CaptureFixture[str]
+def test_only_rows_that_are_there_and_those_of_motions_are_replayed(
+    dips: SweepResult, tmp_path: Path
 ) -> None:
-    assert main(["replay", str(dips.path), row]) == ExitCode.USAGE
-    assert message in capsys.readouterr().err
-
-
-def test_only_motions_are_replayed(tmp_path: Path) -> None:
-    from controller.sweeps.replay import replay
-
+    with pytest.raises(CommandError, match="no row of seed 99; it has 0 to 2"):
+        replay(dips.path, 99)
     result = sweep(swept.trial, 1, workers=1, out=tmp_path / "rows.sqlite")
     with pytest.raises(CommandError, match="only motions are replayed"):
         replay(result.path, 0)

@@ -10,17 +10,15 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from controller.cli import motion_preview_run
+from controller.cli import motion_preview
 from controller.cli.common import ExitCode
-from controller.cli.main import main
 from controller.cli.motion_args import MotionSource
 from go2_wbc.errors import CommandError
-from motions import Timeline
+from motions import FeasibilityChecker, Timeline
+from tests.controller.cli.conftest import Run
 from tests.live_preview import BROKEN, GOOD, TOO_HIGH, LivePreview
 from tests.viz.page_reader import read_data
 from viz.replay.html_page import PAGE_LIMIT
-
-Output = pytest.CaptureFixture[str]
 
 
 @pytest.fixture
@@ -30,10 +28,9 @@ def rise(tmp_path: Path) -> Path:
     return path
 
 
-def test_it_writes_page_and_plot_and_says_so(tmp_path: Path, capsys: Output) -> None:
+def test_it_writes_page_and_plot_and_says_so(tmp_path: Path, run: Run) -> None:
     page, plot = tmp_path / "bow.html", tmp_path / "bow.svg"
-    assert main(["preview", "bow", "--html", str(page), "--plot", str(plot)]) == ExitCode.OK
-    text = capsys.readouterr().out
+    text = run("preview", "bow", "--html", page, "--plot", plot).out
     assert text.startswith("ok   bow ")
     assert f"{page}: " in text
     assert f"{plot}: " in text
@@ -45,12 +42,12 @@ def test_it_writes_page_and_plot_and_says_so(tmp_path: Path, capsys: Output) -> 
 
 
 def test_an_infeasible_motion_is_written_too_with_exit_code_1(
-    rise: Path, tmp_path: Path, capsys: Output
+    rise: Path, tmp_path: Path, run: Run
 ) -> None:
     rise.write_text(TOO_HIGH, encoding="utf-8")
     page = tmp_path / "rise.html"
-    assert main(["preview", str(rise), "--html", str(page), "--json"]) == ExitCode.FAILED
-    report = json.loads(capsys.readouterr().out)
+    said = run("preview", rise, "--html", page, "--json", code=ExitCode.FAILED)
+    report = json.loads(said.out)
     assert not report["ok"]
     assert report["files"] == {"html": str(page)}
     header, _ = read_data(page.read_text(encoding="utf-8"))
@@ -62,9 +59,9 @@ def test_an_infeasible_motion_is_written_too_with_exit_code_1(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["webp", "gif"])
-def test_a_video_lasts_as_long_as_the_motion(tmp_path: Path, suffix: str) -> None:
+def test_a_video_lasts_as_long_as_the_motion(tmp_path: Path, suffix: str, run: Run) -> None:
     path = tmp_path / f"bow.{suffix}"
-    assert main(["preview", "bow", "--video", str(path)]) == ExitCode.OK
+    run("preview", "bow", "--video", path)
     with Image.open(path) as image:
         frames = getattr(image, "n_frames", 1)
         image.seek(1)
@@ -73,58 +70,30 @@ def test_a_video_lasts_as_long_as_the_motion(tmp_path: Path, suffix: str) -> Non
     assert frames == round(2.4 * 12.5) + 1
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "message"),
-    [
-        (["--html", "bow.pdf"], ExitCode.USAGE, "valid: .html, .htm"),
-        (["--video", "bow.mp4"], ExitCode.USAGE, "valid: .webp, .gif"),
-        (["--plot", "bow"], ExitCode.USAGE, "no suffix; valid: .svg, .png"),
-        (["--port", "http"], ExitCode.USAGE, "must be a port from 0 to 65535, got 'http'"),
-        (["--port", "65536"], ExitCode.USAGE, "must be a port from 0 to 65535"),
-        (["--html", "bow.html", "--set", "angle=9"], ExitCode.FAILED, "angle must be 0.1 to 0.45"),
-    ],
-)
-def test_what_is_wrong_is_said_with_what_is_valid(
-    arguments: list[str],
-    code: ExitCode,
-    message: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: Output,
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["preview", "bow", *arguments]) == code
-    assert message in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_place_that_cannot_be_written_is_refused_before_the_work(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Output
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
     def work(*_: object) -> None:
         pytest.fail("the check ran first")
 
-    monkeypatch.setattr(motion_preview_run.FeasibilityChecker, "evaluate", work)
+    monkeypatch.setattr(FeasibilityChecker, "evaluate", work)
     (tmp_path / "file").write_text("")
     target = tmp_path / "file" / "bow.html"
-    assert main(["preview", "bow", "--html", str(target)]) == ExitCode.USAGE
-    assert f"cannot write {target}" in capsys.readouterr().err
+    said = run("preview", "bow", "--html", target, code=ExitCode.USAGE)
+    assert f"cannot write {target}" in said.err
 
 
-def test_unknown_motions_and_several_motions_are_refused(rise: Path, capsys: Output) -> None:
-    assert main(["preview", "levitate", "--no-open"]) == ExitCode.USAGE
-    assert "unknown motion 'levitate'; valid: beckon" in capsys.readouterr().err
+def test_several_motions_are_refused(rise: Path, run: Run) -> None:
     rise.write_text(GOOD + GOOD.replace("rise", "second"), encoding="utf-8")
-    assert main(["preview", str(rise), "--no-open"]) == ExitCode.USAGE
-    assert "choose FILE.py:NAME: rise, second" in capsys.readouterr().err
+    said = run("preview", rise, "--no-open", code=ExitCode.USAGE)
+    assert "choose FILE.py:NAME: rise, second" in said.err
 
 
-def test_a_port_in_use_is_named(capsys: Output) -> None:
+def test_a_port_in_use_is_named(run: Run) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        arguments = ["preview", "bow", "--no-open", "--port", str(port)]
-        assert main(arguments) == ExitCode.USAGE
-    assert f"cannot listen on port {port} of 127.0.0.1" in capsys.readouterr().err
+        said = run("preview", "bow", "--no-open", "--port", port, code=ExitCode.USAGE)
+    assert f"cannot listen on port {port} of 127.0.0.1" in said.err
 
 
 def seconds(source: MotionSource) -> float:
@@ -183,18 +152,17 @@ def test_a_browser_is_opened_where_there_is_a_screen(
     arguments: list[str],
     opens: bool,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: Output,
+    run: Run,
 ) -> None:
     opened: list[str] = []
 
     def interrupt(_seconds: float) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(motion_preview_run, "display_problem", lambda: problem)
-    monkeypatch.setattr(motion_preview_run.webbrowser, "open", opened.append)
-    monkeypatch.setattr(motion_preview_run.time, "sleep", interrupt)
-    assert main(["preview", "bow", "--port", "0", *arguments]) == ExitCode.OK
-    first, verdict = capsys.readouterr().out.splitlines()
+    monkeypatch.setattr("go2_wbc.plant.mujoco.viewer.display_problem", lambda: problem)
+    monkeypatch.setattr(motion_preview.webbrowser, "open", opened.append)
+    monkeypatch.setattr(motion_preview.time, "sleep", interrupt)
+    first, verdict = run("preview", "bow", "--port", 0, *arguments).out.splitlines()
     assert first.startswith("bow: http://127.0.0.1:")
     assert "bow.py; Ctrl-C ends)" in first
     assert verdict.startswith("ok   bow ")

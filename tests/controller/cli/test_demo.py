@@ -2,114 +2,100 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import viz
-from controller.cli import demo, demo_run, main
+from controller.cli import demo
 from controller.cli.common import ExitCode
 from controller.cli.main import high_five_demo
 from controller.demo import run_demo
+from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError, PlantTimeout
+from tests.controller.cli.conftest import Run, Said
 from tests.controller.fake_go2 import FakeGo2
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
+PROGRAM = (sys.executable, "-m", "controller.cli.main")
 NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
-def parsed(*options: str) -> argparse.Namespace:
-    parser = argparse.ArgumentParser()
-    demo.register(parser.add_subparsers())
-    return parser.parse_args(["demo", *options])
+Pretend = Callable[..., Said]
 
 
 @pytest.fixture
-def pretend(monkeypatch: pytest.MonkeyPatch) -> Callable[[FakeGo2], None]:
-    """Lets the command drive a fake robot and draw nothing."""
-
-    def install(go2: FakeGo2) -> None:
-        monkeypatch.setattr(demo_run, "GO2Controller", lambda **_options: go2)
-        monkeypatch.setattr(demo_run, "MujocoPlant", lambda *_args, **_options: None)
-
-    return install
-
-
-@pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Puts a few bytes in the place of every picture."""
+def demo_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run) -> Pretend:
+    """Runs the command with a fake robot, and a few bytes in the place of every picture."""
 
     def draw(_recording: object, path: Path, **_options: object) -> Path:
         path.write_bytes(b"picture")
         return path
 
+    def demo_of(go2: FakeGo2, *words: object, code: int = ExitCode.OK) -> Said:
+        monkeypatch.setattr("controller.go2_controller.GO2Controller", lambda **_options: go2)
+        return run("demo", "--out", tmp_path, *words, code=code)
+
+    monkeypatch.setattr("go2_wbc.plant.MujocoPlant", lambda *_args, **_options: None)
     for name in ("export_html", "export_filmstrip", "export_animation"):
         monkeypatch.setattr(viz, name, draw)
+    return demo_of
 
 
 # --- the command --------------------------------------------------------------------------------
 
 
 def test_a_good_run_prints_the_table_leaves_its_files_and_exits_with_0(
-    tmp_path: Path,
-    pretend: Callable[[FakeGo2], None],
-    drawn: None,
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, demo_of: Pretend
 ) -> None:
-    pretend(FakeGo2())
-    assert main.main(["demo", "--out", str(tmp_path / "new" / "folder")]) == ExitCode.OK
+    folder = tmp_path / "new" / "folder"
+    said = demo_of(FakeGo2(), "--out", folder)
     names = {"demo.html", "demo.npz", "demo.png", "demo.webp", "report.json"}
-    assert {file.name for file in (tmp_path / "new" / "folder").iterdir()} == names
-    captured = capsys.readouterr()
-    assert "All 8 steps done" in captured.out
-    assert all(name in captured.out for name in names)
-    assert captured.err.splitlines()[:2] == ["1/8 stand up: ok", "2/8 sit: ok"]
-    assert len(captured.err.splitlines()) == 8
+    assert {file.name for file in folder.iterdir()} == names
+    assert "All 8 steps done" in said.out
+    assert all(name in said.out for name in names)
+    assert said.err.splitlines()[:2] == ["1/8 stand up: ok", "2/8 sit: ok"]
+    assert len(said.err.splitlines()) == 8
 
 
-def test_a_run_with_a_failed_step_exits_with_1_and_says_why_at_once(
-    tmp_path: Path, pretend: Callable[[FakeGo2], None], capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("go2", "code", "message"),
+    [
+        (
+            {"refusals": {"high_five": "the paw was not held"}},
+            ExitCode.FAILED,
+            "7/8 high five: NOT DONE: the paw was not held",
+        ),
+        ({"errors": {"walk": PlantTimeout("no news")}}, ExitCode.RUNTIME, "go2-wbc: no news"),
+    ],
+)
+def test_a_step_that_is_not_done_and_a_plant_that_fails_are_told(
+    go2: dict[str, Any], code: ExitCode, message: str, demo_of: Pretend
 ) -> None:
-    pretend(FakeGo2(refusals={"high_five": "the paw was not held"}))
-    assert main.main(["demo", "--no-media", "--out", str(tmp_path)]) == ExitCode.FAILED
-    assert "7/8 high five: NOT DONE: the paw was not held" in capsys.readouterr().err
-
-
-def test_a_plant_that_fails_exits_with_3(
-    tmp_path: Path, pretend: Callable[[FakeGo2], None], capsys: pytest.CaptureFixture[str]
-) -> None:
-    pretend(FakeGo2(errors={"walk": PlantTimeout("no news")}))
-    assert main.main(["demo", "--no-media", "--out", str(tmp_path)]) == ExitCode.RUNTIME
-    assert "go2-wbc: no news" in capsys.readouterr().err
+    assert message in demo_of(FakeGo2(**go2), "--no-media", code=code).err
 
 
 def test_json_is_all_that_goes_to_standard_output_and_equals_the_file(
-    tmp_path: Path,
-    pretend: Callable[[FakeGo2], None],
-    drawn: None,
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, demo_of: Pretend
 ) -> None:
-    pretend(FakeGo2())
-    main.main(["demo", "--json", "--seed", "3", "--out", str(tmp_path)])
-    printed = json.loads(capsys.readouterr().out)
+    printed = json.loads(demo_of(FakeGo2(), "--json", "--seed", 3).out)
     assert printed == json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert printed["settings"]["seed"] == 3
     assert len(printed["steps"]) == 8
 
 
 def test_without_media_the_recording_is_kept_and_nothing_is_drawn(
-    tmp_path: Path, pretend: Callable[[FakeGo2], None]
+    tmp_path: Path, demo_of: Pretend
 ) -> None:
     go2 = FakeGo2()
-    pretend(go2)
-    main.main(["demo", "--no-media", "--out", str(tmp_path)])
+    demo_of(go2, "--no-media")
     assert {file.name for file in tmp_path.iterdir()} == {"demo.npz", "report.json"}
     with np.load(tmp_path / "demo.npz") as arrays:
         np.testing.assert_array_equal(arrays["q"], go2.recording().q)
@@ -117,95 +103,83 @@ def test_without_media_the_recording_is_kept_and_nothing_is_drawn(
 
 
 def test_a_picture_that_cannot_be_made_is_a_runtime_error_after_the_table(
-    tmp_path: Path,
-    pretend: Callable[[FakeGo2], None],
-    drawn: None,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path, demo_of: Pretend, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_args: object, **_options: object) -> Path:
         raise ConfigError("the page would have 9 bytes")
 
-    pretend(FakeGo2())
     monkeypatch.setattr(viz, "export_html", refuse)
-    assert main.main(["demo", "--out", str(tmp_path)]) == ExitCode.RUNTIME
-    captured = capsys.readouterr()
-    assert "All 8 steps done" in captured.out
-    assert "go2-wbc: the page would have 9 bytes" in captured.err
+    said = demo_of(FakeGo2(), code=ExitCode.RUNTIME)
+    assert "All 8 steps done" in said.out
+    assert "go2-wbc: the page would have 9 bytes" in said.err
     assert (tmp_path / "report.json").is_file()
 
 
-@pytest.mark.parametrize("place", ["a file", "below a file"])
+@pytest.mark.parametrize(
+    ("place", "reason"), [("file", "it is a file, give a folder"), ("file/folder", "cannot write")]
+)
 def test_an_unwritable_place_is_an_error_before_the_run(
-    place: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    place: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
 ) -> None:
     def start(**_options: object) -> FakeGo2:
         raise AssertionError("the run has started")
 
-    monkeypatch.setattr(demo_run, "GO2Controller", start)
-    file = tmp_path / "file"
-    file.write_text("mine", encoding="utf-8")
-    out = file if place == "a file" else file / "folder"
-    assert main.main(["demo", "--out", str(out)]) == ExitCode.USAGE
-    assert str(out) in capsys.readouterr().err
-    assert file.read_text(encoding="utf-8") == "mine"
+    monkeypatch.setattr("controller.go2_controller.GO2Controller", start)
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    said = run("demo", "--out", tmp_path / place, code=ExitCode.USAGE)
+    assert str(tmp_path / place) in said.err
+    assert reason in said.err
+    assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
 
 
 def test_the_viewer_without_a_display_is_one_line_and_the_run_goes_on(
-    tmp_path: Path,
-    pretend: Callable[[FakeGo2], None],
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    demo_of: Pretend, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in NO_DISPLAY:
         monkeypatch.delenv(name, raising=False)
-    pretend(FakeGo2())
     monkeypatch.setattr(sys, "platform", "linux")
-    code = main.main(["demo", "--viewer", "--no-media", "--out", str(tmp_path)])
-    assert code == ExitCode.OK
-    complaint = capsys.readouterr().err.splitlines()[0]
+    complaint = demo_of(FakeGo2(), "--viewer", "--no-media").err.splitlines()[0]
     assert complaint == "go2-wbc: no viewer: there is no display; going on without it"
 
 
-def test_options_reach_plant_controller_and_engine(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    seen: dict[str, object] = {}
-    monkeypatch.setattr(
-        demo_run, "MujocoPlant", lambda mjcf, **options: seen.update(options, mjcf=mjcf)
-    )
+@pytest.fixture
+def seen(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """The options that reach the plant and the controller."""
+    seen: dict[str, Any] = {}
+
+    def plant(mjcf: Path | None, **options: object) -> None:
+        seen.update(options, mjcf=mjcf)
 
     def start(**options: object) -> FakeGo2:
         seen.update(options)
         return FakeGo2()
 
-    monkeypatch.setattr(demo_run, "GO2Controller", start)
-    monkeypatch.setattr(demo_run, "_has_display", lambda: True)  # no reason to open a viewer
+    monkeypatch.setattr("go2_wbc.plant.MujocoPlant", plant)
+    monkeypatch.setattr("controller.go2_controller.GO2Controller", start)
+    return seen
+
+
+def test_options_reach_plant_controller_and_engine(
+    tmp_path: Path, seen: dict[str, Any], run: Run
+) -> None:
     file = tmp_path / "mine.toml"
     file.write_text("[locomotion]\nheight = 0.27\n", encoding="utf-8")
     options = "--seed 3 --friction 0.4 --mass-scale 1.2 --realtime --backend full --solver proxqp"
-    main.main(
-        ["demo", "--no-media", "--out", str(tmp_path), "--config", str(file), *options.split()]
-    )
+    run("demo", "--no-media", "--out", tmp_path, "--config", file, *options.split())
     config = seen["config"]
     assert (seen["seed"], seen["friction"], seen["mass_scale"]) == (3, 0.4, 1.2)
-    assert seen["initial_joint_noise"] == demo_run.START_NOISE
+    assert seen["initial_joint_noise"] == demo.START_NOISE
     assert (seen["realtime"], seen["viewer"], seen["mjcf"]) == (True, False, None)
-    assert isinstance(config, demo_run.Config)
+    assert isinstance(config, Config)
     assert (config.backend, config.wbc.solver, config.locomotion.height) == ("full", "proxqp", 0.27)
 
 
-def test_without_a_seed_the_robot_starts_exactly(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_without_options_the_robot_starts_exactly_headless_and_as_fast_as_the_cpu(
+    tmp_path: Path, seen: dict[str, Any], run: Run
 ) -> None:
-    seen: dict[str, object] = {}
-    monkeypatch.setattr(demo_run, "MujocoPlant", lambda *_args, **options: seen.update(options))
-    monkeypatch.setattr(demo_run, "GO2Controller", lambda **_options: FakeGo2())
-    main.main(["demo", "--no-media", "--out", str(tmp_path)])
+    run("demo", "--no-media", "--out", tmp_path)
     assert seen["initial_joint_noise"] == 0.0
+    assert (seen["realtime"], seen["viewer"]) == (False, False)
 
 
 def test_the_choices_are_those_of_the_engine() -> None:
@@ -223,37 +197,12 @@ def test_the_choices_are_those_of_the_engine() -> None:
         check_solver("no such solver")
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        ["--friction", "0"],
-        ["--friction", "-1"],
-        ["--mass-scale", "inf"],
-        ["--mass-scale", "heavy"],
-        ["--seed", "-1"],
-        ["--seed", "1.5"],
-        ["--backend", "magic"],
-        ["--solver", "magic"],
-    ],
-)
-def test_a_value_out_of_range_is_a_usage_error(
-    options: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main.main(["demo", *options]) == ExitCode.USAGE
-    assert options[0] in capsys.readouterr().err
-
-
 def test_the_script_of_the_course_is_the_same_command(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["high_five_demo", "--help"])
     assert high_five_demo() == ExitCode.OK
     assert capsys.readouterr().out.startswith("usage: go2-wbc demo")
-
-
-def test_the_defaults_are_headless_and_as_fast_as_the_cpu() -> None:
-    args = parsed()
-    assert (args.viewer, args.realtime, args.no_media) == (False, False, False)
 
 
 # --- the filmstrip ------------------------------------------------------------------------------
@@ -267,7 +216,7 @@ def test_the_filmstrip_shows_sitting_swinging_and_the_raised_paw() -> None:
     inside = np.abs(recording.time - forward.start - 1.0) < 0.1
     stance[inside] = (True, False, False, True)
     recording.stance[:] = stance
-    times = demo_run.filmstrip_times(report, recording)
+    times = demo.filmstrip_times(report, recording)
     assert times is not None
     rows = [int(np.abs(recording.time - recording.time[0] - t).argmin()) for t in times]
     sit = report.steps[1]
@@ -278,13 +227,7 @@ def test_the_filmstrip_shows_sitting_swinging_and_the_raised_paw() -> None:
 
 def test_a_run_without_these_moments_leaves_the_choice_to_the_filmstrip() -> None:
     go2 = FakeGo2(falls_in="walk")
-    assert demo_run.filmstrip_times(run_demo(go2), go2.recording()) is None
-
-
-def test_a_file_in_the_way_of_the_folder_is_named(tmp_path: Path) -> None:
-    (tmp_path / "x").touch()
-    with pytest.raises(ConfigError, match="it is a file"):
-        demo_run.checked_paths(tmp_path / "x")
+    assert demo.filmstrip_times(run_demo(go2), go2.recording()) is None
 
 
 # --- the real thing -----------------------------------------------------------------------------
@@ -301,17 +244,7 @@ def test_the_real_demo_does_every_step_inside_the_limits(
 ) -> None:
     environment = {name: v for name, v in os.environ.items() if name not in NO_DISPLAY}
     done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "controller.cli.main",
-            "demo",
-            "--no-media",
-            "--viewer",
-            "--out",
-            ".",
-            *options,
-        ],
+        [*PROGRAM, "demo", "--no-media", "--viewer", "--out", ".", *options],
         cwd=tmp_path,
         env={**environment, "PYTHONPATH": str(ROOT), "PYTHONIOENCODING": "utf-8"},
         capture_output=True,

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
 import sys
 import tomllib
-from argparse import Namespace
 from pathlib import Path
 
 import pytest
 
-from controller.cli import doctor, probes
+from controller.cli import doctor
 from controller.cli.common import PROGRAM, ExitCode
-from controller.cli.doctor import Finding, Status
-from controller.cli.probes import ImportProbe
+from controller.cli.doctor import Finding, ImportProbe, Status
 from go2_wbc.errors import DescriptionError
+from tests.controller.cli.conftest import Run
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 INSIDE = str(Path(sys.prefix) / "lib" / "placo.so")
 BOUNDS = ">=0.10.2,<0.11"
 HEALTHY = Finding("Python", "python", Status.OK, "3.11.7")
@@ -35,14 +35,11 @@ def test_the_environment_of_these_tests_is_healthy() -> None:
     assert {"pin", "placo", "mujoco", "placo + pin", "URDF", "SRDF", "daqp"} <= subjects
 
 
-def test_a_module_that_imports_is_found_where_it_lies() -> None:
-    probe = probes.probe_imports(["json"])["json"]
-    assert probe.error == ""
-    assert Path(probe.file).name == "__init__.py"
-
-
-def test_qpsolvers_names_its_solvers() -> None:
-    assert "daqp" in probes.probe_imports(["qpsolvers"])["qpsolvers"].solvers
+def test_a_module_that_imports_is_found_where_it_lies_and_qpsolvers_names_its_solvers() -> None:
+    probes = doctor.probe_imports(["json", "qpsolvers"])
+    assert probes["json"].error == ""
+    assert Path(probes["json"].file).name == "__init__.py"
+    assert "daqp" in probes["qpsolvers"].solvers
 
 
 @pytest.mark.parametrize(
@@ -58,14 +55,14 @@ def test_a_broken_import_is_a_finding_and_not_the_end(
 ) -> None:
     (tmp_path / "broken_library.py").write_text(text, encoding="utf-8")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    assert expected in probes.probe_imports(["broken_library"])["broken_library"].error
+    assert expected in doctor.probe_imports(["broken_library"])["broken_library"].error
 
 
 def test_an_import_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "hanging_library.py").write_text("while True: pass", encoding="utf-8")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr(probes, "IMPORT_TIME_LIMIT", 0.2)
-    assert "0.2 s" in probes.probe_imports(["hanging_library"])["hanging_library"].error
+    monkeypatch.setattr(doctor, "IMPORT_TIME_LIMIT", 0.2)
+    assert "0.2 s" in doctor.probe_imports(["hanging_library"])["hanging_library"].error
 
 
 # --- versions -----------------------------------------------------------------------------------
@@ -76,49 +73,52 @@ def test_an_import_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.Monke
     [
         ("0.10.2", ">=0.10.2,<0.11", True),
         ("0.9.3", ">=0.10.2,<0.11", False),
-        ("0.11.0", ">=0.10.2,<0.11", False),
-        ("3.8.0", "==3.8", True),
-        ("3.8.0", "==3.8.0", True),
-        ("4.1.0", "==3.8.0", False),
-        ("4.1.0", ">=4", True),
         ("10.0", ">9", True),
-        ("2.0", "!=2.0", False),
         ("1.2.3rc1", "<=1.2.3", True),
         ("7", "", True),
     ],
 )
 def test_version_bounds_are_compared_by_number(version: str, bounds: str, fits: bool) -> None:
-    assert probes.satisfies(version, bounds) is fits
+    assert doctor.satisfies(version, bounds) is fits
 
 
 def test_requirements_are_read_without_extras() -> None:
     rows = ["placo<0.11,>=0.10.2", "pin", "x[y]>=1 ; python_version>'3'", "ruff; extra == 'dev'"]
-    assert probes.parse_requirements(rows) == {"placo": "<0.11,>=0.10.2", "pin": "", "x": ">=1"}
+    assert doctor.parse_requirements(rows) == {"placo": "<0.11,>=0.10.2", "pin": "", "x": ">=1"}
 
 
-def test_every_library_that_the_project_asks_for_is_looked_at() -> None:
-    """``coal`` and ``scipy`` were not: without them all was said to be there."""
+@pytest.mark.parametrize("is_installed", [True, False])
+def test_every_library_that_the_project_asks_for_is_known(
+    monkeypatch: pytest.MonkeyPatch, *, is_installed: bool
+) -> None:
+    """``coal`` and ``scipy`` were not looked at: without them all was said to be there."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert set(doctor.LIBRARIES) == set(probes.parse_requirements(project["dependencies"]))
+    rows = project["dependencies"]
+
+    def requires(name: str) -> list[str]:
+        if is_installed:
+            return rows
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(importlib.metadata, "requires", requires)
+    assert set(doctor.requirements_of(PROGRAM)) == set(doctor.parse_requirements(rows)) > {"coal"}
 
 
 def test_the_requirements_of_an_absent_package_are_empty() -> None:
-    assert probes.requirements_of("no-such-distribution-anywhere") == {}
+    assert doctor.requirements_of("no-such-distribution-anywhere") == {}
 
 
 # --- illnesses ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("version", "status"), [((3, 10, 9), "PROBLEM"), ((3, 14, 0), "PROBLEM")])
-def test_a_python_without_wheels_is_a_problem(version: tuple[int, ...], status: str) -> None:
+@pytest.mark.parametrize(
+    ("version", "is_fine"),
+    [((3, 10, 9), False), ((3, 11, 0), True), ((3, 13, 9), True), ((3, 14, 0), False)],
+)
+def test_a_python_without_wheels_is_a_problem(version: tuple[int, ...], *, is_fine: bool) -> None:
     finding = doctor.judge_python(version, "Linux")
-    assert finding.status.value == status
-    assert "make PYTHON=" in finding.remedy
-
-
-@pytest.mark.parametrize("version", [(3, 11, 0), (3, 12, 1), (3, 13, 9)])
-def test_a_supported_python_is_fine(version: tuple[int, ...]) -> None:
-    assert doctor.judge_python(version, "Linux").status is Status.OK
+    assert finding.status is (Status.OK if is_fine else Status.PROBLEM)
+    assert ("make PYTHON=" in finding.remedy) is not is_fine
 
 
 @pytest.mark.parametrize(
@@ -211,22 +211,18 @@ def test_a_missing_display_is_a_note_and_never_a_problem(
 )
 def test_the_verdict_and_the_exit_code_follow_the_problems(
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    run: Run,
     findings: list[Finding],
     code: ExitCode,
     verdict: str,
 ) -> None:
     monkeypatch.setattr(doctor, "examine", lambda: findings)
-    assert doctor.run(Namespace(json=False)) == code
-    assert capsys.readouterr().out.splitlines()[-1] == verdict
+    assert run("doctor", code=code).out.splitlines()[-1] == verdict
 
 
-def test_json_says_the_same(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_json_says_the_same(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
     monkeypatch.setattr(doctor, "examine", lambda: [HEALTHY, ILL])
-    assert doctor.run(Namespace(json=True)) == ExitCode.FAILED
-    report = json.loads(capsys.readouterr().out)
+    report = json.loads(run("doctor", "--json", code=ExitCode.FAILED).out)
     assert report["ok"] is False
     assert [item["status"] for item in report["findings"]] == ["ok", "problem"]
     assert report["findings"][1]["remedy"] == ILL.remedy

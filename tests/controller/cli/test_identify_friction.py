@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller.cli import main as cli
 from controller.cli.common import ExitCode
 from go2_wbc.config import load_config
 from go2_wbc.plant import MujocoPlant, Plant, friction_identification
 from go2_wbc.plant.friction_identification import FrictionEstimate
+from tests.controller.cli.conftest import Run
 
 FOUND = FrictionEstimate(
     np.linspace(0.1, 1.2, 12), np.linspace(0.0, 2.0, 12), np.full(12, 0.01), np.full(12, 0.02)
@@ -35,12 +35,11 @@ def found(monkeypatch: pytest.MonkeyPatch) -> list[Plant]:
 
 
 def test_it_prints_and_writes_what_the_controller_takes(
-    found: list[Plant], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    found: list[Plant], tmp_path: Path, run: Run
 ) -> None:
     path = tmp_path / "friction.toml"
-    assert cli.main(["identify-friction", "--out", str(path)]) == ExitCode.OK
+    out = run("identify-friction", "--out", path).out
     assert [type(plant) for plant in found] == [MujocoPlant]
-    out = capsys.readouterr().out
     assert max(map(len, out.splitlines()[:13])) <= 80
     again = tmp_path / "printed.toml"
     again.write_text(out, encoding="utf-8")
@@ -48,25 +47,16 @@ def test_it_prints_and_writes_what_the_controller_takes(
         assert load_config(file).wbc.joint_friction == FOUND.feed_forward
 
 
-def test_a_program_can_read_it(found: list[Plant], capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["identify-friction", "--json"]) == ExitCode.OK
+def test_a_program_can_read_it(found: list[Plant], run: Run) -> None:
+    answer = json.loads(run("identify-friction", "--json").out)
     assert len(found) == 1
-    answer = json.loads(capsys.readouterr().out)
     assert answer["dry"] == pytest.approx(FOUND.dry)
     assert answer["viscous_error"] == pytest.approx(FOUND.viscous_error)
 
 
-def test_a_robot_and_a_model_at_once_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["identify-friction", "--mjcf", "my_go2.xml", "--interface", "lo"]
-    assert cli.main(words) == ExitCode.USAGE
-    assert "not both" in capsys.readouterr().err
-
-
-def test_a_file_that_cannot_be_driven_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    words = ["identify-friction", "--mjcf", str(tmp_path / "none.xml"), "--json"]
-    assert cli.main(words) == ExitCode.RUNTIME
-    captured = capsys.readouterr()
-    assert "no such file" in captured.err
-    assert captured.out == ""
+def test_a_file_that_cannot_be_driven_is_refused(tmp_path: Path, run: Run) -> None:
+    said = run(
+        "identify-friction", "--mjcf", tmp_path / "none.xml", "--json", code=ExitCode.RUNTIME
+    )
+    assert "no such file" in said.err
+    assert said.out == ""

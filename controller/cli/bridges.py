@@ -1,0 +1,158 @@
+"""The robot over a network: ``go2-wbc ros2``, ``unitree-sim`` and ``unitree-drive``."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import sys
+import threading
+from contextlib import closing
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated
+
+from controller.cli.common import ExitCode, print_json_line
+from controller.cli.options import Mjcf, Numbers
+from go2_wbc.errors import PlantError
+from go2_wbc.world import SENSORS
+
+if TYPE_CHECKING:
+    from controller.bridges.unitree.drive import Step
+
+STEPS = ("stand", "trot", "high_five", "lie_down")
+
+
+def ros2(
+    *,
+    namespace: Annotated[str, "NAME", "of topics, default %(default)s"] = "robot1",
+    realtime: Annotated[bool, "at the pace of the wall clock"] = False,
+    viewer: Annotated[bool, "open MuJoCo's window"] = False,
+    sensors: Annotated[str, SENSORS, "what its state comes from"] = "ideal",
+    config: Numbers = None,
+) -> int:
+    """Serve a Go2 in MuJoCo under the whole-body controller as a ROS 2 node, until Ctrl-C.
+
+    Needs the extra [ros2]; docs/ros2.md lists topics and services.
+
+    Examples:
+        go2-wbc ros2 --realtime                      at the pace of the wall clock
+        go2-wbc ros2                                 as fast as it can, with /clock
+        go2-wbc ros2 --realtime --namespace robot2   a second robot
+        go2-wbc ros2 --realtime --sensors imu        odometry as a robot has it
+    """
+    from controller.bridges.ros2.server import ServerSettings, serve
+
+    logging.getLogger("controller").setLevel(logging.INFO)
+    settings = ServerSettings(namespace, realtime, viewer, config, sensors)
+    serve(settings, _until_signal(), lambda text: print(text, file=sys.stderr, flush=True))
+    return ExitCode.OK
+
+
+def unitree_sim(
+    *,
+    domain: Annotated[int, "N", "default %(default)s"] = 1,
+    interface: Annotated[str, "NAME", "network, default %(default)s"] = "lo",
+    mjcf: Mjcf = None,
+    friction: Annotated[float | None, "MU", "of the feet, default 0.8"] = None,
+    payload: Annotated[float, "KG", "extra mass"] = 0.0,
+    sensors: Annotated[str, SENSORS, "what the robot tells"] = "ideal",
+    seed: Annotated[int, "N", "of the noise"] = 0,
+    lockstep: Annotated[
+        bool, "under low-level control time waits for the next lowcmd (1 s at most)"
+    ] = False,
+    config: Numbers = None,
+) -> int:
+    """Simulate a Go2 that speaks Unitree's protocol (DDS), until Ctrl-C, limp at the end.
+
+    It has the sport service for the stock SportClient, lowstate and lowcmd at 500 Hz.
+
+    Examples:
+        go2-wbc unitree-sim                      domain 1 on the loopback interface
+        go2-wbc unitree-sim --domain 5 --sensors noisy
+        go2-wbc unitree-sim --mjcf my_scene.xml --interface eth0
+    """
+    from controller.bridges.unitree import require_dds
+
+    require_dds()
+    from controller.bridges.unitree.simulator import SimulatorSettings, UnitreeSimulator
+
+    logging.getLogger("controller.bridges").setLevel(logging.INFO)
+    stop = _until_signal()
+    settings = SimulatorSettings(
+        domain, interface, mjcf, friction, payload, sensors, seed, config, lockstep
+    )
+    with closing(UnitreeSimulator(settings)) as simulator:
+        print(f"serving on DDS domain {domain}, interface {interface}", flush=True)
+        while not stop.wait(0.5):
+            if not simulator.is_alive:
+                raise PlantError("the simulation has ended; what was said before tells why")
+        gate = simulator.gate
+    refused = ", ".join(f"{reason} {count}" for reason, count in gate.refused.items())
+    print(f"low-level commands: {gate.accepted} good, refused: {refused or 'none'}", flush=True)
+    return ExitCode.OK
+
+
+def unitree_drive(
+    *,
+    interface: Annotated[str, "NAME", "lo for a simulator"],
+    domain: Annotated[int, "N", "0 robot, 1 simulator"] = 0,
+    i_have_the_remote_in_hand: Annotated[bool, "required: you can stop it"] = False,
+    steps: Annotated[
+        tuple[str, ...],
+        "STEP",
+        f"of stand, sit, trot, high_five, lie_down; default {' '.join(STEPS)}",
+    ] = STEPS,
+    speed: Annotated[float, "M/S", "of the trot"] = 0.5,
+    seconds: Annotated[float, "S", "of the trot"] = 4.0,
+    stale_limit: Annotated[
+        float, "S", "damp after this time without lowstate, default %(default)s"
+    ] = 0.03,
+    config: Numbers = None,
+    json: Annotated[bool, "print a JSON line per step"] = False,
+) -> int:
+    """Drive a Go2, or go2-wbc unitree-sim, step by step with this project's controller.
+
+    It goes through lowcmd and lowstate. The robot must lie, and ends limp. Read docs/real_robot.md
+    first: no real robot has been driven by this program yet.
+
+    Examples:
+        go2-wbc unitree-drive --interface lo --domain 1 --i-have-the-remote-in-hand
+        go2-wbc unitree-drive --interface eth0 --json --i-have-the-remote-in-hand
+    """
+    from controller.arguments import config as read_config
+    from controller.bridges.unitree.drive import Trot, check_steps, drive
+    from controller.bridges.unitree.guards import GuardConfig
+    from controller.bridges.unitree.plant import UnitreePlant
+
+    check_steps([*steps])
+    trot, numbers = Trot(speed, seconds), read_config(config)
+    plant = UnitreePlant(
+        interface,
+        domain,
+        i_have_the_remote_in_hand=i_have_the_remote_in_hand,
+        guards=GuardConfig(
+            stale_limit=stale_limit, hang_limit=max(stale_limit, GuardConfig().hang_limit)
+        ),
+        estimator=numbers.estimator,
+    )
+    done = True
+    with closing(plant):
+        for step in drive(plant, [*steps], trot, numbers):
+            _tell(step, as_json=json)
+            done = done and step.ok
+    return ExitCode.OK if done else ExitCode.FAILED
+
+
+def _tell(step: Step, *, as_json: bool) -> None:
+    if as_json:
+        print_json_line(asdict(step))
+        return
+    error = "" if step.speed_error is None else f", speed off by {step.speed_error:.3f} m/s"
+    print(f"{step.name:<12}{'done' if step.ok else 'NOT done: ' + step.reason}{error}", flush=True)
+
+
+def _until_signal() -> threading.Event:
+    """Is set by Ctrl-C, and by what ends a service."""
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    return stop

@@ -1,0 +1,299 @@
+"""What motions there are and whether the robot can do them: list, new, check and export."""
+
+from __future__ import annotations
+
+import io
+import keyword
+import textwrap
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+
+from controller.cli.common import ExitCode, print_json, shown_path
+from controller.cli.motion_args import (
+    MOTION_HELP,
+    SAVED_MOTION,
+    SAVED_PLAN,
+    Friction,
+    MotionWord,
+    Payload,
+    Settings,
+    meant,
+    print_verdict,
+    the_motion,
+)
+from controller.cli.options import Json, output
+from controller.cli.progress import ProgressLine
+from go2_wbc.errors import CommandError, ConfigError
+from go2_wbc.files import checked_output, write_atomically
+from go2_wbc.legs import JOINT_NAMES, LEGS
+
+if TYPE_CHECKING:
+    from motions import CompiledPlan, FeasibilityReport, Motion, Suggestion, Timeline
+    from motions.plan.trajectory import Trajectory
+
+WIDTH = 80
+ARRAYS = ("q", "v", "a", "rpy", "p_com", "stance")
+"""What an npz file holds beside the time."""
+STARTER = '''"""{title}: a motion for the Go2.
+
+    go2-wbc check {name}.py      can the robot do it?
+    go2-wbc preview {name}.py    watch it; the page follows every save of this file
+    go2-wbc run {name}.py        play it in MuJoCo
+"""
+
+from typing import Annotated
+
+from motions import Range, Timeline, deg, motion
+
+
+@motion
+def {name}(taps: Annotated[int, Range(1, 5)] = 2) -> Timeline:
+    """{title}: bow, then tap the ground with a front paw."""
+    # The trunk: metres and radians from where it stands; deg() turns degrees into radians.
+    line = Timeline().body(pitch=deg(15), z=-0.04, over=0.8).hold(0.3).home(over=0.8)
+    # A foot that is raised leaves the ground; the trunk moves over the other three by itself.
+    for _ in range(taps):
+        line = line.foot("FR", z=0.06, over=0.4).down("FR", over=0.3)
+    # home() puts every foot down and brings the trunk back: always end with it.
+    return line.home(over=0.8)
+'''
+
+
+# --- list and new ---------------------------------------------------------------------------------
+
+
+def list_motions(
+    file: Annotated[str | None, "FILE.py", "instead of the library"] = None, *, json: Json = False
+) -> int:
+    """List motions, what they do and what can be set.
+
+    Examples:
+        go2-wbc list                 the library
+        go2-wbc list my_motion.py    the motions of your own file
+        go2-wbc list --json          the same for a program to read
+    """
+    from motions import find_motion, load_file, motion_names
+
+    if file is None:
+        found = [find_motion(name) for name in motion_names()]
+    else:
+        found = list(load_file(file).values())
+    if json:
+        print_json([_parameters(motion) for motion in found])
+        return ExitCode.OK
+    column = max(len(motion.name) for motion in found) + 2
+    indent = " " * column
+    for motion in found:
+        head = motion.name.ljust(column)
+        print(textwrap.fill(head + motion.summary, WIDTH, subsequent_indent=indent))
+        for parameter in motion.parameters:
+            print(f"{indent}--set {parameter}")
+    return ExitCode.OK
+
+
+def _parameters(motion: Motion) -> dict[str, object]:
+    values = {item.name: [item.default, str(item.valid)] for item in motion.parameters}
+    return {"name": motion.name, "summary": motion.summary, "parameters": values}
+
+
+def new(
+    name: Annotated[str, "NAME", "of the motion and its file"],
+    *,
+    out: Annotated[Path, "DIR", "default: here"] = Path(),
+    json: Json = False,
+) -> int:
+    """Write a small, commented motion to start from.
+
+    Examples:
+        go2-wbc new greet            writes greet.py
+        go2-wbc new greet --out motions_of_mine
+    """
+    if not name.isidentifier() or keyword.iskeyword(name):
+        raise CommandError(f"NAME must be a Python name such as my_motion, got {name!r}")
+    shown = out / f"{name}.py"
+    target = checked_output(shown, [".py"])
+    if target.exists():
+        raise ConfigError(f"{shown} exists already: choose another name")
+    title = name.replace("_", " ").capitalize()
+    write_atomically(target, STARTER.format(name=name, title=title).encode())
+    if json:
+        print_json({"motion": name, "file": str(target)})
+    else:
+        print(f"wrote {shown}; now: go2-wbc check {shown}")
+    return ExitCode.OK
+
+
+# --- check ----------------------------------------------------------------------------------------
+
+
+def check(
+    motion: Annotated[tuple[str, ...], "MOTION", MOTION_HELP] = (),
+    *,
+    set: Settings = (),
+    fix: Annotated[bool, "look for the least change that makes a refused motion feasible"] = False,
+    friction: Friction = None,
+    payload: Payload = None,
+    json: Json = False,
+) -> int:
+    """Check motions: can the robot do them? Nothing is simulated.
+
+    Reach, joint limits, torque, support, friction, load of the feet, collisions, landings. Exit
+    code 0 if the robot can do all of them, 1 if it cannot do one.
+
+    Examples:
+        go2-wbc check                     every motion of the library, a line each
+        go2-wbc check wave                one motion, every limit
+        go2-wbc check wave --set times=5
+        go2-wbc check wave --friction 0.4 --payload 3
+        go2-wbc check my_motion.py        every motion of your own file
+        go2-wbc check my_motion.py --fix  what would make it feasible
+        go2-wbc check bow --json          the same for a program to read
+    """
+    from go2_wbc.world import World
+    from motions import FeasibilityChecker, suggest
+
+    lines = meant(motion, set)
+    reports: list[FeasibilityReport] = []
+    changes: dict[str, Sequence[Suggestion]] = {}
+    with ProgressLine(is_quiet=json) as progress:
+        world = World.of(friction, payload)
+        checker = FeasibilityChecker(world=world, progress=progress.solving)
+        for number, line in enumerate(lines):
+            progress.update(number / len(lines), line.name)
+            reports.append(checker.check(line))
+            if fix and not reports[-1].ok:
+                progress.update((number + 0.5) / len(lines), f"{line.name}: changes")
+                changes[line.name] = suggest(line, checker=checker)
+    if json:
+        print_json([_report(report, changes) for report in reports])
+    else:
+        _print_reports(reports, changes)
+    return ExitCode.OK if all(report.ok for report in reports) else ExitCode.FAILED
+
+
+def _print_reports(
+    reports: Sequence[FeasibilityReport], changes: Mapping[str, Sequence[Suggestion]]
+) -> None:
+    """Every limit of one motion, or a verdict each of several; then what would mend them."""
+    if len(reports) == 1:
+        print(reports[0].table())
+        for finding in reports[0].failures:
+            print(f"x {finding}")
+    else:
+        for report in reports:
+            print_verdict(report)
+    for name, found in changes.items():
+        _print_changes(name, found)
+
+
+def _print_changes(name: str, found: Sequence[Suggestion]) -> None:
+    """What to append to the motion ``name`` to make it feasible, the least change first."""
+    if not found:
+        print(f"\n{name}: no change of tempo, size, height or shift time makes it feasible.")
+        return
+    print(f"\n{name} is feasible with one of these appended, the least change first:")
+    for one in found:
+        print(f"    {one}")
+
+
+def _report(
+    report: FeasibilityReport, changes: Mapping[str, Sequence[Suggestion]]
+) -> dict[str, Any]:
+    found = changes.get(report.motion)
+    more = {} if found is None else {"suggestions": [one.as_dict() for one in found]}
+    return {**report.as_dict(), **more}
+
+
+# --- export ---------------------------------------------------------------------------------------
+
+
+def export(
+    motion: MotionWord,
+    *,
+    set: Settings = (),
+    out: Annotated[
+        Path,
+        *("FILE", "ends in .csv, .npz, .json or .plan"),
+        output(".csv", ".npz", SAVED_MOTION, SAVED_PLAN),
+    ],
+    json: Json = False,
+) -> int:
+    """Write a motion's trajectory of the whole robot, or the motion, to a file.
+
+    columns, 100 rows a second, in the frame between the feet (x ahead, z up):
+      time [s]; x y z [m] and roll pitch yaw [rad] of the base; angles [rad] and
+      speeds [rad/s] of the 12 joints; com_x com_y com_z [m]; stance of each foot.
+    npz: the same as arrays time, q (position, quaternion x y z w, joints), v, a (in
+    the base frame), rpy, p_com, stance.
+    json: the motion as it is written; plan: as it is played, by this robot only.
+      Every command takes these two in place of a name.
+
+    Examples:
+        go2-wbc export wave --out wave.csv
+        go2-wbc export wave --out wave.npz
+        go2-wbc export wave --set times=5 --out five.json  then: go2-wbc run five.json
+    """
+    from motions import save_motion
+
+    found = the_motion(motion, set)
+    rows: dict[str, object] = {}
+    if out.suffix == SAVED_MOTION:
+        save_motion(found, out)
+    else:
+        with ProgressLine(is_quiet=json) as line:
+            line.update(0.0, f"compiling {found.name}")
+            rows = _write_compiled(found, out, line)
+    if json:
+        print_json({"motion": found.name, "file": str(out), **rows})
+    else:
+        number = f": {rows['rows']} rows of" if rows else ":"
+        print(f"wrote {shown_path(out)}{number} {found.name}")
+    return ExitCode.OK
+
+
+def _write_compiled(
+    motion: Timeline | CompiledPlan, target: Path, line: ProgressLine
+) -> dict[str, object]:
+    """Write the plan or its trajectory; returns the number of rows of the latter."""
+    from go2_wbc.files import write_atomically
+    from motions import FeasibilityChecker, save_plan
+    from motions.plan.trajectory import trajectory_of
+
+    checker = FeasibilityChecker(progress=line.solving)
+    plan, model = checker.plan(motion, check=False), checker.model
+    if target.suffix == SAVED_PLAN:
+        save_plan(plan, target, model=model)
+        return {}
+    path = trajectory_of(plan, model)
+    if target.suffix == ".npz":
+        stream = io.BytesIO()
+        arrays: dict[str, Any] = {name: getattr(path, name) for name in ARRAYS}
+        np.savez_compressed(stream, time=path.times, **arrays)
+        content = stream.getvalue()
+    else:
+        content = _csv(path).encode()
+    write_atomically(target, content)
+    return {"rows": len(path.times)}
+
+
+def _csv(path: Trajectory) -> str:
+    joints = [name.removesuffix("_joint") for name in JOINT_NAMES]
+    header = ["time", "x", "y", "z", "roll", "pitch", "yaw", *joints]
+    header += [f"{joint}_speed" for joint in joints] + ["com_x", "com_y", "com_z"]
+    numbers, feet = ["%.6f"] * len(header), ["%d"] * len(LEGS)
+    header += [f"{leg.name}_stance" for leg in LEGS]
+    q, v = path.q, path.v
+    columns = [path.times, q[:, :3], path.rpy, q[:, 7:], v[:, 6:], path.p_com, path.stance]
+    stream = io.StringIO()
+    np.savetxt(
+        stream,
+        np.column_stack(columns),
+        fmt=[*numbers, *feet],
+        delimiter=",",
+        header=",".join(header),
+        comments="",
+    )
+    return stream.getvalue()
