@@ -6,6 +6,7 @@ import math
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -205,7 +206,7 @@ def test_in_realtime_a_real_ctrl_c_leaves_a_limp_robot(plant: WatchedPlant, name
             at = go2.state.time + UNDER_WAY
 
             def interrupt() -> None:
-                if plant.inner.time > at and go2._calls.is_running:  # planning is no call yet
+                if plant.inner.time > at and go2._turn:  # planning is no call yet
                     plant.on_write = lambda: None
                     signal.pthread_kill(main, signal.SIGINT)
 
@@ -233,29 +234,24 @@ def test_ctrl_c_at_any_moment_of_many_calls_leaves_a_robot_that_can_be_called() 
             go2.wait(0.01)
 
 
-def test_no_call_begins_while_one_runs_that_began_as_another_one_ended(
-    go2: GO2Controller, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_call_begins_while_one_runs_that_began_as_another_one_ended(go2: GO2Controller) -> None:
     # Between two looks at who is running the first call ended: the second one ran unseen.
-    calls = go2._calls
-    lock, ended = calls._starting, threading.Event()
-
-    class LateLock:
-        def __enter__(self) -> None:
-            lock.acquire()
-
-        def __exit__(self, *_: object) -> None:
-            lock.release()
-            release.set()
-            first.result(HANG_GUARD)
-
     release = threading.Event()
-    first = in_thread(lambda: calls.make("first", lambda: {"": float(release.wait(HANG_GUARD))}))
-    while not calls.is_running:
+
+    class LateTurn(dict[str, Any]):
+        def setdefault(self, key: str, call: Any = None) -> Any:  # noqa: ANN401
+            running = super().setdefault(key, call)
+            if running is not call:
+                release.set()
+                first.result(HANG_GUARD)
+            return running
+
+    go2._turn = LateTurn()
+    first = in_thread(lambda: go2._call("first", lambda: {"": float(release.wait(HANG_GUARD))}))
+    while not go2._turn:
         pass
-    monkeypatch.setattr(calls, "_starting", LateLock())
     with pytest.raises(ModeError, match="while first"):
-        calls.make("second", lambda: {"": float(ended.is_set())})
+        go2._call("second", dict)
 
 
 @pytest.mark.parametrize("realtime", [False, True])
