@@ -10,7 +10,7 @@ from __future__ import annotations
 import threading
 from functools import partial
 
-from controller.acceptance import HeldFeet, Touches, judged
+from controller.acceptance import Acceptance
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
 from controller.checks import (
@@ -275,11 +275,10 @@ class Pilot:
             _refuse_dynamic_on_hardware(plan, plant)
         self._meet_entry(plan)
         behaviour = PlayPlan(plan, self._config.wbc.joint_friction)
-        touches, held = Touches(plant), HeldFeet(plan)
+        acceptance = Acceptance(plan, plant)
 
         def finished() -> bool:
-            touches.note()
-            held.note(self._loop.snapshot, self._loop.state.time - start)
+            acceptance.note(self._loop.snapshot, self._loop.state.time - start)
             return behaviour.is_finished(self._loop.snapshot)
 
         self.playing = behaviour  # from now on a cancel() reaches it; one before is seen here
@@ -298,8 +297,7 @@ class Pilot:
                 self._runner.engage(self._make_standing(Posture.STAND, HOLD_TIME))
         finally:
             self.playing = None
-        touches.require_few(plan)
-        return held.judged(judged(behaviour, self._loop.snapshot, at_rest))
+        return acceptance.judged(behaviour, self._loop.snapshot, at_rest)
 
     def return_safely(self) -> None:
         """Let the procedure that plays a motion leave it and stand; any thread may call it."""

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from controller.checks import (
-    has_arrived,
     is_lying,
     is_sitting,
-    is_small,
     is_standing,
     posture_measurements,
 )
@@ -22,8 +20,6 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, leg_angles
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.tracking.landing import Landings
-from go2_wbc.tracking.plan_tracking import Deviation
 from motions.batch_kinematics import configurations
 from motions.postures import home_poses
 from tests.engine_helpers import state_of
@@ -76,35 +72,3 @@ def test_a_foot_in_the_air_is_no_posture_on_four_feet(posture: Posture) -> None:
     touching = np.array([True, True, False, True])
     raised = snapshot.replaced(state=replace(snapshot.state, feet_in_contact=touching))
     assert not CHECKS[posture](raised)
-
-
-@pytest.mark.parametrize(
-    ("deviation", "standing", "solved"),
-    [
-        (Deviation(place=0.02, attitude=0.05, joints=0.0), True, True),
-        (Deviation(place=0.04, attitude=0.12, joints=0.0), False, True),
-        (Deviation(place=0.06, attitude=0.0, joints=0.0), False, False),
-        (Deviation(place=0.0, attitude=0.15, joints=0.0), False, False),
-        (Deviation(place=0.0, attitude=0.0, joints=0.3), False, False),
-    ],
-)
-def test_a_solved_motion_may_be_as_far_off_as_its_plan_may_be_from_what_was_asked(
-    deviation: Deviation, *, standing: bool, solved: bool
-) -> None:
-    assert is_small(deviation) is standing
-    assert is_small(deviation, is_dynamic=True) is solved
-
-
-@pytest.mark.parametrize(
-    ("place", "heading", "missed", "arrived"),
-    [
-        (0.04, 0.06, 0, True),
-        (0.06, 0.0, 0, False),
-        (0.0, 0.08, 0, False),
-        (0.0, 0.0, 1, False),
-    ],
-)
-def test_a_motion_that_moves_on_has_arrived_near_its_end_with_every_foot_landed(
-    place: float, heading: float, missed: int, *, arrived: bool
-) -> None:
-    assert has_arrived(place, heading, Landings(missed=missed, error=0.0)) is arrived
