@@ -1,10 +1,12 @@
-"""Puts a controller together: robot model, control loop, runner and pilot on one plant."""
+"""Puts a pilot together: robot model, control loop and runner on one plant."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
 
 from controller.loop import ControlLoop
 from controller.pilot import Pilot
@@ -19,6 +21,9 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.tasks import Task
+
+if TYPE_CHECKING:
+    from go2_wbc.plant.mujoco.viewer import PlantViewer
 
 RECORDED_TIME = 240.0
 """Seconds of robot time that the telemetry keeps."""
@@ -45,26 +50,11 @@ class PilotSettings:
     extra_tasks: Sequence[Task] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Assembly:
-    """A pilot and its runner; ``close`` them in the end.
+def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = None) -> Pilot:
+    """Take over a robot that lies on the ground, damped; ``close`` the pilot in the end.
 
-    Attributes:
-        pilot: runs procedures.
-        runner: lets time pass; ``runner.loop`` has the newest state and the telemetry. Its robot
-            model belongs to the thread that ticks: whoever plans needs another one.
-        close: go limp, stop and close the window; the plant stays open. Idempotent.
-    """
-
-    pilot: Pilot
-    runner: Runner
-    close: Callable[[], None]
-
-
-def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = None) -> Assembly:
-    """Take over a robot that lies on the ground, damped.
-
-    Nothing is left open if it fails; ``plant`` stays the caller's to close.
+    Nothing is left open if it fails; ``plant`` stays the caller's to close. The pilot's robot model
+    belongs to the thread that ticks: whoever plans needs another one.
 
     Args:
         plant: what to drive; no other pilot may drive it.
@@ -93,20 +83,21 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
         payloads = PayloadEstimator(model, config.wbc.joint_friction, config.payload)
     loop = ControlLoop(plant, model, wbc, telemetry, config.safety, dynamic_wbc, payloads)
     with ExitStack() as opened:
-        viewer = None
+        after_tick = settings.after_tick
         if settings.viewer:
             from go2_wbc.plant.mujoco.viewer import open_viewer  # MuJoCo's window with it
 
             viewer = open_viewer(plant)
-        if viewer is not None:
-            opened.callback(viewer.close)
-
-        def after_tick() -> None:
             if viewer is not None:
-                viewer.show(loop.state.time)
-            settings.after_tick()
-
+                opened.callback(viewer.close)
+                after_tick = partial(_shown, viewer, loop, settings.after_tick)
         runner = Runner(loop, realtime=settings.realtime, after_tick=after_tick)
         opened.callback(runner.close)
         pilot = Pilot(runner, config)
-        return Assembly(pilot, runner, opened.pop_all().close)
+        pilot.close = opened.pop_all().close
+    return pilot
+
+
+def _shown(viewer: PlantViewer, loop: ControlLoop, after_tick: Callable[[], None]) -> None:
+    viewer.show(loop.state.time)
+    after_tick()

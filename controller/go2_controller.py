@@ -106,10 +106,10 @@ class GO2Controller:
                 plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer, motor=config.motor)
                 opened.callback(plant.close)
             self._plant = plant
-            built = build_pilot(plant, config, settings)
-            opened.callback(built.close)
+            self._pilot = build_pilot(plant, config, settings)
+            opened.callback(self._pilot.close)
             self._resources = opened.pop_all()
-        self._runner, self._pilot, self._description = built.runner, built.pilot, description
+        self._runner, self._description = self._pilot.runner, description
         self._motor = config.motor
         self._closed = False
         self._turn: dict[str, _Call] = {}  # what runs: one entry, or none

@@ -8,6 +8,7 @@ procedures into calls.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from functools import partial
 
 from controller.acceptance import Acceptance
@@ -46,14 +47,15 @@ class Pilot:
     Attributes:
         mode: what the robot is doing.
         playing: the behaviour that plays a motion, or None.
+        runner: lets time pass; ``runner.loop`` has the newest state and the telemetry.
+        close: go limp and stop; the plant stays open. Idempotent.
     """
 
     def __init__(self, runner: Runner, config: Config) -> None:
         """Take over a robot that lies on the ground, or stands and will sink."""
-        self._runner = runner
-        self._loop = runner.loop
-        self._model = runner.loop.model
-        self._config = config
+        self.runner = self._runner = runner
+        self.close: Callable[[], None] = runner.close
+        self._loop, self._config = runner.loop, config
         self._walker = Walker(runner, config)
         self._goal: Goal | None = None
         self._commands = threading.Lock()  # held to take one, and to begin what takes none
@@ -145,7 +147,7 @@ class Pilot:
 
     def _make_standing(self, entry: Posture, duration: float) -> Standing:
         make_plan = partial(rise, entry=entry, duration=duration)
-        return Standing(make_plan, self._model, self._config.locomotion)
+        return Standing(make_plan, self._loop.model, self._config.locomotion)
 
     def _settle(self, posture: Posture, what: str) -> Measurements:
         _, check = _RESTING[posture]

@@ -88,19 +88,19 @@ def test_what_is_asked_to_follow_a_tick_follows_the_window(window: Window) -> No
     seen: list[int] = []
     settings = PilotSettings(viewer=True, after_tick=lambda: seen.append(window.frames))
     plant = MujocoPlant(control_period=1.0 / viewer.FRAME_RATE)
-    built = build_pilot(plant, Config(), settings)
-    built.runner.advance_until(lambda: len(seen) == 3, 1.0)
-    built.close()
+    pilot = build_pilot(plant, Config(), settings)
+    pilot.runner.advance_until(lambda: len(seen) == 3, 1.0)
+    pilot.close()
     plant.close()
     assert seen == [0, 1, 2]  # the first tick is the state that the window opened with
 
 
 def test_the_last_ticks_are_recorded_for_as_long_as_is_asked() -> None:
     plant = StillPlant()
-    built = build_pilot(plant, Config(), PilotSettings(recorded_time=10 * plant.control_period))
-    built.pilot.wait(30 * plant.control_period)
-    built.close()
-    assert len(built.runner.loop.telemetry.samples(1e6).unfinished.time) == 10
+    pilot = build_pilot(plant, Config(), PilotSettings(recorded_time=10 * plant.control_period))
+    pilot.wait(30 * plant.control_period)
+    pilot.close()
+    assert len(pilot.runner.loop.telemetry.samples(1e6).unfinished.time) == 10
 
 
 def test_nothing_is_left_to_compile_when_the_robot_has_been_taken_over() -> None:

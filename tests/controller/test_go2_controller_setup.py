@@ -176,13 +176,13 @@ def test_a_task_of_ones_own_is_followed_while_the_robot_walks() -> None:
 
 def test_a_task_of_ones_own_is_asked_in_plans_with_few_feet_too(plant: WatchedPlant) -> None:
     task = SteadyTrunk()
-    built = build_pilot(plant, Config(), PilotSettings(extra_tasks=(task,)))
+    pilot = build_pilot(plant, Config(), PilotSettings(extra_tasks=(task,)))
     try:
-        loop = built.runner.loop
+        loop = pilot.runner.loop
         for wbc in (loop.wbc, loop._dynamic_wbc):
             assert wbc.tasks[-1] is task
     finally:
-        built.close()
+        pilot.close()
 
 
 def test_placo_takes_no_tasks_of_ones_own(plant: WatchedPlant) -> None:

@@ -19,7 +19,6 @@ from controller.navigation import (
     WALK_SPEED,
     DriveStraight,
     Goal,
-    Odometer,
     TurnInPlace,
 )
 from go2_wbc.errors import CommandError
@@ -64,29 +63,27 @@ def walk(goal: Goal, x: float, y: float, yaw: float) -> RobotState:
 def test_displacement_is_measured_in_the_frame_of_the_start(
     x: float, y: float, yaw: float, ahead: float, left: float
 ) -> None:
-    odometer = Odometer(pose(x, y, yaw))
+    goal = begun(DriveStraight(1.0), pose(x, y, yaw))
     end = pose(x + ahead * cos(yaw) - left * sin(yaw), y + ahead * sin(yaw) + left * cos(yaw))
-    assert odometer.displacement(end) == pytest.approx((ahead, left), abs=EXACT)
+    measured = goal.measurements(end)
+    assert (measured["walked [m]"], measured["aside [m]"]) == pytest.approx(
+        (ahead, left), abs=EXACT
+    )
 
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_the_angle_turned_is_counted_over_several_turns(direction: int) -> None:
-    odometer = Odometer(pose(yaw=3.0))
+    goal = begun(TurnInPlace(1.0), pose(yaw=3.0))
     for step in range(1, 200):
         state = pose(yaw=3.0 + direction * 0.1 * step)
-        assert odometer.turned(state) == pytest.approx(direction * 0.1 * step, abs=EXACT)
-        odometer.update(state)
-        assert odometer.turned(state) == pytest.approx(direction * 0.1 * step, abs=EXACT)
-
-
-def test_asking_for_the_angle_turned_changes_nothing() -> None:
-    # Whoever asked for a state out of turn moved the count: -2 rad, asked last, made a turn of it.
-    odometer = Odometer(pose())
-    for yaw in (2.0, -2.0, 2.0):
-        assert odometer.turned(pose(yaw=yaw)) == pytest.approx(yaw)
+        for _ in range(2):
+            turned = radians(goal.measurements(state)["turned [deg]"])
+            assert turned == pytest.approx(direction * 0.1 * step, abs=EXACT)
+            goal.command(state)
 
 
 def test_whether_a_turn_is_done_may_be_asked_as_often_as_one_likes() -> None:
+    # Whoever asked for a state out of turn moved the count: -2 rad, asked last, made a turn of it.
     goal = begun(TurnInPlace(2.0), pose())
     for yaw in (2.0, -2.0, 2.0):
         assert goal.is_done(pose(yaw=yaw)) is (yaw == 2.0)

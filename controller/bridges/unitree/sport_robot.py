@@ -89,8 +89,8 @@ class SportRobot:
         self.unsupported = (MOTIONS.keys() | WALKS.keys()) - plans.keys() - walks.keys()
         self._gait = "trot"
         settings = PilotSettings(realtime=True, recorded_time=0.0)
-        self._assembly = build_pilot(plant, config, settings)
-        self.pilot, self._runner = self._assembly.pilot, self._assembly.runner
+        self.pilot = build_pilot(plant, config, settings)
+        self._runner = self.pilot.runner
         self.is_locked = False
         self.is_leaning = False
         self.pose = LEVEL
@@ -204,7 +204,7 @@ class SportRobot:
 
     def close(self) -> None:
         """Go limp and stop."""
-        self._assembly.close()
+        self.pilot.close()
 
 
 def playable_plans(model: RobotModel) -> Mapping[int, MotionPlan]:
