@@ -113,7 +113,7 @@ class DriveStraight(Goal):
     """Walk a distance along the heading of the start."""
 
     def __init__(self, distance: float) -> None:
-        """Walk ``distance`` [m], negative is backward; CommandError beyond ``GREATEST_DISTANCE``."""
+        """Walk ``distance`` [m], negative goes back; CommandError beyond ``GREATEST_DISTANCE``."""
         if abs(distance) > GREATEST_DISTANCE:
             limit = f"+-{GREATEST_DISTANCE:.0f} m"
             raise CommandError(f"distance must be within {limit}, got {distance}")
