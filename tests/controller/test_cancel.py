@@ -31,28 +31,28 @@ def plan() -> CompiledPlan:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("moment", MOMENTS)
-def test_a_high_five_that_is_cancelled_ends_standing(moment: float) -> None:
-    plant = WatchedPlant()
-    with GO2Controller(plant=plant) as go2:
-        assert go2.stand()
-        start = go2.state.time
-        plant.once_at(start + 0.9 + moment, go2.cancel)
-        assert go2.high_five() is False
-        assert "cancelled" in go2.last_outcome.reason
-        assert go2.mode is Mode.STANDING
-        assert go2.state.feet_in_contact.all()
-        assert go2.state.time - start < 0.9 + moment + 6.0
-        assert go2.telemetry.qp_failures == 0
+def test_a_high_five_that_is_cancelled_ends_standing(
+    plant: WatchedPlant, go2: GO2Controller, moment: float
+) -> None:
+    assert go2.stand()
+    start = go2.state.time
+    plant.once_at(start + 0.9 + moment, go2.cancel)
+    assert go2.high_five() is False
+    assert "cancelled" in go2.last_outcome.reason
+    assert go2.mode is Mode.STANDING
+    assert go2.state.feet_in_contact.all()
+    assert go2.state.time - start < 0.9 + moment + 6.0
+    assert go2.telemetry.qp_failures == 0
 
 
-def test_a_motion_that_is_cancelled_before_it_begins_is_not_played() -> None:
-    plant = WatchedPlant()
-    with GO2Controller(plant=plant) as go2:
-        plant.once_at(1.0, go2.cancel)
-        assert go2.high_five() is False
-        assert "before it began" in go2.last_outcome.reason
-        assert go2.mode is Mode.STANDING
-        assert go2.progress == 0.0
+def test_a_motion_that_is_cancelled_before_it_begins_is_not_played(
+    plant: WatchedPlant, go2: GO2Controller
+) -> None:
+    plant.once_at(1.0, go2.cancel)
+    assert go2.high_five() is False
+    assert "before it began" in go2.last_outcome.reason
+    assert go2.mode is Mode.STANDING
+    assert go2.progress == 0.0
 
 
 def test_a_plan_that_has_not_begun_has_made_no_progress(plan: CompiledPlan) -> None:

@@ -350,8 +350,9 @@ def test_a_high_five_plays_by_its_name_and_measures_how_high_the_paw_was_held(
 # --- goals and other threads ----------------------------------------------------------------
 
 
-def test_during_a_goal_move_is_refused_and_stop_ends_it() -> None:
-    plant = WatchedPlant()
+def test_during_a_goal_move_is_refused_and_stop_ends_it(
+    plant: WatchedPlant, go2: GO2Controller
+) -> None:
     refused: list[str] = []
 
     def interfere() -> None:
@@ -360,16 +361,15 @@ def test_during_a_goal_move_is_refused_and_stop_ends_it() -> None:
         refused.append(str(caught.value))
         go2.stop()
 
-    with GO2Controller(plant=plant) as go2:
-        assert go2.walk()
-        plant.once_at(go2.state.time + 2.0, interfere)
-        assert go2.move_forward(2.0) is False
-        assert go2.last_outcome.reason == "walk 2.000 m ended by stop()"
-        assert 0.1 < go2.last_outcome.measured["walked [m]"] < 1.0
-        assert refused == ["move() during a goal (walk 2.000 m): end it by stop()"]
-        assert go2.mode is Mode.WALKING
-        go2.move(0.2)
-        assert go2.command.linear_x == 0.2
+    assert go2.walk()
+    plant.once_at(go2.state.time + 2.0, interfere)
+    assert go2.move_forward(2.0) is False
+    assert go2.last_outcome.reason == "walk 2.000 m ended by stop()"
+    assert 0.1 < go2.last_outcome.measured["walked [m]"] < 1.0
+    assert refused == ["move() during a goal (walk 2.000 m): end it by stop()"]
+    assert go2.mode is Mode.WALKING
+    go2.move(0.2)
+    assert go2.command.linear_x == 0.2
 
 
 def test_a_gait_of_ones_own_walks(go2: GO2Controller) -> None:

@@ -34,11 +34,6 @@ from motions.postures import STAND_HEIGHT
 from tests.controller.plants import WatchedPlant
 
 
-@pytest.fixture
-def plant() -> WatchedPlant:
-    return WatchedPlant()
-
-
 def test_without_the_robots_files_the_error_says_what_to_install(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -56,11 +56,6 @@ class Balance(Behaviour):
         return False
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
 @pytest.fixture
 def plant() -> StillPlant:
     plant = StillPlant()

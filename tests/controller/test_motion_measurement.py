@@ -24,11 +24,6 @@ SKID = 0.5  # m/s
 
 
 @pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
 def raised(model: RobotModel) -> MotionPlan:
     """A paw that is raised and put down again."""
     line = Timeline(name="raise").foot("FR", z=0.06, over=0.5).hold(0.2).home(over=0.5)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -15,18 +13,6 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
 from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant, is_limp
-
-
-@pytest.fixture
-def plant() -> WatchedPlant:
-    return WatchedPlant()
-
-
-@pytest.fixture
-def go2(plant: WatchedPlant) -> Iterator[GO2Controller]:
-    with GO2Controller(plant=plant) as go2:
-        yield go2
-
 
 # --- only what was measured -------------------------------------------------------------------
 

@@ -31,11 +31,6 @@ FOREVER = 1e6
 MakeRunner = Callable[..., Runner]
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
 @pytest.fixture
 def plant() -> StillPlant:
     return StillPlant()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -32,17 +32,6 @@ UNDER_WAY = 0.1
 SLOW = 0.3
 
 Do = Callable[[GO2Controller], object]
-
-
-@pytest.fixture
-def plant() -> WatchedPlant:
-    return WatchedPlant()
-
-
-@pytest.fixture
-def go2(plant: WatchedPlant) -> Iterator[GO2Controller]:
-    with GO2Controller(plant=plant) as robot:
-        yield robot
 
 
 def _trot(go2: GO2Controller) -> None:

@@ -28,11 +28,6 @@ WHERE = Anchor(np.array([0.3, -0.2, 0.0]), 0.7)
 
 
 @pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
 def raised(model: RobotModel) -> CompiledPlan:
     """A paw that is raised and put down again."""
     line = Timeline(name="raise").foot("FR", z=0.06, over=0.5).hold(0.2).home(over=0.5)
