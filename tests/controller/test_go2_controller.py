@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 from controller import GO2Controller, Mode, Outcome
-from controller.checks import is_lying, is_sitting, is_standing
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ModeError, MotionInfeasible, StanceMismatch
 from go2_wbc.planning.envelopes import TROT
@@ -18,10 +17,7 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
 from motions import compile_timeline, load_motion
-from tests.controller.plants import (
-    PERIOD,
-    WatchedPlant,
-)
+from tests.controller.plants import PERIOD, WatchedPlant
 from tests.go2_wbc.plant.contract import same
 from tests.motions.doctored import with_joint_beyond_its_limit
 
@@ -73,12 +69,6 @@ def day() -> Day:
             returned = call()
             done[name] = Step(returned, go2.mode, go2.last_outcome, before, go2.state)
     return done
-
-
-@pytest.fixture
-def go2() -> Iterator[GO2Controller]:
-    with GO2Controller(plant=MujocoPlant(control_period=PERIOD)) as go2:
-        yield go2
 
 
 @pytest.fixture(scope="module")
@@ -190,28 +180,6 @@ def test_a_stopped_robot_is_at_rest(day: Day) -> None:
     assert np.abs(day["stop"].after.v[:3]).max() < 0.1
 
 
-POSTURES = {"stand": is_standing, "sit": is_sitting, "lie down": is_lying}
-
-
-@pytest.mark.parametrize("name", POSTURES)
-def test_a_posture_is_told_from_the_others_and_from_a_robot_in_motion(day: Day, name: str) -> None:
-    model = RobotModel()
-    state = day[name].after
-    assert [other for other, check in POSTURES.items() if check(model.snapshot(state))] == [name]
-    for moving in (0, 8):  # base, a joint
-        v = state.v.copy()
-        v[moving] = 1.0
-        assert not POSTURES[name](model.snapshot(replace(state, v=v)))
-
-
-@pytest.mark.parametrize("name", ["stand", "sit"])
-def test_a_robot_with_a_foot_in_the_air_neither_stands_nor_sits(day: Day, name: str) -> None:
-    model = RobotModel()
-    contacts = np.array([True, True, False, True])
-    state = replace(day[name].after, feet_in_contact=contacts)
-    assert not POSTURES[name](model.snapshot(state))
-
-
 # --- the beginning ----------------------------------------------------------------------------
 
 
@@ -234,13 +202,12 @@ def test_without_realtime_no_time_passes_between_calls(go2: GO2Controller) -> No
     assert same(go2.state, before)
 
 
-def test_waiting_for_no_time_lets_none_pass(go2: GO2Controller) -> None:
+def test_waiting_for_no_time_lets_none_pass_and_a_robot_that_lies_lies_down_again(
+    go2: GO2Controller,
+) -> None:
     go2.wait(0.0)
     assert go2.state.time == 0.0
     assert go2.last_outcome.ok
-
-
-def test_a_robot_that_already_lies_lies_down_again(go2: GO2Controller) -> None:
     assert go2.lie_down()
     assert go2.mode is Mode.LYING
 
@@ -282,15 +249,15 @@ def test_damping_makes_the_robot_limp_and_it_can_stand_up_again(go2: GO2Controll
     assert go2.stand()
 
 
-def test_a_lying_robot_whose_walk_was_damped_does_not_take_commands(go2: GO2Controller) -> None:
+def test_a_lying_robot_whose_walk_was_damped_does_not_take_commands(
+    plant: WatchedPlant, go2: GO2Controller
+) -> None:
     # The mode from before the damping once came back when the next behaviour began.
     assert go2.walk()
     go2.damp()
-    plant = go2.plant
-    assert isinstance(plant, MujocoPlant)
     q = go2.state.q.copy()
     q[2], q[3:7] = 0.15, [1.0, 0.0, 0.0, 0.0]
-    plant.place(q)
+    plant.inner.place(q)
     assert not go2.lie_down()
     assert go2.mode in (Mode.DAMPED, Mode.FALLEN)
     with pytest.raises(ModeError):
