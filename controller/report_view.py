@@ -57,20 +57,19 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
     return _shown(checked.plan, ReplayContent(own, verdict=verdict, ghost=plan, written=written))
 
 
-def _is_mended(plan: MotionPlan) -> bool:
-    """Whether there are parts that the robot cannot do as they were written."""
-    spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
-    return any(isinstance(span.asked, PlanTarget) for span in spans)
-
-
 def _as_written(checked: CheckedMotion) -> Recording | None:
-    """The movement that was written, if it is not that of the plan; its forces are not known."""
-    if not _is_mended(checked.plan):
+    """The movement that was written, if it is not that of the plan; its forces are not known.
+
+    It is not where parts cannot be done as they were written.
+    """
+    plan = checked.plan
+    spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
+    if not any(isinstance(span.asked, PlanTarget) for span in spans):
         return None
     shown = checked.recording()
     return replace(
         shown,
-        q=as_written(checked.plan, checked.path),
+        q=as_written(plan, checked.path),
         tau=np.zeros_like(shown.tau),
         foot_forces=np.zeros_like(shown.foot_forces),
         support_margin=np.full_like(shown.support_margin, np.nan),
@@ -101,12 +100,13 @@ def verdict_of(report: FeasibilityReport) -> Verdict:
     text = "feasible" if report.ok else _count(broken, "limit") + " broken"
     if tight:
         text += f", {_count(tight, 'tight margin')}"
+    margins = report.margins
     judged = [
         item
         for item in report.series
-        if len(item.times) >= _LEAST_SAMPLES and item.check in report.margins
+        if len(item.times) >= _LEAST_SAMPLES and item.check in margins
     ]
-    judged.sort(key=lambda item: _share_left(report.margins[item.check]))
+    judged.sort(key=lambda item: _share_left(margins[item.check]))
     findings = (*report.failures, *report.warnings)
     return Verdict(
         ok=report.ok,
