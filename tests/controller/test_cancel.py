@@ -102,20 +102,16 @@ def test_the_way_back_is_smooth_and_its_rates_are_the_derivatives(plan: Compiled
     assert not steps[-1].v_joints.any()
 
 
-def test_time_that_runs_backwards_negates_velocities_only(plan: CompiledPlan) -> None:
-    forward = plan.at(2.0)
+def test_time_that_runs_backwards_negates_velocities_only_and_forces_do_not_hold(
+    plan: CompiledPlan,
+) -> None:
+    forward = replace(plan.at(2.0), force_weight=0.01)
     backward = retimed(forward, -1.0, 0.0)
     assert (backward.v_joints == -forward.v_joints).all()
     assert (backward.a_joints == forward.a_joints).all()
     assert (backward.body.v_world == -forward.body.v_world).all()
     assert (backward.q_joints == forward.q_joints).all()
-
-
-def test_forces_that_were_planned_for_its_tempo_do_not_hold_for_another(
-    plan: CompiledPlan,
-) -> None:
-    pushing = replace(plan.at(2.0), force_weight=0.01)
-    assert retimed(pushing, 0.5, 0.0).force_weight == 0.0
+    assert backward.force_weight == 0.0, "they were planned for another tempo"
 
 
 def test_a_flight_that_has_begun_is_not_slowed_down_and_ends_on_four_feet() -> None:

@@ -35,19 +35,16 @@ def test_a_plant_that_may_be_a_robot_is_not_sent_a_dynamic_motion(two_feet: Comp
         assert not go2.last_outcome
 
 
-def test_who_allows_it_gets_as_far_as_with_any_other_motion(two_feet: CompiledPlan) -> None:
-    with GO2Controller(plant=LivePlant(), realtime=True) as go2:
+@pytest.mark.parametrize("is_simulated", [False, True])
+def test_who_allows_it_or_simulates_gets_as_far_as_with_any_other_motion(
+    two_feet: CompiledPlan, *, is_simulated: bool
+) -> None:
+    plant = StillPlant() if is_simulated else LivePlant()
+    with GO2Controller(plant=plant, realtime=not is_simulated) as go2:
         for plan in (two_feet, compile_timeline(load_motion("bow"), RobotModel())):
+            is_allowed = plan is two_feet and not is_simulated
             with pytest.raises(StanceMismatch, match="the robot is lying"):
-                go2.play(plan, check=False, allow_dynamic=plan is two_feet)
-
-
-def test_a_simulated_robot_needs_no_permission(two_feet: CompiledPlan) -> None:
-    with (
-        GO2Controller(plant=StillPlant()) as go2,
-        pytest.raises(StanceMismatch, match="the robot is lying"),
-    ):
-        go2.play(two_feet, check=False)
+                go2.play(plan, check=False, allow_dynamic=is_allowed)
 
 
 def test_what_simulates_says_so() -> None:

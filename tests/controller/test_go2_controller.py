@@ -109,19 +109,14 @@ def test_a_blocking_call_returns_true_in_its_mode_with_what_was_measured(
     assert 0.0 < step.outcome.duration <= step.after.time - step.before.time + 1e-9
 
 
-@pytest.mark.parametrize("name", ["move", "wait", "stop"])
-def test_a_call_that_only_commands_returns_nothing(day: Day, name: str) -> None:
-    assert day[name].returned is None
-    assert day[name].mode is Mode.WALKING
-
-
-def test_waiting_lets_exactly_that_time_pass(day: Day) -> None:
-    step = day["wait"]
-    assert step.after.time - step.before.time == pytest.approx(1.5, abs=PERIOD)
-
-
-def test_moving_takes_no_time_by_itself(day: Day) -> None:
+def test_a_call_that_only_commands_returns_nothing_and_only_waiting_takes_time(day: Day) -> None:
+    for name in ("move", "wait", "stop"):
+        assert day[name].returned is None
+        assert day[name].mode is Mode.WALKING
     assert same(day["move"].before, day["move"].after)
+    waited = day["wait"].after.time - day["wait"].before.time
+    assert waited == pytest.approx(1.5, abs=PERIOD)
+    assert np.abs(day["stop"].after.v[:3]).max() < 0.1, "at rest"
 
 
 def test_a_standing_robot_is_level_on_four_feet(day: Day) -> None:
@@ -174,10 +169,6 @@ def test_a_velocity_command_moves_the_robot_that_way(day: Day) -> None:
     assert ahead == pytest.approx(0.3 * 1.5, rel=0.25)
     assert left == pytest.approx(0.1 * 1.5, rel=0.35)
     assert step.after.rpy[2] - step.before.rpy[2] == pytest.approx(0.2 * 1.5, rel=0.25)
-
-
-def test_a_stopped_robot_is_at_rest(day: Day) -> None:
-    assert np.abs(day["stop"].after.v[:3]).max() < 0.1
 
 
 # --- the beginning ----------------------------------------------------------------------------

@@ -64,6 +64,8 @@ def test_a_broken_urdf_is_refused_with_the_reason(
 def test_a_missing_urdf_or_mjcf_is_named(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"nowhere\.urdf: No such file"):
         GO2Controller(plant=MujocoPlant(urdf=tmp_path / "nowhere.urdf"))
+    with pytest.raises(DescriptionError, match=r"nowhere\.urdf"):
+        GO2Controller(urdf=tmp_path / "nowhere.urdf")
     with pytest.raises(ModelMismatch, match=r"nowhere\.xml: no such file"):
         GO2Controller(plant=MujocoPlant(tmp_path / "nowhere.xml"))
 
@@ -87,13 +89,10 @@ def test_a_solver_that_is_not_installed_is_refused_with_the_line_that_installs_i
         GO2Controller(config=config)
 
 
-def test_an_unknown_back_end_is_refused_with_the_valid_ones() -> None:
+def test_an_unknown_back_end_is_refused_with_the_valid_ones_and_the_plant_left_untouched(
+    plant: WatchedPlant,
+) -> None:
     with pytest.raises(ConfigError, match="valid: condensed, full, placo"):
-        GO2Controller(config=Config(backend="magic"))
-
-
-def test_a_refused_configuration_leaves_the_plant_untouched(plant: WatchedPlant) -> None:
-    with pytest.raises(ConfigError):
         GO2Controller(plant=plant, config=Config(backend="magic"))
     assert not plant.commands
 
@@ -118,11 +117,6 @@ def test_a_urdf_of_ones_own_makes_the_model_and_the_robot(tmp_path: Path) -> Non
         assert go2.stand()
         height = go2.last_outcome.measured["CoM height [m]"]
         assert height == pytest.approx(STAND_HEIGHT, abs=0.005)
-
-
-def test_a_urdf_that_does_not_exist_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DescriptionError, match=r"nowhere\.urdf"):
-        GO2Controller(urdf=tmp_path / "nowhere.urdf")
 
 
 @pytest.mark.parametrize("motor", MOTORS)

@@ -40,14 +40,6 @@ def _trot(go2: GO2Controller) -> None:
     go2.wait(0.6)
 
 
-def _stand(go2: GO2Controller) -> None:
-    assert go2.stand()
-
-
-def _sit(go2: GO2Controller) -> None:
-    assert go2.sit()
-
-
 def _nothing(_go2: GO2Controller) -> None: ...
 
 
@@ -61,11 +53,11 @@ def _wait(go2: GO2Controller) -> None:
 @pytest.mark.parametrize(
     "call",
     [
-        lambda go2: go2.stand(),
-        lambda go2: go2.sit(),
+        GO2Controller.stand,
+        GO2Controller.sit,
         lambda go2: go2.high_five(hold=0.5),
         lambda go2: go2.play("nod", check=False),
-        lambda go2: go2.lie_down(),
+        GO2Controller.lie_down,
     ],
     ids=["stand", "sit", "high five", "play", "lie down"],
 )
@@ -149,18 +141,18 @@ def test_a_motion_that_is_cancelled_while_it_begins_is_left_at_once(
 
 INTERRUPTED: dict[str, tuple[Do, Do, str]] = {
     "lying": (_nothing, _wait, "wait"),
-    "tucking its legs": (_nothing, lambda go2: go2.stand(), "stand"),
-    "standing": (_stand, _wait, "wait"),
-    "sitting down": (_stand, lambda go2: go2.sit(), "sit"),
-    "sitting": (_sit, _wait, "wait"),
-    "lying down": (_stand, lambda go2: go2.lie_down(), "lie_down"),
+    "tucking its legs": (_nothing, GO2Controller.stand, "stand"),
+    "standing": (GO2Controller.stand, _wait, "wait"),
+    "sitting down": (GO2Controller.stand, GO2Controller.sit, "sit"),
+    "sitting": (GO2Controller.sit, _wait, "wait"),
+    "lying down": (GO2Controller.stand, GO2Controller.lie_down, "lie_down"),
     "trotting": (_trot, _wait, "wait"),
     "changing its gait": (_trot, lambda go2: go2.walk("flying_trot"), "walk"),
-    "coming to rest": (_trot, lambda go2: go2.stop(), "stop"),
+    "coming to rest": (_trot, GO2Controller.stop, "stop"),
     "turning": (_trot, lambda go2: go2.turn_left(1.0), "turn_left"),
-    "high five": (_stand, lambda go2: go2.high_five(), "high_five"),
-    "playing": (_stand, lambda go2: go2.play("bow", check=False), "play"),
-    "recovering": (_nothing, lambda go2: go2.recover(), "recover"),
+    "high five": (GO2Controller.stand, GO2Controller.high_five, "high_five"),
+    "playing": (GO2Controller.stand, lambda go2: go2.play("bow", check=False), "play"),
+    "recovering": (_nothing, GO2Controller.recover, "recover"),
 }
 
 
