@@ -110,7 +110,7 @@ class GO2Controller:
             opened.callback(self._pilot.close)
             self._resources = opened.pop_all()
         self._runner, self._description = self._pilot.runner, description
-        self._motor = config.motor
+        self._motor, self._limits = config.motor, config.feasibility
         self._closed = False
         self._turn: dict[str, _Call] = {}  # what runs: one entry, or none
         self._last = Outcome(True, "lying, nothing asked yet", 0.0)
@@ -304,7 +304,8 @@ class GO2Controller:
     @cached_property
     def _checker(self) -> motions.FeasibilityChecker:
         """Plans on a model of its own: the control loop's belongs to the thread that ticks."""
-        return motions.FeasibilityChecker(RobotModel(self._description, motor=self._motor))
+        model = RobotModel(self._description, motor=self._motor)
+        return motions.FeasibilityChecker(model, self._limits)
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
