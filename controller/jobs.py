@@ -34,22 +34,8 @@ class _Stoppable(Protocol):
 Robot = TypeVar("Robot", bound=_Stoppable)
 
 
-@dataclass(frozen=True, slots=True)
-class Answer(Outcome):
-    """What came of a job, which is ``ok`` too if it has begun when the patience ends.
-
-    Attributes:
-        cancelled: whether it ended early because it was called off.
-        is_refused: whether it was never begun.
-        error: what was raised, if anything.
-    """
-
-    duration: float = 0.0
-    cancelled: bool = False
-    is_refused: bool = False
-    error: Exception | None = None
-
-
+Answer = Outcome
+"""What came of a job, which is ``ok`` too if it has begun when the patience ends."""
 Reply = Callable[[Answer], None]
 
 
