@@ -47,9 +47,9 @@ class Outcome:
     reason: str
     duration: float = 0.0
     measured: Measurements = field(default_factory=dict)
-    cancelled: bool = False
-    is_refused: bool = False
-    error: Exception | None = None
+    cancelled: bool = field(default=False, repr=False)
+    is_refused: bool = field(default=False, repr=False)
+    error: Exception | None = field(default=None, repr=False)
 
     def __bool__(self) -> bool:
         """Truth of the outcome is ``ok``."""
