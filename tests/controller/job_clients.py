@@ -63,6 +63,12 @@ class Client:
         job = Job(name, act, reply, prepare, begin)
         self.is_accepted = self.jobs.submit(job)
 
+    def does(self, name: str, act: Callable[[Job], Measurements] = lambda _job: {}) -> Answer:
+        """What a job is answered that is carried out now."""
+        self.submit(name, act)
+        assert self.jobs.work()
+        return self.only(name)
+
     def told(self, name: str) -> list[Answer]:
         return [answer for told, answer in self.answers if told == name]
 

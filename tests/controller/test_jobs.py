@@ -91,9 +91,7 @@ def test_a_second_job_is_refused_at_once_and_the_first_goes_on(
 
 @pytest.mark.parametrize("error", [Aborted("the rump is too high"), ModeError("fallen: recover()")])
 def test_what_was_not_done_is_answered_with_the_reason(client: Client, error: Exception) -> None:
-    client.submit("sit", failing(error))
-    client.jobs.work()
-    assert client.only("sit") == Answer(False, str(error), error=error)
+    assert client.does("sit", failing(error)) == Answer(False, str(error), error=error)
 
 
 def test_a_job_that_may_not_begin_is_refused_when_its_turn_has_come(client: Client) -> None:
@@ -105,13 +103,10 @@ def test_a_job_that_may_not_begin_is_refused_when_its_turn_has_come(client: Clie
 def test_a_bug_in_an_action_is_answered_and_the_server_goes_on(
     client: Client, caplog: pytest.LogCaptureFixture
 ) -> None:
-    client.submit("dance", failing(ZeroDivisionError("beat")))
-    client.jobs.work()
-    assert client.only("dance").reason == "ZeroDivisionError: beat"
+    answer = client.does("dance", failing(ZeroDivisionError("beat")))
+    assert answer.reason == "ZeroDivisionError: beat"
     assert "Traceback" in caplog.text
-    client.submit("sit")
-    client.jobs.work()
-    assert client.only("sit").ok
+    assert client.does("sit").ok
 
 
 def test_a_reply_that_fails_does_not_stop_the_server(
@@ -120,9 +115,7 @@ def test_a_reply_that_fails_does_not_stop_the_server(
     client.jobs.submit(Job("sit", lambda _job: {}, failing(OSError("no route"))))
     assert client.jobs.work()
     assert "sit could not be answered" in caplog.text
-    client.submit("up")
-    client.jobs.work()
-    assert client.only("up").ok
+    assert client.does("up").ok
 
 
 def test_somebody_who_fails_to_hear_of_an_end_does_not_stop_the_server(
@@ -133,9 +126,7 @@ def test_somebody_who_fails_to_hear_of_an_end_does_not_stop_the_server(
         assert client.jobs.cancel(failing(OSError("no route")))
         return {}
 
-    client.submit("sit", act)
-    assert client.jobs.work()
-    assert client.only("sit").ok
+    assert client.does("sit", act).ok
     assert "sit could not be answered" in caplog.text
 
 
@@ -246,9 +237,7 @@ def test_a_job_that_is_called_off_says_so_and_then_whoever_wants_to_know_is_told
         assert robot.calls == ["cancel"]
         raise Aborted("")
 
-    client.submit("nod", act)
-    client.jobs.work()
-    answer = client.only("nod")
+    answer = client.does("nod", act)
     assert (answer.ok, answer.cancelled, answer.is_refused) == (False, True, False)
     assert answer.reason == "nod was cancelled"
     assert robot.calls == ["cancel", "told"]
@@ -264,9 +253,7 @@ def test_a_job_that_was_done_although_it_was_called_off_is_done(client: Client) 
         client.jobs.cancel()
         return {}
 
-    client.submit("sit", act)
-    client.jobs.work()
-    assert client.only("sit") == Answer(True, "done in 0.0 s")
+    assert client.does("sit", act) == Answer(True, "done in 0.0 s")
 
 
 def test_going_limp_ends_what_runs_and_refuses_what_waits(robot: Robot, threaded: Client) -> None:

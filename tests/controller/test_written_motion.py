@@ -27,13 +27,6 @@ WHERE = Anchor(np.array([0.3, -0.2, 0.0]), 0.7)
 """Where the robot stands in the world: a plan is in a frame of its own."""
 
 
-@pytest.fixture(scope="module")
-def raised(model: RobotModel) -> CompiledPlan:
-    """A paw that is raised and put down again."""
-    line = Timeline(name="raise").foot("FR", z=0.06, over=0.5).hold(0.2).home(over=0.5)
-    return compile_timeline(line, model)
-
-
 def followed(plan: CompiledPlan) -> TruthRecording:
     """What MuJoCo would say of a robot that follows ``plan`` exactly."""
     n = round(plan.duration / PERIOD)
