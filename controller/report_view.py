@@ -100,12 +100,8 @@ def verdict_of(report: FeasibilityReport) -> Verdict:
     text = "feasible" if report.ok else _count(broken, "limit") + " broken"
     if tight:
         text += f", {_count(tight, 'tight margin')}"
-    margins = report.margins
-    judged = [
-        item
-        for item in report.series
-        if len(item.times) >= _LEAST_SAMPLES and item.check in margins
-    ]
+    margins, enough = report.margins, _LEAST_SAMPLES
+    judged = [s for s in report.series if len(s.times) >= enough and s.check in margins]
     judged.sort(key=lambda item: _share_left(margins[item.check]))
     findings = (*report.failures, *report.warnings)
     return Verdict(
@@ -135,34 +131,36 @@ def _annotation(finding: Finding, series: tuple[Series, ...]) -> Annotation:
         time=finding.time,
         text=_words(finding),
         is_broken=is_broken,
-        spans=tuple(
-            (float(item.times[run.start]), float(item.times[run.stop - 1])) for run in runs
-        ),
+        spans=tuple((float(item.times[r.start]), float(item.times[r.stop - 1])) for r in runs),
         parts=parts_of(finding.subject),
     )
 
 
 def _grouped(annotations: Sequence[Annotation]) -> tuple[Annotation, ...]:
     """One annotation for the subjects that meet the same limit at about the same time."""
-    joined, left = [], list(annotations)
-    while left:
-        first, *others = left
-        group = [
-            item
-            for item in others
-            if (item.limit, item.is_broken) == (first.limit, first.is_broken)
-            and abs(item.time - first.time) < _TOGETHER
-        ]
-        left = [item for item in others if item not in group]
-        group.insert(0, first)
-        whole = replace(
-            first,
+    groups: list[list[Annotation]] = []
+    for item in annotations:
+        meets = (item.limit, item.is_broken)
+        alike = (
+            group
+            for group in groups
+            if (group[0].limit, group[0].is_broken) == meets
+            and abs(group[0].time - item.time) < _TOGETHER
+        )
+        group = next(alike, None)
+        if group is None:
+            groups.append([item])
+        else:
+            group.append(item)
+    return tuple(
+        replace(
+            group[0],
             subject=_together([item.subject for item in group]),
             spans=tuple(sorted({span for item in group for span in item.spans})),
             parts=tuple(dict.fromkeys(part for item in group for part in item.parts)),
         )
-        joined.append(whole)
-    return tuple(joined)
+        for group in groups
+    )
 
 
 def _together(subjects: Sequence[str]) -> str:
