@@ -310,7 +310,9 @@ class GO2Controller:
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
         self._check_open()
-        seconds = arguments.duration("seconds", seconds)
+        seconds = finite_number("seconds", seconds)
+        if seconds < 0.0:
+            raise CommandError(f"seconds must not be negative, got {seconds}")
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
 
     # --- looking --------------------------------------------------------------------------
