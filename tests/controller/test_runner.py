@@ -23,8 +23,14 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from motions.postures import TUCKED_JOINTS
-from tests.controller.interrupts import interrupt_somewhere_in
-from tests.controller.plants import HANG_GUARD, PERIOD, StillPlant, in_thread, is_limp
+from tests.controller.plants import (
+    HANG_GUARD,
+    PERIOD,
+    StillPlant,
+    in_thread,
+    interrupt_somewhere_in,
+    is_limp,
+)
 
 # s of robot time; far more than any of these tests lets pass.
 FOREVER = 1e6

@@ -23,8 +23,14 @@ from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task
 from motions import Timeline
 from motions.dynamics.search import Clock
-from tests.controller.interrupts import interrupt_somewhere_in
-from tests.controller.plants import HANG_GUARD, StillPlant, WatchedPlant, in_thread, is_limp
+from tests.controller.plants import (
+    HANG_GUARD,
+    StillPlant,
+    WatchedPlant,
+    in_thread,
+    interrupt_somewhere_in,
+    is_limp,
+)
 
 # s into a call, when it is well under way.
 UNDER_WAY = 0.1
