@@ -174,23 +174,18 @@ def test_a_velocity_command_moves_the_robot_that_way(day: Day) -> None:
 # --- the beginning ----------------------------------------------------------------------------
 
 
-def test_a_new_controller_has_a_robot_that_lies_limp_at_time_zero() -> None:
+def test_a_new_robot_lies_limp_at_time_zero_and_time_passes_in_calls_only() -> None:
     with GO2Controller(namespace="rex_2") as go2:
         assert go2.namespace == "rex_2"
-        assert go2.mode is Mode.LYING
         assert go2.state.time == 0.0
-        assert go2.state.q[2] < 0.1
-        assert go2.command.is_zero
         assert go2.last_outcome.ok
-
-
-def test_without_realtime_no_time_passes_between_calls(go2: GO2Controller) -> None:
-    go2.wait(0.1)
-    before = go2.state
-    assert go2.mode is Mode.LYING
-    assert go2.command.is_zero
-    assert go2.recording().duration > 0.0
-    assert same(go2.state, before)
+        go2.wait(0.1)
+        before = go2.state
+        assert before.q[2] < 0.1
+        assert go2.mode is Mode.LYING
+        assert go2.command.is_zero
+        assert go2.recording().duration > 0.0
+        assert same(go2.state, before)
 
 
 def test_waiting_for_no_time_lets_none_pass_and_a_robot_that_lies_lies_down_again(
