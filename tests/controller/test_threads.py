@@ -179,6 +179,7 @@ def test_ctrl_c_leaves_a_limp_robot_that_gets_up_again(
     assert is_limp(plant.commands[-1])
     assert go2.last_outcome.reason == f"interrupted during {what}(), damped"
     go2.wait(1.0)
+    assert all(map(is_limp, plant.commands[-200:]))
     assert go2.recover(), go2.last_outcome.reason
 
 
