@@ -12,7 +12,7 @@ from pathlib import Path
 
 import motions  # what is named motions.X below is imported when it is used, scipy with it
 from controller import arguments
-from controller.assembly import PilotSettings, build_pilot
+from controller.assembly import build_pilot
 from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
 from controller.telemetry import Telemetry
@@ -94,19 +94,21 @@ class GO2Controller:
         realtime = arguments.pace(realtime, plant)
         urdf = arguments.checked("urdf", urdf, Path | str | None, "a path")
         description = find_description(None if urdf is None else Path(urdf))
-        settings = PilotSettings(
-            realtime=realtime,
-            viewer=viewer,
-            description=description,
-            after_tick=after_tick,
-            extra_tasks=arguments.tasks(extra_tasks),
-        )
+        tasks = arguments.tasks(extra_tasks)
         with ExitStack() as opened:
             if plant is None:
                 plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer, motor=config.motor)
                 opened.callback(plant.close)
             self._plant = plant
-            self._pilot = build_pilot(plant, config, settings)
+            self._pilot = build_pilot(
+                plant,
+                config,
+                realtime=realtime,
+                viewer=viewer,
+                description=description,
+                after_tick=after_tick,
+                extra_tasks=tasks,
+            )
             opened.callback(self._pilot.close)
             self._resources = opened.pop_all()
         self._runner, self._description = self._pilot.runner, description

@@ -12,7 +12,7 @@ import pytest
 import qpsolvers
 
 from controller import GO2Controller
-from controller.assembly import PilotSettings, build_pilot
+from controller.assembly import build_pilot
 from go2_wbc.config import Config
 from go2_wbc.errors import (
     ClosedError,
@@ -161,7 +161,7 @@ def test_a_task_of_ones_own_is_followed_while_the_robot_walks() -> None:
 
 def test_a_task_of_ones_own_is_asked_in_plans_with_few_feet_too(plant: WatchedPlant) -> None:
     task = SteadyTrunk()
-    pilot = build_pilot(plant, Config(), PilotSettings(extra_tasks=(task,)))
+    pilot = build_pilot(plant, Config(), extra_tasks=(task,))
     try:
         loop = pilot.runner.loop
         for wbc in (loop.wbc, loop._dynamic_wbc):

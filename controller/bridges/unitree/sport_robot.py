@@ -9,7 +9,7 @@ from typing import Final, final
 
 import numpy as np
 
-from controller.assembly import PilotSettings, build_pilot
+from controller.assembly import build_pilot
 from controller.behaviours.plans import ChangePosture
 from controller.bridges.unitree.sport_api import Api
 from controller.modes import Mode
@@ -88,8 +88,7 @@ class SportRobot:
         walks = {api: name for api, name in WALKS.items() if name in GAITS}
         self.unsupported = (MOTIONS.keys() | WALKS.keys()) - plans.keys() - walks.keys()
         self._gait = "trot"
-        settings = PilotSettings(realtime=True, recorded_time=0.0)
-        self.pilot = build_pilot(plant, config, settings)
+        self.pilot = build_pilot(plant, config, realtime=True, recorded_time=0.0)
         self._runner = self.pilot.runner
         self.is_locked = False
         self.is_leaning = False
