@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.study import Direction, Measurement, Metric, Study
 from benchmarks.truth_vs_estimate import sensing_plant
-from controller.checks import END_HEADING, END_PLACE
+from controller.acceptance import END_HEADING, END_PLACE
 from controller.motion_measurement import MotionMeasurement, during_motion, measure_motion
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.motion_plan import MotionPlan

@@ -167,7 +167,7 @@ def measure_solutions(trial: Trial) -> Measurement:
             loop = robot.runner.loop
             loop.wbc = AuditedController(loop.model, driver, worst)
             try:
-                _exercise(robot.pilot, plant)
+                _exercise(robot, plant)
             except Aborted as aborted:
                 raise TrialFailed(f"driven by {driver}: {aborted}") from aborted
             worst["wbc.failures"] += loop.telemetry.qp_failures

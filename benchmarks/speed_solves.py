@@ -175,13 +175,13 @@ def recorded_ticks(trial: Trial) -> Ticks:
         recorder = Recorder(loop.model)
         loop.wbc = recorder
         try:
-            robot.pilot.stand()
-            robot.pilot.walk("trot")
-            robot.pilot.set_command(VelocityCommand(0.5))
-            robot.pilot.wait(2.0)
-            robot.pilot.rest()
-            robot.pilot.stand()
-            robot.pilot.play(compile_motion("high_five", RobotModel()))
+            robot.stand()
+            robot.walk("trot")
+            robot.set_command(VelocityCommand(0.5))
+            robot.wait(2.0)
+            robot.rest()
+            robot.stand()
+            robot.play(compile_motion("high_five", RobotModel()))
         except Aborted as aborted:
             raise TrialFailed(str(aborted)) from aborted
         return recorder.ticks

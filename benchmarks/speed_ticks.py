@@ -282,8 +282,8 @@ def _memory(plant: MujocoPlant, go2: GO2Controller, ends: list[int]) -> tuple[fl
 
 def measure_parts(trial: Trial) -> Measurement:
     """Median of each part of a tick of the trot, and of what a tick takes beyond them."""
-    with closing(trial.plant()) as plant, closing(build_pilot(plant, Config())) as robot:
-        pilot, loop = robot.pilot, robot.runner.loop
+    with closing(trial.plant()) as plant, closing(build_pilot(plant, Config())) as pilot:
+        loop = pilot.runner.loop
         try:
             pilot.stand()
             pilot.walk("trot")

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from statistics import fmean
 
 from controller.behaviours.plans import PlayPlan
-from controller.checks import (
-    arrival_measurements,
-    deviation_measurements,
-    ground_height,
-    has_arrived,
-    is_small,
-)
+from controller.checks import ground_height
 from controller.modes import Aborted, Measurements, listed
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import Plant
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.tracking.landing import Landings
+from go2_wbc.tracking.plan_tracking import Deviation
 
 TOUCH_FORCE = 1.0
 """Force [N] of the ground on trunk or legs that counts as a touch."""
@@ -23,45 +21,68 @@ TOUCH_TIME = 0.01
 """Time [s] for which they may touch it in a motion: what the benchmarks call a touch."""
 PAW_TOLERANCE = 0.03
 """Distance [m] that a foot, on the average of its hold, may be below its planned height."""
+PLACE_DEVIATION, ATTITUDE_DEVIATION = 0.03, 0.1
+"""Distance [m] of the tracked point, and angle [rad] of the trunk, that it may be off its plan, on
+the average."""
+DYNAMIC_PLACE, DYNAMIC_ATTITUDE = 0.05, math.radians(8.0)
+"""The same of plans with jumps, rears and lifts: as far as a plan may be from what was asked
+(``motions.dynamics.Tolerance``). A rear at -25 deg was up to 32 mm and 6.6 deg off."""
+JOINT_DEVIATION = 0.2
+"""Angle [rad] that the worst joint of a raised leg may be off its plan, on the average."""
+END_PLACE = 0.05
+"""Distance [m] from its planned end at which a motion that moves on may end: what is asked of a
+walk of 2 m."""
+END_HEADING = math.radians(4.0)
+"""Angle [rad] by which its end may be turned."""
+
+Limited = Mapping[str, tuple[float, float | None]]
+"""What was measured, by name with unit: the value, and what it must stay below, if anything."""
 
 
-class Touches:
-    """Counts for how long more than the feet touches the ground, on a plant that can tell."""
+class Acceptance:
+    """Watches a motion while it is played, and judges it."""
 
-    def __init__(self, plant: Plant) -> None:
-        """Count on ``plant``."""
-        self._plant, self._time = plant, 0.0
-
-    def note(self) -> None:
-        """Once a tick."""
-        force = self._plant.body_contact_force
-        if force is not None and force > TOUCH_FORCE:
-            self._time += self._plant.control_period
-
-    def require_few(self, plan: MotionPlan) -> None:
-        """Raise ``Aborted`` if it was for longer than ``TOUCH_TIME``, unless the robot may lie."""
-        if self._time > TOUCH_TIME and Posture.LIE not in (plan.entry, plan.exit):
-            raise Aborted(
-                f"{plan.name} touched the ground with trunk or legs for {self._time:.2f} s"
-            )
-
-
-class HeldFeet:
-    """Measures how high the feet are held that a plan holds up."""
-
-    def __init__(self, plan: MotionPlan) -> None:
-        """None may be held."""
-        self._plan, self._held = plan, plan.held_feet
+    def __init__(self, plan: MotionPlan, plant: Plant) -> None:
+        """Watch ``plan`` on ``plant``."""
+        self._plan, self._plant, self._held = plan, plant, plan.held_feet
+        self._touched = 0.0
         self._heights: list[list[float]] = [[] for _ in self._held]
 
     def note(self, snapshot: Snapshot, t: float) -> None:
         """Once a tick, ``t`` seconds into the plan."""
+        force = self._plant.body_contact_force  # None from a plant that cannot tell
+        if force is not None and force > TOUCH_FORCE:
+            self._touched += self._plant.control_period
         for foot, heights in zip(self._held, self._heights, strict=True):
             if foot.start <= t <= foot.end:
                 heights.append(float(snapshot.p_world_feet[foot.leg, 2]) - ground_height(snapshot))
 
-    def judged(self, measured: Measurements) -> Measurements:
-        """``measured`` with the heights, if they are those of the plan; else raise ``Aborted``."""
+    def judged(self, played: PlayPlan, snapshot: Snapshot, at_rest: Measurements) -> Measurements:
+        """What was measured of it, if that shows that it was done; else raise ``Aborted``.
+
+        Args:
+            played: the motion, which is over.
+            snapshot: of the robot at rest.
+            at_rest: what was measured of it then.
+        """
+        plan = self._plan
+        if self._touched > TOUCH_TIME and Posture.LIE not in (plan.entry, plan.exit):
+            raise Aborted(
+                f"{plan.name} touched the ground with trunk or legs for {self._touched:.2f} s"
+            )
+        deviation = off_plan(played.deviation, is_dynamic=plan.has_dynamic_spans)
+        end: Limited = {}
+        if plan.footsteps is not None:
+            end = arrival(*played.end_error(snapshot), played.landings)
+        measured = {**at_rest, **_values(deviation), **_values(end)}
+        if not are_within(end):
+            raise Aborted(f"{plan.name} ended elsewhere: {listed(measured)}", measured)
+        if not are_within(deviation):
+            raise Aborted(f"{plan.name} went another way: {listed(measured)}", measured)
+        return self.with_held_feet(measured)
+
+    def with_held_feet(self, measured: Measurements) -> Measurements:
+        """``measured`` and how high feet were held, if that is as planned; else ``Aborted``."""
         found, is_low = dict(measured), False
         for foot, heights in zip(self._held, self._heights, strict=True):
             where = f" in {foot.name}" if len(self._held) > 1 else ""
@@ -75,21 +96,38 @@ class HeldFeet:
         return found
 
 
-def judged(played: PlayPlan, snapshot: Snapshot, at_rest: Measurements) -> Measurements:
-    """What was measured of a motion, if that shows that it was done; else raise ``Aborted``.
+def are_within(measured: Limited) -> bool:
+    """Whether every value is below its limit."""
+    return all(limit is None or value < limit for value, limit in measured.values())
+
+
+def _values(measured: Limited) -> Measurements:
+    return {name: value for name, (value, _) in measured.items()}
+
+
+def off_plan(deviation: Deviation, *, is_dynamic: bool = False) -> Limited:
+    """How far the robot was off its plan; ``is_dynamic`` if that has spans that are solved."""
+    place = DYNAMIC_PLACE if is_dynamic else PLACE_DEVIATION
+    attitude = DYNAMIC_ATTITUDE if is_dynamic else ATTITUDE_DEVIATION
+    degrees = math.degrees
+    return {
+        "mean place off plan [m]": (deviation.place, place),
+        "mean attitude off plan [deg]": (degrees(deviation.attitude), degrees(attitude)),
+        "mean joints off plan [deg]": (degrees(deviation.joints), degrees(JOINT_DEVIATION)),
+    }
+
+
+def arrival(place: float, heading: float, landings: Landings) -> Limited:
+    """How a motion that moves on has ended: where it was to end, and every foot landed?
 
     Args:
-        played: the motion, which is over.
-        snapshot: of the robot at rest.
-        at_rest: what was measured of it then.
+        place: distance [m] of the feet's middle from there.
+        heading: angle [rad] by which they are turned.
+        landings: what came of its steps.
     """
-    deviation, name = played.deviation, played.plan.name
-    measured = {**at_rest, **deviation_measurements(deviation)}
-    if played.plan.footsteps is not None:
-        arrival = *played.end_error(snapshot), played.landings
-        measured |= arrival_measurements(*arrival)
-        if not has_arrived(*arrival):
-            raise Aborted(f"{name} ended elsewhere: {listed(measured)}", measured)
-    if not is_small(deviation, is_dynamic=played.plan.has_dynamic_spans):
-        raise Aborted(f"{name} went another way: {listed(measured)}", measured)
-    return measured
+    return {
+        "end place error [m]": (place, END_PLACE),
+        "end heading error [rad]": (heading, END_HEADING),
+        "worst landing error [m]": (landings.error, None),
+        "missed landings": (float(landings.missed), 1.0),
+    }

@@ -9,8 +9,7 @@ from types import UnionType
 from typing import TypeVar
 
 from go2_wbc.config import Config, load_config
-from go2_wbc.errors import CommandError, ConfigError, Go2WbcError
-from go2_wbc.planning.command import finite_number
+from go2_wbc.errors import ConfigError, Go2WbcError
 from go2_wbc.plant.base import Plant
 from go2_wbc.wbc.tasks import Task
 
@@ -53,14 +52,6 @@ def pace(realtime: bool, plant: Plant | None) -> bool:
             "GO2Controller(plant=..., realtime=True)"
         )
     return realtime
-
-
-def duration(name: str, value: float) -> float:
-    """``value`` [s]; raise CommandError if it is no finite number, or negative."""
-    seconds = finite_number(name, value)
-    if seconds < 0:
-        raise CommandError(f"{name} must not be negative, got {seconds}")
-    return seconds
 
 
 def namespace(value: str) -> str:

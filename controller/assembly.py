@@ -1,10 +1,11 @@
-"""Puts a controller together: robot model, control loop, runner and pilot on one plant."""
+"""Puts a pilot together: robot model, control loop and runner on one plant."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
 
 from controller.loop import ControlLoop
 from controller.pilot import Pilot
@@ -20,56 +21,38 @@ from go2_wbc.robot.payload_estimation import PayloadEstimator
 from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.tasks import Task
 
+if TYPE_CHECKING:
+    from go2_wbc.plant.mujoco.viewer import PlantViewer
+
 RECORDED_TIME = 240.0
 """Seconds of robot time that the telemetry keeps."""
 
 
-@dataclass(frozen=True, slots=True)
-class PilotSettings:
-    """How a pilot drives its plant.
+def build_pilot(
+    plant: Plant,
+    config: Config,
+    *,
+    realtime: bool = False,
+    viewer: bool = False,
+    recorded_time: float = RECORDED_TIME,
+    description: RobotDescription | None = None,
+    after_tick: Callable[[], None] = lambda: None,
+    extra_tasks: Sequence[Task] = (),
+) -> Pilot:
+    """Take over a robot that lies on the ground, damped; ``close`` the pilot in the end.
 
-    Attributes:
+    Nothing is left open if it fails; ``plant`` stays the caller's to close. The pilot's robot model
+    belongs to the thread that ticks: whoever plans needs another one.
+
+    Args:
+        plant: what to drive; no other pilot may drive it.
+        config: numbers of the engine; ``beside_hardware`` if the plant moves a real robot.
         realtime: let time pass in a background thread at wall-clock pace.
         viewer: open MuJoCo's window, if there is a display.
         recorded_time: robot time [s] that the telemetry keeps; 0 keeps the last tick.
         description: what the controller takes the robot for; by default the installed Go2.
         after_tick: is called after every tick, in the thread that ticks.
         extra_tasks: a user's own tasks of the whole-body QP.
-    """
-
-    realtime: bool = False
-    viewer: bool = False
-    recorded_time: float = RECORDED_TIME
-    description: RobotDescription | None = None
-    after_tick: Callable[[], None] = lambda: None
-    extra_tasks: Sequence[Task] = ()
-
-
-@dataclass(frozen=True, slots=True)
-class Assembly:
-    """A pilot and its runner; ``close`` them in the end.
-
-    Attributes:
-        pilot: runs procedures.
-        runner: lets time pass; ``runner.loop`` has the newest state and the telemetry. Its robot
-            model belongs to the thread that ticks: whoever plans needs another one.
-        close: go limp, stop and close the window; the plant stays open. Idempotent.
-    """
-
-    pilot: Pilot
-    runner: Runner
-    close: Callable[[], None]
-
-
-def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = None) -> Assembly:
-    """Take over a robot that lies on the ground, damped.
-
-    Nothing is left open if it fails; ``plant`` stays the caller's to close.
-
-    Args:
-        plant: what to drive; no other pilot may drive it.
-        config: numbers of the engine; ``beside_hardware`` if the plant moves a real robot.
-        settings: by default headless and without realtime.
 
     Raises:
         ConfigError: for a back end that does not exist or takes no tasks of a user's own.
@@ -77,36 +60,35 @@ def build_pilot(plant: Plant, config: Config, settings: PilotSettings | None = N
         DescriptionError: if the robot's files are missing, broken, or not a Go2's.
         PlantError: if the plant does not answer, or another pilot drives it.
     """
-    settings = settings or PilotSettings()
     if plant.is_hardware:
         config = config.beside_hardware
     with without_collecting():
         load_kernels()
-    model = RobotModel(settings.description, motor=config.motor)
+    model = RobotModel(description, motor=config.motor)
     wbc, dynamic_wbc = (
-        WholeBodyController(model, config.backend, numbers, extra_tasks=settings.extra_tasks)
+        WholeBodyController(model, config.backend, numbers, extra_tasks=extra_tasks)
         for numbers in (config.wbc, config.wbc.for_dynamics)
     )
-    telemetry = Telemetry(model, max(1, round(settings.recorded_time / plant.control_period)))
+    telemetry = Telemetry(model, max(1, round(recorded_time / plant.control_period)))
     payloads = None
     if config.payload.enabled and config.backend != "placo":  # whose robot is PlaCo's own
         payloads = PayloadEstimator(model, config.wbc.joint_friction, config.payload)
     loop = ControlLoop(plant, model, wbc, telemetry, config.safety, dynamic_wbc, payloads)
     with ExitStack() as opened:
-        viewer = None
-        if settings.viewer:
+        if viewer:
             from go2_wbc.plant.mujoco.viewer import open_viewer  # MuJoCo's window with it
 
-            viewer = open_viewer(plant)
-        if viewer is not None:
-            opened.callback(viewer.close)
-
-        def after_tick() -> None:
-            if viewer is not None:
-                viewer.show(loop.state.time)
-            settings.after_tick()
-
-        runner = Runner(loop, realtime=settings.realtime, after_tick=after_tick)
+            window = open_viewer(plant)
+            if window is not None:
+                opened.callback(window.close)
+                after_tick = partial(_shown, window, loop, after_tick)
+        runner = Runner(loop, realtime=realtime, after_tick=after_tick)
         opened.callback(runner.close)
         pilot = Pilot(runner, config)
-        return Assembly(pilot, runner, opened.pop_all().close)
+        pilot.close = opened.pop_all().close
+    return pilot
+
+
+def _shown(window: PlantViewer, loop: ControlLoop, after_tick: Callable[[], None]) -> None:
+    window.show(loop.state.time)
+    after_tick()

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.robot.model import FOOT_RADIUS
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.tracking.landing import Landings
-from go2_wbc.tracking.plan_tracking import Deviation
 from motions.postures import SIT_POSE, STAND_HEIGHT, TUCKED_JOINTS
 
 STILL_SPEED = 0.05
@@ -27,20 +23,6 @@ BELLY_HEIGHT = 0.095
 """Height [m] of the base above the lowest foot below which the belly is down: 0.085 at rest."""
 FOLD_TOLERANCE = 0.5
 """Angle [rad] from the tucked legs' joints that still counts as folded."""
-PLACE_DEVIATION = 0.03
-"""Distance [m] that the tracked point may be off its plan, on the average."""
-ATTITUDE_DEVIATION = 0.1
-"""Angle [rad] that the trunk may be off its plan, on the average."""
-DYNAMIC_PLACE, DYNAMIC_ATTITUDE = 0.05, math.radians(8.0)
-"""The same of plans with jumps, rears and lifts: as far as a plan may be from what was asked
-(``motions.dynamics.Tolerance``). A rear at -25 deg was up to 32 mm and 6.6 deg off."""
-JOINT_DEVIATION = 0.2
-"""Angle [rad] that the worst joint of a raised leg may be off its plan, on the average."""
-END_PLACE = 0.05
-"""Distance [m] from its planned end at which a motion that moves on may end: what is asked of a
-walk of 2 m."""
-END_HEADING = math.radians(4.0)
-"""Angle [rad] by which its end may be turned."""
 
 
 def unfolded_legs(snapshot: Snapshot) -> list[Leg]:
@@ -113,50 +95,4 @@ def posture_measurements(snapshot: Snapshot) -> dict[str, float]:
         "yaw [deg]": yaw,
         "feet in contact": float(snapshot.state.feet_in_contact.sum()),
         "base speed [m/s]": float(np.linalg.norm(snapshot.state.v[:3])),
-    }
-
-
-def is_small(deviation: Deviation, *, is_dynamic: bool = False) -> bool:
-    """Whether the robot can be said to have done what was planned.
-
-    Args:
-        deviation: of the motion.
-        is_dynamic: the plan has spans that are solved.
-    """
-    place = DYNAMIC_PLACE if is_dynamic else PLACE_DEVIATION
-    attitude = DYNAMIC_ATTITUDE if is_dynamic else ATTITUDE_DEVIATION
-    return (
-        deviation.place < place
-        and deviation.attitude < attitude
-        and deviation.joints < JOINT_DEVIATION
-    )
-
-
-def has_arrived(place: float, heading: float, landings: Landings) -> bool:
-    """Whether a motion that moves on has ended where it was to end, every foot landed.
-
-    Args:
-        place: distance [m] of the feet's middle from there.
-        heading: angle [rad] by which they are turned.
-        landings: what came of its steps.
-    """
-    return place < END_PLACE and heading < END_HEADING and landings.missed == 0
-
-
-def arrival_measurements(place: float, heading: float, landings: Landings) -> dict[str, float]:
-    """By name with unit; see ``has_arrived``."""
-    return {
-        "end place error [m]": place,
-        "end heading error [rad]": heading,
-        "worst landing error [m]": landings.error,
-        "missed landings": float(landings.missed),
-    }
-
-
-def deviation_measurements(deviation: Deviation) -> dict[str, float]:
-    """By name with unit."""
-    return {
-        "mean place off plan [m]": deviation.place,
-        "mean attitude off plan [deg]": float(np.degrees(deviation.attitude)),
-        "mean joints off plan [deg]": float(np.degrees(deviation.joints)),
     }

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum
 from queue import Empty, SimpleQueue
-from typing import Generic, NoReturn, TypeVar, final
+from typing import Any, TypeVar, final
 
 POLL = 0.05
 """Time [s] after which a waiting thread looks whether the loop still runs."""
@@ -42,10 +42,10 @@ class LoopHangs(Exception):
 
 
 @dataclass(slots=True, eq=False)
-class _Errand(Generic[Result]):
-    work: Callable[[], Result | Pending]
+class _Errand:
+    work: Callable[[], object]
     is_abandoned: bool = False
-    answer: SimpleQueue[Callable[[], Result]] = field(default_factory=SimpleQueue)
+    answer: SimpleQueue[tuple[Any, BaseException | None]] = field(default_factory=SimpleQueue)
 
     def is_over(self) -> bool:
         """Do it, unless nobody waits for it any more; returns whether that was the last time."""
@@ -54,19 +54,12 @@ class _Errand(Generic[Result]):
         try:
             result = self.work()
         except BaseException as error:  # it is its asker's, whatever it is
-            self.answer.put(_raising(error))
+            self.answer.put((None, error))
             return True
-        if isinstance(result, Pending):
+        if result is NOT_YET:
             return False
-        self.answer.put(lambda: result)
+        self.answer.put((result, None))
         return True
-
-
-def _raising(error: BaseException) -> Callable[[], NoReturn]:
-    def fail() -> NoReturn:
-        raise error
-
-    return fail
 
 
 @final
@@ -106,11 +99,14 @@ class Errands:
         errand = _Errand(work)
         try:
             self._asked.put(errand)
-            return self._answer(errand, patience)()
+            result, error = self._answer(errand, patience)
         finally:
             errand.is_abandoned = True  # by Ctrl-C, say: it must not be done after that
+        if error is not None:
+            raise error
+        return result
 
-    def _answer(self, errand: _Errand[Result], patience: float) -> Callable[[], Result]:
+    def _answer(self, errand: _Errand, patience: float) -> tuple[Any, BaseException | None]:
         seen, waited = self._rounds, 0.0
         while True:
             is_last = self._is_ended

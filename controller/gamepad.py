@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import importlib
 import os
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, final
@@ -61,27 +60,13 @@ def _share(axes: tuple[float, ...], axis: int) -> float:
     return round(beyond if value > 0.0 else -beyond, 3)
 
 
-class Gamepad(ABC):
-    """A gamepad that can be read.
+@final
+class Gamepad:
+    """The first gamepad that pygame finds.
 
     Attributes:
         name: what it calls itself.
     """
-
-    name: str
-
-    @abstractmethod
-    def read(self) -> PadReading | None:
-        """What it says now; None once it is gone."""
-
-    @abstractmethod
-    def close(self) -> None:
-        """Let it go."""
-
-
-@final
-class PygameGamepad(Gamepad):
-    """The first gamepad that pygame finds."""
 
     def __init__(self, pygame: Any) -> None:  # noqa: ANN401 - a module of an extra
         """Take ``pygame.joystick``'s first."""
@@ -120,7 +105,7 @@ def find_gamepad() -> tuple[Gamepad | None, str]:
         pygame.display.init()
         pygame.joystick.init()
         if pygame.joystick.get_count():
-            pad = PygameGamepad(pygame)
+            pad = Gamepad(pygame)
             return pad, f"gamepad: {pad.name}"
     except pygame.error as error:
         pygame.quit()

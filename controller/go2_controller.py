@@ -6,19 +6,19 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import motions  # what is named motions.X below is imported when it is used, scipy with it
 from controller import arguments
-from controller.assembly import PilotSettings, build_pilot
-from controller.calls import Calls
-from controller.modes import Measurements, Mode, Outcome
+from controller.assembly import build_pilot
+from controller.modes import Aborted, Measurements, Mode, Outcome
 from controller.navigation import DriveStraight, TurnInPlace
 from controller.telemetry import Telemetry
 from go2_wbc.config import Config
 from go2_wbc.contacts import Gait
-from go2_wbc.errors import ClosedError, CommandError, TimelineError
+from go2_wbc.errors import ClosedError, CommandError, Go2WbcError, ModeError, TimelineError
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.planning.command import VelocityCommand, finite_number
 from go2_wbc.planning.pose import BodyPose
@@ -30,6 +30,12 @@ from go2_wbc.robot.state import Health, RobotState
 from go2_wbc.wbc.tasks import Task
 
 _log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Call:
+    name: str
+    start: float
 
 
 class GO2Controller:
@@ -88,25 +94,28 @@ class GO2Controller:
         realtime = arguments.pace(realtime, plant)
         urdf = arguments.checked("urdf", urdf, Path | str | None, "a path")
         description = find_description(None if urdf is None else Path(urdf))
-        settings = PilotSettings(
-            realtime=realtime,
-            viewer=viewer,
-            description=description,
-            after_tick=after_tick,
-            extra_tasks=arguments.tasks(extra_tasks),
-        )
+        tasks = arguments.tasks(extra_tasks)
         with ExitStack() as opened:
             if plant is None:
                 plant = MujocoPlant(urdf=description.urdf_path, visuals=viewer, motor=config.motor)
                 opened.callback(plant.close)
             self._plant = plant
-            built = build_pilot(plant, config, settings)
-            opened.callback(built.close)
+            self._pilot = build_pilot(
+                plant,
+                config,
+                realtime=realtime,
+                viewer=viewer,
+                description=description,
+                after_tick=after_tick,
+                extra_tasks=tasks,
+            )
+            opened.callback(self._pilot.close)
             self._resources = opened.pop_all()
-        self._runner, self._pilot, self._description = built.runner, built.pilot, description
+        self._runner, self._description = self._pilot.runner, description
         self._motor, self._limits = config.motor, config.feasibility
         self._closed = False
-        self._calls = Calls(built.pilot, built.runner)
+        self._turn: dict[str, _Call] = {}  # what runs: one entry, or none
+        self._last = Outcome(True, "lying, nothing asked yet", 0.0)
         self._planning = threading.Lock()
 
     # --- postures -------------------------------------------------------------------------
@@ -191,7 +200,7 @@ class GO2Controller:
         if self._pilot.mode is not Mode.WALKING:
             return
         ends_goal = self._pilot.halt()
-        if not (ends_goal or self._runner.is_realtime or self._calls.is_running):
+        if not (ends_goal or self._runner.is_realtime or self._turn):
             self._call("stop", self._pilot.rest)
 
     def turn_left(self, angle: float) -> bool:
@@ -308,7 +317,9 @@ class GO2Controller:
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""
         self._check_open()
-        seconds = arguments.duration("seconds", seconds)
+        seconds = finite_number("seconds", seconds)
+        if seconds < 0.0:
+            raise CommandError(f"seconds must not be negative, got {seconds}")
         self._call("wait", lambda: self._pilot.wait(seconds), allow_fallen=True)
 
     # --- looking --------------------------------------------------------------------------
@@ -336,7 +347,7 @@ class GO2Controller:
     @property
     def last_outcome(self) -> Outcome:
         """What came of the last blocking call, and why."""
-        return self._calls.last
+        return self._last
 
     @property
     def namespace(self) -> str:
@@ -382,8 +393,66 @@ class GO2Controller:
     def _call(
         self, name: str, procedure: Callable[[], Measurements], *, allow_fallen: bool = False
     ) -> bool:
+        """Run ``procedure`` to its end, one at a time in all threads; returns whether it was done.
+
+        Whatever ends it is noted. An error that is not of this project, Ctrl-C included, leaves the
+        robot limp.
+
+        Args:
+            name: of the call.
+            procedure: measures what it has done, or raises ``Aborted``.
+            allow_fallen: whether a robot that has fallen may be asked.
+
+        Raises:
+            ModeError: while another call runs, or for a robot that has fallen.
+        """
         self._check_open()
-        return self._calls.make(name, procedure, allow_fallen=allow_fallen)
+        if self._pilot.mode is Mode.FALLEN and not allow_fallen:
+            raise ModeError(f"{name}() needs a robot that has not fallen: call recover() first")
+        call = _Call(name, self.state.time)
+        try:  # Ctrl-C may come anywhere: whose turn it is must be seen from what is stored
+            running = self._turn.setdefault("call", call)  # looks and takes at once
+            if running is not call:
+                raise ModeError(f"{name}() while {running.name}() is still running")
+            return self._run(call, procedure)
+        except Go2WbcError:
+            raise
+        except BaseException as error:
+            is_ctrl_c = isinstance(error, KeyboardInterrupt)
+            what = "interrupted" if is_ctrl_c else type(error).__name__
+            reason = f"{what} during {name}()" + ("" if is_ctrl_c else f": {error}")
+            try:
+                self._pilot.collapse(reason)
+                reason = f"{reason}, damped"
+            finally:
+                self._note(call, reason)
+            raise
+        finally:  # no function is called in here: Python looks for Ctrl-C when one returns
+            if "call" in self._turn and self._turn["call"] is call:
+                del self._turn["call"]
+
+    def _run(self, call: _Call, procedure: Callable[[], Measurements]) -> bool:
+        try:
+            self._pilot.begin()
+            measured = procedure()
+        except Aborted as aborted:
+            self._note(call, str(aborted), aborted.measured)
+            return False
+        except Go2WbcError as error:
+            self._note(call, str(error))
+            raise
+        self._note(call, "done", measured, ok=True)
+        return True
+
+    def _note(
+        self, call: _Call, reason: str, measured: Measurements | None = None, *, ok: bool = False
+    ) -> None:
+        """What came of ``call``."""
+        self._last = Outcome(ok, reason, self.state.time - call.start, dict(measured or {}))
+        fault = self._runner.loop.fault
+        is_known = fault is not None and fault.reason in reason  # the loop has logged it
+        if not (ok or is_known):
+            _log.warning("%s", reason)
 
     def _check_open(self) -> None:
         if self._closed:

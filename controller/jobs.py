@@ -34,22 +34,8 @@ class _Stoppable(Protocol):
 Robot = TypeVar("Robot", bound=_Stoppable)
 
 
-@dataclass(frozen=True, slots=True)
-class Answer(Outcome):
-    """What came of a job, which is ``ok`` too if it has begun when the patience ends.
-
-    Attributes:
-        cancelled: whether it ended early because it was called off.
-        is_refused: whether it was never begun.
-        error: what was raised, if anything.
-    """
-
-    duration: float = 0.0
-    cancelled: bool = False
-    is_refused: bool = False
-    error: Exception | None = None
-
-
+Answer = Outcome
+"""What came of a job, which is ``ok`` too if it has begun when the patience ends."""
 Reply = Callable[[Answer], None]
 
 
@@ -94,6 +80,7 @@ class JobServer(Generic[Robot]):
 
     Attributes:
         robot: that carries them out.
+        job: what is being prepared or carried out, or None.
         last: what came of the last job whose turn came, or None.
     """
 
@@ -108,24 +95,19 @@ class JobServer(Generic[Robot]):
         self.robot = robot
         self.last: Answer | None = None
         self._queue, self._patience = queue, patience
-        self._job: Job | None = None
+        self.job: Job | None = None
         self._waiting: deque[Job] = deque()
         self._changed = threading.Condition()
         self._end = ""
         self._thread: threading.Thread | None = None
 
-    @property
-    def job(self) -> Job | None:
-        """What is being prepared or carried out."""
-        return self._job
-
     def refusal(self) -> str:
         """Why a job cannot be accepted now; empty if it can."""
-        job = self._job
+        job = self.job
         if self._end or job is None or len(self._waiting) < self._queue:
             return self._end
-        since = self.robot.state.time - job.start
-        return f"busy with {job.name!r} since {since:.1f} s; ask again when it has answered"
+        lasted = self._lasted(job)
+        return f"busy with {job.name!r} since {lasted:.1f} s; ask again when it has answered"
 
     def submit(self, job: Job) -> bool:
         """Accept ``job``, or answer why not; returns whether it was accepted."""
@@ -143,7 +125,7 @@ class JobServer(Generic[Robot]):
         """Answer what has lasted longer than the patience; to be called again and again."""
         now = time.monotonic()
         with self._changed:
-            running, waiting = self._job, self._waiting
+            running, waiting = self.job, self._waiting
             self._waiting = deque(job for job in waiting if now <= job._due)
         if running is not None and now > running._due:
             self._answer(running, Answer(True, f"{running.name} has begun"))
@@ -152,7 +134,7 @@ class JobServer(Generic[Robot]):
     def cancel(self, then: Callable[[], None] | None = None) -> bool:
         """Call off what is being carried out, if anything; ``then`` is called when it has ended."""
         with self._changed:
-            job = self._job
+            job = self.job
             if job is None:
                 return False
             job.is_cancelled, job.phase = True, "returning"
@@ -165,8 +147,8 @@ class JobServer(Generic[Robot]):
         """Go limp at once; what waits is refused, what is carried out ends."""
         with self._changed:
             waiting, self._waiting = self._waiting, deque()
-            if self._job is not None:
-                self._job.is_cancelled = True
+            if self.job is not None:
+                self.job.is_cancelled = True
         self._refuse(waiting, "was cancelled")
         self.robot.damp()
 
@@ -174,13 +156,13 @@ class JobServer(Generic[Robot]):
         """The end: who waits is told why; a thread of the server's own gets ``limit`` seconds."""
         with self._changed:
             self._end = reason
-            running, waiting, self._waiting = self._job, self._waiting, deque()
+            running, waiting, self._waiting = self.job, self._waiting, deque()
             if running is not None:
                 running.is_cancelled = True
             self._changed.notify_all()
         self._refuse(waiting, f"was not begun: {reason}")
         if running is not None:
-            self._finish(running, Answer(False, reason, self.robot.state.time - running.start))
+            self._finish(running, Answer(False, reason, self._lasted(running)))
         if self._thread is not None:
             self._thread.join(limit)
 
@@ -200,11 +182,11 @@ class JobServer(Generic[Robot]):
             self.work()
 
     def _has_work(self) -> bool:
-        return self._job is not None and self._job._is_prepared
+        return self.job is not None and self.job._is_prepared
 
     def work(self) -> bool:
         """Carry out the job whose turn it is, if it is prepared; returns whether there was one."""
-        job = self._job
+        job = self.job
         if job is None or not job._is_prepared:
             return False
         self.last = answer = self._carry_out(job)
@@ -214,34 +196,33 @@ class JobServer(Generic[Robot]):
         return True
 
     def _carry_out(self, job: Job) -> Answer:
-        measured: Measurements = {}
-        error: Exception | None = None
-        refusal = message = ""
+        error: Exception
         try:
             with self._changed:  # a damp() before this keeps the job from beginning
                 if job._error is not None:
                     raise job._error
                 refusal = f"{job.name} was cancelled" if job.is_cancelled else job.begin()
-            if not refusal:
-                measured = job.act(job)
+            measured = {} if refusal else job.act(job)
         except (Aborted, Go2WbcError) as failure:
             error, message = failure, str(failure) or f"{job.name} was cancelled"
         except Exception as failure:  # a bug must not leave its caller without an answer
             _log.exception("%s failed", job.name)
             error, message = failure, f"{type(failure).__name__}: {failure}"
-        duration = self.robot.state.time - job.start
-        if error is not None:
-            is_cancelled = job.is_cancelled and isinstance(error, Aborted)
-            return Answer(False, message, duration, cancelled=is_cancelled, error=error)
-        if refusal:
-            cancelled = job.is_cancelled
-            return Answer(False, refusal, duration, cancelled=cancelled, is_refused=True)
-        told = f": {listed(measured)}" if measured else ""
-        return Answer(True, f"done in {duration:.1f} s{told}", duration, measured)
+        else:
+            lasted, was_cancelled = self._lasted(job), job.is_cancelled
+            if refusal:
+                return Answer(False, refusal, lasted, cancelled=was_cancelled, is_refused=True)
+            told = f": {listed(measured)}" if measured else ""
+            return Answer(True, f"done in {lasted:.1f} s{told}", lasted, measured)
+        was_cancelled = job.is_cancelled and isinstance(error, Aborted)
+        return Answer(False, message, self._lasted(job), cancelled=was_cancelled, error=error)
+
+    def _lasted(self, job: Job) -> float:
+        return self.robot.state.time - job.start
 
     def _take_turn(self) -> None:
         """Let the next job have its turn; the lock is held."""
-        if self._job is not None or not self._waiting:
+        if self.job is not None or not self._waiting:
             return
         job = self._waiting.popleft()
         job.start = self.robot.state.time
@@ -249,7 +230,7 @@ class JobServer(Generic[Robot]):
             job._is_prepared = False
             args = (job, job.prepare)
             threading.Thread(target=self._prepare, args=args, name="prepare", daemon=True).start()
-        self._job = job
+        self.job = job
         self._changed.notify_all()
 
     def _prepare(self, job: Job, prepare: Callable[[], None]) -> None:
@@ -267,8 +248,8 @@ class JobServer(Generic[Robot]):
 
     def _finish(self, job: Job, answer: Answer) -> None:
         with self._changed:
-            if self._job is job:
-                self._job = None
+            if self.job is job:
+                self.job = None
                 self._take_turn()
             followers, job._followers = job._followers, []
         self._answer(job, answer)

@@ -31,19 +31,25 @@ Measurements = Mapping[str, float]
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What came of a blocking call.
+    """What came of a blocking call, or of a job.
 
     Attributes:
         ok: whether the measured state shows that it was done.
         reason: why, in plain words.
         duration: robot time [s] that it took.
         measured: the measured quantities that the verdict rests on, by name with unit.
+        cancelled: whether a job ended early because it was called off.
+        is_refused: whether a job was never begun.
+        error: what a job raised, if anything.
     """
 
     ok: bool
     reason: str
-    duration: float
+    duration: float = 0.0
     measured: Measurements = field(default_factory=dict)
+    cancelled: bool = field(default=False, repr=False)
+    is_refused: bool = field(default=False, repr=False)
+    error: Exception | None = field(default=None, repr=False)
 
     def __bool__(self) -> bool:
         """Truth of the outcome is ``ok``."""

@@ -8,8 +8,7 @@ import numpy as np
 
 from controller.go2_controller import GO2Controller
 from controller.modes import Mode
-from controller.placed_plan import PlacedPlan
-from controller.written_motion import off_written
+from controller.written_motion import STRIDE, off_written, placed, trunk_off, turned_off
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant.mujoco.ground_truth import TOUCH, GroundTruth, TruthRecording, true_runs
@@ -17,8 +16,6 @@ from go2_wbc.reference import STANCE, Anchor, LegTask, Target
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
 
-TRACKING_STRIDE = 5
-"""Every fifth tick is compared with the plan."""
 HALF_LENGTH = 0.2
 """Distance [m] from the trunk's middle to its ends: what a wrong attitude moves."""
 FULL = 0.999
@@ -109,6 +106,7 @@ def measure_motion(
     shares = recorded.torque_shares(model)
     force = np.maximum(recorded.trunk_force, recorded.limb_force)
     com, attitude, feet = _off_plan(recorded, plan, model)
+    trunk, turned, paw, landed = off_written(recorded, plan, model).tolist()
     return MotionMeasurement(
         fall=fall,
         said=said,
@@ -123,7 +121,10 @@ def measure_motion(
         joint_distance=recorded.joint_distance(model),
         stopped=dt * float((recorded.joint_distances(model) <= 0.0).sum()),
         touched=dt * float((recorded.touches_itself | (force > TOUCH)).sum()),
-        **asdict(off_written(recorded, plan, model)),
+        trunk_off=trunk,
+        turned_off=turned,
+        paw_off=paw,
+        landed_off=landed,
     )
 
 
@@ -166,12 +167,12 @@ def _off_plan(
 ) -> tuple[float, float, float]:
     """Largest deviations from the plan: CoM [m], attitude [rad], raised feet [m]."""
     anchor = Anchor.of_feet(recorded.p_world_feet[0].copy(), model.foot_radius)
-    truth = recorded.part(slice(None, None, TRACKING_STRIDE))
-    asked = PlacedPlan.of(plan, truth.time - recorded.time[0], anchor)
-    raised, feet = asked.does(LegTask.JOINTS), 0.0
+    truth = recorded.part(slice(None, None, STRIDE))
+    asked = placed(plan, truth.time - recorded.time[0], anchor)
+    raised, feet = asked["legs"] == LegTask.JOINTS, 0.0
     for leg in LEGS:
         rows, geometry = raised[:, leg], LegGeometry.of(model, leg)
-        real, planned = truth.q[rows, 7:][:, leg.joints], asked.q_joints[rows][:, leg.joints]
+        real, planned = truth.q[rows, 7:][:, leg.joints], asked["q_joints"][rows][:, leg.joints]
         off = foot_places(geometry, real) - foot_places(geometry, planned)
         feet = max(feet, float(np.linalg.norm(off, axis=1).max(initial=0.0)))
-    return float(asked.trunk_off(truth).max()), float(asked.turned_off(truth).max()), feet
+    return float(trunk_off(asked, truth).max()), float(turned_off(asked, truth).max()), feet

@@ -39,15 +39,30 @@ class Goal(ABC):
 
     def begin(self, state: RobotState) -> None:
         """Note where it starts."""
-        self._odometer = Odometer(state)
+        self._p_world_start = state.p_world_base.copy()
+        self._yaw_start = self._yaw_last = state.yaw
+        self._turned_before = 0.0
 
     def command(self, state: RobotState) -> VelocityCommand:
         """The velocity that leads to the goal; ask at least twice in every turn of the robot."""
-        self._odometer.update(state)
-        turned = self._odometer.turned(state)
-        x, y, turn = self._velocity(*self._odometer.displacement(state), turned)
+        turned = self._turned(state)
+        self._turned_before, self._yaw_last = turned, state.yaw
+        x, y, turn = self._velocity(*self._displacement(state), turned)
         c, s = math.cos(turned), math.sin(turned)
         return VelocityCommand(c * x + s * y, -s * x + c * y, turn)
+
+    def _turned(self, state: RobotState) -> float:
+        """Angle [rad] turned to the left since the start, over any number of turns.
+
+        The robot must have turned by less than half a turn since it last asked for a command.
+        """
+        return self._turned_before + wrap_angle(state.yaw - self._yaw_last)
+
+    def _displacement(self, state: RobotState) -> tuple[float, float]:
+        """Way ahead and to the left [m] in the frame of the start."""
+        dx, dy = (state.p_world_base - self._p_world_start)[:2].tolist()
+        c, s = math.cos(self._yaw_start), math.sin(self._yaw_start)
+        return c * dx + s * dy, -s * dx + c * dy
 
     @abstractmethod
     def _velocity(self, ahead: float, left: float, turned: float) -> tuple[float, float, float]:
@@ -66,39 +81,11 @@ class Goal(ABC):
         """What was asked and achieved, by name with unit."""
 
 
-class Odometer:
-    """Where the robot stands, seen from where a goal began, over any number of turns."""
-
-    def __init__(self, state: RobotState) -> None:
-        """Begin at ``state``."""
-        self._p_world_start = state.p_world_base.copy()
-        self._yaw_start = self._yaw_last = state.yaw
-        self._turned = 0.0
-
-    def update(self, state: RobotState) -> None:
-        """Count the angle turned since the last update, which must be less than half a turn."""
-        self._turned, self._yaw_last = self.turned(state), state.yaw
-
-    def turned(self, state: RobotState) -> float:
-        """Angle [rad] turned to the left since the start, unwrapped."""
-        return self._turned + wrap_angle(state.yaw - self._yaw_last)
-
-    def displacement(self, state: RobotState) -> tuple[float, float]:
-        """Way ahead and to the left [m] in the frame of the start."""
-        dx, dy = (state.p_world_base - self._p_world_start)[:2].tolist()
-        c, s = math.cos(self._yaw_start), math.sin(self._yaw_start)
-        return c * dx + s * dy, -s * dx + c * dy
-
-
 class TurnInPlace(Goal):
     """Turn left by an angle, staying in place."""
 
     def __init__(self, angle: float) -> None:
-        """Turn by ``angle`` [rad], negative turns right.
-
-        Raises:
-            CommandError: if it is more than ``GREATEST_TURN``.
-        """
+        """Turn by ``angle`` [rad], negative turns right; CommandError beyond ``GREATEST_TURN``."""
         if abs(angle) > GREATEST_TURN:
             raise CommandError(f"angle must be within +-{GREATEST_TURN:.1f} rad, got {angle}")
         super().__init__(f"turn by {math.degrees(angle):.1f} deg", angle, TURN_RATE)
@@ -109,30 +96,24 @@ class TurnInPlace(Goal):
 
     def is_done(self, state: RobotState) -> bool:
         """Whether less than a third of a degree is left and the robot hardly turns."""
-        remaining = self._asked - self._odometer.turned(state)
+        remaining = self._asked - self._turned(state)
         return abs(remaining) < math.radians(0.3) and abs(float(state.v[5])) < 0.15
 
     def is_within_tolerance(self, state: RobotState) -> bool:
         """Whether the heading is right to 1.5 deg."""
-        return abs(self._asked - self._odometer.turned(state)) < HEADING_TOLERANCE
+        return abs(self._asked - self._turned(state)) < HEADING_TOLERANCE
 
     def measurements(self, state: RobotState) -> dict[str, float]:
         """Angle asked and turned."""
-        return {
-            "asked [deg]": math.degrees(self._asked),
-            "turned [deg]": math.degrees(self._odometer.turned(state)),
-        }
+        turned = self._turned(state)
+        return {"asked [deg]": math.degrees(self._asked), "turned [deg]": math.degrees(turned)}
 
 
 class DriveStraight(Goal):
     """Walk a distance along the heading of the start."""
 
     def __init__(self, distance: float) -> None:
-        """Walk ``distance`` [m], negative is backward.
-
-        Raises:
-            CommandError: if it is more than ``GREATEST_DISTANCE``.
-        """
+        """Walk ``distance`` [m], negative goes back; CommandError beyond ``GREATEST_DISTANCE``."""
         if abs(distance) > GREATEST_DISTANCE:
             limit = f"+-{GREATEST_DISTANCE:.0f} m"
             raise CommandError(f"distance must be within {limit}, got {distance}")
@@ -144,23 +125,23 @@ class DriveStraight(Goal):
 
     def is_done(self, state: RobotState) -> bool:
         """Whether less than 4 mm are left and the robot hardly moves on."""
-        ahead, _ = self._odometer.displacement(state)
+        ahead, _ = self._displacement(state)
         return abs(self._asked - ahead) < 0.004 and abs(float(state.v[0])) < 0.06
 
     def is_within_tolerance(self, state: RobotState) -> bool:
         """Whether the robot is within 20 mm of the goal and 1.5 deg of the heading."""
-        ahead, left = self._odometer.displacement(state)
+        ahead, left = self._displacement(state)
         miss = math.hypot(self._asked - ahead, left)
-        return miss < DISTANCE_TOLERANCE and abs(self._odometer.turned(state)) < HEADING_TOLERANCE
+        return miss < DISTANCE_TOLERANCE and abs(self._turned(state)) < HEADING_TOLERANCE
 
     def measurements(self, state: RobotState) -> dict[str, float]:
         """Distance asked and walked, and the heading error."""
-        ahead, left = self._odometer.displacement(state)
+        ahead, left = self._displacement(state)
         return {
             "asked [m]": self._asked,
             "walked [m]": ahead,
             "aside [m]": left,
-            "heading error [deg]": math.degrees(self._odometer.turned(state)),
+            "heading error [deg]": math.degrees(self._turned(state)),
         }
 
 

@@ -8,9 +8,10 @@ procedures into calls.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from functools import partial
 
-from controller.acceptance import HeldFeet, Touches, judged
+from controller.acceptance import Acceptance
 from controller.behaviours.plans import ChangePosture, PlayPlan
 from controller.behaviours.standing import Standing
 from controller.checks import (
@@ -46,14 +47,15 @@ class Pilot:
     Attributes:
         mode: what the robot is doing.
         playing: the behaviour that plays a motion, or None.
+        runner: lets time pass; ``runner.loop`` has the newest state and the telemetry.
+        close: go limp and stop; the plant stays open. Idempotent.
     """
 
     def __init__(self, runner: Runner, config: Config) -> None:
         """Take over a robot that lies on the ground, or stands and will sink."""
-        self._runner = runner
-        self._loop = runner.loop
-        self._model = runner.loop.model
-        self._config = config
+        self.runner = self._runner = runner
+        self.close: Callable[[], None] = runner.close
+        self._loop, self._config = runner.loop, config
         self._walker = Walker(runner, config)
         self._goal: Goal | None = None
         self._commands = threading.Lock()  # held to take one, and to begin what takes none
@@ -145,7 +147,7 @@ class Pilot:
 
     def _make_standing(self, entry: Posture, duration: float) -> Standing:
         make_plan = partial(rise, entry=entry, duration=duration)
-        return Standing(make_plan, self._model, self._config.locomotion)
+        return Standing(make_plan, self._loop.model, self._config.locomotion)
 
     def _settle(self, posture: Posture, what: str) -> Measurements:
         _, check = _RESTING[posture]
@@ -275,11 +277,10 @@ class Pilot:
             _refuse_dynamic_on_hardware(plan, plant)
         self._meet_entry(plan)
         behaviour = PlayPlan(plan, self._config.wbc.joint_friction)
-        touches, held = Touches(plant), HeldFeet(plan)
+        acceptance = Acceptance(plan, plant)
 
         def finished() -> bool:
-            touches.note()
-            held.note(self._loop.snapshot, self._loop.state.time - start)
+            acceptance.note(self._loop.snapshot, self._loop.state.time - start)
             return behaviour.is_finished(self._loop.snapshot)
 
         self.playing = behaviour  # from now on a cancel() reaches it; one before is seen here
@@ -298,8 +299,7 @@ class Pilot:
                 self._runner.engage(self._make_standing(Posture.STAND, HOLD_TIME))
         finally:
             self.playing = None
-        touches.require_few(plan)
-        return held.judged(judged(behaviour, self._loop.snapshot, at_rest))
+        return acceptance.judged(behaviour, self._loop.snapshot, at_rest)
 
     def return_safely(self) -> None:
         """Let the procedure that plays a motion leave it and stand; any thread may call it."""

@@ -57,20 +57,19 @@ def performed(checked: CheckedMotion, run: Recording, model: RobotModel) -> Repl
     return _shown(checked.plan, ReplayContent(own, verdict=verdict, ghost=plan, written=written))
 
 
-def _is_mended(plan: MotionPlan) -> bool:
-    """Whether there are parts that the robot cannot do as they were written."""
-    spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
-    return any(isinstance(span.asked, PlanTarget) for span in spans)
-
-
 def _as_written(checked: CheckedMotion) -> Recording | None:
-    """The movement that was written, if it is not that of the plan; its forces are not known."""
-    if not _is_mended(checked.plan):
+    """The movement that was written, if it is not that of the plan; its forces are not known.
+
+    It is not where parts cannot be done as they were written.
+    """
+    plan = checked.plan
+    spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
+    if not any(isinstance(span.asked, PlanTarget) for span in spans):
         return None
     shown = checked.recording()
     return replace(
         shown,
-        q=as_written(checked.plan, checked.path),
+        q=as_written(plan, checked.path),
         tau=np.zeros_like(shown.tau),
         foot_forces=np.zeros_like(shown.foot_forces),
         support_margin=np.full_like(shown.support_margin, np.nan),
@@ -101,12 +100,9 @@ def verdict_of(report: FeasibilityReport) -> Verdict:
     text = "feasible" if report.ok else _count(broken, "limit") + " broken"
     if tight:
         text += f", {_count(tight, 'tight margin')}"
-    judged = [
-        item
-        for item in report.series
-        if len(item.times) >= _LEAST_SAMPLES and item.check in report.margins
-    ]
-    judged.sort(key=lambda item: _share_left(report.margins[item.check]))
+    margins, enough = report.margins, _LEAST_SAMPLES
+    judged = [s for s in report.series if len(s.times) >= enough and s.check in margins]
+    judged.sort(key=lambda item: _share_left(margins[item.check]))
     findings = (*report.failures, *report.warnings)
     return Verdict(
         ok=report.ok,
@@ -135,34 +131,36 @@ def _annotation(finding: Finding, series: tuple[Series, ...]) -> Annotation:
         time=finding.time,
         text=_words(finding),
         is_broken=is_broken,
-        spans=tuple(
-            (float(item.times[run.start]), float(item.times[run.stop - 1])) for run in runs
-        ),
+        spans=tuple((float(item.times[r.start]), float(item.times[r.stop - 1])) for r in runs),
         parts=parts_of(finding.subject),
     )
 
 
 def _grouped(annotations: Sequence[Annotation]) -> tuple[Annotation, ...]:
     """One annotation for the subjects that meet the same limit at about the same time."""
-    joined, left = [], list(annotations)
-    while left:
-        first, *others = left
-        group = [
-            item
-            for item in others
-            if (item.limit, item.is_broken) == (first.limit, first.is_broken)
-            and abs(item.time - first.time) < _TOGETHER
-        ]
-        left = [item for item in others if item not in group]
-        group.insert(0, first)
-        whole = replace(
-            first,
+    groups: list[list[Annotation]] = []
+    for item in annotations:
+        meets = (item.limit, item.is_broken)
+        alike = (
+            group
+            for group in groups
+            if (group[0].limit, group[0].is_broken) == meets
+            and abs(group[0].time - item.time) < _TOGETHER
+        )
+        group = next(alike, None)
+        if group is None:
+            groups.append([item])
+        else:
+            group.append(item)
+    return tuple(
+        replace(
+            group[0],
             subject=_together([item.subject for item in group]),
             spans=tuple(sorted({span for item in group for span in item.spans})),
             parts=tuple(dict.fromkeys(part for item in group for part in item.parts)),
         )
-        joined.append(whole)
-    return tuple(joined)
+        for group in groups
+    )
 
 
 def _together(subjects: Sequence[str]) -> str:

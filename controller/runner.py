@@ -52,27 +52,6 @@ _DRIVEN: WeakValueDictionary[int, Plant] = WeakValueDictionary()
 Result = TypeVar("Result")
 
 
-class _Wait:
-    """What a call waits for while time passes.
-
-    Attributes:
-        end: time [s] of the loop after which it has not come.
-    """
-
-    def __init__(self, loop: ControlLoop, is_done: Callable[[], bool], limit: float) -> None:
-        """Wait from now on until ``is_done``, for ``limit`` seconds of what ``loop`` does now."""
-        self._loop, self._is_done, self._behaviour = loop, is_done, loop.behaviour
-        self.end = loop.state.time + limit
-
-    def verdict(self) -> bool | Pending:
-        """After a tick: whether it has come, or not yet."""
-        if self._loop.fault is not None or self._loop.behaviour is not self._behaviour:
-            return False
-        if self._is_done():
-            return True
-        return NOT_YET if self._loop.state.time < self.end else False
-
-
 class Runner:
     """Owns the passing of time for one loop.
 
@@ -227,28 +206,40 @@ class Runner:
             ClosedError: if the controller is closed meanwhile.
         """
         if not self.is_realtime:
-            return self._hold(lambda: self._advance(_Wait(self.loop, is_done, limit)))
-        wait = self.between_ticks(lambda: _Wait(self.loop, is_done, limit))
+            return self._hold(lambda: self._advance(self._waiting(is_done, limit)))
+        waiting = self.between_ticks(lambda: self._waiting(is_done, limit))
 
         def verdict() -> bool | Pending:
             self._obey()
             if self._failure is not None:
                 raise self._failure
-            return wait.verdict()
+            return waiting()
 
         with suppress(LoopEnded):
             return self._ask(verdict)
         return verdict() is True  # it raises what has ended the loop
 
-    def _advance(self, wait: _Wait) -> bool:
-        while self.loop.state.time < wait.end:
+    def _waiting(self, is_done: Callable[[], bool], limit: float) -> Callable[[], bool | Pending]:
+        """Says after a tick whether ``is_done()`` has come while the loop does what it does now."""
+        loop, behaviour, end = self.loop, self.loop.behaviour, self.loop.state.time + limit
+
+        def verdict() -> bool | Pending:
+            if loop.fault is not None or loop.behaviour is not behaviour:
+                return False
+            if is_done():
+                return True
+            return NOT_YET if loop.state.time < end else False
+
+        return verdict
+
+    def _advance(self, waiting: Callable[[], bool | Pending]) -> bool:
+        while True:
             self._obey()
             self.loop.tick()
             self._after_tick()
-            verdict = wait.verdict()
+            verdict = waiting()
             if not isinstance(verdict, Pending):
                 return verdict
-        return False
 
     # --- until something is measured ----------------------------------------------------------
 

@@ -7,6 +7,7 @@ has come of it.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import astuple
 from queue import SimpleQueue
 from typing import final
 
@@ -76,7 +77,8 @@ class Teleop:
         """Do what ``key`` means; False if it means to end."""
         try:
             if key in STEPS:
-                self._change(STEPS[key][1])
+                pairs = zip(astuple(self._go2.command), astuple(STEPS[key][1]), strict=True)
+                self._move(VelocityCommand(*(round(now + step, 3) for now, step in pairs)))
             elif key in ACTIONS:
                 self._begin(*ACTIONS[key])
             elif key == STOP:
@@ -97,7 +99,7 @@ class Teleop:
         elif not (wanted.is_zero and self._sticks_rest):
             self._sticks_rest = wanted.is_zero
             try:
-                self._go2.move(wanted.linear_x, wanted.angular_z, linear_y=wanted.linear_y)
+                self._move(wanted)
             except Go2WbcError as error:  # it fell in between
                 self._news.put(str(error))
         return goes_on
@@ -130,13 +132,8 @@ class Teleop:
         self._jobs.damp()
         self._jobs.abandon("the robot is let go", JOIN_TIME)
 
-    def _change(self, step: VelocityCommand) -> None:
-        now = self._go2.command
-        self._go2.move(
-            linear_x=round(now.linear_x + step.linear_x, 3),
-            angular_z=round(now.angular_z + step.angular_z, 3),
-            linear_y=round(now.linear_y + step.linear_y, 3),
-        )
+    def _move(self, wanted: VelocityCommand) -> None:
+        self._go2.move(wanted.linear_x, wanted.angular_z, linear_y=wanted.linear_y)
 
     def _begin(self, label: str, act: Callable[[GO2Controller], bool]) -> None:
         if self.is_busy:

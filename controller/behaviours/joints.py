@@ -12,6 +12,8 @@ from go2_wbc.robot.snapshot import Snapshot
 
 DAMPING = 3.0
 """Joint damping [N m s/rad] of the safe state: the robot sinks in about a second."""
+SERVO_DAMPING = 2.0
+"""That of a servo [N m s/rad]."""
 
 
 class _OnTheGround(Behaviour):
@@ -57,7 +59,6 @@ class ServoJoints(_OnTheGround):
         label: str,
         targets: tuple[tuple[float, Float[np.ndarray, "12"]], ...],
         kp: float = 40.0,
-        kd: float = 2.0,
         *,
         stays_on_belly: bool = False,
     ) -> None:
@@ -67,12 +68,10 @@ class ServoJoints(_OnTheGround):
             label: see ``Behaviour``.
             targets: (duration [s], joint angles (12,) [rad]) of each leg of the way.
             kp: stiffness [N m/rad].
-            kd: damping [N m s/rad].
             stays_on_belly: whether a robot that is tipped over, or was before, has fallen.
         """
         super().__init__(label, stays_on_belly=stays_on_belly)
-        self._targets = targets
-        self._kp, self._kd = kp, kd
+        self._targets, self._kp = targets, kp
 
     def start(self, snapshot: Snapshot) -> None:
         """Plan from the measured joints."""
@@ -85,4 +84,4 @@ class ServoJoints(_OnTheGround):
     def update(self, snapshot: Snapshot) -> JointReference:
         """The point of the way that belongs to this instant."""
         point = self._curve.at(snapshot.state.time - self._start)
-        return JointReference(point.value, point.rate, self._kp, self._kd)
+        return JointReference(point.value, point.rate, self._kp, SERVO_DAMPING)

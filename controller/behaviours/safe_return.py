@@ -10,12 +10,12 @@ until it stands again: a jump that has begun lands first.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from go2_wbc.motion_plan import MotionPlan
+from go2_wbc.plant.mujoco.ground_truth import true_runs
 from go2_wbc.reference import Reference
 
 TURNING = 0.3
@@ -83,7 +83,7 @@ class WayOut:
 
 def way_out(plan: MotionPlan, t: float) -> WayOut:
     """How ``plan`` is left from the instant ``t`` [s]."""
-    calm = list(_calm_spans(plan))
+    calm = _calm_spans(plan)
     for start, end in calm:
         if start <= t < end and (t + ROOM <= end or end == plan.duration):
             target = nearest_safe_instant(plan, t, start, end)
@@ -129,21 +129,14 @@ def _is_safe(plan: MotionPlan, t: float) -> bool:
     return bool(reference.stance.all() and loads.min() >= loads.max())
 
 
-def _calm_spans(plan: MotionPlan) -> Iterator[tuple[float, float]]:
+def _calm_spans(plan: MotionPlan) -> list[tuple[float, float]]:
     """Spans [s] in which three feet or more stand and no foot swings to another place."""
     steps = plan.footsteps
     if steps is None:
-        yield 0.0, plan.duration
-        return
+        return [(0.0, plan.duration)]
     times = [*steps.contacts.times, np.inf]
     is_calm = ~steps.swings.any(axis=1) & (steps.contacts.modes.sum(axis=1) >= 3)
-    start = None
-    for time, calm in zip(times, [*is_calm.tolist(), False], strict=True):
-        if calm and start is None:
-            start = time
-        elif not calm and start is not None:
-            yield start, min(time, plan.duration)
-            start = None
+    return [(times[run.start], min(times[run.stop], plan.duration)) for run in true_runs(is_calm)]
 
 
 def _landing(plan: MotionPlan, span: tuple[float, float]) -> WayOut | None:

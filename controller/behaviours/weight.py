@@ -19,7 +19,7 @@ from go2_wbc.robot.snapshot import Snapshot
 from motions.dynamics.phases import GRAVITY
 
 LEAST, MOST = 0.8, 1.4
-"""Range of the ratio: the lightest robot, and one that carries 6 kg."""
+"""Bounds of the ratio: of the lightest robot, and of one that carries 6 kg."""
 DOUBT = 0.02
 """Time [s] for which the model's weight counts as if it had been felt: a first tick is noisy."""
 _JOINTS = [[6 + joint for joint in range(leg.joints.start, leg.joints.stop)] for leg in LEGS]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.library import Ending, ending
-from controller.checks import END_HEADING, END_PLACE
+from controller.acceptance import END_HEADING, END_PLACE
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions import Timeline, compile_timeline

@@ -1,18 +1,22 @@
-"""A Go2 for tests that does at once what it is told, and records it: no physics, no QP."""
+"""A Go2 for tests that does at once what it is told, and records it: no physics, no QP.
+
+What is called is the real ``GO2Controller``; only how a call is carried out is not, nor the pilot.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from controller.go2_controller import GO2Controller
-from controller.modes import Mode, Outcome
+from controller.modes import Measurements, Mode, Outcome
 from controller.telemetry import Telemetry
-from go2_wbc.contacts import Gait
 from go2_wbc.errors import Go2WbcError, ModeError
 from go2_wbc.motion_plan import MotionPlan
+from go2_wbc.planning.command import VelocityCommand
+from go2_wbc.planning.pose import BodyPose
 from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
@@ -24,6 +28,14 @@ PERIOD = 0.01
 SIT = {"base height [m]": float(SIT_POSE[2]), "pitch [deg]": math.degrees(SIT_POSE[4])}
 STAND = {"CoM height [m]": STAND_HEIGHT}
 RAISED = {"least paw height [m]": 0.6, "mean paw height [m]": 0.61}
+ENDS: Mapping[str, tuple[Mode, Measurements]] = {
+    "stand": (Mode.STANDING, STAND),
+    "sit": (Mode.SITTING, SIT),
+    "walk": (Mode.WALKING, STAND),
+    "turn_left": (Mode.WALKING, {}),
+    "high_five": (Mode.STANDING, RAISED),
+}
+"""How each call ends: the mode, and what is measured."""
 
 
 class FakeGo2(GO2Controller):
@@ -50,39 +62,22 @@ class FakeGo2(GO2Controller):
         self._share, self._yaw = speed_share, yaw
         self._refusals, self._errors = dict(refusals or {}), dict(errors or {})
         self._falls_in = falls_in
-        self._the_mode, self._outcome = Mode.LYING, Outcome(True, "", 0.0)
+        self._the_mode, self._last, self._closed = Mode.LYING, Outcome(True, "", 0.0), False
+        self._pilot, self.limits = self, "what it is told"
         self._position, self._speed, self._time = np.zeros(2), 0.0, 0.0
         self._samples: list[tuple[float, float, float, float, float, bool]] = []
         self._telemetry = Telemetry(RobotModel(), 1)
         self._pass(PERIOD)
 
-    def stand(self) -> bool:
-        return self._do("stand", Mode.STANDING, STAND)
-
-    def sit(self) -> bool:
-        return self._do("sit", Mode.SITTING, SIT)
-
-    def walk(self, gait: str | Gait = "trot") -> bool:
-        return self._do("walk", Mode.WALKING, STAND)
-
-    def move(
-        self,
-        linear_x: float = 0.0,
-        angular_z: float = 0.0,
-        *,
-        linear_y: float = 0.0,
-        height: float = 0.0,
-        roll: float = 0.0,
-        pitch: float = 0.0,
-        yaw: float = 0.0,
-    ) -> None:
+    def set_command(self, command: VelocityCommand, _pose: BodyPose) -> VelocityCommand:
         self.calls.append("move")
         if self._the_mode is not Mode.WALKING:
             raise ModeError(f"move() needs walking mode, not {self._the_mode.value}")
-        self._speed = self._share * linear_x
+        self._speed = self._share * command.linear_x
+        return command
 
     def wait(self, seconds: float) -> None:
-        self._do("wait", self._the_mode, {}, seconds)
+        self._do("wait", seconds)
 
     def stop(self) -> None:
         self.calls.append("stop")
@@ -93,13 +88,13 @@ class FakeGo2(GO2Controller):
         for _ in range(steps):
             self._yaw += angle / steps
             self._pass(PERIOD)
-        return self._do("turn_left", Mode.WALKING, {"turned [deg]": math.degrees(angle)})
+        return self._do("turn_left")
 
     def high_five(
         self, side: str = "right", hold: float = 2.0, *, plan: CompiledPlan | None = None
     ) -> bool:
         self._pass(0.5, is_raised=True)
-        return self._do("high_five", Mode.STANDING, RAISED)
+        return self._do("high_five")
 
     def prepare(self, motion: Playable, *, check: bool = True) -> MotionPlan:
         return FeasibilityChecker().plan(motion, check=check)
@@ -107,10 +102,6 @@ class FakeGo2(GO2Controller):
     @property
     def mode(self) -> Mode:
         return self._the_mode
-
-    @property
-    def last_outcome(self) -> Outcome:
-        return self._outcome
 
     @property
     def telemetry(self) -> Telemetry:
@@ -141,18 +132,23 @@ class FakeGo2(GO2Controller):
     def close(self) -> None:
         self.calls.append("close")
 
-    def _do(self, name: str, mode: Mode, measured: Mapping[str, float], time: float = 0.1) -> bool:
+    def _call(
+        self, name: str, procedure: Callable[[], Measurements], *, allow_fallen: bool = False
+    ) -> bool:
+        return self._do(name)
+
+    def _do(self, name: str, time: float = 0.1) -> bool:
         self.calls.append(name)
         if name in self._errors:
             raise self._errors[name]
         self._pass(time)
         if name == self._falls_in:
             self._the_mode = Mode.FALLEN
-            self._outcome = Outcome(False, "fell at t=3.20 s: roll 71 deg, pitch 2 deg", time)
+            self._last = Outcome(False, "fell at t=3.20 s: roll 71 deg, pitch 2 deg", time)
             return False
         ok = name not in self._refusals
-        self._the_mode = mode
-        self._outcome = Outcome(ok, self._refusals.get(name, "done"), time, measured)
+        self._the_mode, measured = ENDS.get(name, (self._the_mode, {}))
+        self._last = Outcome(ok, self._refusals.get(name, "done"), time, measured)
         return ok
 
     def _pass(self, seconds: float, *, is_raised: bool = False) -> None:

@@ -1,8 +1,9 @@
-"""Plants that can be watched and made to fail, a QP that can be made infeasible, and threads."""
+"""Plants that can be watched and made to fail, a QP that cannot be solved, threads, and Ctrl-C."""
 
 from __future__ import annotations
 
 import itertools
+import signal
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
@@ -27,6 +28,10 @@ PERIOD = 0.004
 HANG_GUARD = 120.0
 # s of robot time: in the middle of rising, when the whole-body QP is at work.
 MID_RISE = 1.5
+
+# s; range of the time after which Ctrl-C comes, and after which it comes again: Python swallows one
+# that comes in a destructor.
+SOON, LATER, AGAIN = 1e-3, 4e-3, 5.0
 
 _Result = TypeVar("_Result")
 
@@ -135,3 +140,22 @@ def in_thread(call: Callable[[], _Result]) -> Future[_Result]:
 
     threading.Thread(target=run, daemon=True).start()
     return future
+
+
+def interrupt_somewhere_in(endless: Callable[[], object], rng: np.random.Generator) -> None:
+    """Raises KeyboardInterrupt wherever the main thread then is in ``endless()``, and catches it.
+
+    By a timer of the kernel: a thread that interrupts does so only while the main thread waits.
+    """
+
+    def begin() -> None:
+        signal.setitimer(signal.ITIMER_REAL, rng.uniform(SOON, LATER), AGAIN)
+        endless()
+
+    usual = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            begin()
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, usual)

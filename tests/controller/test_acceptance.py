@@ -1,4 +1,4 @@
-"""Feet that a motion holds up are measured: on the average of each hold, near their heights."""
+"""A motion is done if it was near its plan, ended there, and held feet up on the average."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from dataclasses import dataclass
 
 import pytest
 
-from controller.acceptance import PAW_TOLERANCE, HeldFeet
+from controller.acceptance import PAW_TOLERANCE, Acceptance, are_within, arrival, off_plan
 from controller.modes import Aborted
 from go2_wbc.legs import Leg
 from go2_wbc.motion_plan import HeldFoot, MotionPlan, Posture
 from go2_wbc.reference import Reference
 from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
 from go2_wbc.robot.snapshot import Snapshot
+from go2_wbc.tracking.landing import Landings
+from go2_wbc.tracking.plan_tracking import Deviation
+from tests.controller.plants import StillPlant
 from tests.engine_helpers import standing_q, state_of
 
 MODEL = RobotModel()
@@ -46,10 +49,10 @@ def raised(leg: Leg, height: float) -> Snapshot:
 
 
 def test_a_foot_counts_on_the_average_of_its_hold_and_at_no_other_time() -> None:
-    held = HeldFeet(Holding((FIRST,)))
+    held = Acceptance(Holding((FIRST,)), StillPlant())
     for t, height in ((0.99, 9.0), (1.0, 0.3 - PAW_TOLERANCE), (2.0, 0.305), (2.01, 0.0)):
         held.note(raised(Leg.FR, height), t)
-    measured = held.judged({"yaw [deg]": 1.0})
+    measured = held.with_held_feet({"yaw [deg]": 1.0})
     assert measured["yaw [deg]"] == 1.0
     assert measured["planned paw height [m]"] == 0.3
     assert measured["least paw height [m]"] == pytest.approx(0.3 - PAW_TOLERANCE)
@@ -57,16 +60,49 @@ def test_a_foot_counts_on_the_average_of_its_hold_and_at_no_other_time() -> None
 
 
 def test_a_foot_that_was_too_low_is_told_with_what_was_measured() -> None:
-    held = HeldFeet(Holding((FIRST, SECOND)))
+    held = Acceptance(Holding((FIRST, SECOND)), StillPlant())
     held.note(raised(Leg.FR, 0.3), 1.5)
     held.note(raised(Leg.FL, 0.2 - PAW_TOLERANCE - CENTIMETRE), 2.7)
     with pytest.raises(Aborted, match=r"holding held no paw at its height: .*in second") as told:
-        held.judged({})
+        held.with_held_feet({})
     assert told.value.measured["mean paw height in first [m]"] == pytest.approx(0.3)
     assert told.value.measured["mean paw height in second [m]"] == pytest.approx(0.16)
 
 
 def test_a_plan_that_holds_no_foot_is_not_measured() -> None:
-    held = HeldFeet(Holding(()))
+    held = Acceptance(Holding(()), StillPlant())
     held.note(raised(Leg.FR, 0.3), 1.5)
-    assert held.judged({"yaw [deg]": 1.0}) == {"yaw [deg]": 1.0}
+    assert held.with_held_feet({"yaw [deg]": 1.0}) == {"yaw [deg]": 1.0}
+
+
+@pytest.mark.parametrize(
+    ("deviation", "standing", "solved"),
+    [
+        (Deviation(place=0.02, attitude=0.05, joints=0.0), True, True),
+        (Deviation(place=0.04, attitude=0.12, joints=0.0), False, True),
+        (Deviation(place=0.06, attitude=0.0, joints=0.0), False, False),
+        (Deviation(place=0.0, attitude=0.15, joints=0.0), False, False),
+        (Deviation(place=0.0, attitude=0.0, joints=0.3), False, False),
+    ],
+)
+def test_a_solved_motion_may_be_as_far_off_as_its_plan_may_be_from_what_was_asked(
+    deviation: Deviation, *, standing: bool, solved: bool
+) -> None:
+    assert are_within(off_plan(deviation)) is standing
+    assert are_within(off_plan(deviation, is_dynamic=True)) is solved
+
+
+@pytest.mark.parametrize(
+    ("place", "heading", "missed", "arrived"),
+    [
+        (0.04, 0.06, 0, True),
+        (0.06, 0.0, 0, False),
+        (0.0, 0.08, 0, False),
+        (0.0, 0.0, 1, False),
+    ],
+)
+def test_a_motion_that_moves_on_has_arrived_near_its_end_with_every_foot_landed(
+    place: float, heading: float, missed: int, *, arrived: bool
+) -> None:
+    landings = Landings(missed=missed, error=0.0)
+    assert are_within(arrival(place, heading, landings)) is arrived

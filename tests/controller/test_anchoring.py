@@ -21,11 +21,6 @@ STEP = 1e-4
 
 
 @pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
 def pair(model: RobotModel) -> MotionPlan:
     """Two diagonal feet up, then the others."""
     return compile_motion("paw_pair", model)

@@ -9,7 +9,7 @@ import threading
 import pytest
 
 from controller import GO2Controller, assembly
-from controller.assembly import PilotSettings, build_pilot
+from controller.assembly import build_pilot
 from go2_wbc.config import Config
 from go2_wbc.errors import ConfigError, PlantError
 from go2_wbc.plant import MujocoPlant
@@ -62,7 +62,7 @@ def test_a_pilot_that_cannot_be_made_leaves_no_thread_behind(
     before = threading.active_count()
     monkeypatch.setattr(assembly, "Pilot", fail)
     with pytest.raises(RuntimeError, match="no pilot"):
-        build_pilot(StillPlant(), Config(), PilotSettings(realtime=True))
+        build_pilot(StillPlant(), Config(), realtime=True)
     assert threading.active_count() == before
 
 
@@ -86,21 +86,21 @@ def test_the_window_shows_fifty_frames_a_second_and_is_closed_in_the_end(window:
 
 def test_what_is_asked_to_follow_a_tick_follows_the_window(window: Window) -> None:
     seen: list[int] = []
-    settings = PilotSettings(viewer=True, after_tick=lambda: seen.append(window.frames))
     plant = MujocoPlant(control_period=1.0 / viewer.FRAME_RATE)
-    built = build_pilot(plant, Config(), settings)
-    built.runner.advance_until(lambda: len(seen) == 3, 1.0)
-    built.close()
+    note = lambda: seen.append(window.frames)  # noqa: E731
+    pilot = build_pilot(plant, Config(), viewer=True, after_tick=note)
+    pilot.runner.advance_until(lambda: len(seen) == 3, 1.0)
+    pilot.close()
     plant.close()
     assert seen == [0, 1, 2]  # the first tick is the state that the window opened with
 
 
 def test_the_last_ticks_are_recorded_for_as_long_as_is_asked() -> None:
     plant = StillPlant()
-    built = build_pilot(plant, Config(), PilotSettings(recorded_time=10 * plant.control_period))
-    built.pilot.wait(30 * plant.control_period)
-    built.close()
-    assert len(built.runner.loop.telemetry.samples(1e6).unfinished.time) == 10
+    pilot = build_pilot(plant, Config(), recorded_time=10 * plant.control_period)
+    pilot.wait(30 * plant.control_period)
+    pilot.close()
+    assert len(pilot.runner.loop.telemetry.samples(1e6).unfinished.time) == 10
 
 
 def test_nothing_is_left_to_compile_when_the_robot_has_been_taken_over() -> None:

@@ -31,28 +31,28 @@ def plan() -> CompiledPlan:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("moment", MOMENTS)
-def test_a_high_five_that_is_cancelled_ends_standing(moment: float) -> None:
-    plant = WatchedPlant()
-    with GO2Controller(plant=plant) as go2:
-        assert go2.stand()
-        start = go2.state.time
-        plant.once_at(start + 0.9 + moment, go2.cancel)
-        assert go2.high_five() is False
-        assert "cancelled" in go2.last_outcome.reason
-        assert go2.mode is Mode.STANDING
-        assert go2.state.feet_in_contact.all()
-        assert go2.state.time - start < 0.9 + moment + 6.0
-        assert go2.telemetry.qp_failures == 0
+def test_a_high_five_that_is_cancelled_ends_standing(
+    plant: WatchedPlant, go2: GO2Controller, moment: float
+) -> None:
+    assert go2.stand()
+    start = go2.state.time
+    plant.once_at(start + 0.9 + moment, go2.cancel)
+    assert go2.high_five() is False
+    assert "cancelled" in go2.last_outcome.reason
+    assert go2.mode is Mode.STANDING
+    assert go2.state.feet_in_contact.all()
+    assert go2.state.time - start < 0.9 + moment + 6.0
+    assert go2.telemetry.qp_failures == 0
 
 
-def test_a_motion_that_is_cancelled_before_it_begins_is_not_played() -> None:
-    plant = WatchedPlant()
-    with GO2Controller(plant=plant) as go2:
-        plant.once_at(1.0, go2.cancel)
-        assert go2.high_five() is False
-        assert "before it began" in go2.last_outcome.reason
-        assert go2.mode is Mode.STANDING
-        assert go2.progress == 0.0
+def test_a_motion_that_is_cancelled_before_it_begins_is_not_played(
+    plant: WatchedPlant, go2: GO2Controller
+) -> None:
+    plant.once_at(1.0, go2.cancel)
+    assert go2.high_five() is False
+    assert "before it began" in go2.last_outcome.reason
+    assert go2.mode is Mode.STANDING
+    assert go2.progress == 0.0
 
 
 def test_a_plan_that_has_not_begun_has_made_no_progress(plan: CompiledPlan) -> None:
@@ -102,20 +102,16 @@ def test_the_way_back_is_smooth_and_its_rates_are_the_derivatives(plan: Compiled
     assert not steps[-1].v_joints.any()
 
 
-def test_time_that_runs_backwards_negates_velocities_only(plan: CompiledPlan) -> None:
-    forward = plan.at(2.0)
+def test_time_that_runs_backwards_negates_velocities_only_and_forces_do_not_hold(
+    plan: CompiledPlan,
+) -> None:
+    forward = replace(plan.at(2.0), force_weight=0.01)
     backward = retimed(forward, -1.0, 0.0)
     assert (backward.v_joints == -forward.v_joints).all()
     assert (backward.a_joints == forward.a_joints).all()
     assert (backward.body.v_world == -forward.body.v_world).all()
     assert (backward.q_joints == forward.q_joints).all()
-
-
-def test_forces_that_were_planned_for_its_tempo_do_not_hold_for_another(
-    plan: CompiledPlan,
-) -> None:
-    pushing = replace(plan.at(2.0), force_weight=0.01)
-    assert retimed(pushing, 0.5, 0.0).force_weight == 0.0
+    assert backward.force_weight == 0.0, "they were planned for another tempo"
 
 
 def test_a_flight_that_has_begun_is_not_slowed_down_and_ends_on_four_feet() -> None:

@@ -71,18 +71,6 @@ Do = Callable[[GO2Controller], object]
 def _nothing(_go2: GO2Controller) -> None: ...
 
 
-def _stand_again(go2: GO2Controller) -> None:
-    go2.stand()
-
-
-def _sit(go2: GO2Controller) -> None:
-    go2.sit()
-
-
-def _trot_ready(go2: GO2Controller) -> None:
-    go2.walk()
-
-
 def _lean(go2: GO2Controller) -> None:
     posture = ChangePosture(lambda pose: lean(pose, np.array(LEANING)))
     go2._runner.run(posture, 2.0)
@@ -116,18 +104,18 @@ class Push:
 
 PUSHES = {
     "standing, up from the belly": Push(_nothing, (80.0, 0.0, 0.0)),
-    "standing for a while": Push(_stand_again, (0.0, 60.0, 0.0)),
+    "standing for a while": Push(GO2Controller.stand, (0.0, 60.0, 0.0)),
     "leaning": Push(_lean, (26.0, 0.0, 0.0)),
-    "sitting, forward": Push(_sit, (42.0, 0.0, 0.0)),
-    "sitting, aslant": Push(_sit, (21.0, 21.0, 0.0)),
-    "ready to walk": Push(_trot_ready, (50.0, 50.0, 0.0)),
+    "sitting, forward": Push(GO2Controller.sit, (42.0, 0.0, 0.0)),
+    "sitting, aslant": Push(GO2Controller.sit, (21.0, 21.0, 0.0)),
+    "ready to walk": Push(GO2Controller.walk, (50.0, 50.0, 0.0)),
     "walking, forward": Push(_walk, (90.0, 0.0, 0.0)),
     "walking, aslant": Push(_walk, (95.0, 95.0, 0.0)),
     "bounding, sat down": Push(_bound, (-70.0, 0.0, -80.0)),
     "bounding, aslant": Push(_bound, (70.0, 70.0, 0.0)),
-    "turning": Push(_trot_ready, (-110.0, 0.0, -60.0), lambda go2: go2.turn_left(1.5)),
+    "turning": Push(GO2Controller.walk, (-110.0, 0.0, -60.0), lambda go2: go2.turn_left(1.5)),
     "push-ups": Push(_nothing, (26.0, 0.0, 0.0), lambda go2: go2.play("push_ups"), 3.0),
-    "high five": Push(_nothing, (26.0, 0.0, 0.0), lambda go2: go2.high_five(), 3.0),
+    "high five": Push(_nothing, (26.0, 0.0, 0.0), GO2Controller.high_five, 3.0),
 }
 
 
@@ -202,7 +190,7 @@ def test_a_sitting_robot_that_comes_to_rest_on_a_limb_says_so_at_once(impulse: f
         assert go2.recover()
 
 
-@pytest.mark.parametrize("before", [_nothing, _sit, _walk])
+@pytest.mark.parametrize("before", [_nothing, GO2Controller.sit, _walk])
 def test_a_push_that_the_robot_withstands_is_no_fall(before: Do) -> None:
     plant = PushedPlant()
     plant.impulse = np.array([10.0, 10.0, 0.0])

@@ -29,7 +29,7 @@ def figure_of(step: StepResult, name: str) -> Measurement:
     return next(figure for figure in step.figures if figure.name == name)
 
 
-def test_the_demo_stands_sits_walks_stops_turns_gives_a_high_five_and_sits() -> None:
+def test_the_demo_does_its_steps_and_leaves_the_controller_open_for_its_owner() -> None:
     go2 = FakeGo2()
     report = run_demo(go2)
     assert go2.calls == [
@@ -38,12 +38,6 @@ def test_the_demo_stands_sits_walks_stops_turns_gives_a_high_five_and_sits() -> 
     ]
     assert report.ok
     assert [step.reason for step in report.steps] == ["done"] * len(DEMO_STEPS)
-
-
-def test_the_demo_leaves_the_controller_open_for_its_owner() -> None:
-    go2 = FakeGo2()
-    run_demo(go2)
-    assert "close" not in go2.calls
 
 
 def test_the_walking_speed_is_measured_and_not_the_command() -> None:
@@ -119,16 +113,12 @@ def test_progress_is_told_when_a_step_begins_and_when_it_ends() -> None:
     assert {progress.count for progress in told} == {8}
 
 
-def test_margin_and_load_count_on_three_legs_and_for_supporting_feet_only() -> None:
+def test_margin_and_load_count_on_three_legs_only_and_for_supporting_feet() -> None:
     totals = run_demo(FakeGo2()).totals
     # Elsewhere the margin is 0.15 m; the raised foot itself carries 0 N.
     assert totals.least_support_margin == 0.06
     assert totals.least_foot_load == 40.0
-
-
-def test_without_three_legs_there_is_no_margin() -> None:
-    go2 = FakeGo2()
-    assert all(math.isnan(value) for value in three_leg_minima(go2.recording()))
+    assert all(math.isnan(value) for value in three_leg_minima(FakeGo2().recording()))
 
 
 def test_qp_failures_before_the_demo_are_not_its_own() -> None:

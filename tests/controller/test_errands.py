@@ -45,11 +45,10 @@ def counting(end: int) -> Callable[[], int | Pending]:
     return work
 
 
-def test_the_thread_that_serves_does_the_work(errands: Errands, serving: threading.Thread) -> None:
+def test_the_thread_that_serves_does_the_work_and_nothing_is_an_answer_too(
+    errands: Errands, serving: threading.Thread
+) -> None:
     assert errands.ask(threading.current_thread, HANG_GUARD) is serving
-
-
-def test_nothing_is_an_answer_too(errands: Errands, serving: threading.Thread) -> None:
     assert errands.ask(lambda: None, HANG_GUARD) is None
 
 

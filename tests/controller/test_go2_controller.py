@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 
 from controller import GO2Controller, Mode, Outcome
-from controller.checks import is_lying, is_sitting, is_standing
 from go2_wbc.contacts import Gait
 from go2_wbc.errors import ModeError, MotionInfeasible, StanceMismatch
 from go2_wbc.planning.envelopes import TROT
@@ -18,10 +17,7 @@ from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
 from motions import compile_timeline, load_motion
-from tests.controller.plants import (
-    PERIOD,
-    WatchedPlant,
-)
+from tests.controller.plants import PERIOD, WatchedPlant
 from tests.go2_wbc.plant.contract import same
 from tests.motions.doctored import with_joint_beyond_its_limit
 
@@ -75,12 +71,6 @@ def day() -> Day:
     return done
 
 
-@pytest.fixture
-def go2() -> Iterator[GO2Controller]:
-    with GO2Controller(plant=MujocoPlant(control_period=PERIOD)) as go2:
-        yield go2
-
-
 @pytest.fixture(scope="module")
 def standing() -> Iterator[GO2Controller]:
     """A standing robot; its tests leave it standing."""
@@ -119,19 +109,14 @@ def test_a_blocking_call_returns_true_in_its_mode_with_what_was_measured(
     assert 0.0 < step.outcome.duration <= step.after.time - step.before.time + 1e-9
 
 
-@pytest.mark.parametrize("name", ["move", "wait", "stop"])
-def test_a_call_that_only_commands_returns_nothing(day: Day, name: str) -> None:
-    assert day[name].returned is None
-    assert day[name].mode is Mode.WALKING
-
-
-def test_waiting_lets_exactly_that_time_pass(day: Day) -> None:
-    step = day["wait"]
-    assert step.after.time - step.before.time == pytest.approx(1.5, abs=PERIOD)
-
-
-def test_moving_takes_no_time_by_itself(day: Day) -> None:
+def test_a_call_that_only_commands_returns_nothing_and_only_waiting_takes_time(day: Day) -> None:
+    for name in ("move", "wait", "stop"):
+        assert day[name].returned is None
+        assert day[name].mode is Mode.WALKING
     assert same(day["move"].before, day["move"].after)
+    waited = day["wait"].after.time - day["wait"].before.time
+    assert waited == pytest.approx(1.5, abs=PERIOD)
+    assert np.abs(day["stop"].after.v[:3]).max() < 0.1, "at rest"
 
 
 def test_a_standing_robot_is_level_on_four_feet(day: Day) -> None:
@@ -186,61 +171,29 @@ def test_a_velocity_command_moves_the_robot_that_way(day: Day) -> None:
     assert step.after.rpy[2] - step.before.rpy[2] == pytest.approx(0.2 * 1.5, rel=0.25)
 
 
-def test_a_stopped_robot_is_at_rest(day: Day) -> None:
-    assert np.abs(day["stop"].after.v[:3]).max() < 0.1
-
-
-POSTURES = {"stand": is_standing, "sit": is_sitting, "lie down": is_lying}
-
-
-@pytest.mark.parametrize("name", POSTURES)
-def test_a_posture_is_told_from_the_others_and_from_a_robot_in_motion(day: Day, name: str) -> None:
-    model = RobotModel()
-    state = day[name].after
-    assert [other for other, check in POSTURES.items() if check(model.snapshot(state))] == [name]
-    for moving in (0, 8):  # base, a joint
-        v = state.v.copy()
-        v[moving] = 1.0
-        assert not POSTURES[name](model.snapshot(replace(state, v=v)))
-
-
-@pytest.mark.parametrize("name", ["stand", "sit"])
-def test_a_robot_with_a_foot_in_the_air_neither_stands_nor_sits(day: Day, name: str) -> None:
-    model = RobotModel()
-    contacts = np.array([True, True, False, True])
-    state = replace(day[name].after, feet_in_contact=contacts)
-    assert not POSTURES[name](model.snapshot(state))
-
-
 # --- the beginning ----------------------------------------------------------------------------
 
 
-def test_a_new_controller_has_a_robot_that_lies_limp_at_time_zero() -> None:
+def test_a_new_robot_lies_limp_at_time_zero_and_time_passes_in_calls_only() -> None:
     with GO2Controller(namespace="rex_2") as go2:
         assert go2.namespace == "rex_2"
-        assert go2.mode is Mode.LYING
         assert go2.state.time == 0.0
-        assert go2.state.q[2] < 0.1
-        assert go2.command.is_zero
         assert go2.last_outcome.ok
+        go2.wait(0.1)
+        before = go2.state
+        assert before.q[2] < 0.1
+        assert go2.mode is Mode.LYING
+        assert go2.command.is_zero
+        assert go2.recording().duration > 0.0
+        assert same(go2.state, before)
 
 
-def test_without_realtime_no_time_passes_between_calls(go2: GO2Controller) -> None:
-    go2.wait(0.1)
-    before = go2.state
-    assert go2.mode is Mode.LYING
-    assert go2.command.is_zero
-    assert go2.recording().duration > 0.0
-    assert same(go2.state, before)
-
-
-def test_waiting_for_no_time_lets_none_pass(go2: GO2Controller) -> None:
+def test_waiting_for_no_time_lets_none_pass_and_a_robot_that_lies_lies_down_again(
+    go2: GO2Controller,
+) -> None:
     go2.wait(0.0)
     assert go2.state.time == 0.0
     assert go2.last_outcome.ok
-
-
-def test_a_robot_that_already_lies_lies_down_again(go2: GO2Controller) -> None:
     assert go2.lie_down()
     assert go2.mode is Mode.LYING
 
@@ -282,15 +235,15 @@ def test_damping_makes_the_robot_limp_and_it_can_stand_up_again(go2: GO2Controll
     assert go2.stand()
 
 
-def test_a_lying_robot_whose_walk_was_damped_does_not_take_commands(go2: GO2Controller) -> None:
+def test_a_lying_robot_whose_walk_was_damped_does_not_take_commands(
+    plant: WatchedPlant, go2: GO2Controller
+) -> None:
     # The mode from before the damping once came back when the next behaviour began.
     assert go2.walk()
     go2.damp()
-    plant = go2.plant
-    assert isinstance(plant, MujocoPlant)
     q = go2.state.q.copy()
     q[2], q[3:7] = 0.15, [1.0, 0.0, 0.0, 0.0]
-    plant.place(q)
+    plant.inner.place(q)
     assert not go2.lie_down()
     assert go2.mode in (Mode.DAMPED, Mode.FALLEN)
     with pytest.raises(ModeError):
@@ -350,8 +303,9 @@ def test_a_high_five_plays_by_its_name_and_measures_how_high_the_paw_was_held(
 # --- goals and other threads ----------------------------------------------------------------
 
 
-def test_during_a_goal_move_is_refused_and_stop_ends_it() -> None:
-    plant = WatchedPlant()
+def test_during_a_goal_move_is_refused_and_stop_ends_it(
+    plant: WatchedPlant, go2: GO2Controller
+) -> None:
     refused: list[str] = []
 
     def interfere() -> None:
@@ -360,16 +314,15 @@ def test_during_a_goal_move_is_refused_and_stop_ends_it() -> None:
         refused.append(str(caught.value))
         go2.stop()
 
-    with GO2Controller(plant=plant) as go2:
-        assert go2.walk()
-        plant.once_at(go2.state.time + 2.0, interfere)
-        assert go2.move_forward(2.0) is False
-        assert go2.last_outcome.reason == "walk 2.000 m ended by stop()"
-        assert 0.1 < go2.last_outcome.measured["walked [m]"] < 1.0
-        assert refused == ["move() during a goal (walk 2.000 m): end it by stop()"]
-        assert go2.mode is Mode.WALKING
-        go2.move(0.2)
-        assert go2.command.linear_x == 0.2
+    assert go2.walk()
+    plant.once_at(go2.state.time + 2.0, interfere)
+    assert go2.move_forward(2.0) is False
+    assert go2.last_outcome.reason == "walk 2.000 m ended by stop()"
+    assert 0.1 < go2.last_outcome.measured["walked [m]"] < 1.0
+    assert refused == ["move() during a goal (walk 2.000 m): end it by stop()"]
+    assert go2.mode is Mode.WALKING
+    go2.move(0.2)
+    assert go2.command.linear_x == 0.2
 
 
 def test_a_gait_of_ones_own_walks(go2: GO2Controller) -> None:

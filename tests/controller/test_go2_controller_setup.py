@@ -12,7 +12,7 @@ import pytest
 import qpsolvers
 
 from controller import GO2Controller
-from controller.assembly import PilotSettings, build_pilot
+from controller.assembly import build_pilot
 from go2_wbc.config import Config
 from go2_wbc.errors import (
     ClosedError,
@@ -32,11 +32,6 @@ from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task
 from motions.postures import STAND_HEIGHT
 from tests.controller.plants import WatchedPlant
-
-
-@pytest.fixture
-def plant() -> WatchedPlant:
-    return WatchedPlant()
 
 
 def test_without_the_robots_files_the_error_says_what_to_install(
@@ -69,36 +64,31 @@ def test_a_broken_urdf_is_refused_with_the_reason(
 def test_a_missing_urdf_or_mjcf_is_named(tmp_path: Path) -> None:
     with pytest.raises(DescriptionError, match=r"nowhere\.urdf: No such file"):
         GO2Controller(plant=MujocoPlant(urdf=tmp_path / "nowhere.urdf"))
+    with pytest.raises(DescriptionError, match=r"nowhere\.urdf"):
+        GO2Controller(urdf=tmp_path / "nowhere.urdf")
     with pytest.raises(ModelMismatch, match=r"nowhere\.xml: no such file"):
         GO2Controller(plant=MujocoPlant(tmp_path / "nowhere.xml"))
 
 
-def test_an_unknown_solver_is_refused_with_the_valid_ones() -> None:
-    config = Config(wbc=replace(WbcConfig(), solver="gurobi9000"))
-    with pytest.raises(
-        SolverUnavailable, match="unknown QP solver 'gurobi9000'; valid: active_set, daqp, "
-    ):
-        GO2Controller(config=config)
-
-
-def test_a_solver_that_is_not_installed_is_refused_with_the_line_that_installs_it(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize(
+    ("solver", "told"),
+    [
+        ("gurobi9000", "unknown QP solver 'gurobi9000'; valid: active_set, daqp"),
+        ("proxqp", "pip install proxsuite; installed: active_set, daqp"),
+    ],
+)
+def test_a_solver_that_is_unknown_or_not_installed_is_refused_with_what_helps(
+    monkeypatch: pytest.MonkeyPatch, solver: str, told: str
 ) -> None:
     monkeypatch.setattr(qpsolvers, "available_solvers", ["daqp"])
-    config = Config(wbc=replace(WbcConfig(), solver="proxqp"))
-    with pytest.raises(
-        SolverUnavailable, match="pip install proxsuite; installed: active_set, daqp"
-    ):
-        GO2Controller(config=config)
+    with pytest.raises(SolverUnavailable, match=told):
+        GO2Controller(config=Config(wbc=replace(WbcConfig(), solver=solver)))
 
 
-def test_an_unknown_back_end_is_refused_with_the_valid_ones() -> None:
+def test_an_unknown_back_end_is_refused_with_the_valid_ones_and_the_plant_left_untouched(
+    plant: WatchedPlant,
+) -> None:
     with pytest.raises(ConfigError, match="valid: condensed, full, placo"):
-        GO2Controller(config=Config(backend="magic"))
-
-
-def test_a_refused_configuration_leaves_the_plant_untouched(plant: WatchedPlant) -> None:
-    with pytest.raises(ConfigError):
         GO2Controller(plant=plant, config=Config(backend="magic"))
     assert not plant.commands
 
@@ -123,11 +113,6 @@ def test_a_urdf_of_ones_own_makes_the_model_and_the_robot(tmp_path: Path) -> Non
         assert go2.stand()
         height = go2.last_outcome.measured["CoM height [m]"]
         assert height == pytest.approx(STAND_HEIGHT, abs=0.005)
-
-
-def test_a_urdf_that_does_not_exist_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DescriptionError, match=r"nowhere\.urdf"):
-        GO2Controller(urdf=tmp_path / "nowhere.urdf")
 
 
 @pytest.mark.parametrize("motor", MOTORS)
@@ -176,13 +161,13 @@ def test_a_task_of_ones_own_is_followed_while_the_robot_walks() -> None:
 
 def test_a_task_of_ones_own_is_asked_in_plans_with_few_feet_too(plant: WatchedPlant) -> None:
     task = SteadyTrunk()
-    built = build_pilot(plant, Config(), PilotSettings(extra_tasks=(task,)))
+    pilot = build_pilot(plant, Config(), extra_tasks=(task,))
     try:
-        loop = built.runner.loop
+        loop = pilot.runner.loop
         for wbc in (loop.wbc, loop._dynamic_wbc):
             assert wbc.tasks[-1] is task
     finally:
-        built.close()
+        pilot.close()
 
 
 def test_placo_takes_no_tasks_of_ones_own(plant: WatchedPlant) -> None:

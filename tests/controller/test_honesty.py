@@ -64,26 +64,26 @@ def test_walking_again_while_walking_goes_on_with_the_command(moment: float) -> 
 
 
 @pytest.mark.slow
-def test_a_paw_that_is_held_down_is_no_high_five_for_play_either() -> None:
-    plant = WatchedPlant()
-    with GO2Controller(plant=plant) as go2:
-        assert go2.stand()
-        hold = lambda: plant.inner.push(np.array([0.0, 0.0, -30.0]), 8.0, "FR_foot")  # noqa: E731
-        plant.once_at(go2.state.time + 2.5, hold)
-        assert go2.play("high_five") is False
-        assert "went another way" in go2.last_outcome.reason
-        assert go2.last_outcome.measured["mean joints off plan [deg]"] > 10.0
+def test_a_paw_that_is_held_down_is_no_high_five_for_play_either(
+    plant: WatchedPlant, go2: GO2Controller
+) -> None:
+    assert go2.stand()
+    hold = lambda: plant.inner.push(np.array([0.0, 0.0, -30.0]), 8.0, "FR_foot")  # noqa: E731
+    plant.once_at(go2.state.time + 2.5, hold)
+    assert go2.play("high_five") is False
+    assert "went another way" in go2.last_outcome.reason
+    assert go2.last_outcome.measured["mean joints off plan [deg]"] > 10.0
 
 
-def test_stopping_from_another_thread_while_time_passes_is_no_error() -> None:
-    plant = WatchedPlant()
-    with GO2Controller(plant=plant) as go2:
-        assert go2.walk()
-        go2.move(0.3)
-        plant.once_at(go2.state.time + 0.5, lambda: in_thread(go2.stop).result(HANG_GUARD))
-        go2.wait(2.0)
-        assert go2.command.is_zero
-        assert go2.mode is Mode.WALKING
+def test_stopping_from_another_thread_while_time_passes_is_no_error(
+    plant: WatchedPlant, go2: GO2Controller
+) -> None:
+    assert go2.walk()
+    go2.move(0.3)
+    plant.once_at(go2.state.time + 0.5, lambda: in_thread(go2.stop).result(HANG_GUARD))
+    go2.wait(2.0)
+    assert go2.command.is_zero
+    assert go2.mode is Mode.WALKING
 
 
 def test_in_realtime_a_plant_that_blocks_keeps_nobody_waiting(

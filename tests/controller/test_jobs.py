@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from typing import NoReturn
 
 import pytest
 
@@ -12,10 +13,89 @@ from controller import jobs
 from controller.jobs import Answer, Job, JobServer
 from controller.modes import Aborted, Measurements
 from go2_wbc.errors import ModeError
-from tests.controller.job_clients import Client, Clock, Robot, failing, now
-from tests.controller.plants import HANG_GUARD, in_thread
+from go2_wbc.robot.state import RobotState
+from tests.controller.plants import HANG_GUARD, in_thread, lying_state
 
 PATIENCE = 0.8
+
+
+class Robot:
+    """Does nothing, and notes what it was told."""
+
+    def __init__(self) -> None:
+        self.calls: list[str] = []
+        self.time = 0.0
+        self.is_limp = threading.Event()
+
+    @property
+    def state(self) -> RobotState:
+        return lying_state(self.time)
+
+    def cancel(self) -> None:
+        self.calls.append("cancel")
+
+    def damp(self) -> None:
+        self.calls.append("damp")
+        self.is_limp.set()
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+class Client:
+    """Submits jobs and keeps what they were answered, in order."""
+
+    def __init__(self, jobs: JobServer[Robot]) -> None:
+        self.jobs, self.is_accepted = jobs, False
+        self.answers: list[tuple[str, Answer]] = []
+        self.answered = threading.Condition()
+
+    def submit(
+        self,
+        name: str,
+        act: Callable[[Job], Measurements] = lambda _job: {},
+        prepare: Callable[[], None] | None = None,
+        begin: Callable[[], str] = lambda: "",
+    ) -> None:
+        def reply(answer: Answer) -> None:
+            with self.answered:
+                self.answers.append((name, answer))
+                self.answered.notify_all()
+
+        job = Job(name, act, reply, prepare, begin)
+        self.is_accepted = self.jobs.submit(job)
+
+    def does(self, name: str, act: Callable[[Job], Measurements] = lambda _job: {}) -> Answer:
+        """What a job is answered that is carried out now."""
+        self.submit(name, act)
+        assert self.jobs.work()
+        return self.only(name)
+
+    def told(self, name: str) -> list[Answer]:
+        return [answer for told, answer in self.answers if told == name]
+
+    def only(self, name: str) -> Answer:
+        """The answer to this job, which has come once; waits for it."""
+        with self.answered:
+            assert self.answered.wait_for(lambda: self.told(name), HANG_GUARD)
+        (answer,) = self.told(name)
+        return answer
+
+
+def now(event: threading.Event) -> None:
+    assert event.wait(HANG_GUARD)
+
+
+def failing(error: Exception) -> Callable[..., NoReturn]:
+    def act(*_: object) -> NoReturn:
+        raise error
+
+    return act
 
 
 @pytest.fixture
@@ -91,9 +171,7 @@ def test_a_second_job_is_refused_at_once_and_the_first_goes_on(
 
 @pytest.mark.parametrize("error", [Aborted("the rump is too high"), ModeError("fallen: recover()")])
 def test_what_was_not_done_is_answered_with_the_reason(client: Client, error: Exception) -> None:
-    client.submit("sit", failing(error))
-    client.jobs.work()
-    assert client.only("sit") == Answer(False, str(error), error=error)
+    assert client.does("sit", failing(error)) == Answer(False, str(error), error=error)
 
 
 def test_a_job_that_may_not_begin_is_refused_when_its_turn_has_come(client: Client) -> None:
@@ -105,13 +183,10 @@ def test_a_job_that_may_not_begin_is_refused_when_its_turn_has_come(client: Clie
 def test_a_bug_in_an_action_is_answered_and_the_server_goes_on(
     client: Client, caplog: pytest.LogCaptureFixture
 ) -> None:
-    client.submit("dance", failing(ZeroDivisionError("beat")))
-    client.jobs.work()
-    assert client.only("dance").reason == "ZeroDivisionError: beat"
+    answer = client.does("dance", failing(ZeroDivisionError("beat")))
+    assert answer.reason == "ZeroDivisionError: beat"
     assert "Traceback" in caplog.text
-    client.submit("sit")
-    client.jobs.work()
-    assert client.only("sit").ok
+    assert client.does("sit").ok
 
 
 def test_a_reply_that_fails_does_not_stop_the_server(
@@ -120,9 +195,7 @@ def test_a_reply_that_fails_does_not_stop_the_server(
     client.jobs.submit(Job("sit", lambda _job: {}, failing(OSError("no route"))))
     assert client.jobs.work()
     assert "sit could not be answered" in caplog.text
-    client.submit("up")
-    client.jobs.work()
-    assert client.only("up").ok
+    assert client.does("up").ok
 
 
 def test_somebody_who_fails_to_hear_of_an_end_does_not_stop_the_server(
@@ -133,9 +206,7 @@ def test_somebody_who_fails_to_hear_of_an_end_does_not_stop_the_server(
         assert client.jobs.cancel(failing(OSError("no route")))
         return {}
 
-    client.submit("sit", act)
-    assert client.jobs.work()
-    assert client.only("sit").ok
+    assert client.does("sit", act).ok
     assert "sit could not be answered" in caplog.text
 
 
@@ -246,9 +317,7 @@ def test_a_job_that_is_called_off_says_so_and_then_whoever_wants_to_know_is_told
         assert robot.calls == ["cancel"]
         raise Aborted("")
 
-    client.submit("nod", act)
-    client.jobs.work()
-    answer = client.only("nod")
+    answer = client.does("nod", act)
     assert (answer.ok, answer.cancelled, answer.is_refused) == (False, True, False)
     assert answer.reason == "nod was cancelled"
     assert robot.calls == ["cancel", "told"]
@@ -264,9 +333,7 @@ def test_a_job_that_was_done_although_it_was_called_off_is_done(client: Client) 
         client.jobs.cancel()
         return {}
 
-    client.submit("sit", act)
-    client.jobs.work()
-    assert client.only("sit") == Answer(True, "done in 0.0 s")
+    assert client.does("sit", act) == Answer(True, "done in 0.0 s")
 
 
 def test_going_limp_ends_what_runs_and_refuses_what_waits(robot: Robot, threaded: Client) -> None:

@@ -16,23 +16,11 @@ from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.mujoco.ground_truth import GroundTruth
 from go2_wbc.robot.model import RobotModel
-from motions import Timeline, compile_timeline, deg
+from motions import CompiledPlan, Timeline, compile_timeline, deg
+from tests.controller.test_written_motion import PERIOD, touchdown
 from tests.go2_wbc.plant.helpers import empty_recording
 
-PERIOD = 0.002
 SKID = 0.5  # m/s
-
-
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-@pytest.fixture(scope="module")
-def raised(model: RobotModel) -> MotionPlan:
-    """A paw that is raised and put down again."""
-    line = Timeline(name="raise").foot("FR", z=0.06, over=0.5).hold(0.2).home(over=0.5)
-    return compile_timeline(line, model)
 
 
 def slip(plan: MotionPlan, start: float, end: float) -> float:
@@ -43,24 +31,18 @@ def slip(plan: MotionPlan, start: float, end: float) -> float:
     return _slip(empty_recording(n, velocity), plan, PERIOD)
 
 
-def touchdown(plan: MotionPlan) -> float:
-    times = PERIOD * np.arange(round(plan.duration / PERIOD))
-    in_air = [t for t in times if not plan.at(float(t)).stance[Leg.FR]]
-    return float(in_air[-1]) + PERIOD
-
-
-def test_a_standing_foot_that_slides_counts_by_its_way(raised: MotionPlan) -> None:
-    start = touchdown(raised) + SETTLED_CONTACT + 5 * PERIOD
+def test_a_standing_foot_that_slides_counts_by_its_way(raised: CompiledPlan) -> None:
+    start = PERIOD * touchdown(raised) + SETTLED_CONTACT + 5 * PERIOD
     assert slip(raised, start, start + 0.02) == pytest.approx(SKID * 0.02)
 
 
-def test_a_foot_in_the_air_or_just_landed_may_move(raised: MotionPlan) -> None:
-    landed = touchdown(raised)
+def test_a_foot_in_the_air_or_just_landed_may_move(raised: CompiledPlan) -> None:
+    landed = PERIOD * touchdown(raised)
     assert slip(raised, landed - 0.1, landed + SETTLED_CONTACT - PERIOD) == 0.0
 
 
 def test_a_played_motion_is_measured_from_its_begin_to_its_end(
-    raised: MotionPlan, model: RobotModel
+    raised: CompiledPlan, model: RobotModel
 ) -> None:
     with closing(GroundTruth(MujocoPlant())) as truth, GO2Controller(plant=truth) as go2:
         assert go2.stand()

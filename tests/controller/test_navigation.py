@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import cos, degrees, pi, radians, sin
 
 import numpy as np
@@ -19,10 +18,10 @@ from controller.navigation import (
     WALK_SPEED,
     DriveStraight,
     Goal,
-    Odometer,
     TurnInPlace,
 )
 from go2_wbc.errors import CommandError
+from go2_wbc.planning.command import VelocityCommand
 from go2_wbc.robot.state import RobotState
 
 # Rounding of sines and quaternions.
@@ -64,29 +63,27 @@ def walk(goal: Goal, x: float, y: float, yaw: float) -> RobotState:
 def test_displacement_is_measured_in_the_frame_of_the_start(
     x: float, y: float, yaw: float, ahead: float, left: float
 ) -> None:
-    odometer = Odometer(pose(x, y, yaw))
+    goal = begun(DriveStraight(1.0), pose(x, y, yaw))
     end = pose(x + ahead * cos(yaw) - left * sin(yaw), y + ahead * sin(yaw) + left * cos(yaw))
-    assert odometer.displacement(end) == pytest.approx((ahead, left), abs=EXACT)
+    measured = goal.measurements(end)
+    assert (measured["walked [m]"], measured["aside [m]"]) == pytest.approx(
+        (ahead, left), abs=EXACT
+    )
 
 
 @pytest.mark.parametrize("direction", [1, -1])
 def test_the_angle_turned_is_counted_over_several_turns(direction: int) -> None:
-    odometer = Odometer(pose(yaw=3.0))
+    goal = begun(TurnInPlace(1.0), pose(yaw=3.0))
     for step in range(1, 200):
         state = pose(yaw=3.0 + direction * 0.1 * step)
-        assert odometer.turned(state) == pytest.approx(direction * 0.1 * step, abs=EXACT)
-        odometer.update(state)
-        assert odometer.turned(state) == pytest.approx(direction * 0.1 * step, abs=EXACT)
-
-
-def test_asking_for_the_angle_turned_changes_nothing() -> None:
-    # Whoever asked for a state out of turn moved the count: -2 rad, asked last, made a turn of it.
-    odometer = Odometer(pose())
-    for yaw in (2.0, -2.0, 2.0):
-        assert odometer.turned(pose(yaw=yaw)) == pytest.approx(yaw)
+        for _ in range(2):
+            turned = radians(goal.measurements(state)["turned [deg]"])
+            assert turned == pytest.approx(direction * 0.1 * step, abs=EXACT)
+            goal.command(state)
 
 
 def test_whether_a_turn_is_done_may_be_asked_as_often_as_one_likes() -> None:
+    # Whoever asked for a state out of turn moved the count: -2 rad, asked last, made a turn of it.
     goal = begun(TurnInPlace(2.0), pose())
     for yaw in (2.0, -2.0, 2.0):
         assert goal.is_done(pose(yaw=yaw)) is (yaw == 2.0)
@@ -94,25 +91,13 @@ def test_whether_a_turn_is_done_may_be_asked_as_often_as_one_likes() -> None:
         assert goal.measurements(pose(yaw=yaw))["turned [deg]"] == pytest.approx(degrees(yaw))
 
 
-@pytest.mark.parametrize(
-    ("goal", "sign"),
-    [
-        (lambda: TurnInPlace(1.0), 1),
-        (lambda: TurnInPlace(-1.0), -1),
-        (lambda: DriveStraight(1.0), 1),
-        (lambda: DriveStraight(-1.0), -1),
-    ],
-)
-def test_a_goal_starts_towards_its_goal_at_its_full_speed(
-    goal: Callable[[], Goal], sign: int
-) -> None:
-    made = goal()
-    command = begun(made, pose()).command(pose())
-    turn, speed = command.angular_z, command.linear_x
-    if isinstance(made, TurnInPlace):
-        assert (turn, speed) == (sign * TURN_RATE, 0.0)
-    else:
-        assert (turn, speed) == (0.0, sign * WALK_SPEED)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_goal_starts_towards_its_goal_at_its_full_speed(sign: float) -> None:
+    turn, drive = (
+        begun(goal, pose()).command(pose()) for goal in (TurnInPlace(sign), DriveStraight(sign))
+    )
+    assert turn == VelocityCommand(angular_z=sign * TURN_RATE)
+    assert drive == VelocityCommand(linear_x=sign * WALK_SPEED)
 
 
 @given(x=places, y=places, yaw=yaws, angle=st.floats(-8.0, 8.0))
@@ -156,27 +141,23 @@ def test_a_turning_robot_that_drifts_is_led_back_to_its_place() -> None:
 
 
 @pytest.mark.parametrize(
-    ("end", "is_good"),
+    ("goal", "end", "is_good"),
     [
-        (pose(x=1.0), True),
-        (pose(x=1.0 - 0.9 * DISTANCE_TOLERANCE), True),
-        (pose(x=1.0 + 1.1 * DISTANCE_TOLERANCE), False),
-        (pose(x=1.0, y=1.1 * DISTANCE_TOLERANCE), False),
-        (pose(x=1.0, yaw=1.1 * HEADING_TOLERANCE), False),
-        (pose(), False),
+        (DriveStraight(1.0), pose(x=1.0), True),
+        (DriveStraight(1.0), pose(x=1.0 - 0.9 * DISTANCE_TOLERANCE), True),
+        (DriveStraight(1.0), pose(x=1.0 + 1.1 * DISTANCE_TOLERANCE), False),
+        (DriveStraight(1.0), pose(x=1.0, y=1.1 * DISTANCE_TOLERANCE), False),
+        (DriveStraight(1.0), pose(x=1.0, yaw=1.1 * HEADING_TOLERANCE), False),
+        (DriveStraight(1.0), pose(), False),
+        (TurnInPlace(0.5), pose(yaw=0.5 + 0.9 * HEADING_TOLERANCE), True),
+        (TurnInPlace(0.5), pose(yaw=0.5 - 1.1 * HEADING_TOLERANCE), False),
+        (TurnInPlace(0.5), pose(yaw=-0.5), False),
     ],
 )
-def test_a_walk_is_judged_by_place_and_heading(end: RobotState, *, is_good: bool) -> None:
-    assert begun(DriveStraight(1.0), pose()).is_within_tolerance(end) is is_good
-
-
-def test_a_turn_is_judged_by_the_heading() -> None:
-    def is_good(yaw: float) -> bool:
-        return begun(TurnInPlace(0.5), pose()).is_within_tolerance(pose(yaw=yaw))
-
-    assert is_good(0.5 + 0.9 * HEADING_TOLERANCE)
-    assert not is_good(0.5 - 1.1 * HEADING_TOLERANCE)
-    assert not is_good(-0.5)
+def test_a_walk_is_judged_by_place_and_heading_and_a_turn_by_the_heading(
+    goal: Goal, end: RobotState, *, is_good: bool
+) -> None:
+    assert begun(goal, pose()).is_within_tolerance(end) is is_good
 
 
 def test_a_robot_that_is_still_moving_is_not_done() -> None:

@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
 from controller import GO2Controller, Mode
-from controller.navigation import DriveStraight, TurnInPlace
+from controller.navigation import DriveStraight, Goal, TurnInPlace
 from go2_wbc.errors import ModeError
 from go2_wbc.planning.command import ZERO_COMMAND
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
 from motions import compile_timeline, load_motion
 from tests.controller.plants import MID_RISE, PERIOD, StillPlant, WatchedPlant, is_limp
-
-
-@pytest.fixture
-def plant() -> WatchedPlant:
-    return WatchedPlant()
-
-
-@pytest.fixture
-def go2(plant: WatchedPlant) -> Iterator[GO2Controller]:
-    with GO2Controller(plant=plant) as go2:
-        yield go2
-
 
 # --- only what was measured -------------------------------------------------------------------
 
@@ -52,23 +38,26 @@ def test_a_robot_that_is_lifted_is_not_standing(go2: GO2Controller, plant: Watch
     assert go2.mode is not Mode.STANDING
 
 
-def test_a_turn_that_does_not_come_about_says_how_far_it_got(
-    go2: GO2Controller, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("goal", "name", "said", "reason"),
+    [
+        (TurnInPlace, "command", ZERO_COMMAND, "turn by 17.2 deg not done within 8.9 s: "),
+        (DriveStraight, "is_done", True, "walk 0.500 m missed: asked [m] 0.5, walked [m] "),
+    ],
+)
+def test_a_goal_that_is_not_reached_is_not_done_and_says_how_far_it_got(
+    go2: GO2Controller,
+    monkeypatch: pytest.MonkeyPatch,
+    goal: type[Goal],
+    name: str,
+    said: object,
+    reason: str,
 ) -> None:
     assert go2.walk()
-    monkeypatch.setattr(TurnInPlace, "command", lambda _self, _state: ZERO_COMMAND)
-    assert go2.turn_left(0.3) is False
-    assert go2.last_outcome.reason.startswith("turn by 17.2 deg not done within 8.9 s: ")
+    monkeypatch.setattr(goal, name, lambda _self, _state: said)
+    assert (go2.turn_left(0.3) if goal is TurnInPlace else go2.move_forward(0.5)) is False
+    assert go2.last_outcome.reason.startswith(reason)
     assert go2.mode is Mode.WALKING
-
-
-def test_a_walk_that_ends_beside_its_goal_is_not_done(
-    go2: GO2Controller, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    assert go2.walk()
-    monkeypatch.setattr(DriveStraight, "is_done", lambda _self, _state: True)
-    assert go2.move_forward(0.5) is False
-    assert go2.last_outcome.reason.startswith("walk 0.500 m missed: asked [m] 0.5, walked [m] ")
 
 
 # --- modes after failures ---------------------------------------------------------------------
@@ -126,10 +115,14 @@ def test_a_high_five_whose_robot_does_not_come_to_rest_is_not_standing_in_the_en
         assert go2.mode is not Mode.STANDING
 
 
-def test_a_robot_on_its_back_does_not_try_to_stand(go2: GO2Controller, plant: WatchedPlant) -> None:
-    q = go2.state.q.copy()
+def turn_over(plant: WatchedPlant) -> None:
+    q = plant.inner.read().q.copy()
     q[2], q[3:7] = 0.12, [1.0, 0.0, 0.0, 0.0]
     plant.inner.place(q)
+
+
+def test_a_robot_on_its_back_does_not_try_to_stand(go2: GO2Controller, plant: WatchedPlant) -> None:
+    turn_over(plant)
     go2.wait(0.5)
     assert go2.mode is Mode.FALLEN
     with pytest.raises(ModeError, match=r"call recover\(\) first"):
@@ -140,9 +133,7 @@ def test_a_robot_on_its_back_does_not_try_to_stand(go2: GO2Controller, plant: Wa
 def test_a_robot_that_is_found_on_its_back_says_so_when_it_shall_stand() -> None:
     # It went on moving its legs there, and recover() then said again to call recover().
     plant = WatchedPlant()
-    q = plant.inner.read().q.copy()
-    q[2], q[3:7] = 0.12, [1.0, 0.0, 0.0, 0.0]
-    plant.inner.place(q)
+    turn_over(plant)
     with GO2Controller(plant=plant) as go2:
         go2.wait(0.5)
         assert go2.mode is Mode.LYING
@@ -154,20 +145,12 @@ def test_a_robot_that_is_found_on_its_back_says_so_when_it_shall_stand() -> None
         assert go2.recover()
 
 
-def test_figures_are_measured_only_when_it_was_done(go2: GO2Controller) -> None:
-    assert go2.stand()
-    assert go2.last_outcome.measured["feet in contact"] == 4.0
-    assert bool(go2.last_outcome) is True
-
-
 def test_a_robot_that_lies_down_on_its_back_has_fallen(
     go2: GO2Controller, plant: WatchedPlant
 ) -> None:
     # It was limp and said to move, for ever; so was one that a push had thrown up on its way down.
-    q = go2.state.q.copy()
-    q[2], q[3:7] = 0.12, [1.0, 0.0, 0.0, 0.0]
     go2.damp()
-    plant.inner.place(q)
+    turn_over(plant)
     assert go2.lie_down() is False
     assert go2.mode is Mode.FALLEN
     assert go2.recover()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -61,21 +62,20 @@ def test_a_leg_that_is_jammed_beside_the_trunk_is_freed_before_the_robot_rises()
         assert go2.telemetry.qp_failures == 0
 
 
+@pytest.mark.parametrize(
+    ("call", "reason"),
+    [
+        (GO2Controller.recover, "could not fold RL below the trunk"),
+        (GO2Controller.stand, "cannot stand up: RL not below the trunk; call recover()"),
+    ],
+)
 def test_a_leg_that_cannot_be_folded_is_named_and_the_robot_stays_down(
-    monkeypatch: pytest.MonkeyPatch,
+    monkeypatch: pytest.MonkeyPatch, call: Callable[[GO2Controller], bool], reason: str
 ) -> None:
     monkeypatch.setattr(recovery, "TRIES", 1)
     with GO2Controller(plant=LamePlant(wrapped().inner)) as go2:
-        assert go2.recover() is False
-        assert go2.last_outcome.reason == "could not fold RL below the trunk"
-        assert go2.mode is Mode.FALLEN
-        assert go2.state.q[2] < 0.2
-
-
-def test_standing_up_on_a_leg_that_does_not_fold_is_refused() -> None:
-    with GO2Controller(plant=LamePlant(wrapped().inner)) as go2:
-        assert go2.stand() is False
-        assert go2.last_outcome.reason.startswith("cannot stand up: RL not below the trunk")
+        assert call(go2) is False
+        assert go2.last_outcome.reason == reason
         assert go2.mode is Mode.FALLEN
         assert go2.state.q[2] < 0.2
 

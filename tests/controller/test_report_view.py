@@ -59,11 +59,6 @@ def test_what_is_broken_says_where_and_when(stretched: CheckedMotion) -> None:
     ]
     assert calves.subject == "FL, FR, RL, RR calf"
     assert "-0 rad" not in calves.text
-
-
-def test_the_spans_are_where_the_margin_is_negative(stretched: CheckedMotion) -> None:
-    verdict = verdict_of(stretched.report)
-    (reach,) = [annotation for annotation in verdict.annotations if annotation.limit == "reach"]
     (curve,) = [curve for curve in verdict.curves if curve.name == "reach"]
     inside = np.zeros(len(curve.time), dtype=bool)
     for start, end in reach.spans:

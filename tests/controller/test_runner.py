@@ -7,13 +7,14 @@ import io
 import logging
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 
 import numpy as np
 import pytest
 
 import controller.runner
 from controller.behaviours.joints import Damped, ServoJoints
-from controller.loop import ControlLoop
+from controller.loop import ControlLoop, Fault
 from controller.modes import Aborted
 from controller.runner import Runner
 from controller.telemetry import Telemetry
@@ -22,18 +23,19 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.safety import SafetyConfig
 from go2_wbc.wbc.controller import WholeBodyController
 from motions.postures import TUCKED_JOINTS
-from tests.controller.interrupts import interrupt_somewhere_in
-from tests.controller.plants import HANG_GUARD, PERIOD, StillPlant, in_thread, is_limp
+from tests.controller.plants import (
+    HANG_GUARD,
+    PERIOD,
+    StillPlant,
+    in_thread,
+    interrupt_somewhere_in,
+    is_limp,
+)
 
 # s of robot time; far more than any of these tests lets pass.
 FOREVER = 1e6
 
 MakeRunner = Callable[..., Runner]
-
-
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
 
 
 @pytest.fixture
@@ -62,6 +64,18 @@ def make_runner(plant: StillPlant, model: RobotModel) -> Iterator[MakeRunner]:
         close(runner)
 
 
+@pytest.fixture
+def runner(make_runner: MakeRunner) -> Runner:
+    """Lets time pass in calls only."""
+    return make_runner(realtime=False)
+
+
+@pytest.fixture
+def live(make_runner: MakeRunner) -> Runner:
+    """Lets time pass all the time."""
+    return make_runner(realtime=True)
+
+
 def close(runner: Runner) -> None:
     """Closes from another thread, so that a runner that cannot be closed fails the test."""
     in_thread(runner.close).result(HANG_GUARD)
@@ -79,79 +93,70 @@ def wait_for(event: threading.Event) -> None:
 # --- without realtime -------------------------------------------------------------------------
 
 
-def test_no_time_passes_outside_calls(make_runner: MakeRunner, plant: StillPlant) -> None:
-    runner = make_runner(realtime=False)
+def test_time_passes_in_calls_only_and_on_each_until_it_is_done_or_at_its_limit(
+    runner: Runner, plant: StillPlant
+) -> None:
     runner.engage(Damped())
     assert not plant.commands
     assert runner.loop.state.time == 0.0
-
-
-def test_a_call_ends_on_the_tick_on_which_it_is_done(
-    make_runner: MakeRunner, plant: StillPlant
-) -> None:
-    runner = make_runner(realtime=False)
     assert runner.advance_until(lambda: len(plant.commands) == 7, FOREVER)
     assert len(plant.commands) == 7
-
-
-def test_a_call_that_is_never_done_ends_at_its_limit(
-    make_runner: MakeRunner, plant: StillPlant
-) -> None:
-    runner = make_runner(realtime=False)
     assert not runner.advance_until(lambda: False, 10 * PERIOD)
-    assert len(plant.commands) in (10, 11)
+    assert len(plant.commands) in (17, 18)
 
 
-def test_an_interruption_between_two_calls_damps_at_once(
-    make_runner: MakeRunner, plant: StillPlant
-) -> None:
-    runner = make_runner(realtime=False)
+def test_an_interruption_between_two_calls_damps_at_once(runner: Runner, plant: StillPlant) -> None:
     runner.interrupt("a test")
-    assert runner.loop.fault is not None
-    assert runner.loop.fault.reason == "a test"
+    assert runner.loop.fault == Fault("a test")
     assert len(plant.commands) == 1
     assert is_limp(plant.commands[0])
 
 
 def test_an_interruption_from_within_a_tick_ends_the_call(
-    make_runner: MakeRunner, plant: StillPlant
+    runner: Runner, plant: StillPlant
 ) -> None:
-    runner = make_runner(realtime=False)
-
     def interrupt_once() -> None:
         plant.on_write = lambda: None
         runner.interrupt("a test")
 
     plant.on_write = interrupt_once
     assert not runner.advance_until(lambda: False, FOREVER)
-    assert runner.loop.fault is not None
+    assert runner.loop.fault == Fault("a test")
 
 
+def under_way(runner: Runner) -> Future[bool]:
+    """A call without an end, which another thread makes."""
+    begun = threading.Event()
+    call = in_thread(lambda: runner.advance_until(lambda: bool(begun.set()), FOREVER))
+    wait_for(begun)
+    return call
+
+
+@pytest.mark.parametrize("realtime", [False, True])
 def test_an_interruption_from_another_thread_ends_a_long_call(
-    make_runner: MakeRunner, plant: StillPlant
+    make_runner: MakeRunner, *, realtime: bool
 ) -> None:
-    # The call holds the lock all the time; the interruption must not wait for it.
-    runner = make_runner(realtime=False)
-    under_way = threading.Event()
-    plant.on_write = under_way.set
-    call = in_thread(lambda: runner.advance_until(lambda: False, FOREVER))
-    wait_for(under_way)
+    # Without realtime the call holds the lock all the time; the interruption must not wait for it.
+    runner = make_runner(realtime=realtime)
+    call = under_way(runner)
     in_thread(lambda: runner.interrupt("a test")).result(HANG_GUARD)
     assert call.result(HANG_GUARD) is False
-    assert runner.loop.fault is not None
+    assert runner.loop.fault == Fault("a test")
 
 
+@pytest.mark.parametrize("realtime", [False, True])
 def test_closing_from_another_thread_ends_a_long_call_and_no_tick_follows(
-    make_runner: MakeRunner, plant: StillPlant
+    make_runner: MakeRunner, plant: StillPlant, *, realtime: bool
 ) -> None:
-    runner = make_runner(realtime=False)
-    under_way = threading.Event()
-    plant.on_write = under_way.set
-    call = in_thread(lambda: runner.advance_until(lambda: False, FOREVER))
-    wait_for(under_way)
-    close(runner)
+    before = loop_threads()
+    runner = make_runner(realtime=realtime)
+    assert len(loop_threads() - before) == realtime
+    call = under_way(runner)
+    for _ in range(2):
+        close(runner)
     with pytest.raises(ClosedError, match="closed during a call"):
         call.result(HANG_GUARD)
+    assert loop_threads() == before
     assert is_limp(plant.commands[-1])
     ticks = len(plant.commands)
     with pytest.raises(ClosedError):
@@ -161,9 +166,8 @@ def test_closing_from_another_thread_ends_a_long_call_and_no_tick_follows(
     assert len(plant.commands) == ticks
 
 
-def test_a_fault_between_two_behaviours_of_a_call_is_not_lost(make_runner: MakeRunner) -> None:
+def test_a_fault_between_two_behaviours_of_a_call_is_not_lost(runner: Runner) -> None:
     # damp() once vanished when it came just before the next behaviour of a running call.
-    runner = make_runner(realtime=False)
     runner.begin()
     runner.engage(Damped("first"))
     runner.interrupt("a test")
@@ -172,27 +176,21 @@ def test_a_fault_between_two_behaviours_of_a_call_is_not_lost(make_runner: MakeR
     assert runner.loop.behaviour.label == "damped"
 
 
-def test_a_fault_from_before_a_call_does_not_forbid_it(make_runner: MakeRunner) -> None:
-    runner = make_runner(realtime=False)
+def test_a_fault_from_before_a_call_does_not_forbid_it_and_the_same_one_again_does(
+    runner: Runner,
+) -> None:
+    for _ in range(2):
+        runner.interrupt("a test")
+        runner.begin()
     runner.interrupt("a test")
+    with pytest.raises(Aborted, match=r"^a test$"):
+        runner.engage(Damped())
     runner.begin()
     runner.engage(Damped())
     assert runner.loop.fault is None
 
 
-def test_the_same_fault_again_counts_as_a_new_one(make_runner: MakeRunner) -> None:
-    runner = make_runner(realtime=False)
-    runner.interrupt("a test")
-    runner.begin()
-    runner.interrupt("a test")
-    with pytest.raises(Aborted, match=r"^a test$"):
-        runner.engage(Damped())
-
-
-def test_the_last_word_to_the_plant_is_to_go_limp(
-    make_runner: MakeRunner, plant: StillPlant
-) -> None:
-    runner = make_runner(realtime=False)
+def test_the_last_word_to_the_plant_is_to_go_limp(runner: Runner, plant: StillPlant) -> None:
     runner.engage(ServoJoints("hold", ((1.0, TUCKED_JOINTS),)))
     runner.advance_until(lambda: False, 5 * PERIOD)
     assert not is_limp(plant.commands[-1])
@@ -210,12 +208,9 @@ def test_in_realtime_time_passes_by_itself(make_runner: MakeRunner, plant: Still
     wait_for(tenth)
 
 
-def test_in_realtime_a_call_waits_for_what_it_wants_to_see(
-    make_runner: MakeRunner, plant: StillPlant
-) -> None:
-    runner = make_runner(realtime=True)
-    assert runner.advance_until(lambda: plant.state.time > 0.1, FOREVER)
-    assert not runner.advance_until(lambda: False, 0.02)
+def test_in_realtime_a_call_waits_for_what_it_wants_to_see(live: Runner, plant: StillPlant) -> None:
+    assert live.advance_until(lambda: plant.state.time > 0.1, FOREVER)
+    assert not live.advance_until(lambda: False, 0.02)
 
 
 def test_in_realtime_late_ticks_are_counted_in_the_telemetry(
@@ -248,47 +243,23 @@ def test_garbage_is_looked_for_in_new_objects_only_while_a_loop_keeps_pace(
 
 
 @pytest.mark.parametrize("error", [PlantTimeout("no answer"), ValueError("a bug")])
+@pytest.mark.parametrize("is_after_tick", [False, True])
 def test_a_failure_in_the_background_ends_a_waiting_call_with_it_and_every_later_one(
-    make_runner: MakeRunner, plant: StillPlant, error: Exception
+    make_runner: MakeRunner, plant: StillPlant, error: Exception, *, is_after_tick: bool
 ) -> None:
     # Anything but a PlantError once killed the thread and left the call waiting for ever.
     def fail_later() -> None:
         if len(plant.commands) >= 5:
             raise error
 
-    plant.on_write = fail_later
-    runner = make_runner(realtime=True)
+    if not is_after_tick:
+        plant.on_write = fail_later
+    runner = make_runner(realtime=True, after_tick=fail_later)
     for _ in range(2):
         call = in_thread(lambda: runner.advance_until(lambda: False, FOREVER))
         with pytest.raises(type(error), match=str(error)):
             call.result(HANG_GUARD)
     assert runner.loop.fault is not None
-
-
-def test_a_failure_after_the_tick_ends_a_waiting_call_too(
-    make_runner: MakeRunner, plant: StillPlant
-) -> None:
-    def fail_later() -> None:
-        if len(plant.commands) >= 5:
-            raise RuntimeError("viewer")
-
-    runner = make_runner(realtime=True, after_tick=fail_later)
-    call = in_thread(lambda: runner.advance_until(lambda: False, FOREVER))
-    with pytest.raises(RuntimeError, match="viewer"):
-        call.result(HANG_GUARD)
-
-
-def test_in_realtime_an_interruption_ends_a_waiting_call(
-    make_runner: MakeRunner, plant: StillPlant
-) -> None:
-    runner = make_runner(realtime=True)
-    under_way = threading.Event()
-    call = in_thread(lambda: runner.advance_until(lambda: bool(under_way.set()), FOREVER))
-    wait_for(under_way)
-    in_thread(lambda: runner.interrupt("a test")).result(HANG_GUARD)
-    assert call.result(HANG_GUARD) is False
-    assert runner.loop.fault is not None
-    assert runner.loop.fault.reason == "a test"
 
 
 def test_in_realtime_ctrl_c_at_any_moment_of_a_wait_leaves_a_loop_that_runs(
@@ -324,7 +295,7 @@ def test_in_realtime_a_log_handler_that_is_taken_keeps_no_robot_from_going_limp(
         handler.release()
         logging.getLogger().removeHandler(handler)
     close(runner)
-    assert handler.stream.getvalue() == "a test\n"
+    assert "a test" in handler.stream.getvalue().splitlines()  # beside a lag, on a busy machine
 
 
 def test_in_realtime_no_call_begins_within_a_tick(
@@ -363,36 +334,16 @@ def test_an_interruption_is_told_if_what_another_thread_does_to_the_loop_does_no
     work.result(HANG_GUARD)
 
 
-def test_what_is_done_between_ticks_is_done_after_the_end_too(make_runner: MakeRunner) -> None:
-    runner = make_runner(realtime=True)
+def test_what_is_done_between_ticks_is_done_after_the_end_too(live: Runner) -> None:
     here = threading.current_thread()
-    assert runner.between_ticks(threading.current_thread) is not here
-    close(runner)
-    assert runner.between_ticks(threading.current_thread) is here
-
-
-def test_in_realtime_closing_ends_a_waiting_call_and_the_thread(
-    make_runner: MakeRunner, plant: StillPlant
-) -> None:
-    before = loop_threads()
-    runner = make_runner(realtime=True)
-    assert len(loop_threads() - before) == 1
-    under_way = threading.Event()
-    call = in_thread(lambda: runner.advance_until(lambda: bool(under_way.set()), FOREVER))
-    wait_for(under_way)
-    close(runner)
-    with pytest.raises(ClosedError):
-        call.result(HANG_GUARD)
-    assert is_limp(plant.commands[-1])
-    close(runner)
-    assert loop_threads() == before
+    assert live.between_ticks(threading.current_thread) is not here
+    close(live)
+    assert live.between_ticks(threading.current_thread) is here
 
 
 def test_closing_a_runner_whose_plant_has_died_does_not_raise(
-    make_runner: MakeRunner, plant: StillPlant
+    runner: Runner, plant: StillPlant
 ) -> None:
-    runner = make_runner(realtime=False)
-
     def fail() -> None:
         raise PlantTimeout("no answer")
 

@@ -26,11 +26,6 @@ def _in_blocks(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("controller.telemetry.BLOCK", request.param)
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
 def recorded(model: RobotModel, ticks: int, first: int = 0) -> Telemetry:
     telemetry = Telemetry(model, CAPACITY)
     for tick in range(first, first + ticks):

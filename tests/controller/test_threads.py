@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,8 +23,14 @@ from go2_wbc.wbc.problem import SIZE, Rows
 from go2_wbc.wbc.tasks import Task
 from motions import Timeline
 from motions.dynamics.search import Clock
-from tests.controller.interrupts import interrupt_somewhere_in
-from tests.controller.plants import HANG_GUARD, StillPlant, WatchedPlant, in_thread, is_limp
+from tests.controller.plants import (
+    HANG_GUARD,
+    StillPlant,
+    WatchedPlant,
+    in_thread,
+    interrupt_somewhere_in,
+    is_limp,
+)
 
 # s into a call, when it is well under way.
 UNDER_WAY = 0.1
@@ -33,29 +40,10 @@ SLOW = 0.3
 Do = Callable[[GO2Controller], object]
 
 
-@pytest.fixture
-def plant() -> WatchedPlant:
-    return WatchedPlant()
-
-
-@pytest.fixture
-def go2(plant: WatchedPlant) -> Iterator[GO2Controller]:
-    with GO2Controller(plant=plant) as robot:
-        yield robot
-
-
 def _trot(go2: GO2Controller) -> None:
     assert go2.walk()
     go2.move(SLOW)
     go2.wait(0.6)
-
-
-def _stand(go2: GO2Controller) -> None:
-    assert go2.stand()
-
-
-def _sit(go2: GO2Controller) -> None:
-    assert go2.sit()
 
 
 def _nothing(_go2: GO2Controller) -> None: ...
@@ -71,11 +59,11 @@ def _wait(go2: GO2Controller) -> None:
 @pytest.mark.parametrize(
     "call",
     [
-        lambda go2: go2.stand(),
-        lambda go2: go2.sit(),
+        GO2Controller.stand,
+        GO2Controller.sit,
         lambda go2: go2.high_five(hold=0.5),
         lambda go2: go2.play("nod", check=False),
-        lambda go2: go2.lie_down(),
+        GO2Controller.lie_down,
     ],
     ids=["stand", "sit", "high five", "play", "lie down"],
 )
@@ -159,18 +147,18 @@ def test_a_motion_that_is_cancelled_while_it_begins_is_left_at_once(
 
 INTERRUPTED: dict[str, tuple[Do, Do, str]] = {
     "lying": (_nothing, _wait, "wait"),
-    "tucking its legs": (_nothing, lambda go2: go2.stand(), "stand"),
-    "standing": (_stand, _wait, "wait"),
-    "sitting down": (_stand, lambda go2: go2.sit(), "sit"),
-    "sitting": (_sit, _wait, "wait"),
-    "lying down": (_stand, lambda go2: go2.lie_down(), "lie_down"),
+    "tucking its legs": (_nothing, GO2Controller.stand, "stand"),
+    "standing": (GO2Controller.stand, _wait, "wait"),
+    "sitting down": (GO2Controller.stand, GO2Controller.sit, "sit"),
+    "sitting": (GO2Controller.sit, _wait, "wait"),
+    "lying down": (GO2Controller.stand, GO2Controller.lie_down, "lie_down"),
     "trotting": (_trot, _wait, "wait"),
     "changing its gait": (_trot, lambda go2: go2.walk("flying_trot"), "walk"),
-    "coming to rest": (_trot, lambda go2: go2.stop(), "stop"),
+    "coming to rest": (_trot, GO2Controller.stop, "stop"),
     "turning": (_trot, lambda go2: go2.turn_left(1.0), "turn_left"),
-    "high five": (_stand, lambda go2: go2.high_five(), "high_five"),
-    "playing": (_stand, lambda go2: go2.play("bow", check=False), "play"),
-    "recovering": (_nothing, lambda go2: go2.recover(), "recover"),
+    "high five": (GO2Controller.stand, GO2Controller.high_five, "high_five"),
+    "playing": (GO2Controller.stand, lambda go2: go2.play("bow", check=False), "play"),
+    "recovering": (_nothing, GO2Controller.recover, "recover"),
 }
 
 
@@ -191,6 +179,7 @@ def test_ctrl_c_leaves_a_limp_robot_that_gets_up_again(
     assert is_limp(plant.commands[-1])
     assert go2.last_outcome.reason == f"interrupted during {what}(), damped"
     go2.wait(1.0)
+    assert all(map(is_limp, plant.commands[-200:]))
     assert go2.recover(), go2.last_outcome.reason
 
 
@@ -205,7 +194,7 @@ def test_in_realtime_a_real_ctrl_c_leaves_a_limp_robot(plant: WatchedPlant, name
             at = go2.state.time + UNDER_WAY
 
             def interrupt() -> None:
-                if plant.inner.time > at and go2._calls.is_running:  # planning is no call yet
+                if plant.inner.time > at and go2._turn:  # planning is no call yet
                     plant.on_write = lambda: None
                     signal.pthread_kill(main, signal.SIGINT)
 
@@ -233,29 +222,24 @@ def test_ctrl_c_at_any_moment_of_many_calls_leaves_a_robot_that_can_be_called() 
             go2.wait(0.01)
 
 
-def test_no_call_begins_while_one_runs_that_began_as_another_one_ended(
-    go2: GO2Controller, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_call_begins_while_one_runs_that_began_as_another_one_ended(go2: GO2Controller) -> None:
     # Between two looks at who is running the first call ended: the second one ran unseen.
-    calls = go2._calls
-    lock, ended = calls._starting, threading.Event()
-
-    class LateLock:
-        def __enter__(self) -> None:
-            lock.acquire()
-
-        def __exit__(self, *_: object) -> None:
-            lock.release()
-            release.set()
-            first.result(HANG_GUARD)
-
     release = threading.Event()
-    first = in_thread(lambda: calls.make("first", lambda: {"": float(release.wait(HANG_GUARD))}))
-    while not calls.is_running:
+
+    class LateTurn(dict[str, Any]):
+        def setdefault(self, key: str, call: Any = None) -> Any:  # noqa: ANN401
+            running = super().setdefault(key, call)
+            if running is not call:
+                release.set()
+                first.result(HANG_GUARD)
+            return running
+
+    go2._turn = LateTurn()
+    first = in_thread(lambda: go2._call("first", lambda: {"": float(release.wait(HANG_GUARD))}))
+    while not go2._turn:
         pass
-    monkeypatch.setattr(calls, "_starting", LateLock())
     with pytest.raises(ModeError, match="while first"):
-        calls.make("second", lambda: {"": float(ended.is_set())})
+        go2._call("second", dict)
 
 
 @pytest.mark.parametrize("realtime", [False, True])

@@ -22,11 +22,6 @@ GRAVITY, DT = 9.81, 0.002
 NO_FRICTION = JointFriction.none()
 
 
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
 def pressed(model: RobotModel, state: RobotState, share: float) -> tuple[Snapshot, float]:
     """The robot at ``state``, whose joints balance random forces; and their vertical sum [N].
 

@@ -11,7 +11,7 @@ from typing import Final, final
 import numpy as np
 from jaxtyping import Float
 
-from controller.assembly import PilotSettings, build_pilot
+from controller.assembly import build_pilot
 from controller.behaviours.plans import ChangePosture
 from controller.bridges.unitree.sport_api import Api
 from controller.modes import Mode
@@ -90,9 +90,8 @@ class SportRobot:
         walks = {api: name for api, name in WALKS.items() if name in GAITS}
         self.unsupported = (MOTIONS.keys() | WALKS.keys()) - plans.keys() - walks.keys()
         self._gait = "trot"
-        settings = PilotSettings(realtime=True, recorded_time=0.0)
-        self._assembly = build_pilot(plant, config, settings)
-        self.pilot, self._runner = self._assembly.pilot, self._assembly.runner
+        self.pilot = build_pilot(plant, config, realtime=True, recorded_time=0.0)
+        self._runner = self.pilot.runner
         self.is_locked = False
         self.is_leaning = False
         self.pose = LEVEL
@@ -206,7 +205,7 @@ class SportRobot:
 
     def close(self) -> None:
         """Go limp and stop."""
-        self._assembly.close()
+        self.pilot.close()
 
 
 def playable_plans(model: RobotModel) -> Mapping[int, MotionPlan]:

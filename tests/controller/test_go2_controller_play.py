@@ -1,0 +1,124 @@
+"""``play`` does nothing twice, tells how far a plan is from what was written, and may ask first."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+import pytest
+
+import motions
+from benchmarks.validation_set.physics import play
+from controller import GO2Controller
+from go2_wbc.errors import DynamicMotionRefused, MotionInfeasible, StanceMismatch
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.plant.mujoco.ground_truth import GroundTruth
+from go2_wbc.robot.model import RobotModel
+from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, load_motion
+from tests.controller.plants import StillPlant
+from tests.solver import needs_solver
+
+STILL = 0.008
+"""Distance [m] that a foot which stands may slide: less than the 10 mm that count as a slip."""
+
+
+# --- compiled and checked by a caller -------------------------------------------------------------
+
+
+def test_a_checked_motion_is_played_or_refused_by_the_report_that_it_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    checker = FeasibilityChecker()
+    good = checker.evaluate("nod")
+    bad = checker.evaluate(Timeline().body(z=0.18, over=1.0).home(over=1.0))
+    for module, name in (("check", "trajectory_of"), ("checked_motion", "compile_timeline")):
+        found = import_module(f"motions.feasibility.{module}")
+        monkeypatch.setattr(found, name, lambda *_: pytest.fail("done twice"))
+    with GO2Controller() as go2:
+        assert go2.stand()
+        assert go2.play(good), go2.last_outcome.reason
+        with pytest.raises(MotionInfeasible, match="way of a foot"):
+            go2.play(bad)
+
+
+@pytest.mark.slow
+def test_a_high_five_takes_the_plan_of_a_caller_who_has_one(
+    monkeypatch: pytest.MonkeyPatch, model: RobotModel
+) -> None:
+    plan = compile_timeline(load_motion("high_five", side="left", hold=0.5), model)
+    monkeypatch.setattr(motions, "compile_timeline", lambda *_: pytest.fail("done twice"))
+    with GO2Controller() as go2:
+        assert go2.stand()
+        assert go2.high_five("left", hold=0.5, plan=plan), go2.last_outcome.reason
+
+
+# --- the nearest to a motion that cannot be done --------------------------------------------------
+
+
+@needs_solver
+def test_play_tells_how_far_the_plan_is_from_what_was_written() -> None:
+    line = Timeline(physics="nearest").hold(0.2).body(y=0.06, over=0.2).body(y=-0.06, over=0.2)
+    checked = FeasibilityChecker().evaluate(line.home(over=0.4).hold(0.2))
+    (departed,) = checked.report.departures
+    with GO2Controller() as go2:
+        assert go2.stand()
+        assert go2.play(checked), go2.last_outcome.reason
+        measured = dict(go2.last_outcome.measured)
+        assert measured["plan off what was written [m]"] == pytest.approx(departed.place)
+        assert measured["the same, at [s]"] == pytest.approx(departed.place_time)
+        assert measured["plan late [s]"] == pytest.approx(departed.lag)
+        assert go2.play(Timeline().body(z=-0.02, over=0.4).home(over=0.4))
+        assert not any("written" in name for name in go2.last_outcome.measured)
+
+
+@needs_solver
+def test_feet_stand_still_on_the_floor_that_a_quick_sway_was_solved_for(model: RobotModel) -> None:
+    """Its forces lie in the cone of that floor; shared evenly they do not, and feet slid 20 mm."""
+    line = Timeline(physics="nearest").body(y=0.085, over=0.45).body(y=-0.085, over=0.45)
+    plan = FeasibilityChecker(model).plan(line.home(over=0.4))
+    run = play(plan, model, seed=0)
+    assert run.said, run.reason
+    assert run.slip < STILL
+
+
+# --- dynamic motions, on what may be a robot ------------------------------------------------------
+
+
+class LivePlant(StillPlant):
+    """A user's own plant, of which nothing is known but that its time does not wait."""
+
+    @property
+    def is_live(self) -> bool:
+        return True
+
+
+@pytest.fixture(scope="module")
+def two_feet(model: RobotModel) -> CompiledPlan:
+    line = Timeline(balance=False).foot("FL", z=0.03, over=0.4).foot("RR", z=0.03, over=0.4)
+    return compile_timeline(line.home(over=0.4), model)
+
+
+def test_a_plant_that_may_be_a_robot_is_not_sent_a_dynamic_motion(two_feet: CompiledPlan) -> None:
+    with GO2Controller(plant=LivePlant(), realtime=True) as go2:
+        with pytest.raises(DynamicMotionRefused, match="LivePlant may move a robot") as caught:
+            go2.play(two_feet, check=False)
+        assert "play(..., allow_dynamic=True)" in str(caught.value)
+        assert not go2.last_outcome
+
+
+@pytest.mark.parametrize("is_simulated", [False, True])
+def test_who_allows_it_or_simulates_gets_as_far_as_with_any_other_motion(
+    two_feet: CompiledPlan, model: RobotModel, *, is_simulated: bool
+) -> None:
+    plant = StillPlant() if is_simulated else LivePlant()
+    with GO2Controller(plant=plant, realtime=not is_simulated) as go2:
+        for plan in (two_feet, compile_timeline(load_motion("bow"), model)):
+            is_allowed = plan is two_feet and not is_simulated
+            with pytest.raises(StanceMismatch, match="the robot is lying"):
+                go2.play(plan, check=False, allow_dynamic=is_allowed)
+
+
+def test_what_simulates_says_so() -> None:
+    plant = GroundTruth(MujocoPlant())
+    assert not plant.is_hardware
+    assert LivePlant().is_hardware
+    plant.close()
