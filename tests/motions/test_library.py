@@ -34,7 +34,7 @@ def test_there_are_motions_enough_and_each_says_what_it_is() -> None:
         found = find_motion(name)
         assert found.name == name
         assert len(found.summary) > 10
-        assert f"motions/library/{name}.py:" in found.source
+        assert "motions/library/" in found.source
 
 
 @pytest.mark.parametrize("name", ["", "High_Five", "levitate"])
