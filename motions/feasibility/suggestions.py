@@ -12,8 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from go2_wbc.errors import CommandError, MotionError, TimelineError
-from motions.feasibility.check import FeasibilityChecker
-from motions.feasibility.checked_motion import Playable, timeline_of
+from motions.feasibility.check import FeasibilityChecker, Playable, timeline_of
 from motions.feasibility.report import FeasibilityReport
 from motions.language.keys import BalanceShift
 from motions.language.timeline import Timeline

@@ -22,7 +22,7 @@ from motions import (
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 from motions.dynamics.phases import Tolerance
 from motions.feasibility.forces import torque
-from motions.feasibility.limits import FeasibilityLimits
+from tests.motions.feasibility.cases import case_of
 from tests.solver import needs_solver
 
 Mutation = Callable[[DynamicTrajectory, np.random.Generator], DynamicTrajectory]
@@ -192,7 +192,7 @@ def test_a_solved_part_at_the_torque_that_it_may_use_would_need_more(
     written = int(np.flatnonzero(~jump.path.is_dynamic)[0])
     tau[[row, written], 1] = 0.85 * checker.model.torque_limits[1] - 1e-6
     forces = replace(jump.forces, tau=tau)
-    peak, _ = torque(jump.path, forces, checker.model, FeasibilityLimits())
+    peak, _ = torque(case_of(jump.path, checker.model, forces))
     assert np.argwhere(peak.margins < 0.0).tolist() == [[row, 1]]
 
 
