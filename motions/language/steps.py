@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, TypeVar
+from typing import Any, Self
 
 import numpy as np
 
@@ -32,8 +32,6 @@ FARTHEST_WALK = 20.0
 POINTS = 65
 """Poses between two points of a way: own choice, a millimetre apart at the end of a stride."""
 
-_Line = TypeVar("_Line", bound="Steps")
-
 
 class Steps(TimelineData):
     """Where the robot goes."""
@@ -41,7 +39,7 @@ class Steps(TimelineData):
     __slots__ = ()
 
     def step(
-        self: _Line,
+        self,
         leg: Leg | str,
         x: float = 0.0,
         y: float = 0.0,
@@ -49,7 +47,7 @@ class Steps(TimelineData):
         yaw: float = 0.0,
         over: float,
         height: float = STEP_HEIGHT,
-    ) -> _Line:
+    ) -> Self:
         """Put a foot down in a new place; from then on offsets and ``home`` count from there.
 
         Args:
@@ -70,14 +68,14 @@ class Steps(TimelineData):
         return line._longer([key], end)
 
     def walk(
-        self: _Line,
+        self,
         x: float = 0.0,
         y: float = 0.0,
         turn: float = 0.0,
         over: float | None = None,
         *,
         gait: str = "walk",
-    ) -> _Line:
+    ) -> Self:
         """Walk there: straight, and turning evenly on the way. All feet end below their hips.
 
         Args:
@@ -95,21 +93,21 @@ class Steps(TimelineData):
         shares = np.linspace(0.0, 1.0, POINTS)[:, None]
         return self._stepped("walk()", Way(shares * np.array(goal)), over, gait)
 
-    def turn(self: _Line, angle: float, over: float | None = None, *, gait: str = "walk") -> _Line:
+    def turn(self, angle: float, over: float | None = None, *, gait: str = "walk") -> Self:
         """Turn on the spot by ``angle`` [rad], to the left; see ``walk``."""
         return self.walk(turn=angle, over=over, gait=gait)
 
-    def side_step(self: _Line, y: float, over: float | None = None, *, gait: str = "walk") -> _Line:
+    def side_step(self, y: float, over: float | None = None, *, gait: str = "walk") -> Self:
         """Go aside by ``y`` [m], to the left; see ``walk``."""
         return self.walk(y=y, over=over, gait=gait)
 
     def path(
-        self: _Line,
+        self,
         points: Sequence[Sequence[float]],
         over: float | None = None,
         *,
         gait: str = "walk",
-    ) -> _Line:
+    ) -> Self:
         """Walk along a smooth curve through ``points``; see ``walk``.
 
         Args:
@@ -120,7 +118,7 @@ class Steps(TimelineData):
         """
         return self._stepped("path()", _way_through(points), over, gait)
 
-    def _stepped(self: _Line, what: str, way: Way, over: float | None, name: str) -> _Line:
+    def _stepped(self, what: str, way: Way, over: float | None, name: str) -> Self:
         if name not in STEP_GAITS:
             raise TimelineError(unknown_name("gait", str(name), STEP_GAITS))
         if self.raised:
