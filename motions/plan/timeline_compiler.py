@@ -30,9 +30,8 @@ from motions.language.dynamic_blocks import away_from_home
 from motions.language.keys import BodyKey, FootHold, Key, Mark, PhaseKey
 from motions.language.timeline import Timeline
 from motions.plan.compiled_plan import CompiledPlan, Problem, event_at
-from motions.plan.contact_schedule import UNLOAD_TIME
 from motions.plan.dynamic_span import DynamicSpan, attitude_angles, curves_of, placed
-from motions.plan.quasi_static import compile_quasi_static
+from motions.plan.quasi_static import UNLOAD_TIME, compile_quasi_static
 from motions.plan.repair import pieces_to_repair, without_vain_shifts
 from motions.plan.trajectory import trajectory_of
 from motions.postures import standing_feet

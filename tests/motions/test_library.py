@@ -18,7 +18,7 @@ from motions import (
     motion_names,
 )
 from motions.authoring import Choice
-from motions.plan.contact_schedule import LEAST_RAMP
+from motions.plan.quasi_static import LEAST_RAMP
 from tests.motions.plans import library_plan
 
 # Between a difference quotient over 2 ms and the derivative; the curves are smooth.
