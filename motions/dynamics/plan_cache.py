@@ -83,7 +83,7 @@ def _kept(
     model: RobotModel,
     solved: Callable[[], DynamicTrajectory],
 ) -> DynamicTrajectory:
-    """The plan of the first of ``files`` that has one, judged; else one that is put into the last."""
+    """The plan of the first of ``files`` that has one, judged; or a new one, put into the last."""
     for file in files:
         if (plan := _read(file)) is not None:
             accept(plan, tolerance, model)
