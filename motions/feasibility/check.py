@@ -170,13 +170,12 @@ class FeasibilityChecker:
         """The plan of ``motion``, compiled and checked no more often than needed.
 
         Args:
-            motion: as for ``check``; of a checked one nothing is done again.
+            motion: of a checked one nothing is done again.
             check: whether it must be feasible.
 
         Raises:
-            CommandError: for an unknown name, or for what stands for no motion.
-            TimelineError: if the timeline is empty or its parameters are not valid.
-            MotionInfeasible: if the motion breaks a limit; carries the findings.
+            MotionInfeasible: if the motion breaks a limit; carries the findings. Else what
+                ``compile_motion`` raises.
         """
         plan = self._compiled(motion)
         if check:
@@ -187,13 +186,7 @@ class FeasibilityChecker:
     def check(self, motion: Playable) -> FeasibilityReport:
         """The report on ``motion``; one that was checked before keeps its report.
 
-        Args:
-            motion: a name of the library, a motion with its default parameters, a timeline, a plan,
-                or a checked motion.
-
-        Raises:
-            CommandError: for an unknown name, or for what stands for no motion.
-            TimelineError: if the timeline is empty or its parameters are not valid.
+        Raises what ``compile_motion`` does.
         """
         if isinstance(motion, CheckedMotion):
             return motion.report
@@ -225,13 +218,11 @@ class FeasibilityChecker:
         The result stands for the motion wherever one is asked for: ``GO2Controller.play`` plays its
         plan without compiling or checking it again.
 
-        Args:
-            motion: as for ``check``; one that was checked before is returned as it is.
+        One that was checked before is returned as it is.
 
         Raises:
-            CommandError: for an unknown name, or for what stands for no motion.
-            TimelineError: if the timeline is empty or its parameters are not valid.
-            MotionError: if the plan is not finite: then there is no movement to judge.
+            MotionError: if the plan is not finite: then there is no movement to judge. Else what
+                ``compile_motion`` raises.
         """
         if isinstance(motion, CheckedMotion):
             return motion

@@ -12,7 +12,7 @@ import pytest
 from controller.cli.common import ExitCode
 from controller.cli.main import main
 from motions.music import Beats, click_track
-from motions.music.sound import RATE, read_sound
+from motions.music.songs import RATE, read_sound
 from tests.viz.page_reader import read_data
 
 SECONDS, BPM = 7.0, 96.0
