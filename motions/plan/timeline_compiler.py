@@ -77,9 +77,7 @@ def compile_timeline(
         return compile_quasi_static(timeline, model, p_feet)
     for block in blocks:
         _require_alone(timeline, block)
-    maker = _Maker(timeline, model, mend, progress)
-    if p_feet is not None:
-        maker.start_on(p_feet)
+    maker = _Maker(timeline, model, p_feet, mend, progress)
     for block in blocks:
         maker.add_stretch(block.start, Posture.STAND)
         maker.add_block(block)
@@ -124,6 +122,7 @@ class _Maker:
         self,
         timeline: Timeline,
         model: RobotModel,
+        p_feet: Float[np.ndarray, "4 3"] | None,
         broken: Broken | None,
         progress: Progress | None,
     ) -> None:
@@ -136,10 +135,8 @@ class _Maker:
         self._spans: list[DynamicSpan] = []
         self._problems: list[Problem] = []
         self._ramps: list[float] = []
-
-    def start_on(self, p_feet: Float[np.ndarray, "4 3"]) -> None:
-        """Start with the feet there [m], in the frame of the motion."""
-        self._move_on(0.0, p_feet, 0.0)
+        if p_feet is not None:
+            self._move_on(0.0, p_feet, 0.0)
 
     def add_stretch(self, end: float, exit: Posture) -> None:
         """What is written from here to ``end`` [s]."""
