@@ -26,7 +26,7 @@ from go2_wbc.plant import MujocoPlant, Plant
 from go2_wbc.recording import Recording
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.robot.state import RobotState
+from go2_wbc.robot.state import Health, RobotState
 from go2_wbc.wbc.tasks import Task
 
 _log = logging.getLogger(__name__)
@@ -104,7 +104,7 @@ class GO2Controller:
             opened.callback(built.close)
             self._resources = opened.pop_all()
         self._runner, self._pilot, self._description = built.runner, built.pilot, description
-        self._motor = config.motor
+        self._motor, self._limits = config.motor, config.feasibility
         self._closed = False
         self._calls = Calls(built.pilot, built.runner)
         self._planning = threading.Lock()
@@ -289,6 +289,11 @@ class GO2Controller:
         self._pilot.return_safely()
 
     @property
+    def health(self) -> Health:
+        """Which parts of the robot were found to be broken; ``print(go2.health)`` names them."""
+        return self._runner.loop.health
+
+    @property
     def progress(self) -> float:
         """Share of the motion that has been played, 0 to 1; 0 if none is."""
         playing = self._pilot.playing
@@ -297,7 +302,8 @@ class GO2Controller:
     @cached_property
     def _checker(self) -> motions.FeasibilityChecker:
         """Plans on a model of its own: the control loop's belongs to the thread that ticks."""
-        return motions.FeasibilityChecker(RobotModel(self._description, motor=self._motor))
+        model = RobotModel(self._description, motor=self._motor)
+        return motions.FeasibilityChecker(model, self._limits)
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""

@@ -1,6 +1,6 @@
 """Feasibility: whether the robot can do a motion, told without simulating it."""
 
-from motions.feasibility.case import FeasibilityLimits
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from motions.feasibility.check import (
     CheckedMotion,
     FeasibilityChecker,

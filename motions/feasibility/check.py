@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from go2_wbc.errors import CommandError, MotionError
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.recording import Recording
@@ -21,7 +22,7 @@ from motions.dynamics.phases import Progress
 from motions.feasibility import dynamic_spans, kinematic, tracking
 from motions.feasibility import forces as dynamics
 from motions.feasibility.bodies import SelfCollision, hulls_of, self_distance
-from motions.feasibility.case import Case, FeasibilityLimits, Forces
+from motions.feasibility.case import Case, Forces
 from motions.feasibility.goal_errors import departure_measurements, departures
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.language.timeline import Timeline

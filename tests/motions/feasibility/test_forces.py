@@ -10,6 +10,7 @@ from jaxtyping import Float
 from scipy.linalg import null_space
 
 from go2_wbc.errors import QpInfeasible
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
@@ -19,7 +20,6 @@ from go2_wbc.wbc.constraints import friction_pyramid
 from go2_wbc.wbc.solvers import DenseQp, solve_dense_qp
 from motions import FeasibilityChecker, Timeline, compile_timeline
 from motions.batch_kinematics import configurations, zero_moment_points
-from motions.feasibility.case import FeasibilityLimits
 from motions.feasibility.forces import (
     EVENNESS,
     PYRAMID,

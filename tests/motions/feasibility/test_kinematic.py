@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
 from motions.feasibility.bodies import LinkHulls, SelfCollision
-from motions.feasibility.case import FeasibilityLimits
 from motions.feasibility.kinematic import clearance, ends, joint_position
 from motions.plan.trajectory import Trajectory, trajectory_of
 from tests.motions.feasibility.cases import case_of
