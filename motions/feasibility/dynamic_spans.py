@@ -21,11 +21,10 @@ from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from motions.dynamics.curves import centred, feet_at
 from motions.dynamics.dynamic_trajectory import BALANCING_FEET
 from motions.dynamics.knots import true_spans
-from motions.dynamics.phases import PhaseProblem
 from motions.dynamics.plan_audit import defects, drift
 from motions.feasibility.case import FEET, JOINTS, Case, Forces
 from motions.feasibility.forces import PRESSED
-from motions.feasibility.goal_errors import Misses, of_phases, of_written
+from motions.feasibility.goal_errors import Misses, misses_of
 from motions.feasibility.report import Series
 from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan
 from motions.plan.dynamic_span import DynamicSpan
@@ -209,11 +208,8 @@ class _Judge:
         return Series.against(*what, tolerance, where=where, tight=(1.0 - NEAR) * tolerance)
 
     def _misses(self) -> Misses:
-        asked, plan = self.span.asked, self.span.trajectory
-        places = feet_at(plan.q, plan.v, self.model)[0]
-        if isinstance(asked, PhaseProblem):
-            return of_phases(plan, asked, self.span.frame, places)
-        return of_written(self.span, places, self.model)
+        plan = self.span.trajectory
+        return misses_of(self.span, feet_at(plan.q, plan.v, self.model)[0], self.model)
 
     def _at_knots(
         self, check: str, unit: str, subjects: tuple[str, ...], values: _Columns, limit: float,
