@@ -1,7 +1,7 @@
 """``python -m benchmarks steps``: where authored steps end, against where they were to end.
 
 Random steps to new places, and walks with turns and raised paws, one and three after another. The
-gaits of ``motions.step_gaits`` were chosen by the check and on two runs on the nominal floor; no
+gaits were chosen by the check and on two runs on the nominal floor; no
 seed of theirs is judged here.
 """
 

@@ -17,7 +17,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.batch_kinematics import attitudes
 from motions.dynamics.phases import PhaseProblem
-from motions.feasibility.goal_errors import of_phases, of_written
+from motions.feasibility.goal_errors import misses_of
 from motions.plan.compiled_plan import CompiledPlan
 from motions.plan.dynamic_span import DynamicSpan
 
@@ -67,7 +67,7 @@ def off_written(
     air, and of one that came down, in the world [m].
 
     Parts that follow curves are compared with these in every ``STRIDE``-th tick; solved parts with
-    what was asked of them (see ``motions.feasibility.misses``): their plan is only one answer.
+    what was asked of them (see ``motions.feasibility.goal_errors``): their plan is only one answer.
     """
     anchor = Anchor.of_feet(recorded.p_world_feet[0].copy(), model.foot_radius)
     spans = plan.dynamic if isinstance(plan, CompiledPlan) else ()
@@ -120,13 +120,10 @@ def _off_asked(
     q[:, :3] = (q[:, :3] - anchor.p_world) @ R
     q[:, 3:7] = [(turn * pin.Quaternion(xyzw)).coeffs() for xyzw in q[:, 3:7]]
     places = (recorded.p_world_feet[rows] - anchor.p_world) @ R
-    happened = replace(plan, q=q)
+    found = misses_of(replace(span, trajectory=replace(plan, q=q)), places, model)
+    lands = np.ones((len(found.times), 4), dtype=bool)
     if isinstance(span.asked, PhaseProblem):
-        found = of_phases(happened, span.asked, span.frame, places)
         lands = _landings(span.asked)
-    else:
-        found = of_written(replace(span, trajectory=happened), places, model)
-        lands = np.ones((len(found.times), 4), dtype=bool)
     away, turned = np.nan_to_num(found.away), np.nan_to_num(found.turned)
     feet = away[:, 1:]
     in_air, landed = (feet[which].max(initial=0.0) for which in (~lands, lands))

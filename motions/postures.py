@@ -38,7 +38,6 @@ SPLAYED_JOINTS = TUCKED_JOINTS + np.tile([0.3, 0.0, 0.0, -0.3, 0.0, 0.0], 2)
 """Joint angles [rad] with the feet beside the hips, so that the folded legs carry nothing."""
 SETTLING_STEPS = 10
 """Steps that put the CoM of a standing robot in its place; see ``place``."""
-"""Every leg's ``LegTask.STANCE``, and its share of the load."""
 
 
 def standing_feet(model: RobotModel) -> Float[np.ndarray, "4 3"]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import importlib
-import pkgutil
 import runpy
 from collections.abc import Mapping
 from functools import cache
@@ -20,10 +19,21 @@ LIBRARY = Path(__file__).with_name("library")
 """The folder of the library, whose files are as users write theirs."""
 
 
-@cache
 def motion_names() -> tuple[str, ...]:
-    """Names of the motions in the library: one file each."""
-    return tuple(sorted(module.name for module in pkgutil.iter_modules([str(LIBRARY)])))
+    """Names of the motions in the library."""
+    return tuple(_homes())
+
+
+@cache
+def _homes() -> Mapping[str, str]:
+    """The module of each motion of the library, by name: a file is read, not run, for its names."""
+    found = {
+        node.name: file.stem
+        for file in LIBRARY.glob("*.py")
+        for node in ast.parse(file.read_bytes()).body
+        if isinstance(node, ast.FunctionDef) and node.decorator_list
+    }
+    return dict(sorted(found.items()))
 
 
 def find_motion(name: str) -> Motion:
@@ -32,9 +42,9 @@ def find_motion(name: str) -> Motion:
     Raises:
         CommandError: for an unknown name; lists the valid ones.
     """
-    if name not in motion_names():
-        raise CommandError(unknown_name("motion", name, motion_names()))
-    module = importlib.import_module(f"motions.library.{name}")
+    if name not in _homes():
+        raise CommandError(unknown_name("motion", name, _homes()))
+    module = importlib.import_module(f"motions.library.{_homes()[name]}")
     return getattr(module, name)
 
 

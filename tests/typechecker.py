@@ -1,6 +1,6 @@
 """The check of every argument under pytest: as types say it, a whole number is a number too.
 
-So is what numpy calls true and false a flag.
+So is what numpy calls true and false a flag; ``Self`` is pyright's to check.
 
 A check costs many times what most functions do, and a scenario of a minute makes the same calls
 tens of thousands of times. A wrong call is wrong because of the place that makes it. So in each
@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable
 from functools import partial, wraps
 from types import FunctionType
-from typing import Any
+from typing import Any, Self
 
 import jaxtyping
 import numpy as np
@@ -27,8 +27,8 @@ STRIDE = 251
 """Prime, so that the calls of a loop come up in turn, whatever their number. A control loop makes
 its calls as often in half a second; at every 61st the checks took a quarter of a tick."""
 _ARRAY: Any = type(jaxtyping.Float[np.ndarray, "1"])
-_FLAGS = FrozenDict({bool: bool | np.bool_})
-_check = beartype(conf=BeartypeConf(is_pep484_tower=True, hint_overrides=_FLAGS))
+_MEANINGS = FrozenDict({bool: bool | np.bool_, Self: object})
+_check = beartype(conf=BeartypeConf(is_pep484_tower=True, hint_overrides=_MEANINGS))
 _calls: dict[int, int] = {}
 """By place: how many calls it has made since the last ``renew``."""
 

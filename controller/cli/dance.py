@@ -87,7 +87,7 @@ def _played(
 def _music(song: Path) -> bytes:
     """As much of the song as can be danced, for the page."""
     from motions.music.choreography import LONGEST
-    from motions.music.sound import RATE, mp3_of, read_sound
+    from motions.music.songs import RATE, mp3_of, read_sound
 
     return mp3_of(read_sound(song)[: round(LONGEST * RATE)])
 

@@ -50,16 +50,11 @@ def jump(
     flight: float | None = None,
     footprint: Float[np.ndarray, "4 2"] = FOOTPRINT,
 ) -> tuple[Phase, ...]:
-    """A jump from four feet to four feet.
+    """A jump ``x``, ``y`` [m] and ``yaw`` [rad] away, its feet ``height`` [m] high at the top.
 
-    Args:
-        x: how far ahead it lands [m].
-        y: how far to the left [m].
-        yaw: turn [rad], positive to the left.
-        height: of the feet at the top [m].
-        flight: time in the air [s], in whole knots. By default what a fall from ``height`` takes,
-            so the trunk rises by that much; in less, the legs are drawn up for the rest.
-        footprint: where the feet stand around their middle [m].
+    ``flight`` is the time in the air [s], in whole knots, by default what a fall from ``height``
+    takes, so the trunk rises by that much; in less, the legs are drawn up for the rest.
+    ``footprint``: where the feet stand around their middle [m].
 
     Raises:
         TimelineError: for what no Go2 can jump.
@@ -83,12 +78,7 @@ def jump(
 
 
 def hop(times: int = 3, period: float = 0.5, height: float = 0.05) -> tuple[Phase, ...]:
-    """Hops in place; the feet touch down once a period.
-
-    Args:
-        times: how many.
-        period: time [s] from one touchdown to the next.
-        height: of the feet at the top [m].
+    """Hops in place, ``height`` [m] high; the feet touch down once a ``period`` [s].
 
     Raises:
         TimelineError: for no hop, or a period that leaves no time on the ground.
@@ -111,14 +101,11 @@ def hop(times: int = 3, period: float = 0.5, height: float = 0.05) -> tuple[Phas
 
 
 def rear(pitch: float = math.radians(-25.0), hold: float = 0.6) -> tuple[Phase, ...]:
-    """Rears up on the rear feet and comes down again.
+    """Rears up on the rear feet to ``pitch`` [rad], negative is front up, and comes down again.
 
     The trunk goes up and back like a pendulum on its head, so that it returns by itself: the longer
-    the front feet are to be off the ground, the nearer it comes to above the rear feet.
-
-    Args:
-        pitch: of the trunk at the top [rad]; negative is front up.
-        hold: time [s] for which the front feet are off the ground.
+    the front feet are to be off the ground (``hold`` [s]), the nearer it comes to above the rear
+    feet.
 
     Raises:
         TimelineError: for a pitch or time that the robot cannot do.
@@ -140,12 +127,7 @@ def rear(pitch: float = math.radians(-25.0), hold: float = 0.6) -> tuple[Phase, 
 def lift(
     legs: Collection[Leg] = (Leg.FL, Leg.RR), hold: float = 0.35, height: float = 0.06
 ) -> tuple[Phase, ...]:
-    """Lifts feet together and puts them down where they stood.
-
-    Args:
-        legs: one or two of them.
-        hold: time [s] for which they are off the ground.
-        height: to which they are lifted [m].
+    """Lifts one foot or two ``height`` [m] for ``hold`` seconds, puts them where they stood.
 
     Raises:
         TimelineError: for more legs, or a time or height that the robot cannot do.

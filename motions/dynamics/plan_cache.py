@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import logging
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import astuple
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -53,13 +53,9 @@ def solve_cached(
     """
     limits = limits or PlanLimits()
     path = (folder or plan_folder()) / f"{_key(problem, model, limits)}.npz"
-    for known in (SHIPPED / f"{problem_key(problem, model, limits)}.npz", path):
-        if (plan := _read(known)) is not None:
-            accept(plan, problem.tolerance, model)
-            return plan
-    found = solve(problem, model, progress=progress, limits=limits)
-    _write(path, found)
-    return found
+    known = (SHIPPED / f"{problem_key(problem, model, limits)}.npz", path)
+    found = partial(solve, problem, model, progress=progress, limits=limits)
+    return _kept(known, problem.tolerance, model, found)
 
 
 def nearest_cached(
@@ -75,16 +71,26 @@ def nearest_cached(
         MissingDependency: if it must be solved and crocoddyl is not installed.
         PlanNotFound: if there is no such plan within the tolerance.
     """
-    digest = hashlib.sha256(repr((astuple(PlanLimits()), _versions())).encode())
-    for array in (written.times, written.q, written.stance, *_numbers(model)):
-        digest.update(np.ascontiguousarray(array, float).tobytes())
-    path = plan_folder() / f"{digest.hexdigest()[:32]}.npz"
-    if (plan := _read(path)) is not None:
-        accept(plan, tolerance, model)
-        return plan
-    found = nearest(written, model, tolerance=tolerance, progress=progress)
-    _write(path, found)
-    return found
+    arrays = (written.times, written.q, written.stance, *_numbers(model))
+    key = _hash((astuple(PlanLimits()), _versions()), arrays)
+    found = partial(nearest, written, model, tolerance=tolerance, progress=progress)
+    return _kept((plan_folder() / f"{key}.npz",), tolerance, model, found)
+
+
+def _kept(
+    files: tuple[Path, ...],
+    tolerance: Tolerance,
+    model: RobotModel,
+    solved: Callable[[], DynamicTrajectory],
+) -> DynamicTrajectory:
+    """The plan of the first of ``files`` that has one, judged; or a new one, put into the last."""
+    for file in files:
+        if (plan := _read(file)) is not None:
+            accept(plan, tolerance, model)
+            return plan
+    plan = solved()
+    _write(files[-1], plan)
+    return plan
 
 
 def plan_folder() -> Path:
@@ -135,8 +141,14 @@ def _write(path: Path, trajectory: DynamicTrajectory) -> None:
 
 def _key(problem: PhaseProblem, model: RobotModel, limits: PlanLimits) -> str:
     """A hash of all that the plan depends on."""
-    text = repr((problem_key(problem, model, limits), _versions()))
-    return hashlib.sha256(text.encode()).hexdigest()[:32]
+    return _hash((problem_key(problem, model, limits), _versions()))
+
+
+def _hash(words: object, arrays: Iterable[np.ndarray] = ()) -> str:
+    digest = hashlib.sha256(repr(words).encode())
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array, float).tobytes())
+    return digest.hexdigest()[:32]
 
 
 def problem_key(problem: PhaseProblem, model: RobotModel, limits: PlanLimits) -> str:

@@ -12,7 +12,6 @@ from jaxtyping import Float
 
 from go2_wbc.errors import PlanNotFound
 from go2_wbc.legs import FOOT_NAMES, LEGS
-from motions.dynamics.continuation import Start
 from motions.dynamics.knots import Knots, Solution
 from motions.dynamics.phases import Progress
 from motions.dynamics.shooting_problem import ShootingProblem
@@ -77,7 +76,7 @@ class Search:
         turns: Callable[[Solution], bool],
         budget: float,
         progress: Progress | None,
-        start: Start | None = None,
+        start: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> None:
         """Prepare; the budget, processor time [s], runs from here; ``start`` is tried first.
 
@@ -137,7 +136,7 @@ class Search:
         """States, torques and regularisation of every start of the full program."""
         knots, soft = self._knots, self._soft_solver
         if self._start is not None:
-            xs, us = list(self._start.x), list(self._start.tau)
+            xs, us = map(list, self._start)
             yield xs, us, REGULARISATIONS[0]
             self._solve(soft, xs, us, REGULARISATIONS[0], SOFT_STOP)
             yield list(soft.xs), list(soft.us), REGULARISATIONS[0]

@@ -10,11 +10,10 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
-from go2_wbc.errors import MissingDependency, PlanNotFound
+from go2_wbc.errors import MissingDependency, PlanNotFound, TimelineError
 from go2_wbc.legs import FOOT_NAMES, LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
-from motions.dynamics.continuation import Solved, Start, continued
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory, Miss
 from motions.dynamics.knots import Knots, Solution, feet_at, knots_of, pose_of
 from motions.dynamics.phases import PhaseProblem, Progress, Tolerance
@@ -24,6 +23,8 @@ from motions.dynamics.plan_limits import PlanLimits, Weights
 INSTALL_LINE = "pip install go2-wbc[dynamics]"
 BUDGET = 20.0
 """Processor time [s] that solving may take."""
+SAME = 1e-9
+"""Time [s] by which rounding may put a knot before its phase."""
 ANOTHER_TURN = 1.5 * math.pi
 """Angle [rad] about an axis of the trunk from which on what is left of a turn is a whole one that
 was lost: attitudes look the same, and the axes tip by much less than the rest."""
@@ -63,6 +64,52 @@ def solve(
     task = Task(knots, model, limits, Weights(), problem.tolerance, _misses)
     first = None if start is None else continued(start, problem, knots.times, model)
     return optimum(task, budget=budget, progress=progress, start=first)
+
+
+@dataclass(frozen=True, slots=True)
+class Solved:
+    """A problem and its plan, from which the search for another of the same phases may begin.
+
+    Attributes:
+        problem: what was asked.
+        plan: what was found.
+    """
+
+    problem: PhaseProblem
+    plan: DynamicTrajectory
+
+
+def continued(
+    solved: Solved, problem: PhaseProblem, times: Float[np.ndarray, " n1"], model: RobotModel
+) -> tuple[Float[np.ndarray, "n1 37"], Float[np.ndarray, "n 12"]]:
+    """States and torques [N m] of the plan of ``solved`` at the knots ``times`` [s] of ``problem``.
+
+    Each knot is where it was as a share of its phase, so phases may last longer or shorter.
+
+    Raises:
+        TimelineError: if the two problems differ in which feet stand in which phase.
+    """
+    asked, known = ([phase.stance for phase in one.phases] for one in (problem, solved.problem))
+    if asked != known:
+        raise TimelineError(
+            f"a plan of {len(known)} phases is no start for these {len(asked)}: the same feet must "
+            "stand, phase by phase"
+        )
+    plan = solved.plan
+    at = np.interp(times, _ends(problem), _ends(solved.problem))
+    rows = np.clip(np.searchsorted(plan.times, at + SAME, side="right") - 1, 0, len(plan.tau) - 1)
+    shares = np.clip((at - plan.times[rows]) / np.diff(plan.times)[rows], 0.0, 1.0)
+    q = [
+        pin.interpolate(model.pin_model, plan.q[row], plan.q[row + 1], share)
+        for row, share in zip(rows.tolist(), shares.tolist(), strict=True)
+    ]
+    v = plan.v[rows] + shares[:, None] * (plan.v[rows + 1] - plan.v[rows])
+    return np.hstack([np.array(q), v]), plan.tau[rows[:-1]]
+
+
+def _ends(problem: PhaseProblem) -> Float[np.ndarray, " k"]:
+    """When [s] the phases begin, and the last one ends."""
+    return np.cumsum([0.0, *(phase.duration for phase in problem.phases)])
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +156,7 @@ def optimum(
     *,
     budget: float,
     progress: Progress | None,
-    start: Start | None = None,
+    start: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> DynamicTrajectory:
     """The best plan for ``task``; raises what ``solve`` does."""
     require_crocoddyl()

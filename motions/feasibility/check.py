@@ -2,34 +2,136 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from go2_wbc.errors import MotionError
+from go2_wbc.errors import CommandError, MotionError
 from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan
+from go2_wbc.recording import Recording
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
+from motions.authoring import Motion
 from motions.batch_kinematics import centres_of_mass
 from motions.dynamics.phases import Progress
-from motions.feasibility import dynamic_spans, friction, kinematic, tracking
+from motions.feasibility import dynamic_spans, kinematic, tracking
 from motions.feasibility import forces as dynamics
-from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_motion
-from motions.feasibility.collision import SelfCollision, self_distance
+from motions.feasibility.bodies import SelfCollision, hulls_of, self_distance
+from motions.feasibility.case import Case, Forces
 from motions.feasibility.goal_errors import departure_measurements, departures
-from motions.feasibility.hulls import hulls_of
 from motions.feasibility.report import FeasibilityReport, Series
-from motions.plan.compiled_plan import CompiledPlan, Problem
+from motions.language.timeline import Timeline
+from motions.language.timeline_data import NEAREST
+from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan, Problem
+from motions.plan.timeline_compiler import Broken, compile_timeline
 from motions.plan.trajectory import Trajectory, trajectory_of
+from motions.registry import load_motion
+from motions.saved.plan_file import is_saved_plan, load_plan
 
 BALANCE, WAY = "balance", "way of a foot"
 """Problems of the compiler."""
 SLIDING = 0.17
 """Share of the slip that is allowed, from which on a force that lacks for a moment matters."""
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedMotion:
+    """A checked motion, with what the check worked out on its way.
+
+    Attributes:
+        plan: what was checked.
+        report: what the check says.
+        path: the movement of the whole robot, in the frame of the motion.
+        forces: contact forces and torques along it.
+    """
+
+    plan: MotionPlan
+    report: FeasibilityReport
+    path: Trajectory
+    forces: Forces
+
+    def recording(self) -> Recording:
+        """The plan in the form of a recorded run, for viewers: 100 samples a second.
+
+        Labels are the names of the plan's holds, elsewhere the feet that are in the air.
+        """
+        path = self.path
+        (support,) = (series for series in self.report.series if series.check == "support")
+        has_area = path.stance.sum(axis=1) >= LEAST_FEET
+        spans = self.plan.spans if isinstance(self.plan, CompiledPlan) else {}
+        return Recording(
+            time=path.times,
+            q=path.q,
+            v=path.v,
+            tau=self.forces.tau,
+            foot_forces=self.forces.contact[:, :, 2],
+            stance=path.stance,
+            p_world_com=path.p_com,
+            support_margin=np.where(has_area, support.values[:, 0], np.nan),
+            labels=tuple(
+                _label(float(t), stands, spans)
+                for t, stands in zip(path.times, path.stance, strict=True)
+            ),
+        )
+
+
+Playable = str | Path | Motion | Timeline | MotionPlan | CheckedMotion
+"""What stands for a motion: a name of the library, the file of a saved motion or plan, a motion
+(with its default parameters), a timeline, a plan, or a motion that was checked before."""
+
+
+def compile_motion(
+    motion: object,
+    model: RobotModel,
+    *,
+    mend: Broken | None = None,
+    progress: Progress | None = None,
+) -> MotionPlan:
+    """The plan of ``motion`` on the robot ``model``; what is compiled already is not done again.
+
+    Args:
+        motion: a ``Playable``; anything else is refused.
+        model: must not be that of a control loop that runs in another thread.
+        mend, progress: as for ``compile_timeline``; ``mend`` is asked for timelines with
+            ``physics="nearest"`` only.
+
+    Raises:
+        CommandError: for an unknown name, or for what stands for no motion.
+        TimelineError: if the timeline is empty or its parameters are not valid.
+        MotionFileError: for a file that cannot be used.
+    """
+    if isinstance(motion, CheckedMotion):
+        return motion.plan
+    if isinstance(motion, MotionPlan):
+        return motion
+    if isinstance(motion, str | Path) and is_saved_plan(motion):
+        return load_plan(motion, model=model)
+    line = timeline_of(motion)
+    if line is None:
+        raise CommandError(
+            "motion must be a name of the library, a function with @motion before it, a Timeline, "
+            f"a plan or a CheckedMotion, got {motion!r}"
+        )
+    asked = mend if line.physics == NEAREST else None
+    return compile_timeline(line, model, mend=asked, progress=progress)
+
+
+def timeline_of(motion: object) -> Timeline | None:
+    """The timeline of ``motion``; of a plan, or of what stands for no motion, none.
+
+    Raises:
+        CommandError: for an unknown name.
+    """
+    if isinstance(motion, str | Path):
+        return None if is_saved_plan(motion) else load_motion(motion)
+    if isinstance(motion, Motion):
+        return motion()
+    return motion if isinstance(motion, Timeline) else None
 
 
 class FeasibilityChecker:
@@ -69,13 +171,12 @@ class FeasibilityChecker:
         """The plan of ``motion``, compiled and checked no more often than needed.
 
         Args:
-            motion: as for ``check``; of a checked one nothing is done again.
+            motion: of a checked one nothing is done again.
             check: whether it must be feasible.
 
         Raises:
-            CommandError: for an unknown name, or for what stands for no motion.
-            TimelineError: if the timeline is empty or its parameters are not valid.
-            MotionInfeasible: if the motion breaks a limit; carries the findings.
+            MotionInfeasible: if the motion breaks a limit; carries the findings. Else what
+                ``compile_motion`` raises.
         """
         plan = self._compiled(motion)
         if check:
@@ -86,13 +187,7 @@ class FeasibilityChecker:
     def check(self, motion: Playable) -> FeasibilityReport:
         """The report on ``motion``; one that was checked before keeps its report.
 
-        Args:
-            motion: a name of the library, a motion with its default parameters, a timeline, a plan,
-                or a checked motion.
-
-        Raises:
-            CommandError: for an unknown name, or for what stands for no motion.
-            TimelineError: if the timeline is empty or its parameters are not valid.
+        Raises what ``compile_motion`` does.
         """
         if isinstance(motion, CheckedMotion):
             return motion.report
@@ -124,76 +219,79 @@ class FeasibilityChecker:
         The result stands for the motion wherever one is asked for: ``GO2Controller.play`` plays its
         plan without compiling or checking it again.
 
-        Args:
-            motion: as for ``check``; one that was checked before is returned as it is.
+        One that was checked before is returned as it is.
 
         Raises:
-            CommandError: for an unknown name, or for what stands for no motion.
-            TimelineError: if the timeline is empty or its parameters are not valid.
-            MotionError: if the plan is not finite: then there is no movement to judge.
+            MotionError: if the plan is not finite: then there is no movement to judge. Else what
+                ``compile_motion`` raises.
         """
         if isinstance(motion, CheckedMotion):
             return motion
-        plan, model, limits = self._compiled(motion), self.model, self._limits
-        path = trajectory_of(plan, model)
-        heavy, floor = self._loaded, self.world.worst.friction
-        carried = path if heavy is model else _with_load(path, heavy)
+        plan, model, heavy = self._compiled(motion), self.model, self._loaded
+        world, limits, path = self.world.worst, self._limits, trajectory_of(plan, model)
         forces = dynamics.forces_of(path, heavy)
+        whole = plan if isinstance(plan, CompiledPlan) else None
+        solved = whole if whole is not None and whole.dynamic else None
+        if solved is not None:
+            forces = dynamic_spans.with_spans(forces, path, solved, model)
+        forces = dynamics.resisted(forces, path, world)
+        report = FeasibilityReport.of(
+            plan.name,
+            plan.duration,
+            self._judged(Case(path, forces, model, heavy, world, limits), plan),
+            None if whole is None else whole.end_pose,
+            departures=() if solved is None else departures(solved, model),
+            world=self.world,
+        )
+        return CheckedMotion(plan, report, path, forces)
+
+    def _judged(self, case: Case, plan: MotionPlan) -> list[Series]:
+        """Every check, causes before what follows from them."""
+        limits = case.limits
         problems, in_flight = (), []
         if isinstance(plan, CompiledPlan):
             problems = plan.problems
-            forces = dynamic_spans.with_spans(forces, path, plan, model)
-            in_flight = dynamic_spans.judged(plan, model, heavy.mass, floor)
-        forces = dynamics.resisted(forces, path, self.world.worst)
-        lag = dynamics.lagging(path, forces, heavy, limits)
-        off = tracking.tracking(path, forces, heavy, self.world.worst, limits)
-        com, zero_moment_point = dynamics.support(carried, forces, limits)
-        if carried is not path:  # the controller feels the load, and shifts the CoM back
-            com = _lesser(com, dynamics.support(path, forces, limits)[0])
-        tips = tracking.tipping(carried, forces, zero_moment_point.values[:, 0], heavy, limits)
-        slip = friction.slip(path, forces, heavy, limits, floor)
+            if plan.dynamic:
+                in_flight = dynamic_spans.judged(plan, case)
+        carried = case
+        if case.heavy is not case.model:
+            carried = replace(case, path=_with_load(case.path, case.heavy))
+        com, zero_moment_point = dynamics.support(carried)
+        if carried is not case:  # the controller feels the load, and shifts the CoM back
+            com = _lesser(com, dynamics.support(case)[0])
+        lag, slip = dynamics.lagging(case), dynamics.slip(case)
+        wrench, load = dynamics.contacts(case)
         is_off, slips = com.is_broken or lag.is_broken, slip.is_broken or lag.is_broken
-        wrench, load = dynamics.contacts(path, forces, limits)
         slides = max(map(slip.worst, LEGS)) > SLIDING * limits.slip
         lacks = wrench.worst(0, begin=dynamics.SPREAD) > limits.jolt
         is_lacking = lag.is_broken or (slides and lacks)
-        grip = friction.friction(path, forces, heavy, limits, floor)
-        landing_place, landing_speed = kinematic.landing(path, model, limits)
-        in_order_of_causes = [
+        grip = dynamics.friction(case)
+        landing_place, landing_speed = kinematic.landing(case)
+        return [
             *_missed(problems, limits),
-            kinematic.reach(path, limits),
-            kinematic.joint_position(path, model, limits),
-            self_distance(path, self._collision, model, limits),
-            kinematic.clearance(path, model, self._hulls, limits),
-            kinematic.dragging(path, model, limits),
+            kinematic.reach(case),
+            kinematic.joint_position(case),
+            self_distance(case, self._collision),
+            kinematic.clearance(case, self._hulls),
+            kinematic.dragging(case),
             landing_place,
-            kinematic.ends(plan, path, model, limits),
+            kinematic.ends(case, plan),
             *(_failed(problem) for problem in problems if is_off and problem.check == "balance"),
             com,
-            kinematic.joint_speed(path, model),
+            kinematic.joint_speed(case),
             landing_speed,
-            kinematic.smoothness(path, limits),
+            kinematic.smoothness(case),
             zero_moment_point if lag.is_broken else zero_moment_point.downgraded(),
             wrench if is_lacking else wrench.downgraded(),
             load if slips else load.downgraded(),
             lag,
-            tips,
-            off,
+            tracking.tipping(carried, zero_moment_point.values[:, 0]),
+            tracking.tracking(case),
             grip if slips else grip.downgraded(),
             slip,
-            *dynamics.torque(path, forces, model, limits),
+            *dynamics.torque(case),
             *in_flight,
         ]
-        end_pose = plan.end_pose if isinstance(plan, CompiledPlan) else None
-        report = FeasibilityReport.of(
-            plan.name,
-            plan.duration,
-            in_order_of_causes,
-            end_pose,
-            departures=departures(plan, model),
-            world=self.world,
-        )
-        return CheckedMotion(plan, report, path, forces)
 
 
 def check(
@@ -258,3 +356,13 @@ def _with_load(motion: Trajectory, heavy: RobotModel) -> Trajectory:
     """The same movement with the CoM that the load gives it."""
     poses = np.hstack([motion.q[:, :3], motion.rpy])
     return replace(motion, p_com=centres_of_mass(poses, motion.q[:, 7:], heavy))
+
+
+def _label(
+    time: float, stance: Bool[np.ndarray, "4"], spans: Mapping[str, tuple[float, float]]
+) -> str:
+    for name, (start, end) in spans.items():
+        if start <= time < end:
+            return name
+    raised = [leg.name for leg in LEGS if not stance[leg]]
+    return f"{' and '.join(raised)} up" if raised else "on four feet"

@@ -21,11 +21,10 @@ from go2_wbc.robot.rotations import log_rotation, rotation_from_rpy
 from motions.dynamics.curves import centred, feet_at
 from motions.dynamics.dynamic_trajectory import BALANCING_FEET
 from motions.dynamics.knots import true_spans
-from motions.dynamics.phases import PhaseProblem
 from motions.dynamics.plan_audit import defects, drift
-from motions.feasibility.forces import PRESSED, Forces
-from motions.feasibility.goal_errors import Misses, of_phases, of_written
-from motions.feasibility.kinematic import FEET, JOINTS
+from motions.feasibility.case import FEET, JOINTS, Case, Forces
+from motions.feasibility.forces import PRESSED
+from motions.feasibility.goal_errors import Misses, misses_of
 from motions.feasibility.report import Series
 from motions.plan.compiled_plan import LEAST_FEET, CompiledPlan
 from motions.plan.dynamic_span import DynamicSpan
@@ -72,18 +71,10 @@ def with_spans(forces: Forces, path: Trajectory, plan: CompiledPlan, model: Robo
     return replace(forces, contact=contact, tau=tau, missing=missing, v_motors=v)
 
 
-def judged(plan: CompiledPlan, model: RobotModel, mass: float, floor: float) -> list[Series]:
-    """All checks of the dynamic spans of ``plan``; causes before what follows from them.
-
-    Args:
-        plan: what was solved for ``model``.
-        model: the robot without load.
-        mass: of the robot that plays it [kg].
-        floor: friction coefficient of the floor.
-    """
-    judges = [_Judge(span, plan, model, mass, floor) for span in plan.dynamic]
-    if not judges:
-        return []
+def judged(plan: CompiledPlan, case: Case) -> list[Series]:
+    """All checks of the dynamic spans of ``plan``; causes before what follows from them."""
+    of = (plan, case.model, case.heavy.mass, case.world.friction)
+    judges = [_Judge(span, *of) for span in plan.dynamic]
     kinds: Sequence[Callable[[_Judge], Series]] = (
         _Judge.load, _Judge.steps, _Judge.equations, _Judge.curves, _Judge.contact_force,
         _Judge.cone, _Judge.standing, _Judge.balance, _Judge.touchdown, _Judge.place, _Judge.turn,
@@ -217,11 +208,8 @@ class _Judge:
         return Series.against(*what, tolerance, where=where, tight=(1.0 - NEAR) * tolerance)
 
     def _misses(self) -> Misses:
-        asked, plan = self.span.asked, self.span.trajectory
-        places = feet_at(plan.q, plan.v, self.model)[0]
-        if isinstance(asked, PhaseProblem):
-            return of_phases(plan, asked, self.span.frame, places)
-        return of_written(self.span, places, self.model)
+        plan = self.span.trajectory
+        return misses_of(self.span, feet_at(plan.q, plan.v, self.model)[0], self.model)
 
     def _at_knots(
         self, check: str, unit: str, subjects: tuple[str, ...], values: _Columns, limit: float,

@@ -1,4 +1,4 @@
-"""Checks of forces: can the feet carry the motion, and can the motors?
+"""Checks of forces: can the feet carry the motion, do they slide, and can the motors do it?
 
 The equations of motion, M a + h = S' tau + J' f (Wieber, Tedrake & Kuindersma 2016), split into
 six rows of the base, in which no motor acts, and twelve of the joints:
@@ -16,11 +16,28 @@ foot bears, as the whole-body controller does it; see
 The ground gives no force at once: MuJoCo's contacts need 20 ms (their ``solref``), as rubber and a
 leg's gears do. M a + h is therefore averaged over ``SPREAD`` samples before it is shared. Where a
 plan jumps from one sample to the next, the force of one is taken back by the other.
+
+Friction is a cone, |f_t| <= mu f_z, here a pyramid of ``FACETS`` facets inside of it (2 % less).
+Two questions are asked:
+
+- With which least coefficient can the feet give what the trunk needs, however the load is shared?
+  With less, no controller can keep to the plan.
+- How far do the feet slide when the load is shared as the whole-body controller shares it? It asks
+  each foot for much the same force along the ground, so one that bears little may slide though the
+  others could hold; and a short slip moves little. Each foot is a block on the ground (Newmark
+  1965, *Effects of earthquakes on dams and embankments*): what exceeds friction accelerates it, and
+  friction stops it. How heavy that block is, and how much the joints hold it, was fitted to motions
+  in MuJoCo (``FOOT_MASS``, ``HELD``): a foot with 5 N on it that lacks 2 N hardly slides.
+
+Where a leg turns fast, a foot creeps as well, however rough the ground is. A constraint of MuJoCo
+asks for J a = -b J v (Todorov, *Convex and analytically-invertible dynamics with contacts and
+constraints*, ICRA 2014) and leaves out the derivative of J. What is left out moves the foot at the
+speed dJ/dt v / b, and as the plan's feet rest, dJ/dt v = -J a. Fast rocking makes 13 mm of it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -33,10 +50,17 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import RobotState
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.wbc.constraints import friction_pyramid
-from go2_wbc.wbc.trajectory_loads import LoadNumbers, lag, share_loads
+from go2_wbc.wbc.trajectory_loads import (
+    LoadNumbers,
+    accelerate,
+    lag,
+    least_friction,
+    share_loads,
+    slide,
+)
 from go2_wbc.world import World
 from motions.batch_kinematics import attitudes, turned, zero_moment_points
-from motions.feasibility.kinematic import FEET, JOINTS
+from motions.feasibility.case import FEET, JOINTS, Case, Forces
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 from motions.postures import NORMAL_FORCE_MAX
@@ -64,31 +88,27 @@ STILL = 1e-6
 NO_SUPPORT = 1.0
 """How far outside [m] of their support CoM and zero-moment point count when no foot stands."""
 _FEW = (2, 3)
-TIGHT_TORQUE, TIGHT_LOAD, TIGHT_FRICTION, TIGHT_SUPPORT = 0.1, 10.0, 0.05, 0.01
-"""Margins below which a warning is due: share of the smallest torque limit, N, 1 and m; own choice,
+TRUNK = ("trunk", "trunk turning")
+TIGHT_TORQUE, TIGHT_LOAD, TIGHT_FRICTION = 0.1, 10.0, 0.05
+"""Margins below which a warning is due: share of the smallest torque limit, N and 1; own choice,
 about what separates a plan from its run in simulation."""
-
-
-@dataclass(frozen=True, slots=True)
-class Forces:
-    """What the ground and the motors must give.
-
-    Attributes:
-        contact: (n, 4, 3) forces on the feet in the frame of the motion [N].
-        tau: (n, 12) joint torques [N m].
-        missing: (n, 2) part of the force [N] and of the moment [N m] that the feet cannot give.
-        zmp: (n, 2) zero-moment point on the ground [m].
-        wrench: (n, 6) what the trunk needs, in its frame [N, N m].
-        v_motors: (n, 12) joint speeds [rad/s] at which the torques are given; those of the path
-            unless said.
-    """
-
-    contact: Float[np.ndarray, "n 4 3"]
-    tau: Float[np.ndarray, "n 12"]
-    missing: Float[np.ndarray, "n 2"]
-    zmp: Float[np.ndarray, "n 2"]
-    wrench: Float[np.ndarray, "n 6"]
-    v_motors: Float[np.ndarray, "n 12"] | None = None
+TIGHT_SUPPORT, TIGHT_SLIP = 0.01, 0.003
+"""The same [m]."""
+FACETS = 16
+"""Of the cone."""
+NEAR_LIMIT = 0.8
+"""Share of the limit up to which the controller's own share of the load is looked at, no better."""
+MOST_FRICTION = 1.5
+"""Friction coefficient above which none is looked for: rubber on dry concrete has 1."""
+FOOT_MASS, HELD = 1.0, 0.5
+"""Mass [kg] of the block that a sliding foot is, and the force [N] along the ground by which the
+dry friction of its joints holds it, 0.2 N m on an arm of 0.3 m or so: with them 10 mm of slip in
+1,400 generated motions (seeds that judge nothing) are told best. A leg weighs 2.2 kg."""
+CONTACT_RATE = 145.0
+"""Rate b [1/s] at which a contact of MuJoCo stops a foot: 105 by its numbers (2 / 0.95 / 0.02 s);
+more, as trunks lag their plan. Own choice, seen on motions that judge nothing."""
+SETTLED = 0.1
+"""Time [s] after a touchdown, and before a lift-off, in which a foot without load may skid."""
 
 
 def forces_of(motion: Trajectory, model: RobotModel) -> Forces:
@@ -156,14 +176,13 @@ def joint_friction(v: Float[np.ndarray, "n 12"], world: World) -> Float[np.ndarr
     return world.joint_friction * (DRY * np.tanh(v / CREEP) + VISCOUS * v)
 
 
-def torque(
-    motion: Trajectory, forces: Forces, model: RobotModel, limits: FeasibilityLimits
-) -> tuple[Series, Series]:
+def torque(case: Case) -> tuple[Series, Series]:
     """Torques against the motors' peak, and against what ``model.motor`` gives at that speed.
 
     Only a driving motor, tau v > 0, meets the line of torque and speed; rounding moves none. A plan
     that begins at speed is followed late: what its first ``SPREAD`` samples need is not asked for.
     """
+    motion, forces, model, limits = case.path, case.forces, case.model, case.limits
     begun = ((np.arange(len(motion.times)) >= SPREAD) | motion.is_dynamic)[:, None]
     share = np.where(motion.is_dynamic, limits.solved_torque_share, limits.torque_share)
     asked, most = np.abs(forces.tau), share[:, None] * model.torque_limits
@@ -172,49 +191,43 @@ def torque(
     at_speed = np.where(forces.tau < 0.0, -lower, upper)
     drives = forces.tau * v > STILL * asked
     tight = TIGHT_TORQUE * float(model.torque_limits.min())
-    what = ("N m", JOINTS, motion.times, asked)
+    what = ("N m", JOINTS, asked)
     return (
-        Series.against("torque", *what, most, where=begun, tight=tight),
-        Series.against("torque at speed", *what, at_speed, where=drives & begun, tight=tight),
+        case.series("torque", *what, most, where=begun, tight=tight),
+        case.series("torque at speed", *what, at_speed, where=drives & begun, tight=tight),
     )
 
 
-def contacts(
-    motion: Trajectory, forces: Forces, limits: FeasibilityLimits
-) -> tuple[Series, Series]:
+def contacts(case: Case) -> tuple[Series, Series]:
     """What the feet cannot give, and the least load of three standing ones."""
-    times, normal = motion.times, forces.contact[:, :, 2]
+    motion, forces, limits = case.path, case.forces, case.limits
     written = ~motion.is_dynamic[:, None]
     is_needed = written & ~motion.stance.all(axis=1, keepdims=True)  # of four one may be unloaded
     stands = (motion.load_share > LOADED) & is_needed
-    wrench = ("contact wrench", "N", ("force", "moment"), times, forces.missing)
-    load = ("foot load", "N", FEET, times, normal)
+    wrench = ("contact wrench", "N", ("force", "moment"), forces.missing)
+    load = ("foot load", "N", FEET, forces.contact[:, :, 2], limits.foot_load)
     return (
-        Series.against(*wrench, np.array([limits.wrench, limits.wrench * ARM]), where=written),
-        Series.against(*load, limits.foot_load, is_floor=True, where=stands, tight=TIGHT_LOAD),
+        case.series(*wrench, np.array([limits.wrench, limits.wrench * ARM]), where=written),
+        case.series(*load, is_floor=True, where=stands, tight=TIGHT_LOAD),
     )
 
 
-def lagging(
-    motion: Trajectory, forces: Forces, model: RobotModel, limits: FeasibilityLimits
-) -> Series:
+def lagging(case: Case) -> Series:
     """How far the trunk is off its plan, since the ground cannot give what it needs: m, rad.
 
     The controller pulls it back, with the gains that it has, so that the error obeys
     e'' + kd e' + kp e = w / m, with the missing force over the mass and the missing moment over the
     moments of inertia of the robot as it stands at first. A moment without them moves little.
     """
-    errors = errors_of(motion, lost(motion, forces, model))
-    values = np.column_stack([np.linalg.norm(e, axis=1) for e in (errors[:, :3], errors[:, 3:])])
-    bounds, subjects = np.array([limits.lag, limits.lag_angle]), ("trunk", "trunk turning")
-    return Series.against("lag", "m, rad", subjects, motion.times, values, bounds)
+    most = np.array([case.limits.lag, case.limits.lag_angle])
+    return case.series("lag", "m, rad", TRUNK, errors_of(case.path, lost(case)), most)
 
 
 def errors_of(
     motion: Trajectory,
     pushes: Float[np.ndarray, "n 6"],
     damping: Float[np.ndarray, "6"] | float = 0.0,
-) -> Float[np.ndarray, "n 6"]:
+) -> Float[np.ndarray, "n 2"]:
     """How far trunk and attitude [m, rad] are off for accelerations that are taken from them.
 
     Solved parts, in which they are followed otherwise, take none. ``damping`` [1/s] is what damps
@@ -226,24 +239,20 @@ def errors_of(
     taken = np.where(motion.is_dynamic[:, None], 0.0, pushes)
     errors, dt = np.zeros(taken.shape), float(np.mean(np.diff(motion.times)))
     lag(taken, kp, kd + damping, dt, errors)
-    return errors
+    return np.column_stack([np.linalg.norm(e, axis=1) for e in (errors[:, :3], errors[:, 3:])])
 
 
-def lost(motion: Trajectory, forces: Forces, model: RobotModel) -> Float[np.ndarray, "n 6"]:
+def lost(case: Case) -> Float[np.ndarray, "n 6"]:
     """The acceleration [m/s^2, rad/s^2] that the feet do not give, along world axes."""
-    return _left(motion, forces, model) / _inertia(motion, model)
-
-
-def _left(motion: Trajectory, forces: Forces, model: RobotModel) -> Float[np.ndarray, "n 6"]:
-    """Force [N] and moment [N m] about the base that the feet do not give, along world axes."""
+    motion, forces = case.path, case.forces
     R, p = attitudes(motion.rpy), motion.q[:, :3]
-    arms = motion.p_feet - [0.0, 0.0, model.foot_radius] - p[:, None]
+    arms = motion.p_feet - [0.0, 0.0, case.heavy.foot_radius] - p[:, None]
     force = turned(R, forces.wrench[:, :3]) - forces.contact.sum(axis=1)
     moment = turned(R, forces.wrench[:, 3:]) - np.cross(arms, forces.contact).sum(axis=1)
-    return np.hstack([force, moment])
+    return np.hstack([force, moment]) / _inertia(motion, case.heavy)
 
 
-def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tuple[Series, Series]:
+def support(case: Case) -> tuple[Series, Series]:
     """Distance of the CoM and of the zero-moment point to the edges of the support polygon.
 
     At rest the CoM must lie above it (McGhee & Frank 1968); in motion the zero-moment point must
@@ -254,22 +263,25 @@ def support(motion: Trajectory, forces: Forces, limits: FeasibilityLimits) -> tu
     a short time only, the zero-moment point must be near that line, and the CoM need not. Over
     three, while a foot is lifted shortly without a shift of the trunk, both may be as far outside.
     """
+    motion, limits = case.path, case.limits
     values = np.full((len(motion.times), 2), -NO_SUPPORT)
     for rows in _same_support(motion):
         stands = motion.stance[rows[0]]
         feet = motion.p_feet[rows[0], stands, :2]
-        for column, points in enumerate((motion.p_com[:, :2], forces.zmp)):
+        for column, points in enumerate((motion.p_com[:, :2], case.forces.zmp)):
             values[rows, column] = support_margins(feet, points[rows])
     passes, pair = passes_over_few(motion, limits), motion.stance.sum(axis=1) == _FEW[0]
-    com = ("support", "m", ("CoM",), motion.times, values[:, :1])
-    zmp = ("support of ZMP", "m", ("ZMP",), motion.times, values[:, 1:])
-    least = np.where(passes, -limits.off_line, limits.zero_moment)[:, None]
     written, tight = ~motion.is_dynamic, TIGHT_SUPPORT
     where, both = (written & ~(passes & pair))[:, None], written[:, None]
-    inside = np.where(passes, -limits.off_line, limits.support)[:, None]
+    inside, least = (
+        np.where(passes, -limits.off_line, limit)[:, None]
+        for limit in (limits.support, limits.zero_moment)
+    )
+    com = ("support", "m", ("CoM",), values[:, :1], inside)
+    zmp = ("support of ZMP", "m", ("ZMP",), values[:, 1:], least)
     return (
-        Series.against(*com, inside, is_floor=True, where=where, tight=tight),
-        Series.against(*zmp, least, is_floor=True, where=both, tight=tight),
+        case.series(*com, is_floor=True, where=where, tight=tight),
+        case.series(*zmp, is_floor=True, where=both, tight=tight),
     )
 
 
@@ -303,3 +315,69 @@ def state_at(motion: Trajectory, row: int) -> RobotState:
         foot_forces=np.zeros(4),
         feet_in_contact=motion.stance[row],
     )
+
+
+def friction(case: Case) -> Series:
+    """The least friction coefficient with which the feet can give what the trunk needs.
+
+    Below ``NEAR_LIMIT`` of the floor's the value is that of the controller's share of the load,
+    which is no less.
+    """
+    values, floor = _least_friction(case)[:, None], case.world.friction
+    written = (~case.path.is_dynamic & case.path.stance.any(axis=1))[:, None]
+    what = ("friction", "", ("feet",), values, floor)
+    return case.series(*what, where=written, tight=TIGHT_FRICTION)
+
+
+def slip(case: Case) -> Series:
+    """How far each foot slides and creeps while it stands [m]."""
+    motion, floor = case.path, case.world.friction
+    counts = _settled(motion) & ~motion.is_dynamic[:, None]
+    dt = float(motion.times[-1] - motion.times[0]) / max(len(motion.times) - 1, 1)
+    ways = np.zeros(counts.shape)
+    held = case.forces.contact + [0.0, 0.0, HELD / floor]  # as a load of that size would
+    slide(held, creep(motion, case.heavy), counts, floor, FOOT_MASS, dt, ways)
+    return case.series("slip", "m", FEET, ways, case.limits.slip, where=counts, tight=TIGHT_SLIP)
+
+
+def creep(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "n 4 2"]:
+    """Speed [m/s] along the ground at which standing feet creep, by the rows of MuJoCo's contacts.
+
+    That is -J a / ``CONTACT_RATE`` of the contact points.
+    """
+    J_a = np.empty((len(motion.times), 4, 2))
+    joints, a = np.array(motion.q[:, 7:], order="C"), np.array(motion.a, order="C")
+    accelerate(joints, attitudes(motion.rpy), a, leg_table(model), model.foot_radius, J_a)
+    return -J_a / CONTACT_RATE
+
+
+def cone(facets: int = FACETS) -> Float[np.ndarray, "k 3"]:
+    """Rows of a pyramid inside the cone of coefficient 1 (at most 0), and of the normal force."""
+    angles = 2.0 * np.pi * np.arange(facets) / facets
+    inside = np.full(facets, -np.cos(np.pi / facets))
+    sides = np.column_stack([np.cos(angles), np.sin(angles), inside])
+    return np.vstack([sides, [0.0, 0.0, 1.0]])
+
+
+def _least_friction(case: Case) -> Float[np.ndarray, " n"]:
+    motion, forces, model = case.path, case.forces, case.heavy
+    normal = forces.contact[:, :, 2]
+    along = np.linalg.norm(forces.contact[:, :, :2], axis=2)
+    values = np.where(normal > PRESSED, along / np.maximum(normal, PRESSED), 0.0).max(axis=1)
+    missing = np.hypot(forces.missing[:, 0], forces.missing[:, 1] / ARM)
+    highest = np.where(missing <= case.limits.wrench, values, MOST_FRICTION)
+    is_far = highest < NEAR_LIMIT * case.world.friction
+    highest[is_far | motion.is_dynamic] = 0.0
+    joints, load_share = (np.array(a, order="C") for a in (motion.q[:, 7:], motion.load_share))
+    given = (joints, attitudes(motion.rpy), forces.wrench, load_share, leg_table(model), cone())
+    what = (scale_of_wrench(), numbers_of(model), highest, case.limits.wrench)
+    least_friction(*given, *what, values)
+    return values
+
+
+def _settled(motion: Trajectory) -> Bool[np.ndarray, "n 4"]:
+    """Where feet stand, and have stood and will stand for ``SETTLED``; the motion's ends count."""
+    stands = motion.stance.copy()
+    for edge, leg in np.argwhere(motion.stance[1:] != motion.stance[:-1]):
+        stands[np.abs(motion.times - motion.times[edge]) < SETTLED, leg] = False
+    return stands

@@ -10,11 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from go2_wbc.legs import FOOT_NAMES, LEGS, Leg
 from go2_wbc.motion_plan import MotionPlan
-from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 from motions.dynamics.curves import feet_at
-from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 from motions.dynamics.phases import PhaseProblem
 from motions.dynamics.projection import PlanTarget
 from motions.plan.compiled_plan import CompiledPlan
@@ -39,18 +37,17 @@ class Misses:
     turned: Float[np.ndarray, "k 5"]
 
 
-def of_phases(
-    plan: DynamicTrajectory, asked: PhaseProblem, frame: Anchor, places: _Places
-) -> Misses:
-    """What is missed at the ends of phases; whole turns count.
+def misses_of(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses:
+    """What ``span`` misses of what it was asked, its feet at ``places`` (n+1, 4, 3) [m]."""
+    if isinstance(span.asked, PhaseProblem):
+        return _of_phases(span, span.asked, places)
+    return _of_written(span, places, model)
 
-    Args:
-        plan: in the frame of the motion.
-        asked: in ``frame``.
-        frame: of the problem, in that of the motion.
-        places: (n+1, 4, 3) of the plan's feet [m].
-    """
-    R, angles = yaw_rotation(frame.yaw), attitude_angles(plan.q)
+
+def _of_phases(span: DynamicSpan, asked: PhaseProblem, places: _Places) -> Misses:
+    """What is missed at the ends of phases; whole turns count."""
+    plan = span.trajectory
+    R, angles = yaw_rotation(span.frame.yaw), attitude_angles(plan.q)
     shifts = asked.foot_shifts @ R.T
     ends = np.cumsum([phase.duration for phase in asked.phases])
     away, turned = (np.full((len(ends), 5), np.nan) for _ in range(2))
@@ -69,14 +66,8 @@ def of_phases(
     return Misses(ends, away, turned)
 
 
-def of_written(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses:
-    """What the trunk misses at every knot, and the feet where they land.
-
-    Args:
-        span: which was asked to do what was written.
-        places: (n+1, 4, 3) of its feet [m].
-        model: the robot.
-    """
+def _of_written(span: DynamicSpan, places: _Places, model: RobotModel) -> Misses:
+    """What the trunk misses at every knot, and the feet where they land."""
     plan = span.trajectory
     wanted = span.written(span.start + plan.times)
     away, turned = (np.full((len(wanted), 5), np.nan) for _ in range(2))
@@ -131,7 +122,7 @@ def departures(plan: MotionPlan, model: RobotModel) -> tuple[Departure, ...]:
         if not isinstance(span.asked, PlanTarget):
             continue
         solved = span.trajectory
-        misses = of_written(span, feet_at(solved.q, solved.v, model)[0], model)
+        misses = misses_of(span, feet_at(solved.q, solved.v, model)[0], model)
         away, turned = np.nan_to_num(misses.away), np.nan_to_num(misses.turned[:, 0])
         row, column = np.unravel_index(int(np.argmax(away)), away.shape)
         worst = int(np.argmax(turned))

@@ -10,21 +10,19 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-from go2_wbc.feasibility_limits import FeasibilityLimits
-from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
+from go2_wbc.legs import LEGS, Leg
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions.batch_kinematics import attitudes, foot_centres
-from motions.feasibility.hulls import LinkHulls
+from motions.feasibility.bodies import LinkHulls
+from motions.feasibility.case import FEET, JOINTS, Case
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory, runs
 from motions.postures import home_poses
 
-JOINTS = tuple(name.removesuffix("_joint") for name in JOINT_NAMES)
-FEET = tuple(leg.name for leg in LEGS)
 ENDS = ("entry", "exit")
 RAISED = 0.006
 """Height [m] from which on a foot that does not stand is raised when a motion begins."""
@@ -34,12 +32,12 @@ TIGHT_ANGLE, TIGHT_SPEED = 0.03, 0.1
 """Margins below which a warning is due: rad, and share of the least speed limit; own choice."""
 
 
-def reach(motion: Trajectory, limits: FeasibilityLimits) -> Series:
+def reach(case: Case) -> Series:
     """Whether the standing legs reach their feet's places."""
-    return Series.against("reach", "m", FEET, motion.times, motion.miss, limits.reach)
+    return case.series("reach", "m", FEET, case.path.miss, case.limits.reach)
 
 
-def joint_position(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) -> Series:
+def joint_position(case: Case) -> Series:
     """Joint angles against the tighter of the URDF's and the published limits.
 
     A joint that is asked to go beyond its stop stays at it. Where its foot, or the trunk above a
@@ -50,6 +48,7 @@ def joint_position(motion: Trajectory, model: RobotModel, limits: FeasibilityLim
     the trunk comes too late for it. Hips of two standing legs keep ``limits.pair_hip`` to their
     stops: a trunk that rolls late needs them, and no third foot holds it.
     """
+    motion, model, limits = case.path, case.model, case.limits
     q, room = motion.q[:, 7:], np.zeros((len(motion.times), 12))
     few = (motion.stance.sum(axis=1) <= PAIR) & ~motion.is_dynamic
     is_steady = ~few & ~motion.is_dynamic
@@ -105,16 +104,14 @@ def _stopped(
     return np.where(stands, np.abs(reach - left) + 2.0 * turned * reach, moved)
 
 
-def joint_speed(motion: Trajectory, model: RobotModel) -> Series:
+def joint_speed(case: Case) -> Series:
     """Joint speeds against the URDF's limits."""
-    what = ("joint speed", "rad/s", JOINTS, motion.times, np.abs(motion.v[:, 6:]))
-    tight = TIGHT_SPEED * float(model.speed_limits.min())
-    return Series.against(*what, model.speed_limits, tight=tight)
+    most, speeds = case.model.speed_limits, np.abs(case.path.v[:, 6:])
+    tight = TIGHT_SPEED * float(most.min())
+    return case.series("joint speed", "rad/s", JOINTS, speeds, most, tight=tight)
 
 
-def clearance(
-    motion: Trajectory, model: RobotModel, hulls: LinkHulls, limits: FeasibilityLimits
-) -> Series:
+def clearance(case: Case, hulls: LinkHulls) -> Series:
     """Heights of the lowest points of the links, and of the feet in the air, over the ground.
 
     A foot in the air that is to be below the ground stays above, and its calf with it: that may be
@@ -122,7 +119,8 @@ def clearance(
     last step of a push-off, by half the square of the step times its J' v, that is the planner's
     integration.
     """
-    feet = _feet(motion, model)[:, :, 2] - model.foot_radius
+    motion, limits = case.path, case.limits
+    feet = _feet(case)[:, :, 2] - case.model.foot_radius
     sunk = np.where(motion.stance | motion.is_dynamic[:, None], 0.0, np.minimum(feet, 0.0))
     links, count = hulls.heights(motion), len(hulls.links)
     lower = {"thigh": limits.thigh_clearance, "calf": limits.calf_clearance}
@@ -138,37 +136,36 @@ def clearance(
     stood = np.vstack([motion.stance[:1], motion.stance[:-1]]) & motion.is_dynamic[:, None]
     is_checked[:, count:] = ~(motion.stance | stood)
     subjects = (*hulls.names, *(f"{leg.name} foot" for leg in LEGS))
-    what = ("clearance", "m", subjects, motion.times, values)
-    return Series.against(*what, floor, is_floor=True, where=is_checked)
+    what = ("clearance", "m", subjects, values, floor)
+    return case.series(*what, is_floor=True, where=is_checked)
 
 
-def dragging(motion: Trajectory, model: RobotModel, limits: FeasibilityLimits) -> Series:
+def dragging(case: Case) -> Series:
     """Ways [m] that feet in the air go sideways while they are on the ground nevertheless.
 
     Such a foot is not raised, or moves on before it is put down: it rubs, with forces that the plan
     and this check leave out, small as long as it bears nothing. From ``limits.rub`` on that is a
     warning. The way is summed for as long as the foot stays that low.
     """
-    places = _feet(motion, model)
-    rubs = (places[:, :, 2] - model.foot_radius < limits.drag_height) & ~motion.stance
+    motion, limits, places = case.path, case.limits, _feet(case)
+    rubs = (places[:, :, 2] - case.model.foot_radius < limits.drag_height) & ~motion.stance
     rubs &= ~motion.is_dynamic[:, None]
     steps = np.linalg.norm(np.diff(places[:, :, :2], axis=0), axis=2)
     ways = np.zeros(rubs.shape)
     for row, leg in np.argwhere(rubs[1:] & rubs[:-1]):
         ways[row + 1, leg] = ways[row, leg] + steps[row, leg]
     tight = limits.drag - limits.rub
-    return Series.against("dragging", "m", FEET, motion.times, ways, limits.drag, tight=tight)
+    return case.series("dragging", "m", FEET, ways, limits.drag, tight=tight)
 
 
-def landing(
-    motion: Trajectory, model: RobotModel, limits: FeasibilityLimits
-) -> tuple[Series, Series]:
+def landing(case: Case) -> tuple[Series, Series]:
     """Where and how fast raised feet leave and meet the ground.
 
     The speed at touchdown is that between the last two samples in the air; a difference to the
     next one would reach to the foot that stands.
     """
-    stands, times, places = motion.stance, motion.times, _feet(motion, model)
+    motion, limits, places = case.path, case.limits, _feet(case)
+    stands, times = motion.stance, motion.times
     paces = np.linalg.norm(np.diff(places, axis=0), axis=2) / np.diff(times)[:, None]
     away, speed = np.full(stands.shape, np.nan), np.full(stands.shape, np.nan)
     written = ~(motion.is_dynamic[1:] | motion.is_dynamic[:-1])[:, None]
@@ -178,35 +175,34 @@ def landing(
         away[row, leg] = np.linalg.norm(places[row, leg] - motion.p_feet[standing, leg])
         speed[row, leg] = paces[max(row - 1, 0), leg] if lands else 0.0
     return (
-        Series.against("landing place", "m", FEET, times, away, limits.landing),
-        Series.against("landing speed", "m/s", FEET, times, speed, limits.landing_speed),
+        case.series("landing place", "m", FEET, away, limits.landing),
+        case.series("landing speed", "m/s", FEET, speed, limits.landing_speed),
     )
 
 
-def smoothness(motion: Trajectory, limits: FeasibilityLimits) -> Series:
+def smoothness(case: Case) -> Series:
     """Jumps of velocity between samples: m/s of the trunk, rad/s of its attitude and the joints.
 
     A limit on |v_i+1 - v_i|, so on the acceleration over a sample: 400 rad/s^2 of a joint.
     """
+    motion, limits = case.path, case.limits
     jumps = np.vstack([np.zeros(18), np.abs(np.diff(motion.v, axis=0))])
     values = np.maximum.reduceat(jumps, (0, 3, 6), axis=1)
     bounds = np.array([limits.body_jump, limits.turn_jump, limits.joint_jump])
     subjects = ("trunk", "trunk turning", "joints")
     written = ~motion.is_dynamic
     written[1:] &= ~motion.is_dynamic[:-1]
-    what = ("continuity", "/s", subjects, motion.times, values)
-    return Series.against(*what, bounds, where=written[:, None])
+    return case.series("continuity", "/s", subjects, values, bounds, where=written[:, None])
 
 
-def ends(
-    plan: MotionPlan, motion: Trajectory, model: RobotModel, limits: FeasibilityLimits
-) -> Series:
+def ends(case: Case, plan: MotionPlan) -> Series:
     """Whether the motion starts and ends at rest in the postures that it names.
 
     They are above the feet as they stand then, with their heading. A foot that is lifted from the
     first instant on still stands then.
     """
-    home, places = home_poses(model), _feet(motion, model)[0]
+    motion, model, limits = case.path, case.model, case.limits
+    home, places = home_poses(model), _feet(case)[0]
     names = tuple(f"{end} {what}" for end in ENDS for what in ("place", "attitude", "speed"))
     bounds = np.array([limits.stance_position, limits.stance_angle, limits.end_speed] * 2)
     values = []
@@ -232,6 +228,7 @@ def ends(
     return replace(series, note=f"it is to end in {end}: {way}")
 
 
-def _feet(motion: Trajectory, model: RobotModel) -> Float[np.ndarray, "n 4 3"]:
+def _feet(case: Case) -> Float[np.ndarray, "n 4 3"]:
     """Places [m] of the feet's centres in the frame of the motion."""
-    return foot_centres(motion.q[:, :3], attitudes(motion.rpy), motion.q[:, 7:], model)
+    q, R = case.path.q, attitudes(case.path.rpy)
+    return foot_centres(q[:, :3], R, q[:, 7:], case.model)

@@ -254,7 +254,7 @@ class FeasibilityReport:
         """One line: the verdict, and what is closest to its limit."""
         if not self.ok:
             return f"no   {self.motion:<15} {_count(len(self.failures), 'limit')} broken"
-        tight = min(self.margins.values(), key=_share_left)
+        tight = min(self.margins.values(), key=lambda f: f.margin / max(abs(f.limit), 1e-9))
         return (
             f"ok   {self.motion:<15} {self.duration:>5.1f} s   closest: {tight.check}, "
             f"{tight.subject} at {tight.time:.1f} s"
@@ -274,10 +274,6 @@ class FeasibilityReport:
             "departures": [asdict(one) for one in self.departures],
             "margins": {check: asdict(finding) for check, finding in self.margins.items()},
         }
-
-
-def _share_left(finding: Finding) -> float:
-    return finding.margin / max(abs(finding.limit), 1e-9)
 
 
 def _count(number: int, what: str) -> str:

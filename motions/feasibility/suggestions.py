@@ -7,13 +7,12 @@ last number that was refused and the first that was not. So what is suggested is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from go2_wbc.errors import CommandError, MotionError, TimelineError
-from motions.feasibility.check import FeasibilityChecker
-from motions.feasibility.checked_motion import Playable, timeline_of
+from motions.feasibility.check import FeasibilityChecker, Playable, timeline_of
 from motions.feasibility.report import FeasibilityReport
 from motions.language.keys import BalanceShift
 from motions.language.timeline import Timeline
@@ -54,10 +53,6 @@ class Suggestion:
         }
 
 
-_Calls = dict[str, float]
-"""Calls of one number each, by their names, in their order."""
-
-
 @dataclass(frozen=True, slots=True)
 class _Kind:
     """One kind of change.
@@ -65,22 +60,28 @@ class _Kind:
     Attributes:
         name: see ``Suggestion.kind``.
         ladder: numbers of steps that are tried, increasing.
-        calls: what is called for a number of steps.
-        meaning: in words, of a number of steps and the duration [s] after them.
+        calls: calls of one number each, in their order, by what that is for a number of steps.
+        meaning: in words, of ``steps`` and of how long it ``lasts`` [s] after them.
+        digits: to which the numbers are rounded.
     """
 
     name: str
     ladder: Sequence[int]
-    calls: Callable[[int], _Calls]
-    meaning: Callable[[int, float], str]
+    calls: Mapping[str, Callable[[int], float]]
+    meaning: str
+    digits: int = 2
+
+    def numbers(self, steps: int) -> dict[str, float]:
+        """The calls' numbers, by their names."""
+        return {name: round(value(steps), self.digits) for name, value in self.calls.items()}
 
     def text(self, steps: int) -> str:
         """The calls as Python, with the very numbers that ``apply`` uses."""
-        return "".join(f".{name}({value!r})" for name, value in self.calls(steps).items())
+        return "".join(f".{name}({value!r})" for name, value in self.numbers(steps).items())
 
     def apply(self, line: Timeline, steps: int) -> Timeline:
         """``line`` after the calls."""
-        for name, value in self.calls(steps).items():
+        for name, value in self.numbers(steps).items():
             line = getattr(line, name)(value)
         return line
 
@@ -92,44 +93,32 @@ _SHARES = (2, 5, 10, 15, 20, 30, 40, 50, 60, 70, 80, 90)
 _LONGER = (2, 5, 10, 20, 30, 40, 50, 75, 100, 150, 200, 300)
 """Per cent."""
 
-TEMPO = _Kind(
-    "tempo",
-    _LONGER,
-    lambda steps: {"scale_time": round(1.0 + steps / 100, 2)},
-    lambda _, lasts: f"slower: it takes {lasts:.1f} s",
-)
-AMPLITUDE = _Kind(
-    "amplitude",
-    _SHARES,
-    lambda steps: {"scale": round(1.0 - steps / 100, 2)},
-    lambda steps, _: f"all moves smaller by {steps} %",
-)
-HIGHER = _Kind(
-    "height",
-    _RISE,
-    lambda steps: {"shift_height": round(steps / 1000, 3)},
-    lambda steps, _: f"the trunk higher by {steps} mm",
-)
-LOWER = _Kind(
-    "height",
-    _RISE,
-    lambda steps: {"shift_height": -round(steps / 1000, 3)},
-    lambda steps, _: f"the trunk lower by {steps} mm",
+
+def _longer(steps: int) -> float:
+    return 1.0 + steps / 100
+
+
+def _smaller(steps: int) -> float:
+    return 1.0 - steps / 100
+
+
+TEMPO = _Kind("tempo", _LONGER, {"scale_time": _longer}, "slower: it takes {lasts:.1f} s")
+AMPLITUDE = _Kind("amplitude", _SHARES, {"scale": _smaller}, "all moves smaller by {steps} %")
+HIGHER, LOWER = (
+    _Kind("height", _RISE, {"shift_height": rise}, f"the trunk {way} by {{steps}} mm", digits=3)
+    for way, rise in (("higher", lambda mm: mm / 1000), ("lower", lambda mm: -mm / 1000))
 )
 SHIFT_TIME = _Kind(
     "shift time",
     _LONGER,
-    lambda steps: {"scale_shifts": round(1.0 + steps / 100, 2)},
-    lambda steps, _: f"{steps} % more time to move over the feet that stay",
+    {"scale_shifts": _longer},
+    "{steps} % more time to move over the feet that stay",
 )
 BOTH = _Kind(
     "tempo and amplitude",
     _SHARES,
-    lambda steps: {
-        "scale": round(1.0 - steps / 100, 2),
-        "scale_time": round(1.0 / (1.0 - steps / 100), 2),
-    },
-    lambda steps, lasts: f"smaller by {steps} % and slower: {lasts:.1f} s",
+    {"scale": _smaller, "scale_time": lambda steps: 1.0 / _smaller(steps)},
+    "smaller by {steps} % and slower: {lasts:.1f} s",
 )
 
 
@@ -172,7 +161,8 @@ def _least(line: Timeline, kind: _Kind, checker: FeasibilityChecker) -> Suggesti
         changed = kind.apply(line, steps)
         if (report := _report(changed, checker)) is None:
             return None
-        meaning, share = kind.meaning(steps, report.duration), steps / kind.ladder[-1]
+        meaning = kind.meaning.format(steps=steps, lasts=report.duration)
+        share = steps / kind.ladder[-1]
         return Suggestion(kind.name, kind.text(steps), meaning, share, changed, report)
 
     try:

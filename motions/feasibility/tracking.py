@@ -25,14 +25,14 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
 from go2_wbc.world import World
+from motions.feasibility.case import Case
 from motions.feasibility.forces import (
+    TRUNK,
     VISCOUS,
-    Forces,
     errors_of,
     joint_friction,
     lost,
@@ -52,18 +52,15 @@ RCOND = 0.05
 """Of a leg's Jacobian: a leg that is nearly stretched turns no faster than this says."""
 
 
-def tracking(
-    motion: Trajectory, forces: Forces, model: RobotModel, world: World, limits: FeasibilityLimits
-) -> Series:
+def tracking(case: Case) -> Series:
     """How far the trunk is off its plan in all: m, rad; solved parts, played otherwise, count 0.
 
     In MuJoCo it was off by 1.05 to 1.3 times as much for friction (motions drawn for that alone).
     """
-    taken, damping = resistance(motion, model, world)
-    errors = errors_of(motion, lost(motion, forces, model) + taken, damping)
-    values = np.column_stack([np.linalg.norm(e, axis=1) for e in (errors[:, :3], errors[:, 3:])])
-    bounds, subjects = np.array([limits.off, limits.off_angle]), ("trunk", "trunk turning")
-    return Series.against("tracking", "m, rad", subjects, motion.times, values, bounds)
+    taken, damping = resistance(case.path, case.heavy, case.world)
+    errors = errors_of(case.path, lost(case) + taken, damping)
+    most = np.array([case.limits.off, case.limits.off_angle])
+    return case.series("tracking", "m, rad", TRUNK, errors, most)
 
 
 def resistance(
@@ -110,34 +107,23 @@ def _taken(
     return forth, np.diagonal(damping, axis1=1, axis2=2)
 
 
-def tipping(
-    motion: Trajectory,
-    forces: Forces,
-    zmp: Float[np.ndarray, " n"],
-    model: RobotModel,
-    limits: FeasibilityLimits,
-) -> Series:
+def tipping(case: Case, zmp: Float[np.ndarray, " n"]) -> Series:
     """How far the trunk falls over the edge of three feet [m], where they stand for long.
 
     Of motions that bounce and sway on three feet, drawn for that alone, 39 up to 5.1 mm did not
-    fall; of 6 above 7.4 mm, 5 fell, and the other one came 50 mm off.
-
-    Args:
-        motion: the movement.
-        forces: of the ground in it.
-        zmp: how far inside of the support the zero-moment point is [m].
-        model: the robot.
-        limits: of the check.
+    fall; of 6 above 7.4 mm, 5 fell, and the other one came 50 mm off. ``zmp``: how far inside of
+    the support the zero-moment point is [m].
     """
+    motion = case.path
     is_asked = (motion.stance.sum(axis=1) == TRIPOD) & ~motion.is_dynamic
-    is_asked &= ~passes_over_few(motion, limits)
+    is_asked &= ~passes_over_few(motion, case.limits)
     values = np.zeros((len(zmp), 1))
     if (zmp[is_asked] < 0.0).any():
-        normal = np.maximum(forces.contact[:, :, 2].sum(axis=1), 0.0)
-        rates = normal / (model.mass * np.maximum(motion.p_com[:, 2], LOWEST))
+        normal = np.maximum(case.forces.contact[:, :, 2].sum(axis=1), 0.0)
+        rates = normal / (case.heavy.mass * np.maximum(motion.p_com[:, 2], LOWEST))
         values[:, 0] = _falls(rates, zmp, is_asked, float(np.mean(np.diff(motion.times))))
-    what = ("tipping", "m", ("trunk",), motion.times, values)
-    return Series.against(*what, limits.tipping, where=is_asked[:, None])
+    what = ("tipping", "m", ("trunk",), values, case.limits.tipping)
+    return case.series(*what, where=is_asked[:, None])
 
 
 def _falls(

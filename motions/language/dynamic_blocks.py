@@ -10,7 +10,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import count, pairwise
-from typing import TypeVar
+from typing import Self
 
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
@@ -24,7 +24,6 @@ from motions.language.clock import SAME, BeatClock
 from motions.language.keys import PhaseKey, PostureKey
 from motions.language.timeline_data import TimelineData
 
-_Line = TypeVar("_Line", bound="DynamicBlocks")
 _Place = tuple[float, float, float]
 _LOW = (-0.03, 0.0, -0.09, 0.0, 0.1, 0.0)
 """Trunk before it pounces [m, rad]."""
@@ -44,14 +43,14 @@ class DynamicBlocks(TimelineData):
         return any(isinstance(key, PhaseKey) for key in self.keys)
 
     def jump(
-        self: _Line,
+        self,
         x: float = 0.0,
         y: float = 0.0,
         yaw: float = 0.0,
         height: float = 0.1,
         *,
         flight: float | None = None,
-    ) -> _Line:
+    ) -> Self:
         """Jump to a place [m] and heading [rad] from here, the feet ``height`` [m] over the ground.
 
         Offsets count from where it lands. ``flight`` is the time in the air [s, beats], by default
@@ -60,23 +59,23 @@ class DynamicBlocks(TimelineData):
         time = None if flight is None else self._seconds("jump(): flight", flight)
         return self._to_beats(build.jump(x, y, yaw, height, flight=time))
 
-    def spin_jump(self: _Line, angle: float, *, height: float = 0.12) -> _Line:
+    def spin_jump(self, angle: float, *, height: float = 0.12) -> Self:
         """Jump up and turn by ``angle`` [rad] in the air, to the left if it is positive."""
         return self._to_beats(build.jump(yaw=angle, height=height))
 
-    def pounce(self: _Line, x: float = 0.3, *, height: float = 0.08, crouch: float = 0.6) -> _Line:
+    def pounce(self, x: float = 0.3, *, height: float = 0.08, crouch: float = 0.6) -> Self:
         """Crouch low for ``crouch`` seconds (beats), then leap ``x`` [m] ahead."""
         first, *others = build.jump(x, height=height)
         duration = self._seconds("pounce(): crouch", crouch)
         low = replace(first, duration=duration, body=_LOW, label="crouch low")
         return self._to_beats((low, *others))
 
-    def hop(self: _Line, times: int, *, height: float = 0.05, period: float = 0.5) -> _Line:
+    def hop(self, times: int, *, height: float = 0.05, period: float = 0.5) -> Self:
         """Hop in place ``times`` times, coming down once a ``period`` [s, beats]."""
         phases = build.hop(times, self._seconds("hop(): period", period), height)
         return self._to_beats(phases, period)
 
-    def rear(self: _Line, pitch: float = -math.radians(25.0), *, hold: float = 0.6) -> _Line:
+    def rear(self, pitch: float = -math.radians(25.0), *, hold: float = 0.6) -> Self:
         """Rear up on the hind feet to a ``pitch`` [rad] below 0, nose up.
 
         The front feet are in the air for ``hold`` seconds (beats).
@@ -84,8 +83,8 @@ class DynamicBlocks(TimelineData):
         return self._to_beats(build.rear(pitch, self._seconds("rear(): hold", hold)))
 
     def lift(
-        self: _Line, legs: Collection[Leg | str], *, hold: float = 0.35, height: float = 0.06
-    ) -> _Line:
+        self, legs: Collection[Leg | str], *, hold: float = 0.35, height: float = 0.06
+    ) -> Self:
         """Lift two feet ``height`` [m] and put them back, in the air for ``hold`` seconds (beats).
 
         For one foot at a time, which takes no balance on a line, there is ``foot``.
@@ -99,7 +98,7 @@ class DynamicBlocks(TimelineData):
     def _seconds(self, name: str, beats: float) -> float:
         return self.clock.after(self.cursor, positive(name, beats)) - self.cursor
 
-    def _to_beats(self: _Line, phases: tuple[Phase, ...], period: float | None = None) -> _Line:
+    def _to_beats(self, phases: tuple[Phase, ...], period: float | None = None) -> Self:
         """A block of ``phases``, some of them longer, so that it keeps the tempo, if there is one.
 
         Feet come down on a beat first, then ``period`` beats later each time; the end is on one.
@@ -122,14 +121,14 @@ class DynamicBlocks(TimelineData):
         return self._block(tuple(timed))
 
     def phase(
-        self: _Line,
+        self,
         duration: float,
         *,
         stance: Collection[Leg | str] = LEGS,
         body: Mapping[str, float] | None = None,
         feet: Mapping[Leg | str, Sequence[float]] | None = None,
         label: str = "",
-    ) -> _Line:
+    ) -> Self:
         """A phase of a dynamic block [s, beats]; those that follow each other are one block.
 
         Args:
@@ -155,7 +154,7 @@ class DynamicBlocks(TimelineData):
         keys = tuple(key for key in self.keys if key is not last)
         return replace(self, keys=keys)._longer([longer], longer.end)
 
-    def _block(self: _Line, phases: tuple[Phase, ...], *, is_open: bool = False) -> _Line:
+    def _block(self, phases: tuple[Phase, ...], *, is_open: bool = False) -> Self:
         away = away_from_home(self, self.cursor)
         if away:
             raise TimelineError(

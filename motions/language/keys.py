@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import Enum
-from typing import ClassVar, TypeVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from jaxtyping import Float
@@ -20,9 +19,6 @@ from motions.language.easing import Easing
 BODY_CHANNELS = ("x", "y", "z", "roll", "pitch", "yaw")
 """What of the trunk can move: places [m] and angles [rad], as offsets from the posture."""
 _FLIPPED = frozenset({"y", "roll", "yaw"})
-
-_KeyType = TypeVar("_KeyType", bound="Key")
-_BodyKeyType = TypeVar("_BodyKeyType", bound="BodyKey")
 
 
 class Frame(Enum):
@@ -72,7 +68,7 @@ ON_GROUND = LegTarget(Frame.GROUND, (0.0, 0.0, 0.0))
 
 
 @dataclass(frozen=True, slots=True)
-class Key(ABC):
+class Key:
     """One move of one track.
 
     Attributes:
@@ -81,37 +77,40 @@ class Key(ABC):
     """
 
     instants: ClassVar[tuple[str, ...]] = ("start", "end")
+    moves: ClassVar[str]
+    """What moves, in words."""
 
     start: float
     end: float
     ease: Easing
 
-    def later(self: _KeyType, seconds: float) -> _KeyType:
+    @property
+    def track(self) -> str:
+        """What moves: keys of one track follow each other."""
+        return self.moves.format(self)
+
+    def later(self, seconds: float) -> Self:
         """The same key, moved in time."""
         return self._moved(lambda t: t + seconds)
 
-    def slower(self: _KeyType, factor: float) -> _KeyType:
+    def slower(self, factor: float) -> Self:
         """The same key, all times multiplied."""
         return self._moved(lambda t: factor * t)
 
-    def retimed(self: _KeyType, when: Callable[[float], float]) -> _KeyType:
+    def retimed(self, when: Callable[[float], float]) -> Self:
         """The same key, its instants where ``when`` puts them."""
         return self._moved(when)
 
-    def _moved(self: _KeyType, when: Callable[[float], float]) -> _KeyType:
+    def _moved(self, when: Callable[[float], float]) -> Self:
         return replace(self, **{name: when(getattr(self, name)) for name in self.instants})
 
     @property
-    @abstractmethod
-    def track(self) -> str:
-        """What moves, in words."""
-
-    @property
-    def mirrored(self) -> Key:
+    def mirrored(self) -> Self:
         """Left and right exchanged."""
-        return self
+        across: dict[str, Any] = {f.name: _across(getattr(self, f.name)) for f in fields(self)}
+        return replace(self, **across)
 
-    def scaled(self, amplitude: float) -> Key:
+    def scaled(self, amplitude: float) -> Self:
         """Its offsets multiplied; what is no offset stays."""
         del amplitude
         return self
@@ -121,24 +120,21 @@ class Key(ABC):
 class BodyKey(Key):
     """The trunk moves along one channel to an offset [m or rad]."""
 
+    moves: ClassVar[str] = "body {0.channel}"
+
     channel: str
     value: float
 
     @property
-    def track(self) -> str:
-        """The channel."""
-        return f"body {self.channel}"
-
-    @property
-    def mirrored(self) -> BodyKey:
+    def mirrored(self) -> Self:
         """Left and right exchanged."""
         return self.scaled(-1.0) if self.channel in _FLIPPED else self
 
-    def scaled(self, amplitude: float) -> BodyKey:
+    def scaled(self, amplitude: float) -> Self:
         """Its offset multiplied."""
         return replace(self, value=amplitude * self.value)
 
-    def moved(self: _BodyKeyType, offset: float) -> _BodyKeyType:
+    def moved(self, offset: float) -> Self:
         """Its goal ``offset`` farther."""
         return replace(self, value=self.value + offset)
 
@@ -155,12 +151,12 @@ class BodyPathKey(BodyKey):
     through: tuple[float, ...]
     shares: tuple[float, ...]
 
-    def scaled(self, amplitude: float) -> BodyPathKey:
+    def scaled(self, amplitude: float) -> Self:
         """Its offsets multiplied."""
         through = tuple(amplitude * value for value in self.through)
         return replace(self, value=amplitude * self.value, through=through)
 
-    def moved(self, offset: float) -> BodyPathKey:
+    def moved(self, offset: float) -> Self:
         """All that it goes through ``offset`` farther."""
         through = tuple(value + offset for value in self.through)
         return replace(self, value=self.value + offset, through=through)
@@ -170,32 +166,21 @@ class BodyPathKey(BodyKey):
 class PostureKey(Key):
     """The trunk moves to another resting posture, from which offsets count from then on."""
 
-    posture: Posture
+    moves: ClassVar[str] = "posture"
 
-    @property
-    def track(self) -> str:
-        """The posture."""
-        return "posture"
+    posture: Posture
 
 
 @dataclass(frozen=True, slots=True)
 class LegKey(Key):
     """A leg moves to a target."""
 
+    moves: ClassVar[str] = "foot {0.leg.name}"
+
     leg: Leg
     target: LegTarget
 
-    @property
-    def track(self) -> str:
-        """The leg."""
-        return f"foot {self.leg.name}"
-
-    @property
-    def mirrored(self) -> LegKey:
-        """Left and right exchanged."""
-        return replace(self, leg=self.leg.mirror, target=self.target.mirrored)
-
-    def scaled(self, amplitude: float) -> LegKey:
+    def scaled(self, amplitude: float) -> Self:
         """Its offset multiplied; angles stay."""
         return replace(self, target=self.target.scaled(amplitude))
 
@@ -228,6 +213,7 @@ class StepKey(Key):
     """
 
     instants: ClassVar[tuple[str, ...]] = ("start", "end", "since")
+    moves: ClassVar[str] = "foot {0.leg.name}"
 
     leg: Leg
     place: tuple[float, float, float]
@@ -236,22 +222,17 @@ class StepKey(Key):
     lead: float = 0.0
     is_square: bool = False
 
-    def slower(self, factor: float) -> StepKey:
+    def slower(self, factor: float) -> Self:
         """The same key, all times multiplied."""
         return replace(self._moved(lambda t: factor * t), lead=factor * self.lead)
 
-    def scaled(self, amplitude: float) -> StepKey:
+    def scaled(self, amplitude: float) -> Self:
         """Its way multiplied."""
         x, y, yaw = self.place
         return replace(self, place=(amplitude * x, amplitude * y, amplitude * yaw))
 
     @property
-    def track(self) -> str:
-        """The leg."""
-        return f"foot {self.leg.name}"
-
-    @property
-    def mirrored(self) -> StepKey:
+    def mirrored(self) -> Self:
         """Left and right exchanged."""
         x, y, yaw = self.place
         return replace(self, leg=self.leg.mirror, place=(x, -y, -yaw))
@@ -261,12 +242,9 @@ class StepKey(Key):
 class Mark(Key):
     """A named span of time: something is worth looking at."""
 
-    name: str
+    moves: ClassVar[str] = "span {0.name!r}"
 
-    @property
-    def track(self) -> str:
-        """The name."""
-        return f"span {self.name!r}"
+    name: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,11 +252,6 @@ class FootHold(Mark):
     """A named span in which a raised foot is held up: only then does the motion count as done."""
 
     leg: Leg
-
-    @property
-    def mirrored(self) -> FootHold:
-        """Left and right exchanged."""
-        return replace(self, leg=self.leg.mirror)
 
 
 @dataclass(frozen=True, slots=True)
@@ -290,18 +263,10 @@ class BalanceShift(Key):
         is_swaying: whether it is instead over those of the feet that stand while others step.
     """
 
+    moves: ClassVar[str] = "balance"
+
     raised: frozenset[Leg]
     is_swaying: bool = False
-
-    @property
-    def track(self) -> str:
-        """The balance."""
-        return "balance"
-
-    @property
-    def mirrored(self) -> BalanceShift:
-        """Left and right exchanged."""
-        return replace(self, raised=frozenset(leg.mirror for leg in self.raised))
 
 
 @dataclass(frozen=True, slots=True)
@@ -313,41 +278,46 @@ class PhaseKey(Key):
         is_open: whether ``Timeline.phase`` may still add one.
     """
 
+    moves: ClassVar[str] = "the whole robot"
+
     phases: tuple[Phase, ...]
     is_open: bool
-
-    @property
-    def track(self) -> str:
-        """The whole robot."""
-        return "the whole robot"
 
     @property
     def shift(self) -> Float[np.ndarray, "4 3"]:
         """Where each foot comes to stand [m], in the frame of the feet at the start."""
         return PhaseProblem(self.phases).shift
 
-    def slower(self, factor: float) -> PhaseKey:
+    def slower(self, factor: float) -> Self:
         """Gravity does not wait."""
         raise TimelineError(
             f"scale_time({factor:g}) does not work with a dynamic block, whose pace gravity sets; "
             "give its calls other numbers"
         )
 
-    def retimed(self, when: Callable[[float], float]) -> PhaseKey:
+    def retimed(self, when: Callable[[float], float]) -> Self:
         """The same block, started when ``when`` says; it lasts what it lasts."""
         return self.later(when(self.start) - self.start)
 
-    def scaled(self, amplitude: float) -> PhaseKey:
+    def scaled(self, amplitude: float) -> Self:
         """Nor do heights scale without times."""
         raise TimelineError(
             f"scale({amplitude:g}) does not work with a dynamic block, whose heights and times go "
             "together; give its calls other numbers"
         )
 
-    @property
-    def mirrored(self) -> PhaseKey:
-        """Left and right exchanged."""
-        return replace(self, phases=tuple(map(_mirrored, self.phases)))
+
+def _across(value: object) -> object:
+    """``value``, of a field of a key, with left and right exchanged; what has no side stays."""
+    if isinstance(value, Leg):
+        return value.mirror
+    if isinstance(value, LegTarget):
+        return value.mirrored
+    if isinstance(value, Phase):
+        return _mirrored(value)
+    if isinstance(value, tuple | frozenset):
+        return type(value)(map(_across, value))
+    return value
 
 
 def _mirrored(phase: Phase) -> Phase:

@@ -25,17 +25,17 @@ from jaxtyping import Float
 from go2_wbc.reference import Anchor
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
+from motions.language.arrangement import Arrangement
+from motions.language.body_and_feet import BodyAndFeet
 from motions.language.clock import SAME
 from motions.language.dynamic_blocks import DynamicBlocks
 from motions.language.footing import Footing
 from motions.language.keys import PhaseKey, StepKey
-from motions.language.shapes import Shapes
 from motions.language.steps import Steps
-from motions.language.transforms import Transforms
 from motions.postures import standing_feet
 
 
-class Timeline(Shapes, Steps, DynamicBlocks, Transforms):
+class Timeline(BodyAndFeet, Steps, DynamicBlocks, Arrangement):
     """An authored motion; ``motions.language`` holds its calls."""
 
     __slots__ = ()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import Self, TypeVar
 
 from go2_wbc.curves import Ease
 from go2_wbc.errors import TimelineError, unknown_name
@@ -24,7 +24,6 @@ AS_WRITTEN, NEAREST = PHYSICS = ("as_written", "nearest")
 """What may be made of a motion that the robot cannot do: nothing, or the nearest that it can."""
 
 _KeyType = TypeVar("_KeyType", bound=Key)
-_Line = TypeVar("_Line", bound="TimelineData")
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +126,7 @@ class TimelineData:
 
     # --- how it is written ----------------------------------------------------------------
 
-    def _shifted(self: _Line, raised: frozenset[Leg]) -> _Line:
+    def _shifted(self, raised: frozenset[Leg]) -> Self:
         if not self.balance or self.shifted_for == raised:
             return self
         end = self.cursor + self.shift_time
@@ -135,7 +134,7 @@ class TimelineData:
             end = self.clock.after(self.cursor, self.shift_beats)
         return self._longer([BalanceShift(self.cursor, end, Ease.MINIMUM_JERK, raised)], end)
 
-    def _longer(self: _Line, keys: Sequence[Key], cursor: float) -> _Line:
+    def _longer(self, keys: Sequence[Key], cursor: float) -> Self:
         return replace(
             self,
             keys=(*self.keys, *keys),
@@ -144,7 +143,7 @@ class TimelineData:
             floor=0.0,
         )
 
-    def _joined(self: _Line, other: TimelineData, start: float) -> _Line:
+    def _joined(self, other: TimelineData, start: float) -> Self:
         return self._longer([key.later(start) for key in other.keys], start + other.end)
 
     def _beats_until(self, end: float) -> tuple[float, ...]:

@@ -1,1 +1,1 @@
-"""The library: one motion a file, named like the file."""
+"""The library: motions as users write theirs, by what they are about."""

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from go2_wbc.errors import CommandError
-from motions.music.sound import RATE, Sound, read_sound
+from motions.music.songs import RATE, Sound, read_sound
 
 HOP, WINDOW = 128, 512
 """Samples from one frame to the next (5.8 ms), and of a frame (23 ms): short, to tell when a note

@@ -13,8 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import CommandError, MotionInfeasible, unknown_name
-from motions.feasibility.check import FeasibilityChecker
-from motions.feasibility.checked_motion import CheckedMotion
+from motions.feasibility.check import CheckedMotion, FeasibilityChecker
 from motions.language.timeline import Timeline
 from motions.music.beat_tracking import Beats
 from motions.music.dance_moves import MOVES, Accent, Move

@@ -1,7 +1,7 @@
-"""Songs made by code, whose beats are known: a click track, and drums with bass and chords.
+"""Sounds from and to files, and songs made by code: a click track, and drums with bass and chords.
 
-They are what beat finders and dances are measured on: nothing needs to be downloaded, and the
-instants of their beats are given, not estimated.
+Beat finders and dances are measured on the latter: nothing needs to be downloaded, and the instants
+of their beats are given, not estimated.
 """
 
 from __future__ import annotations
@@ -14,10 +14,17 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from go2_wbc.errors import CommandError, MissingDependency
 from go2_wbc.files import checked_output, write_atomically
 from motions.arguments import positive
-from motions.music.sound import RATE, Sound
 
+INSTALL_LINE = 'python -m pip install -e ".[music]"'
+RATE = 22050
+"""Samples per second that are kept, or made: librosa's default, half of a compact disc's."""
+LONGEST = 900.0
+"""Length [s] of the longest song: a quarter of an hour, so that no file fills the memory."""
+COMPRESSION = 0.7
+"""How far an MP3 file is made smaller, from 0 to 1: about 7 kB for a second."""
 LEAD_IN = 0.5
 """Silence [s] before the first beat of a click track."""
 CLICK_PITCH, ACCENT_PITCH = 1000.0, 1500.0
@@ -33,7 +40,50 @@ JITTER = 0.004
 SWING = 0.08
 """By which share of a beat the off-beats come late, at most."""
 
+Sound = Float[np.ndarray, " m"]
+"""Amplitudes from -1 to 1, ``RATE`` a second."""
 Note = Float[np.ndarray, " j"]
+
+
+def read_sound(path: Path | str) -> Sound:
+    """The sound of a WAV, FLAC, OGG or MP3 file, as one channel.
+
+    Raises:
+        CommandError: if the file is missing, no sound, or longer than a quarter of an hour.
+        MissingDependency: without the extra ``[music]``.
+    """
+    path = Path(path)
+    try:
+        import librosa
+        import soundfile
+    except (ImportError, OSError) as error:  # soundfile: OSError without its C library
+        raise MissingDependency(f"music needs librosa ({error}): {INSTALL_LINE}") from error
+    if not path.is_file():
+        raise CommandError(f"{path}: there is no such file; give a song, such as song.wav")
+    try:
+        length = soundfile.info(str(path)).duration
+        if length > LONGEST:
+            raise CommandError(
+                f"{path.name} is {length:.0f} s long, {LONGEST:.0f} s at most: cut it"
+            )
+        channels, rate = soundfile.read(str(path), dtype="float32", always_2d=True)
+    except (RuntimeError, OSError) as error:  # soundfile's own error is a RuntimeError
+        raise CommandError(
+            f"{path.name} is no song that can be read; valid: WAV, FLAC, OGG, MP3 ({error})"
+        ) from error
+    if not np.isfinite(channels).all():
+        raise CommandError(f"{path.name} is no song: it has samples that are no numbers")
+    sound = channels.mean(axis=1)
+    return librosa.resample(sound, orig_sr=rate, target_sr=RATE) if rate != RATE else sound
+
+
+def mp3_of(sound: Sound) -> bytes:
+    """The sound as an MP3 file."""
+    import soundfile
+
+    stream = io.BytesIO()
+    soundfile.write(stream, sound, RATE, format="MP3", compression_level=COMPRESSION)
+    return stream.getvalue()
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,10 +132,11 @@ class CompiledPlan(MotionPlan):
                 f"plan {self.name!r}: swings must have a row for each of {len(contacts.times)} "
                 f"contact events, got {list(self.swings.shape)}"
             )
-        tasks, events = _tasks(contacts.modes, self.swings), np.array(contacts.times)
+        in_air = np.where(self.swings, float(LegTask.SWING), float(LegTask.JOINTS))
+        tasks = np.where(contacts.modes, float(LegTask.STANCE), in_air)
         since, until = self._gradual(contacts.since, -np.inf), self._gradual(contacts.until, np.inf)
         load = StanceLoad(self.ramp, NORMAL_FORCE_MIN, NORMAL_FORCE_MAX)
-        asked = PlanCurves(curves.x, curves.c, events, tasks, since, until, load)
+        asked = PlanCurves(curves.x, curves.c, np.array(contacts.times), tasks, since, until, load)
         object.__setattr__(self, "_asked", asked)
 
     @property
@@ -193,33 +194,18 @@ class CompiledPlan(MotionPlan):
 
     def row_at(self, t: float) -> Float[np.ndarray, " size"]:
         """Its numbers, by a kernel; see ``MotionPlan.row_at``."""
-        target, forces = self._asked.at(t), self._forces_at(t)
-        if forces is not None:
-            target.f_world_feet[:], target.force_weight = forces, FORCE_WEIGHT
+        target, span = self._asked.at(t), self._span_at(t)
+        if span is not None:
+            target.f_world_feet[:], target.force_weight = span.forces_at(t), FORCE_WEIGHT
         return target.row
 
     def feedback_at(self, t: float) -> PlanFeedback | None:
         """Of the span at ``t``, on two feet or one; see ``MotionPlan.feedback_at``."""
-        for span in self.dynamic:
-            if span.start <= t < span.end:
-                return span.feedback_at(t)
-        return None
+        span = self._span_at(t)
+        return None if span is None else span.feedback_at(t)
 
-    def _forces_at(self, t: float) -> Float[np.ndarray, "4 3"] | None:
-        """Forces [N] on the feet that the span at ``t`` was solved with; elsewhere none."""
-        for span in self.dynamic:
-            if span.start <= t < span.end:
-                plan = span.trajectory
-                step = int(np.searchsorted(plan.times, t - span.start, side="right")) - 1
-                return plan.forces[min(step, len(plan.forces) - 1)]
-        return None
-
-    def _phases(self, times: Float[np.ndarray, " n"]) -> ContactPhase:
-        """The contacts at ``times``, with the changes to which load is ramped."""
-        rows, asked = event_at(self.contacts, times), self._asked
-        elapsed = np.maximum(times[:, None] - asked.since[rows], 0.0)
-        left = asked.until[rows] - times[:, None]
-        return ContactPhase(self.contacts.modes[rows], elapsed, left)
+    def _span_at(self, t: float) -> DynamicSpan | None:
+        return next((span for span in self.dynamic if span.start <= t < span.end), None)
 
     def _gradual(self, changes: Float[np.ndarray, "m 4"], never: float) -> Float[np.ndarray, "m 4"]:
         """``changes`` of contacts [s] but those in dynamic spans: there forces jump as planned."""
@@ -231,7 +217,10 @@ class CompiledPlan(MotionPlan):
     def samples(self, times: Float[np.ndarray, " n"]) -> PlanSamples:
         """What the references at ``times`` ask for; ``at`` gives the same one by one."""
         values = self.curves(np.clip(times, 0.0, self.duration))
-        phase, swings = self._phases(times), self.swings[event_at(self.contacts, times)]
+        rows, asked = event_at(self.contacts, times), self._asked
+        elapsed = np.maximum(times[:, None] - asked.since[rows], 0.0)
+        left = asked.until[rows] - times[:, None]
+        phase = ContactPhase(self.contacts.modes[rows], elapsed, left)
         return PlanSamples(
             times=times,
             p=values[:, :3],
@@ -239,7 +228,7 @@ class CompiledPlan(MotionPlan):
             R=attitudes(values[:, 3:6]),
             q_joints=values[:, 6:18],
             stance=phase.stance,
-            raised=~(phase.stance | swings),
+            raised=~(phase.stance | self.swings[rows]),
             p_feet=values[:, 18:].reshape(-1, 4, 3),
             normal_force_max=NORMAL_FORCE_MAX * phase.load_share(self.ramp),
         )
@@ -249,8 +238,3 @@ def event_at(contacts: ContactSchedule, times: Float[np.ndarray, " n"]) -> Int[n
     """Index of the last event at or before each of ``times`` [s], of a schedule that ends."""
     event = np.searchsorted(contacts.times, times + TIE, side="right") - 1
     return np.maximum(event, 0)
-
-
-def _tasks(stance: Bool[np.ndarray, "*n 4"], swings: Bool[np.ndarray, "*n 4"]) -> np.ndarray:
-    in_air = np.where(swings, float(LegTask.SWING), float(LegTask.JOINTS))
-    return np.where(stance, float(LegTask.STANCE), in_air)

@@ -84,14 +84,21 @@ class DynamicSpan:
             ),
         )
 
+    def forces_at(self, t: float) -> Float[np.ndarray, "4 3"]:
+        """Forces [N] on the feet that it was solved with, at ``t`` [s] of the plan."""
+        return self.trajectory.forces[self._step_at(t)]
+
+    def _step_at(self, t: float) -> int:
+        plan = self.trajectory
+        row = int(np.searchsorted(plan.times, t - self.start, side="right")) - 1
+        return min(max(row, 0), len(plan.tau) - 1)
+
     def feedback_at(self, t: float) -> PlanFeedback | None:
         """The feedback at ``t`` [s] of the plan, if two feet or one stand then.
 
         The planned state is that of the curves that are played, for which see ``centred``.
         """
-        plan = self.trajectory
-        row = int(np.searchsorted(plan.times, t - self.start, side="right")) - 1
-        row = min(max(row, 0), len(plan.tau) - 1)
+        plan, row = self.trajectory, self._step_at(t)
         if not 1 <= plan.stance[row].sum() <= BALANCING_FEET:
             return None
         step = float(plan.times[row + 1] - plan.times[row])

@@ -30,9 +30,8 @@ from motions.language.dynamic_blocks import away_from_home
 from motions.language.keys import BodyKey, FootHold, Key, Mark, PhaseKey
 from motions.language.timeline import Timeline
 from motions.plan.compiled_plan import CompiledPlan, Problem, event_at
-from motions.plan.contact_schedule import UNLOAD_TIME
 from motions.plan.dynamic_span import DynamicSpan, attitude_angles, curves_of, placed
-from motions.plan.quasi_static import compile_quasi_static
+from motions.plan.quasi_static import UNLOAD_TIME, compile_quasi_static
 from motions.plan.repair import pieces_to_repair, without_vain_shifts
 from motions.plan.trajectory import trajectory_of
 from motions.postures import standing_feet
@@ -78,9 +77,7 @@ def compile_timeline(
         return compile_quasi_static(timeline, model, p_feet)
     for block in blocks:
         _require_alone(timeline, block)
-    maker = _Maker(timeline, model, mend, progress)
-    if p_feet is not None:
-        maker.start_on(p_feet)
+    maker = _Maker(timeline, model, p_feet, mend, progress)
     for block in blocks:
         maker.add_stretch(block.start, Posture.STAND)
         maker.add_block(block)
@@ -125,6 +122,7 @@ class _Maker:
         self,
         timeline: Timeline,
         model: RobotModel,
+        p_feet: Float[np.ndarray, "4 3"] | None,
         broken: Broken | None,
         progress: Progress | None,
     ) -> None:
@@ -137,10 +135,8 @@ class _Maker:
         self._spans: list[DynamicSpan] = []
         self._problems: list[Problem] = []
         self._ramps: list[float] = []
-
-    def start_on(self, p_feet: Float[np.ndarray, "4 3"]) -> None:
-        """Start with the feet there [m], in the frame of the motion."""
-        self._move_on(0.0, p_feet, 0.0)
+        if p_feet is not None:
+            self._move_on(0.0, p_feet, 0.0)
 
     def add_stretch(self, end: float, exit: Posture) -> None:
         """What is written from here to ``end`` [s]."""

@@ -144,7 +144,9 @@ class Decoder:
         for name in required(value, dict, where):
             if name not in given:
                 raise MotionFileError(f"{where}: {unknown_name('field', name, given)}")
-        missing = [name for name, item in given.items() if _is_needed(item) and name not in value]
+        defaults = {name: (item.default, item.default_factory) for name, item in given.items()}
+        needed = [name for name, known in defaults.items() if known == (MISSING, MISSING)]
+        missing = [name for name in needed if name not in value]
         if missing:
             raise MotionFileError(f"{where} lacks {', '.join(missing)}")
         hints = get_type_hints(kind)
@@ -199,9 +201,8 @@ class Decoder:
             raise MotionFileError(f"{where} names the array {name!r:.60}, which is not there")
         array = self.arrays[name]
         if not isinstance(array, kind) or array.dtype.kind not in _NUMBERS:
-            raise MotionFileError(
-                f"{where} must be {_named(kind)}, got {array.dtype}{list(array.shape)}"
-            )
+            what = "an array of numbers" if kind is np.ndarray else kind.__name__
+            raise MotionFileError(f"{where} must be {what}, got {array.dtype}{list(array.shape)}")
         if not np.isfinite(array).all():
             raise MotionFileError(f"{where} has a value that is not finite")
         return array
@@ -227,14 +228,6 @@ def required(value: Json, kind: type, where: str) -> Json:
 
 def _given(kind: Kind) -> list[Field[Any]]:
     return [item for item in fields(kind) if item.init]
-
-
-def _is_needed(item: Field[Any]) -> bool:
-    return item.default is MISSING and item.default_factory is MISSING
-
-
-def _named(kind: Kind) -> str:
-    return "an array of numbers" if kind is np.ndarray else kind.__name__
 
 
 def _is_nan(*values: object) -> bool:

@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from go2_wbc.curves import Ease
-from go2_wbc.errors import Go2WbcError
+from go2_wbc.errors import Go2WbcError, TimelineError
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import Posture
 from go2_wbc.robot.model import RobotModel
@@ -30,7 +30,7 @@ from motions.language.keys import (
     StepKey,
 )
 
-Mutator = Callable[[Timeline, np.random.Generator], Timeline | None]
+Mutator = Callable[[Timeline, np.random.Generator], Timeline]
 _KeyType = TypeVar("_KeyType", BodyKey, LegKey, BalanceShift)
 
 STEP = 0.004  # s, between the instants that the oracle looks at
@@ -84,44 +84,38 @@ def _mutated(mutate: Mutator, rng: np.random.Generator) -> Timeline | None:
     line = load_motion(str(rng.choice(STANDING)))
     try:
         return mutate(line, rng)
-    except Go2WbcError:  # the language itself refuses it: nothing is left to check
+    except Go2WbcError:  # nothing fits, or the language itself refuses it: nothing is left to check
         return None
 
 
 # --- what is broken ---------------------------------------------------------------------------
 
 
-def _larger(line: Timeline, rng: np.random.Generator) -> Timeline | None:
+def _larger(line: Timeline, rng: np.random.Generator) -> Timeline:
     """One move of the trunk several times as large."""
     key = _one(line, BodyKey, rng, lambda key: key.value != 0.0)
-    if key is None:
-        return None
     value = float(np.clip(key.value * rng.uniform(3.0, 6.0), -1.4, 1.4))
     return _with(line, key, replace(key, value=value))
 
 
-def _hurried(line: Timeline, rng: np.random.Generator) -> Timeline | None:
+def _hurried(line: Timeline, rng: np.random.Generator) -> Timeline:
     """Everything many times as fast."""
     share = float(rng.uniform(0.04, 0.12))
     keys = tuple(replace(key, start=share * key.start, end=share * key.end) for key in line.keys)
     return replace(line, keys=keys, cursor=share * line.cursor)
 
 
-def _without_balance(line: Timeline, rng: np.random.Generator) -> Timeline | None:
+def _without_balance(line: Timeline, rng: np.random.Generator) -> Timeline:
     """Feet are raised, and the trunk stays where it is."""
-    if not line.in_order(BalanceShift):
-        return None
+    _one(line, BalanceShift, rng, lambda _: True)
     return replace(line, keys=tuple(key for key in line.keys if not isinstance(key, BalanceShift)))
 
 
-def _second_foot(line: Timeline, rng: np.random.Generator) -> Timeline | None:
+def _second_foot(line: Timeline, rng: np.random.Generator) -> Timeline:
     """Another foot leaves the ground while one is up."""
     raised = {key.leg for key in line.in_order(LegKey)}
-    key = _one(line, LegKey, rng, lambda key: not key.target.is_on_ground)
-    if key is None:
-        return None
-    free = [leg for leg in LEGS if leg not in raised]
-    leg = free[int(rng.integers(len(free)))]
+    key = _one(line, LegKey, rng, _is_up)
+    leg = rng.choice(np.array([leg for leg in LEGS if leg not in raised], dtype=object))
     up = LegTarget(Frame.GROUND, (0.0, 0.0, float(rng.uniform(0.05, 0.12))))
     middle = key.start + 0.3
     moves = (
@@ -131,45 +125,28 @@ def _second_foot(line: Timeline, rng: np.random.Generator) -> Timeline | None:
     return replace(line, keys=(*line.keys, *moves))
 
 
-def _never_down(line: Timeline, rng: np.random.Generator) -> Timeline | None:
-    """The last foot that was raised stays in the air."""
-    landings = [key for key in line.in_order(LegKey) if key.target.is_on_ground]
-    return _without(line, landings[-1]) if landings else None
-
-
-def _never_home(line: Timeline, rng: np.random.Generator) -> Timeline | None:
-    """The trunk stays where its last move but one left it."""
-    key = _one(line, BodyKey, rng, lambda key: key.value == 0.0 and key.end == line.end)
-    return None if key is None else _without(line, key)
-
-
-def _out_of_reach(line: Timeline, rng: np.random.Generator) -> Timeline | None:
+def _out_of_reach(line: Timeline, rng: np.random.Generator) -> Timeline:
     """A foot is sent half a metre farther."""
-    key = _one(line, LegKey, rng, lambda key: not key.target.is_on_ground)
-    if key is None:
-        return None
+    key = _one(line, LegKey, rng, _is_up)
     ahead, up = (float(rng.uniform(0.45, 0.8)) for _ in range(2))
-    target = LegTarget(Frame.GROUND, (ahead, 0.0, up))
-    return _with(line, key, replace(key, target=target))
+    return _with(line, key, replace(key, target=LegTarget(Frame.GROUND, (ahead, 0.0, up))))
 
 
-def _jumping(line: Timeline, rng: np.random.Generator) -> Timeline | None:
+def _jumping(line: Timeline, rng: np.random.Generator) -> Timeline:
     """A move of the trunk happens all at once."""
     key = _one(line, BodyKey, rng, lambda key: abs(key.value) > 0.03)
-    return None if key is None else _with(line, key, replace(key, ease=Ease.HOLD))
+    return _with(line, key, replace(key, ease=Ease.HOLD))
 
 
-def _mislabelled(line: Timeline, rng: np.random.Generator) -> Timeline | None:
-    """It says that it starts or ends in another posture."""
+def _mislabelled(line: Timeline, rng: np.random.Generator) -> Timeline:
+    """It says that it ends in another posture."""
     others = [posture for posture in Posture if posture is not line.exit]
     return replace(line, exit=others[int(rng.integers(len(others)))])
 
 
-def _joint_beyond(line: Timeline, rng: np.random.Generator) -> Timeline | None:
+def _joint_beyond(line: Timeline, rng: np.random.Generator) -> Timeline:
     """A raised leg's joints are sent beyond their limits."""
-    key = _one(line, LegKey, rng, lambda key: not key.target.is_on_ground)
-    if key is None:
-        return None
+    key = _one(line, LegKey, rng, _is_up)
     hip, thigh, calf = (0.0, 0.8, -1.6)
     worse = [(1.3, thigh, calf), (hip, -2.0, calf), (hip, thigh, -0.4), (hip, thigh, -3.0)]
     angles = worse[int(rng.integers(len(worse)))]
@@ -181,8 +158,12 @@ MUTATORS: Mapping[str, Mutator] = {
     "hurried": _hurried,
     "without balance": _without_balance,
     "second foot": _second_foot,
-    "never down": _never_down,
-    "never home": _never_home,
+    "never down": lambda line, rng: _without(
+        line, _one(line, LegKey, rng, lambda key: key.target.is_on_ground)
+    ),
+    "never home": lambda line, rng: _without(
+        line, _one(line, BodyKey, rng, lambda key: key.value == 0.0 and key.end == line.end)
+    ),
     "out of reach": _out_of_reach,
     "jumping": _jumping,
     "mislabelled": _mislabelled,
@@ -190,14 +171,21 @@ MUTATORS: Mapping[str, Mutator] = {
 }
 
 
+def _is_up(key: LegKey) -> bool:
+    return not key.target.is_on_ground
+
+
 def _one(
     line: Timeline,
     kind: type[_KeyType],
     rng: np.random.Generator,
     fits: Callable[[_KeyType], bool],
-) -> _KeyType | None:
+) -> _KeyType:
+    """One of the keys that fit; TimelineError if there is none."""
     keys = [key for key in line.in_order(kind) if fits(key)]
-    return keys[int(rng.integers(len(keys)))] if keys else None
+    if not keys:
+        raise TimelineError("nothing fits")
+    return keys[int(rng.integers(len(keys)))]
 
 
 def _with(line: Timeline, old: Key, new: Key) -> Timeline:

@@ -10,7 +10,6 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import rotation_from_rpy, rpy_from_rotation
 from motions.batch_kinematics import (
     Wanted,
-    _angular_rates,
     angles_of,
     attitudes,
     place,
@@ -82,17 +81,6 @@ def test_roll_pitch_and_yaw_are_those_of_one_rotation_after_the_other() -> None:
 def test_a_trunk_on_its_end_has_angles_that_give_its_attitude() -> None:
     R = attitudes(np.array([[0.4, np.pi / 2, 0.3], [-0.2, -np.pi / 2, 1.0]]))
     assert attitudes(angles_of(R)) == pytest.approx(R, abs=1e-9)
-
-
-def test_angular_rates_are_those_of_one_instant_after_the_other() -> None:
-    rpy, rate, acceleration = np.random.default_rng(5).normal(size=(3, COUNT, 3))
-    w, dw = _angular_rates(rpy, rate, acceleration)
-    for row in range(COUNT):
-        expected = angular_velocity_from_rpy(rpy[row], rate[row], acceleration[row])
-        assert (w[row], dw[row]) == (
-            pytest.approx(expected[0], abs=1e-12),
-            pytest.approx(expected[1], abs=1e-12),
-        )
 
 
 def test_the_nearest_sample_is_that_of_the_least_distance() -> None:

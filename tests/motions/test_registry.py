@@ -33,7 +33,10 @@ def test_the_motions_of_a_file_come_by_name(tmp_path: Path) -> None:
 
 def test_motions_that_a_file_imports_are_not_its_own(tmp_path: Path) -> None:
     text = (
-        HEAD + "from motions.library.bow import bow\n\n\n" + NOD + "\n\nagain = nod\nother = bow\n"
+        HEAD
+        + "from motions.library.trunk import bow\n\n\n"
+        + NOD
+        + "\n\nagain = nod\nother = bow\n"
     )
     assert list(load_file(written(tmp_path, text))) == ["nod"]
 

@@ -11,7 +11,7 @@ import pytest
 
 from controller.cli.common import ExitCode
 from motions.music import Beats, click_track
-from motions.music.sound import RATE, read_sound
+from motions.music.songs import RATE, read_sound
 from tests.controller.cli.conftest import Run
 from tests.viz.page_reader import read_data
 

@@ -10,7 +10,7 @@ import pytest
 from go2_wbc.errors import TimelineError
 from go2_wbc.robot.model import RobotModel
 from motions.dynamics import DynamicTrajectory, PhaseProblem, Solved, audit, phase_builders, solve
-from motions.dynamics.continuation import continued
+from motions.dynamics.solver import continued
 from tests.motions.dynamics.conftest import PROBLEMS
 
 EXACT = 1e-9
@@ -23,10 +23,10 @@ def jump(plans: dict[str, DynamicTrajectory]) -> Solved:
 
 
 def test_at_its_own_knots_a_plan_is_its_own_start(jump: Solved, model: RobotModel) -> None:
-    start = continued(jump, jump.problem, jump.plan.times, model)
-    np.testing.assert_allclose(start.x[:, :19], jump.plan.q, atol=EXACT)
-    np.testing.assert_allclose(start.x[:, 19:], jump.plan.v, atol=EXACT)
-    np.testing.assert_array_equal(start.tau, jump.plan.tau)
+    x, tau = continued(jump, jump.problem, jump.plan.times, model)
+    np.testing.assert_allclose(x[:, :19], jump.plan.q, atol=EXACT)
+    np.testing.assert_allclose(x[:, 19:], jump.plan.v, atol=EXACT)
+    np.testing.assert_array_equal(tau, jump.plan.tau)
 
 
 def test_a_longer_phase_takes_the_same_states_at_its_ends(jump: Solved, model: RobotModel) -> None:
@@ -35,9 +35,9 @@ def test_a_longer_phase_takes_the_same_states_at_its_ends(jump: Solved, model: R
     phases[1] = replace(push, duration=factor * push.duration)
     begin, end = phases[0].duration, phases[0].duration + push.duration
     times = np.array([begin, begin + factor * push.duration])
-    start = continued(jump, PhaseProblem(tuple(phases)), times, model)
+    x, _ = continued(jump, PhaseProblem(tuple(phases)), times, model)
     rows = np.searchsorted(jump.plan.times, np.array([begin, end]) - EXACT)
-    np.testing.assert_allclose(start.x[:, :19], jump.plan.q[rows], atol=1e-6)
+    np.testing.assert_allclose(x[:, :19], jump.plan.q[rows], atol=1e-6)
 
 
 def test_other_feet_in_a_phase_are_no_start(jump: Solved, model: RobotModel) -> None:

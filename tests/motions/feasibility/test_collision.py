@@ -10,15 +10,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, load_motion
-from motions.feasibility import collision
-from motions.feasibility.collision import SLACK, STRIDE, SelfCollision, self_distance
-from motions.feasibility.hulls import hulls_of
+from motions.feasibility import bodies as geometry
+from motions.feasibility.bodies import SLACK, STRIDE, SelfCollision, hulls_of, self_distance
 from motions.plan.trajectory import trajectory_of
 from tests.engine_helpers import standing_q
+from tests.motions.feasibility.cases import case_of
 
 TOLERANCE = 2e-6  # m; twice what GJK and EPA leave: where they stop depends on where they start
 
@@ -89,7 +88,7 @@ def test_few_pairs_are_looked_at_along_a_motion(
         looked["pairs"] += 1
         return compute(*arguments)
 
-    monkeypatch.setattr(collision.pin, "computeDistance", counted)
+    monkeypatch.setattr(geometry.pin, "computeDistance", counted)
     for name in ("dance", "high_five"):
         q = trajectory_of(compile_timeline(load_motion(name), model), model).q[::STRIDE]
         looked.clear()
@@ -99,16 +98,16 @@ def test_few_pairs_are_looked_at_along_a_motion(
 
 def test_bodies_are_loaded_once_and_again_if_the_file_has_changed(tmp_path: Path) -> None:
     installed = find_description()
-    assert collision.geometry_of(installed) is collision.geometry_of(find_description())
+    assert geometry.geometry_of(installed) is geometry.geometry_of(find_description())
     urdf = tmp_path / "go2.urdf"
     urdf.write_bytes(installed.urdf_path.read_bytes())
     own = find_description(urdf)
-    first = collision.geometry_of(own)
-    assert first is not collision.geometry_of(installed)
-    assert collision.geometry_of(own) is first
+    first = geometry.geometry_of(own)
+    assert first is not geometry.geometry_of(installed)
+    assert geometry.geometry_of(own) is first
     hulls = hulls_of(own)
     os.utime(urdf, ns=(0, 0))
-    assert collision.geometry_of(own) is not first
+    assert geometry.geometry_of(own) is not first
     assert hulls_of(own) is not hulls
     assert hulls_of(own) is hulls_of(own)
 
@@ -122,6 +121,6 @@ def test_a_joint_at_its_stop_brings_no_links_nearer(
     stopped = asked.q[0].copy()
     stopped[9] = model.q_lower[2]
     real, beyond = (bodies.nearest(q)[0] for q in (stopped, asked.q[0]))
-    least = self_distance(asked, bodies, model, FeasibilityLimits()).values.min()
+    least = self_distance(case_of(asked, model), bodies).values.min()
     assert beyond < real - 0.005
     assert least == pytest.approx(real, abs=TOLERANCE)

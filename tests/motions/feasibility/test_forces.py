@@ -34,6 +34,7 @@ from motions.feasibility.forces import (
 from motions.plan.trajectory import Trajectory, trajectory_of
 from motions.postures import NORMAL_FORCE_MAX
 from tests.engine_helpers import state_of
+from tests.motions.feasibility.cases import case_of
 
 EXACT = 1e-5  # N; what the QP's solver leaves, and the motion itself
 
@@ -67,7 +68,7 @@ def test_the_torque_at_speed_is_what_the_motors_of_the_plant_give(
     tau = rng.uniform(-1.2, 1.2, (count, 12)) * model.torque_limits
     zeros = (np.zeros((count, size)) for size in (2, 2, 6))
     forces = Forces(np.zeros((count, 4, 3)), tau, *zeros)
-    _, at_speed = torque(replace(resting, v=v), forces, model, FeasibilityLimits())
+    _, at_speed = torque(case_of(replace(resting, v=v), model, forces))
     lower, upper = MujocoPlant().motor.limits(v[:, 6:])
     drives = tau * v[:, 6:] > 0.0
     drives[:SPREAD] = False  # what a plan begins with is not asked for

@@ -8,14 +8,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.trajectory_loads import lag, least_friction, slide
 from motions import FeasibilityChecker, Timeline, deg
-from motions.feasibility.forces import numbers_of, scale_of_wrench, state_at
-from motions.feasibility.friction import CREEP, HELD, cone, creep, slip
+from motions.feasibility.forces import (
+    CONTACT_RATE,
+    HELD,
+    cone,
+    creep,
+    numbers_of,
+    scale_of_wrench,
+    slip,
+    state_at,
+)
 from tests.engine_helpers import standing_q, state_of
+from tests.motions.feasibility.cases import case_of
 
 BISECTION = 1.5 / 2**7  # what is left of the interval
 INSIDE = 0.02  # of a cone whose pyramid of 16 facets lies inside of it
@@ -83,7 +91,7 @@ def test_joints_hold_a_foot_that_lacks_little(
         forces = np.zeros_like(checked.forces.contact)
         forces[:, 0] = 2.5 + lacks, 0.0, 5.0
         given = replace(checked.forces, contact=forces)
-        series = slip(checked.path, given, model, FeasibilityLimits(), floor=0.5)
+        series = slip(case_of(checked.path, model, given))
         assert (series.values[:, 0].max() > 0.1) == slides
 
 
@@ -138,7 +146,7 @@ def test_feet_creep_by_what_contacts_leave_out(checker: FeasibilityChecker) -> N
     found, model = creep(path, checker.model), checker.model
     for row in range(0, len(path.times), 7):
         J_a = model.snapshot(state_at(path, row)).J_contacts @ path.a[row]
-        np.testing.assert_allclose(found[row], -J_a[:, :2] / CREEP, atol=1e-12)
+        np.testing.assert_allclose(found[row], -J_a[:, :2] / CONTACT_RATE, atol=1e-12)
     assert np.abs(found).max() > 0.01
 
 

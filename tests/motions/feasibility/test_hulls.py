@@ -12,8 +12,7 @@ import pytest
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker, Timeline, compile_timeline, deg
 from motions.batch_kinematics import configurations
-from motions.feasibility.collision import SelfCollision
-from motions.feasibility.hulls import FAR, LinkHulls
+from motions.feasibility.bodies import FAR, LinkHulls, SelfCollision
 from motions.plan.trajectory import Trajectory, trajectory_of
 
 EXACT = 1e-9  # m; rounding of sums

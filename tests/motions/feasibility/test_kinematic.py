@@ -12,10 +12,10 @@ from go2_wbc.legs import LEGS, Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
-from motions.feasibility.collision import SelfCollision
-from motions.feasibility.hulls import LinkHulls
+from motions.feasibility.bodies import LinkHulls, SelfCollision
 from motions.feasibility.kinematic import clearance, ends, joint_position
 from motions.plan.trajectory import Trajectory, trajectory_of
+from tests.motions.feasibility.cases import case_of
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def raising(plan: MotionPlan, model: RobotModel) -> Trajectory:
 def test_only_a_standing_foot_is_excused_from_clearance(
     model: RobotModel, hulls: LinkHulls, raising: Trajectory
 ) -> None:
-    series = clearance(raising, model, hulls, FeasibilityLimits())
+    series = clearance(case_of(raising, model), hulls)
     unchecked = np.isnan(series.margins)
     for leg in LEGS:
         foot = unchecked[:, series.subjects.index(f"{leg.name} foot")]
@@ -50,7 +50,7 @@ def test_where_it_is_solved_a_foot_stands_until_it_has_lifted_off(
 ) -> None:
     """Far jumps sank by 7 mm in the last step of the push-off, and were refused though done."""
     solved = replace(raising, is_dynamic=np.ones(len(raising.times), dtype=bool))
-    unchecked = np.isnan(clearance(solved, model, hulls, FeasibilityLimits()).margins)
+    unchecked = np.isnan(clearance(case_of(solved, model), hulls).margins)
     stands = raising.stance
     lifts = stands[:-1] & ~stands[1:]
     assert lifts.any()
@@ -66,7 +66,7 @@ def test_the_ends_are_the_very_first_and_the_very_last_sample(
     rpy[row, 2] -= 0.2
     v[row, 9] = -0.9
     bent = replace(raising, q=q, rpy=rpy, v=v)
-    series = ends(plan, bent, model, FeasibilityLimits())
+    series = ends(case_of(bent, model), plan)
     values = dict(zip(series.subjects, series.values[0].tolist(), strict=True))
     expected = {f"{end} place": 0.07, f"{end} attitude": 0.2, f"{end} speed": 0.9}
     other = {name: value for name, value in values.items() if name not in expected}
@@ -81,7 +81,7 @@ def test_a_motion_that_begins_or_ends_with_a_foot_in_the_air_has_no_place(
     stance, q = raising.stance.copy(), raising.q.copy()
     stance[row, 2] = False
     q[row, 7 + 8] -= 0.2  # the calf, bent: the foot is raised
-    series = ends(plan, replace(raising, stance=stance, q=q), model, FeasibilityLimits())
+    series = ends(case_of(replace(raising, stance=stance, q=q), model), plan)
     broken = {finding.subject for finding in series.findings() if finding.margin < 0.0}
     assert broken == {f"{end} place"}
 
@@ -91,7 +91,7 @@ def test_a_foot_that_is_lifted_from_the_first_instant_on_still_stands_then(
 ) -> None:
     stance = raising.stance.copy()
     stance[0, 2] = False
-    series = ends(plan, replace(raising, stance=stance), model, FeasibilityLimits())
+    series = ends(case_of(replace(raising, stance=stance), model), plan)
     assert not series.is_broken
 
 
@@ -100,7 +100,7 @@ def test_calves_of_solved_parts_may_come_nearer_to_the_ground(
 ) -> None:
     """Deep push-offs pass 1.1 to 1.9 mm above it, and were refused though nothing touched."""
     limits, is_dynamic = FeasibilityLimits(), np.arange(len(raising.times)) < 10
-    series = clearance(replace(raising, is_dynamic=is_dynamic), model, hulls, limits)
+    series = clearance(case_of(replace(raising, is_dynamic=is_dynamic), model), hulls)
     floor = series.limits[:, series.subjects.index("FL calf")]
     assert set(floor[:10]) == {limits.solved_calf_clearance}
     assert set(floor[10:]) == {limits.calf_clearance}
@@ -111,13 +111,13 @@ def test_a_trunk_may_sink_to_a_leg_at_its_stop_for_a_moment(
     rows: int, passes: bool, model: RobotModel, raising: Trajectory
 ) -> None:
     """Up to 0.17 s all were done that were refused for this alone, from 0.22 s on half."""
-    limits, calf = FeasibilityLimits(), int(Leg.FL.joints.stop) - 1
+    calf = int(Leg.FL.joints.stop) - 1
     at = slice(10, 10 + rows)
     assert raising.stance[at].all()
     for beyond, is_near in ((0.2, True), (0.3, passes), (0.7, False)):  # 9, 21 and 35 mm
         q = raising.q.copy()
         q[at, 7 + calf] = model.q_upper[calf] + beyond
-        margins = joint_position(replace(raising, q=q), model, limits).margins[at, calf]
+        margins = joint_position(case_of(replace(raising, q=q), model)).margins[at, calf]
         assert (margins >= 0.0).all() == is_near, beyond
 
 
@@ -128,7 +128,7 @@ def test_a_calf_may_go_down_with_a_foot_that_is_to_be_below_the_ground(
     limits, stance, q = FeasibilityLimits(), raising.stance.copy(), raising.q.copy()
     stance[:10, Leg.FL] = False
     q[:10, 2] -= 0.005
-    series = clearance(replace(raising, stance=stance, q=q), model, hulls, limits)
+    series = clearance(case_of(replace(raising, stance=stance, q=q), model), hulls)
     floor = series.limits[:10, series.subjects.index("FL calf")]
     np.testing.assert_allclose(floor, limits.calf_clearance - 0.005, atol=1e-4)
     standing = series.limits[:10, series.subjects.index("RR calf")]

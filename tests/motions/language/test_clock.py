@@ -14,26 +14,25 @@ from motions.language.keys import BalanceShift, LegKey
 
 EXACT = 1e-9
 SONG = (0.5, 1.0, 1.6, 2.4)
+COUNTED = Timeline().on_beats(SONG)
 
 
-def test_moves_start_and_end_on_the_beats_of_a_song() -> None:
-    line = Timeline().on_beats(SONG).at(1).body(z=-0.05, over=1).hold(1).home(over=1)
-    spans = [instant for key in line.keys for instant in (key.start, key.end)]
-    assert spans == pytest.approx([1.0, 1.6, 2.4, 3.2])
-
-
-def test_between_two_beats_time_goes_evenly() -> None:
-    line = Timeline().on_beats(SONG).at(0.5).body(z=-0.05, over=1.0)
-    assert (line.keys[0].start, line.keys[0].end) == pytest.approx((0.75, 1.3))
-
-
-def test_a_move_before_the_first_beat_lasts_as_the_first_two_are_apart() -> None:
-    line = Timeline().on_beats(SONG).body(z=-0.05, over=1.0)
-    assert (line.keys[0].start, line.keys[0].end) == pytest.approx((0.0, 0.5))
+@pytest.mark.parametrize(
+    ("line", "instants"),
+    [
+        (COUNTED.at(1).body(z=-0.05, over=1).hold(1).home(over=1), (1.0, 1.6, 2.4, 3.2)),
+        (COUNTED.at(0.5).body(z=-0.05, over=1.0), (0.75, 1.3)),  # evenly between two beats
+        (COUNTED.body(z=-0.05, over=1.0), (0.0, 0.5)),  # before the first, as the first two
+    ],
+)
+def test_moves_start_and_end_on_the_beats_of_a_song(
+    line: Timeline, instants: tuple[float, ...]
+) -> None:
+    assert [t for key in line.keys for t in (key.start, key.end)] == pytest.approx(instants)
 
 
 def test_before_a_raise_the_trunk_moves_aside_in_whole_beats() -> None:
-    line = Timeline().on_beats(SONG).at(0).foot("FR", z=0.05, over=1)
+    line = COUNTED.at(0).foot("FR", z=0.05, over=1)
     (shift,), (up,) = line.in_order(BalanceShift), line.in_order(LegKey)
     assert (shift.start, shift.end) == pytest.approx((0.5, 1.6))
     assert up.end == pytest.approx(2.4)
@@ -70,18 +69,19 @@ def test_beats_that_are_none_are_refused(times: tuple[float, ...], words: str) -
         Timeline().on_beats(times)
 
 
-def test_a_motion_knows_the_beats_of_its_song() -> None:
-    line = Timeline().on_beats(SONG).at(1).body(z=-0.05, over=1).hold(1).home(over=1)
-    assert line.beats == pytest.approx([0.5, 1.0, 1.6, 2.4, 3.2])
-
-
-def test_without_a_tempo_there_are_no_beats() -> None:
-    assert Timeline().body(z=-0.05, over=1.0).beats == ()
-
-
-def test_beats_are_counted_from_where_the_tempo_was_set() -> None:
-    line = Timeline().hold(0.7).bpm(120).hold(2).bpm(60).hold(2)
-    assert line.beats == pytest.approx([0.7, 1.2, 1.7, 2.7, 3.7])
+@pytest.mark.parametrize(
+    ("line", "beats"),
+    [
+        (COUNTED.at(1).body(z=-0.05, over=1).hold(1).home(over=1), (0.5, 1.0, 1.6, 2.4, 3.2)),
+        (Timeline().body(z=-0.05, over=1.0), ()),
+        (Timeline().hold(0.7).bpm(120).hold(2).bpm(60).hold(2), (0.7, 1.2, 1.7, 2.7, 3.7)),
+        (Timeline().bpm(1e9).hold(1e9), ()),  # nobody counts so fast
+    ],
+)
+def test_a_motion_knows_its_beats_from_where_a_tempo_was_set(
+    line: Timeline, beats: tuple[float, ...]
+) -> None:
+    assert line.beats == pytest.approx(beats)
 
 
 def test_a_motion_that_follows_keeps_its_own_beats() -> None:
@@ -90,8 +90,3 @@ def test_a_motion_that_follows_keeps_its_own_beats() -> None:
     assert line.beats == pytest.approx([0.0, 1.0, 1.4, 1.9, 2.4, 3.4])
     assert line.scale_time(2.0).beats == pytest.approx([2.0 * beat for beat in line.beats])
     assert line.reverse().beats == pytest.approx([0.0, 1.0, 1.5, 2.0, 2.4, 3.4])
-
-
-def test_beats_that_nobody_counts_are_left_out() -> None:
-    line = Timeline().bpm(1e9).hold(1e9)
-    assert line.beats == ()

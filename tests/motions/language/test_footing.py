@@ -16,9 +16,7 @@ from motions.postures import standing_feet
 MODEL = RobotModel()
 NOMINAL = standing_feet(MODEL)
 EXACT = 1e-9
-RIPPLE = (
-    0.08  # share of the speed; minimum jerk over a round, two pairs half a round apart, has 6 %
-)
+RIPPLE = 0.08  # share of the speed; minimum jerk over a round, pairs half a round apart, has 6 %
 
 
 def test_a_swing_begins_and_ends_at_rest_and_rises_to_its_height() -> None:

@@ -111,19 +111,7 @@ def test_a_step_out_of_reach_is_a_finding_and_no_near_miss() -> None:
         (lambda line, gait: line.walk(0.3, -0.05, deg(20), gait=gait), (0.3, -0.05, deg(20))),
         (lambda line, gait: line.turn(deg(-50), gait=gait), (0.0, 0.0, deg(-50))),
         (lambda line, gait: line.side_step(0.12, gait=gait), (0.0, 0.12, 0.0)),
-        (
-            lambda line, gait: line.path(
-                [
-                    (0.2, 0.0),
-                    (
-                        0.3,
-                        0.1,
-                    ),
-                ],
-                gait=gait,
-            ),
-            (0.3, 0.1, None),
-        ),
+        (lambda line, gait: line.path([(0.2, 0.0), (0.3, 0.1)], gait=gait), (0.3, 0.1, None)),
         (lambda line, gait: line.path([(0.2, 0.1, deg(15))], gait=gait), (0.2, 0.1, deg(15))),
         (lambda line, gait: line.walk(over=4.0, gait=gait), (0.0, 0.0, 0.0)),
     ],

@@ -19,7 +19,7 @@ from go2_wbc.robot.leg_kinematics import LegGeometry, foot_places, leg_angles
 from motions import Timeline, compile_timeline, deg
 from motions.language.keys import BalanceShift, BodyKey, LegKey
 from motions.language.timeline_data import SHIFT_TIME
-from motions.plan.contact_schedule import FootContacts
+from motions.plan.quasi_static import FootContacts
 from motions.postures import home_poses
 from tests.motions.plans import MODEL, curves_at, plan_of
 

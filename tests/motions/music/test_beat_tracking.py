@@ -110,7 +110,7 @@ def test_a_file_that_is_no_song_is_refused(tmp_path: Path) -> None:
 def test_a_song_of_hours_is_refused_before_it_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("motions.music.sound.LONGEST", 5.0)
+    monkeypatch.setattr("motions.music.songs.LONGEST", 5.0)
     with pytest.raises(CommandError, match="is 12 s long, 5 s at most"):
         beats(saved(click_track(90.0, SECONDS), tmp_path))
 

@@ -10,7 +10,7 @@ import pytest
 from go2_wbc.geometry import support_margins
 from go2_wbc.legs import Leg
 from go2_wbc.robot.model import RobotModel
-from motions.plan.com_trajectory import INSIDE, OFF_LINE, Stepping, SwayProblem
+from motions.plan.balance import INSIDE, OFF_LINE, Stepping, SwayProblem
 from motions.postures import standing_feet
 
 NOMINAL = standing_feet(RobotModel())

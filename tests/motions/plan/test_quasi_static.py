@@ -25,7 +25,7 @@ from motions import (
     find_motion,
     load_motion,
 )
-from motions.feasibility import collision, tracking
+from motions.feasibility import bodies, tracking
 from motions.language.keys import Mark
 from motions.plan import balance, tracks
 
@@ -128,7 +128,7 @@ def test_the_work_of_checking_grows_as_the_motion_does(
             counted(patch, counts, checker.model, "inverse_dynamics", lambda *_: 1)
             counted(patch, counts, checker.model, "snapshot", lambda *_: 1)
             counted(patch, counts, checker.model, "center_of_mass", lambda *_: 1)
-            counted(patch, counts, collision.pin, "computeDistance", lambda *_: 1)
+            counted(patch, counts, bodies.pin, "computeDistance", lambda *_: 1)
             samples[seconds] = len(checker.evaluate(plan).path.times)
         assert counts["inverse_dynamics"] == samples[seconds]
         # Nothing else is asked for one instant after the other; the moments of inertia twice, and

@@ -37,21 +37,20 @@ def spans(path: Trajectory, *broken: float) -> list[tuple[float, float]]:
     return [(round(piece.start, 2), round(piece.end, 2)) for piece in pieces]
 
 
-def test_a_part_reaches_from_rest_to_rest_with_a_lead(path: Trajectory) -> None:
-    assert spans(path, 1.0) == [(0.5 - LEAD, 1.7 + LEAD)]
-
-
-def test_poses_without_a_hold_between_them_are_one_part(path: Trajectory) -> None:
-    assert spans(path, 0.6, 1.6) == spans(path, 1.0)
-
-
-def test_every_broken_part_is_mended_and_the_ends_bound_the_last(path: Trajectory) -> None:
-    assert spans(path, 1.0, 3.0) == [(0.2, 2.0), (2.4, 3.95)]
-    assert spans(path) == []
-
-
-def test_a_rest_that_breaks_a_limit_itself_is_no_end(path: Trajectory) -> None:
-    assert spans(path, 2.2) == [(0.2, 3.95)]
+@pytest.mark.parametrize(
+    ("broken", "mended"),
+    [
+        ((1.0,), [(0.5 - LEAD, 1.7 + LEAD)]),  # from rest to rest, with a lead
+        ((0.6, 1.6), [(0.5 - LEAD, 1.7 + LEAD)]),  # poses without a hold between them
+        ((1.0, 3.0), [(0.2, 2.0), (2.4, 3.95)]),  # the ends bound the last
+        ((), []),
+        ((2.2,), [(0.2, 3.95)]),  # a rest that breaks a limit itself is no end
+    ],
+)
+def test_every_part_that_is_broken_is_mended(
+    path: Trajectory, broken: tuple[float, ...], mended: list[tuple[float, float]]
+) -> None:
+    assert spans(path, *broken) == mended
 
 
 def test_at_a_rest_that_was_checked_elsewhere_nothing_ends(path: Trajectory) -> None:
