@@ -22,9 +22,6 @@ COMMANDS: tuple[Command, ...] = (
     Command("golden", "benchmarks.golden", "is every tick what it was, to the last bit?"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
     Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
-    Command(
-        "jump_limits", "benchmarks.studies.jump_limits", "the greatest jumps, what forbids more"
-    ),
     Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),
     Command("false_negatives", "benchmarks.false_negatives", "do motions that passed fall?"),
     Command("sweeps", "benchmarks.sweeping", "a second worker, memory, the time of a certificate"),
@@ -39,6 +36,10 @@ ALIASES = {
     "trust": "false_negatives",
 }
 """Former names of commands."""
+GONE = {
+    "jump_limits": "docs/explanation/dynamics.md has its results, commit 55f699b its program",
+}
+"""What is no command any more, and where it is."""
 EXAMPLES = """
 python -m benchmarks --list                     these benchmarks
 python -m benchmarks behaviour --list           the metrics of one, and their thresholds
@@ -56,6 +57,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     if arguments[:1] and arguments[0] in ALIASES:
         arguments[0] = ALIASES[arguments[0]]
+    if arguments[:1] and arguments[0] in GONE:
+        print(f"{arguments[0]} is gone: {GONE[arguments[0]]}", file=sys.stderr)
+        return ExitCode.USAGE
     if arguments == ["--list"]:
         for command in COMMANDS:
             print(f"{command.name:<18}{command.summary}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.high_five import highest_window
 from benchmarks.robots import standing_failure, way_between
-from benchmarks.study import Direction, Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from controller.demo.run import DemoProgress, run_demo
 from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.legs import LEGS, Leg
@@ -34,15 +34,8 @@ PAW_HEIGHT, PAW_TIME = 0.60, 1.9
 PAW_SUPPORT = 5.0
 """N on every other foot meanwhile."""
 
-_ITEM = "whole demo sequence"
-METRICS = (
-    Metric("demo.done", _ITEM, "share of seeds done", "", 1.0, Direction.AT_LEAST),
-    Metric("demo.untrue", _ITEM, "True that does not hold", "", 0.0),
-    Metric("demo.pace", "whole run headless", "real-time factor, CPU", "", 2.5, Direction.AT_LEAST),
-)
 
-
-def measure(trial: Trial) -> Measurement:
+def measure(trial: Trial, found: TrialResult) -> None:
     """Run the demo and check every step that it calls done against the simulator.
 
     - share of seeds done: 1 for a trial in which every step was done, 0 for any other;
@@ -57,14 +50,14 @@ def measure(trial: Trial) -> Measurement:
         report = run_demo(robot.go2, check)
         robot_time, recording_time = robot.plant.time, robot.truth.cpu_time
     cpu_time = time.process_time() - cpu_start - recording_time
-    values = {
-        "demo.done": float(report.ok),
-        "demo.untrue": float(len(check.untrue)),
-        "demo.pace": robot_time / cpu_time,
+    found.values = {
+        "done": float(report.ok),
+        "untrue": float(len(check.untrue)),
+        "pace": robot_time / cpu_time,
     }
     undone = [f"{step.name}: {step.reason}" for step in report.steps if not step.ok]
-    failures = {"demo.done": "; ".join(undone), "demo.untrue": "; ".join(check.untrue)}
-    return Measurement(values, {name: why for name, why in failures.items() if why})
+    failures = {"done": "; ".join(undone), "untrue": "; ".join(check.untrue)}
+    found.failures = {name: why for name, why in failures.items() if why}
 
 
 class StepCheck:
@@ -154,4 +147,11 @@ CRITERIA: dict[str, Callable[[TrialRobot, RobotState], str | None]] = {
 """What is missing for a step to be true, by the step's name; every step must have one."""
 
 
-STUDY = Study("sequence", METRICS, measure, seed_factor=5)
+TABLE = {
+    "whole demo sequence": (
+        ("done", "share of seeds done", ">= 1"),
+        ("untrue", "True that does not hold", "<= 0"),
+    ),
+    "whole run headless": (("pace", "real-time factor, CPU", ">= 2.5"),),
+}
+STUDY = Study("sequence", TABLE, measure, "demo", seed_factor=5)

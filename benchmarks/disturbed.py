@@ -17,9 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.locomotion import MASS_RANGE
-from benchmarks.robots import PUSH_TIME, heading_force, plant_of
-from benchmarks.study import Measurement, Metric, Study
+from benchmarks.robots import PUSH_TIME, UNTOLD, heading_force, plant_of
+from benchmarks.study import Study, TrialResult
 from controller.modes import Mode
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.contacts import GAITS
@@ -151,10 +150,10 @@ class Watch:
             self._fell, self._fell_as = (self._touches_since if lies else now), mode
 
 
-def measure_disturbed(trial: Trial) -> Measurement:
+def measure_disturbed(trial: Trial, found: TrialResult) -> None:
     """Call at random, push at random, and let the robot recover from every fall."""
     rng = np.random.default_rng(FIRST_SEED + trial.seed)
-    with TrialRobot(plant_of(trial, FIRST_SEED, MASS_RANGE)) as robot:
+    with TrialRobot(plant_of(trial, FIRST_SEED, UNTOLD)) as robot:
         watch = Watch(robot, rng)
         robot.truth.on_tick = watch.look
         for _ in range(CALLS):
@@ -168,11 +167,10 @@ def measure_disturbed(trial: Trial) -> Measurement:
             robot.go2.wait(2.0 * NOTICED)
         falls, longest = watch.all_falls, watch.delay  # what comes now is the end
     late = [str(fall) for fall in falls if not fall.delay <= NOTICED]
-    return Measurement(
-        {"disturbed.delay": longest, "disturbed.falls": float(len(falls))},
-        {"disturbed.delay": "; ".join(late)} if late else {},
-        notes={"disturbed.falls": "; ".join(map(str, falls))},
-    )
+    found.values = {"delay": longest, "falls": float(len(falls))}
+    found.notes["falls"] = "; ".join(map(str, falls))
+    if late:
+        found.failures["delay"] = "; ".join(late)
 
 
 def _make(robot: TrialRobot, watch: Watch, what: str, rng: np.random.Generator) -> None:
@@ -199,9 +197,8 @@ def _make(robot: TrialRobot, watch: Watch, what: str, rng: np.random.Generator) 
         return
 
 
-_ITEM = "random calls and pushes"
-METRICS = (
-    Metric("disturbed.delay", _ITEM, "longest delay of notice", "s", NOTICED),
-    Metric("disturbed.falls", _ITEM, "falls", "", None),
+ROWS = (
+    ("delay", "longest delay of notice", f"<= {NOTICED:g} s"),
+    ("falls", "falls", ""),
 )
-STUDY = Study("disturbed", METRICS, measure_disturbed, 50, "truth")
+STUDY = Study("disturbed", {"random calls and pushes": ROWS}, measure_disturbed, seed_factor=50)

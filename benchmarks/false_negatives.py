@@ -123,14 +123,9 @@ def passed_play(seed: int) -> dict[str, object]:
     is_passed = FeasibilityChecker(model(), world=world).check(plan).ok
     harm = played(plan, world, FIRST_WORLD + seed) if is_passed else ()
     return {
-        "motion": name,
-        "stratum": stratum,
-        "friction": world.friction,
-        "payload": world.payload,
-        "passed": is_passed,
-        "done": is_passed and not harm,
-        "fell": FELL in harm,
-        "harm": "; ".join(harm),
+        **{"motion": name, "stratum": stratum},
+        **{"friction": world.friction, "payload": world.payload, "passed": is_passed},
+        **{"done": is_passed and not harm, "fell": FELL in harm, "harm": "; ".join(harm)},
     }
 
 
@@ -150,14 +145,11 @@ def _asked(number: int) -> tuple[str, str, MotionPlan]:
 @lru_cache(maxsize=1)
 def _library() -> list[str]:
     """The motions of the library that begin on four feet or sitting, shuffled."""
-    names = [
-        name
-        for name in motion_names()
-        if compile_motion(name, model()).entry in (Posture.STAND, Posture.SIT)
-    ]
-    return [names[k] for k in np.random.default_rng(_STREAM).permutation(len(names))]
+    begins = {name: compile_motion(name, model()).entry for name in motion_names()}
+    names = [name for name, entry in begins.items() if entry in (Posture.STAND, Posture.SIT)]
+    return [names[k] for k in _order(len(names))]
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=2)
 def _order(count: int) -> list[int]:
     return np.random.default_rng(_STREAM).permutation(count).tolist()

@@ -25,10 +25,11 @@ import numpy as np
 
 from benchmarks import library, truth_vs_estimate
 from benchmarks.command import Benchmark
-from benchmarks.robots import plant_of
-from benchmarks.study import Measurement, Metric, Study, sensed
+from benchmarks.robots import UNTOLD, plant_of
+from benchmarks.study import Study, TrialResult
 from benchmarks.unknown_world import STUDIES as UNKNOWN
 from controller.motion_measurement import FULL
+from controller.sweeps.studies import set_off
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.planning.command import VelocityCommand, VelocityEnvelope
@@ -38,8 +39,6 @@ from go2_wbc.robot.model import RobotModel
 
 FIRST_SEED = 14000
 """Seed of the first trial that is judged; those from 4000 on were, and causes found on them."""
-MASS_RANGE = (0.9, 1.1)
-"""Factor on every mass and inertia of the robot; the controller is not told."""
 START_TIME, WINDOW = 3.0, 20.0
 """Time [s] after a command that is left out, and that is measured."""
 BEYOND = Config(envelope=VelocityEnvelope(forward=4.0))
@@ -71,21 +70,24 @@ class Run:
     speed: float | None = 1.0
 
     @property
-    def metrics(self) -> tuple[Metric, ...]:
-        """The rows of the report."""
+    def study(self) -> Study:
+        """Its rows and its trial."""
         c = self.command
         item = f"{self.gait} ({c.linear_x:g}, {c.linear_y:g}) m/s, {c.angular_z:g} rad/s, 20 s"
-        turning = [Metric(f"{self.name}.turn", item, "mean turning error", "%", self.mean)]
-        moving = [
-            Metric(f"{self.name}.mean", item, "mean velocity error", "%", self.mean),
-            Metric(f"{self.name}.mae", item, "mean absolute error", "m/s", self.mae),
+        rows = [
+            ("mean", "mean velocity error", _bar(self.mean, "%")),
+            ("mae", "mean absolute error", _bar(self.mae, "m/s")),
+            ("turn", "mean turning error", _bar(self.mean, "%")),
+            ("saturated", "saturated ticks", _bar(self.saturated, "%")),
+            ("speed", "peak joint speed / limit", _bar(self.speed, "")),
         ]
-        return (
-            *(moving if speed_of(c) else ()),
-            *(turning if c.angular_z else ()),
-            Metric(f"{self.name}.saturated", item, "saturated ticks", "%", self.saturated),
-            Metric(f"{self.name}.speed", item, "peak joint speed / limit", "", self.speed),
-        )
+        first, last = 0 if speed_of(c) else 2, 3 if c.angular_z else 2
+        table = {item: (*rows[first:last], *rows[3:])}
+        return Study(self.name, table, partial(measure_run, run=self), group=self.group)
+
+
+def _bar(most: float | None, unit: str) -> str:
+    return unit if most is None else f"<= {most:g} {unit}".rstrip()
 
 
 def speed_of(command: VelocityCommand) -> float:
@@ -93,35 +95,33 @@ def speed_of(command: VelocityCommand) -> float:
     return math.hypot(command.linear_x, command.linear_y)
 
 
-def measure_run(trial: Trial, run: Run) -> Measurement:
+def measure_run(trial: Trial, found: TrialResult, run: Run) -> None:
     """Follow the command; see the module's docstring for what is measured."""
-    command, plant = run.command, plant_of(trial, FIRST_SEED, MASS_RANGE)
-    with TrialRobot(plant, BEYOND if speed_of(command) > TROT.forward else None) as robot:
-        robot.require(robot.go2.stand())
-        robot.require(robot.go2.walk(run.gait))
-        robot.go2.move(command.linear_x, command.angular_z, linear_y=command.linear_y)
-        robot.truth.clear()
+    plant, config = plant_of(trial, FIRST_SEED, UNTOLD), None
+    if speed_of(run.command) > TROT.forward:
+        config = BEYOND
+    with TrialRobot(plant, config) as robot:
+        set_off(robot, run.gait, run.command)
         robot.wait(START_TIME + WINDOW)
         recorded = robot.truth.recording()
-    return Measurement(measured(run, recorded.since(recorded.time[0] + START_TIME)))
+    found.values = measured(run, recorded.since(recorded.time[0] + START_TIME))
 
 
 def measured(run: Run, window: TruthRecording) -> dict[str, float]:
-    """The values of the run's metrics."""
-    command, model, name = run.command, RobotModel(), run.name
-    wanted = speed_of(command)
+    """The values of the run's rows."""
+    command, model, wanted = run.command, RobotModel(), speed_of(run.command)
     values = {
-        f"{name}.saturated": 100.0 * float((window.torque_shares(model) >= FULL).mean()),
-        f"{name}.speed": window.peak_speed_share(model),
+        "saturated": 100.0 * float((window.torque_shares(model) >= FULL).mean()),
+        "speed": window.peak_speed_share(model),
     }
     if wanted:
         direction = np.array([command.linear_x, command.linear_y]) / wanted
         error = window.com_velocity[:, :2] @ direction - wanted
-        values[f"{name}.mean"] = 100.0 * abs(float(error.mean())) / wanted
-        values[f"{name}.mae"] = float(np.abs(error).mean())
+        values["mean"] = 100.0 * abs(float(error.mean())) / wanted
+        values["mae"] = float(np.abs(error).mean())
     if command.angular_z:
         rate = (window.rpy[-1, 2] - window.rpy[0, 2]) / (window.time[-1] - window.time[0])
-        values[f"{name}.turn"] = 100.0 * abs(rate / command.angular_z - 1.0)
+        values["turn"] = 100.0 * abs(rate / command.angular_z - 1.0)
     return values
 
 
@@ -157,13 +157,9 @@ ON_SENSORS = (
 """The same on its own sensors; at 3 m/s all that is asked for is not to fall, at 3.5 nothing."""
 
 
-def _study(run: Run) -> Study:
-    return Study(run.name, run.metrics, partial(measure_run, run=run), group=run.group)
-
-
 STUDIES = (
-    *map(_study, RUNS),
-    *(sensed(_study(run), "sensors") for run in ON_SENSORS),
+    *(run.study for run in RUNS),
+    *(run.study.sensed("sensors") for run in ON_SENSORS),
     *truth_vs_estimate.STUDIES,
     library.ON_SENSORS,
     *UNKNOWN,
@@ -176,9 +172,6 @@ BENCHMARK = Benchmark(
     "Every gait at its speeds: how exactly, and within which limits.",
     STUDIES,
     takes="an hour on two cores",
-    examples=(
-        "--rows sensors",
-        "--rows ahead-2.5 gaits --json",
-    ),
+    examples=("--rows sensors", "--rows ahead-2.5 gaits --json"),
 )
 register, run = BENCHMARK.register, BENCHMARK.run

@@ -183,30 +183,22 @@ def calibration(
     for _ in range(RESAMPLES):
         drawn = np.concatenate([rows[i] for i in rng.integers(len(rows), size=len(rows))])
         errors.append(_error(_bins(chances[drawn], done[drawn])))
-    low, high = np.percentile(errors, [2.5, 97.5])
-    rate = done.mean()
-    bins = _bins(chances, done)
-    return Calibration(
-        error=_error(bins),
-        error_interval=(float(low), float(high)),
-        brier=float(((chances - done) ** 2).mean()),
-        brier_of_base_rate=float(rate * (1.0 - rate)),
-        bins=bins,
-    )
+    low, high = np.percentile(errors, [2.5, 97.5]).tolist()
+    rate, bins = float(done.mean()), _bins(chances, done)
+    brier = float(((chances - done) ** 2).mean())
+    return Calibration(_error(bins), (low, high), brier, rate * (1.0 - rate), bins)
 
 
 def _bins(
     chances: Float[np.ndarray, " n"], done: Bool[np.ndarray, " n"]
 ) -> tuple[tuple[float, float, int], ...]:
     number: Int[np.ndarray, " n"] = np.minimum((chances * BINS).astype(int), BINS - 1)
-    found = []
-    for index in range(BINS):
-        inside = number == index
-        if inside.any():
-            found.append(
-                (float(chances[inside].mean()), float(done[inside].mean()), int(inside.sum()))
-            )
-    return tuple(found)
+    groups = (number == index for index in range(BINS))
+    return tuple(
+        (float(chances[own].mean()), float(done[own].mean()), int(own.sum()))
+        for own in groups
+        if own.any()
+    )
 
 
 def _error(bins: tuple[tuple[float, float, int], ...]) -> float:

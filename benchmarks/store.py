@@ -9,12 +9,12 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 
-from benchmarks.study import Measurement, Study
+from benchmarks.study import Study, TrialResult
 from controller.sweeps.identity import SOURCES, identity
 from controller.sweeps.rows import SEED, Row
 from controller.sweeps.run import remove_sweep
@@ -26,7 +26,7 @@ ROOT = Path(__file__).resolve().parent.parent
 FOLDER = Path("out/benchmarks")
 """Where finished trials are kept, in a folder for each benchmark."""
 _WORDS = ("failures", "notes", "not_asked")
-"""Of a measurement, by metric."""
+"""Of a trial, by row."""
 
 
 def settings_header() -> dict[str, str]:
@@ -39,7 +39,7 @@ class Store:
     """The finished trials of studies. A context manager.
 
     Attributes:
-        finished: measurements of the run that is resumed, by study and seed.
+        finished: trials of the run that is resumed, by study and seed.
     """
 
     def __init__(self, folder: Path, studies: Iterable[Study], *, resume: bool) -> None:
@@ -49,7 +49,7 @@ class Store:
             ConfigError: if a file cannot be written, is not such a file, or holds trials under
                 other settings.
         """
-        self.finished: dict[tuple[str, int], Measurement] = {}
+        self.finished: dict[tuple[str, int], TrialResult] = {}
         self._files: dict[str, SweepFile] = {}
         self._exits, header = ExitStack(), settings_header()
         for study in studies:
@@ -66,11 +66,11 @@ class Store:
                 raise ConfigError(f"{error}; run without --resume to begin anew") from error
             self._files[study.name] = rows
             for row in rows.rows():
-                self.finished[study.name, int(row[SEED])] = measurement_of(study, row)
+                self.finished[study.name, int(row[SEED])] = result_of(study, row)
 
-    def add(self, study: Study, seed: int, measurement: Measurement) -> None:
+    def add(self, study: Study, seed: int, result: TrialResult) -> None:
         """Keep a trial: whoever kills the process leaves all of it or nothing."""
-        self._files[study.name].add(seed, row_of(study, measurement))
+        self._files[study.name].add(seed, row_of(study, result))
 
     def __enter__(self) -> Store:
         return self
@@ -89,16 +89,16 @@ def file_of(folder: Path, study: Study) -> Path:
     return folder / f"{study.name.replace(', ', '-').replace(' ', '_')}.sqlite"
 
 
-def row_of(study: Study, measurement: Measurement) -> Row:
-    """A measurement as the row of a sweep; nan is no value."""
-    values = {m.name: float(measurement.values.get(m.name, math.nan)) for m in study.metrics}
-    words = {name: json.dumps(dict(getattr(measurement, name))) for name in _WORDS}
-    return {**values, "reason": measurement.reason, **words}
+def row_of(study: Study, result: TrialResult) -> Row:
+    """A trial as the row of a sweep; nan is no value."""
+    values = {m.name: float(result.values.get(m.name, math.nan)) for m in study.metrics}
+    words = {name: json.dumps(getattr(result, name)) for name in _WORDS}
+    return {**values, "reason": result.reason, **words}
 
 
-def measurement_of(study: Study, row: Row) -> Measurement:
-    """The measurement that a row keeps."""
+def result_of(study: Study, row: Row) -> TrialResult:
+    """The trial that a row keeps."""
     values = {m.name: float(row[m.name]) for m in study.metrics}
-    words: Mapping[str, dict[str, str]] = {name: json.loads(str(row[name])) for name in _WORDS}
+    words = {name: json.loads(str(row[name])) for name in _WORDS}
     known = {name: value for name, value in values.items() if not math.isnan(value)}
-    return Measurement(known, reason=str(row["reason"]), **words)
+    return TrialResult(known, reason=str(row["reason"]), **words)

@@ -27,8 +27,8 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.robots import com_height
-from benchmarks.study import IDEAL, Direction, Measurement, Metric, Study, sensed
+from benchmarks.robots import FRICTION_RANGE, UNTOLD, com_height
+from benchmarks.study import IDEAL, Study, TrialResult
 from controller.sweeps.trials import JOINT_NOISE, Trial, TrialFailed, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.plant import MujocoPlant
@@ -40,15 +40,14 @@ from motions.postures import STAND_HEIGHT
 
 FIRST_SEED = 14200
 """Seed of the first trial that is judged; those from 4200 on were, and causes found on them."""
-FRICTION_RANGE, MASS_RANGE = (0.6, 1.0), (0.9, 1.1)
 HEADING_RANGE = math.radians(5.0)
 """By which the heading at the start is off its way, at most, on either side [rad]."""
 LEAST_SHARE = 0.9
 """Of the wanted way, that has to be walked."""
 RAMP_UP = 1.0
 """Time [s] after the command that is left out."""
-REST, SAMPLING = 3.0, 10
-"""Time [s] over which height and tilt are averaged, and ticks from one sample to the next."""
+REST = 3.0
+"""Time [s] over which height and tilt are averaged."""
 STEEP = math.radians(15.0)
 UP, ACROSS, DOWN = 0.0, math.pi / 2, math.pi
 """Headings on a slope [rad]."""
@@ -94,24 +93,20 @@ class Unknown:
     control_period: float = 0.002
 
     @property
-    def metrics(self) -> tuple[Metric, ...]:
-        """The rows of the report."""
-        name, item = self.name, self.item
-        done = Metric(f"{name}.done", item, "share done", "", 1.0, Direction.AT_LEAST)
+    def study(self) -> Study:
+        """Its rows and its trial."""
+        rows = [("done", "share done", ">= 1")]
         if self.payload:
-            return (
-                done,
-                Metric(f"{name}.height", item, "mean height off", "mm", 10.0),
-                Metric(f"{name}.tilt", item, "mean tilt", "deg", 2.0),
-            )
-        if not self.speed:
-            return (done,)
-        return done, Metric(f"{name}.mean", item, "mean velocity error", "%", None)
+            rows += [("height", "mean height off", "<= 10 mm"), ("tilt", "mean tilt", "<= 2 deg")]
+        elif self.speed:
+            rows += [("mean", "mean velocity error", "%")]
+        measure = partial(measure_world, unknown=self)
+        return Study(self.name, {self.item: rows}, measure, done="done", group="unknown")
 
     def plant(self, seed: int, sensors: str = IDEAL) -> MujocoPlant:
         """The simulated robot of a trial."""
         rng = np.random.default_rng(seed)
-        friction, mass = rng.uniform(*FRICTION_RANGE), rng.uniform(*MASS_RANGE)
+        friction, mass = rng.uniform(*FRICTION_RANGE), rng.uniform(*UNTOLD)
         off = rng.uniform(-HEADING_RANGE, HEADING_RANGE)
         terrain = self.terrain
         if isinstance(terrain, Boxes):
@@ -132,52 +127,48 @@ class Unknown:
 
 
 def measure_world(
-    trial: Trial, unknown: Unknown, first_seed: int = FIRST_SEED, config: Config | None = None
-) -> Measurement:
+    trial: Trial, found: TrialResult, unknown: Unknown, first_seed: int = FIRST_SEED
+) -> None:
     """Stand up, walk, come to rest, stand; see the module's docstring."""
-    values = {f"{unknown.name}.done": 0.0}
-    try:
-        with TrialRobot(unknown.plant(first_seed + trial.seed, trial.sensors), config) as robot:
-            robot.require(robot.go2.stand())
-            if unknown.speed:
-                _walk(robot, unknown, values)
-            robot.require(robot.go2.stand())
+    with TrialRobot(unknown.plant(first_seed + trial.seed, trial.sensors)) as robot:
+        robot.require(robot.go2.stand())
+        if unknown.speed:
+            recorded, speed = _trotted(robot, unknown.speed, RAMP_UP, unknown.time)
             if unknown.payload:
-                robot.truth.clear()
-                robot.wait(REST)
-                _note_posture(unknown, robot.truth.recording(), values)
-    except TrialFailed as failed:
-        return Measurement(values, {f"{unknown.name}.done": str(failed)}, str(failed))
-    return Measurement(values | {f"{unknown.name}.done": 1.0})
+                _note_posture(recorded, found)
+            else:
+                found.values["mean"] = 100.0 * abs(speed / unknown.speed - 1.0)
+        robot.require(robot.go2.stand())
+        if unknown.payload:
+            robot.truth.clear()
+            robot.wait(REST)
+            _note_posture(robot.truth.recording(), found)
 
 
-def _walk(robot: TrialRobot, unknown: Unknown, values: dict[str, float]) -> None:
+def _trotted(
+    robot: TrialRobot, speed: float, ramp_up: float, time: float
+) -> tuple[TruthRecording, float]:
+    """What was recorded while it trotted, and its mean speed [m/s]: fast enough, or it failed."""
     robot.require(robot.go2.walk())
-    robot.go2.move(unknown.speed)
-    robot.wait(RAMP_UP)
+    robot.go2.move(speed)
+    robot.wait(ramp_up)
     robot.truth.clear()
-    robot.wait(unknown.time)
+    robot.wait(time)
     recorded = robot.truth.recording()
-    speed = float(recorded.com_velocity[:, 0].mean())
-    if speed < LEAST_SHARE * unknown.speed:
-        raise TrialFailed(f"walked at {speed:.2f} m/s")
-    if unknown.payload:
-        _note_posture(unknown, recorded, values)
-    else:
-        values[f"{unknown.name}.mean"] = 100.0 * abs(speed / unknown.speed - 1.0)
+    reached = float(recorded.com_velocity[:, 0].mean())
+    if reached < LEAST_SHARE * speed:
+        raise TrialFailed(f"walked at {reached:.2f} m/s")
+    return recorded, reached
 
 
-def _note_posture(unknown: Unknown, recorded: TruthRecording, values: dict[str, float]) -> None:
+def _note_posture(recorded: TruthRecording, found: TrialResult) -> None:
     """Mean height and tilt over the last ``REST`` seconds, if worse than what was noted before.
 
     The height is that of the CoM as the model has it, without the payload: what is asked for.
     """
     window = recorded.since(recorded.time[-1] - REST)
-    off = 1000.0 * abs(com_height(window) - STAND_HEIGHT)
-    tilt = math.degrees(float(np.abs(window.rpy[:, :2].mean(axis=0)).max()))
-    for name, value in ("height", off), ("tilt", tilt):
-        key = f"{unknown.name}.{name}"
-        values[key] = max(values.get(key, 0.0), value)
+    found.worsen("height", 1000.0 * abs(com_height(window) - STAND_HEIGHT))
+    found.worsen("tilt", math.degrees(float(np.abs(window.rpy[:, :2].mean(axis=0)).max())))
 
 
 ASIDE = (0.0, 0.08, 0.1)
@@ -222,13 +213,12 @@ class Robot:
     config: Config | None = None
 
     @property
-    def metrics(self) -> tuple[Metric, ...]:
-        """The rows of the report."""
-        done = (
-            Metric(f"{self.name}.{call}", self.item, f"{call} done", "", 1.0, Direction.AT_LEAST)
-            for call in CALLS
-        )
-        return (*done, Metric(f"{self.name}.height", self.item, "height off, trot", "mm", 5.0))
+    def study(self) -> Study:
+        """Its rows and its trial."""
+        rows = [(call, f"{call} done", ">= 1") for call in CALLS]
+        rows.append(("height", "height off, trot", "<= 5 mm"))
+        measure = partial(measure_robot, robot=self)
+        return Study(self.name, {self.item: rows}, measure, group="robots")
 
     def plant(self, seed: int, sensors: str = IDEAL) -> MujocoPlant:
         """The simulated robot of a trial."""
@@ -247,39 +237,31 @@ class Robot:
         )
 
 
-def measure_robot(trial: Trial, robot: Robot, first_seed: int = FIRST_SEED) -> Measurement:
+def measure_robot(
+    trial: Trial, found: TrialResult, robot: Robot, first_seed: int = FIRST_SEED
+) -> None:
     """Ask for everything, one call after the other, until one fails."""
-    values = {f"{robot.name}.{call}": 0.0 for call in CALLS}
+    found.values |= dict.fromkeys(CALLS, 0.0)
     call = CALLS[0]
     try:
         with TrialRobot(robot.plant(first_seed + trial.seed, trial.sensors), robot.config) as tried:
             steps: tuple[Callable[[], bool], ...] = (
                 tried.go2.stand,
-                partial(_trot, tried, SPEEDS[0], robot.name, values),
-                partial(_trot, tried, SPEEDS[1], robot.name, values),
+                partial(_trot, tried, SPEEDS[0], found),
+                partial(_trot, tried, SPEEDS[1], found),
                 partial(_stop, tried),
                 tried.go2.high_five,
             )
             for call, step in zip(CALLS, steps, strict=True):
                 tried.require(step())
-                values[f"{robot.name}.{call}"] = 1.0
+                found.values[call] = 1.0
     except TrialFailed as failed:
-        return Measurement(values, {f"{robot.name}.{call}": str(failed)}, str(failed))
-    return Measurement(values)
+        found.failures[call] = found.reason = str(failed)
 
 
-def _trot(tried: TrialRobot, speed: float, name: str, values: dict[str, float]) -> bool:
-    tried.require(tried.go2.walk())
-    tried.go2.move(speed)
-    tried.wait(ROBOT_RAMP_UP)
-    tried.truth.clear()
-    tried.wait(ROBOT_TROT)
-    recorded = tried.truth.recording()
-    reached = float(recorded.com_velocity[:, 0].mean())
-    if reached < LEAST_SHARE * speed:
-        raise TrialFailed(f"walked at {reached:.2f} m/s")
-    off = 1000.0 * abs(com_height(recorded) - STAND_HEIGHT)
-    values[f"{name}.height"] = max(values.get(f"{name}.height", 0.0), off)
+def _trot(tried: TrialRobot, speed: float, found: TrialResult) -> bool:
+    recorded, _ = _trotted(tried, speed, ROBOT_RAMP_UP, ROBOT_TROT)
+    found.worsen("height", 1000.0 * abs(com_height(recorded) - STAND_HEIGHT))
     return True
 
 
@@ -302,16 +284,9 @@ ROBOTS = (
     Robot("half-friction", "joint friction x 0.5", JointDynamics().scaled(0.5)),
     Robot("twice-friction", "joint friction x 2", JointDynamics().scaled(2.0)),
 )
-_WORLDS = [
-    Study(world.name, world.metrics, partial(measure_world, unknown=world), group="unknown")
-    for world in WORLDS
-]
-_ROBOTS = [
-    Study(robot.name, robot.metrics, partial(measure_robot, robot=robot), group="robots")
-    for robot in ROBOTS
-]
+_WORLDS, _ROBOTS = [world.study for world in WORLDS], [robot.study for robot in ROBOTS]
 STUDIES = (
-    *(*_WORLDS, *(sensed(study, "unknown-sensors") for study in _WORLDS)),
-    *(*_ROBOTS, *(sensed(study, "robots") for study in _ROBOTS)),
+    *(*_WORLDS, *(study.sensed("unknown-sensors") for study in _WORLDS)),
+    *(*_ROBOTS, *(study.sensed("robots") for study in _ROBOTS)),
 )
 """In the order of the report."""

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 
-from benchmarks.study import Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.questions import Question, draws
 from controller.motion_failures import failures_of
 from controller.motion_measurement import MotionMeasurement, measure_motion
-from controller.sweeps.trials import Trial, TrialRobot
+from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
@@ -22,8 +22,7 @@ NEAR, NEAR_SOLVED = 1.06, 1.13
 """Ratio of amplitudes, one done and one failed, at which the search ends."""
 STEP, STEP_SOLVED = 1.6, 1.25
 """Ratio of amplitudes in the search for two that differ."""
-BORDER = Metric("feasibility.border", "border", "amplitude at which physics fails", "", None)
-PLAYS = Metric("feasibility.plays", "border", "motions played to find it", "", None)
+BORDER, PLAYS = "border", "plays"
 
 
 def play(
@@ -48,18 +47,19 @@ def is_done(question: Question) -> bool:
     return not failures_of(play(plan, model, question.draw), plan).strict
 
 
-def measure_border(trial: Trial) -> Measurement:
+def measure_border(trial: Trial, found: TrialResult) -> None:
     """The border of draw number ``trial.seed``, or why there is none.
 
     From amplitude 1 in steps to the first one at which physics changes its mind, then by bisection.
     """
     family, number = draws()[trial.seed]
     step, near = (STEP_SOLVED, NEAR_SOLVED) if family.is_dynamic else (STEP, NEAR)
-    done, failed, plays = family.low, family.high, 0
+    done, failed = family.low, family.high
+    found.values[PLAYS] = 0.0
     is_low_done = is_high_failed = False
     middle = 1.0
     while not (is_low_done and is_high_failed) or failed / done > near:
-        plays += 1
+        found.values[PLAYS] += 1.0
         if is_done(Question(family, number, middle)):
             done, is_low_done = middle, True
         else:
@@ -68,11 +68,21 @@ def measure_border(trial: Trial) -> Measurement:
             middle = math.sqrt(done * failed)
         elif middle in (family.low, family.high):
             why = "even the highest amplitude is done" if is_low_done else "the lowest one fails"
-            return Measurement({PLAYS.name: float(plays)}, reason=why)
+            raise TrialFailed(why)
         else:
             onwards = middle * step if is_low_done else middle / step
             middle = min(max(onwards, family.low), family.high)
-    return Measurement({BORDER.name: math.sqrt(done * failed), PLAYS.name: float(plays)})
+    found.values[BORDER] = math.sqrt(done * failed)
 
 
-BORDERS = Study("borders", (BORDER, PLAYS), measure_border)
+BORDERS = Study(
+    "borders",
+    {
+        "border": (
+            (BORDER, "amplitude at which physics fails", ""),
+            (PLAYS, "motions played to find it", ""),
+        )
+    },
+    measure_border,
+    prefix="",
+)

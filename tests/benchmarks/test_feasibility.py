@@ -10,18 +10,17 @@ import pytest
 
 from benchmarks import feasibility
 from benchmarks.__main__ import main
-from benchmarks.command import IDEAL, IMU, on_sensors
 from benchmarks.feasibility import (
     EXAM,
     OUTCOMES,
     PLAN,
     REFUSED,
-    ask,
     exam,
     judged,
     judged_dynamic,
+    study_of,
 )
-from benchmarks.study import Measurement, run_tasks
+from benchmarks.study import IDEAL, IMU, TrialResult
 from benchmarks.validation_set.drawing import TEST, TRAIN
 from benchmarks.validation_set.physics import BORDER, PLAYS
 from benchmarks.validation_set.questions import draw_name, draws
@@ -41,7 +40,7 @@ COUNT = 12
 
 def case(refused: bool, failed: bool, stratum: str = "border") -> Case:
     refusal = ("friction",) if refused else ()
-    return Case("a 0 1", "a", TEST, stratum, False, refusal, BAD if failed else FINE)
+    return Case("a 0 1", TEST, stratum, False, refusal, BAD if failed else FINE)
 
 
 def test_the_bars_are_those_of_the_test_half() -> None:
@@ -73,11 +72,11 @@ def test_enough_dynamic_motions_must_be_foretold() -> None:
     assert not judged_dynamic([*right, *(4 * [case(True, False)])], 104)[0]
 
 
-def fake(trial: Trial) -> Measurement:
-    failed = float(trial.seed % 2)
-    values = {REFUSED.name: failed, **{metric.name: failed for metric in OUTCOMES.values()}}
-    reasons = dict.fromkeys(values, "friction; fell") if failed else {}
-    return Measurement(values, notes={**reasons, PLAN: f"{trial.seed}"})
+def fake(trial: Trial, found: TrialResult, *_: object, **__: object) -> None:
+    reasons = (REFUSED, *OUTCOMES)
+    found.values = dict.fromkeys(reasons, float(trial.seed % 2))
+    found.notes = dict.fromkeys(reasons, "friction; fell" if trial.seed % 2 else "")
+    found.notes[PLAN] = f"{trial.seed}"
 
 
 def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
@@ -86,8 +85,7 @@ def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
     tmp_path: Path,
     results_folder: Path,
 ) -> None:
-    fakes = {of: replace(one, measure=fake) for of, one in feasibility.STORED.items()}
-    monkeypatch.setattr(feasibility, "STORED", fakes)
+    monkeypatch.setattr(feasibility, "ask", fake)
     file = tmp_path / "scores.json"
     arguments = ["feasibility", "--motions", str(COUNT), "--jobs", "1", "--json"]
     assert main([*arguments, "--out", str(file)]) == ExitCode.OK
@@ -109,8 +107,7 @@ def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
 def test_dynamic_motions_of_one_half_are_asked_by_themselves(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
 ) -> None:
-    fakes = {of: replace(one, measure=fake) for of, one in feasibility.STORED.items()}
-    monkeypatch.setattr(feasibility, "STORED", fakes)
+    monkeypatch.setattr(feasibility, "ask", fake)
     arguments = ["feasibility", "--rows", "dynamic", "--half", "test", "--jobs", "1", "--json"]
     main([*arguments, "--motions", str(COUNT)])
     found = json.loads(capsys.readouterr().out)["scores"]
@@ -121,8 +118,7 @@ def test_what_is_remade_is_stored_beside_what_was_stored(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
 ) -> None:
     kept: dict[str, MotionFailures] = {}
-    fakes = {of: replace(one, measure=fake) for of, one in feasibility.REMADE.items()}
-    monkeypatch.setattr(feasibility, "REMADE", fakes)
+    monkeypatch.setattr(feasibility, "ask", fake)
     monkeypatch.setattr(feasibility, "write_outcomes", kept.update)
     monkeypatch.setattr(feasibility, "_known", lambda: {"old": FINE, "1": FINE})
     main(["feasibility", "--motions", "2", "--jobs", "1", "--remake"])
@@ -148,10 +144,9 @@ def test_only_borders_that_are_not_stored_are_bisected(
     assert f"{len(names)} of {len(names)} borders, 1 beyond" in capsys.readouterr().out
 
 
-def found_border(trial: Trial) -> Measurement:
+def found_border(trial: Trial, found: TrialResult) -> None:
     """Every second draw has a border."""
-    values = {PLAYS.name: 3.0} if trial.seed % 2 else {PLAYS.name: 3.0, BORDER.name: 0.25}
-    return Measurement(values)
+    found.values = {PLAYS: 3.0} if trial.seed % 2 else {PLAYS: 3.0, BORDER: 0.25}
 
 
 def test_physics_is_asked_only_where_no_outcome_is_stored(
@@ -166,14 +161,14 @@ def test_physics_is_asked_only_where_no_outcome_is_stored(
     monkeypatch.setattr(feasibility, "play", play)
     monkeypatch.setattr(feasibility, "failures_of", lambda _run, _plan: BAD)
     monkeypatch.setattr(feasibility, "_known", dict[str, object])
-    first = ask(Trial(0), of=EXAM, is_played=False)
+    first = study_of(EXAM, is_played=False).run(0)
     assert len(played) == 1
-    assert first.notes[f"feasibility.{STRICT}"] == "fell"
+    assert first.notes[STRICT] == "fell"
     monkeypatch.setattr(feasibility, "_known", lambda: {first.notes[PLAN]: FINE})
-    stored = ask(Trial(0), of=EXAM, is_played=False)
+    stored = study_of(EXAM, is_played=False).run(0)
     assert len(played) == 1
-    assert stored.values[f"feasibility.{STRICT}"] == 0.0
-    ask(Trial(0), of=EXAM, is_played=True)
+    assert stored.values[STRICT] == 0.0
+    study_of(EXAM, is_played=True).run(0)
     assert len(played) == 2
 
 
@@ -186,8 +181,8 @@ def test_on_sensors_all_is_played_and_nothing_is_stored(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(feasibility, "play", play)
     monkeypatch.setattr(feasibility, "failures_of", lambda _run, _plan: BAD)
-    on_sensors(feasibility.REMADE[EXAM], IMU).measure(Trial(0))
-    feasibility.REMADE[EXAM].measure(Trial(0))
+    for sensors in (IMU, IDEAL):
+        study_of(EXAM, is_played=True).on(sensors).run(0)
     assert asked == [IMU, IDEAL]
     assert main(["feasibility", "--remake", "--sensors", "imu"]) != ExitCode.OK
     assert asked == [IMU, IDEAL]
@@ -197,5 +192,5 @@ def test_a_robot_that_does_not_get_ready_is_a_lost_run_and_not_a_bug(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(GO2Controller, "stand", lambda _go2: False)
-    ((_, _, measured),) = run_tasks([(feasibility.REMADE[EXAM], 0)], jobs=0)
-    assert (measured.values, measured.reason) == ({}, "lying, nothing asked yet")
+    found = study_of(EXAM, is_played=True).run(0)
+    assert (found.values, found.reason) == ({}, "lying, nothing asked yet")

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.__main__ import main
 from benchmarks.store import Store, file_of, settings_header
-from benchmarks.study import Measurement, Metric, Study
+from benchmarks.study import Study, TrialResult
 from controller.cli.common import ExitCode
 from controller.sweeps.run import read_sweep
 from controller.sweeps.trials import Trial
@@ -18,9 +18,9 @@ from go2_wbc.errors import ConfigError
 from tests.benchmarks.conftest import Only
 from tests.benchmarks.support import fake, measure_well
 
-TROT = Study("trot", (Metric("a", "", "", "", None), Metric("b", "", "", "", None)), measure_well)
-FIRST = Measurement({"a": 0.1 + 0.2, "b": math.inf}, {"b": "it fell"}, "said no", {"a": "x"})
-SECOND = Measurement({"a": math.nan, "b": -0.0}, not_asked={"a": "no plan"})
+TROT = Study("trot", {"": (("a", "", ""), ("b", "", ""))}, measure_well, prefix="")
+FIRST = TrialResult({"a": 0.1 + 0.2, "b": math.inf}, {"b": "it fell"}, "said no", {"a": "x"})
+SECOND = TrialResult({"a": math.nan, "b": -0.0}, not_asked={"a": "no plan"})
 
 
 class Interrupted:
@@ -29,11 +29,11 @@ class Interrupted:
     def __init__(self, before: int) -> None:
         self.before, self.seeds = before, list[int]()
 
-    def __call__(self, trial: Trial) -> Measurement:
+    def __call__(self, trial: Trial, found: TrialResult) -> None:
         if trial.seed == self.before:
             raise KeyboardInterrupt
         self.seeds.append(trial.seed)
-        return measure_well(trial)
+        measure_well(trial, found)
 
 
 @pytest.fixture

@@ -6,10 +6,10 @@ import pytest
 
 from benchmarks.command import tasks_of
 from benchmarks.report import summarise
-from benchmarks.study import Measurement, Results, Study, run_tasks
+from benchmarks.study import Results, Study, TrialResult, run_tasks
 from controller.sweeps.trials import Trial, TrialFailed
 from tests.benchmarks.support import (
-    SPEED,
+    TABLE,
     break_the_plant,
     die_on_seed_1,
     fake,
@@ -33,7 +33,7 @@ def test_an_error_of_the_project_is_a_failed_trial_with_its_reason() -> None:
     assert not report.ok
 
 
-def fall(trial: Trial) -> Measurement:
+def fall(_trial: Trial, _found: TrialResult) -> None:
     raise TrialFailed("fell at t=1.00 s")
 
 
@@ -47,7 +47,7 @@ def test_a_bug_is_raised_and_not_counted() -> None:
 
 
 def test_every_seed_of_every_scenario_is_run_once() -> None:
-    more = Study("more", (SPEED,), measure_badly, seed_factor=2)
+    more = Study("more", TABLE, measure_badly, seed_factor=2)
     results = results_of(fake(), more, seeds=2)
     assert {name: sorted(trials) for name, trials in results.items()} == {
         "fake": [0, 1],

@@ -5,10 +5,8 @@ from __future__ import annotations
 import pytest
 
 from benchmarks import sweeping
-from benchmarks.study import Direction
-from benchmarks.sweeping import LONG, MEMORY, SCALING, growth_of, measure_scaling, trial
+from benchmarks.sweeping import LONG, STUDIES, growth_of, trial
 from controller.sweeps.rows import row_of
-from controller.sweeps.trials import Trial
 
 
 def test_a_run_is_a_row_with_the_memory_of_its_process() -> None:
@@ -21,14 +19,15 @@ def test_a_run_is_a_row_with_the_memory_of_its_process() -> None:
 def test_memory_that_grows_is_told(leak: float, is_flat: bool) -> None:
     rows = [{"memory": 500.0 + min(k, 50) + leak * k} for k in range(LONG)]  # 0.1 MB: 17 % in all
     values = growth_of(rows)
-    assert MEMORY[0].threshold is not None
-    assert Direction.AT_MOST.meets(values["sweeps.growth"], MEMORY[0].threshold) is is_flat
-    assert values["sweeps.memory"] == pytest.approx(550.0 + leak * 949.5)
+    growth = STUDIES[1].metrics[0]
+    assert growth.threshold is not None
+    assert growth.direction.meets(values["growth"], growth.threshold) is is_flat
+    assert values["memory"] == pytest.approx(550.0 + leak * 949.5)
 
 
 def test_two_workers_are_held_to_two_bare_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sweeping, "_pace_swept", {1: 2.0, 2: 3.0}.__getitem__)
     monkeypatch.setattr(sweeping, "_pace_bare", {1: 2.5, 2: 4.5}.__getitem__)
-    values = measure_scaling(Trial(0)).values
+    values = STUDIES[0].run(0).values
     assert values["sweeps.share"] == pytest.approx(1.5 / 1.8)
-    assert {metric.name for metric in SCALING} == set(values)
+    assert {metric.name for metric in STUDIES[0].metrics} == set(values)

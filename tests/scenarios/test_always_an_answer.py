@@ -9,9 +9,8 @@ import math
 
 import pytest
 
-from benchmarks.locomotion import MASS_RANGE
 from benchmarks.qp_infeasibility import STUDIES
-from benchmarks.robots import PUSH_TIME, heading_force, plant_of
+from benchmarks.robots import PUSH_TIME, UNTOLD, heading_force, plant_of
 from controller.sweeps.trials import Trial, TrialRobot
 from go2_wbc.config import Config
 from go2_wbc.planning.locomotion import LocomotionConfig
@@ -29,7 +28,7 @@ GRAVE = 0.1  # [%] of the ticks
 @pytest.mark.parametrize(("name", "seed"), SAMPLES)
 def test_contradictions_are_answered_and_never_damp_an_upright_robot(name: str, seed: int) -> None:
     scenario = next(scenario for scenario in STUDIES if scenario.name == name)
-    values = scenario.measure(Trial(seed)).values
+    values = scenario.run(seed).values
     assert values[f"{name}.failures"] == 0.0
     assert values[f"{name}.damped"] == 0.0
     assert values[f"{name}.unreported"] == values[f"{name}.falls"] == 0.0
@@ -47,7 +46,7 @@ def test_a_hip_at_its_stop_for_a_moment_does_not_damp_a_robot_that_is_pushed(
     The attitude keeps its weight, or no hip comes to its stop.
     """
     config = Config(locomotion=LocomotionConfig(mpc=MpcConfig(throw_speed=1e9)))
-    with TrialRobot(plant_of(Trial(seed), 7100, MASS_RANGE, "imu"), config) as robot:
+    with TrialRobot(plant_of(Trial(seed, sensors="imu"), 7100, UNTOLD), config) as robot:
         robot.require(robot.go2.stand())
         robot.require(robot.go2.walk())
         robot.go2.move(0.5)

@@ -8,11 +8,10 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.validation_set import physics
-from benchmarks.validation_set.physics import BORDER, NEAR, measure_border, play
+from benchmarks.validation_set.physics import BORDER, BORDERS, NEAR, PLAYS, play
 from benchmarks.validation_set.questions import FAMILIES, Question, draws
 from controller.motion_failures import UNPLANNED, MotionFailures, failures_of
 from controller.motion_measurement import MotionMeasurement
-from controller.sweeps.trials import Trial
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline
@@ -122,9 +121,9 @@ def test_a_border_is_found_between_what_is_done_and_what_fails(
         return question.amplitude < 0.83
 
     monkeypatch.setattr(physics, "is_done", is_done)
-    found = measure_border(Trial(0))
-    assert found.values[BORDER.name] == pytest.approx(0.83, rel=NEAR - 1.0)
-    assert found.values["feasibility.plays"] == len(asked)
+    found = BORDERS.run(0)
+    assert found.values[BORDER] == pytest.approx(0.83, rel=NEAR - 1.0)
+    assert found.values[PLAYS] == len(asked)
 
 
 @pytest.mark.parametrize(("answer", "word"), [(True, "highest"), (False, "lowest")])
@@ -132,8 +131,8 @@ def test_no_border_is_made_up_where_physics_does_not_change_its_mind(
     monkeypatch: pytest.MonkeyPatch, answer: bool, word: str
 ) -> None:
     monkeypatch.setattr(physics, "is_done", lambda _question: answer)
-    found = measure_border(Trial(0))
-    assert BORDER.name not in found.values
+    found = BORDERS.run(0)
+    assert BORDER not in found.values
     assert word in found.reason
 
 
@@ -148,7 +147,7 @@ def test_a_border_is_searched_for_its_own_draw_from_amplitude_1(
 
     monkeypatch.setattr(physics, "is_done", is_done)
     row = next(row for row, (_, number) in enumerate(draws()) if number == 1)
-    measure_border(Trial(row))
+    BORDERS.run(row)
     assert {(q.family, q.draw) for q in asked} == {draws()[row]}
     assert asked[0].amplitude == 1.0
     assert min(q.amplitude for q in asked) >= draws()[row][0].low
