@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from functools import cache, partial
 
 from benchmarks.command import RESULTS, add_options, measure_all, positive, publish
-from benchmarks.study import IDEAL, Study, TrialResult
+from benchmarks.study import Study, TrialResult
 from benchmarks.validation_set.causes import CAUSES, examples, render_causes
 from benchmarks.validation_set.drawing import TEST
 from benchmarks.validation_set.physics import BORDER, BORDERS, play
@@ -29,20 +29,16 @@ from benchmarks.validation_set.scores import HALVES, Case, render, scores, wrong
 from benchmarks.validation_set.stored import (
     BORDERS_FILE,
     borders_version,
-    digest,
     read_borders,
-    read_outcomes,
     write_borders,
-    write_outcomes,
 )
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_failures import FELL, LENIENT, STOPS, STRICT, MotionFailures, failures_of
 from controller.sweeps.trials import Trial
-from go2_wbc.errors import CommandError
 from go2_wbc.robot.model import RobotModel
 from motions import FeasibilityChecker
 
-EXAM, DYNAMIC, CAUSES_ROW = "exam", "dynamic", "causes"
+EXAM, DYNAMIC, CAUSES_ROW, REFUSED = "exam", "dynamic", "causes", "refused"
 THRESHOLD = 0.95
 """Least precision and recall of refusals and of passes, test half, strict outcome."""
 BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
@@ -50,22 +46,17 @@ BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
 LEAST_DYNAMIC = 100
 """Dynamic motions of the test half that are judged, at least."""
 EXAMPLES = """
-python -m benchmarks feasibility              the exam: ten minutes, 2 cores;
-                                              twenty where nothing is stored
+python -m benchmarks feasibility              the exam: twenty minutes, 2 cores
 python -m benchmarks feasibility --motions 60
 python -m benchmarks feasibility --rows causes
 python -m benchmarks feasibility --rows dynamic --half test
 python -m benchmarks feasibility --wrong      also what is wrong, train half
-python -m benchmarks feasibility --remake     play all, store the outcomes
 python -m benchmarks feasibility --sensors imu
-                                              play all on its own sensors
+                                              on its own sensors
 python -m benchmarks feasibility --borders    bisect missing borders, with
                                               --remake all: half an hour
 """
-REFUSED = "refused"
 OUTCOMES = (STRICT, STOPS, LENIENT, FELL)
-PLAN = "plan"
-"""The note that names motion and plan."""
 _BETWEEN = "; "
 
 
@@ -83,35 +74,21 @@ def register(subparsers: Subparsers) -> None:
     parser.add_argument("--half", choices=HALVES, help="only the families of this half")
     parser.add_argument("--motions", metavar="N", type=positive, help="only the first N")
     parser.add_argument("--wrong", action="store_true", help="list what is wrong, train half")
-    parser.add_argument(
-        "--remake", action="store_true", help="ask physics again, and store what it says"
-    )
-    parser.add_argument(
-        "--borders", action="store_true", help="bisect where physics changes its mind"
-    )
+    parser.add_argument("--borders", action="store_true", help="bisect, and store them")
+    parser.add_argument("--remake", action="store_true", help="all borders, stored or not")
     add_options(parser, "sensors", "jobs", *RESULTS)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Bisect borders, or hold the exam and report it.
-
-    Raises:
-        CommandError: if outcomes on the robot's own sensors are to be stored.
-    """
-    if args.remake and args.sensors != IDEAL:
-        raise CommandError(
-            f"--remake stores outcomes on the true state: leave out --sensors {args.sensors}, "
-            "or --remake, which plays every motion anyway"
-        )
+    """Bisect borders, or hold the exam and report it."""
     if args.borders:
         return _bisect(args)
-    is_played = args.remake or args.sensors != IDEAL or args.rows == CAUSES_ROW
-    if not is_played and (why := read_outcomes()[1]):
-        print(f"{why}: physics is asked again", file=sys.stderr)
+    if args.remake:
+        print("--remake is for --borders: every motion is played, none is stored", file=sys.stderr)
     asked = QUESTIONS[args.rows]()
     seeds = [n for n, one in enumerate(asked) if args.half in (None, one.family.half)]
     seeds = seeds[: args.motions]
-    cases = _measured(args, study_of(args.rows, is_played=is_played), seeds)
+    cases = _measured(args, seeds)
     if args.rows == CAUSES_ROW:
         wrong = sum(case.is_wrong for case in cases)
         rows = [{"name": c.name, "refused": c.refusal, "wrong": c.outcome.strict} for c in cases]
@@ -143,67 +120,51 @@ QUESTIONS = {EXAM: exam, DYNAMIC: dynamic, CAUSES_ROW: examples}
 
 
 @cache
-def _known() -> dict[str, MotionFailures]:
-    return read_outcomes()[0]
-
-
-@cache
 def _checker() -> FeasibilityChecker:
     """Made once for all trials of a process."""
     return FeasibilityChecker(RobotModel())
 
 
-def ask(trial: Trial, found: TrialResult, of: str, *, is_played: bool) -> None:
+def ask(trial: Trial, found: TrialResult, of: str) -> None:
     """Check a motion and see what physics does; reasons are kept as notes.
 
     Args:
         trial: its seed is the number of the motion.
         found: what is filled.
         of: the exam, its dynamic motions and more, or the known causes.
-        is_played: whether physics is asked although an outcome is stored.
     """
     question, checker = QUESTIONS[of]()[trial.seed], _checker()
     plan = question.plan(checker.model)
-    report, name = checker.check(plan), f"{question.name} {digest(plan)}"
-    outcome = None if is_played else _known().get(name)
-    if outcome is None:
-        played = play(plan, checker.model, question.draw, trial.sensors)
-        outcome = failures_of(played, plan)
+    report = checker.check(plan)
+    outcome = failures_of(play(plan, checker.model, question.draw, trial.sensors), plan)
     refusal = tuple(dict.fromkeys(finding.check for finding in report.failures))
     reasons = {REFUSED: refusal, **{kind: outcome.by(kind) for kind in OUTCOMES}}
     found.values = {row: float(bool(reason)) for row, reason in reasons.items()}
     found.values[REFUSED] = float(not report.ok)
-    found.notes = {row: _BETWEEN.join(reason) for row, reason in reasons.items()} | {PLAN: name}
+    found.notes = {row: _BETWEEN.join(reason) for row, reason in reasons.items()}
 
 
-def study_of(of: str, *, is_played: bool) -> Study:
+def study_of(of: str) -> Study:
     """The trials of these motions, with borders as they are now."""
-    name = f"{of}, played" if is_played and of != CAUSES_ROW else of
     return Study(
-        name if of == CAUSES_ROW else f"{name} {borders_version()}",
+        of if of == CAUSES_ROW else f"{of} {borders_version()}",
         {
             "verdict": ((REFUSED, "refused by the check", ""),),
             "physics": [(kind, f"went wrong, {kind}", "") for kind in OUTCOMES],
         },
-        partial(ask, of=of, is_played=is_played),
+        partial(ask, of=of),
         prefix="",
     )
 
 
-def _measured(args: argparse.Namespace, study: Study, seeds: Sequence[int]) -> list[Case]:
-    """The cases of these motions; outcomes are stored if that is asked for."""
-    asked, study = QUESTIONS[args.rows](), study.on(args.sensors)
+def _measured(args: argparse.Namespace, seeds: Sequence[int]) -> list[Case]:
+    """The cases of these motions."""
+    asked, study = QUESTIONS[args.rows](), study_of(args.rows).on(args.sensors)
     found = measure_all(args, [(study, seed) for seed in seeds])[study.name]
     for seed, one in sorted(found.items()):
         if not one.values:
             print(f"{asked[seed].name}: no result, {one.reason}", file=sys.stderr)
-    answered = {seed: one for seed, one in sorted(found.items()) if one.values}
-    cases = [case_of(asked[seed], one) for seed, one in answered.items()]
-    if args.remake and args.rows != CAUSES_ROW:
-        names = [one.notes[PLAN] for one in answered.values()]
-        new = {name: case.outcome for name, case in zip(names, cases, strict=True)}
-        write_outcomes({**_known(), **new})
-    return cases
+    return [case_of(asked[seed], one) for seed, one in sorted(found.items()) if one.values]
 
 
 def case_of(question: Question, one: TrialResult) -> Case:

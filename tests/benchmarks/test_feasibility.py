@@ -13,7 +13,6 @@ from benchmarks.__main__ import main
 from benchmarks.feasibility import (
     EXAM,
     OUTCOMES,
-    PLAN,
     REFUSED,
     exam,
     judged,
@@ -76,7 +75,6 @@ def fake(trial: Trial, found: TrialResult, *_: object, **__: object) -> None:
     reasons = (REFUSED, *OUTCOMES)
     found.values = dict.fromkeys(reasons, float(trial.seed % 2))
     found.notes = dict.fromkeys(reasons, "friction; fell" if trial.seed % 2 else "")
-    found.notes[PLAN] = f"{trial.seed}"
 
 
 def test_the_command_reports_and_writes_scores_and_no_motion_of_the_test_half(
@@ -114,18 +112,6 @@ def test_dynamic_motions_of_one_half_are_asked_by_themselves(
     assert (found["test dynamic"]["n"], found["train strict"]["n"]) == (COUNT, 0)
 
 
-def test_what_is_remade_is_stored_beside_what_was_stored(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
-) -> None:
-    kept: dict[str, MotionFailures] = {}
-    monkeypatch.setattr(feasibility, "ask", fake)
-    monkeypatch.setattr(feasibility, "write_outcomes", kept.update)
-    monkeypatch.setattr(feasibility, "_known", lambda: {"old": FINE, "1": FINE})
-    main(["feasibility", "--motions", "2", "--jobs", "1", "--remake"])
-    assert kept == {"old": FINE, "0": FINE, "1": MotionFailures(*(4 * [("friction", "fell")]))}
-    assert "2 motions" in capsys.readouterr().out
-
-
 def test_only_borders_that_are_not_stored_are_bisected(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], results_folder: Path
 ) -> None:
@@ -149,30 +135,9 @@ def found_border(trial: Trial, found: TrialResult) -> None:
     found.values = {PLAYS: 3.0} if trial.seed % 2 else {PLAYS: 3.0, BORDER: 0.25}
 
 
-def test_physics_is_asked_only_where_no_outcome_is_stored(
+def test_a_motion_is_played_with_the_sensors_that_are_asked_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    played: list[int] = []
-
-    def play(_plan: object, _model: RobotModel, seed: int, _sensors: str) -> object:
-        played.append(seed)
-        return object()
-
-    monkeypatch.setattr(feasibility, "play", play)
-    monkeypatch.setattr(feasibility, "failures_of", lambda _run, _plan: BAD)
-    monkeypatch.setattr(feasibility, "_known", dict[str, object])
-    first = study_of(EXAM, is_played=False).run(0)
-    assert len(played) == 1
-    assert first.notes[STRICT] == "fell"
-    monkeypatch.setattr(feasibility, "_known", lambda: {first.notes[PLAN]: FINE})
-    stored = study_of(EXAM, is_played=False).run(0)
-    assert len(played) == 1
-    assert stored.values[STRICT] == 0.0
-    study_of(EXAM, is_played=True).run(0)
-    assert len(played) == 2
-
-
-def test_on_sensors_all_is_played_and_nothing_is_stored(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
 
     def play(_plan: object, _model: RobotModel, _seed: int, sensors: str) -> object:
@@ -182,9 +147,7 @@ def test_on_sensors_all_is_played_and_nothing_is_stored(monkeypatch: pytest.Monk
     monkeypatch.setattr(feasibility, "play", play)
     monkeypatch.setattr(feasibility, "failures_of", lambda _run, _plan: BAD)
     for sensors in (IMU, IDEAL):
-        study_of(EXAM, is_played=True).on(sensors).run(0)
-    assert asked == [IMU, IDEAL]
-    assert main(["feasibility", "--remake", "--sensors", "imu"]) != ExitCode.OK
+        assert study_of(EXAM).on(sensors).run(0).notes[STRICT] == "fell"
     assert asked == [IMU, IDEAL]
 
 
@@ -192,5 +155,5 @@ def test_a_robot_that_does_not_get_ready_is_a_lost_run_and_not_a_bug(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(GO2Controller, "stand", lambda _go2: False)
-    found = study_of(EXAM, is_played=True).run(0)
+    found = study_of(EXAM).run(0)
     assert (found.values, found.reason) == ({}, "lying, nothing asked yet")
