@@ -13,7 +13,6 @@ from typing import Any
 
 from benchmarks import store
 from benchmarks.report import render, summarise, threshold_text
-from benchmarks.store import Store
 from benchmarks.study import IDEAL, IMU, Results, Study, Task, chosen_studies, run_tasks, tasks_of
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json
 from controller.cli.progress import ProgressLine
@@ -167,7 +166,7 @@ def measure_all(args: argparse.Namespace, tasks: Sequence[Task]) -> Results:
     studies = {study.name: study for study, _ in tasks}
     results: Results = {name: {} for name in studies}
     folder = store.FOLDER / args.command
-    with Store(folder, studies.values(), resume=args.resume) as kept, ProgressLine() as line:
+    with store.opened(folder, studies.values(), resume=args.resume) as kept, ProgressLine() as line:
         if kept.finished:
             print(f"{len(kept.finished)} finished trials are taken from {folder}", file=sys.stderr)
         left = [(s, seed) for s, seed in tasks if (s.name, seed) not in kept.finished]
@@ -195,11 +194,7 @@ def run_sweep(
 ) -> SweepResult:
     """Run those of ``n`` seeds whose rows are not kept yet, and tell of the progress.
 
-    Args:
-        args: with the options of ``add_sweep``.
-        trial: a function ``(seed) -> row`` of a module.
-        n: how many seeds.
-        is_enough: see ``controller.sweep``.
+    ``args`` has the options of ``add_sweep``; the rest is as in ``controller.sweep``.
 
     Raises:
         ConfigError: if the folder of the rows cannot be made, or they depend on something else.
@@ -210,15 +205,8 @@ def run_sweep(
     except OSError as error:
         raise ConfigError(f"cannot make the folder of {rows}: {error.strerror}") from error
     with ProgressLine() as line:
-        return sweep(
-            trial,
-            n,
-            workers=args.jobs,
-            out=rows,
-            keep_going=True,
-            is_enough=is_enough,
-            on_progress=lambda progress: tell(line, progress),
-        )
+        options = {"workers": args.jobs, "out": rows, "keep_going": True, "is_enough": is_enough}
+        return sweep(trial, n, **options, on_progress=lambda progress: tell(line, progress))
 
 
 # --- output ---------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import main
-from benchmarks.store import Store, file_of, settings_header
+from benchmarks.store import file_of, opened, settings_header
 from benchmarks.study import Study, TrialResult
 from controller.cli.common import ExitCode
 from controller.sweeps.run import read_sweep
@@ -39,7 +39,7 @@ class Interrupted:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Two trials of a run that has ended."""
-    with Store(tmp_path, [TROT], resume=False) as store:
+    with opened(tmp_path, [TROT], resume=False) as store:
         store.add(TROT, 0, FIRST)
         store.add(TROT, 7, SECOND)
     return tmp_path
@@ -84,7 +84,7 @@ def test_without_resume_everything_is_measured_again(only: Only) -> None:
 
 
 def test_trials_come_back_to_the_last_bit(folder: Path) -> None:
-    with Store(folder, [TROT], resume=True) as store:
+    with opened(folder, [TROT], resume=True) as store:
         found = store.finished
     assert set(found) == {("trot", 0), ("trot", 7)}
     assert found["trot", 0] == FIRST
@@ -105,8 +105,11 @@ def test_trials_under_other_settings_are_refused_with_what_differs(
 ) -> None:
     other = {**settings_header(), name: "another"}
     monkeypatch.setattr("benchmarks.store.settings_header", lambda: other)
-    with pytest.raises(ConfigError, match=rf"{name} .*now another.*without --resume"):
-        Store(folder, [TROT], resume=True)
+    with (
+        pytest.raises(ConfigError, match=rf"{name} .*now another.*without --resume"),
+        opened(folder, [TROT], resume=True),
+    ):
+        pass
 
 
 def test_other_settings_are_a_usage_error_that_keeps_the_trials(
@@ -128,8 +131,11 @@ def test_other_settings_are_a_usage_error_that_keeps_the_trials(
 def test_a_file_of_something_else_is_neither_read_nor_removed(tmp_path: Path) -> None:
     file_of(tmp_path, TROT).write_text("notes")
     for resume in (True, False):
-        with pytest.raises(ConfigError, match="no database"):
-            Store(tmp_path, [TROT], resume=resume)
+        with (
+            pytest.raises(ConfigError, match="no database"),
+            opened(tmp_path, [TROT], resume=resume),
+        ):
+            pass
     assert file_of(tmp_path, TROT).read_text() == "notes"
 
 
