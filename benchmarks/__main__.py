@@ -17,14 +17,12 @@ COMMANDS: tuple[Command, ...] = (
     Command("locomotion", "benchmarks.locomotion", "gaits at their speeds"),
     Command("envelopes", "benchmarks.envelopes", "the greatest speed of each gait, and store it"),
     Command("balance", "benchmarks.balance", "pushes, drops, gait changes; falls noticed"),
-    Command("dynamics", "benchmarks.dynamics", "solving dynamic motions, and what comes of it"),
     Command("dance", "benchmarks.dance", "dances against the true beats of their songs"),
     Command("golden", "benchmarks.golden", "is every tick what it was, to the last bit?"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
     Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
     Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),
     Command("false_negatives", "benchmarks.false_negatives", "do motions that passed fall?"),
-    Command("sweeps", "benchmarks.sweeping", "a second worker, memory, the time of a certificate"),
     Command("nearest", "benchmarks.nearest", "the nearest to motions that the check refuses"),
     Command("solve", "benchmarks.solved_plans", "solve the library's dynamic plans, to ship them"),
     Command("gallery", "benchmarks.gallery", "play the library's motions, write their pictures"),
@@ -38,6 +36,8 @@ ALIASES = {
 """Former names of commands."""
 GONE = {
     "jump_limits": "docs/explanation/dynamics.md has its results, commit 55f699b its program",
+    "dynamics": "`nearest` measures what planning takes, commit 55f699b has the program",
+    "sweeps": "commit 55f699b has the program",
 }
 """What is no command any more, and where it is."""
 EXAMPLES = """

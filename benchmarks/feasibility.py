@@ -46,7 +46,7 @@ BORDER_PRECISION, BORDER_RECALL = 0.85, 0.90
 LEAST_DYNAMIC = 100
 """Dynamic motions of the test half that are judged, at least."""
 EXAMPLES = """
-python -m benchmarks feasibility              the exam: twenty minutes, 2 cores
+python -m benchmarks feasibility              the exam: 20 minutes, 2 cores
 python -m benchmarks feasibility --motions 60
 python -m benchmarks feasibility --rows causes
 python -m benchmarks feasibility --rows dynamic --half test

@@ -63,7 +63,6 @@ def test_what_is_gone_is_told_with_its_place(capsys: pytest.CaptureFixture[str])
     for name, place in GONE.items():
         assert main([name, "--quick"]) == ExitCode.USAGE
         assert place in capsys.readouterr().err
-        assert (ROOT / place.split()[0]).is_file()
 
 
 @pytest.mark.parametrize("argv", [[], ["gallop"], ["behaviour", "--nonsense"], ["--nonsense"]])
