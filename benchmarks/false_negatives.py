@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from benchmarks.command import add_sweep, positive, publish, run_sweep
-from benchmarks.probability_runs import NOT_READY, exam, model, played, world_of
+from benchmarks.probability_runs import NOT_READY, exam, model, motion_and_world, played, world_of
 from controller.cli.common import ExitCode, Subparsers, add_parser
 from controller.motion_failures import FELL
 from controller.sweeps.rows import Row
@@ -99,18 +99,13 @@ def render(rows: Sequence[Row], values: dict[str, object]) -> str:
         own = [row for row in played if row["stratum"] == stratum]
         done, fell = (sum(bool(row[name]) for row in own) for name in ("done", "fell"))
         lines.append(f"{stratum:<14}{asked:>8}{len(own):>8}{done:>8}{fell:>8}")
-    lines.append("-" * 80)
-    for row in played:
-        if row["fell"]:
-            where = f"friction {row['friction']:.2f}, {row['payload']:.1f} kg"
-            lines.append(f"seed {row['seed']} fell: {row['motion']:.40}, {where}")
-    fell = sum(bool(row["fell"]) for row in played)
-    high = rate_interval(fell, max(len(played), 1))[1]
-    lines.append(
-        f"{fell} of {len(played)} fell, at most {100.0 * high:.2f} % (95 %, Clopper-Pearson); "
-        f"bar 0: {'ok' if values['passed'] else 'NO'}"
+    fallen = [f"seed {row['seed']} fell: {motion_and_world(row)}" for row in played if row["fell"]]
+    high = rate_interval(len(fallen), max(len(played), 1))[1]
+    verdict = (
+        f"{len(fallen)} of {len(played)} fell, at most {100.0 * high:.2f} % "
+        f"(95 %, Clopper-Pearson); bar 0: {'ok' if values['passed'] else 'NO'}"
     )
-    return "\n".join(lines)
+    return "\n".join([*lines, "-" * 80, *fallen, verdict])
 
 
 def passed_play(seed: int) -> dict[str, object]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -35,15 +36,8 @@ RESAMPLES = 1000
 _LEAST = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """One motion in one world.
-
-    Attributes:
-        motion: which motion; runs of one are not independent.
-        margins: the least margin of every check.
-        is_done: whether it was done.
-    """
+class Sample(NamedTuple):
+    """A motion in a world (runs of one are not independent), its least margins, and how it ended."""
 
     motion: str
     margins: Mapping[str, float]
@@ -130,23 +124,12 @@ def _loss(
     d_width = -(slope * z).sum(axis=0)  # of the logarithm of the width
     d_rest = float((pull * expit(-rest)).sum())
     d_leak = float((pull * ((1.0 - share) * expit(-leak) - share * expit(leak))).sum())
-    away = (parameters[k : 2 * k] - np.log(USUAL_WIDTH)) / WIDTH_SPREAD
-    leak_away = (leak - USUAL_LEAK) / LEAK_SPREAD
-    prior = (
-        0.5 * float(((centres / CENTRE_SPREAD) ** 2).sum())
-        + 0.5 * float((away**2).sum())
-        + 0.5 * (rest / REST_SPREAD) ** 2
-        + 0.5 * leak_away**2
-    )
-    gradient = np.concatenate(
-        [
-            -d_centre + centres / CENTRE_SPREAD**2,
-            -d_width + away / WIDTH_SPREAD,
-            [-d_rest + rest / REST_SPREAD**2],
-            [-d_leak + leak_away / LEAK_SPREAD],
-        ]
-    )
-    return prior - float(likelihood), gradient
+    gradient = -np.concatenate([d_centre, d_width, [d_rest, d_leak]])
+    # How far each is from its prior, over the spread of that.
+    spreads = np.repeat([CENTRE_SPREAD, WIDTH_SPREAD, REST_SPREAD, LEAK_SPREAD], [k, k, 1, 1])
+    usual = np.repeat([0.0, np.log(USUAL_WIDTH), 0.0, USUAL_LEAK], [k, k, 1, 1])
+    away = (parameters - usual) / spreads
+    return 0.5 * float(away @ away) - float(likelihood), gradient + away / spreads
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from benchmarks.validation_set.random_timelines import RandomTimeline, random_ti
 from benchmarks.validation_set.stored import read_borders
 from controller.motion_failures import FELL, failures_of
 from controller.motion_measurement import measure_motion
+from controller.sweeps.rows import Row
 from controller.sweeps.trials import TrialFailed, TrialRobot
 from go2_wbc.errors import Go2WbcError
 from go2_wbc.motion_plan import MotionPlan, Posture
@@ -79,6 +80,12 @@ def _row(
         "harm": "; ".join(harm),
         "margins": json.dumps({name: f.margin for name, f in report.margins.items()}),
     }
+
+
+def motion_and_world(row: Row) -> str:
+    """In words."""
+    where = f"friction {row['friction']:.2f}, {row['payload']:.1f} kg"
+    return f"{row['motion']:.40}, {where}"
 
 
 def world_of(seed: int) -> World:
