@@ -38,15 +38,12 @@ from go2_wbc.robot.model import RobotModel
 
 FIRST_SEED = 64000
 """Seed of the first trial that is judged, but of disturbed runs, which have their own."""
-ASIDE, AHEAD = 36.0, 45.0
-"""Impulses [N s] on the standing robot."""
+ASIDE, AHEAD = 36.0, 45.0  # Impulses [N s] on the standing robot
 DIRECTIONS, PHASES = 8, 16
 STANDING_LIMIT = 3.0
 """Time [s] after a push in which the robot must stand again."""
-LOOK = 0.05
-"""Time [s] between two looks at the robot."""
-CALM = 0.2
-"""Time [s] for which it must stand."""
+LOOK = 0.05  # Time [s] between two looks at the robot
+CALM = 0.2  # Time [s] for which it must stand
 TROT_PUSHES = {"lateral": (math.pi / 2, 26.0), "forward": (0.0, 50.0), "backward": (math.pi, 42.0)}
 """Direction [rad] and impulse [N s]."""
 TROT_SPEED, SPEED_TOLERANCE, TROT_TIME = 0.5, 0.15, 2.0
@@ -59,8 +56,7 @@ DROP_TIME = 1.0
 GENTLE = VelocityEnvelope(forward=1.2, backward=1.2, lateral=0.5, turning=1.5)
 """Of the trot's changes; those of the other gaits are in proportion."""
 CHANGES = 10
-COMMANDS = 80
-"""Random velocities of a run, two minutes of them."""
+COMMANDS = 80  # Random velocities of a run, two minutes of them
 
 
 def impulse_at(angle: float) -> float:

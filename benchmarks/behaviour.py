@@ -60,8 +60,7 @@ TROTS: dict[str, tuple[VelocityCommand, dict[str, Rows]]] = {
     ),
 }
 """What is followed, and asked of it."""
-DISTANCE, ANGLE = 1.0, math.pi / 2
-"""m, rad"""
+DISTANCE, ANGLE = 1.0, math.pi / 2  # m, rad
 GOALS = {
     "move_forward(1.0)": (
         ("miss", "distance from the goal", "<= 20 mm"),

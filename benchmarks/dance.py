@@ -20,12 +20,9 @@ from controller.sweeps.trials import Trial, TrialRobot
 from motions import FeasibilityChecker
 from motions.music import Beats, Song, beats, click_track, danced, feasible_dance, made_song
 
-SECONDS = 30.0
-"""Length [s] of a song."""
-TEMPI = (62.0, 178.0)
-"""Tempi [beats/min] that are drawn."""
-FIRST_SONG = 5000
-"""Seed of the first song that is judged."""
+SECONDS = 30.0  # Length [s] of a song
+TEMPI = (62.0, 178.0)  # Tempi [beats/min] that are drawn
+FIRST_SONG = 5000  # Seed of the first song that is judged
 
 
 def song_of(kind: str, seed: int) -> Song:

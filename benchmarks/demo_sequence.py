@@ -21,18 +21,14 @@ SIT_PITCH = math.radians(-25.0)
 """Pitch of the trunk of a sitting robot: at least this much nose up."""
 SIT_REAR_HEIGHT = 0.16
 """Height [m] below which the rear end of the trunk is down; it is at 0.29 m when standing."""
-REAR_END = -0.1934
-"""m; the rear hips in the base frame, by the URDF."""
-FORWARD_WAY = (0.30, 0.44)
-"""Way [m] of two seconds at 0.2 m/s, from rest."""
+REAR_END = -0.1934  # m; the rear hips in the base frame, by the URDF
+FORWARD_WAY = (0.30, 0.44)  # Way [m] of two seconds at 0.2 m/s, from rest
 FORWARD_ASIDE = 0.05
-STOP_SPEED = 0.05
-"""m/s"""
+STOP_SPEED = 0.05  # m/s
 TURN = (math.pi / 2, math.radians(2.0))
 PAW_HEIGHT, PAW_TIME = 0.60, 1.9
 """Height [m] that the paw keeps, and for how long [s]: the hold without its edges."""
-PAW_SUPPORT = 5.0
-"""N on every other foot meanwhile."""
+PAW_SUPPORT = 5.0  # N on every other foot meanwhile
 
 
 def measure(trial: Trial, found: TrialResult) -> None:

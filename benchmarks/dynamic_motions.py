@@ -25,8 +25,7 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions import CompiledPlan, FeasibilityChecker, Timeline, compile_timeline, deg
 
-FIRST_SEED = 6200
-"""Seed of the first trial that is judged."""
+FIRST_SEED = 6200  # Seed of the first trial that is judged
 AFTERWARDS = 1.0
 """Time [s] for which the robot must stand when the motion is over."""
 PRESSED = 15.0

@@ -37,16 +37,13 @@ FIRST_SEED = 5200
 """Of those that measure an envelope; nothing is judged by them."""
 SEEDS = 4
 MASS_RANGE = (0.9, 1.1)
-ERROR, SATURATED = 0.05, 0.05
-"""Share of the command, and of the ticks."""
+ERROR, SATURATED = 0.05, 0.05  # Share of the command, and of the ticks
 LEAST_ERROR = 0.02
 """m/s, rad/s; an error below it is none, however slow the command."""
 LEAD, WINDOW = 1.0, 2.0
 """Time [s] after the ramp that is left out, and that is measured."""
-MOST = {"forward": 4.0, "backward": 3.0, "lateral": 2.0, "turning": 7.0}
-"""m/s, rad/s"""
-STEPS = 6
-"""Halvings: a bound is exact to a 64th of ``MOST``."""
+MOST = {"forward": 4.0, "backward": 3.0, "lateral": 2.0, "turning": 7.0}  # m/s, rad/s
+STEPS = 6  # Halvings: a bound is exact to a 64th of ``MOST``
 ITEMS = tuple(product(GAITS, MOST))
 CONFIG = Config(envelope=VelocityEnvelope(forward=1e3, backward=1e3, lateral=1e3, turning=1e3))
 EXAMPLES = """

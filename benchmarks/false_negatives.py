@@ -27,12 +27,10 @@ from motions import FeasibilityChecker, compile_motion, motion_names
 PLAYS = 2000
 MOST_ASKED = 20
 """Worlds that are asked for at most, for each play that is wanted; the check passes half."""
-WORLDS = 5
-"""Worlds of each motion."""
+WORLDS = 5  # Worlds of each motion
 FIRST_WORLD = 10_000_000
 """Added to seeds, so that the worlds are not those that probabilities are fitted or judged in."""
-EVERY = 4
-"""One motion of so many is of the library."""
+EVERY = 4  # One motion of so many is of the library
 LIBRARY = "library"
 _STREAM = 13
 EXAMPLES = """

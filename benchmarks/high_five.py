@@ -18,8 +18,7 @@ from go2_wbc.legs import LEGS, SIDES, Leg
 from go2_wbc.plant.mujoco.ground_truth import TruthRecording, true_runs
 from go2_wbc.robot.model import RobotModel
 
-HOLD = 2.0
-"""Time [s] for which the paw is asked to be held."""
+HOLD = 2.0  # Time [s] for which the paw is asked to be held
 HELD_TIME = 1.9
 """Length [s] of the window in which the paw's height is measured: the hold without its edges."""
 HELD_ROWS = (
@@ -39,8 +38,7 @@ SETTLE_TIME = 1.5
 """Time [s] from then to the first slap; the rest of the lift takes 0.3 s."""
 RETURN_TIME = 2.0
 """Time [s] after a slap within which the paw must be back in its place."""
-PAUSE = 0.3
-"""Time [s] from there to the next slap."""
+PAUSE = 0.3  # Time [s] from there to the next slap
 PLACE_TOLERANCE = 30.0
 """mm; a paw this near to its place is back in the pose. Dry friction in the joints keeps a part."""
 

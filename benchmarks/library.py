@@ -26,8 +26,7 @@ from go2_wbc.robot.model import FOOT_RADIUS, RobotModel
 from go2_wbc.robot.rotations import wrap_angle
 from motions import compile_timeline, load_motion, motion_names
 
-FIRST_SEED = 14000
-"""Of the first trial on sensors that is judged."""
+FIRST_SEED = 14000  # Of the first trial on sensors that is judged
 DRIFT, TURN_DRIFT = 0.015, 0.02
 """What leg odometry may add to where a motion ends: a share of its way, and an angle [rad].
 

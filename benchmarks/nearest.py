@@ -37,8 +37,7 @@ from motions.language.timeline_data import NEAREST
 from motions.plan.dynamic_span import DynamicSpan
 from motions.plan.trajectory import as_written
 
-FIRST_SEED = 8600
-"""Seed of the first motion that is judged."""
+FIRST_SEED = 8600  # Seed of the first motion that is judged
 AS_REPORTED = 10.0
 """Difference [mm] between the measured and the reported deviation, of every motion."""
 LARGEST = {"x": 0.05, "y": 0.05, "z": 0.05, "roll": 0.25, "pitch": 0.25, "yaw": 0.35}

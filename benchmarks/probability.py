@@ -29,8 +29,7 @@ from motions.feasibility.probability import FILE, ProbabilityModel, fitted
 from viz.render.figure_style import PLOT_SUFFIXES, save_figure
 from viz.render.reliability_plot import reliability_figure
 
-FITTED = (TRAIN, DRAWN)
-"""What the model may be fitted to."""
+FITTED = (TRAIN, DRAWN)  # What the model may be fitted to
 ERROR, BRIER_SHARE = 0.05, 0.5
 """Greatest expected calibration error, and Brier score over that of the base rate."""
 COLUMNS = ("seed", "motion", "half", "stratum", "friction", "payload", "refused", "done", "fell")

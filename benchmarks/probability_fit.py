@@ -17,8 +17,7 @@ LEAST_SAMPLES = 20
 """Runs in which a check must have looked at something for its curve to be fitted."""
 CENTRE_SPREAD = 2.0
 """Standard deviation of a centre about 0 before anything is seen, as of all that follow."""
-USUAL_WIDTH = 0.3
-"""Width before anything is seen."""
+USUAL_WIDTH = 0.3  # Width before anything is seen
 WIDTH_SPREAD = 1.5
 """Standard deviation of the logarithm of a width before anything is seen."""
 FARTHEST, WIDTHS = (-10.0, 10.0), (1e-3, 3.0)
@@ -27,8 +26,7 @@ LEAST_SPREAD = 1e-2
 """Of a margin, as a share of its size, below which it counts as the same in all runs."""
 MOST = 20.0
 """Value of asinh beyond which more of it, or an infinite margin, tells nothing."""
-REST_SPREAD = 5.0
-"""Standard deviation of the log odds of the rest."""
+REST_SPREAD = 5.0  # Standard deviation of the log odds of the rest
 USUAL_LEAK, LEAK_SPREAD = -3.0, 1.5
 """Log odds of the leak before anything is seen, and their standard deviation."""
 BINS = 10
@@ -37,7 +35,7 @@ _LEAST = 1e-9
 
 
 class Sample(NamedTuple):
-    """A motion in a world (runs of one are not independent), its least margins, and how it ended."""
+    """A motion in a world, its least margins, and its end; runs of one are not independent."""
 
     motion: str
     margins: Mapping[str, float]

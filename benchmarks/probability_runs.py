@@ -40,8 +40,7 @@ FRICTION, PAYLOAD = (0.3, 1.0), (0.0, 4.0)
 """What the worlds are drawn from; half of them have no payload [kg]."""
 PLACE = ((-0.08, 0.08), (-0.04, 0.04), (0.0, 0.10))
 """Where its middle may be [m], in the frame of the base."""
-MASS_UNCERTAINTY, JOINT_FRICTION_UNCERTAINTY = 0.05, 0.5
-"""What the check is not told."""
+MASS_UNCERTAINTY, JOINT_FRICTION_UNCERTAINTY = 0.05, 0.5  # What the check is not told
 _STREAM = 12
 NOT_READY = "not ready"
 """What went wrong with a robot that did not get as far as the motion."""

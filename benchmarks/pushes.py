@@ -16,12 +16,10 @@ from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.contacts import GAITS
 from go2_wbc.planning.command import VelocityCommand
 
-IMPULSE_STEP = 2.0
-"""N s between the impulses that are tried."""
+IMPULSE_STEP = 2.0  # N s between the impulses that are tried
 STANDS_AFTER, TROTS_AFTER = 3.0, 2.0
 """Time [s] after a push within which the robot must stand, or trot, again."""
-START_TIME = 1.5
-"""Time [s] from the command to trot to the first push."""
+START_TIME = 1.5  # Time [s] from the command to trot to the first push
 PHASES = 8
 """Instants of the stride, evenly spread, at which the trotting robot is pushed."""
 PUSHED_SPEED, SPEED_TOLERANCE = 0.5, 0.15

@@ -27,14 +27,11 @@ from go2_wbc.plant.terrain import Boxes
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import yaw_rotation
 
-FIRST_LAYOUT = 20
-"""Seed of the first layout of boxes that is judged."""
-BOX_HEIGHT = 0.08
-"""m"""
+FIRST_LAYOUT = 20  # Seed of the first layout of boxes that is judged
+BOX_HEIGHT = 0.08  # m
 FIRST_COMMANDS = 900
 """Seed of the first sequence of random commands that is judged."""
-FIRST_PUSH = 700
-"""Seed of the first series of pushes that is judged."""
+FIRST_PUSH = 700  # Seed of the first series of pushes that is judged
 IMPULSE, IMPULSE_AT_STOPS = 30.0, 20.0
 """N s of a push; and at the ends of the joints, where a trot has less room to answer."""
 AT_STOP = 0.01

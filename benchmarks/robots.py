@@ -23,10 +23,8 @@ FRICTION_RANGE, MASS_RANGE, UNTOLD = (0.6, 1.0), (0.95, 1.05), (0.9, 1.1)
 HEIGHT_TOLERANCE, TILT_TOLERANCE = 0.02, math.radians(6.0)
 LOAD = 5.0
 """Force [N] on a foot that counts as loaded; a standing foot carries about 40 N."""
-SAMPLING = 10
-"""Ticks from one sample of the mean height to the next."""
-PUSH_TIME = 0.1
-"""Duration [s] of a push."""
+SAMPLING = 10  # Ticks from one sample of the mean height to the next
+PUSH_TIME = 0.1  # Duration [s] of a push
 DIRECTIONS: dict[str, tuple[float, float, float]] = {
     "forward": (1.0, 0.0, 0.0),
     "backward": (-1.0, 0.0, 0.0),

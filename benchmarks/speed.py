@@ -44,8 +44,7 @@ CHECKS = {
     )
     for motion in _MOTIONS
 }
-PROCESSES = 5
-"""Fresh processes of a trial; the median counts."""
+PROCESSES = 5  # Fresh processes of a trial; the median counts
 ROBOT = "from controller import GO2Controller; go2 = GO2Controller()"
 STAND = f"{ROBOT}; raise SystemExit(not go2.stand())"
 DEMO = "from controller.cli.main import main; raise SystemExit(main(['demo', '--no-media']))"

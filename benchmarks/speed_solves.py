@@ -25,10 +25,8 @@ from go2_wbc.wbc.controller import WholeBodyController
 from go2_wbc.wbc.solution import WbcSolution
 from motions import compile_motion
 
-ROUNDS = 500
-"""Ticks of each contact mode that are solved."""
-WARM_UP = 50
-"""Rounds before the measurement."""
+ROUNDS = 500  # Ticks of each contact mode that are solved
+WARM_UP = 50  # Rounds before the measurement
 FASTER = {4: 3.5, 3: 3.5, 2: 3.0}
 """By number of stance feet (standing, high five, trot): how many times faster than PlaCo we are to
 be."""

@@ -23,12 +23,10 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions import CompiledPlan, Timeline, compile_timeline, deg
 
-FIRST_SEED = 4100
-"""Seed of the first trial that is judged."""
+FIRST_SEED = 4100  # Seed of the first trial that is judged
 STEP_AHEAD, STEP_ASIDE = 0.06, 0.03
 """Greatest way [m] of a random step, in either direction."""
-ROUNDS = 3
-"""Times that a walk is played."""
+ROUNDS = 3  # Times that a walk is played
 
 
 def random_steps(rng: np.random.Generator) -> Timeline:

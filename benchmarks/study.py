@@ -17,10 +17,8 @@ from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 
 IDEAL, IMU = "ideal", "imu"
 """The state that the controller is given: the true one, or what its own sensors tell."""
-SENSED = "sensed-"
-"""What names on the robot's own sensors begin with."""
-BAR = re.compile(r"(<=|>=)? ?(-?\d[-\d.e]*(?= |$))? ?(.*)")
-"""Side, threshold and unit."""
+SENSED = "sensed-"  # What names on the robot's own sensors begin with
+BAR = re.compile(r"(<=|>=)? ?(-?\d[-\d.e]*(?= |$))? ?(.*)")  # Side, threshold and unit
 Rows = Sequence[tuple[str, str, str]]
 """Name, quantity and bar."""
 

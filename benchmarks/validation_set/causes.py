@@ -14,8 +14,7 @@ from benchmarks.validation_set.scores import Case
 from go2_wbc.legs import LEGS
 from motions import Timeline, deg
 
-CAUSES = "cause"
-"""Stratum and half of these motions."""
+CAUSES = "cause"  # Stratum and half of these motions
 
 
 def _roll_and_back(_draw: Draw, s: float) -> Timeline:

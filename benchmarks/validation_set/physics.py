@@ -20,8 +20,7 @@ FRICTION = 0.5
 """Friction coefficient of the floor: the one that the check counts on."""
 NEAR, NEAR_SOLVED = 1.06, 1.13
 """Ratio of amplitudes, one done and one failed, at which the search ends."""
-STEP, STEP_SOLVED = 1.6, 1.25
-"""Ratio of amplitudes in the search for two that differ."""
+STEP, STEP_SOLVED = 1.6, 1.25  # Ratio of amplitudes in the search for two that differ
 BORDER, PLAYS = "border", "plays"
 
 
