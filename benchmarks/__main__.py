@@ -19,6 +19,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("balance", "benchmarks.balance", "pushes, drops, gait changes; falls noticed"),
     Command("dance", "benchmarks.dance", "dances against the true beats of their songs"),
     Command("golden", "benchmarks.golden", "is every tick what it was, to the last bit?"),
+    Command("plain", "benchmarks.plain", "does compiled code do what its own Python does?"),
     Command("speed", "benchmarks.speed", "processor time of the QP and of a control tick"),
     Command("dynamic_motions", "benchmarks.dynamic_motions", "jumps, hops and rears in physics"),
     Command("probability", "benchmarks.probability", "is the stated chance the one that it has?"),

@@ -104,7 +104,7 @@ class GO2Controller:
             opened.callback(built.close)
             self._resources = opened.pop_all()
         self._runner, self._pilot, self._description = built.runner, built.pilot, description
-        self._motor = config.motor
+        self._motor, self._limits = config.motor, config.feasibility
         self._closed = False
         self._calls = Calls(built.pilot, built.runner)
         self._planning = threading.Lock()
@@ -297,7 +297,8 @@ class GO2Controller:
     @cached_property
     def _checker(self) -> motions.FeasibilityChecker:
         """Plans on a model of its own: the control loop's belongs to the thread that ticks."""
-        return motions.FeasibilityChecker(RobotModel(self._description, motor=self._motor))
+        model = RobotModel(self._description, motor=self._motor)
+        return motions.FeasibilityChecker(model, self._limits)
 
     def wait(self, seconds: float) -> None:
         """Let ``seconds`` of robot time pass; the robot goes on doing what it does."""

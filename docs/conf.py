@@ -23,6 +23,7 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
+    "call_graph",
     "import_graph",
     "mathml",
     "plain_docstrings",

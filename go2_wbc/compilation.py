@@ -35,7 +35,17 @@ import numpy as np
 from go2_wbc.records import Record
 from go2_wbc.written import Foreign, Written
 
-__all__ = ["Foreign", "Kernel", "Routine", "kernel", "load_kernels", "plain", "subroutine"]
+__all__ = [
+    "Foreign",
+    "Kernel",
+    "Routine",
+    "all_kernels",
+    "call_plain",
+    "kernel",
+    "load_kernels",
+    "plain",
+    "subroutine",
+]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -138,7 +148,7 @@ def kernel(function: Any = None, /, *, nogil: bool = False) -> Any:
 
 def _made(function: Callable[..., Any], *, nogil: bool) -> Kernel:
     written = function.python if isinstance(function, Routine) else function
-    call = _call_plain if _IS_PLAIN else _first_call
+    call = call_plain if _IS_PLAIN else _first_call
     return type(function.__name__, (Kernel,), {"__call__": call})(written, nogil=nogil)
 
 
@@ -152,7 +162,7 @@ def plain(function: F) -> F:
     return cast(F, cast(Routine, function).python)
 
 
-def _call_plain(self: Kernel, *arguments: Any) -> Any:
+def call_plain(self: Kernel, *arguments: Any) -> Any:
     """The Python: a record where there is only a row, numbers that divide by 0 as compiled ones."""
     hints = typing.get_type_hints(self.written).values()
     given = [_as_compiled(value, hint) for value, hint in zip(arguments, hints, strict=False)]
@@ -166,18 +176,23 @@ def _as_compiled(value: Any, hint: Any) -> Any:
     return np.float64(value) if hint is float else value
 
 
+def all_kernels() -> list[Kernel]:
+    """Every kernel there is, none of them loaded."""
+    return [
+        value
+        for module in map(import_module, MODULES)
+        for value in vars(module).values()
+        if isinstance(value, Kernel) and value.written.__module__ == module.__name__
+    ]
+
+
 def load_kernels(*, backwards: bool = False) -> None:
     """Compile every kernel, or load it: half a second, or about 30 s the first time.
 
     Before a robot is taken over: a loop must not wait for a compiler. Where many are missing,
     another process helps, from the end of the list: each finds what the other has kept.
     """
-    kernels = [
-        value
-        for module in map(import_module, MODULES)
-        for value in vars(module).values()
-        if isinstance(value, Kernel) and value.written.__module__ == module.__name__
-    ]
+    kernels = all_kernels()
     helper = None if backwards or _IS_PLAIN else _helper(kernels)
     for made in reversed(kernels) if backwards else kernels:
         made.load()

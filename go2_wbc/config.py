@@ -21,9 +21,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from go2_wbc.errors import ConfigError, unknown_name
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.planning.command import VelocityEnvelope
 from go2_wbc.planning.locomotion import LocomotionConfig
 from go2_wbc.planning.pose import PoseEnvelope
+from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.motor import TORQUE_SPEED, require_motor
 from go2_wbc.robot.payload_estimation import PayloadConfig
 from go2_wbc.robot.safety import SafetyConfig
@@ -46,6 +48,8 @@ class Config:
         pose: poses of the trunk that are taken while walking.
         safety: when to give up.
         payload: estimate of what the robot carries.
+        estimator: of the state, for a plant that measures no pose: its maker passes it on.
+        feasibility: what a motion must keep to be played.
         backend: whole-body back end: condensed, full or placo.
         motor: what the motors are taken for: "torque-speed", or "ideal" for the peak torque at
             every speed.
@@ -57,6 +61,8 @@ class Config:
     pose: PoseEnvelope = field(default_factory=PoseEnvelope)
     safety: SafetyConfig = field(default_factory=SafetyConfig)
     payload: PayloadConfig = field(default_factory=PayloadConfig)
+    estimator: EstimatorConfig = field(default_factory=EstimatorConfig)
+    feasibility: FeasibilityLimits = field(default_factory=FeasibilityLimits)
     backend: str = "condensed"
     motor: str = TORQUE_SPEED
 

@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float
 from go2_wbc.compilation import subroutine
 from go2_wbc.errors import CommandError, ConfigError, unknown_name
 from go2_wbc.legs import LEGS
-from go2_wbc.validation import require_not_negative, require_positive, require_share
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Retired, ranged, retires
 
 TIE = 1e-9
 """Times this close [s] to an event count as the event: absorbs rounding of summed time steps."""
@@ -120,6 +120,7 @@ class ContactSchedule:
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE, swing_slope=NOT_NEGATIVE)
 class Stride:
     """How a stride follows the speed: a foot stands as long as it takes to pass below the hip.
 
@@ -141,9 +142,7 @@ class Stride:
     swing_slope: float = 0.01
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_positive(self, "reach", "stance_min", "stance_max", "swing")
-        require_not_negative(self, "swing_slope")
+        """Raise ConfigError for bounds or a swing that leave no stride."""
         if self.stance_min > self.stance_max or self.swing <= self.swing_slope:
             raise ConfigError(
                 f"Stride needs stance_min <= stance_max and swing > swing_slope, got {self}"
@@ -163,6 +162,8 @@ def stride_at(c: Stride, speed: float) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, slots=True)
+@retires(needs_mpc=Retired(True, "the forces of every gait are planned ahead"))
+@ranged(period=POSITIVE, duty=SHARE, envelope_share=SHARE, width=SHARE)
 class Gait:
     """A periodic pattern of steps.
 
@@ -182,8 +183,6 @@ class Gait:
             on both feet of a side pushes along the ground by half of what they carry, or tips over:
             of 285 changes from a flying trot to a pace as wide as a trot 4 fell, of 300 to one of
             0.65 none.
-
-    ``needs_mpc`` is retired and means nothing: the forces of every gait are planned ahead.
     """
 
     name: str
@@ -198,11 +197,9 @@ class Gait:
     width: float = 1.0
 
     def __post_init__(self, needs_mpc: bool) -> None:
-        """Raise ConfigError for a period, duty, offset or share that is out of range."""
-        require_positive(self, "period")
+        """Raise ConfigError for an apex or offset that is out of range."""
         if not self.apex > 0.0:
             raise ConfigError(f"Gait.apex must be positive, got {self.apex!r}")
-        require_share(self, "duty", "envelope_share", "width")
         if len(self.offsets) != 4 or not all(0.0 <= offset < 1.0 for offset in self.offsets):
             raise ConfigError(f"Gait.offsets must be four phases in [0, 1), got {self.offsets}")
 

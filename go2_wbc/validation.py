@@ -1,53 +1,167 @@
-"""Range checks for the frozen ``*Config`` classes, called from their ``__post_init__``."""
+"""Ranges of the numbers of a frozen ``*Config``, and what it had of old, as tables above the class.
+
+    @dataclass(frozen=True, slots=True)
+    @retires(tolerance=TOLERANCE)
+    @ranged(POSITIVE, share=SHARE, angles=between(-1.0, 1.0))
+    class StepConfig:
+        height: float = 0.08
+        share: float = 0.5
+        angles: tuple[float, float] = (0.0, 0.1)
+
+Every number of it is positive but two, and ``tolerance``, a constant now, may still be given.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
+import re
 import warnings
 from collections.abc import Callable
+from dataclasses import InitVar, dataclass
 from numbers import Real
-from typing import TypeGuard
+from typing import Any, TypeGuard, TypeVar
 
 from go2_wbc.errors import ConfigError
+
+_Class = TypeVar("_Class", bound=type)
+_NUMBERS = re.compile(r"(float|int)$|(Annotated\[)?tuple\[(float|int)\b")
+"""Annotations of fields that hold numbers."""
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """What a number must be, beside finite: in words, and as a rule."""
+
+    what: str
+    holds: Callable[[float], bool]
+
+
+POSITIVE = Range("positive", lambda value: value > 0.0)
+NOT_NEGATIVE = Range("at least 0", lambda value: value >= 0.0)
+FINITE = Range("finite", lambda _: True)
+SHARE = Range("above 0 and at most 1", lambda value: 0.0 < value <= 1.0)
+
+
+def between(low: float, high: float) -> Range:
+    """Numbers in [``low``, ``high``]."""
+    return Range(f"between {low:g} and {high:g}", lambda value: low <= value <= high)
+
+
+def ranged(rest: Range | None = None, /, **ranges: Range) -> Callable[[_Class], _Class]:
+    """Let a dataclass refuse numbers out of range; stands below ``@dataclass``.
+
+    Its ``__post_init__``, if it has one, is called with numbers that are in range.
+
+    Args:
+        rest: range of every field of numbers that is not named; None to leave them alone.
+        ranges: by field; those of an optional one hold unless it is None.
+    """
+
+    def decorate(cls: _Class) -> _Class:
+        named = {
+            name: ranges.get(name, rest)
+            for name, kind in vars(cls)["__annotations__"].items()
+            if name in ranges or _NUMBERS.match(kind)
+        }
+        optional = {n for n, kind in vars(cls)["__annotations__"].items() if "| None" in str(kind)}
+        further = vars(cls).get("__post_init__")
+
+        def check(self: object, *given: object) -> None:
+            for name, rule in named.items():
+                if rule and not (name in optional and getattr(self, name) is None):
+                    require(self, rule, name)
+            if further:
+                further(self, *given)
+
+        cls.__post_init__ = check
+        return cls
+
+    return decorate
+
+
+@dataclass(frozen=True, slots=True)
+class Retired:
+    """What a field was by default, and what there is in its place."""
+
+    value: object
+    instead: str
+
+
+def retires(**names: object) -> Callable[[_Class], _Class]:
+    """Let a dataclass, and its table in a file, take what it had of old; next to ``@dataclass``.
+
+    Whoever asks for something else than there was is warned that it has no effect. It is given by
+    keyword; an ``InitVar`` of the class keeps its place, and is passed to its ``__post_init__``.
+
+    Args:
+        names: what each is now, a number or a ``Retired``.
+    """
+    table = {
+        name: item if isinstance(item, Retired) else Retired(item, f"it is always {item!r}")
+        for name, item in names.items()
+    }
+
+    def decorate(cls: _Class) -> _Class:
+        own = [name for name in cls.__annotations__ if name in table]
+        for name in [name for name in table if name not in own]:
+            cls.__annotations__[name] = InitVar[Any]
+            setattr(cls, name, dataclasses.field(default=table[name].value, kw_only=True))
+        order = [name for name in cls.__annotations__ if name in table]
+        further = vars(cls).get("__post_init__")
+
+        def check(self: object, *given: object) -> None:
+            for name, value in zip(order, given, strict=True):
+                if value != table[name].value:
+                    warn_retired(f"{type(self).__name__}.{name}", table[name].instead)
+            if further:
+                further(self, *given[: len(own)])
+
+        cls.__post_init__ = check
+        return cls
+
+    return decorate
+
+
+def require(config: object, rule: Range, *names: str) -> None:
+    """Raise ConfigError unless each named field of ``config`` keeps to ``rule``."""
+    for name in names:
+        field = getattr(config, name)
+        for value in field if isinstance(field, tuple) else (field,):
+            if not (is_finite_number(value) and rule.holds(float(value))):
+                raise ConfigError(
+                    f"{type(config).__name__}.{name} must be {rule.what}, got {field!r}"
+                )
 
 
 def require_positive(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is finite and above 0."""
-    _require(config, "positive", lambda value: value > 0.0, *names)
+    require(config, POSITIVE, *names)
 
 
 def require_not_negative(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is finite and at least 0."""
-    _require(config, "at least 0", lambda value: value >= 0.0, *names)
+    require(config, NOT_NEGATIVE, *names)
 
 
 def require_finite(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is a finite number."""
-    _require(config, "finite", lambda _: True, *names)
+    require(config, FINITE, *names)
 
 
 def require_between(config: object, low: float, high: float, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is in [``low``, ``high``]."""
-    what = f"between {low:g} and {high:g}"
-    _require(config, what, lambda value: low <= value <= high, *names)
+    require(config, between(low, high), *names)
 
 
 def require_share(config: object, *names: str) -> None:
     """Raise ConfigError unless each named field of ``config`` is in (0, 1]."""
-    _require(config, "above 0 and at most 1", lambda value: 0.0 < value <= 1.0, *names)
+    require(config, SHARE, *names)
 
 
 def is_finite_number(value: object) -> TypeGuard[Real]:
     """Whether ``value`` is a finite number; True and False are none."""
     return isinstance(value, Real) and not isinstance(value, bool) and math.isfinite(value)
-
-
-def _require(config: object, what: str, holds: Callable[[float], bool], *names: str) -> None:
-    for name in names:
-        field = getattr(config, name)
-        for value in field if isinstance(field, tuple) else (field,):
-            if not (is_finite_number(value) and holds(float(value))):
-                raise ConfigError(f"{type(config).__name__}.{name} must be {what}, got {field!r}")
 
 
 def warn_retired(name: str, instead: str) -> None:

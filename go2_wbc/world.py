@@ -8,14 +8,27 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from go2_wbc.errors import ConfigError, unknown_name
-from go2_wbc.validation import require_between
+from go2_wbc.validation import between, ranged, require
 
 SENSORS = ("ideal", "noisy", "imu")
 PAYLOAD_HALF_SIZE = (0.10, 0.06, 0.04)
 """Of the payload [m]: a solid box of about a battery's or computer's size."""
 
 
+_RANGES = {
+    "friction": (0.0001, 2.0),
+    "friction_uncertainty": (0.0, 0.9),
+    "payload": (0.0, 12.0),
+    "mass_scale": (0.25, 3.0),
+    "mass_uncertainty": (0.0, 0.5),
+    "joint_friction": (0.0, 10.0),
+    "joint_friction_uncertainty": (0.0, 1.0),
+    "delay": (0.0, 0.05),
+}
+
+
 @dataclass(frozen=True, slots=True)
+@ranged(**{name: between(*bounds) for name, bounds in _RANGES.items()})
 class World:
     """What a check counts on, and what a simulated robot meets.
 
@@ -54,8 +67,7 @@ class World:
         """Raise ConfigError for a value that is out of range."""
         if not isinstance(self.payload_place, tuple) or len(self.payload_place) != 3:
             raise ConfigError(f"World.payload_place must be (x, y, z), got {self.payload_place!r}")
-        for name, (low, high) in _RANGES.items():
-            require_between(self, low, high, name)
+        require(self, between(-0.5, 0.5), "payload_place")
         if self.sensors not in SENSORS:
             raise ConfigError(unknown_name("World.sensors", str(self.sensors), SENSORS))
 
@@ -110,17 +122,6 @@ class World:
         return ", ".join(words)
 
 
-_RANGES = {
-    "friction": (0.0001, 2.0),
-    "friction_uncertainty": (0.0, 0.9),
-    "payload": (0.0, 12.0),
-    "payload_place": (-0.5, 0.5),
-    "mass_scale": (0.25, 3.0),
-    "mass_uncertainty": (0.0, 0.5),
-    "joint_friction": (0.0, 10.0),
-    "joint_friction_uncertainty": (0.0, 1.0),
-    "delay": (0.0, 0.05),
-}
 _UNCERTAIN = {"mass_scale": "mass", "joint_friction": "joint_friction", "friction": "friction"}
 """What is uncertain, and the name of its uncertainty without the ending."""
 _USUAL = World()

@@ -133,6 +133,20 @@ def test_the_picture_of_the_packages_is_that_of_their_imports() -> None:
     assert all(f">{name}</text>" in drawn for name in packages)
 
 
+def test_the_picture_of_a_tick_is_that_of_what_is_called() -> None:
+    graph = extension("call_graph")
+    flow = graph.traced_apart("tick")
+    calls = (
+        "controller/loop.py",
+        "controller/behaviours/walking.py",
+        "go2_wbc/planning/locomotion.py",
+    )
+    assert [flow.callers.get(file) for file in calls] == [None, *calls[:2]]
+    assert "foothold" in flow.functions["go2_wbc/planning/footholds.py"], "compiled code is seen"
+    drawn = graph.picture(flow, "tick")
+    assert all(f">{file.removesuffix('.py')}</text>" in drawn for file in flow.functions)
+
+
 def test_a_docstring_keeps_its_bars_and_its_indented_blocks() -> None:
     plain = extension("plain_docstrings")
     lines = ["Norm |x| and ``a | b``.", "", "    minimise |x|", "", "Args:", "    x: any.", ""]

@@ -60,8 +60,11 @@ def run(args: argparse.Namespace) -> int:
     pad, said = (None, "keys only") if args.keyboard else find_gamepad()
     print(keys_help(), said, *([] if pad is None else [LEGEND]), sep="\n")
     numbers = config(args.config).beside_hardware
+    simulator = MujocoPlant(
+        args.mjcf, motor=numbers.motor, sensors=args.sensors, estimator=numbers.estimator
+    )
     with (
-        closing(MujocoPlant(args.mjcf, motor=numbers.motor, sensors=args.sensors)) as plant,
+        closing(simulator) as plant,
         GO2Controller(plant=plant, realtime=True, viewer=args.viewer, config=numbers) as go2,
     ):
         teleop = Teleop(go2)

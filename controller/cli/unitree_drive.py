@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from contextlib import closing
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from controller.cli.common import ExitCode, Subparsers, add_parser, print_json_line
@@ -49,17 +50,19 @@ def register(subparsers: Subparsers) -> None:
         default=0.03,
         help="damp after this time without lowstate, default %(default)s",
     )
+    parser.add_argument("--config", metavar="FILE", type=Path, help="TOML with other numbers")
     parser.add_argument("--json", action="store_true", help="print a JSON line per step")
 
 
 def run(args: argparse.Namespace) -> int:
     """Drive step by step; the robot ends limp."""
+    from controller.arguments import config
     from controller.bridges.unitree.drive import Trot, check_steps, drive
     from controller.bridges.unitree.guards import GuardConfig
     from controller.bridges.unitree.plant import UnitreePlant
 
     check_steps(args.steps)
-    trot = Trot(args.speed, args.seconds)
+    trot, numbers = Trot(args.speed, args.seconds), config(args.config)
     plant = UnitreePlant(
         args.interface,
         args.domain,
@@ -67,10 +70,11 @@ def run(args: argparse.Namespace) -> int:
         guards=GuardConfig(
             stale_limit=args.stale_limit, hang_limit=max(args.stale_limit, GuardConfig().hang_limit)
         ),
+        estimator=numbers.estimator,
     )
     done = True
     with closing(plant):
-        for step in drive(plant, args.steps, trot):
+        for step in drive(plant, args.steps, trot, numbers):
             _tell(step, as_json=args.json)
             done = done and step.ok
     return ExitCode.OK if done else ExitCode.FAILED

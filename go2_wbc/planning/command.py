@@ -7,7 +7,7 @@ from dataclasses import astuple, dataclass
 from numbers import Real
 
 from go2_wbc.errors import CommandError
-from go2_wbc.validation import require_positive
+from go2_wbc.validation import POSITIVE, ranged
 
 ROUNDING = 1e-12
 """Share of the envelope by which a command on its surface may seem to lie outside."""
@@ -49,6 +49,7 @@ ZERO_COMMAND = VelocityCommand()
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
 class VelocityEnvelope:
     """Commands that are followed.
 
@@ -69,10 +70,6 @@ class VelocityEnvelope:
     lateral: float = 0.6
     turning: float = 2.0
     curve: float = 1.5
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a bound that is not positive."""
-        require_positive(self, "forward", "backward", "lateral", "turning", "curve")
 
     def scaled(self, share: float) -> VelocityEnvelope:
         """That of every command in this one multiplied by ``share``."""

@@ -21,10 +21,11 @@ import numpy as np
 from go2_wbc.compilation import subroutine
 from go2_wbc.contacts import TIE
 from go2_wbc.records import Record
-from go2_wbc.validation import require_positive, require_share
+from go2_wbc.validation import POSITIVE, SHARE, ranged
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE, earliest=SHARE)
 class ContactConfig:
     """When contacts count, from a search on this robot in simulation.
 
@@ -35,11 +36,6 @@ class ContactConfig:
 
     earliest: float = 0.7
     step: float = 0.015
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_share(self, "earliest")
-        require_positive(self, "step")
 
 
 class FootContact(Record):

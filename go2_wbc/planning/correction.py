@@ -19,7 +19,7 @@ second, in which a robot that had just stood up with 4 kg 8 cm aside leaned by 6
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -30,10 +30,11 @@ from go2_wbc.contacts import TIE
 from go2_wbc.records import Record
 from go2_wbc.reference import Target, TrackedPoint
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import require_not_negative
+from go2_wbc.validation import NOT_NEGATIVE, ranged
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(NOT_NEGATIVE)
 class CorrectionConfig:
     """Numbers of the correction.
 
@@ -61,10 +62,6 @@ class CorrectionConfig:
     height_per_weight: float = 0.00055
     roll_per_moment: float = 0.08
     pitch_per_moment: float = 0.0085
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a negative number."""
-        require_not_negative(self, *(f.name for f in fields(self)))
 
 
 class Correction(Record):

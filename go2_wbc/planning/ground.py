@@ -16,12 +16,7 @@ from jaxtyping import Bool, Float
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import Record
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import (
-    require_between,
-    require_not_negative,
-    require_positive,
-    require_share,
-)
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, between, ranged
 
 GROUND_SHARE = 0.5
 """Share of a landing foot's height that goes into the estimate of the ground's height. A pitch that
@@ -38,6 +33,13 @@ MOST_DELAY = 0.8
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(
+    NOT_NEGATIVE,
+    slope_share=SHARE,
+    calming=SHARE,
+    stumble=POSITIVE,
+    delay=between(0.0, MOST_DELAY),
+)
 class GroundConfig:
     """Numbers of the estimate, from a search on this robot in simulation.
 
@@ -61,13 +63,6 @@ class GroundConfig:
     calming: float = 0.8
     stumble: float = 0.06
     delay: float = 0.4
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_share(self, "slope_share", "calming")
-        require_not_negative(self, "follow", "smooth", "most_raise")
-        require_between(self, 0.0, MOST_DELAY, "delay")
-        require_positive(self, "stumble")
 
 
 class Ground(Record):

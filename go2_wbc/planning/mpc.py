@@ -24,7 +24,7 @@ with one s for each of the six axes, and no matrix of the horizon is ever built.
 
 from __future__ import annotations
 
-from dataclasses import InitVar, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -33,18 +33,22 @@ from go2_wbc.algebra.active_set import SINGULAR, constrain, factorise, solve_fac
 from go2_wbc.algebra.linear import solve_linear
 from go2_wbc.compilation import subroutine
 from go2_wbc.records import Record
-from go2_wbc.validation import (
-    require_not_negative,
-    require_positive,
-    require_share,
-    warn_retired,
-)
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, SHARE, Retired, ranged, retires
 
 NODES = 12
 """Nodes of the horizon."""
 
 
 @dataclass(frozen=True, slots=True)
+@retires(enabled=Retired(True, "the forces of every gait are planned ahead"))
+@ranged(
+    POSITIVE,
+    angle_weights=NOT_NEGATIVE,
+    position_weights=NOT_NEGATIVE,
+    angular_weights=NOT_NEGATIVE,
+    linear_weights=NOT_NEGATIVE,
+    least_share=SHARE,
+)
 class MpcConfig:
     """Numbers of the MPC, from a search on this robot in simulation.
 
@@ -65,11 +69,8 @@ class MpcConfig:
             which the trunk's attitude weighs half as much in the whole-body QP. With all its weight
             and the feet far from below the CoM, the legs in the air are swung to turn the trunk:
             feet that should have come down were 0.16 m high, and the robot fell onto them.
-
-    ``enabled`` is retired: the forces of every gait are planned ahead.
     """
 
-    enabled: InitVar[bool] = True
     step: float = 0.03
     interval: float = 0.01
     angle_weights: tuple[float, float, float] = (20.0, 20.0, 20.0)
@@ -84,16 +85,6 @@ class MpcConfig:
     load_ramp: float = 0.01
     throw_time: float = 0.4
     throw_speed: float = 0.05
-
-    def __post_init__(self, enabled: bool) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        if not enabled:
-            warn_retired("MpcConfig.enabled", "the forces of every gait are planned ahead")
-        weights = "angle_weights", "position_weights", "angular_weights", "linear_weights"
-        require_not_negative(self, *weights)
-        require_positive(self, "step", "interval", "force_weight", "friction", "force_max")
-        require_positive(self, "prior_weight", "load_ramp", "throw_time", "throw_speed")
-        require_share(self, "least_share")
 
 
 class Robot(Record):

@@ -17,7 +17,7 @@ from jaxtyping import Float
 from go2_wbc.compilation import subroutine
 from go2_wbc.errors import CommandError, ConfigError
 from go2_wbc.planning.command import finite_number
-from go2_wbc.validation import require_not_negative, require_positive
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +52,7 @@ LEVEL = BodyPose()
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(highest=NOT_NEGATIVE, roll=NOT_NEGATIVE, pitch=NOT_NEGATIVE, yaw=NOT_NEGATIVE)
 class PoseEnvelope:
     """Poses that are held while the robot walks, each with all others at their bounds.
 
@@ -67,8 +68,7 @@ class PoseEnvelope:
     yaw: float = 0.20
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a bound on the wrong side of 0."""
-        require_not_negative(self, "highest", "roll", "pitch", "yaw")
+        """Raise ConfigError for a lowest trunk that is above the usual one."""
         if not -np.inf < self.lowest <= 0.0:
             raise ConfigError(f"PoseEnvelope.lowest must be 0 or below, got {self.lowest!r}")
 
@@ -92,6 +92,7 @@ class PoseEnvelope:
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
 class PoseConfig:
     """How a new pose is approached (own choice: about a second for what is allowed).
 
@@ -104,10 +105,6 @@ class PoseConfig:
     height_rate: float = 0.10
     turning_rate: float = 0.35
     sharpness: float = 5.0
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is not positive."""
-        require_positive(self, "height_rate", "turning_rate", "sharpness")
 
 
 @subroutine

@@ -32,13 +32,14 @@ from go2_wbc.compilation import Foreign, subroutine
 from go2_wbc.errors import ConfigError
 from go2_wbc.records import Record
 from go2_wbc.robot.snapshot import Snapshot
-from go2_wbc.validation import require_not_negative, require_positive
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
 _TINY = 1e-9
 """Force [N], over a determinant, that stands in for none where one divides by it."""
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE, patience=NOT_NEGATIVE, mask=NOT_NEGATIVE, recovery=NOT_NEGATIVE)
 class SlipConfig:
     """Numbers of the estimate, from a search on this robot in simulation.
 
@@ -66,9 +67,7 @@ class SlipConfig:
     half_speed: float = 0.5
 
     def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_positive(self, "speed", "steepness", "time_constant", "least", "most", "half_speed")
-        require_not_negative(self, "patience", "mask", "recovery")
+        """Raise ConfigError for bounds without a range."""
         if self.least > self.most:
             raise ConfigError(
                 f"SlipConfig.least must be at most .most, got {self.least} and {self.most}"

@@ -23,7 +23,7 @@ from go2_wbc.compilation import subroutine
 from go2_wbc.planning.gait_clock import Clock
 from go2_wbc.planning.ground import Ground, GroundConfig, apex_raise, delay
 from go2_wbc.records import Record
-from go2_wbc.validation import require_not_negative, require_positive
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, ranged
 
 TIE = 1e-9
 """Progress this near to the middle counts as the middle, where the acceleration changes its sign:
@@ -31,6 +31,7 @@ a gait passes through it in whole ticks, and rounding must not decide."""
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE, touchdown_depth=NOT_NEGATIVE)
 class SwingConfig:
     """Shape of a swing.
 
@@ -49,11 +50,6 @@ class SwingConfig:
     apex: float = 0.09
     touchdown_depth: float = 0.008
     full_depth_way: float = 0.4
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a length that is out of range."""
-        require_positive(self, "apex", "full_depth_way")
-        require_not_negative(self, "touchdown_depth")
 
     def at_most(self, apex: float) -> SwingConfig:
         """The same with an apex [m] of ``apex`` if that is lower."""

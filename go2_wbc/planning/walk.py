@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import InitVar, dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -19,15 +19,20 @@ from go2_wbc.planning.swing import Swing, SwingConfig
 from go2_wbc.planning.trunk import Trunk
 from go2_wbc.records import Record
 from go2_wbc.robot.model import RobotModel
-from go2_wbc.validation import require_not_negative, require_positive, warn_retired
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Retired, ranged, retires
 
 LEAST_HEIGHT, GREATEST_HEIGHT = 0.18, 0.34
 """CoM heights [m] between which the legs can step."""
-_RETIRED_RAMP = 0.03
-"""Time [s] that ``LocomotionConfig.load_ramp`` was by default."""
 
 
 @dataclass(frozen=True, slots=True)
+@retires(load_ramp=Retired(0.03, "LocomotionConfig.mpc.load_ramp counts"))
+@ranged(
+    POSITIVE,
+    compression=NOT_NEGATIVE,
+    velocity_feedback=NOT_NEGATIVE,
+    normal_force_min=NOT_NEGATIVE,
+)
 class LocomotionConfig:
     """Numbers of the locomotion planner, from a search on this robot in simulation.
 
@@ -57,8 +62,6 @@ class LocomotionConfig:
         ground: estimate of its slope and roughness.
         mpc: planning of the forces ahead.
         pose: how a new pose of the trunk is approached.
-
-    ``load_ramp`` is retired: ``mpc.load_ramp`` is the one that counts.
     """
 
     height: float = 0.29
@@ -72,7 +75,6 @@ class LocomotionConfig:
     foothold_reach: float = 0.22
     normal_force_min: float = 0.0
     normal_force_max: float = 400.0
-    load_ramp: InitVar[float] = _RETIRED_RAMP
     settle_speed: float = 0.05
     capture_margin: float = 0.09
     square_tolerance: float = 0.02
@@ -83,15 +85,8 @@ class LocomotionConfig:
     mpc: MpcConfig = field(default_factory=MpcConfig)
     pose: PoseConfig = field(default_factory=PoseConfig)
 
-    def __post_init__(self, load_ramp: float) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        if load_ramp != _RETIRED_RAMP:
-            warn_retired("LocomotionConfig.load_ramp", "LocomotionConfig.mpc.load_ramp counts")
-        zero_is_valid = {"velocity_feedback", "normal_force_min", "compression"}
-        parts = {"swing", "slip", "contact", "ground", "mpc", "pose"}
-        positive = {f.name for f in fields(self)} - zero_is_valid - parts
-        require_positive(self, *sorted(positive))
-        require_not_negative(self, *sorted(zero_is_valid))
+    def __post_init__(self) -> None:
+        """Raise ConfigError for a height that the legs have not, or forces without a range."""
         if not LEAST_HEIGHT <= self.height <= GREATEST_HEIGHT:
             raise ConfigError(
                 f"LocomotionConfig.height must be {LEAST_HEIGHT} to {GREATEST_HEIGHT} m, "

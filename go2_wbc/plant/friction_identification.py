@@ -29,7 +29,7 @@ from go2_wbc.plant.base import Plant
 from go2_wbc.robot.joint_friction import JointFriction
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import JointCommand, RobotState
-from go2_wbc.validation import require_positive
+from go2_wbc.validation import POSITIVE, ranged
 
 SPEEDS = (0.25, 0.5, 1.0, 1.5)
 """Joint speeds [rad/s]; the dry part shows at the low ones, the viscous part at the high ones."""
@@ -56,6 +56,7 @@ CERTAIN = 2.0
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
 class SweepConfig:
     """How the joints are moved, and what counts as a measurement.
 
@@ -71,10 +72,6 @@ class SweepConfig:
     kd: float = 3.0
     speed_tolerance: float = 0.2
     misfit: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is not positive."""
-        require_positive(self, "kp", "kd", "speed_tolerance", "misfit")
 
 
 @dataclass(frozen=True, slots=True)

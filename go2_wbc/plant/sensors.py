@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any, final
 
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.robot.estimator import SensorReading, StateEstimator
+from go2_wbc.robot.estimator import EstimatorConfig, SensorReading, StateEstimator
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.state import OdometryCovariance, RobotState
-from go2_wbc.validation import require_not_negative
+from go2_wbc.validation import NOT_NEGATIVE, ranged
 
 EXACT = 1e-4
 """Standard deviation [m, rad, m/s, rad/s] that stands for the truth's 0, which many filters take
@@ -37,6 +37,7 @@ class ImuSample:
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(NOT_NEGATIVE)
 class SensorNoise:
     """Standard deviations of the white noise on each quantity that a plant reports.
 
@@ -63,10 +64,6 @@ class SensorNoise:
     joint_position: float = 0.002
     joint_velocity: float = 0.05
     foot_force: float = 2.0
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a negative deviation."""
-        require_not_negative(self, *(f.name for f in fields(self)))
 
     def corrupt_state(self, state: RobotState, rng: np.random.Generator) -> RobotState:
         """``state`` with noise added; time and torque are known exactly."""
@@ -111,6 +108,7 @@ NONE = SensorNoise(*[0.0] * 8)
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(NOT_NEGATIVE)
 class SensorErrors:
     """How the sensors of ``sensors="imu"`` err: all that the controller is given then.
 
@@ -146,18 +144,20 @@ class SensorErrors:
     force_step: float = 1.0
     latency: float = 0.002
 
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a negative number."""
-        require_not_negative(self, *(f.name for f in fields(self)))
-
 
 @final
 class Proprioception:
     """The state as a robot knows it: read with errors, late, and estimated from nothing else."""
 
-    def __init__(self, errors: SensorErrors, period: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self,
+        errors: SensorErrors,
+        period: float,
+        rng: np.random.Generator,
+        estimator: EstimatorConfig | None = None,
+    ) -> None:
         """Draw the biases from ``rng``, of which every later error is drawn, too."""
-        self._errors, self._rng = errors, rng
+        self._errors, self._rng, self._config = errors, rng, estimator
         self._late = round(errors.latency / period)
         self._model = RobotModel()
         self._gyro_bias = errors.gyro_bias * rng.standard_normal(3)
@@ -166,7 +166,7 @@ class Proprioception:
 
     def restart(self) -> None:
         """Forget everything: the robot is switched on where it is."""
-        self._estimator = StateEstimator(self._model)
+        self._estimator = StateEstimator(self._model, self._config)
         self._waiting: deque[SensorReading] = deque()
 
     def sense(self, true: RobotState, imu: ImuSample) -> tuple[RobotState, ImuSample]:

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from go2_wbc.errors import ConfigError
-from go2_wbc.validation import require_not_negative, require_positive
+from go2_wbc.validation import NOT_NEGATIVE, POSITIVE, Range, ranged
 
 STEEPEST = 0.8
 """Greatest angle [rad] of a slope: steeper than any friction coefficient up to 1 holds."""
 HALF_WIDTH = 5.0
 """Half width [m] of stairs, ramps and patches."""
+CLIMBED = Range(f"above 0, at most {STEEPEST} rad", lambda angle: 0.0 < angle <= STEEPEST)
 PLATFORM = 10.0
 """Length [m] of the level ground behind the last step."""
 
@@ -59,6 +59,7 @@ class Terrain(ABC):
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE, count=NOT_NEGATIVE, clear_radius=NOT_NEGATIVE, seed=NOT_NEGATIVE)
 class Boxes(Terrain):
     """Flat ground strewn with low boxes that the robot does not know about.
 
@@ -79,11 +80,6 @@ class Boxes(Terrain):
     extent: float = 4.0
     clear_radius: float = 0.55
     seed: int = 0
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_positive(self, "height", "size", "extent")
-        require_not_negative(self, "count", "clear_radius", "seed")
 
     def layout(self) -> Float[np.ndarray, "n 4"]:
         """One row per box: x, y of its centre [m], yaw [rad], height [m].
@@ -107,6 +103,7 @@ class Boxes(Terrain):
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
 class Stairs(Terrain):
     """Steps that lead up to a platform; with a ``count`` of 1 a single step.
 
@@ -122,10 +119,6 @@ class Stairs(Terrain):
     depth: float = 0.3
     start: float = 0.8
 
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_positive(self, "height", "count", "depth", "start")
-
     def blocks(self) -> tuple[Block, ...]:
         """One for each step, the last one with the platform."""
         blocks = []
@@ -138,6 +131,7 @@ class Stairs(Terrain):
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(angle=CLIMBED)
 class Slope(Terrain):
     """A plane that rises ahead; where the robot goes on it is for ``initial_yaw`` to say.
 
@@ -146,10 +140,6 @@ class Slope(Terrain):
     """
 
     angle: float
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        _require_angle(self.angle)
 
     @property
     def floor_pitch(self) -> float:
@@ -162,6 +152,7 @@ class Slope(Terrain):
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE, angle=CLIMBED)
 class Ramp(Terrain):
     """A slope that leads up from the level, a level top, and a slope that leads down again.
 
@@ -174,11 +165,6 @@ class Ramp(Terrain):
     angle: float
     length: float = 1.5
     start: float = 0.8
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        _require_angle(self.angle)
-        require_positive(self, "length", "start")
 
     def blocks(self) -> tuple[Block, ...]:
         """The way up, the top and the way down."""
@@ -199,6 +185,7 @@ class Ramp(Terrain):
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
 class Patch(Terrain):
     """A strip across the way with a friction of its own, as of oil or ice; 2 mm high.
 
@@ -212,17 +199,8 @@ class Patch(Terrain):
     length: float = 0.5
     start: float = 1.0
 
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a number that is out of range."""
-        require_positive(self, "friction", "length", "start")
-
     def blocks(self) -> tuple[Block, ...]:
         """The strip."""
         half = 0.5 * self.length
         centre = (self.start + half, 0.0, 0.001)
         return (Block(centre, (half, HALF_WIDTH, 0.001), friction=self.friction),)
-
-
-def _require_angle(angle: float) -> None:
-    if not 0.0 < angle <= STEEPEST:
-        raise ConfigError(f"angle must be above 0, at most {STEEPEST} rad, got {angle!r}")

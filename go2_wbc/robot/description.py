@@ -33,6 +33,9 @@ class RobotDescription:
         disabled_pairs: pairs of links that the SRDF excludes from collision.
         efforts: torque limit of each joint [N m], in the order of ``JOINT_NAMES``.
         speeds: speed limit of each joint [rad/s], in the order of ``JOINT_NAMES``.
+        mass: of all links [kg].
+        origins: of each joint in the frame of the one above it [m], in the order of
+            ``JOINT_NAMES``; those of hips in the frame of the base.
     """
 
     urdf_path: Path
@@ -41,6 +44,14 @@ class RobotDescription:
     disabled_pairs: tuple[tuple[str, str], ...]
     efforts: tuple[float, ...]
     speeds: tuple[float, ...]
+    mass: float
+    origins: tuple[tuple[float, ...], ...]
+
+    def distance(self, first: str, second: str) -> float:
+        """Between two neighbouring joints of a leg, or two hips [m]."""
+        one, other = (self.origins[JOINT_NAMES.index(name)] for name in (first, second))
+        is_hip = second.endswith("hip_joint")
+        return math.dist(one, other) if is_hip else math.hypot(*other)
 
     def mesh_path(self, filename: str) -> Path:
         """The file that a mesh name of the URDF means.
@@ -94,6 +105,8 @@ def find_description(urdf: Path | str | None = None) -> RobotDescription:
         disabled_pairs=() if srdf is None else parse_disabled_pairs(srdf),
         efforts=efforts,
         speeds=speeds,
+        mass=sum(_number(m.get("value")) for m in root.iterfind("link/inertial/mass")),
+        origins=_joint_origins(root),
     )
 
 
@@ -163,6 +176,12 @@ def _joint_limits(urdf: Path, root: ET.Element) -> tuple[tuple[float, ...], tupl
                 message = f"{urdf}: joint {name} has no valid {what} limit ({texts.get(what)!r})"
                 raise DescriptionError(message)
     return tuple(efforts), tuple(speeds)
+
+
+def _joint_origins(root: ET.Element) -> tuple[tuple[float, ...], ...]:
+    origins = {joint.get("name"): joint.find("origin") for joint in root.findall("joint")}
+    texts = [None if (o := origins[name]) is None else o.get("xyz") for name in JOINT_NAMES]
+    return tuple(tuple(map(_number, (text or "0 0 0").split())) for text in texts)
 
 
 def _check_masses(urdf: Path, root: ET.Element) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from go2_wbc.errors import MotionError
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
@@ -21,7 +22,6 @@ from motions.feasibility.checked_motion import CheckedMotion, Playable, compile_
 from motions.feasibility.collision import SelfCollision, self_distance
 from motions.feasibility.goal_errors import departure_measurements, departures
 from motions.feasibility.hulls import hulls_of
-from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import FeasibilityReport, Series
 from motions.plan.compiled_plan import CompiledPlan, Problem
 from motions.plan.trajectory import Trajectory, trajectory_of

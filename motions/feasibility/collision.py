@@ -30,9 +30,9 @@ import numpy as np
 import pinocchio as pin
 from jaxtyping import Float
 
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.robot.description import RobotDescription
 from go2_wbc.robot.model import RobotModel
-from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 

@@ -25,6 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.geometry import support_margins
 from go2_wbc.records import packed
 from go2_wbc.robot.leg_kinematics import leg_table
@@ -36,7 +37,6 @@ from go2_wbc.wbc.trajectory_loads import LoadNumbers, lag, share_loads
 from go2_wbc.world import World
 from motions.batch_kinematics import attitudes, turned, zero_moment_points
 from motions.feasibility.kinematic import FEET, JOINTS
-from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 from motions.postures import NORMAL_FORCE_MAX

@@ -23,6 +23,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.trajectory_loads import accelerate, least_friction, slide
@@ -36,7 +37,6 @@ from motions.feasibility.forces import (
     scale_of_wrench,
 )
 from motions.feasibility.kinematic import FEET
-from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 

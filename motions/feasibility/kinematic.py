@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float
 
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import JOINT_NAMES, LEGS, Leg
 from go2_wbc.motion_plan import MotionPlan, Posture
 from go2_wbc.reference import Anchor
@@ -18,7 +19,6 @@ from go2_wbc.robot.model import RobotModel
 from go2_wbc.robot.rotations import wrap_angle, yaw_rotation
 from motions.batch_kinematics import attitudes, foot_centres
 from motions.feasibility.hulls import LinkHulls
-from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory, runs
 from motions.postures import home_poses

@@ -25,6 +25,7 @@ from __future__ import annotations
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.config import WbcConfig
@@ -38,7 +39,6 @@ from motions.feasibility.forces import (
     passes_over_few,
     state_at,
 )
-from motions.feasibility.limits import FeasibilityLimits
 from motions.feasibility.report import Series
 from motions.plan.trajectory import Trajectory
 

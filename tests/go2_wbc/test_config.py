@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from controller import GO2Controller
 from go2_wbc.config import Config, load_config, override
-from go2_wbc.errors import ConfigError
+from go2_wbc.errors import ConfigError, MotionInfeasible
 from go2_wbc.planning.command import VelocityEnvelope
-from go2_wbc.planning.locomotion import LocomotionConfig
-from go2_wbc.planning.mpc import MpcConfig
+from go2_wbc.plant import MujocoPlant
+from go2_wbc.robot.state import JointCommand
 from tests.controller.plants import StillPlant
 
 
@@ -76,16 +78,8 @@ def test_a_retired_key_warns_and_changes_nothing(tmp_path: Path, text: str, mess
 def test_a_retired_key_that_asks_for_what_there_is_is_taken(tmp_path: Path) -> None:
     text = "[locomotion]\nload_ramp = 0.03\nmpc = { enabled = true }"
     assert load_config(written(tmp_path, text)) == Config()
-    assert MpcConfig(enabled=True) == MpcConfig()
     with pytest.raises(ConfigError, match=r"mpc: enabled must be of type bool, got 1"):
         load_config(written(tmp_path, "[locomotion.mpc]\nenabled = 1"))
-
-
-def test_who_constructs_with_what_is_retired_is_warned() -> None:
-    with pytest.warns(FutureWarning, match="MpcConfig.enabled"):
-        assert MpcConfig(enabled=False) == MpcConfig()
-    with pytest.warns(FutureWarning, match="LocomotionConfig.load_ramp"):
-        assert LocomotionConfig(load_ramp=0.05) == LocomotionConfig()
 
 
 def test_one_half_of_a_nested_table_may_be_left_out(tmp_path: Path) -> None:
@@ -99,8 +93,8 @@ def test_one_half_of_a_nested_table_may_be_left_out(tmp_path: Path) -> None:
     [
         (
             "speed = 1",
-            r"unknown key 'speed'; valid: backend, envelope, locomotion, motor, payload, pose,"
-            " safety",
+            r"unknown key 'speed'; valid: backend, envelope, estimator, feasibility, locomotion,"
+            " motor, payload, pose, safety, wbc",
         ),
         ("[wbc]\nsolvr = 'daqp'", r"mine\.toml: wbc: unknown key 'solvr'; valid: .*solver"),
         ("[wbc.swing_foot]\nki = [1, 1, 1]", r"wbc: swing_foot: unknown key 'ki'; valid: kd, kp"),
@@ -111,6 +105,8 @@ def test_one_half_of_a_nested_table_may_be_left_out(tmp_path: Path) -> None:
         ("[locomotion]\nheight = inf", r"height must be a finite number, got inf"),
         ("[wbc]\nswing_weight = inf", r"swing_weight must be a finite number, got inf"),
         ("[wbc.leg_posture]\nkd = [nan, 1, 1]", r"kd must be a finite number, got nan"),
+        ("[estimator]\nforce = 9", r"estimator: unknown key 'force'; valid: .*contact_force"),
+        ("[feasibility]\njolt = 'soft'", r"feasibility: jolt must be a finite number, got 'soft'"),
         ("[safety]\nqp_patience = 2.5", r"qp_patience must be of type int, got 2\.5"),
         ("[safety]\nqp_patience = true", r"qp_patience must be of type int, got True"),
         ("backend = 1", r"backend must be of type str, got 1"),
@@ -143,6 +139,25 @@ def test_a_file_that_cannot_be_read_is_named_with_the_reason(tmp_path: Path) -> 
         load_config(tmp_path / "gone.toml")
     with pytest.raises(ConfigError, match=r"cannot read .*: Is a directory"):
         load_config(tmp_path)
+
+
+def test_what_a_motion_must_keep_and_how_the_state_is_estimated_is_set_by_a_file(
+    tmp_path: Path,
+) -> None:
+    text = "[estimator]\nstill_time = 0.02\n[feasibility]\ntorque_share = 0.01"
+    config = load_config(written(tmp_path, text))
+    with (
+        GO2Controller(plant=StillPlant(), config=config) as go2,
+        pytest.raises(MotionInfeasible, match="torque"),
+    ):
+        go2.prepare("nod")
+    kept = {}
+    for estimator in (None, config.estimator):
+        with closing(MujocoPlant(sensors="imu", estimator=estimator)) as plant:
+            for _ in range(60):
+                plant.write(JointCommand.damping(1.0))
+            kept[estimator] = plant.read().q
+    assert not np.array_equal(*kept.values())
 
 
 def test_an_override_leaves_the_original_alone() -> None:
@@ -183,6 +198,9 @@ def test_a_controller_takes_a_file_a_path_or_a_config(tmp_path: Path) -> None:
         ("[locomotion]\nheight = 0", "LocomotionConfig.height must be positive"),
         ("[locomotion]\nnormal_force_max = 1\nnormal_force_min = 2", "must be below"),
         ("[locomotion.swing]\napex = 0", "SwingConfig.apex must be positive"),
+        ("[estimator]\nslip = 0", "EstimatorConfig.slip must be positive, got 0.0"),
+        ("[estimator]\ncontact_force = 30", "contact_force"),
+        ("[feasibility]\njolt = -1", "FeasibilityLimits.jolt must be positive, got -1.0"),
         ("[safety]\nqp_patience = 0", "SafetyConfig.qp_patience must be positive, got 0"),
     ],
 )

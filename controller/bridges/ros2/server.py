@@ -108,7 +108,10 @@ def serve(
         watch = GraphWatch(graph_node, namespace)
         watch.check()
         simulator = MujocoPlant(
-            visuals=settings.viewer, motor=config.motor, sensors=settings.sensors
+            visuals=settings.viewer,
+            motor=config.motor,
+            sensors=settings.sensors,
+            estimator=config.estimator,
         )
         stack.callback(simulator.close)
         go2 = stack.enter_context(

@@ -9,6 +9,7 @@ from typing import Final
 
 from controller.bridges.unitree.plant import UnitreePlant
 from controller.go2_controller import GO2Controller
+from go2_wbc.config import Config
 from go2_wbc.errors import CommandError, Go2WbcError, unknown_name
 from go2_wbc.validation import require_finite, require_positive
 
@@ -50,9 +51,11 @@ def check_steps(names: list[str]) -> None:
             raise CommandError(unknown_name("step", name, STEPS))
 
 
-def drive(plant: UnitreePlant, names: list[str], trot: Trot) -> Iterator[Step]:
+def drive(
+    plant: UnitreePlant, names: list[str], trot: Trot, config: Config | None = None
+) -> Iterator[Step]:
     """Do the steps one after the other; ends with the first that is not done, the robot limp."""
-    with GO2Controller(plant=plant, realtime=True) as go2:
+    with GO2Controller(plant=plant, realtime=True, config=config) as go2:
         for name in names:
             step = _do(go2, name, trot)
             yield step

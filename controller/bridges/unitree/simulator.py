@@ -87,6 +87,7 @@ class UnitreeSimulator:
             sensors=settings.sensors,
             seed=settings.seed,
             motor=config.motor,
+            estimator=config.estimator,
         )
         model = RobotModel()
         self.gate = CommandGate(model.q_lower, model.q_upper)

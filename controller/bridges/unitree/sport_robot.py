@@ -83,7 +83,7 @@ class SportRobot:
         """Take over a robot that lies on the ground."""
         self._config = config = config.beside_hardware
         # With a model of its own: the loop is another thread.
-        self._checker = FeasibilityChecker(RobotModel(motor=config.motor))
+        self._checker = FeasibilityChecker(RobotModel(motor=config.motor), config.feasibility)
         plans = playable_plans(self._checker.model)
         walks = {api: name for api, name in WALKS.items() if name in GAITS}
         self.unsupported = (MOTIONS.keys() | WALKS.keys()) - plans.keys() - walks.keys()

@@ -19,7 +19,7 @@ from go2_wbc.plant.mujoco.visuals import add_visuals
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.description import BASE_LINK, RobotDescription
 from go2_wbc.robot.model import FOOT_RADIUS
-from go2_wbc.validation import require_not_negative
+from go2_wbc.validation import NOT_NEGATIVE, ranged
 from go2_wbc.world import PAYLOAD_HALF_SIZE
 
 FLOOR = "go2_wbc_floor"
@@ -40,6 +40,7 @@ _FLOOR_HALF_SIZE = (0.0, 0.0, 0.05)  # m; 0 is infinite, the third is the render
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(NOT_NEGATIVE)
 class JointDynamics:
     """What the URDF does not say about the joints; each triple is hip, thigh, calf.
 
@@ -56,10 +57,6 @@ class JointDynamics:
     armature: tuple[float, float, float] = (0.0045, 0.0045, 0.0164)
     damping: tuple[float, float, float] = (0.1, 0.1, 0.1)
     friction_loss: tuple[float, float, float] = (0.2, 0.2, 0.2)
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a negative number."""
-        require_not_negative(self, "armature", "damping", "friction_loss")
 
     def scaled(self, friction: float) -> JointDynamics:
         """The same with friction and damping ``friction`` times as large."""

@@ -30,6 +30,7 @@ from go2_wbc.plant.mujoco.setup import PlantSetup, prepare
 from go2_wbc.plant.sensors import NONE, ImuSample, Proprioception, SensorErrors, SensorNoise
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.records import packed
+from go2_wbc.robot.estimator_config import EstimatorConfig
 from go2_wbc.robot.motor import TORQUE_SPEED, MotorModel, drive
 from go2_wbc.robot.state import JointCommand, OdometryCovariance, RobotState
 from go2_wbc.world import SENSORS
@@ -62,6 +63,7 @@ class MujocoPlant(Plant):
             that ``read`` gives is estimated from IMU, encoders and feet, in a world of its own.
         noise: standard deviations of ``"noisy"``.
         errors: of the sensors of ``"imu"``.
+        estimator: numbers of the estimate of ``"imu"``.
         seed: of both and of ``initial_joint_noise``.
         initial_yaw: heading at the start [rad].
         initial_joint_noise: standard deviation [rad] of the joint angles from which it settles.
@@ -92,6 +94,7 @@ class MujocoPlant(Plant):
         sensors: str = "ideal",
         noise: SensorNoise | None = None,
         errors: SensorErrors | None = None,
+        estimator: EstimatorConfig | None = None,
         seed: int = 0,
         initial_yaw: float = 0.0,
         initial_joint_noise: float = 0.0,
@@ -144,7 +147,8 @@ class MujocoPlant(Plant):
         self.write(JointCommand.damping(LYING_DAMPING))
         self._ticks, self._data.time = 0, 0.0
         if sensors == "imu":
-            self._senses = Proprioception(errors or SensorErrors(), control_period, self._rng)
+            errors = errors or SensorErrors()
+            self._senses = Proprioception(errors, control_period, self._rng, estimator)
             self._sense()
 
     @property

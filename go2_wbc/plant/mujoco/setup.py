@@ -16,13 +16,22 @@ from go2_wbc.plant.mujoco.user_model import load_user_model
 from go2_wbc.plant.terrain import Terrain
 from go2_wbc.robot.description import BASE_LINK, find_description
 from go2_wbc.robot.motor import MotorModel, require_motor
-from go2_wbc.validation import require_finite, require_not_negative, require_positive
+from go2_wbc.validation import FINITE, NOT_NEGATIVE, POSITIVE, ranged
 
 # Dry rubber on a hard floor; Unitree publishes none. The prototype's runs used it.
 DEFAULT_FRICTION = 0.8
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(
+    NOT_NEGATIVE,
+    timestep=POSITIVE,
+    control_period=POSITIVE,
+    friction=POSITIVE,
+    mass_scale=POSITIVE,
+    initial_yaw=FINITE,
+    payload_place=FINITE,
+)
 class PlantSetup:
     """The settings of a ``MujocoPlant``; its docstring says what they mean."""
 
@@ -52,12 +61,6 @@ class PlantSetup:
             raise ConfigError(
                 f"terrain must be a Terrain, as Boxes(...), or None, got {self.terrain!r}"
             )
-        require_positive(self, "timestep", "control_period", "mass_scale")
-        if self.friction is not None:
-            require_positive(self, "friction")
-        require_not_negative(self, "payload", "initial_joint_noise", "seed")
-        require_finite(self, "initial_yaw", "payload_place")
-        require_not_negative(self, "delay")
         require_motor(self.motor)
         ratio = self.control_period / self.timestep
         if not math.isclose(ratio, round(ratio)):  # only the two decimal numbers' rounding

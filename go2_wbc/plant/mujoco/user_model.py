@@ -2,9 +2,10 @@
 
 The file must have the Go2's twelve joints below one body with a free joint, and its four feet as
 bodies ``FL_foot`` or geoms ``FL_foot`` or ``FL``. Added when absent: a floor, a torque motor for a
-joint that no actuator drives, and the IMU. Everything else stays as the file says, except that the
-time step is the plant's and keyframes are not used. An actuator that is not a plain torque motor
-is refused, never replaced.
+joint that no actuator drives, and the IMU. It must have the size of the robot that is controlled:
+another robot with joints of these names is refused. Everything else stays as the file says, except
+that the time step is the plant's and keyframes are not used. An actuator that is not a plain torque
+motor is refused, never replaced.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import mujoco
+import numpy as np
 
 from go2_wbc.errors import ModelMismatch
 from go2_wbc.legs import JOINT_NAMES, LEGS
@@ -27,6 +29,19 @@ from go2_wbc.plant.mujoco.model import (
 from go2_wbc.robot.description import RobotDescription
 
 _BASE_FALLBACK = "go2_wbc_base"
+MASS_RATIO = 1.6
+"""Times heavier or lighter than the controlled robot a user's one may be: it may carry things."""
+LENGTH_TOLERANCE = 0.01
+"""m; files of one robot by several authors differ by 1 mm, a Go1 from a Go2 by 15."""
+NARROW_RANGE = 0.2
+"""rad; ranges in radians that were read as degrees are all narrower, those of a leg wider."""
+SPANS = {
+    "from its front to its rear hip": ("FL_hip_joint", "RL_hip_joint"),
+    "from its left to its right hip": ("FL_hip_joint", "FR_hip_joint"),
+    "from its hip to its thigh's joint": ("FL_hip_joint", "FL_thigh_joint"),
+    "its thigh": ("FL_thigh_joint", "FL_calf_joint"),
+}
+"""Distances of joints that tell one robot from another."""
 
 
 def load_user_model(
@@ -46,6 +61,7 @@ def load_user_model(
     """
     spec = _read(mjcf)
     problems = _joint_problems(spec) + _foot_problems(spec) + _actuator_problems(spec)
+    problems = problems or _size_problems(_compiled(spec, mjcf), description)
     if problems:
         listing = "".join(f"\n  - {problem}" for problem in problems)
         raise ModelMismatch(f"{mjcf} cannot be driven as a Go2:{listing}")
@@ -126,6 +142,39 @@ def _motor_faults(actuator: mujoco.MjsActuator) -> list[str]:
         return ["has internal dynamics; the controller needs a torque <motor>"]
     ratio = float(actuator.gear[0] * actuator.gainprm[0])
     return [] if ratio == 1.0 else [f"has gear times gain {ratio:g}; the controller needs 1"]
+
+
+def _compiled(spec: mujoco.MjSpec, mjcf: Path | str) -> mujoco.MjModel:
+    try:
+        return spec.copy().compile()
+    except ValueError as error:
+        raise ModelMismatch(f"MuJoCo cannot compile {mjcf}: {error}") from error
+
+
+def _size_problems(model: mujoco.MjModel, description: RobotDescription) -> list[str]:
+    """What makes it another robot than that of ``description``, or a file in other units."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    joints = {name: model.joint(name).id for name in JOINT_NAMES}
+    base = model.body_rootid[model.jnt_bodyid[joints[JOINT_NAMES[0]]]]
+    mass, usual = float(model.body_subtreemass[base]), description.mass
+    problems = []
+    if not usual / MASS_RATIO <= mass <= usual * MASS_RATIO:
+        problems.append(f"it weighs {mass:.1f} kg, the robot that is controlled {usual:.1f} kg")
+    anchors = {name: data.xanchor[joint] for name, joint in joints.items()}
+    for what, (first, second) in SPANS.items():
+        length = float(np.linalg.norm(anchors[first] - anchors[second]))
+        expected = description.distance(first, second)
+        if abs(length - expected) > LENGTH_TOLERANCE:
+            problems.append(f"{what} is {length:.3f} m, not {expected:.3f} m")
+    widths = np.ptp(model.jnt_range[list(joints.values())], axis=1)
+    is_limited = model.jnt_limited[list(joints.values())] != 0
+    if is_limited.any() and widths[is_limited].max() < NARROW_RANGE:
+        problems.append(
+            f"its joints turn by {widths[is_limited].max():.3f} rad at most: if its angles are in "
+            'radians, it needs <compiler angle="radian"/>'
+        )
+    return problems
 
 
 def _root(joint: mujoco.MjsJoint) -> mujoco.MjsBody:

@@ -10,13 +10,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.robot.description import find_description
 from go2_wbc.robot.model import RobotModel
 from motions import Timeline, compile_timeline, load_motion
 from motions.feasibility import collision
 from motions.feasibility.collision import SLACK, STRIDE, SelfCollision, self_distance
 from motions.feasibility.hulls import hulls_of
-from motions.feasibility.limits import FeasibilityLimits
 from motions.plan.trajectory import trajectory_of
 from tests.engine_helpers import standing_q
 

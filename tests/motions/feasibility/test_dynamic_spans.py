@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.world import World
 from motions import (
@@ -22,7 +23,6 @@ from motions import (
 from motions.dynamics.dynamic_trajectory import DynamicTrajectory
 from motions.dynamics.phases import Tolerance
 from motions.feasibility.forces import torque
-from motions.feasibility.limits import FeasibilityLimits
 from tests.solver import needs_solver
 
 Mutation = Callable[[DynamicTrajectory, np.random.Generator], DynamicTrajectory]

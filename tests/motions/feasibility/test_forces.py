@@ -10,6 +10,7 @@ from jaxtyping import Float
 from scipy.linalg import null_space
 
 from go2_wbc.errors import QpInfeasible
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.robot.model import RobotModel
@@ -30,7 +31,6 @@ from motions.feasibility.forces import (
     torque,
     weights_of,
 )
-from motions.feasibility.limits import FeasibilityLimits
 from motions.plan.trajectory import Trajectory, trajectory_of
 from motions.postures import NORMAL_FORCE_MAX
 from tests.engine_helpers import state_of

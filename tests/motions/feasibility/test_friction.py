@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.robot.leg_kinematics import leg_table
 from go2_wbc.robot.model import RobotModel
 from go2_wbc.wbc.trajectory_loads import lag, least_friction, slide
 from motions import FeasibilityChecker, Timeline, deg
 from motions.feasibility.forces import numbers_of, scale_of_wrench, state_at
 from motions.feasibility.friction import CREEP, HELD, cone, creep, slip
-from motions.feasibility.limits import FeasibilityLimits
 from tests.engine_helpers import standing_q, state_of
 
 BISECTION = 1.5 / 2**7  # what is left of the interval

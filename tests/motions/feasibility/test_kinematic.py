@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from go2_wbc.feasibility_limits import FeasibilityLimits
 from go2_wbc.legs import LEGS, Leg
 from go2_wbc.motion_plan import MotionPlan
 from go2_wbc.robot.model import RobotModel
@@ -14,7 +15,6 @@ from motions import Timeline, compile_timeline
 from motions.feasibility.collision import SelfCollision
 from motions.feasibility.hulls import LinkHulls
 from motions.feasibility.kinematic import clearance, ends, joint_position
-from motions.feasibility.limits import FeasibilityLimits
 from motions.plan.trajectory import Trajectory, trajectory_of
 
 

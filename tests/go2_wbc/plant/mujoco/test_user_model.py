@@ -271,6 +271,20 @@ def second_motor(spec: mujoco.MjSpec) -> None:
     motor.set_to_motor()
 
 
+def lengthen_thighs(spec: mujoco.MjSpec) -> None:
+    for leg in LEGS:
+        spec.joint(f"{leg.name}_calf_joint").parent.pos[2] -= 0.02
+
+
+def make_heavy(spec: mujoco.MjSpec) -> None:
+    spec.body("base").mass += 15.0
+
+
+def take_radians_for_degrees(spec: mujoco.MjSpec) -> None:
+    for joint in spec.joints:
+        joint.range = np.radians(joint.range)
+
+
 FAULTS: list[tuple[Edit, str]] = [
     (rename_joint, "no joint FL_hip_joint"),
     (fix_base, "base body 'base' has no free joint"),
@@ -280,6 +294,9 @@ FAULTS: list[tuple[Edit, str]] = [
     (make_filtered, "actuator FR_thigh of FR_thigh_joint has internal dynamics"),
     (gear, "actuator RL_hip of RL_hip_joint has gear times gain 6.33"),
     (second_motor, "actuator booster of FL_calf_joint is a second actuator"),
+    (lengthen_thighs, "its thigh is 0.233 m, not 0.213 m"),
+    (make_heavy, "it weighs 31.1 kg, the robot that is controlled 16.1 kg"),
+    (take_radians_for_degrees, 'it needs <compiler angle="radian"/>'),
 ]
 
 

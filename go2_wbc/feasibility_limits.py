@@ -1,13 +1,14 @@
-"""Limits of the feasibility check; those of solved parts stand in ``dynamic_spans``."""
+"""Limits of the feasibility check (``motions.feasibility``), which a configuration may set."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-from go2_wbc.validation import require_positive
+from go2_wbc.validation import POSITIVE, ranged
 
 
 @dataclass(frozen=True, slots=True)
+@ranged(POSITIVE)
 class FeasibilityLimits:
     """What a motion must keep. Own choice, set by comparing verdicts with simulated runs.
 
@@ -117,7 +118,3 @@ class FeasibilityLimits:
     stance_position: float = 0.02
     stance_angle: float = 0.05
     end_speed: float = 0.1
-
-    def __post_init__(self) -> None:
-        """Raise ConfigError for a limit that is not positive."""
-        require_positive(self, *(f.name for f in fields(self)))
