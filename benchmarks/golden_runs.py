@@ -24,8 +24,6 @@ from jaxtyping import Float
 from controller import GO2Controller
 from go2_wbc.config import Config
 from go2_wbc.errors import Go2WbcError
-from go2_wbc.planning.locomotion import LocomotionConfig
-from go2_wbc.planning.mpc import MpcConfig
 from go2_wbc.plant import MujocoPlant
 from go2_wbc.plant.terrain import Boxes, Slope, Stairs
 from go2_wbc.reference import Reference
@@ -275,7 +273,6 @@ def _readings() -> Float[np.ndarray, "n 47"]:
 
 
 IMU = partial(MujocoPlant, sensors="imu", seed=3)
-PLANNED = Config(locomotion=LocomotionConfig(mpc=MpcConfig(enabled=True)))
 STAND, STOP = GO2Controller.stand, GO2Controller.stop
 SHOVED = Timeline(name="shoved", physics="nearest").body(y=0.09, over=0.16).hold(0.2).home(over=0.5)
 LEAP = Timeline(name="leap").jump(x=0.13, height=0.06)
@@ -285,7 +282,7 @@ RUNS: dict[str, Callable[[Ledger], None]] = {
     "postures": RobotRun((STAND, GO2Controller.sit, STAND, GO2Controller.lie_down, STAND)),
     "trot": RobotRun((walk(), move(0.5), move(1.5), STOP)),
     "trot-fast": RobotRun((walk(), move(1.5, wait=1.5), move(3.0, wait=3.0), STOP)),
-    "trot-planned": RobotRun((walk(), move(1.0), move(2.0, wait=1.0), STOP), IMU, PLANNED),
+    "trot-planned": RobotRun((walk(), move(1.0), move(2.0, wait=1.0), STOP), IMU),
     "trot-imu": RobotRun((walk(), move(0.8, 0.8), move(0.0, y=0.4), move(-0.3), STOP), IMU),
     "trot-noisy": RobotRun(
         (walk(), move(0.6, -0.5), STOP), partial(MujocoPlant, sensors="noisy", delay=0.004)

@@ -182,12 +182,10 @@ def _hit_all(trial: Trial, kind: Impact) -> tuple[dict[str, float], dict[str, st
         call of ``high_five`` said True.
     """
     side = ("left", "right")[trial.seed % 2]
-    distances: dict[str, float] = {}
-    lost: dict[str, str] = {}
-    remaining, said = list(DIRECTIONS), False
-    while remaining:
+    found, lost, said = dict[str, float](), dict[str, str](), False
+    while remaining := [d for d in DIRECTIONS if d not in lost and d not in found]:
         with TrialRobot(trial) as robot:
-            found: dict[str, float] = {}
+            before = len(found)
             ticks = _hits(robot, side, kind, remaining, found)
             robot.truth.on_tick = partial(next, ticks, None)
             try:
@@ -197,12 +195,10 @@ def _hit_all(trial: Trial, kind: Impact) -> tuple[dict[str, float], dict[str, st
             except TrialFailed as failed:
                 failure = str(failed)
             if failure is not None:
-                culprit = remaining[min(len(found), len(remaining) - 1)]
+                culprit = remaining[min(len(found) - before, len(remaining) - 1)]
                 lost[culprit] = f"{failure} ({robot.go2.last_outcome.reason})"
                 found.pop(culprit, None)
-            distances |= found
-        remaining = [d for d in remaining if d not in lost and d not in distances]
-    return distances, lost, float(said)
+    return found, lost, float(said)
 
 
 def _hits(
