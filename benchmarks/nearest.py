@@ -77,7 +77,8 @@ def measure(trial: Trial, found: TrialResult) -> None:
     found.values |= {"found": 100.0, "cpu": planning_time(checked, model)}
     found.values["reported"] = reported_worst(checked.report, "off by")
     found.values["angle"] = reported_worst(checked.report, "turned off by")
-    found.values["lag"] = 1000.0 * max(late(checked), key=abs)
+    lags = (span.trajectory.lag for span in spans_of(checked))
+    found.values["lag"] = 1000.0 * max(lags, key=abs)
     try:
         found.values |= play(trial, checked, model)
     except TrialFailed as failed:
@@ -102,11 +103,6 @@ def reported_worst(report: FeasibilityReport, check: str) -> float:
     """The trunk's worst value in one check of the report, in its unit."""
     (series,) = (item for item in report.series if item.check == check)
     return float(np.max(series.values[:, series.subjects.index("trunk")]))
-
-
-def late(checked: CheckedMotion) -> list[float]:
-    """By how much [s] the parts that were solved are late."""
-    return [span.trajectory.lag for span in spans_of(checked)]
 
 
 def play(trial: Trial, checked: CheckedMotion, model: RobotModel) -> dict[str, float]:
