@@ -129,7 +129,7 @@ def undeclared_libraries(
     rows = tomllib.loads(pyproject)["project"]["dependencies"]
     declared = {re.split(r"[^A-Za-z0-9._-]", row.strip())[0] for row in rows}
     known = _names(modules)
-    allowed = stdlib | OPTIONAL | set(PACKAGES)
+    allowed = stdlib | OPTIONAL | {*PACKAGES, "tests"}
     return [
         f"{module.path}:{line}: {top} is not a dependency in pyproject.toml"
         for module in modules

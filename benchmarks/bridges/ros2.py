@@ -9,10 +9,10 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.bridges.ros2_processes import Probe, joined, quiet_client, serving
 from benchmarks.study import Study, TrialResult
 from controller.sweeps.trials import Trial
 from go2_wbc.errors import BridgeError, MissingDependency
+from tests.controller.bridges.ros2_processes import Probe, joined, quiet_client, serving
 
 NAMESPACE: Final = "bench"
 CALLS: Final = 300

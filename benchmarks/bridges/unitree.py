@@ -10,8 +10,6 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.bridges.processes import require, wait_until
-from benchmarks.bridges.unitree_processes import MOVE, SPEED, Scene, driver, good_commands, scene
 from benchmarks.study import Study, TrialResult
 from controller.bridges.unitree import layout
 from controller.bridges.unitree.codec import decode_message, encode_message
@@ -19,6 +17,15 @@ from controller.bridges.unitree.low_level import intact_message, low_cmd_message
 from controller.bridges.unitree.sport_api import Api
 from controller.sweeps.trials import Trial
 from go2_wbc.robot.state import JointCommand
+from tests.controller.bridges.processes import require, wait_until
+from tests.controller.bridges.unitree_processes import (
+    MOVE,
+    SPEED,
+    Scene,
+    driver,
+    good_commands,
+    scene,
+)
 
 MOVE_TIME, MOVE_PERIOD = 3.0, 0.05
 STREAM_TIME: Final = 10.0

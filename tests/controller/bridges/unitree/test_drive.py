@@ -10,17 +10,17 @@ from collections.abc import Iterator
 
 import pytest
 
-from benchmarks.bridges import unitree_processes
-from benchmarks.bridges.processes import wait_until
 from benchmarks.bridges.unitree import measure_drive
-from benchmarks.bridges.unitree_processes import own_domain, simulator
 from benchmarks.study import TrialResult
 from controller.bridges.unitree.guards import GuardConfig
 from controller.sweeps.trials import Trial
 from go2_wbc.errors import CommandError, PlantTimeout
 from go2_wbc.plant.base import Plant
+from tests.controller.bridges import unitree_processes
+from tests.controller.bridges.processes import wait_until
 from tests.controller.bridges.unitree.scenes import DAMPED, garbage, watched
 from tests.controller.bridges.unitree.support import needs_dds
+from tests.controller.bridges.unitree_processes import own_domain, simulator
 from tests.go2_wbc.plant.contract import PlantContract
 
 MAE_BAR = 0.04  # m/s
